@@ -31,7 +31,7 @@ class ProposalAnswer:
     mission: Mission | None
     rejections: list[dict[str, Any]]
     bounds: dict[str, Any] | None
-    #: rejections that there are beside those that are told
+    #: the number of further rejections
     more: int = 0
 
     @property
@@ -76,7 +76,7 @@ class Missions:
         compiled = compile_reading(reading, mission=None, issued_at_us=issued_at_us, pins=self._pins)
         if compiled.mission is None or compiled.policy is None:
             source = reading.program.sources[PROPOSAL]
-            told, more = rejections(specification, compiled.diagnostics, source, self._frame)
-            return ProposalAnswer(None, None, told, None, more)
+            first, more = rejections(specification, compiled.diagnostics, source, self._frame)
+            return ProposalAnswer(None, None, first, None, more)
         bounds = None if compiled.bounds is None else compiled.bounds._asdict()
         return ProposalAnswer(compiled.policy, compiled.mission, [], bounds)

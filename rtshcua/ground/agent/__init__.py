@@ -1,1 +1,1 @@
-"""Mission specifications: missions as JSON, as an agent proposes them."""
+"""Mission specifications: the JSON in which an agent proposes a mission."""

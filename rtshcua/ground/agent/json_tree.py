@@ -1,7 +1,7 @@
-"""JSON (RFC 8259) with the place of every value, and JSON Pointers (RFC 6901) to these places.
+"""A JSON reader (RFC 8259) that keeps the place of every value, and JSON Pointers (RFC 6901) to these places.
 
-The reader is strict: no key twice, no NaN, no fractions. Depth and size are bounded before anything is built, so that
-hostile input costs little.
+The reader is strict: it refuses duplicate keys, NaN and fractions. It limits depth and size before it builds anything,
+so that hostile input costs little.
 """
 
 import re
@@ -20,20 +20,20 @@ from rtshcua.ground.language.size_limits import without_texts
 MAX_BYTES: Final = 1 << 20
 MAX_DEPTH: Final = 16
 MAX_DIGITS: Final = 18
-#: objects, lists, texts and numbers: those of some 4,000 steps
+#: objects, arrays, strings and numbers: enough for about 4,000 steps
 MAX_VALUES: Final = 1 << 15
 
 _SPACE = re.compile(r"[ \t\n\r]*")
 _NUMBER = re.compile(r"(-?(?:0|[1-9][0-9]*))(\.[0-9]+)?([eE][-+]?[0-9]+)?")
 _LITERALS = {"true": True, "false": False, "null": None}
 
-#: where a value stands: the keys and indexes that lead to it
+#: the keys and indexes that lead to a value
 Path = tuple[str | int, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class JsonTree:
-    """A JSON value, and where each of its parts is written: `spans` by path, `keys` the keys of objects by path."""
+    """A JSON value with the `spans` of its parts and of the `keys` of its objects, by path."""
 
     value: Any
     spans: dict[Path, Span]
@@ -41,7 +41,7 @@ class JsonTree:
 
 
 class _Unreadable(Exception):
-    """The text cannot be read any further."""
+    """The text is not JSON, or too large, so reading stops."""
 
     def __init__(self, code: Code, message: str, start: int, end: int, help: str | None = None) -> None:
         super().__init__(message)
@@ -49,9 +49,9 @@ class _Unreadable(Exception):
 
 
 def read_json(file: str, data: bytes) -> tuple[Source, JsonTree | None, tuple[Diagnostic, ...]]:
-    """The source text, its tree (None where it is no JSON), and what is wrong with it."""
+    """Return the source text, its tree (None if it is not JSON), and the findings."""
     if len(data) > MAX_BYTES:
-        message = f"the specification has {len(data)} bytes, and at most {MAX_BYTES} are read"
+        message = f"the specification is {len(data)} bytes; the limit is {MAX_BYTES}"
         return Source(file, ""), None, (Diagnostic(codes.SPECIFICATION_SIZE, message, Span(file, 0, 0)),)
     try:
         source = Source(file, data.decode("utf-8"))
@@ -61,7 +61,7 @@ def read_json(file: str, data: bytes) -> tuple[Source, JsonTree | None, tuple[Di
         message = f"byte {error.start} (0x{data[error.start]:02x}) is not UTF-8"
         return source, None, (Diagnostic(codes.NOT_JSON, message, Span(file, at, at + 1)),)
     if without_texts(data, MAX_VALUES) is None:
-        message = f"the specification has more than {MAX_VALUES} values"
+        message = f"the specification has too many values; the limit is {MAX_VALUES}"
         return source, None, (Diagnostic(codes.SPECIFICATION_SIZE, message, Span(file, 0, 0)),)
     reader = _Reader(source)
     try:
@@ -74,7 +74,7 @@ def read_json(file: str, data: bytes) -> tuple[Source, JsonTree | None, tuple[Di
 
 
 class _Reader:
-    """Reads one text from left to right."""
+    """A recursive descent reader of one text."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
@@ -84,7 +84,7 @@ class _Reader:
         self.found: list[Diagnostic] = []
 
     def document(self) -> Any:
-        """The one value that the text is."""
+        """Return the value of the whole text."""
         value, at = self._value(self._skip(0), ())
         at = self._skip(at)
         if at < len(self.text):
@@ -98,7 +98,7 @@ class _Reader:
 
     def _value(self, at: int, path: Path) -> tuple[Any, int]:
         if len(path) > MAX_DEPTH:
-            message = f"the specification is nested more than {MAX_DEPTH} deep"
+            message = f"the specification is nested too deeply; the limit is {MAX_DEPTH} levels"
             raise _Unreadable(codes.SPECIFICATION_SIZE, message, at, at + 1)
         first = self.text[at : at + 1]
         value: Any
@@ -148,7 +148,7 @@ class _Reader:
         return value, self._items(start, "]", item)
 
     def _items(self, start: int, closing: str, item: Callable[[int], int]) -> int:
-        """Read items separated by commas up to the closing bracket; gives the offset after it."""
+        """Read items separated by commas up to the closing bracket; return the offset after it."""
         at = self._skip(start + 1)
         if self.text[at : at + 1] == closing:
             return at + 1
@@ -178,30 +178,28 @@ class _Reader:
         if matched is None:
             raise self._unexpected(at, "a value")
         if matched[2] or matched[3]:
-            help = 'quantities are written as texts with their unit, such as "12.5 m"'
+            help = 'write a quantity as a string with its unit, such as "12.5 m"'
             raise _Unreadable(codes.NOT_JSON, f"`{matched[0][:40]}` is not a whole number", *matched.span(), help)
         if len(matched[0].lstrip("-")) > MAX_DIGITS:
-            raise _Unreadable(
-                codes.SPECIFICATION_SIZE, f"the number has more than {MAX_DIGITS} digits", *matched.span()
-            )
+            message = f"the number has too many digits; the limit is {MAX_DIGITS}"
+            raise _Unreadable(codes.SPECIFICATION_SIZE, message, *matched.span())
         return int(matched[0]), matched.end()
 
     def _unexpected(self, at: int, expected: str) -> _Unreadable:
         found = self.text[at : at + 1]
         if not found:
-            return _Unreadable(
-                codes.NOT_JSON, f"the text ends where {expected} is expected", len(self.text), len(self.text)
-            )
-        return _Unreadable(codes.NOT_JSON, f"`{found}` stands where {expected} is expected", at, at + 1)
+            message = f"expected {expected}; found the end of the text"
+            return _Unreadable(codes.NOT_JSON, message, len(self.text), len(self.text))
+        return _Unreadable(codes.NOT_JSON, f"expected {expected}; found `{found}`", at, at + 1)
 
 
 def pointer(path: Path) -> str:
-    """The pointer to a path; the whole document is the empty one."""
+    """The JSON Pointer to a path; empty for the whole document."""
     return "".join("/" + str(part).replace("~", "~0").replace("/", "~1") for part in path)
 
 
 class JsonPlaces:
-    """The values and keys of a tree by where they stand, for as many questions as there are findings."""
+    """An index of the values and keys of a tree by their spans."""
 
     def __init__(self, tree: JsonTree) -> None:
         found = [
@@ -211,7 +209,7 @@ class JsonPlaces:
         self._starts = [start for start, _, _ in found]
         self._ends = [-end for _, end, _ in found]
         self._paths = [path for _, _, path in found]
-        self._around: list[int] = []  # of each place the one that it lies in, -1 for the whole
+        self._around: list[int] = []  # for each place the index of the enclosing place, -1 for the whole document
         open_places: list[int] = []
         for number, end in enumerate(self._ends):
             while open_places and self._ends[open_places[-1]] < end:
@@ -220,7 +218,7 @@ class JsonPlaces:
             open_places.append(number)
 
     def innermost(self, span: Span) -> Path:
-        """The path of the smallest value that holds a span, or of the member whose key does."""
+        """Return the path of the smallest value, or of the member with the key, that contains a span."""
         at = bisect_right(self._starts, span.start) - 1
         while at >= 0 and self._ends[at] < span.end:
             at = self._around[at]

@@ -1,8 +1,8 @@
 """The JSON Schema of the missions that an agent may propose under one policy.
 
-It has the skills that a permit names for an agent, with the ranges and zones that some permit leaves, and the names of
-the policy, its vehicle and its roles. It may permit too much, never too little: conditions on the state, paths, times
-and charge are checked by the compiler, which stays the authority.
+It has the skills that a permit allows an agent, with the ranges and zones that some permit allows, and the names of the
+policy, its vehicle and its roles. It accepts every mission that the policy permits, and some more: only the compiler
+checks conditions on the state, paths, times and charge.
 """
 
 from collections.abc import Iterator, Sequence
@@ -25,7 +25,7 @@ _MIRRORED = {"<": ">", "<=": ">=", ">": "<", ">=": "<="}
 
 @dataclass(frozen=True, slots=True)
 class PermittedArgument:
-    """A parameter, and what of it may be permitted: the ends of a range, the names of zones, or choices."""
+    """A parameter with its permitted range, or the names of its permitted zones, places or choices."""
 
     parameter: Parameter
     low: int = 0
@@ -35,7 +35,7 @@ class PermittedArgument:
 
 @dataclass(frozen=True, slots=True)
 class PermittedSkill:
-    """A skill that an agent may ask for, in one of these roles."""
+    """A skill that an agent may request, in one of these roles."""
 
     contract: Contract
     roles: tuple[str, ...]
@@ -43,8 +43,8 @@ class PermittedSkill:
 
 
 def permitted_skills(lowered: LoweredPolicy, entries: Sequence[str]) -> tuple[PermittedSkill, ...]:
-    """The skills that some permit names for an agent, and that nothing forbids it always; `entries` are the places
-    that have a name.
+    """Return the skills that some permit allows an agent and that no rule always forbids; `entries` are the named
+    places.
     """
     policy = lowered.policy
     found = []
@@ -71,7 +71,7 @@ def _always_forbids(rule: Rule) -> bool:
 def _allowed(
     lowered: LoweredPolicy, parameter: Parameter, conditions: Sequence[Condition | None], entries: Sequence[str]
 ) -> PermittedArgument:
-    """What any of the permits leaves of a parameter."""
+    """Return the values of a parameter that at least one of the permits allows."""
     policy = lowered.policy
     match parameter.kind:
         case kind if kind == CHOICE:
@@ -89,7 +89,7 @@ def _allowed(
 
 
 def _range(parameter: Parameter, condition: Condition | None) -> tuple[int, int]:
-    """The range that is left when comparisons of the parameter with quantities must hold: both ends belong to it."""
+    """Return the range, both ends included, in which the condition's comparisons with quantities hold."""
     low, high = parameter.low, parameter.high
     if parameter.kind != QUANTITY:
         return low, high
@@ -102,7 +102,7 @@ def _range(parameter: Parameter, condition: Condition | None) -> tuple[int, int]
 
 
 def _bounds(name: str, condition: Condition | None) -> Iterator[tuple[str, int]]:
-    """How a parameter must compare with which quantities, the parameter on the left."""
+    """Yield the comparisons of a parameter with quantities, with the parameter on the left."""
     for each in _conjuncts(condition):
         if isinstance(each, Comparison):
             if _is(each.left, name) and isinstance(each.right, Quantity):
@@ -121,7 +121,7 @@ def _is(value: Value, name: str) -> bool:
 
 
 def _zones(lowered: LoweredPolicy, name: str, condition: Condition | None) -> frozenset[str] | None:
-    """The zones for which the parameter may lie where a condition says; None: it says nothing of that."""
+    """Return the zones that a condition allows for the parameter; None if it does not limit them."""
     left: frozenset[str] | None = None
     for each in _conjuncts(condition):
         found = _within(lowered, name, each)
@@ -167,9 +167,10 @@ Schema = dict[str, Any]
 
 
 def narrowed(lowered: LoweredPolicy, units: Sequence[Unit], path: str | None) -> Schema:
-    """The schema under a policy; `path` is that of its source in the shipped library, where it is one of that.
+    """Return the schema under a policy.
 
-    `units` are those of its program: they say which zones have an entry, and which parameters a default.
+    `path` is the policy's source, if it is one of the shipped library. `units` are those of its program: they say which
+    zones have an entry and which parameters have a default.
     """
     policy = lowered.policy
     known = {zone.name for zone in policy.zones[: policy.declared]}
@@ -187,22 +188,22 @@ def narrowed(lowered: LoweredPolicy, units: Sequence[Unit], path: str | None) ->
         "$id": f"urn:{FORMAT.replace('/', ':')}:{VERSION}:{policy.name}:{policy.version}",
         "title": f"Missions under the policy {policy.name}, version {policy.version}",
         "description": (
-            f"A mission as an agent proposes it under {policy.name}@{policy.version}. "
-            "It is checked in full when it is handed in."
+            f"A mission that an agent proposes under {policy.name}@{policy.version}. "
+            "A mission that fits this schema may still be rejected: the compiler checks it in full."
         ),
         "$defs": {skill.contract.name: _step(skill, defaults) for skill in skills},
         **_object(
             {
                 "format": _const(FORMAT),
                 "version": {"type": "integer", "const": VERSION},
-                "name": name | {"description": "What the mission is called."},
+                "name": name | {"description": "The name of the mission."},
                 "imports": imports,
                 "policy": _object({"name": _const(policy.name), "version": version}),
                 "vehicle": _const(policy.vehicle.name),
                 "intent": {
                     "type": "string",
                     "maxLength": 1000,
-                    "description": "What it is for, in a sentence; no invisible characters.",
+                    "description": "The purpose of the mission, in one sentence, without invisible characters.",
                 },
                 "proposed_by": _object(
                     {"source": _const("agent"), "name": name, "role": {"type": "string", "enum": roles}}
@@ -226,7 +227,7 @@ def narrowed(lowered: LoweredPolicy, units: Sequence[Unit], path: str | None) ->
 
 
 def _with_defaults(units: Sequence[Unit]) -> frozenset[tuple[str, str]]:
-    """The skills and the names of their parameters that have a default."""
+    """The pairs of skill and parameter that have a default."""
     skills = [skill for unit in units for skill in unit.skills]
     return frozenset(
         (skill.name.text, parameter.name.text)
@@ -238,28 +239,29 @@ def _with_defaults(units: Sequence[Unit]) -> frozenset[tuple[str, str]]:
 
 def _phases(skills: Sequence[PermittedSkill]) -> str:
     bound = [f"{each.contract.name} in {' or '.join(each.contract.phases)}" for each in skills if each.contract.phases]
-    return "The name of a stretch of the mission." + (f" Only in these phases: {'; '.join(bound)}." if bound else "")
+    limits = f" Some skills are permitted in some phases only: {'; '.join(bound)}." if bound else ""
+    return f"The name of the phase.{limits}"
 
 
 def _step(skill: PermittedSkill, defaults: frozenset[tuple[str, str]]) -> Schema:
-    """One step of a skill."""
+    """The schema of a step that requests a skill."""
     contract = skill.contract
-    given = {each.parameter.name: _argument(each) for each in skill.allowed}
-    left = [name for name in given if (contract.name, name) in defaults]
+    arguments = {each.parameter.name: _argument(each) for each in skill.allowed}
+    optional = [name for name in arguments if (contract.name, name) in defaults]
     step = _object(
         {
             "skill": _const(contract.name),
-            "arguments": _object(given, optional=left),
+            "arguments": _object(arguments, optional=optional),
             "on_inadmissible": {"type": "string", "enum": ["abort", "hold", "skip", "replan"]},
             "overrides": _overrides(),
         },
-        optional=("on_inadmissible", "overrides", *(() if len(left) < len(given) else ("arguments",))),
+        optional=("on_inadmissible", "overrides", *(() if len(optional) < len(arguments) else ("arguments",))),
     )
     return step | {"description": _described(contract)}
 
 
 def _overrides() -> Schema:
-    """What may be tightened; whether it is tighter, and whether its conditions hold water, the compiler says."""
+    """The schema of a step's overrides. The compiler checks that they are tighter, and their conditions."""
     duration = {"type": "string", "pattern": r"^[1-9][0-9]{0,4} (?:ms|s|min)$"}
     names = {"type": "array", "items": {"type": "string", "pattern": name_but(RESERVED)}}
     kinds = {"type": "array", "items": {"type": "string", "enum": list(RECORDS)}}
@@ -277,25 +279,25 @@ def _overrides() -> Schema:
 def _described(contract: Contract) -> str:
     during = f" Only in the phase {' or '.join(contract.phases)}." if contract.phases else ""
     lasts, energy = display(contract.duration_us, Dimension.DURATION), display(contract.energy, Dimension.RATIO)
-    return f"{_MOTIONS[MotionKind(contract.motion.kind)]}{during} It lasts at most {lasts} and takes at most {energy}."
+    return f"{_MOTIONS[MotionKind(contract.motion.kind)]}{during} It lasts at most {lasts} and uses at most {energy}."
 
 
 def _argument(allowed: PermittedArgument) -> Schema:
-    """What may be given for a parameter."""
+    """The schema of an argument."""
     parameter = allowed.parameter
     if parameter.kind in (CHOICE, ZONE):
         return {"type": "string", "enum": list(allowed.names)}
     if parameter.kind == PLACE:
         named = [name.replace(".", r"\.") for name in allowed.names]
         known = f": {', '.join(allowed.names)}" if allowed.names else ""
-        words = f"A place: `47.39927 N, 8.54572 E` (WGS 84), or one that has a name{known}."
+        words = f"A place: coordinates such as `47.39927 N, 8.54572 E` (WGS 84), or a named place{known}."
         return {"type": "string", "pattern": whole(*named, COORDINATES), "description": words}
     dimension = _DIMENSIONS[parameter.dimension]
     low, high = (written(end, dimension) for end in (allowed.low, allowed.high))
     above = " above home" if dimension is Dimension.ALTITUDE else ""
     unit = unit_of(dimension)
-    form = f"a number, a space and {unit}" if unit else "a whole number in a text"
-    words = f"From {low} to {high}{above}, as {form}."
+    form = f"a number, a space and {unit}" if unit else "a whole number in a string"
+    words = f"From {low} to {high}{above}. Write {form}."
     pattern = quantities(allowed.low, allowed.high, dimension)
     return {"type": "string", "pattern": pattern, "description": words, "examples": [high]}
 

@@ -1,7 +1,6 @@
 """Reads quantities that the language does not accept, to advise the agent: `25 meters`, `82 ft`, `+25 m`, `25,0 m`.
 
-Nothing is flown by what is read here: an agent is told how the language writes the same value, or why it cannot be
-told.
+The result is used in advice only, never in a flight: how the language writes the same value, or why that is unclear.
 """
 
 import re
@@ -15,7 +14,7 @@ from rtshcua.model.quantity import UNITS, Dimension
 
 _FOOT = Fraction(3048, 10)  # mm, exact since 1959
 _KNOT = Fraction(1_852_000, 3_600)  # mm/s
-#: units that people use and the language does not have: their quantity, and one of them in its canonical unit
+#: common units that the language does not have: their dimension, and their size in its canonical unit
 _FOREIGN: Final = {
     **dict.fromkeys(("ft", "foot", "feet", "'"), (Dimension.LENGTH, _FOOT)),
     **dict.fromkeys(("in", "inch", "inches", '"'), (Dimension.LENGTH, _FOOT / 12)),
@@ -41,8 +40,8 @@ _WIDE, _WIDE_END, _FROM_ASCII = 0xFF01, 0xFF5E, 0xFEE0
 
 
 class ReadQuantity(NamedTuple):
-    """A value in the canonical unit of the dimension that is asked, None where none can be told; `why` says what is not
-    as the language has it, empty where nothing is.
+    """A value in the canonical unit of its dimension, None if unclear. `why` says what the language does not accept; it
+    is empty if the text is accepted.
     """
 
     value: Fraction | None
@@ -50,36 +49,35 @@ class ReadQuantity(NamedTuple):
 
 
 def read_quantity(text: str, dimension: Dimension) -> ReadQuantity:
-    """What a text says where a quantity of a dimension is asked."""
+    """Read a text as a quantity of a dimension."""
     unit = unit_of(dimension)
     plain = " ".join(_ascii(text).split())
     found = _NUMBER.fullmatch(plain)
     if found is None:
-        return ReadQuantity(None, f"this is no number with a unit, such as `{f'20 {unit}'.rstrip()}`")
+        return ReadQuantity(None, f"expected a number with a unit, such as `{f'20 {unit}'.rstrip()}`")
     sign, number, exponent, rest = found.groups()
     if re.fullmatch(r"[0-9_]+,[0-9]{3}", number):
-        return ReadQuantity(
-            None, f"`{number}` can be read in two ways: use a decimal point, and `_` between groups of digits"
-        )
+        return ReadQuantity(None, f"`{number}` is ambiguous: use a decimal point, and `_` between groups of digits")
     value = _value(sign, number, exponent)
     written, datum = _unit_and_datum(rest or "")
     if datum in _GROUND or datum in _SEA:
         above = "ground" if datum in _GROUND else "sea"
-        return ReadQuantity(None, f"this is a height above {above}, and one above home is asked")
+        return ReadQuantity(None, f"this is a height above {above}; expected a height above home")
+    if not written and not unit:
+        return ReadQuantity(value, "")
     if not written:
-        why = f"`{number}` has no unit: write it so if {_unit_in_words(dimension)} are meant" if unit else ""
-        return ReadQuantity(value * (UNITS[unit].numerator if unit else 1), why)
+        why = f"`{number}` has no unit; this is the value in {_unit_in_words(dimension)}"
+        return ReadQuantity(value * UNITS[unit].numerator, why)
     known = _unit(written)
     if known is None:
-        return ReadQuantity(None, f"`{written}` is no unit known here")
-    asked = Dimension.LENGTH if dimension is Dimension.ALTITUDE else dimension
-    if known[0] is not asked:
-        return ReadQuantity(None, f"`{written}` is a unit of {known[0].value}, and {dimension.value} is asked")
+        return ReadQuantity(None, f"unknown unit `{written}`")
+    if known[0] is not (Dimension.LENGTH if dimension is Dimension.ALTITUDE else dimension):
+        return ReadQuantity(None, f"`{written}` is a unit of {known[0].value}; expected {dimension.value}")
     value *= known[1]
-    if written in UNITS:
-        usual = plain == text.strip() and sign != "+" and exponent is None and "," not in number and not datum
-        return ReadQuantity(value, "" if usual else "this is how the language writes the same value")
-    return ReadQuantity(value, f"`{written}` is no unit here, and {plain} is {decimal(value, dimension)}")
+    if written not in UNITS:
+        return ReadQuantity(value, f"the language has no unit `{written}`; {plain} is {decimal(value, dimension)}")
+    accepted = plain == text.strip() and not any((sign == "+", exponent, "," in number, datum))
+    return ReadQuantity(value, "" if accepted else "this is how the language writes the same value")
 
 
 def _value(sign: str, number: str, exponent: str | None) -> Fraction:
@@ -88,7 +86,7 @@ def _value(sign: str, number: str, exponent: str | None) -> Fraction:
 
 
 def _ascii(text: str) -> str:
-    """The text with blanks, digits, signs and full-width letters of other scripts as ASCII has them."""
+    """The text with the spaces, digits, minus signs and full-width letters of other scripts replaced by ASCII."""
     return "".join(map(_plain, text))
 
 
@@ -105,7 +103,7 @@ def _plain(character: str) -> str:
 
 
 def _unit_and_datum(rest: str) -> tuple[str, str]:
-    """The unit, as the tables write it, and what a height counts from."""
+    """Return the unit, as the tables write it, and the datum of a height; both may be empty."""
     folded = rest.casefold()
     datum = next((each for each in (*_GROUND, *_SEA, *_HOME) if folded == each or folded.endswith(f" {each}")), "")
     unit = rest[: len(rest) - len(datum)].strip()
@@ -113,7 +111,7 @@ def _unit_and_datum(rest: str) -> tuple[str, str]:
 
 
 def _unit(written: str) -> tuple[Dimension, Fraction] | None:
-    """The quantity and the size of a unit, in whatever way it is written."""
+    """The dimension and size of a unit in any common spelling; None if the unit is unknown."""
     folded = written.casefold()
     parts = "/".join(MEANT.get(part, part) for part in folded.split("/"))
     for name in (written, MEANT.get(folded, ""), parts):
@@ -125,14 +123,14 @@ def _unit(written: str) -> tuple[Dimension, Fraction] | None:
 
 
 def _unit_in_words(dimension: Dimension) -> str:
-    """The unit that is asked, in words."""
+    """The name of the unit of a dimension."""
     unit = unit_of(dimension)
     words = {"m": "metres", "m/s": "metres a second", "s": "seconds", "%": "per cent", "deg": "degrees", "V": "volts"}
     return words.get(unit, f"`{unit}`")
 
 
 def decimal(value: Fraction, dimension: Dimension) -> str:
-    """A value of the canonical unit in the unit that is asked for, with six decimals at most."""
+    """Write a value of the canonical unit in the unit of `unit_of`, with at most six decimals."""
     unit = unit_of(dimension)
     whole = round(value * 1_000_000 * (UNITS[unit].denominator if unit else 1) / (UNITS[unit].numerator if unit else 1))
     digits = f"{abs(whole) // 1_000_000}.{abs(whole) % 1_000_000:06}".rstrip("0").rstrip(".")

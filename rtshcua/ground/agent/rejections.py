@@ -1,7 +1,7 @@
-"""Rejections of a proposal, for a program to correct it: the place, the limit, the value found, and the nearest one.
+"""Machine-readable rejections of a proposal: the place, the limit, the value found, and the nearest accepted value.
 
-The compiler finds what is wrong. The schema that its policy narrows gives the limit and the nearest value that fits;
-where it gives none, a fix of the finding does, or its help.
+The errors come from the compiler. The limit and the nearest value come from the schema that the policy narrows, or else
+from a fix or the help of the error.
 """
 
 import json
@@ -22,23 +22,23 @@ from rtshcua.ground.agent.value_patterns import written
 from rtshcua.model.flat.contract import QUANTITY
 from rtshcua.model.quantity import Dimension
 
-#: the limit of what does not belong there: it is to be left out
+#: the limit of a value that must be removed
 ABSENT: Final[Mapping[str, Any]] = {"absent": True}
 _NO_NAME = re.compile(r"[^A-Za-z0-9_]+")
 _MOST = 40
-#: places that do not fit, of each kind, that errors are held against: more would take long, and few are told
+#: the most misfits of each kind that are matched with errors, which bounds the work
 _MOST_MISFITS = 1_000
 _NAMES = {dict: "object", list: "array", str: "string", bool: "boolean", int: "integer"}
 _ARTICLED = {
     "object": "an object", "array": "a list", "string": "a text", "boolean": "true or false",
     "integer": "a whole number",
 }  # fmt: skip
-#: characters of a text that is read as JSON for advice
+#: the longest string, in characters, that is tried as JSON
 _MOST_JSON = 65_536
 
 
 class PermittedRange(NamedTuple):
-    """The least and the most of an argument that some permit leaves, in the canonical unit of its dimension."""
+    """The range of an argument that some permit allows, in the canonical unit of its dimension."""
 
     low: int
     high: int
@@ -46,8 +46,8 @@ class PermittedRange(NamedTuple):
 
 
 class ProposalFrame(NamedTuple):
-    """What a policy leaves an agent: the narrowed schema, the ranges of quantities by skill and argument, and the
-    phases that a skill is bound to.
+    """What a policy permits an agent: the narrowed schema, the ranges of quantities by skill and argument, and the
+    phases to which a skill is limited.
     """
 
     schema: Mapping[str, Any]
@@ -56,20 +56,21 @@ class ProposalFrame(NamedTuple):
 
 
 class SchemaMisfit(NamedTuple):
-    """A place that does not fit. `near` is the value that fits and says the same, or the nearest one; None where the
-    limit is `ABSENT`, or what stands there says nothing that can be asked for. `of` is what it is found by, where that
-    is another place; `why` says what is wrong, or how it should stand there.
+    """A value that does not fit the schema.
+
+    `near` is the same value in the accepted form, or the nearest accepted value; None if there is none. `reported_at`
+    is the pointer of the compiler's error, if that is another place. `why` is the reason.
     """
 
     pointer: str
     limit: Mapping[str, Any]
     near: Any
-    of: str = ""
+    reported_at: str = ""
     why: str = ""
 
 
 def frame_of(schema: Mapping[str, Any], skills: Iterable[PermittedSkill]) -> ProposalFrame:
-    """What a policy leaves an agent: `schema` is narrowed by it, `skills` are those that it permits."""
+    """Return what a policy permits an agent, from its narrowed `schema` and the `skills` that it permits."""
     known = tuple(skills)
     ranges = {
         (skill.contract.name, each.parameter.name): PermittedRange(
@@ -84,27 +85,29 @@ def frame_of(schema: Mapping[str, Any], skills: Iterable[PermittedSkill]) -> Pro
 
 
 class Rejections(NamedTuple):
-    """The first rejections of a proposal, and how many more there are."""
+    """The first rejections of a proposal, and the number of further ones."""
 
-    told: list[dict[str, Any]]
+    first: list[dict[str, Any]]
     more: int
 
 
 def rejections(value: Any, found: Iterable[Diagnostic], source: Source, frame: ProposalFrame) -> Rejections:
-    """One rejection for each error of the compiler on the specification `value`, whose text is `source`. Of many the
-    first 40, and how many more there are: findings that the compiler counts and does not tell are among them.
+    """Return a rejection for each compiler error on the specification `value`, whose text is `source`.
+
+    Only the first 40 are returned, with the number of further ones. That number includes the findings that the compiler
+    counted but did not list.
     """
     fit = islice(_SchemaFit(frame).misfits(frame.schema, value, "", ("", "")), _MOST_MISFITS)
     misfits = [*fit, *islice(_StepOrder(frame, value).misfits(), _MOST_MISFITS)]
-    told: dict[str, dict[str, Any]] = {}
+    rejected: dict[str, dict[str, Any]] = {}
     more = 0
     for each in found:
         if uncounted_findings(each):
             more += uncounted_findings(each)
         elif each.severity is Severity.ERROR:
             for one in _rejections(each, value, source, misfits):
-                told.setdefault(json.dumps([one["field"], one["limit"] or one["code"]]), one)
-    return Rejections(list(told.values())[:_MOST], max(len(told) - _MOST, 0) + more)
+                rejected.setdefault(json.dumps([one["field"], one["limit"] or one["code"]]), one)
+    return Rejections(list(rejected.values())[:_MOST], max(len(rejected) - _MOST, 0) + more)
 
 
 def _rejections(found: Diagnostic, value: Any, source: Source, misfits: list[SchemaMisfit]) -> Iterator[dict[str, Any]]:
@@ -118,9 +121,9 @@ def _rejections(found: Diagnostic, value: Any, source: Source, misfits: list[Sch
 
 
 def _about(pointer: str, misfits: list[SchemaMisfit]) -> list[SchemaMisfit]:
-    """The misfits at a place; where there are none those below it, or else those that it is below."""
-    own = [each for each in misfits if pointer == (each.of or each.pointer)]
-    others = [each for each in misfits if not each.of]
+    """Return the misfits at a place; if there are none, those below it; if there are none either, those above it."""
+    own = [each for each in misfits if pointer == (each.reported_at or each.pointer)]
+    others = [each for each in misfits if not each.reported_at]
     below = [each for each in others if each.pointer.startswith(f"{pointer}/")]
     return own or below or [each for each in others if pointer.startswith(f"{each.pointer}/")]
 
@@ -131,7 +134,8 @@ def _rejection(
     there, observed = _at(value, pointer)
     message = found.message
     if there and limit is not None and set(limit) == {"type"} and pointer != (found.pointer or ""):
-        message = f"expected {_ARTICLED[limit['type']]}; this is `{observed}`"  # `found` is the first of several
+        # the error is about another value below the same place
+        message = f"expected {_ARTICLED[limit['type']]}; found `{observed}`"
     return {
         "code": found.code.id,
         "field": pointer,
@@ -145,24 +149,24 @@ def _rejection(
 
 
 def _repair(pointer: str, limit: Mapping[str, Any], near: Any, why: str) -> str:
-    """What to do, in words, as far as the limit, the nearest value or the reason tell it."""
+    """The advice how to correct the value; empty if neither the limit, the nearest value nor a reason is known."""
     accepted = limit.get("one_of", limit.get("places"))
     if limit == ABSENT:
-        return f"leave `{pointer}` out"
+        return f"remove `{pointer}`"
     if isinstance(near, dict | list) and why:
         return f"{why} at `{pointer}`"
     if near is not None:
         return f"write {json.dumps(near, ensure_ascii=False)} at `{pointer}`" + (f": {why}" if why else "")
     if "least" in limit:
-        return (f"{why}; " if why else "") + f"from {limit['least']} to {limit['most']} is permitted at `{pointer}`"
+        return (f"{why}; " if why else "") + f"permitted at `{pointer}`: from {limit['least']} to {limit['most']}"
     if accepted:
         listed = ", ".join(json.dumps(each, ensure_ascii=False) for each in accepted)
-        return f"accepted at `{pointer}`: {listed}" + ("" if "one_of" in limit else ", or a place in degrees")
+        return f"accepted at `{pointer}`: {listed}" + ("" if "one_of" in limit else ", or coordinates in degrees")
     return why
 
 
 def _at(value: Any, pointer: str) -> tuple[bool, Any]:
-    """What stands at a pointer; objects and arrays are told by their size alone."""
+    """Return whether there is a value at a pointer, and the value; of an object or array only its size."""
     for part in pointer.split("/")[1:]:
         key = part.replace("~1", "/").replace("~0", "~")
         try:
@@ -175,7 +179,7 @@ def _at(value: Any, pointer: str) -> tuple[bool, Any]:
 
 
 def _fixed(found: Diagnostic, source: Source) -> Any:
-    """The value that the first fix writes there, where it writes a whole one."""
+    """The JSON value that the first fix writes; None if the fix does not write a whole value."""
     for fix in found.fixes:
         if fix.span.file == source.file:
             try:
@@ -186,8 +190,8 @@ def _fixed(found: Diagnostic, source: Source) -> Any:
 
 
 class _StepOrder:
-    """Holds the steps of a specification against each other: in which phase each may stand, and that each begins where
-    the one before it ended.
+    """Checks the steps of a specification against each other: whether each may be in its phase, and whether each begins
+    where the previous step ended.
     """
 
     def __init__(self, frame: ProposalFrame, value: Any) -> None:
@@ -195,7 +199,7 @@ class _StepOrder:
         self._phases = value.get("phases") if isinstance(value, dict) else None
 
     def misfits(self) -> Iterator[SchemaMisfit]:
-        """What does not fit beside the rest."""
+        """Yield the phase names and arguments that do not fit the other steps."""
         before: tuple[str, Any] | None = None
         names: list[Any] = []
         for number, phase in enumerate(self._phases if isinstance(self._phases, list) else ()):
@@ -211,18 +215,18 @@ class _StepOrder:
                 if bound and name not in bound:
                     yield SchemaMisfit(f"{at}/name", {"one_of": list(bound)}, bound[0], f"{here}/skill")
                 if before is not None and isinstance(step, dict):
-                    yield from self._continued(before, step, here)
+                    yield from self._discontinuities(before, step, here)
                 before = (here, step)
 
-    def _continued(self, before: tuple[str, Any], step: Mapping[str, Any], here: str) -> Iterator[SchemaMisfit]:
-        """What the step before would have to say for this one to begin where that one ends."""
-        at, earlier = before
-        old, new = (each.get("arguments") if isinstance(each, dict) else None for each in (earlier, step))
-        schema = self._frame.schema["$defs"].get(_skill(earlier))
-        if not isinstance(old, dict) or not isinstance(new, dict) or schema is None:
+    def _discontinuities(self, before: tuple[str, Any], step: Mapping[str, Any], here: str) -> Iterator[SchemaMisfit]:
+        """Yield the arguments that the previous step needs so that `step` begins where it ends."""
+        at, previous = before
+        old, new = _arguments(previous), _arguments(step)
+        schema = self._frame.schema["$defs"].get(_skill(previous))
+        if old is None or new is None or schema is None:
             return
         for name, wanted in new.items():
-            if name in old and old[name] != wanted and (_skill(step), name) in self._frame.ranges:
+            if old.get(name, wanted) != wanted and (_skill(step), name) in self._frame.ranges:
                 yield SchemaMisfit(f"{at}/arguments/{name}", {"one_of": [wanted]}, wanted, here)
         entries = [f"{each}.entry" for each in new.values() if isinstance(each, str)]
         for name, each in schema["properties"]["arguments"]["properties"].items():
@@ -232,14 +236,14 @@ class _StepOrder:
 
 
 class _SchemaFit:
-    """Holds a value against the narrowed schema: the keywords that it uses, and no others."""
+    """Validates a value against the narrowed schema. It knows only the keywords that this schema uses."""
 
     def __init__(self, frame: ProposalFrame) -> None:
         self._frame = frame
         self._defs: Mapping[str, Any] = frame.schema["$defs"]
 
     def misfits(self, schema: Mapping[str, Any], value: Any, at: str, of: tuple[str, str]) -> Iterator[SchemaMisfit]:
-        """What of `value`, which stands `at` a pointer, does not fit; `of` names the skill and the argument."""
+        """Yield what does not fit in `value`, which is `at` a pointer; `of` is the skill and the argument."""
         if "anyOf" in schema:
             yield from self._step(value, at)
         elif _NAMES.get(type(value)) != schema["type"]:
@@ -259,18 +263,17 @@ class _SchemaFit:
             yield SchemaMisfit(at, self._limit(schema, of), near, why=why)
 
     def _step(self, value: Any, at: str) -> Iterator[SchemaMisfit]:
-        """A step: the skill that it names says what else it has."""
+        """Yield what does not fit in a step, by the schema of the skill that it names."""
         named = _skill(value)
         if named in self._defs:
             yield from self.misfits(self._defs[named], value, at, (named, ""))
             return
         near = nearest(named, self._defs)
-        given = value.get("arguments") if isinstance(value, dict) else None
-        yield SchemaMisfit(f"{at}/skill", {"one_of": list(self._defs)}, near or self._alike(given))
+        yield SchemaMisfit(f"{at}/skill", {"one_of": list(self._defs)}, near or self._alike(_arguments(value) or {}))
 
-    def _alike(self, given: Any) -> str:
-        """The skill whose arguments are most like those that are given."""
-        named = frozenset(given) if isinstance(given, dict) else frozenset()
+    def _alike(self, arguments: Mapping[str, Any]) -> str:
+        """The skill whose parameters are most like these arguments."""
+        named = frozenset(arguments)
 
         def differs(skill: str) -> int:
             own = self._defs[skill]["properties"]["arguments"]
@@ -292,9 +295,9 @@ class _SchemaFit:
                 yield SchemaMisfit(f"{at}/{name}", limit, self._near(each, None, here)[0])
 
     def _limit(self, schema: Mapping[str, Any], of: tuple[str, str]) -> dict[str, Any]:
-        span = self._frame.ranges.get(of)
-        if "const" in schema or "enum" in schema:
-            return {"one_of": schema.get("enum", [schema.get("const")])}
+        choices, span = _choices(schema), self._frame.ranges.get(of)
+        if choices is not None:
+            return {"one_of": choices}
         if span is not None:
             return {"least": written(span.low, span.dimension), "most": written(span.high, span.dimension)}
         places = _places(schema)
@@ -302,22 +305,18 @@ class _SchemaFit:
         return own | ({"places": places} if places else {})
 
     def _near(self, schema: Mapping[str, Any], value: Any, of: tuple[str, str]) -> tuple[Any, str]:
-        """The value that fits and says what `value` says, as far as that can be told, and why another one is asked;
-        None where nothing that fits is near to it, or nothing was said.
-        """
-        span = self._frame.ranges.get(of)
-        if "const" in schema:
-            return schema["const"], ""
-        if "enum" in schema:
-            only = schema["enum"][0] if len(schema["enum"]) == 1 else None
-            return (nearest(value, schema["enum"]) if isinstance(value, str) else None) or only, ""
+        """Return the accepted value nearest to `value` (None if none is near) and why `value` is not accepted."""
+        choices, span, kind = _choices(schema), self._frame.ranges.get(of), schema.get("type")
+        if choices is not None and len(choices) == 1:
+            return choices[0], ""
+        if choices is not None:
+            return nearest(value, choices) if isinstance(value, str) else None, ""
         if span is not None:
             return _clamped(value, span)
-        kind = schema.get("type")
         if kind in ("object", "array"):
-            inner = _unquoted(value) if isinstance(value, str) else None
+            inner = _unquoted(value)
             if _NAMES.get(type(inner)) == kind:
-                return inner, f"write the {'list' if kind == 'array' else 'object'} itself, not a text that holds it,"
+                return inner, f"write the {'list' if kind == 'array' else 'object'} itself, not a string with JSON,"
         if kind == "object":
             made = {name: self._near(schema["properties"][name], None, (of[0], name))[0] for name in schema["required"]}
             return None if any(each is None for each in made.values()) else made, ""
@@ -325,16 +324,26 @@ class _SchemaFit:
 
 
 def _skill(step: Any) -> str:
-    """The skill that a step names; empty where it names none."""
+    """The skill that a step names; empty if it names none."""
     named = step.get("skill") if isinstance(step, dict) else None
     return named if isinstance(named, str) else ""
 
 
+def _arguments(step: Any) -> dict[str, Any] | None:
+    found = step.get("arguments") if isinstance(step, dict) else None
+    return found if isinstance(found, dict) else None
+
+
+def _choices(schema: Mapping[str, Any]) -> list[Any] | None:
+    """The only values that a schema accepts; None if it does not list them."""
+    listed: list[Any] | None = schema.get("enum", [schema["const"]] if "const" in schema else None)
+    return listed
+
+
 def _fits(schema: Mapping[str, Any], value: Any) -> bool:
-    if "const" in schema:
-        return bool(value == schema["const"])
-    if "enum" in schema:
-        return value in schema["enum"]
+    choices = _choices(schema)
+    if choices is not None:
+        return value in choices
     if not isinstance(value, str):
         return True
     long = schema.get("maxLength", len(value)) < len(value)
@@ -342,7 +351,7 @@ def _fits(schema: Mapping[str, Any], value: Any) -> bool:
 
 
 def _clamped(value: Any, span: PermittedRange) -> tuple[str | None, str]:
-    """The quantity that a text or a number says, within the range, as the language writes it; and why that is asked."""
+    """Return the quantity in a string or number, moved into the range, in the language's form; and what was wrong."""
     if isinstance(value, bool) or not isinstance(value, str | int | float):
         return None, ""
     found, why = read_quantity(str(value), span.dimension)
@@ -354,21 +363,21 @@ def _clamped(value: Any, span: PermittedRange) -> tuple[str | None, str]:
     return written(near, span.dimension), why
 
 
-def _unquoted(text: str) -> Any:
-    """What a text says as JSON; None where it is none."""
+def _unquoted(value: Any) -> Any:
+    """Return the JSON value in a string; None if it holds none."""
     try:
-        return json.loads(text) if len(text) <= _MOST_JSON else None
+        return json.loads(value) if isinstance(value, str) and len(value) <= _MOST_JSON else None
     except (ValueError, RecursionError):
         return None
 
 
 def _places(schema: Mapping[str, Any]) -> list[str]:
-    """The places that a pattern has by their names."""
+    """The named places that a pattern accepts."""
     return [each.replace("\\", "") for each in re.findall(r"\w+\\\.entry", schema.get("pattern", ""))]
 
 
 def _name(schema: Mapping[str, Any], value: Any) -> str | None:
-    """A text that fits a pattern of names, made of what was written; of places the one that was probably meant."""
+    """Return a name made from `value` that fits the schema, or the place whose name is nearest to it."""
     words: str = (value if isinstance(value, str) else "")[: schema.get("maxLength", 200)]
     places = _places(schema)
     if places:

@@ -1,7 +1,7 @@
 """Reads a mission specification into the IR of a mission; every finding has a JSON Pointer (RFC 6901).
 
-Spans are places in the JSON text itself. A specification comes from an agent, so it may import from the shipped library
-only: whoever runs the compiler names the policy's own sources, never the agent that is bound by them.
+Spans are places in the JSON text. A specification comes from an agent, so it may import from the shipped library only.
+The person who runs the compiler names the policy's own sources.
 """
 
 import json
@@ -41,14 +41,14 @@ from rtshcua.model.ir.skills import ArgumentValue, ClauseDecl
 def mission_of(
     shape: SpecificationShape, tree: JsonTree, source: Source
 ) -> tuple[MissionDecl | None, tuple[Diagnostic, ...]]:
-    """The mission, or None, and what its values say wrong."""
+    """Return the mission, None if a value is wrong, and the findings about its values."""
     made = _MissionBuilder(tree, source)
     mission = made.mission(shape)
     return (None if made.found else mission), tuple(made.found)
 
 
 class _MissionBuilder:
-    """Makes the nodes of one specification."""
+    """Builds the IR nodes of one specification and collects findings."""
 
     def __init__(self, tree: JsonTree, source: Source) -> None:
         self.tree = tree
@@ -56,7 +56,7 @@ class _MissionBuilder:
         self.found: list[Diagnostic] = []
 
     def mission(self, shape: SpecificationShape) -> MissionDecl:
-        """The whole mission. The policy's place is that of its name and version together."""
+        """Build the mission. The span of the policy covers its name and version."""
         phases = tuple(
             Phase(
                 span=self.tree.spans["phases", number],
@@ -82,7 +82,7 @@ class _MissionBuilder:
         )
 
     def step(self, shape: StepShape, path: Path) -> Step:
-        """One step; an argument that says nothing sensible is reported and left out."""
+        """Build a step. An argument that cannot be parsed is reported and omitted."""
         arguments: list[ArgumentValue] = []
         for key, text in shape.arguments.items():
             here = (*path, "arguments", key)
@@ -101,7 +101,7 @@ class _MissionBuilder:
         )
 
     def overrides(self, shape: OverridesShape, path: Path) -> Overrides:
-        """What a step is held to beyond its skill's contract; what says nothing sensible is reported and left out."""
+        """Build the overrides of a step. A value that cannot be parsed is reported and omitted."""
         return Overrides(
             span=self.tree.spans[path],
             deadline=self.quantity("deadline", shape.deadline, (*path, "deadline")),
@@ -116,30 +116,30 @@ class _MissionBuilder:
             record=tuple(self.name(text, (*path, "record", at)) for at, text in enumerate(shape.record)),
         )
 
-    def quantity(self, words: str, text: str | None, path: Path) -> Quantity | None:
-        """The quantity of an override, if it is given."""
+    def quantity(self, keyword: str, text: str | None, path: Path) -> Quantity | None:
+        """Build the quantity of an override, if there is one."""
         if text is None:
             return None
-        value, found = parse_quantity(words, text, *self.within(path))
+        value, found = parse_quantity(keyword, text, *self.within(path))
         self.found += found
         return value
 
-    def clauses(self, words: str, texts: Sequence[str], path: Path) -> tuple[ClauseDecl, ...]:
-        """The clauses of conditions."""
+    def clauses(self, keyword: str, texts: Sequence[str], path: Path) -> tuple[ClauseDecl, ...]:
+        """Build the clauses of an override."""
         clauses: list[ClauseDecl] = []
         for number, text in enumerate(texts):
-            some, found = parse_clauses(words, text, *self.within((*path, number)))
+            some, found = parse_clauses(keyword, text, *self.within((*path, number)))
             clauses += some
             self.found += found
         return tuple(clauses)
 
     def within(self, path: Path) -> tuple[Span, Moved]:
-        """Where a text stands between its quotes, and where each of its characters does."""
+        """Return the span of a string between its quotes, and a function from its offsets to those of the source."""
         place = self.tree.spans[path]
         return Span(place.file, place.start + 1, place.end - 1), string_offsets(self.source.text, place).__getitem__
 
     def name(self, text: str, path: Path) -> Name:
-        """A name with its place; the language's reserved words are none."""
+        """Build a name. A reserved word of the language is reported."""
         span = self.tree.spans[path]
         if text in RESERVED:
             message = f"`{text}` is a reserved word and cannot be used as a name"
@@ -148,7 +148,7 @@ class _MissionBuilder:
 
 
 def string_offsets(text: str, place: Span) -> list[int]:
-    """Where each character of a JSON string stands in the text, and where the string ends."""
+    """The offsets in `text` of each character of a JSON string, and of its end."""
     offsets: list[int] = []
     at, end = place.start + 1, place.end - 1
     while at < end:
@@ -163,15 +163,15 @@ def string_offsets(text: str, place: Span) -> list[int]:
     return [*offsets, end]
 
 
-#: findings on one specification: what is wrong a hundred times over is not mended by reading it all
+#: the most findings that are listed for one specification
 MAX_FINDINGS = 100
 
-_CONTROL = re.compile(r"[\t\n\f\r]")  # white space in sources, and in no text of a specification
+_CONTROL = re.compile(r"[\t\n\f\r]")  # white space that sources may have, but not the strings of a specification
 
 
 @dataclass(frozen=True, slots=True)
 class Specification:
-    """A specification as a unit of a program; the unit has no mission where the specification has errors."""
+    """A specification as a unit of a program; the unit has no mission if the specification has errors."""
 
     source: Source
     tree: JsonTree | None
@@ -179,7 +179,7 @@ class Specification:
     diagnostics: tuple[Diagnostic, ...]
 
     def pointed(self, diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
-        """The findings, those on this specification with a JSON Pointer to the value they are about."""
+        """Return the findings, with a JSON Pointer to the value in each finding about this specification."""
         places = None if self.tree is None else JsonPlaces(self.tree)
         return tuple(self._pointed(diagnostic, places) for diagnostic in diagnostics)
 
@@ -191,7 +191,7 @@ class Specification:
 
 
 def parse_specification(file: str, data: bytes) -> Specification:
-    """The specification that `data` is; never raises for what it says."""
+    """Parse a specification. Errors become findings, never exceptions."""
     kind = foreign(data)
     if kind is not None:
         source = Source(file, data.decode("utf-8", "replace"))
@@ -213,7 +213,7 @@ def parse_specification(file: str, data: bytes) -> Specification:
 
 
 def _hiding(source: Source, tree: JsonTree) -> Iterator[Diagnostic]:
-    """The texts that hold a control character, or one that hides or reorders what a person reads."""
+    """Yield a finding for each string with a control, invisible or reordering character."""
     for span in (*tree.keys.values(), *tree.spans.values()):
         written = source.text[span.start : span.end]
         if written.startswith('"'):
@@ -222,7 +222,7 @@ def _hiding(source: Source, tree: JsonTree) -> Iterator[Diagnostic]:
             at = hiding(text) if control is None else control.start()
             if at is not None:
                 message = f"`{visible(text[at])}` hides or reorders what a person reads"
-                help = "a specification has no control characters and nothing invisible in its texts"
+                help = "remove control characters and invisible characters from the strings of the specification"
                 yield Diagnostic(HIDDEN_CHARACTER, message, span, help)
 
 
@@ -235,11 +235,11 @@ def load_specification(
     packs: Packs = no_packs,
     pins: Pins = PROPOSED,
 ) -> tuple[Program, Specification]:
-    """A program of a specification and the sources that it is checked against.
+    """Load a specification with the sources against which it is checked.
 
-    `policies` are sources named by the caller, beside what the specification imports from the library. What it claims
-    beyond `pins` is a finding: an agent's word is no authority. The program's findings include the specification's;
-    pass what compiling it finds through `Specification.pointed`.
+    `policies` are sources that the caller names, in addition to the specification's imports from the library. A claim
+    beyond `pins` is a finding. The findings of the program include those of the specification. Pass the findings of
+    compilation through `Specification.pointed`.
     """
     name = shown(path)
     try:
@@ -254,8 +254,8 @@ def load_specification(
     for each in specification.unit.imports:
         resolved = imported(each.path, path, folders.get)
         if not on_a_shelf(each.path):
-            message = f"`{each.path}` is not of the library that ships"
-            help = "a specification imports from `lib:policies/`, `lib:skills/` and `lib:missions/`, without `..`"
+            message = f"`{each.path}` is not in the shipped library"
+            help = "import from `lib:policies/`, `lib:skills/` or `lib:missions/`, without `..`"
             found += specification.pointed([Diagnostic(IMPORT_PATH, message, each.span, help)])
             continue
         try:
@@ -263,7 +263,7 @@ def load_specification(
                 read(resolved)
                 wanted.append(resolved)
                 continue
-            why = "there is no library here"
+            why = "the shipped library is not installed"
         except OSError as error:
             why = (error.strerror or "it is unreadable").lower()
         found += specification.pointed([Diagnostic(NO_SUCH_FILE, f"cannot read `{each.path}`: {why}", each.span)])

@@ -1,4 +1,4 @@
-"""The schema of a mission specification: pydantic models, JSON Schema, and violations as findings (E0902)."""
+"""The schema of a mission specification: pydantic models, their JSON Schema, and violations as findings."""
 
 import re
 from collections.abc import Iterator, Mapping
@@ -15,10 +15,10 @@ from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.agent.json_tree import JsonTree, Path, pointer
 from rtshcua.wire import names
 
-#: the draft that the schema is of
+#: the draft of JSON Schema
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 FORMAT, VERSION = names.MISSION_SPEC.name, names.MISSION_SPEC.version
-#: the words of the language that are no names
+#: the keywords of the language that cannot be names
 RESERVED = frozenset({"and", "or", "not", "in", "inside", "outside", "any"})
 
 NAME = r"^[A-Za-z_][A-Za-z0-9_]*(\.[A-Za-z_][A-Za-z0-9_]*)*$"
@@ -28,7 +28,7 @@ ArgumentText = Annotated[
     str,
     StringConstraints(max_length=200),
     Field(
-        description="A value as the language writes it: `20 m`, `4 m/s`, `47.3977 N, 8.5456 E`, a zone such as "
+        description="A value in the language's form: `20 m`, `4 m/s`, `47.3977 N, 8.5456 E`, a zone such as "
         "`bridge_a`, its entry `bridge_a.entry`, or a choice such as `grid`. Altitudes are above home.",
         examples=["20 m", "4.5 m/s", "bridge_a.entry", "47.39927 N, 8.54572 E", "grid"],
     ),
@@ -36,20 +36,20 @@ ArgumentText = Annotated[
 
 
 class SpecificationPart(BaseModel):
-    """The base: nothing beyond what is declared, and nothing taken for something else."""
+    """The base of all parts: no undeclared keys, and no conversion between types."""
 
     model_config = ConfigDict(strict=True, extra="forbid", frozen=True)
 
 
 class PolicyName(SpecificationPart):
-    """The policy that the mission is under, in the version that it was written for."""
+    """The policy of the mission, and the version of the policy for which the mission was written."""
 
     name: Name
     version: Annotated[int, Field(ge=0)]
 
 
 class Proposer(SpecificationPart):
-    """Who proposes the mission, and for which human role."""
+    """The proposer of the mission, and the human role for which it is proposed."""
 
     source: Literal["agent", "operator"]
     name: Name
@@ -62,15 +62,15 @@ Duration = Annotated[
 Conditions = Annotated[
     list[Annotated[str, StringConstraints(max_length=1000)]],
     Field(
-        description="Conditions as the language writes them, over what the policy reads.",
+        description="Conditions in the language's form, over signals that the policy reads.",
         examples=[["battery > 50 %", "wind.speed < 8 m/s"]],
     ),
 ]
 
 
 class OverridesShape(SpecificationPart):
-    """What holds of this step beyond its skill's contract. It may only tighten: shorter times, more energy kept ready,
-    fewer phases, further clauses and kinds of evidence.
+    """Limits of this step that tighten its skill's contract: shorter times, a larger energy reserve, fewer phases,
+    additional clauses and kinds of evidence.
     """
 
     deadline: Duration | None = None
@@ -79,7 +79,7 @@ class OverridesShape(SpecificationPart):
     lasts_at_most: Duration | None = None
     grace: Duration | None = None
     energy_at_most: Annotated[
-        str | None, Field(description="A part of a full charge, not less than the skill's.", examples=["6 %"])
+        str | None, Field(description="A share of a full charge, not below the skill's value.", examples=["6 %"])
     ] = None
     require: Conditions = []
     assume: Conditions = []
@@ -88,8 +88,8 @@ class OverridesShape(SpecificationPart):
 
 
 class StepShape(SpecificationPart):
-    """One step: a skill, its arguments by name, what the mission does when it is not admitted, and what it is held to
-    beyond the skill's contract.
+    """One step: a skill, its arguments by name, what the mission does if the step is not admitted, and limits that
+    tighten the skill's contract.
     """
 
     skill: Name
@@ -99,14 +99,14 @@ class StepShape(SpecificationPart):
 
 
 class PhaseShape(SpecificationPart):
-    """A named stretch of the mission; its steps run in order."""
+    """A named phase of the mission; its steps run in order."""
 
     name: Name
     steps: list[StepShape]
 
 
 class SpecificationShape(SpecificationPart):
-    """A mission as an agent proposes it. The same checks apply as to a mission in the language."""
+    """A mission that an agent proposes. It passes the same checks as a mission in the language."""
 
     model_config = ConfigDict(title="RT-SHCUA mission specification")
 
@@ -133,16 +133,16 @@ def schema() -> dict[str, Any]:
     }
 
 
-_UNTOLD = re.compile(r"and ([0-9]+) more findings, which are not told")
+_UNLISTED = re.compile(r"([0-9]+) more findings are not listed")
 _EXPECTED_TYPES: Mapping[str, str] = {
-    "string_type": "a text",
+    "string_type": "a string",
     "int_type": "a whole number",
     "list_type": "a list",
     "dict_type": "an object",
     "model_type": "an object",
 }
 _FOUND_TYPES: Mapping[type, str] = {
-    str: "a text",
+    str: "a string",
     bool: "true or false",
     int: "a number",
     list: "a list",
@@ -152,23 +152,21 @@ _FOUND_TYPES: Mapping[type, str] = {
 
 
 def shape_errors(error: ValidationError, tree: JsonTree, most: int) -> tuple[Diagnostic, ...]:
-    """One finding for each place where the specification is not what its schema asks; of many, the first `most`, and
-    how many more there are.
-    """
+    """Return a finding for each violation of the schema: the first `most`, and the number of further ones."""
     found = tuple(islice(_shape_errors(error, tree), most))
     more = error.error_count() - len(found)
     return (*found, more_findings(more, tree.spans[()].file)) if more else found
 
 
 def more_findings(more: int, file: str) -> Diagnostic:
-    """That there is more to find than is told, and how much."""
-    message = f"and {more} more findings, which are not told"
-    return Diagnostic(codes.SPECIFICATION_SIZE, message, Span(file, 0, 0), "mend those that are told, and try again")
+    """Return the finding that says how many findings are not listed."""
+    message = f"{more} more findings are not listed"
+    return Diagnostic(codes.SPECIFICATION_SIZE, message, Span(file, 0, 0), "correct the listed findings and try again")
 
 
 def uncounted_findings(found: Diagnostic) -> int:
-    """How many findings one of `more_findings` stands for; 0 for any other finding."""
-    matched = _UNTOLD.fullmatch(found.message) if found.code is codes.SPECIFICATION_SIZE else None
+    """The number in a finding of `more_findings`; 0 for any other finding."""
+    matched = _UNLISTED.fullmatch(found.message) if found.code is codes.SPECIFICATION_SIZE else None
     return 0 if matched is None else int(matched[1])
 
 
@@ -184,7 +182,7 @@ def _shape_errors(error: ValidationError, tree: JsonTree) -> Iterator[Diagnostic
 
 
 def _missing(path: Path, tree: JsonTree) -> Diagnostic:
-    """A key that is not there: the bracket of the object that lacks it is shown."""
+    """A missing key. The span is the bracket of the object that lacks it."""
     place = tree.spans[path[:-1]]
     return Diagnostic(
         codes.SPECIFICATION_SHAPE,
@@ -199,10 +197,10 @@ def _unknown_key(path: Path, tree: JsonTree) -> Diagnostic:
     place = tree.keys[path]
     known = list(_shape_at(path[:-1]).model_fields)
     near = nearest(str(path[-1]), known)
-    listed = "its keys are " + ", ".join(f"`{key}`" for key in known)
+    listed = "known keys: " + ", ".join(f"`{key}`" for key in known)
     return Diagnostic(
         codes.SPECIFICATION_SHAPE,
-        f"there is no key `{path[-1]}` here",
+        f"unknown key `{path[-1]}`",
         place,
         listed if near is None else f"did you mean `{near}`?",
         fixes=() if near is None else (Fix(place, f'"{near}"', f"write `{near}`"),),
@@ -214,16 +212,16 @@ def _wrong_value(path: Path, tree: JsonTree, error: ErrorDetails) -> Diagnostic:
     kind, value = error["type"], error["input"]
     help: str | None = None
     if kind in _EXPECTED_TYPES:
-        message = f"expected {_EXPECTED_TYPES[kind]}; this is {_FOUND_TYPES.get(type(value), 'something else')}"
+        message = f"expected {_EXPECTED_TYPES[kind]}; found {_FOUND_TYPES.get(type(value), 'another type')}"
         if kind == "string_type" and {"arguments", "overrides"} & set(path):
-            help = 'write the value as a text with its unit, such as "20 m"'
+            help = 'write the value as a string with its unit, such as "20 m"'
     elif kind == "literal_error":
-        message, help = "this value is not accepted", f"accepted: {error.get('ctx', {}).get('expected', '')}"
+        message, help = "value not accepted", f"accepted: {error.get('ctx', {}).get('expected', '')}"
     elif kind == "string_pattern_mismatch" and "imports" in path:
-        message = "a specification imports from the shipped library only"
+        message = "a specification may import from the shipped library only"
         help = "write `lib:` and a path; name the policy's own files on the command line"
     elif kind == "string_pattern_mismatch":
-        message, help = "this is not a name", "a name has letters, digits, `_`, and `.` between its parts"
+        message, help = "not a valid name", "a name has letters, digits, `_`, and `.` between its parts"
     else:
         message = error["msg"][0].lower() + error["msg"][1:]
     span = tree.keys[path] if "[key]" in error["loc"] else tree.spans[path]
@@ -231,7 +229,7 @@ def _wrong_value(path: Path, tree: JsonTree, error: ErrorDetails) -> Diagnostic:
 
 
 def _shape_at(path: Path) -> type[BaseModel]:
-    """The shape of the object at a path."""
+    """The model of the object at a path."""
     if not path:
         return SpecificationShape
     if path[0] == "phases":

@@ -1,4 +1,4 @@
-"""The schema as tools that models call, in the forms that their providers document.
+"""The schema as a tool definition for language models, in the forms that their providers document.
 
 - OpenAI, Responses API: a function tool is flat, `{"type": "function", "name", "description", "parameters",
   "strict"}`; Chat Completions nest it under `"function"`. With `strict` each object has `additionalProperties` false
@@ -8,8 +8,8 @@
 - Model Context Protocol, 2025-11-25: `{"name", "title", "description", "inputSchema", "annotations"}`; the schema is of
   draft 2020-12 where it names no other.
 
-Strict forms are made of a schema that a policy narrows; the general one has arguments of any name, which no strict form
-can say. They leave out `overrides`, for of these every part may be missing.
+A strict form needs a schema that a policy narrows: the general schema has arguments of any name, which strict mode does
+not support. Strict forms omit `overrides`, because all its properties are optional.
 """
 
 from collections.abc import Callable, Mapping
@@ -20,23 +20,23 @@ Schema = dict[str, Any]
 NAME: Final = "propose_mission"
 TITLE: Final = "Propose a mission"
 DESCRIPTION: Final = (
-    "Propose a mission for the drone. It is checked against the policy before anything happens; the answer says "
-    "whether it is accepted, or lists findings, each with a JSON Pointer to the value that is wrong and what would be "
-    "accepted. Nothing flies by this call alone."
+    "Propose a mission for the drone. The mission is checked against the policy. The answer accepts it or lists "
+    "findings, each with a JSON Pointer to the wrong value and the values that are accepted. "
+    "This call alone does not start a flight."
 )
-#: what every strict form understands
+#: the keywords that every provider's strict mode supports
 _KEPT: Final = frozenset(
     {"type", "properties", "required", "additionalProperties", "items", "enum", "const", "anyOf", "$ref", "$defs"}
     | {"description", "pattern"}
 )
-#: not in strict forms
+#: the property that strict forms omit
 _LEFT_OUT: Final = "overrides"
 
 
 def strict(schema: Schema) -> Schema:
-    """A narrowed schema with every property required, and with those keywords alone that strict forms understand.
+    """Return a narrowed schema with every property required and only the keywords of strict mode.
 
-    Whatever it accepts, the schema accepts too, but for lengths.
+    Every value that it accepts also fits `schema`, except for lengths.
     """
     kept: Schema = {}
     for key, value in schema.items():
@@ -84,7 +84,7 @@ def _mcp(schema: Schema, *, narrow: bool) -> Schema:
 
 
 def _plain(schema: Schema) -> Schema:
-    """Without what names the document."""
+    """The schema without the keywords that identify the document."""
     return {key: value for key, value in schema.items() if key not in ("$schema", "$id", "title")}
 
 
@@ -93,7 +93,7 @@ def _itself(schema: Schema, *, narrow: bool) -> Schema:
     return schema
 
 
-#: the forms by their names on the command line
+#: the forms, by the name of the command's option
 FORMS: Final[Mapping[str, Callable[..., Schema]]] = {
     "schema": _itself,
     "openai": _openai,

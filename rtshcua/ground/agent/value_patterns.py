@@ -1,6 +1,6 @@
-"""Regular expressions of texts in a specification, in what every implementation has (ECMA-262 without look-around).
+"""Regular expressions for the strings of a specification, in ECMA-262 syntax without look-around.
 
-JSON Schema compares no numbers that stand in a text, so a range of quantities becomes a pattern of its digits.
+JSON Schema cannot compare numbers inside strings, so a range of quantities becomes a pattern of digits.
 """
 
 from collections.abc import Iterable
@@ -9,27 +9,27 @@ from typing import Final
 from rtshcua.model.quantity import DISPLAY, UNITS, Dimension
 
 _FIRST, _REST = "A-Za-z_", "A-Za-z0-9_"
-#: a place on the ground, WGS 84
+#: coordinates of a place, WGS 84
 COORDINATES: Final = (
     r"[0-8]?[0-9](?:\.[0-9]{1,7})? [NS], (?:1[0-7][0-9]|[0-9]?[0-9])(?:\.[0-9]{1,7})? [EW]"  # up to 89.9 and 179.9
 )
 
 
 def whole(*alternatives: str) -> str:
-    """A pattern for a whole text that is one of the alternatives."""
+    """The pattern of a whole string that is one of the alternatives."""
     return f"^(?:{'|'.join(alternatives)})$" if len(alternatives) != 1 else f"^{alternatives[0]}$"
 
 
 def name_but(reserved: Iterable[str]) -> str:
-    """A pattern of names without dots that are none of some words."""
+    """The pattern of names without dots, except the reserved words."""
     return f"^{_after(sorted(set(reserved)), first=True)}$"
 
 
 def _after(words: list[str], *, first: bool) -> str:
-    """What may follow where these are the rests of the words that must not come about."""
+    """The pattern of the rest of a name; `words` are the rests of the reserved words that still match."""
     own = _FIRST if first else _REST
     heads = sorted({word[0] for word in words if word})
-    # a letter that no word goes on with frees what follows
+    # after a letter that continues no reserved word, anything may follow
     choices = [f"{_class(own, heads)}[{_REST}]*"]
     for head in heads:
         rests = [word[1:] for word in words if word.startswith(head)]
@@ -40,20 +40,20 @@ def _after(words: list[str], *, first: bool) -> str:
 
 
 def _class(own: str, heads: list[str]) -> str:
-    """A class of letters without some lower-case ones, written without negation."""
+    """The character class `own` without the lower-case letters `heads`, written without negation."""
     kept = "".join(letter for letter in "abcdefghijklmnopqrstuvwxyz" if letter not in heads)
     return f"[{own.replace('a-z', kept)}]"
 
 
 def unit_of(dimension: Dimension) -> str:
-    """The unit that quantities of a schema are in: what a person reads first; empty for a count, which has none."""
+    """The unit of a dimension's quantities in a schema; empty for a count."""
     if dimension is Dimension.COUNT:
         return ""
     return "s" if dimension is Dimension.DURATION else DISPLAY[dimension][0]
 
 
 def written(value: int, dimension: Dimension) -> str:
-    """A canonical value in that unit, exactly: `30250` of LENGTH is `30.25 m`, `3` of COUNT is `3`."""
+    """Write a canonical value exactly, in the unit of `unit_of`: `30250` of LENGTH is `30.25 m`."""
     places = _places(dimension)
     whole_, rest = divmod(abs(value), 10**places)
     fraction = str(rest).zfill(places).rstrip("0") if rest else ""
@@ -62,9 +62,9 @@ def written(value: int, dimension: Dimension) -> str:
 
 
 def quantities(low: int, high: int, dimension: Dimension) -> str:
-    """The pattern of just the quantities from `low` to `high`, both canonical, in the unit of `unit_of`.
+    """The pattern of the quantities from `low` to `high`, both canonical values, in the unit of `unit_of`.
 
-    They have as many decimals as that unit has in the canonical one, at most; no leading zeros, and no `-0`.
+    They have no more decimals than the canonical unit can hold, no leading zeros, and no `-0`.
     """
     places, unit = _places(dimension), unit_of(dimension)
     parts = [f"-(?:{one})" for one in _decimals(max(1, -high), -low, places)]
@@ -73,14 +73,14 @@ def quantities(low: int, high: int, dimension: Dimension) -> str:
 
 
 def _places(dimension: Dimension) -> int:
-    """How many decimals a number in the unit may have: a metre has three, for it is 1000 mm."""
+    """The number of decimals that a quantity may have: three for a metre, because it is 1000 mm."""
     if dimension is Dimension.COUNT:
         return 0
     return len(str(UNITS[unit_of(dimension)].numerator)) - 1
 
 
 def _decimals(low: int, high: int, places: int) -> list[str]:
-    """Patterns of the decimals from `low` to `high`, which count 10 ** -places and are not negative."""
+    """Patterns of the decimal numbers from `low` to `high`, given in units of 10 ** -places and not negative."""
     if low > high:
         return []
     scale = 10**places
@@ -100,7 +100,7 @@ def _decimals(low: int, high: int, places: int) -> list[str]:
 
 
 def _fraction(low: int, high: int, places: int) -> str:
-    """The pattern of a point and decimals, padded to `places`, from `low` to `high`; none at all is zero."""
+    """The pattern of a point and decimals from `low` to `high`, counted with `places` digits; no decimals mean zero."""
     if places == 0:
         return ""
     some = rf"\.(?:{'|'.join(_padded(low, high, places))})"
@@ -108,11 +108,11 @@ def _fraction(low: int, high: int, places: int) -> str:
 
 
 def _padded(low: int, high: int, places: int) -> list[str]:
-    """Patterns of one digit or more that count, with zeros put behind them up to `places`, from `low` to `high`."""
+    """Patterns of one digit or more that, padded with zeros to `places` digits, are from `low` to `high`."""
     if (low, high) == (0, 10**places - 1):
         return [f"[0-9]{{1,{places}}}"]
     rest = 10 ** (places - 1)
-    heads: dict[str, list[int]] = {}  # the digits that the same may follow
+    heads: dict[str, list[int]] = {}  # the leading digits, by the pattern that follows them
     for digit in range(low // rest, high // rest + 1):
         least, most = max(low - digit * rest, 0), min(high - digit * rest, rest - 1)
         after = f"(?:{'|'.join(_padded(least, most, places - 1))})" if places > 1 else ""
@@ -121,15 +121,15 @@ def _padded(low: int, high: int, places: int) -> list[str]:
 
 
 def _one_of(some: list[int]) -> str:
-    """A pattern of some digits, which follow each other."""
+    """The pattern of a run of consecutive digits."""
     return str(some[0]) if len(some) == 1 else f"[{some[0]}-{some[-1]}]"
 
 
 def digits(low: int, high: int) -> str:
-    """A pattern of the whole numbers from `low` to `high`, without leading zeros; `low` is not negative."""
+    """The pattern of the whole numbers from `low` to `high`, without leading zeros; `low` is not negative."""
     found: list[str] = []
     while low <= high:
-        power = 1  # the largest block of a power of ten that begins at `low`, and does not go beyond
+        power = 1  # the largest power of ten whose block begins at `low` and ends by `high`
         while low % (power * 10) == 0 and low + power * 10 - 1 <= high and low >= power * 10:
             power *= 10
         count = 1

@@ -1,1 +1,1 @@
-"""Audit of a log, offline, with nothing but the log and one pinned public key: `audit.audit`."""
+"""The offline audit of a log (`audit.audit`). It needs only the log and one pinned public key."""

@@ -1,21 +1,22 @@
-"""The audit of a log. The steps beyond those of `rtshcua.evidence.verify`, numbered on from there:
+"""The audit of a log. It continues the steps of `rtshcua.evidence.verify`:
 
 8. trust: the root under the pinned key, the log key's duty, the bundle under that root (`trust`)
-9. the bundle is the one that the caller knows of, if there is one
-10. anchors: what witnesses cosigned is what the log holds (`rtshcua.evidence.witnessing.anchors`)
-11. what the records tell of is what the boundary made and signed for (`rtshcua.evidence.attested`)
-12. each decision is derived again (`decisions`), under the mode of the genesis; what the temporal monitors said is not
-    ruled out by the states that the records hold
-13. documents: each approval, recall, replacement and cancellation is verified again, and no decision read another
+9. the bundle is the expected one, if the caller supplies it
+10. anchors: the log holds what witnesses cosigned (`rtshcua.evidence.witnessing.anchors`)
+11. the records agree with the boundary's own signed evidence (`rtshcua.evidence.attested`)
+12. each decision is derived again (`decisions`), in the mode of the genesis; the recorded states do not contradict the
+    temporal monitors
+13. documents: each approval, recall, replacement and cancellation is verified again, and decisions use no others
     (`documents`)
-14. evidence before effect: each dispatch follows a record that permits it, in its turn (`dispatches`); not in mode
-    `none`
+14. evidence before effect: each dispatch follows a record that permits it, in the right order (`dispatches`); not in
+    mode `none`
 
-Of several flaws the first of these is told: of the genesis and its trust, of the log itself, of its anchors, of the
-boundary's own evidence, of what its records mean. For a log that is not whole proves nothing, whatever its records say.
+Of several flaws, the first of these is reported: genesis and trust, the log itself, anchors, the boundary's own
+evidence, the meaning of the records. A log that is not intact proves nothing, so its own flaws come before those of its
+meaning.
 
-What no log can prove: that the state it records is what the vehicle's sensors saw, and that the temporal monitors said
-what follows from all observations, of which the log has those at which something was decided.
+A log cannot prove that the recorded state is what the vehicle's sensors measured. Nor can it prove that the temporal
+monitors follow from all observations, because it holds only those at which a decision was made.
 """
 
 from collections.abc import Iterable
@@ -36,38 +37,38 @@ Claims = tuple[tuple[Claim, ...], tuple[Claim, ...]]
 
 
 def trust_claims(genesis: Genesis, basis: Basis) -> Claims:
-    """What the pinned key vouches for, and what it does not."""
+    """Return the claims that the pinned key proves, and those that stay unproven."""
     bundle = basis.bundle
     kind = "development root" if basis.root.development else "trust root"
     proven = (
-        Claim("trust", f"the {kind} is signed by the pinned key, and gives log key {genesis.log_kid} its duty"),
+        Claim("trust", f"the {kind} is signed by the pinned key and authorises log key {genesis.log_kid}"),
         Claim(
             "bundle",
             f"mission `{bundle.mission.name}` under `{bundle.policy.name}@{bundle.policy.version}` on "
-            f"`{genesis.vehicle}`, both signed by keys that the root trusts for them",
+            f"`{genesis.vehicle}`, both signed by keys that the root authorises",
         ),
     )
     if not basis.root.development:
         return proven, ()
-    text = "development keys lie unencrypted where they were made: whoever can read them can sign anything"
+    text = "development keys are stored unencrypted: anyone who can read them can sign anything"
     return proven, (Claim("development", text),)
 
 
 def record_claims(basis: Basis, meaning: RecordAudit) -> Claims:
-    """What deriving again proved."""
+    """Return the claims that the audit of the records proves, and those that stay unproven."""
     proven = [Claim("decisions", f"{_many(meaning.derived, 'decision')} derived again, each with the same answer")]
     documents = [
         f"{_many(count, kind)}{_signed_by(meaning.people[kind])}" for kind, count in meaning.documents.items() if count
     ]
     if documents:
-        text = f"{', '.join(documents)}, each signed by a key that the root trusts for it, and good when it came"
+        text = f"{', '.join(documents)}, each signed by an authorised key and valid when it was received"
         proven.append(Claim("documents", text))
     if meaning.preparations.count:
-        text = f"{_many(meaning.preparations.count, 'parameter')} listed to be set or put back, none while it flew"
+        text = f"{_many(meaning.preparations.count, 'parameter change')} listed, none in flight"
         proven.append(Claim("preparations", text))
-    unproven = [Claim("state", "that the recorded state is what the vehicle's sensors saw")]
+    unproven = [Claim("state", "that the recorded state is what the vehicle's sensors measured")]
     if basis.policy.monitors:
-        text = "what the temporal monitors said between the records: only that no recorded state rules it out"
+        text = "the temporal monitors between the records: the recorded states do not contradict them"
         unproven.append(Claim("monitors", text))
     if meaning.mode == UNENFORCED:
         unproven.append(Claim("enforcement", "mode `none`: nothing was enforced, so dispatches needed no permit"))
@@ -85,11 +86,13 @@ def _many(count: int, one: str, more: str | None = None) -> str:
     return f"{count} {one if count == 1 else more or one + 's'}"
 
 
-_NOT_DERIVED = "that decisions follow from what they record, and commands from them: `--audit` without `--no-derive`"
+_NOT_DERIVED = (
+    "that decisions follow from their recorded inputs, and commands from decisions: use `--audit` without `--no-derive`"
+)
 
 
 class Audit(NamedTuple):
-    """A report whose claims say what the pinned key proves, with what the log rests on where that was trusted."""
+    """The report of an audit, the basis of a trusted log, and the numbers of decisions and dispatches."""
 
     report: LogReport
     basis: Basis | None
@@ -98,18 +101,17 @@ class Audit(NamedTuple):
 
 
 class Auditor:
-    """Takes the lines of a log in order, in memory that the bundle bounds, and some hundred bytes an epoch.
+    """Audits the lines of a log in order. Memory is bounded by the bundle, plus some hundred bytes for each epoch.
 
-    `derive` says whether what the records mean is worked out again. `anchors` are notes that witnesses cosigned, from
-    wherever; those that the log itself holds are looked at too. `frames` follows the raw frames beside the log; what
-    it found, the caller asks it, once it is known that they are those of the log.
+    `derive` says whether decisions are derived again. `anchors` are notes that witnesses cosigned, in addition to those
+    in the log. `frames` audits the raw frames beside the log; the caller reads its findings.
     """
 
     def __init__(
         self, pinned: bytes, *, bundle: bytes | None = None, derive: bool = True, anchors: Iterable[str] = (),
         frames: FrameAudit | None = None,
     ) -> None:  # fmt: skip
-        self.record: AnyRecord | None = None  # the last line's, if it is sound in itself and in its place
+        self.record: AnyRecord | None = None  # of the last line, if it is valid
         self._pinned = pinned
         self._expected = bundle
         self._derive = derive
@@ -126,7 +128,7 @@ class Auditor:
         self._unattested: Finding | None = None
 
     def take(self, line: bytes) -> bool:
-        """Takes the next line; False when no further one would change the result."""
+        """Audit the next line; return False when further lines cannot change the result."""
         verifier = self._verifier
         record = self.record = verifier.take(line)
         if record is None:
@@ -135,7 +137,7 @@ class Auditor:
             flaw = self._begin(record)
             self._untrusted = flaw and flaw.at(0, 0)
         if self._untrusted is not None:
-            return True  # what another root vouches for may be sound in itself: it is read on, for how long it lasted
+            return True  # the log may still be intact: the report says how far
         if self._contradicted is None and (flaw := self._witnessed(record)):
             self._contradicted = flaw.at(record.seq, verifier.offset - len(line))
         if self._unattested is None and self._boundary is not None and not isinstance(record, Genesis):
@@ -162,10 +164,10 @@ class Auditor:
     def _attested(self, boundary: BoundaryEvidence, record: AnyRecord, offset: int) -> Finding | None:
         before = boundary.last
         found = boundary.check(record, offset)
-        said = boundary.last
-        if found is None and said is not before and said is not None and self._frames is not None:
+        statement = boundary.last
+        if found is None and statement is not before and statement is not None and self._frames is not None:
             assert isinstance(record, Effect)
-            self._frames.stated(said.frames, said.left, record, final=said.final)
+            self._frames.stated(statement.frames, statement.left, record, final=statement.final)
         return found
 
     def _witnessed(self, record: AnyRecord) -> Flaw | None:
@@ -178,7 +180,7 @@ class Auditor:
         return self._anchors.checkpoint(record.checkpoint)
 
     def audit(self) -> Audit:
-        """The whole, once the lines are over."""
+        """Return the result. Call it after the last line."""
         report = self._judged(self._verifier.report())
         meaning = self._meaning
         if meaning is None:
@@ -220,20 +222,20 @@ class Auditor:
 
 
 def trusted(report: LogReport, basis: Basis) -> LogReport:
-    """The report with what the pinned key vouches for, of a log that was trusted."""
+    """Return the report of a trusted log with the claims that the pinned key proves."""
     assert report.genesis is not None
     proven, unproven = trust_claims(report.genesis, basis)
     return report._replace(proven=(*proven, *report.proven), unproven=(*report.unproven, *unproven))
 
 
 def anchors_of(basis: Basis, genesis: Genesis) -> Anchors:
-    """What the witnesses of a log's root saw is held against its checkpoints by this."""
+    """Return the check of a log's checkpoints against what the witnesses of its root cosigned."""
     root, origin = basis.root, origin_of(genesis.vehicle, genesis.boot)
     return Anchors(origin, root.witnesses(genesis.vehicle, genesis.utc_us), root.witness_threshold)
 
 
 def failing(report: LogReport, failure: Finding) -> LogReport:
-    """The report with a failure that its log's own chain and seals do not show."""
+    """Return the report with a failure that verification of the chain and seals does not find."""
     proven, unproven = claims(report.records, 0, 0, report.genesis, None, failure)
     return report._replace(failure=failure, shortfall=None, proven=proven, unproven=unproven)
 
@@ -242,10 +244,10 @@ def audit(
     lines: Iterable[bytes], pinned: bytes, *, bundle: bytes | None = None, derive: bool = True,
     anchors: Iterable[str] = (),
 ) -> Audit:  # fmt: skip
-    """Audits the lines of a log, each with its newline.
+    """Audit the lines of a log, each with its newline.
 
-    `pinned` is the trust root's public key (32 bytes) or its `kid` (16 bytes), which must come from elsewhere than the
-    log. `bundle` is what the log should be of, where the caller knows. `derive` and `anchors`: see `Auditor`.
+    `pinned` is the trust root's public key (32 bytes) or its `kid` (16 bytes); it must not come from the log. `bundle`
+    is the expected bundle, if known. `derive` and `anchors`: see `Auditor`.
     """
     auditor = Auditor(pinned, bundle=bundle, derive=derive, anchors=anchors)
     for line in lines:

@@ -1,9 +1,9 @@
-"""Each decision once more: from the inputs that its record holds, by the same rules that decided on board; and what the
-temporal monitors said, against what the log knows of their past.
+"""Derives each decision again from its recorded inputs, and checks the temporal monitors against earlier records.
 
-Each decision record holds the state of one observation, and what the monitors said there. The observations in between
-are not recorded, so nobody can work out again what a monitor said; but each record tells the truth of its condition at
-that moment, and a monitor must not say what these truths rule out: not TRUE `for the last 3 s` with a FALSE in them.
+A decision record holds the state of one observation and the values of the monitors. The observations between records
+are not recorded, so a monitor's value cannot be computed again. But each record gives the truth of the monitor's
+condition at that moment, and the monitor must not contradict it: `for the last 3 s` cannot be TRUE if a record of these
+3 s has FALSE.
 """
 
 from typing import Final
@@ -35,39 +35,37 @@ _NEVER: Final = -(1 << 62)
 
 
 class MonitorHistory:
-    """Follows the decisions of one log; what it keeps is bounded by the policy: when each truth was last recorded."""
+    """The times at which each truth of each monitor's condition was last recorded in one log."""
 
     def __init__(self, policy: PreparedPolicy) -> None:
         self._policy = policy
         self._last = [{TRUE: _NEVER, FALSE: _NEVER, UNKNOWN: _NEVER} for _ in policy.monitors]
 
     def check(self, state: State, now: Now) -> Flaw | None:
-        """What is wrong with what the monitors said at a recorded moment, given those before, or None."""
+        """Return a flaw if a monitor contradicts this record or an earlier one, else None."""
         at_us = now.monotonic_us
         at = environment(situation(state, self._policy, now), self._policy, (), NO_PHASE)
         flaw: Flaw | None = None
-        for monitor, last, said, flat in zip(
+        for monitor, last, recorded, flat in zip(
             self._policy.monitors, self._last, state.monitors, self._policy.policy.monitors, strict=True
         ):
             found = monitor.condition(at)
-            truth = found if found in SINGLE else UNKNOWN  # as `decision.temporal` has it
+            truth = found if found in SINGLE else UNKNOWN  # as in `decision.temporal`
             last[truth] = at_us
             may = _allowed_truths(monitor.kind, truth, {one for one in last if last[one] >= at_us - monitor.window_us})
-            if flaw is None and not said & may:
-                text = (
-                    f"a monitor of `{flat.when.text}` said what its condition rules out, in this record or one before"
-                )
+            if flaw is None and not recorded & may:
+                text = f"a monitor of `{flat.when.text}` contradicts its condition in this record or an earlier one"
                 expected = " or ".join(word for one, word in _WORDS.items() if one & may)
-                flaw = Flaw("decision/monitor", text, _WORDS[said], expected)
+                flaw = Flaw("decision/monitor", text, _WORDS[recorded], expected)
         return flaw
 
 
 def _allowed_truths(kind: int, now: Truth, recorded: set[Truth]) -> Truth:
-    """What a monitor may say, by the truth of its condition now, and those that were recorded in its window."""
+    """The possible values of a monitor, by the truth of its condition now and those recorded in its window."""
     match kind:
-        case MonitorKind.FOR_LAST:  # the least of more truths than these
+        case MonitorKind.FOR_LAST:  # the least of these and the unrecorded truths
             return FALSE if FALSE in recorded else FALSE | UNKNOWN if UNKNOWN in recorded else _ALL
-        case MonitorKind.WITHIN_LAST:  # the greatest of more truths than these
+        case MonitorKind.WITHIN_LAST:  # the greatest of these and the unrecorded truths
             return TRUE if TRUE in recorded else TRUE | UNKNOWN if UNKNOWN in recorded else _ALL
         case MonitorKind.RISING:
             return FALSE if now == FALSE else FALSE | UNKNOWN if now == UNKNOWN else _ALL
@@ -75,7 +73,7 @@ def _allowed_truths(kind: int, now: Truth, recorded: set[Truth]) -> Truth:
             return FALSE if now == TRUE else FALSE | UNKNOWN if now == UNKNOWN else _ALL
 
 
-#: what the fields `DECIDED` of a record are called
+#: the names of the fields `DECIDED` of a record
 _WHAT = (
     "outcome",
     "reason",
@@ -89,7 +87,7 @@ _WHAT = (
 
 
 class DecisionAudit:
-    """Derives the decisions of one log in their order, in the session that it was, with what the monitors said."""
+    """Derives the decisions of one log again, in their order, in a session with the recorded monitor values."""
 
     def __init__(self, basis: Basis, session: Session) -> None:
         self._basis = basis
@@ -97,29 +95,29 @@ class DecisionAudit:
         self._observed = MonitorHistory(basis.policy)
 
     def check(self, record: DecisionRecord) -> Flaw | None:
-        """What is wrong with a decision, or None when it derives again."""
+        """Return a flaw if the derived decision differs from the recorded one, else None."""
         decided = self._derived(record)
         if isinstance(decided, Flaw):
             return decided
         for field, what, expected in zip(DECIDED, _WHAT, in_words(decided), strict=True):
             found = getattr(record, field)
             if found != expected:
-                text = f"derived again from the inputs that it records, this decision has another {what}"
+                text = f"the decision derived from the recorded inputs has another {what}"
                 return Flaw(f"decision/{field.replace('_', '-')}", text, str(found), str(expected))
         return self._durable(record)
 
     def _durable(self, record: DecisionRecord) -> Flaw | None:
-        """What is wrong with how durable a record that derived again says it was."""
+        """Return a flaw if the record's durability is not the required one, else None."""
         if record.kind == STEP:
             contract = self._basis.invocations[record.step].invocation.contract
             approved = any(granted for _, _, granted, _, _ in record.context.approvals)
-            asked = durability_of(contract, Outcome[record.outcome.upper()], confirmed=approved, kind=STEP)
+            required = durability_of(contract, Outcome[record.outcome.upper()], confirmed=approved, kind=STEP)
         else:
-            asked = WRITTEN
-        if record.durability == asked:
+            required = WRITTEN
+        if record.durability == required:
             return None
-        text = "its record was not as durable as the contract and the risk ask, or more"
-        return Flaw("decision/durability", text, _durability_words(record.durability), _durability_words(asked))
+        text = "the record has not the durability that the contract and the risk require"
+        return Flaw("decision/durability", text, _durability_words(record.durability), _durability_words(required))
 
     def _derived(self, record: DecisionRecord) -> Decided | Flaw:
         state = State(record.state.values, record.state.ages, record.state.monitors)
@@ -130,30 +128,30 @@ class DecisionAudit:
             return flaw
         if record.kind == STEP:
             return self._step(record, state, now)
-        binding = _octets(record.binding) or b""  # what is no binding at all is not the right one
+        binding = _octets(record.binding) or b""  # a malformed binding never matches
         return self._session.decide_link(ref, binding, state, now)
 
     def _inputs(self, record: DecisionRecord, state: State, now: Now) -> Flaw | None:
-        """What is wrong with the situation that a decision was made in."""
+        """Return a flaw in the inputs of a decision, or None."""
         policy = self._basis.policy
         slots, monitors = policy.policy.slots, len(policy.monitors)
         if len(state.values) != slots or len(state.ages) != slots:
-            return Flaw("decision/inputs", f"the state has not the {slots} slots of the policy")
+            return Flaw("decision/inputs", f"the state does not have the {slots} slots of the policy")
         if len(state.monitors) != monitors or not SINGLE.issuperset(state.monitors):
-            return Flaw("decision/inputs", f"the state has not a truth for each of the policy's {monitors} monitors")
-        identity, version, given = policy.policy.vehicle.identity, policy.policy.version, record.context
-        if given.vehicle != identity:
-            return Flaw("decision/vehicle", "it was made for another vehicle than the log's", given.vehicle, identity)
-        if given.policy_version != version:
-            text = "it was made under another version of the policy than the log's"
-            return Flaw("decision/policy-version", text, str(given.policy_version), str(version))
+            return Flaw("decision/inputs", f"the state does not have a truth for each of the {monitors} monitors")
+        identity, version, context = policy.policy.vehicle.identity, policy.policy.version, record.context
+        if context.vehicle != identity:
+            return Flaw("decision/vehicle", "the decision is for another vehicle", context.vehicle, identity)
+        if context.policy_version != version:
+            text = "the decision is under another version of the policy"
+            return Flaw("decision/policy-version", text, str(context.policy_version), str(version))
         flaw = self._observed.check(state, now)
-        if flaw is None and record.kind != STEP and record.context.approvals:
-            return Flaw("decision/approvals", "a link of a chain is decided without approvals")
+        if flaw is None and record.kind != STEP and context.approvals:
+            return Flaw("decision/approvals", "the decision on a link of a chain has approvals")
         return flaw
 
     def _turn(self, record: DecisionRecord, ref: Ref) -> Flaw | None:
-        """Why the boundary would not have decided on this then."""
+        """Return a flaw if the boundary would not have decided on this step or link then, else None."""
         refused = self._session.refusal(ref)
         if refused is Status.UNKNOWN_STEP:
             text = "the bundle has no such step or link"
@@ -161,49 +159,49 @@ class DecisionAudit:
         if ref.kind == CONTINGENCY_LINK:
             if not record.invocation:
                 return None
-            return Flaw("decision/invocation", "a link of the contingency belongs to no step", record.invocation)
+            return Flaw("decision/invocation", "a decision on the contingency names a step", record.invocation)
         expected = self._basis.invocations[ref.step].invocation.invocation_id.hex()
         if record.invocation != expected:
-            return Flaw("decision/invocation", "the id is not that of its step", record.invocation, expected)
+            return Flaw("decision/invocation", "the id is not that of the step", record.invocation, expected)
         if ref.kind == STEP:
-            given, consumed = record.context.consumed, self._session.consumed(ref.step)
-            if given != consumed:
-                text = "whether the step's id was used before is not what the records before say"
-                return Flaw("decision/consumed", text, str(given), str(consumed))
+            recorded, consumed = record.context.consumed, self._session.consumed(ref.step)
+            if recorded != consumed:
+                text = "`consumed` contradicts earlier records"
+                return Flaw("decision/consumed", text, str(recorded), str(consumed))
             if self._basis.in_force.recalled:
-                return Flaw("decision/recalled", "a step is decided after the mission was recalled")
+                return Flaw("decision/recalled", "a step was decided after the mission was recalled")
             if self._basis.in_force.cancelled:
-                return Flaw("decision/cancelled", "a step is decided after the mission was cancelled")
+                return Flaw("decision/cancelled", "a step was decided after the mission was cancelled")
         if refused is None:
             return None
-        text = "a step is decided whose turn had not come, or was over: the boundary decides no such step"
+        text = "the step was not the current one: the boundary does not decide such a step"
         current = f"{step_words(self._session.current)} or the next"
         return Flaw("decision/not-current", text, step_words(ref.step), current)
 
     def _step(self, record: DecisionRecord, state: State, now: Now) -> Decided | Flaw:
-        given = record.context
+        recorded = record.context
         approvals = self._basis.in_force.approvals(self._basis.invocations[record.step].invocation, now)
-        if given.approvals != tuple(astuple(each) for each in approvals):
-            text = "the approvals that it read are not those that the log holds and that are verified"
-            return Flaw("decision/approvals", text, str(given.approvals), str(approvals))
+        if recorded.approvals != tuple(astuple(each) for each in approvals):
+            text = "the approvals of the decision are not the verified approvals of the log"
+            return Flaw("decision/approvals", text, str(recorded.approvals), str(approvals))
         received_us = self._basis.in_force.received_us(record.step)
-        if given.released_us < received_us:
+        if recorded.released_us < received_us:
             text = "a step was released before it was received on board"
-            return Flaw("decision/released", text, f"{given.released_us} us", f"{received_us} us or later")
-        if given.released_us > record.at_us:
-            text = "a step is decided before it is released: the boundary decides no such step"
-            return Flaw("decision/released", text, f"{given.released_us} us", f"{record.at_us} us or before")
+            return Flaw("decision/released", text, f"{recorded.released_us} us", f"{received_us} us or later")
+        if recorded.released_us > record.at_us:
+            text = "a step was decided before its release: the boundary does not decide such a step"
+            return Flaw("decision/released", text, f"{recorded.released_us} us", f"{record.at_us} us or before")
         binding = _octets(record.binding)
         if binding is None:
-            return Flaw("decision/inputs", "the binding is not written in hexadecimal", record.binding)
+            return Flaw("decision/inputs", "the binding is not hexadecimal", record.binding)
         context = Context(
             binding,
-            given.vehicle,
-            given.policy_version,
-            given.consumed,
-            given.released_us,
-            given.phase,
-            given.remaining_us,
+            recorded.vehicle,
+            recorded.policy_version,
+            recorded.consumed,
+            recorded.released_us,
+            recorded.phase,
+            recorded.remaining_us,
             approvals,
         )
         return self._session.decide_step(record.step, state, context, now)

@@ -1,9 +1,9 @@
 """The dispatches of a log: evidence before effect, and their order (design 4.5, 6).
 
-Nothing was dispatched without an earlier record that permits it; and what the executor refuses whatever was decided, no
-log may hold. One step runs at a time and none comes back, but for one that was withdrawn, of which nothing was sent; no
-step follows a return or a landing that a fallback began; chains go forward only, and a chain lapses when another step
-was sent. A dispatch names a skill of the bundle, where it stands.
+Every dispatch needs an earlier record that permits it. A log must also not contain a dispatch that the executor always
+refuses. One step runs at a time. A step is sent once, unless it was withdrawn and nothing of it was sent. No step
+follows a return or landing of a fallback. Chains only go forward, and a chain lapses when the next step is sent. The
+skill of a dispatch is that of its step or link in the bundle.
 """
 
 from rtshcua.evidence.finding import Flaw
@@ -16,7 +16,7 @@ from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP,
 
 
 def ref_words(ref: Ref) -> str:
-    """A step or link in words; the fields of the record where they are about neither."""
+    """Describe a step or link; the bare fields of the record if they are neither."""
     match ref:
         case Ref(kind=kind, step=step, link=-1) if kind == STEP and step >= 0:
             return step_words(step)
@@ -31,7 +31,7 @@ def ref_words(ref: Ref) -> str:
 
 
 def is_withdrawn(record: Effect) -> bool:
-    """Whether an effect says that nothing was sent of a step that was admitted, so that it may come again."""
+    """Whether an effect records that nothing was sent of an admitted step, so that the step may be sent later."""
     return record.event == "refused" and record.detail == WITHDRAWN
 
 
@@ -39,21 +39,21 @@ DISPATCHED = "dispatched"
 
 
 class DispatchCover:
-    """Follows permits through a log. What is kept is bounded by the steps and links of the bundle.
+    """Checks that each dispatch of a log has a permit. Its memory is bounded by the steps and links of the bundle.
 
-    An `allow` covers one dispatch of what it was asked for, up to its `valid_until_us`. The `allow` of a step covers
-    the links of its fallback chain and of the contingency too: these are standing permits.
+    An `allow` covers one dispatch of its step or link, up to its `valid_until_us`. The `allow` of a step also covers
+    the links of its fallback chain and of the contingency: these are standing permits.
     """
 
     def __init__(self) -> None:
-        self.recalled = False  # no step may be sent any more,
-        self.cancelled = False  # nor then
+        self.recalled = False  # then no step may be sent any more
+        self.cancelled = False  # likewise
         self.dispatches = 0
         self._until_us: dict[Ref, int] = {}
         self._standing: set[int] = set()
 
     def decided(self, record: DecisionRecord) -> None:
-        """Takes note of a decision that was derived again."""
+        """Record a decision that was derived again."""
         key = record.ref
         if record.outcome != "allow":
             self._until_us.pop(key, None)
@@ -63,12 +63,12 @@ class DispatchCover:
             self._standing.add(record.step)
 
     def withdrawn(self, record: Effect) -> None:
-        """Takes note of a step of which nothing was sent: its permit is good for nothing any more."""
+        """Record that a step was withdrawn: its permit is void."""
         self._until_us.pop(record.ref, None)
         self._standing.discard(record.step)
 
     def check(self, record: Effect) -> Flaw | None:
-        """What is wrong with an effect, or None."""
+        """Return a flaw if an effect is a dispatch without a valid permit, else None."""
         if record.event != DISPATCHED:
             return None
         self.dispatches += 1
@@ -82,11 +82,11 @@ class DispatchCover:
         if until_us is not None:
             if record.at_us <= until_us or self._stands(record):
                 return None
-            text = "it was sent when its permit was over"
+            text = "the command was sent after its permit expired"
             return Flaw("dispatch/late", text, f"{record.at_us} us", f"at most {until_us} us")
         if self._stands(record):
             return None
-        text = "it was sent without an earlier record that permits it"
+        text = "the command was sent without an earlier record that permits it"
         return Flaw("dispatch/not-permitted", text, ref_words(record.ref))
 
     def _stands(self, record: Effect) -> bool:
@@ -95,29 +95,29 @@ class DispatchCover:
         return record.kind == CONTINGENCY_LINK and bool(self._standing)
 
 
-#: effects that show that a command was sent
+#: effects that prove that a command was sent
 _SHOWS = ("obeyed", "succeeded")
-_REPLACED = "replaced"  # how a command ends in whose place another is sent; no step is sent in the place of a step
+_REPLACED = "replaced"  # a command that another one replaces; a step never replaces a step
 _HOMEWARD = (MotionKind.HOME, MotionKind.LAND)
 
 
 class DispatchOrder:
-    """Follows the commands of one log; what it keeps does not grow."""
+    """Checks the order of the dispatches of one log, in constant memory."""
 
     def __init__(self, basis: Basis) -> None:
         self._basis = basis
-        self._step = -1  # the last that was sent,
-        self._running: int | None = None  # and its token, while it runs
-        self._before = -1  # the one that was sent before it
-        self._last: Ref | None = None  # what was dispatched last,
-        self._shown = False  # and whether anything shows that it was sent
+        self._step = -1  # the last step that was sent
+        self._running: int | None = None  # its token, while it runs
+        self._before = -1  # the step that was sent before it
+        self._last: Ref | None = None  # the last dispatch
+        self._shown = False  # whether an effect proves that the last dispatch was sent
         self._fallback = (-1, DEGRADE - 1)  # the step whose chain was last in use, and the last link sent
         self._contingency = -1
-        self._homeward = False  # a link began a return or a landing,
-        self._final = False  # and it was one of the contingency
+        self._homeward = False  # a link began a return or a landing
+        self._final = False  # a link of the contingency did
 
     def check(self, record: Effect) -> Flaw | None:
-        """What is wrong with an effect, or None."""
+        """Return a flaw if an effect is a dispatch of the wrong skill or out of order, else None."""
         if record.event != DISPATCHED:
             if record.token == self._running and record.event != _REPLACED:
                 self._running = None
@@ -125,7 +125,7 @@ class DispatchOrder:
                 self._shown = True
             return None
         if record.detail not in self._skills(record):
-            text = "what was sent is not what stands there in the bundle"
+            text = "the skill that was sent is not that of the bundle"
             return Flaw("dispatch/other-skill", text, record.detail, " or ".join(self._skills(record)) or "nothing")
         flaw = self._check_step(record) if record.kind == STEP else self._check_link(record)
         if flaw is None:
@@ -133,11 +133,11 @@ class DispatchOrder:
         return flaw
 
     def withdrawn(self, record: Effect) -> Flaw | None:
-        """What is wrong with an effect that says that nothing was sent of a step, or None: then it may come again."""
+        """Return a flaw if a withdrawn step may have been sent; else None, and the step may be sent later."""
         dispatched = record.ref == self._last
         unsent = not self._shown and self._running is None if dispatched else record.step > self._step
         if record.kind != STEP or not unsent:
-            text = "a step may come again of which something may have been sent"
+            text = "a step was withdrawn although it may have been sent"
             return Flaw("dispatch/was-sent", text, _name(record))
         if dispatched:
             self._step, self._last = self._before, None
@@ -147,18 +147,18 @@ class DispatchOrder:
         if self._homeward:
             return Flaw("dispatch/mission-over", "a step was sent after a return or a landing began", _name(record))
         if self._running is not None or record.step <= self._step:
-            return Flaw("dispatch/out-of-turn", "a step was sent while another ran, or before it", _name(record))
+            return Flaw("dispatch/out-of-turn", "a step was sent out of order or while another ran", _name(record))
         return None
 
     def _check_link(self, record: Effect) -> Flaw | None:
         if record.kind == CONTINGENCY_LINK:
             backwards = self._final and record.link < self._contingency
         elif record.step < self._step:
-            return Flaw("dispatch/lapsed", "a link was sent whose step was over", _name(record))
+            return Flaw("dispatch/lapsed", "a link was sent after its step had ended", _name(record))
         else:
             step, last = self._fallback
             backwards = self._final or (record.step == step and record.link <= last)
-        text = "a link was sent after one that stands behind it"
+        text = "a link was sent after a later link of its chain"
         return Flaw("dispatch/backwards", text, _name(record)) if backwards else None
 
     def _follow(self, record: Effect) -> None:
@@ -177,7 +177,7 @@ class DispatchOrder:
             self._fallback = (record.step, record.link)
 
     def _skills(self, record: Effect) -> tuple[str, ...]:
-        """The names of the skills that may be sent as this step or link."""
+        """The skills that may be sent as this step or link."""
         policy, invocations = self._basis.policy.policy, self._basis.invocations
         if record.kind == CONTINGENCY_LINK:
             links = _nth(policy.contingency, record.link) if record.step == -1 else ()

@@ -1,6 +1,4 @@
-"""The documents of a log (approvals, recalls, replacements, cancellations): each is verified again, as of when it came,
-before it counts.
-"""
+"""Verifies the documents of a log (approvals, recalls, replacements, cancellations) as of the time of their receipt."""
 
 from typing import Final
 
@@ -20,8 +18,8 @@ DOCUMENT_KINDS: Final = {
 
 
 class DocumentAudit:
-    """Follows the documents that a log says were accepted. `counts` has how many there were of each kind, and `people`
-    who of the trust root's persons signed some of each, in the order in which they did.
+    """Verifies the documents that a log records as accepted. `counts` has their number by kind, and `people` the
+    persons of the trust root who signed them, in order.
     """
 
     def __init__(self, session: Session, root: TrustRoot) -> None:
@@ -31,7 +29,7 @@ class DocumentAudit:
         self.counts = dict.fromkeys(DOCUMENT_KINDS, 0)
 
     def check(self, record: Effect) -> Flaw | None:
-        """What is wrong with an effect, if it is a document."""
+        """Return a flaw if an effect is a document that is not valid, else None."""
         kind = DOCUMENT_KINDS.get(record.event)
         if kind is None:
             return None
@@ -41,9 +39,9 @@ class DocumentAudit:
         now = Now(record.at_us, record.utc_us, record.utc_error_us)
         receipt = self._session.take(document, now)
         if not receipt.accepted:
-            return Flaw(f"document/{receipt.slug}", f"the {record.event} was not to be trusted: {receipt.text}")
+            return Flaw(f"document/{receipt.slug}", f"the {record.event} is not trusted: {receipt.text}")
         if receipt.kind != kind or receipt.step != record.step:
-            return Flaw("document/other", f"the document is not the {record.event} that its record says it is")
+            return Flaw("document/other", f"the document is not the {record.event} that its record names")
         self.counts[record.event] += 1
         person, people = self._persons.get(cose.unverified(document).kid), self.people[record.event]
         if person is not None and person not in people:

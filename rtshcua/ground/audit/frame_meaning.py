@@ -1,18 +1,17 @@
-"""What a frame that we sent would have an autopilot do, and whether that is part of flying a command of the bundle: the
-auditor's own reading, written apart from the gate's.
+"""Classifies the frames that we sent, and decides whether a frame is part of flying a command of the bundle.
 
-Both read the same layouts and numbers, which tests compare with the dialect. Everything counts as a command that is not
-known to be harmless, so that a message nobody thought of is not overlooked. By autopilot and motion:
+This is the auditor's own implementation, independent of the gate's. Both use the same layouts and numbers, which tests
+compare with the dialect. A message that is not known to be harmless counts as a command. The frames of each motion:
 
 | motion | PX4 | ArduCopter |
 |---|---|---|
 | climb | mode Hold, arm, take off to the height above sea | mode GUIDED, arm, take off to the height above home |
 | fly, cover | reposition to a point of the path, at its height | mode GUIDED, speed, position target on the path |
-| hold | reposition to no place, height or heading, which stops it | mode BRAKE |
+| hold | reposition without place, height and heading, which stops it | mode BRAKE |
 | home | mode Return | mode RTL |
 | land | mode Land | mode LAND |
 
-Heights above sea are judged by what the vehicle reported of its home.
+Heights above sea are checked with the height of home that the vehicle reported.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -41,11 +40,11 @@ _QUESTIONS: Final = frozenset((
     layouts.PARAM_REQUEST_READ, layouts.PARAM_REQUEST_LIST, layouts.MISSION_REQUEST, layouts.MISSION_REQUEST_LIST,
     layouts.MISSION_REQUEST_INT, layouts.MISSION_ACK, layouts.TIMESYNC, layouts.STATUSTEXT,
 ))  # fmt: skip
-#: commands that only ask
+#: commands that only request information
 _ASKS: Final = frozenset(
     {enums.MAV_CMD_RUN_PREARM_CHECKS, enums.MAV_CMD_SET_MESSAGE_INTERVAL, enums.MAV_CMD_REQUEST_MESSAGE}
 )
-_AREAS: Final = 4  # a bit of FENCE_TYPE
+_AREAS: Final = 4  # the polygon bit of FENCE_TYPE
 
 
 _number: Final = LAYOUTS[COMMAND_LONG].getter("command")
@@ -60,16 +59,16 @@ _mission_types: Final = {
 
 
 class FrameNature(Enum):
-    """What kind of thing a frame is."""
+    """The class of a frame."""
 
     HARMLESS = auto()
-    FENCE = auto()  # harmless before the first command
-    SETTING = auto()  # a parameter, which a record has to list
+    FENCE = auto()  # part of a geofence: harmless before the first command
+    SETTING = auto()  # a parameter, which a record must list
     COMMAND = auto()
 
 
 class AuditedFrame(NamedTuple):
-    """A frame. `fields` are in the order of the wire, empty where its message is none of those that are read."""
+    """A frame. `fields` are in wire order; empty if the audit does not read its message."""
 
     system: int
     component: int
@@ -78,7 +77,7 @@ class AuditedFrame(NamedTuple):
 
 
 def read_frame(octets: bytes) -> AuditedFrame | None:
-    """What a frame says; None if the octets are no whole frame of MAVLink 2."""
+    """Decode a frame; None if the octets are not a complete MAVLink 2 frame."""
     if len(octets) < HEADER or octets[0] != MARKER or len(octets) < HEADER + octets[1]:
         return None
     _, length, _, _, _, system, component, low, high = HEAD.unpack_from(octets)
@@ -89,7 +88,7 @@ def read_frame(octets: bytes) -> AuditedFrame | None:
 
 
 def nature(frame: AuditedFrame) -> FrameNature:
-    """What kind of thing a frame of ours is."""
+    """Return the class of a frame that we sent."""
     fields = frame.fields
     if frame.message in _QUESTIONS:
         return FrameNature.HARMLESS
@@ -105,34 +104,32 @@ def nature(frame: AuditedFrame) -> FrameNature:
     if kind is None or kind(fields) != enums.MAV_MISSION_TYPE_FENCE:
         return FrameNature.COMMAND
     if frame.message == MISSION_ITEM_INT and _current(fields) != 0:
-        return FrameNature.COMMAND  # 2 and 3 are ArduPilot's "go there now"
+        return FrameNature.COMMAND  # 2 and 3 make ArduPilot fly there at once
     return FrameNature.FENCE
 
 
 def parameter_write(frame: AuditedFrame, autopilot: int) -> tuple[str, float]:
-    """Name and value in a PARAM_SET or PARAM_VALUE, as this autopilot has them."""
+    """The name and value in a PARAM_SET or PARAM_VALUE, in the encoding of this autopilot."""
     name, raw, kind = _parameters[frame.message](frame.fields)
     return name.rstrip(b"\0").decode("latin-1"), decode(raw, kind, bytewise=is_bytewise(autopilot))
 
 
 def switches_fence_on(name: str, value: float, types: float | None) -> bool:
-    """Whether this setting switches ArduPilot's fence on, and takes nothing from what its owner has in it: `types` is
-    the FENCE_TYPE that was told last, None before.
-    """
+    """Whether a parameter write only switches ArduPilot's fence on; `types` is the last reported FENCE_TYPE."""
     if name == "FENCE_TYPE":
         return isfinite(value) and value == (int(value) if types is None else int(types)) | _AREAS
     return (name, value) == ("FENCE_ENABLE", 1)
 
 
 def frame_words(frame: AuditedFrame) -> str:
-    """A frame in words, for a finding."""
+    """Describe a frame for a finding."""
     if frame.fields and frame.message in (COMMAND_LONG, COMMAND_INT):
         return f"command {frame.fields[LAYOUTS[frame.message].at('command')]}"
     return f"message {frame.message}"
 
 
 _TRAVELS: Final = frozenset({MotionKind.FLY, MotionKind.COVER})
-#: the modes (as parameters 2 and 3 of DO_SET_MODE) that an autopilot is put in, and for which motions
+#: the motions for which a mode is set, by autopilot and parameters 2 and 3 of DO_SET_MODE
 _MODES: Final = {
     (PX4, *Px4Mode.HOLD.parameters): frozenset({MotionKind.CLIMB}),
     (PX4, *Px4Mode.RETURN.parameters): frozenset({MotionKind.HOME}),
@@ -142,17 +139,17 @@ _MODES: Final = {
     (ARDUPILOT, *CopterMode.RTL.parameters): frozenset({MotionKind.HOME}),
     (ARDUPILOT, *CopterMode.LAND.parameters): frozenset({MotionKind.LAND}),
 }
-_ROUNDING: Final = 2  # mm, mm/s: what a 32-bit float loses
-_DATUM: Final = 2_000  # mm: by how much home's height above sea may have moved since it was last reported
-#: a DO_REPOSITION: its number, heights above the sea; and its flags: to Hold, or where it is in Hold
+_ROUNDING: Final = 2  # mm, mm/s: the rounding of a 32-bit float
+_DATUM: Final = 2_000  # mm: the tolerance of home's reported height above sea
+#: the number and frame (heights above sea) of a DO_REPOSITION, and its accepted flags
 _REPOSITION: Final = (enums.MAV_CMD_DO_REPOSITION, enums.MAV_FRAME_GLOBAL)
 _FLAGS: Final = (enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE, 0)
 
 
 class MotionTarget(NamedTuple):
-    """What a step or link of the bundle has the vehicle do.
+    """The motion of a step or link of the bundle.
 
-    `points` in 1e-7 degree; `altitude` in mm above home, `speed` in mm/s, 0 where it is the vehicle's own.
+    `points` in 1e-7 degree; `altitude` in mm above home, `speed` in mm/s, 0 for the vehicle's own.
     """
 
     kind: int
@@ -162,20 +159,20 @@ class MotionTarget(NamedTuple):
 
 
 class HomeHeights(NamedTuple):
-    """The lowest and the highest height above sea that home was reported at, in mm."""
+    """The lowest and highest reported height of home above sea, in mm."""
 
     low: int
     high: int
 
 
 def target_of_step(invocation: Invocation, policy: Policy) -> MotionTarget:
-    """What a step does."""
+    """The motion of a step."""
     plan = invocation.plan
     return MotionTarget(plan.kind, _points(plan.path, policy), plan.altitude, plan.speed)
 
 
 def target_of_link(link: Link, policy: Policy) -> MotionTarget:
-    """What a link of a chain, or the target of a degrade rule, does."""
+    """The motion of a link of a chain, or of the target of a degrade rule."""
     contract = policy.contracts[link.skill]
     motion = contract.motion
     altitude, speed = (link.arguments[cell] if cell >= 0 else 0 for cell in (motion.altitude, motion.speed))
@@ -184,7 +181,7 @@ def target_of_link(link: Link, policy: Policy) -> MotionTarget:
 
 
 def is_part_of(frame: AuditedFrame, target: MotionTarget, autopilot: int, home: HomeHeights | None) -> bool:
-    """Whether an autopilot that obeys the frame does what the target is, or a part of it."""
+    """Whether the frame makes an autopilot fly the target or a part of it."""
     if not frame.fields:
         return False
     if frame.message == COMMAND_LONG:
@@ -203,7 +200,7 @@ def is_part_of(frame: AuditedFrame, target: MotionTarget, autopilot: int, home: 
 def _repositions(fields: tuple[Any, ...], target: MotionTarget, home: HomeHeights | None) -> bool:
     speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
     if (number, reference, radius) != (*_REPOSITION, 0) or flags not in _FLAGS or not isnan(yaw):
-        return False  # it is another command, or has a circle or a heading of its own
+        return False  # another command, or with a loiter radius or a heading
     if target.kind == MotionKind.HOLD:
         return bool(x == y == enums.NO_PLACE and isnan(z) and speed == -1)
     wanted = _is_near(speed, target.speed) if target.speed else speed == -1
@@ -216,14 +213,14 @@ def _sets_mode(values: Sequence[Any], target: MotionTarget, autopilot: int, home
 
 
 def _arms(values: Sequence[Any], target: MotionTarget, autopilot: int, home: HomeHeights | None) -> bool:
-    return target.kind == MotionKind.CLIMB and values[0] == 1 and not any(values[1:])  # to arm, and not by force
+    return target.kind == MotionKind.CLIMB and values[0] == 1 and not any(values[1:])  # arm, without force
 
 
 def _takes_off(values: Sequence[Any], target: MotionTarget, autopilot: int, home: HomeHeights | None) -> bool:
     pitch, height = values[0], values[6]
     if target.kind != MotionKind.CLIMB:
         return False
-    if autopilot == PX4:  # where it is, turned as it is
+    if autopilot == PX4:  # at the current position, with the current heading
         here = (isnan(pitch) or not pitch) and not any(values[1:3]) and all(map(isnan, values[3:6]))
         return here and _above_sea(height, target, home)
     return not any(values[:6]) and _is_near(height, target.altitude)
@@ -231,11 +228,11 @@ def _takes_off(values: Sequence[Any], target: MotionTarget, autopilot: int, home
 
 def _changes_speed(values: Sequence[Any], target: MotionTarget, autopilot: int, home: HomeHeights | None) -> bool:
     wanted = target.kind in _TRAVELS and target.speed > 0 and _is_near(values[1], target.speed)
-    over_ground = values[0] == enums.SPEED_TYPE_GROUNDSPEED  # and the throttle as it is
+    over_ground = values[0] == enums.SPEED_TYPE_GROUNDSPEED
     return wanted and over_ground and values[2] == -1 and not any(values[3:])
 
 
-#: by the number of a COMMAND_LONG: whether it, with its parameters, is part of a motion
+#: whether a COMMAND_LONG with these parameters is part of a motion, by its number
 _COMMANDS: Final[Mapping[int, Callable[[Sequence[Any], MotionTarget, int, HomeHeights | None], bool]]] = {
     enums.MAV_CMD_DO_SET_MODE: _sets_mode,
     enums.MAV_CMD_COMPONENT_ARM_DISARM: _arms,
@@ -261,6 +258,6 @@ def _link_place(contract: Contract, link: Link) -> tuple[int, ...]:
 
 
 def _points(path: tuple[int, ...], policy: Policy) -> frozenset[tuple[int, int]]:
-    """Points that are local, in mm, as they are sent."""
+    """Convert local points in mm to the coordinates that are sent, in 1e-7 degree."""
     local = zip(path[::2], path[1::2], strict=True)
     return frozenset(unproject(policy.projection, x, y) for x, y in local)

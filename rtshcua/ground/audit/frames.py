@@ -1,19 +1,19 @@
-"""Evidence before effect, held against the raw frames: what we sent had a record first, and was what that permits.
+"""Checks evidence before effect with the raw frames: each frame that we sent follows a record that permits it.
 
-A frame of ours is one that the companion's component sent in a system of which an autopilot was heard; before any was
-heard, in every system. For whoever reaches the link can send the heartbeat of another system, nothing follows from one:
-frames of a companion like ours in another vehicle's system, heard over the same link, count as ours too. Each that is
-not harmless must be part of a command (`frame_meaning`) whose `dispatched` record is earlier and whose end is not.
-One that sets a parameter must be listed by a record before it, with its value, and the vehicle stand on the ground.
-Frames of others, which came over the same link, are theirs to answer for.
+A frame is ours if the companion component sent it in a system with a known autopilot, or in any system while no
+autopilot is known. Anyone on the link can send a heartbeat, so a heartbeat proves nothing: frames of another companion
+on the same link, in another vehicle's system, count as ours too. Every frame that is not harmless must be part of a
+command (`frame_meaning`) that was dispatched before it and has not ended. A frame that sets a parameter needs an
+earlier record that lists the parameter with this value, and the vehicle must be on the ground. Frames of other senders
+on the link are not checked.
 
-Where the boundary signs its own evidence, the commands among them are just those that passed its gate, in this order
-(`wire.boundary_chain`): each statement says how many there were, and their digest.
+If the boundary signs its own evidence, the commands must be exactly those that passed its gate, in this order
+(`wire.boundary_chain`): each statement has their number and digest.
 
-Frames carry UTC, records UTC too, both of one clock that never goes back: their order is exact, but for frames and
-records of the same microsecond, whose order among themselves nobody can tell and which count for either.
+Frames and records carry UTC from one clock that never goes back, so their order is exact. Frames and records of the
+same microsecond have no order: such a frame may belong to either side of the record.
 
-What is kept does not grow with the flight: for each system (there are 255) its autopilot, and the height of its home.
+Memory is constant: for each of the 255 systems its autopilot and the height of its home.
 """
 
 from collections.abc import Iterator
@@ -47,7 +47,7 @@ from rtshcua.mavlink.parameters import bits_of
 from rtshcua.wire.boundary_chain import START, after_frame
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, STEP
 
-#: who we are
+#: the component id of our frames
 OURS: Final = enums.MAV_COMP_ID_ONBOARD_COMPUTER
 
 _identity: Final = LAYOUTS[HEARTBEAT].getter("type autopilot")
@@ -63,7 +63,7 @@ class _Entry(NamedTuple):
 
 
 class _Suspect(NamedTuple):
-    """The first frame that nothing covers. `record` is the last record before it."""
+    """The first frame that no record permits. `record` is the last record before it."""
 
     frame: AuditedFrame
     number: int
@@ -81,44 +81,42 @@ class _Running(NamedTuple):
 
 
 class _Allowed(NamedTuple):
-    """What may be sent besides what is harmless: frames that do any of `targets`, parameters that are `listed`, and
-    those of the `fence`.
-    """
+    """The frames that may be sent, in addition to harmless ones: parts of `targets`, `listed` parameters, a `fence`."""
 
     targets: tuple[MotionTarget, ...] = ()
     listed: tuple[Listed, ...] = ()
     fence: bool = False
 
     def or_as(self, other: "_Allowed") -> "_Allowed":
-        """What either allows, each once."""
+        """Return what at least one of both allows."""
         targets, listed = {*self.targets, *other.targets}, {*self.listed, *other.listed}
         return _Allowed(tuple(targets), tuple(listed), self.fence or other.fence)
 
 
 class _Stated(NamedTuple):
-    """How many frames had passed the gate, their digest, and the record that says so."""
+    """The number of frames that passed the gate and their digest, according to a record."""
 
     passed: int
     digest: bytes
     record: int
 
 
-#: the slug of frames that are not those that passed the boundary's gate
+#: the slug of frames that differ from those that passed the boundary's gate
 OTHERS: Final = "boundary/frames"
 
 
 class _Passed:
-    """The commands among the frames, held against what the boundary stated. What is kept is bounded by an epoch."""
+    """Compares the commands among the frames with the boundary's statements. Memory is bounded by an epoch."""
 
     def __init__(self) -> None:
         self._count = 0
-        self._digests = {0: START}  # by how many there were, since the last statement
-        self._awaited: list[_Stated] = []  # of which not all frames came by
+        self._digests = {0: START}  # by the number of commands, since the last statement
+        self._awaited: list[_Stated] = []  # statements with frames that were not read yet
         self._last: _Stated | None = None
         self._final = False
 
     def frame(self, octets: bytes) -> Finding | None:
-        """One command more."""
+        """Add a command."""
         digest = after_frame(self._digests[self._count], octets)
         self._count += 1
         if self._last is not None:
@@ -128,17 +126,15 @@ class _Passed:
         return None
 
     def stated(self, stated: _Stated, *, final: bool) -> Finding | None:
-        """What the boundary signed next."""
+        """Add a statement of the boundary."""
         self._last, self._final = stated, final
         self._awaited.append(stated)
         return self._compared()
 
     def over(self) -> Finding | None:
-        """There are no more frames."""
+        """Return the finding about missing or additional commands after the last frame, or None."""
         if self._awaited:
-            text = (
-                f"{self._awaited[0].passed - self._count} frames that passed the boundary's gate by then are not there"
-            )
+            text = f"{self._awaited[0].passed - self._count} frames that passed the boundary's gate are missing"
             return Flaw(OTHERS, text).at(self._awaited[0].record)
         if self._last is not None and self._final and self._count > self._last.passed:
             text = f"{self._count - self._last.passed} commands were sent that did not pass the boundary's gate"
@@ -150,7 +146,7 @@ class _Passed:
             stated = self._awaited.pop(0)
             digest = self._digests.get(stated.passed)
             if digest != stated.digest:
-                text = "the commands among the frames are not those that passed the boundary's gate up to then"
+                text = "the commands among the frames are not those that passed the boundary's gate"
                 found = "" if digest is None else digest.hex()
                 return Flaw(OTHERS, text, found, stated.digest.hex()).at(stated.record)
             self._digests = {count: each for count, each in self._digests.items() if count >= stated.passed}
@@ -158,10 +154,10 @@ class _Passed:
 
 
 class FrameAudit:
-    """Follows a log and the frames that lie beside it, in step. `entries` are (UTC us, frame) as they were kept.
+    """Checks the frames beside a log, in parallel with its records. `entries` are pairs of UTC in us and frame.
 
-    `count` is how many frames of ours were commands, `begun` whether the log has any that was sent.
-    `DamagedTlog` or the like passes through from `entries`.
+    `count` is the number of our frames that were commands, `begun` whether the log has a dispatch. Exceptions of
+    `entries`, such as `DamagedTlog`, pass through.
     """
 
     def __init__(self, entries: Iterator[tuple[int, bytes]]) -> None:
@@ -170,31 +166,32 @@ class FrameAudit:
         self._next: _Entry | None = None
         self._over = False
         self._basis: Basis | None = None
-        self._autopilots: dict[int, int] = {}  # of each system that has one
-        self._kinds: dict[int, tuple[int, int]] = {}  # and its MAV_TYPE with that
+        # by system
+        self._autopilots: dict[int, int] = {}
+        self._kinds: dict[int, tuple[int, int]] = {}  # MAV_TYPE and autopilot
         self._homes: dict[int, HomeHeights] = {}
-        self._flying: dict[int, bool] = {}  # armed, as its last heartbeat said,
-        self._aloft: dict[int, bool] = {}  # or not on the ground
+        self._flying: dict[int, bool] = {}  # armed, according to its last heartbeat
+        self._aloft: dict[int, bool] = {}  # not on the ground
         self._types: dict[int, float] = {}  # FENCE_TYPE
         self._listed: tuple[Listed, ...] = ()  # the parameters that may be written
         self._running: _Running | None = None
-        self._latest: _Running | None = None  # what was dispatched last, whether it runs or not,
-        self._left: _Suspect | None = None  # and the first frame that carries it out
+        self._latest: _Running | None = None  # the last dispatch, running or not
+        self._left: _Suspect | None = None  # the first frame that is part of it
         self.begun = False
-        self._changed_us = -1  # when the last record was made,
-        self._before = _Allowed()  # and what was allowed until that moment, or since then until a later record of it
+        self._changed_us = -1  # the time of the last record
+        self._before = _Allowed()  # what was allowed before the records of that time
         self._record = 0
         self._suspect: _Suspect | None = None
         self._finding: Finding | None = None
         self._passed = _Passed()
 
     def begin(self, basis: Basis) -> None:
-        """The log was found to rest on this."""
+        """Set the basis of the log, once it is known."""
         self._basis = basis
 
     def happened(self, record: Effect, listed: tuple[Listed, ...] = ()) -> None:
-        """Takes note of an effect, in the order of the log, once it is known to be sound. `listed` are the parameters
-        that may be written from it on.
+        """Add an effect, in the order of the log, after it was checked. `listed` are the parameters that may be written
+        from then on.
         """
         if self._finding is not None:
             return
@@ -213,12 +210,12 @@ class FrameAudit:
         self._record = record.seq
 
     def stated(self, count: int, digest: bytes, record: Effect, *, final: bool) -> None:
-        """Takes note of what the boundary signed: so many commands passed its gate, of this digest."""
+        """Add a statement of the boundary: the number of commands that passed its gate, and their digest."""
         if self._finding is None:
             self._finding = self._passed.stated(_Stated(count, digest, record.seq), final=final)
 
     def over(self) -> Finding | None:
-        """The first frame that should not be, once the log is over."""
+        """Return the finding about the first frame that is not permitted, or None. Call it after the last record."""
         if self._finding is None:
             self._until(None)
             if self._suspect is not None:
@@ -228,15 +225,15 @@ class FrameAudit:
         return self._finding
 
     def _allowed(self, at_us: int | None = None) -> _Allowed:
-        """What may be sent now; with the moment of a frame, also what might be until that very moment."""
+        """Return what may be sent now; for a frame in the microsecond of the last record, also what might be before."""
         now = _Allowed(() if self._running is None else self._running.targets, self._listed, not self.begun)
         return now.or_as(self._before) if at_us == self._changed_us else now
 
     def _withdrawn(self, record: Effect) -> None:
-        """Nothing was sent of it, says the record; what would be, from this moment on, is not allowed."""
+        """A step was withdrawn: no frame of it may come before or after this record."""
         self._before = _Allowed()
         if self._left is not None:
-            text = "a frame carries out a step of which the log says that nothing was sent"
+            text = "a frame belongs to a step that the log records as not sent"
             self._finding = Flaw("frames/was-sent", text, _found(self._left)).at(record.seq)
 
     def _dispatched(self, record: Effect) -> None:
@@ -250,7 +247,7 @@ class FrameAudit:
         self.begun = True
 
     def _targets(self, record: Effect) -> tuple[MotionTarget, ...]:
-        """What the dispatch may have the vehicle do; several only for degrade rules, of which the record names none."""
+        """The motions that a dispatch allows; several for a degrade rule, because the record does not name the rule."""
         assert self._basis is not None
         policy, invocations = self._basis.policy.policy, self._basis.invocations
         links = policy.contingency
@@ -270,7 +267,7 @@ class FrameAudit:
         )
 
     def _until(self, utc_us: int | None) -> None:
-        """Judges the frames before a moment; all that are left, if there is none."""
+        """Check the frames before a time, or all remaining ones."""
         while True:
             entry = self._next or self._take()
             if entry is None:
@@ -289,20 +286,22 @@ class FrameAudit:
     def _judge(self, entry: _Entry) -> None:
         frame = read_frame(entry.octets)
         if frame is None:
-            return  # nothing that an autopilot would take for a frame
+            return  # an autopilot ignores it
         if frame.component == enums.MAV_COMP_ID_AUTOPILOT1:
             self._heard(frame)
         if frame.component != OURS or (self._autopilots and frame.system not in self._autopilots):
             return
-        what = nature(frame)
-        if what is FrameNature.HARMLESS:
+        kind = nature(frame)
+        if kind is FrameNature.HARMLESS:
             return
         allowed = self._allowed(entry.at_us)
-        if what is FrameNature.FENCE and allowed.fence:
-            return
-        if what is FrameNature.SETTING:
-            self._set(frame, entry, allowed)
-            return
+        if kind is FrameNature.SETTING:
+            self._judge_setting(frame, entry, allowed)
+        elif kind is FrameNature.COMMAND or not allowed.fence:
+            self._judge_command(frame, entry, allowed)
+
+    def _judge_command(self, frame: AuditedFrame, entry: _Entry, allowed: _Allowed) -> None:
+        """Check a command: it is part of what is allowed, and does not precede its record."""
         self.count += 1
         self._finding = self._finding or self._passed.frame(unsigned(entry.octets))
         if self._suspect is not None or self._finding is not None:
@@ -311,20 +310,20 @@ class FrameAudit:
         suspect = _Suspect(frame, entry.number, entry.at_us, self._record, running is not None)
         if not self._any(frame, allowed.targets):
             self._suspect = suspect
-        elif running is not None and entry.at_us < running.since_us:  # frames do not stand in the order of their times
+        elif running is not None and entry.at_us < running.since_us:  # frames are not sorted by time
             self._finding = _early(suspect, running.since_us, running.record)
-        elif self._left is None and self._carries_out_the_latest(frame, entry.at_us):
+        elif self._left is None and self._is_part_of_latest(frame, entry.at_us):
             self._left = suspect
 
-    def _carries_out_the_latest(self, frame: AuditedFrame, at_us: int) -> bool:
-        """Whether a frame is part of what was dispatched last, and of nothing that was allowed until that moment."""
+    def _is_part_of_latest(self, frame: AuditedFrame, at_us: int) -> bool:
+        """Whether a frame is part of the last dispatch, and not of what was allowed before it."""
         latest = self._latest
         if latest is None or not self._any(frame, latest.targets):
             return False
         return at_us > latest.since_us or (at_us == latest.since_us and not self._any(frame, latest.before))
 
-    def _set(self, frame: AuditedFrame, entry: _Entry, allowed: _Allowed) -> None:
-        """Judges a write of a parameter: it is listed, and the vehicle stands; or it switches a fence on, before."""
+    def _judge_setting(self, frame: AuditedFrame, entry: _Entry, allowed: _Allowed) -> None:
+        """Check a parameter write: it is listed and the vehicle is on the ground, or it switches the fence on."""
         parameter, value = parameter_write(frame, self._autopilots.get(frame.system, 0))
         is_listed = any((each.name, bits_of(each.value)) == (parameter, bits_of(value)) for each in allowed.listed)
         if not is_listed and allowed.fence and switches_fence_on(parameter, value, self._types.get(frame.system)):
@@ -334,16 +333,14 @@ class FrameAudit:
             return
         found = f"{parameter} {value:g} at {entry.at_us} us, frame {entry.number}"
         if not is_listed:
-            text = "a parameter was set that no record lists, or not with this value"
+            text = "a parameter was set, but no record lists it with this value"
             self._finding = Flaw("frames/unlisted-parameter", text, found).at(self._record)
         elif self._flying.get(frame.system) or self._aloft.get(frame.system):
-            text = "a parameter was set of a vehicle that was armed, or not on the ground"
+            text = "a parameter was set while the vehicle was armed or not on the ground"
             self._finding = Flaw("frames/parameter-in-flight", text, found).at(self._record)
 
     def _heard(self, frame: AuditedFrame) -> None:
-        """The first heartbeat in a system settles what its autopilot is; its positions tell how high home lies, other
-        messages whether it flies, and what its fence is.
-        """
+        """Read a message of an autopilot: its kind (from its first heartbeat), state, fence and height of home."""
         fields, system = frame.fields, frame.system
         if frame.message == HEARTBEAT and fields:
             kind, autopilot = _identity(fields)
@@ -376,9 +373,9 @@ def _early(suspect: _Suspect, utc_us: int, record: int) -> Finding:
 
 def _unrecorded(suspect: _Suspect) -> Finding:
     if suspect.running:
-        text = "a command was sent that is no part of what the record before it permits"
+        text = "a command was sent that is not part of what the preceding record permits"
         return Flaw("frames/other-command", text, _found(suspect)).at(suspect.record)
-    text = "a command was sent while no record permits any"
+    text = "a command was sent while no record permitted any"
     return Flaw("frames/unrecorded", text, _found(suspect)).at(suspect.record)
 
 

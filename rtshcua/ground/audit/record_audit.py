@@ -1,4 +1,4 @@
-"""What the records of a log mean together: each decision follows from its inputs, and each command from a record."""
+"""Checks the meaning of a log's records: each decision follows from its inputs, and each command from a record."""
 
 from rtshcua.decision.session import Session
 from rtshcua.evidence.finding import Flaw
@@ -14,7 +14,7 @@ UNENFORCED = "none"
 
 
 class RecordAudit:
-    """Takes the records of one log after its genesis, in order, in memory that the bundle bounds, not the log."""
+    """Checks the records of one log after its genesis, in order. Its memory is bounded by the bundle."""
 
     def __init__(self, basis: Basis, mode: str, frames: FrameAudit | None = None) -> None:
         self.mode = mode
@@ -31,21 +31,21 @@ class RecordAudit:
 
     @property
     def dispatches(self) -> int:
-        """How many commands were sent."""
+        """The number of commands that were sent."""
         return self._cover.dispatches
 
     @property
     def documents(self) -> dict[str, int]:
-        """How many documents of each kind were verified."""
+        """The number of verified documents by kind."""
         return self._documents.counts
 
     @property
     def people(self) -> dict[str, list[str]]:
-        """Who signed documents of each kind, by the names that the trust root has for them."""
+        """The names in the trust root of those who signed documents, by kind."""
         return self._documents.people
 
     def check(self, record: AnyRecord) -> Flaw | None:
-        """What is wrong with the next record, or None."""
+        """Return a flaw in the next record, or None."""
         if isinstance(record, DecisionRecord):
             return self._decided(record)
         if isinstance(record, Effect):
@@ -54,7 +54,7 @@ class RecordAudit:
 
     def _decided(self, record: DecisionRecord) -> Flaw | None:
         if record.mode != self.mode:
-            text = "the decision was made in another mode than the log began in"
+            text = "the mode of the decision is not that of the log's beginning"
             return Flaw("decision/mode", text, record.mode, self.mode)
         flaw = self._deriver.check(record)
         if flaw is None:
@@ -77,7 +77,7 @@ class RecordAudit:
     def _withdrawn(self, record: Effect) -> Flaw | None:
         flaw = self._turns.withdrawn(record)
         if flaw is None and not self._session.give_back(record.step):
-            text = "a step may come again that is not the one that was admitted last"
+            text = "a step was withdrawn that is not the last admitted one"
             flaw = Flaw("dispatch/was-sent", text, ref_words(record.ref))
         if flaw is None:
             self._cover.withdrawn(record)

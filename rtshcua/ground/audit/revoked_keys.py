@@ -1,15 +1,15 @@
-"""Keys that were revoked since a log began: told by newer trust roots, which the auditor gives.
+"""Checks a log for keys that newer trust roots revoke. The auditor supplies these roots.
 
-A log carries the trust root of its time and is judged by that one; what came later it cannot know. A key is revoked
-when the first root that has it among its revoked ones is issued. What it signed
+A log carries the trust root of its time and is verified with that root; it cannot contain later revocations. A key is
+revoked when the first root that lists it as revoked is issued. What the key signed
 
-- before, counts as it did, and it is told that the key was revoked since;
-- after, is not to be trusted: the vehicle had not been told, or it was signed by whoever took the key;
-- at a time that may be either, makes the log incomplete.
+- before that is valid, and the report says that the key was revoked since;
+- after that is not trusted: the vehicle did not have the newer root, or another holder of the key signed it;
+- at a time that may be before or after makes the log incomplete.
 
-A log's times are what its log key vouches for, so of a log whose log key was revoked they count for nothing: it is
-incomplete, unless witnesses saw it to its end before. A trust root of a revoked root key counts where the auditor gives
-that very root, and else not at all.
+The log key vouches for the times of a log. If the log key was revoked, the times prove nothing: the log is incomplete,
+unless witnesses cosigned its end before the revocation. A trust root that a revoked root key signed is accepted only if
+the auditor supplies this root.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -33,7 +33,7 @@ _S: Final = 1_000_000  # us
 
 
 class Revocation(NamedTuple):
-    """By which version of the root a key was revoked: from `early_us` on at the earliest, from `late_us` on surely."""
+    """The version of the root that revoked a key, and the earliest and latest time of the revocation."""
 
     version: int
     early_us: int
@@ -41,7 +41,7 @@ class Revocation(NamedTuple):
 
 
 class KeyUse(NamedTuple):
-    """What a key signed, in which record, and between which times that was here; `document`: in flight."""
+    """What a key signed, in which record, and the earliest and latest time; `document` means a document in flight."""
 
     what: str
     kid: bytes
@@ -52,19 +52,19 @@ class KeyUse(NamedTuple):
 
 
 class RevokedKeys:
-    """Takes the records of a log that is audited, and judges it by signed trust roots that were given, in any order.
+    """Checks the records of an audited log against signed trust roots, given in any order.
 
-    Each is trusted for being given. Raises `Untrusted` for what is no trust root.
+    Each root is trusted because the auditor supplies it. Raises `Untrusted` for data that is not a trust root.
     """
 
     def __init__(self, roots: Iterable[bytes]) -> None:
         self._roots = {signed: _opened(signed) for signed in roots}
         self._documents: list[KeyUse] = []
-        self._statements: dict[bytes, KeyUse] = {}  # of each boundary key the last
+        self._statements: dict[bytes, KeyUse] = {}  # the last one of each boundary key
         self._read = False
 
     def take(self, record: AnyRecord) -> None:
-        """One sound record. Whether a document or a statement in it is one is for the audit to say."""
+        """Add a valid record. The audit verifies the document or statement in it."""
         self._read = True
         if not self._roots or not isinstance(record, Effect) or record.event not in (*DOCUMENT_KINDS, BOUNDARY):
             return
@@ -77,7 +77,7 @@ class RevokedKeys:
             self._documents.append(KeyUse(f"the {record.event}", kid, record.seq, *times, document=True))
 
     def judged(self, audit: Audit) -> Audit:
-        """The audit, with what was revoked since. One that failed stays as it is."""
+        """Return the audit with the revocations applied. A failed audit is returned unchanged."""
         report, basis, genesis = audit.report, audit.basis, audit.report.genesis
         if report.failure is not None or basis is None or genesis is None:
             return audit
@@ -87,22 +87,22 @@ class RevokedKeys:
         given = {data: root for data, root in self._roots.items() if data != signed}
         revoked = _revocations(tuple(given.values()), own)
         if not revoked and all(root.version <= own.version for root in given.values()):
-            return audit  # nothing newer was given
+            return audit  # no newer root was supplied
         flaw = self._unknown_root(signed, revoked) or next(_after(self._uses(genesis), revoked), None)
         if flaw is not None:
             return audit._replace(report=failing(report, flaw))
-        later, doubts = self._told(report, genesis, own, revoked)
-        proven, unproven = (
-            _lineage(signed, given, " and documents" * self._read) if not later and not doubts else ([], later)
-        )
-        told = report._replace(proven=(*report.proven, *proven), unproven=(*report.unproven, *unproven))
-        if doubts:
-            others = tuple(Claim(each.slug, each.text) for each in doubts[report.shortfall is None :])
-            told = told._replace(shortfall=report.shortfall or doubts[0], unproven=(*told.unproven, *others))
-        return audit._replace(report=told)
+        proven: list[Claim] = []
+        unproven, doubts = self._later_revocations(report, genesis, own, revoked)
+        if not unproven and not doubts:
+            proven, unproven = _lineage(signed, given, " and documents" * self._read)
+        shortfall = report.shortfall or next(iter(doubts), None)
+        unproven += [Claim(each.slug, each.text) for each in doubts if each is not shortfall]
+        proven, unproven = [*report.proven, *proven], [*report.unproven, *unproven]
+        report = report._replace(proven=tuple(proven), unproven=tuple(unproven), shortfall=shortfall)
+        return audit._replace(report=report)
 
     def _uses(self, genesis: Genesis) -> list[KeyUse]:
-        """What the keys of a log that was trusted signed; that of the log's own comes first."""
+        """What the keys of a trusted log signed, beginning with the log key."""
         data = octets(genesis.bundle)
         assert data is not None
         policy, mission = envelopes(data)
@@ -121,36 +121,32 @@ class RevokedKeys:
         if by is None or signed in self._roots:
             return None
         text = (
-            f"{_by(kid, by)}, and it signed the log's trust root, which is none of those that you gave: whoever took "
-            "that key can sign roots for any log"
+            f"{_by(kid, by)}, and it signed the log's trust root, which is not among the supplied roots: a holder of "
+            "the key can sign a root for any log"
         )
         return Finding("trust/root-revoked-key", 0, text, kid.hex())
 
-    def _told(
+    def _later_revocations(
         self, report: LogReport, genesis: Genesis, own: TrustRoot, revoked: Mapping[bytes, Revocation]
     ) -> tuple[list[Claim], list[Finding]]:
-        """What was revoked after it signed, and what may have been revoked before."""
+        """Return claims about keys that were revoked after they signed, and findings about those that are uncertain."""
         later: list[Claim] = []
         doubts: list[Finding] = []
         for use in self._uses(genesis):
             by = revoked.get(use.kid)
             if by is None:
                 continue
-            own_word = use.kid.hex() == genesis.log_kid
-            late_us = _witnessed_us(report, own, revoked) if own_word else use.late_us
+            is_log_key = use.kid.hex() == genesis.log_kid
+            late_us = _witnessed_us(report, own, revoked) if is_log_key else use.late_us
             if late_us is not None and late_us < by.early_us:
                 later.append(
                     Claim("revoked", f"that nobody else held the key that signed {use.what}: {_by(use.kid, by)}")
                 )
-            elif own_word:
-                text = (
-                    f"{_by(use.kid, by)}, and no witness saw before that what it signed: {use.what}, with all its times"
-                )
+            elif is_log_key:
+                text = f"{_by(use.kid, by)}, and no witness cosigned {use.what} before that: its times prove nothing"
                 doubts.append(Finding("trust/revoked-log-key", use.record, text, use.kid.hex()))
             else:
-                text = (
-                    f"{_by(use.kid, by)} or one before, and it signed {use.what}: whether before or after is not known"
-                )
+                text = f"{_by(use.kid, by)} or earlier, and it signed {use.what}, before or after that"
                 doubts.append(Finding("trust/revoked-when", use.record, text, use.kid.hex()))
         return later, doubts
 
@@ -168,8 +164,10 @@ def _between(utc_us: int, error_us: int) -> tuple[int, int]:
 
 
 def _revocations(roots: Sequence[TrustRoot], own: TrustRoot) -> dict[bytes, Revocation]:
-    """What these roots revoke and the log's own does not, with when. Where one between is not known, that is not exact;
-    where the log's own is no older, it should have known.
+    """Return the keys that these roots revoke and the log's own root does not, with the times of revocation.
+
+    A missing version in between makes the earliest time inexact. If the log's own root is not older than the revoking
+    one, the key counts as revoked from the beginning.
     """
     found: dict[bytes, Revocation] = {}
     for root in sorted(roots, key=lambda each: each.version):
@@ -185,17 +183,17 @@ def _revocations(roots: Sequence[TrustRoot], own: TrustRoot) -> dict[bytes, Revo
 
 
 def _after(uses: Iterable[KeyUse], revoked: Mapping[bytes, Revocation]) -> Iterator[Finding]:
-    """What was signed by a key that was revoked already."""
+    """Yield a finding for each use of a key after its revocation."""
     for use in uses:
         by = revoked.get(use.kid)
         if by is not None and use.early_us >= by.late_us:
             slug = "document/revoked-key" if use.document else "trust/revoked-key"
-            text = f"{_by(use.kid, by)}, and it signed {use.what} after that: whoever flew had not been told"
+            text = f"{_by(use.kid, by)}, and it signed {use.what} after that: the vehicle did not have this root"
             yield Finding(slug, use.record, text, use.kid.hex())
 
 
 def _witnessed_us(report: LogReport, own: TrustRoot, revoked: Mapping[bytes, Revocation]) -> int | None:
-    """When the threshold of witnesses, revoked ones apart, had seen a log to its end; None where it had not."""
+    """The time when enough witnesses, without revoked ones, had cosigned the end of a log; None if too few did."""
     if report.outside is None:
         return None
     gone = {key.public for key in own.keys if key.kid in revoked}
@@ -210,14 +208,14 @@ def _by(kid: bytes, by: Revocation) -> str:
 
 
 def _lineage(signed: bytes, roots: Mapping[bytes, TrustRoot], also: str) -> tuple[list[Claim], list[Claim]]:
-    """That the newest of some roots follows from a log's, and revokes nothing that signed there; or that it may not."""
+    """Return the claim, proven or unproven, that the newest root succeeds the log's root and revokes no key of it."""
     chain = sorted(roots, key=lambda data: roots[data].version)
     newest = roots[chain[-1]]
     try:
         follow(chain, current=signed, now_us=0)
     except Untrusted as error:
-        text = f"that root version {newest.version} is of those who flew: it does not follow from the log's: {error}"
+        text = f"that root version {newest.version} succeeds the log's root: {error}"
         return [], [Claim("revocations", text)]
     text = f"root version {newest.version} of {utc_of(newest.issued_at_us // _S)} revokes none of the keys that "
-    text += f"signed log, policy, mission{also}"
+    text += f"signed the log, the policy, the mission{also}"
     return [Claim("revocations", text)], []

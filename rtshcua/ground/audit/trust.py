@@ -1,4 +1,4 @@
-"""What a log rests on: the trust root under the pinned key, the bundle under that root, and the log key's duty."""
+"""The basis of a log: the trust root under the pinned key, the bundle under that root, and the log key's duty."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from rtshcua.wire.untrusted import Untrusted
 
 
 class Basis(NamedTuple):
-    """What the decisions of a log are derived from."""
+    """The trust root, policy and mission from which the decisions of a log are derived."""
 
     root: TrustRoot
     policy: PreparedPolicy
@@ -24,27 +24,27 @@ class Basis(NamedTuple):
 
     @property
     def bundle(self) -> Bundle:
-        """The bundle; after a replacement, with the mission that was in force at the end."""
+        """The bundle; after a replacement, with the mission in force."""
         return self.in_force.bundle
 
     @property
     def invocations(self) -> tuple[PreparedInvocation, ...]:
-        """The invocations of the mission that is in force."""
+        """The invocations of the mission in force."""
         return self.in_force.invocations
 
 
 def establish(genesis: Genesis, pinned: bytes, *, bundle: bytes | None = None) -> Basis | Flaw:
-    """The basis of a log, or what is not to be trusted about it.
+    """Return the basis of a log, or the flaw because of which it is not trusted.
 
-    `pinned` is the root's public key (32 bytes) or its `kid` (16 bytes). Everything is judged as of the genesis' UTC:
-    what has expired since was good when it flew. `bundle` is what the log should be of, where the caller knows.
+    `pinned` is the root's public key (32 bytes) or its `kid` (16 bytes). Validity is checked at the UTC of the genesis,
+    so a later expiry does not matter. `bundle` is the expected bundle, if known.
     """
     trusted = _trusted(genesis, pinned)
     if isinstance(trusted, Flaw):
         return trusted
     root, opened = trusted
     if bundle not in (None, octets(genesis.bundle)):
-        return Flaw("genesis/other-bundle", "the log is of another bundle than the one that lies beside it")
+        return Flaw("genesis/other-bundle", "the log is not of the expected bundle")
     prepared = _prepared(genesis, pinned)
     if isinstance(prepared, Flaw):
         return prepared
@@ -54,14 +54,14 @@ def establish(genesis: Genesis, pinned: bytes, *, bundle: bytes | None = None) -
     return Basis(root, policy, in_force)
 
 
-# A log that is asked several things (by the quick verifier and then the careful one, for one proof and the next) says
-# the same at its beginning each time: opening its bundle takes longer than reading a short log.
+# The quick verifier, the careful one and each proof open the same genesis, and opening its bundle takes longer than
+# reading a short log.
 _kept = lru_cache(maxsize=8)
 
 
 @_kept
 def _trusted(genesis: Genesis, pinned: bytes) -> tuple[TrustRoot, Bundle] | Flaw:
-    """The root and the bundle in a genesis, if they are to be trusted."""
+    """Return the root and the bundle in a genesis, if they are trusted."""
     root, data = rooted(genesis, pinned), octets(genesis.bundle)
     if isinstance(root, Flaw):
         return root
@@ -69,12 +69,12 @@ def _trusted(genesis: Genesis, pinned: bytes) -> tuple[TrustRoot, Bundle] | Flaw
     try:
         return root, open_bundle(data, root=root, vehicle=genesis.vehicle, now_us=genesis.utc_us)
     except Untrusted as error:
-        return Flaw(f"trust/bundle-{error.slug}", f"the bundle is not to be trusted: {error}")
+        return Flaw(f"trust/bundle-{error.slug}", f"the bundle is not trusted: {error}")
 
 
 @_kept
 def _prepared(genesis: Genesis, pinned: bytes) -> tuple[PreparedPolicy, tuple[PreparedInvocation, ...]] | Flaw:
-    """Policy and mission of such a bundle, compiled."""
+    """Return the prepared policy and mission of the bundle in a genesis."""
     trusted = _trusted(genesis, pinned)
     if isinstance(trusted, Flaw):
         return trusted
@@ -85,8 +85,8 @@ def _prepared(genesis: Genesis, pinned: bytes) -> tuple[PreparedPolicy, tuple[Pr
         )
     policy = prepare(bundle.policy)
     if isinstance(policy, Refusal):
-        return Flaw("trust/bundle-malformed", f"the bundle's policy makes no sense: {policy.text}")
+        return Flaw("trust/bundle-malformed", f"the bundle's policy is invalid: {policy.text}")
     invocations = prepare_mission(bundle.mission, policy)
     if isinstance(invocations, Refusal):
-        return Flaw("trust/bundle-malformed", f"the bundle's mission makes no sense: {invocations.text}")
+        return Flaw("trust/bundle-malformed", f"the bundle's mission is invalid: {invocations.text}")
     return policy, invocations

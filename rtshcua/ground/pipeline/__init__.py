@@ -1,1 +1,1 @@
-"""From sources to what is signed: what is imported, checked, proved, compiled, tested and pinned, in that order."""
+"""The compiler pipeline: imports, checks, proofs, lowering, the test suite, pins and signing."""

@@ -1,7 +1,7 @@
-"""What a policy is made of: the declarations in its own file and in all that this file imports.
+"""The files of a policy: its own file and everything that this file imports.
 
-A mission may bring declarations of its own, but nothing that it brings may speak in the policy's name: the policy is
-signed on its own, and is the same for every mission under it.
+A mission may have declarations of its own, but they do not change the policy: the policy is signed separately and is
+the same for every mission under it.
 """
 
 import posixpath
@@ -12,14 +12,14 @@ from rtshcua.model.ir.program import Import, Unit
 
 
 class Imports:
-    """The files of a program by what they import."""
+    """The import graph of a program's files."""
 
     def __init__(self, units: Sequence[Unit], stable: Mapping[str, str]) -> None:
         self._units = {unit.file: unit for unit in units}
         self._by_stable = {stable.get(unit.file, unit.file): unit.file for unit in units}
 
     def closure(self, file: str) -> frozenset[str]:
-        """A file and everything that it imports, directly or not."""
+        """A file and everything that it imports, directly or indirectly."""
         seen = {file}
         waiting = [file]
         while waiting:
@@ -30,7 +30,7 @@ class Imports:
         return frozenset(seen)
 
     def target(self, file: str, each: Import) -> str | None:
-        """The file of the program that an import of `file` means."""
+        """Return the file of the program to which an import of `file` refers; None if there is none."""
         pack = pack_of(each.path)
         if pack is not None:
             inside = posixpath.normpath(each.path.removeprefix(f"{pack}:").lstrip("/"))
@@ -49,7 +49,7 @@ class Imports:
 
 
 def beside(name: str, other: str) -> str:
-    """The stable name of a file as seen from the folder of another, so that it does not depend on who asked first."""
+    """The stable name of a file relative to the folder of another, so that it does not depend on the importing file."""
     if pack_of(name) is not None or pack_of(other) is not None:
         return name
     parts, folder = name.split("/"), other.split("/")[:-1]

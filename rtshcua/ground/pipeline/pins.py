@@ -1,7 +1,8 @@
-"""E0905, E0906: whose mission it is, and under which policy, is for whoever compiles to say, never for its text.
+"""Pins: the source, role and policy of a mission that the person who compiles it sets.
 
-What a mission says of its own source, role and policy is a claim. A mission specification comes from an agent, so its
-source is `agent` unless whoever compiles it says otherwise, and its policy is the one that they name or hand in.
+The source, role and policy in the text of a mission are claims, which are checked against the pins. A mission
+specification comes from an agent, so its source is `agent` unless the command line sets another one, and its policy is
+the one that the command line names or supplies.
 """
 
 from collections.abc import Iterable, Iterator
@@ -18,9 +19,9 @@ from rtshcua.model.ir.node import Name
 
 
 class Pins(NamedTuple):
-    """What whoever compiles a mission says of it; None leaves it to the mission.
+    """What the command line sets for a mission; None accepts the mission's own claim.
 
-    `policies` are the names of which its policy must be one; none at all where nobody named any.
+    The mission's policy must be one of `policies`; an empty set means that no policy was named.
     """
 
     source: str | None = None
@@ -29,38 +30,38 @@ class Pins(NamedTuple):
     version: int | None = None
 
 
-#: what holds of a specification that nobody said more about
+#: the pins of a specification if nothing else is set
 PROPOSED = Pins(source="agent")
 
 
 def claims(mission: MissionDecl, pins: Pins) -> Iterator[Diagnostic]:
-    """What a mission claims beyond what is pinned."""
+    """Yield a finding for each claim of a mission that contradicts a pin."""
     for word, name, pinned in (("source", mission.source, pins.source), ("role", mission.role, pins.role)):
         if name is not None and pinned is not None and name.text != pinned:
-            text = f"says that its {word} is `{name.text}`, and is compiled as `{pinned}`"
-            yield _claim(name, text, _either(word, name.text, pinned))
+            help = f"write `{pinned}` in the mission, or compile with `--{word} {name.text}`"
+            yield _claim(name, f"claims the {word} `{name.text}` but is compiled as `{pinned}`", help)
     policy, allowed = mission.policy, pins.policies
     if allowed is not None and not allowed:
         yield Diagnostic(
             codes.POLICY_NOT_NAMED,
-            f"nothing but the mission itself says that it flies under `{policy.text}`",
+            f"the policy `{policy.text}` is named by the mission only",
             policy.span,
-            f"whoever compiles it names the policy: `--policy {policy.text}`, or `--with` and its source",
+            f"name the policy on the command line: `--policy {policy.text}`, or `--with` and its source",
         )
     elif allowed is not None and policy.text not in allowed:
         names = " or ".join(f"`{each}`" for each in sorted(allowed))
-        text = f"says that it flies under `{policy.text}`, and is compiled for {names}"
-        yield _claim(policy, text, f"write {names}")
+        yield _claim(policy, f"names the policy `{policy.text}` but is compiled for {names}", f"write {names}")
     elif pins.version is not None and mission.policy_version != pins.version:
         named = f"`{policy.text}@{mission.policy_version}`"
-        text = f"says that it flies under {named}, and is compiled for version {pins.version}"
+        text = f"names the policy {named} but is compiled for version {pins.version}"
         yield _claim(policy, text, f"write `{policy.text}@{pins.version}`")
 
 
 def undeclared(pins: Pins, declared: frozenset[tuple[str, int]], found: Iterable[Diagnostic]) -> Refusal | None:
-    """Why the policy that whoever compiles named is none of those `declared` (name and version): a slip in an option is
-    no fault of the mission. None where it is one of them, and where errors other than a claim may have kept its source
-    from being read.
+    """Return a refusal if the pinned policy is not one of those `declared` (name and version).
+
+    Then the option is wrong, not the mission. None if the policy is declared, or if other errors may have kept its
+    source from being read.
     """
     claimed = (codes.CLAIMED_AUTHORITY, codes.POLICY_NOT_NAMED)
     if not pins.policies or has_errors(each for each in found if each.code not in claimed):
@@ -70,17 +71,12 @@ def undeclared(pins: Pins, declared: frozenset[tuple[str, int]], found: Iterable
         return None
     word = min(pins.policies)
     if versions:
-        help = f"the sources declare `{word}@{versions[-1]}`; `--with` hands in the source of another"
+        help = f"the sources declare `{word}@{versions[-1]}`; use `--with` to add another source"
         return Refusal("usage", f"there is no policy `{word}@{pins.version}`", help)
     names = sorted({name for name, _ in declared})
     near = nearest(word, names)
-    known = f"the sources declare {listed(names) or 'none'}; `--with` hands in the source of another"
+    known = f"the sources declare {listed(names) or 'none'}; use `--with` to add another source"
     return Refusal("usage", f"there is no policy `{word}`", f"did you mean `--policy {near}`?" if near else known)
-
-
-def _either(word: str, claimed: str, pinned: str) -> str:
-    """Which of both is wrong nobody knows here: a slip in an option, or a claim that goes too far."""
-    return f"if `--{word} {pinned}` is what you mean, write `{pinned}`; else `--{word} {claimed}` is for you to say"
 
 
 def _claim(name: Name, text: str, help: str) -> Diagnostic:
@@ -88,7 +84,7 @@ def _claim(name: Name, text: str, help: str) -> Diagnostic:
 
 
 def policies_of(program: Program, files: frozenset[str]) -> frozenset[str]:
-    """The policies that sources declare; where they declare none, those that they import."""
+    """The policies that the files declare; if they declare none, those that they import."""
     own = _declared(program, files)
     if own or not files:
         return own

@@ -1,4 +1,4 @@
-"""A whole program: check every declaration, lower every policy and mission, and hand out the one that was asked for."""
+"""Compiles a whole program: checks every declaration, and lowers and proves every policy and mission."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -35,16 +35,16 @@ from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.places import VehicleDecl
 from rtshcua.model.ir.policies import PolicyDecl
 
-#: findings that leave out a whole file
+#: findings that exclude a whole file
 FILE_CODES = frozenset({codes.NO_SUCH_FILE, codes.NOT_TEXT, codes.TOO_LARGE, codes.IMPORT_PATH})
 
 
 @dataclass(frozen=True, slots=True)
 class Compiled:
-    """A flat policy and mission, both None where there are errors; the mission is not yet bound to the policy.
+    """A flat policy and mission, both None if there are errors; the mission is not yet bound to the policy.
 
-    `bounds` is what the mission takes at most; `sources` are the texts that findings speak of, the program's and what
-    was given for the mission's parameters; `declared` are all policies of the program, by name and version.
+    `bounds` are the upper bounds of the mission. `sources` are the texts of the program and of the mission's parameter
+    settings, to which findings refer. `declared` are all policies of the program, by name and version.
     """
 
     policy: Policy | None
@@ -56,7 +56,7 @@ class Compiled:
 
 
 class PlannedMission(NamedTuple):
-    """A mission whose way is planned, whatever else is wrong with it, and the policy that it is under."""
+    """A mission with its planned path, and its policy. The mission may have errors."""
 
     under: LoweredPolicy
     mission: Mission
@@ -65,15 +65,16 @@ class PlannedMission(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Checked:
-    """All findings on a program, and by name what each mission takes at most, with any values of its parameters;
-    without errors also its policies, for each vehicle that it has missions for. `planned` are the missions as they were
-    first lowered, with the defaults of their parameters, with errors too.
+    """The findings of a program, and the upper bounds of each mission by name, over all values of its parameters.
+
+    `policies` are the lowered policies for each vehicle with a mission, if there are no errors. `planned` are the
+    missions with the defaults of their parameters, even if there are errors.
     """
 
     diagnostics: tuple[Diagnostic, ...]
     bounds: Mapping[str, Bounds]
     policies: tuple[LoweredPolicy, ...] = ()
-    grounds: tuple[ProofContext, ...] = ()  # the same, prepared as on board, with what was asked about them
+    grounds: tuple[ProofContext, ...] = ()  # the policies, prepared as on board, with the state of their proofs
     planned: tuple[PlannedMission, ...] = ()
 
 
@@ -86,10 +87,10 @@ def compile_program(
     settings: ParameterSettings | None = None,
     pins: Pins | None = None,
 ) -> Compiled:
-    """Compile one mission (None: the only one of the file that was asked for) and the policy that it is under.
+    """Compile one mission (None: the only one of the first file) and its policy.
 
-    `settings` are values for that mission's parameters; what it claims beyond `pins` is a finding. All declarations are
-    checked, and all missions. Never raises for what the sources say.
+    `settings` are values for that mission's parameters. A claim that contradicts `pins` is a finding. All declarations
+    and all missions are checked. Errors in the sources become findings, never exceptions.
     """
     settings = settings or ParameterSettings()
     candidates = _candidates(program)
@@ -108,19 +109,19 @@ def compile_program(
 
 
 def check_program(program: Program, dialect: Dialect) -> tuple[Diagnostic, ...]:
-    """All findings on a program, which need not have a mission."""
+    """Return all findings of a program, with or without missions."""
     return examine_program(program, dialect).diagnostics
 
 
 def check_declared(program: Program, dialect: Dialect) -> tuple[Diagnostic, ...]:
-    """The findings on declarations alone, without lowering or proofs: for an editor, which asks at every keystroke."""
+    """Return the findings on declarations, without lowering or proofs: fast enough for an editor at every keystroke."""
     run = Compilation(program, dialect, 0)
     run.check()
     return run.diagnostics()
 
 
 def examine_program(program: Program, dialect: Dialect, issued_at_us: int = 0) -> Checked:
-    """All findings on a program, and the bounds of its missions; as if they were issued at a time, if one is given."""
+    """Return all findings of a program and the bounds of its missions, with the missions issued at a UTC time in us."""
     run = Compilation(program, dialect, issued_at_us)
     run.check()
     run.lowered(None)
@@ -134,14 +135,15 @@ def examine_program(program: Program, dialect: Dialect, issued_at_us: int = 0) -
 
 
 def _candidates(program: Program) -> list[MissionDecl]:
-    """The missions of which one is meant where none is named: those of the first file, or else all."""
+    """The missions to choose from if none is named: those of the first file, or else all."""
     first = list(program.units[0].missions) if program.units else []
     return first or [mission for unit in program.units for mission in unit.missions]
 
 
 class Compilation:
-    """One compilation: `check` first, then what is asked of it, then `diagnostics`. `issues` has, of missions by their
-    names, other times of issue than that of all.
+    """One compilation. Call `check` first, then the other methods, then `diagnostics`.
+
+    `issues` are the times of issue of missions, by name, that differ from `issued_at_us`.
     """
 
     def __init__(
@@ -156,8 +158,8 @@ class Compilation:
         self.program = program
         self.issued_at_us = issued_at_us
         self.issues = issues or {}
-        given = settings or ParameterSettings()
-        options = {given.source.file: given.source} if given.source.text else {}
+        settings = settings or ParameterSettings()
+        options = {settings.source.file: settings.source} if settings.source.text else {}
         self.report = Report({**program.sources, **options}, program.data)
         self.report.found += program.diagnostics
         self.bounds: dict[str, Bounds] = {}
@@ -170,18 +172,18 @@ class Compilation:
         data = DataFiles(program.data, program.data_names)
         self.context = CheckContext(collect(program.units, program.broken), self.report, dialect, data=data)
         if self.whole:
-            plain = elaborate(self.context, program.units, self._imports.closure, chosen, given)
+            plain = elaborate(self.context, program.units, self._imports.closure, chosen, settings)
             symbols = collect(plain.units, program.broken)
             instances, samples = plain.instances, plain.samples
             self.context = CheckContext(symbols, self.report, dialect, instances=instances, samples=samples, data=data)
 
     def check(self) -> None:
-        """Check all declarations; where a file is missing or an import unread, half of all names would be unknown."""
+        """Check all declarations, unless a file is missing: then many names would be unknown."""
         if self.whole:
             check_declarations(self.context)
 
     def choose(self, name: str | None) -> MissionDecl | None:
-        """The mission that was asked for; None, and reported, where there is not exactly one."""
+        """Return the chosen mission; report an error and return None if there is not exactly one."""
         if not self.whole:
             return None
         if name is not None:
@@ -195,17 +197,18 @@ class Compilation:
                 codes.NO_MISSION,
                 candidates[1].name.span if candidates else None,
                 f"there are {len(candidates)} missions" if candidates else "the sources declare no mission",
-                help=f"say which one to compile: {names}" if candidates else "add a mission, or name the file of one",
+                help=f"choose one with `--mission`: {names}" if candidates else "add a mission, or name its file",
             )
         return None
 
     def lowered(self, chosen: MissionDecl | None) -> tuple[Policy, Mission] | None:
-        """Lower every mission and every policy, if nothing is wrong with the declarations."""
+        """Lower every mission and every policy if the declarations have no errors; return the chosen mission's."""
         if self.report.failed():
             return None
         found: tuple[Policy, Mission] | None = None
         symbols = self.context.symbols
-        for mission in symbols.missions.values():  # first, so that no finding on a policy is one on a mission's values
+        # first, so that a finding on a policy does not depend on a mission's values
+        for mission in symbols.missions.values():
             self._policy(symbols.policies[mission.policy.text], symbols.vehicles[mission.vehicle.text])
         for mission in self.context.missions():
             flat = self._mission(mission)
@@ -216,7 +219,7 @@ class Compilation:
         return found
 
     def diagnostics(self) -> tuple[Diagnostic, ...]:
-        """The findings by file, in the order in which the files were reached, and by place."""
+        """Return the findings, sorted by file in the order of import, and by place."""
         order = {unit.file: number for number, unit in enumerate(self.program.units)}
 
         def place(found: Diagnostic) -> tuple[int, Span]:
@@ -227,7 +230,7 @@ class Compilation:
         return tuple(dict.fromkeys(sorted(merged, key=place)))
 
     def grounds(self) -> list[ProofContext]:
-        """The policies that were lowered."""
+        """Return the lowered policies."""
         return [ground for ground in self._policies.values() if ground is not None]
 
     def _mission(self, mission: MissionDecl) -> tuple[Policy, Mission] | None:
@@ -251,7 +254,7 @@ class Compilation:
         return self.issues.get(mission.name.text, self.issued_at_us)
 
     def _unused(self, policy: PolicyDecl) -> None:
-        """Lower a policy that no mission is under, for the first vehicle that it imports."""
+        """Lower a policy without missions, for the first vehicle that it imports."""
         if any(name == policy.name.text for name, _ in self._policies):
             return
         vehicle = self._imported_vehicle(policy)
@@ -270,7 +273,7 @@ class Compilation:
         return self._policies[key]
 
     def unproved(self) -> None:
-        """Lower every mission and every policy, and prove nothing: what is found without waiting for proofs."""
+        """Lower every mission and every policy, without proofs."""
         if self.report.failed():
             return
         symbols = self.context.symbols
@@ -284,19 +287,19 @@ class Compilation:
                 self._under_test(policy, vehicle)
 
     def cases(self) -> tuple[PolicyCase, ...]:
-        """What the tests of the file that was asked for come to, if nothing is wrong with the declarations."""
+        """Return the test cases of the first file, if the declarations have no errors."""
         if self.report.failed() or not self.context.symbols.tests:
             return ()
         return tuple(cases_of(self.context, self._under_test, self.program.stable))
 
     def scenarios(self) -> tuple[ScenarioFlight, ...]:
-        """The scenarios of the file that was asked for, if nothing is wrong with what was lowered before."""
+        """Return the scenarios of the first file, if lowering found no errors."""
         if self.report.failed() or not self.context.symbols.scenarios:
             return ()
         return tuple(scenarios_of(self.context, self._flown, self.program.stable))
 
     def _under_test(self, policy: PolicyDecl, vehicle: VehicleDecl) -> PolicyUnderTest | None:
-        """A policy as tests need it; None where it has errors. It is not proved for them."""
+        """Return a policy prepared for tests, without proofs; None if it has errors."""
         key = (policy.name.text, vehicle.name.text)
         if key not in self._tested:
             proved = self._policies.get(key)

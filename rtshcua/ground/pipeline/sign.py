@@ -1,4 +1,4 @@
-"""The last step of a compilation: bind every invocation to its policy, and sign both parts."""
+"""The last stage of a compilation: binds every invocation to the policy, and signs both parts."""
 
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
@@ -8,9 +8,9 @@ from rtshcua.wire.keys import SigningKey
 
 
 def sign(policy: Policy, mission: Mission, *, policy_key: SigningKey, mission_key: SigningKey) -> bytes:
-    """The bundle's bytes: the same for the same parts and keys.
+    """Return the bytes of the bundle. The same parts and keys give the same bytes.
 
-    Raises `WrongDuty` for a key of another duty, `CborError` for a number that no wire form has.
+    Raises `WrongDuty` for a key of another duty, `CborError` for a number that the wire format cannot hold.
     """
     payload = bundle.policy_payload(policy)
     bound = bind(mission, bundle.policy_digest(payload))

@@ -1,4 +1,4 @@
-"""The cases of a program, prepared as real requests are, and its scenarios with what they fly."""
+"""The test suite of a program: its cases, prepared like real requests, and its scenarios with their missions."""
 
 from collections.abc import Mapping
 
@@ -13,9 +13,9 @@ from rtshcua.model.ir.scenarios import Begins, ScenarioDecl
 
 
 def suite(program: Program, dialect: Dialect) -> CaseSuite:
-    """The cases of the first file of a program; findings on the declarations and the tests.
+    """Return the cases of the first file of a program, with the findings on declarations and tests.
 
-    What is proved of policies and missions is not asked here: that is `check_program`'s business.
+    Policies and missions are not proved: `check_program` does that.
     """
     run = Compilation(program, dialect, 0)
     run.check()
@@ -28,10 +28,10 @@ def suite(program: Program, dialect: Dialect) -> CaseSuite:
 
 
 def scenarios(program: Program, dialect: Dialect, issued_at_us: int, later_us: int = 0) -> ScenarioSuite:
-    """The scenarios of the first file of a program; all findings on the program, its proofs included.
+    """Return the scenarios of the first file of a program, with all findings, including those of the proofs.
 
-    Their missions are issued at a UTC time in us; that of a scenario which says when it begins, `later_us` before. What
-    no scenario flies is proved for any time, as `check` does.
+    The missions are issued at a UTC time in us. If a scenario sets its begin, its mission is issued `later_us` before
+    that. Missions without a scenario are proved for any time, as in `check_program`.
     """
     found: dict[Diagnostic, None] = {}
     flights: list[ScenarioFlight] = []
@@ -58,7 +58,7 @@ def scenarios(program: Program, dialect: Dialect, issued_at_us: int, later_us: i
 
 
 def _starts(program: Program, issued_at_us: int, later_us: int) -> dict[str, list[int]]:
-    """When the missions that scenarios fly are issued, each time once, by the names of the missions."""
+    """The distinct times of issue of the missions with scenarios, by the name of the mission."""
     starts: dict[str, list[int]] = {}
     for scenario in program.units[0].scenarios if program.units else ():
         times = starts.setdefault(scenario.mission.text, [])

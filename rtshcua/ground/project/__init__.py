@@ -1,1 +1,1 @@
-"""The configuration of a project: what its `rtshcua.toml` says, and which files a pattern there matches."""
+"""The configuration of a project: reading `rtshcua.toml`, and matching its file patterns."""

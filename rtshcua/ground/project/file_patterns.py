@@ -1,11 +1,11 @@
-"""Patterns for files, as people know them from `.gitignore`, relative to the folder of the configuration.
+"""File patterns in the style of `.gitignore`, relative to the folder of the configuration.
 
-`*` and `?` stay within one part of a path, `**` stands for any number of parts. A pattern also means everything below
-what it matches, so that `drafts` means the folder. Without a `/` it may match in any folder; with one, it begins at the
-configuration's folder. `/` separates on every platform.
+`*` and `?` match within one part of a path, `**` matches any number of parts. A pattern also matches everything below
+the paths that it matches, so `drafts` matches a folder. A pattern without `/` matches in any folder; one with `/` is
+relative to the configuration's folder. The separator is `/` on every platform.
 
-A configuration may be anybody's, so no pattern takes long: for parts as for characters, of what stands before a star
-the first place where it fits is as good as any other, so only the last star is ever gone back to.
+A configuration may come from an untrusted source, so matching takes quadratic time at most: the first match of the text
+before a star is as good as any later one, so the matcher only backtracks to the last star.
 """
 
 import re
@@ -19,20 +19,20 @@ _ANY = "**"
 
 
 def matches(pattern: str, path: str) -> bool:
-    """Whether a pattern means the file at `path`, which is relative to the configuration's folder."""
+    """Whether a pattern matches the file at `path`, which is relative to the configuration's folder."""
     parts = _parts(pattern)
     return bool(parts) and _fits(parts, path.split("/"), _ANY, _part_fits)
 
 
 @lru_cache(maxsize=256)
 def _parts(pattern: str) -> tuple[str, ...]:
-    """The parts of a pattern for a whole path, in which no two stars stand side by side; none of one without parts."""
+    """The parts of a pattern for a whole path, without adjacent stars; empty if the pattern has no parts."""
     written = pattern.removeprefix("./")
     found = [part if part == _ANY else re.sub(r"\*+", "*", part) for part in written.split("/") if part]
     if not found:
         return ()
     if found[-1] == _ANY:
-        found[-1] = "*"  # at least one part, and what is below
+        found[-1] = "*"  # at least one part
     if "/" not in written.rstrip("/"):
         found.insert(0, _ANY)
     found.append(_ANY)
@@ -48,11 +48,11 @@ def _character_fits(pattern: str, character: str) -> bool:
 
 
 def _fits(pattern: Sequence[T], whole: Sequence[T], star: T, fits: Callable[[T, T], bool]) -> bool:
-    """Whether all of `whole` is as the pattern says, in which `star` stands for any number of anything."""
-    if len(pattern) > 2 * len(whole) + 1:  # more than can stand for something
+    """Whether the pattern matches all of `whole`; `star` matches any number of elements."""
+    if len(pattern) > 2 * len(whole) + 1:  # every second part matches at least one element
         return False
     at = place = 0
-    last, gone = -1, 0  # the last star, and up to where it stands for what was passed
+    last, gone = -1, 0  # the last star, and the end of the elements that it matches
     while place < len(whole):
         if at < len(pattern) and pattern[at] == star:
             last, gone = at, place

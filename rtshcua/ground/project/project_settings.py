@@ -1,7 +1,7 @@
-"""What a project says in `rtshcua.toml`, or in `pyproject.toml` below `[tool.rtshcua]`: the text, as `ProjectSettings`.
+"""Reads the configuration of a project, `rtshcua.toml` or `[tool.rtshcua]` of `pyproject.toml`, as `ProjectSettings`.
 
-Nothing is guessed: an unknown key, a value of the wrong type, an ignore without a reason is a refusal, with the nearest
-that would be accepted. `docs/linting.md` has all keys.
+Reading is strict: an unknown key, a value of the wrong type and an ignore without a reason are refused, with the
+nearest accepted value. `docs/linting.md` lists all keys.
 """
 
 import tomllib
@@ -12,7 +12,7 @@ from rtshcua.diagnostics.codes import Code
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.project.strict_tables import SettingError, SettingsTable
 
-#: the names under which a configuration is looked for, of one folder the first that has one
+#: the file names of a configuration; the first one that exists in a folder is used
 OWN, SHARED = "rtshcua.toml", "pyproject.toml"
 NAMES = (OWN, SHARED)
 
@@ -23,7 +23,7 @@ WIDTH, NARROWEST, WIDEST = 120, 40, 400
 
 @dataclass(frozen=True, slots=True)
 class IgnoredCode:
-    """A kind of finding that is ignored, and why; `pattern` says in which files, None: in all."""
+    """An ignored code with its reason. `pattern` limits it to some files; None means all files."""
 
     code: Code
     reason: str
@@ -32,8 +32,8 @@ class IgnoredCode:
 
 @dataclass(frozen=True, slots=True)
 class LintSettings:
-    """`[lint]`: what is ignored, which files are left out, from which level on a run fails, further sources, whether
-    what was found is remembered, and whether the format is looked at.
+    """`[lint]`: ignored codes, excluded files, the lowest level that fails a run, further sources, whether to cache
+    results, and whether to check the format.
     """
 
     ignored: tuple[IgnoredCode, ...] = ()
@@ -46,7 +46,7 @@ class LintSettings:
 
 @dataclass(frozen=True, slots=True)
 class FormatSettings:
-    """`[format]`: how many characters wide lines are, and which files are left out."""
+    """`[format]`: the line width in characters, and the excluded files."""
 
     width: int = WIDTH
     exclude: tuple[str, ...] = ()
@@ -54,7 +54,7 @@ class FormatSettings:
 
 @dataclass(frozen=True, slots=True)
 class TestSettings:
-    """`[test]`: the coverage in whole per cent below which a run fails, None for any; and which files are left out."""
+    """`[test]`: the least coverage in per cent (None: no minimum), and the excluded files."""
 
     __test__ = False  # for pytest
 
@@ -64,25 +64,25 @@ class TestSettings:
 
 @dataclass(frozen=True, slots=True)
 class ProjectSettings:
-    """A whole configuration. Paths and patterns in it are relative to the folder that it stands in."""
+    """A whole configuration. Its paths and patterns are relative to its folder."""
 
     lint: LintSettings = LintSettings()
     format: FormatSettings = FormatSettings()
     test: TestSettings = TestSettings()
 
 
-#: parts of a dotted key; ours have three
+#: the most parts of a dotted key; ours have three
 _MOST_PARTS = 64
 
 
 def misconfigured(file: str, what: str, help: str = "", line: int | None = None) -> Refusal:
-    """Why a configuration is none: in `file`, at `line` where that is known (from 1)."""
+    """Return the refusal of a configuration: `what` is wrong in `file`, at `line` (from 1) if known."""
     return Refusal("configuration", f"{file}{'' if line is None else f':{line}'}: {what}", help)
 
 
 def parse_settings(text: str, file: str, *, shared: bool = False) -> ProjectSettings | Refusal | None:
-    """The settings in a configuration called `file`; `shared` where it is a `pyproject.toml`, in which others have
-    tables too: None where that has none of ours.
+    """Return the settings in the configuration `file`. `shared` means a `pyproject.toml`; None if it has no table of
+    ours.
     """
     if _longest_key(text) > _MOST_PARTS:
         return misconfigured(file, f"a key has more than {_MOST_PARTS} parts")
@@ -91,7 +91,7 @@ def parse_settings(text: str, file: str, *, shared: bool = False) -> ProjectSett
     except tomllib.TOMLDecodeError as error:
         return _not_toml(file, str(error))
     except RecursionError:
-        return misconfigured(file, "it is nested too deeply to be read")
+        return misconfigured(file, "the configuration is nested too deeply")
     prefix = ""
     if shared:
         tool = found.get("tool")
@@ -105,7 +105,7 @@ def parse_settings(text: str, file: str, *, shared: bool = False) -> ProjectSett
 
 
 def _longest_key(text: str) -> int:
-    """How many parts the longest dotted key has, or what looks like one: `tomllib` takes the square of that in time."""
+    """The number of parts of the longest text that looks like a dotted key. `tomllib` takes quadratic time for one."""
     longest = parts = 0
     for each in text.split("."):
         word = each.strip(" \t")
@@ -156,17 +156,15 @@ def _test(table: SettingsTable) -> TestSettings:
 
 
 def _not_toml(file: str, error: str) -> Refusal:
-    """What `tomllib` says, as our messages are written; its place, which it puts at the end, goes to the front."""
+    """The error of `tomllib` in the style of our messages, with its line at the front."""
     words, _, place = error.removesuffix(")").partition(" (at ")
     words = words[:1].lower() + words[1:]
     line = place.removeprefix("line ").partition(",")[0]
-    return misconfigured(file, f"it is not TOML: {words}", "", int(line) if line.isdecimal() else None)
+    return misconfigured(file, f"not valid TOML: {words}", "", int(line) if line.isdecimal() else None)
 
 
 def _line(text: str, key: str) -> int | None:
-    """The first line on which a key stands; it may be one of the same name in another table, so it is only said where
-    there is one such line.
-    """
+    """The line of a key; None unless exactly one line has it, because another table may have a key of the same name."""
     written = (key, f'"{key}"', f"'{key}'")
     lines = [
         number

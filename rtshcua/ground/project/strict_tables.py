@@ -6,12 +6,12 @@ from typing import Any, TypeVar
 from rtshcua.diagnostics.codes import REGISTRY, Code, Severity, can_be_ignored, code_named
 from rtshcua.diagnostics.suggest import listed, nearest
 
-#: a reason has at least so many letters and digits
+#: the least number of letters and digits in a reason
 SHORTEST = 3
 
 
 def is_reason(reason: str) -> bool:
-    """Whether a text can be a reason: it has letters. Points and marks alone say nothing, seen or unseen."""
+    """Whether a text can be a reason: it needs letters, because punctuation and invisible characters say nothing."""
     return sum(map(str.isalnum, reason)) >= SHORTEST and any(map(str.isalpha, reason))
 
 
@@ -19,7 +19,7 @@ T = TypeVar("T", bound=str)
 
 
 class SettingError(Exception):
-    """A key is not as it must be: which, what was found, and what would be accepted."""
+    """A key of a configuration is wrong: which key, what was found, and what is accepted."""
 
     def __init__(self, key: str, message: str, help: str = "") -> None:
         super().__init__(message)
@@ -27,50 +27,50 @@ class SettingError(Exception):
 
 
 class SettingsTable:
-    """A table of a configuration: `close` refuses what nobody asked for. All methods raise NotSo."""
+    """A table of a configuration. `close` refuses the keys that were not read. All methods raise `SettingError`."""
 
     def __init__(self, found: Mapping[str, Any], name: str) -> None:
         self._found = found
         self._name = name
-        self._asked: dict[str, None] = {}
+        self._known: dict[str, None] = {}
 
     @staticmethod
     def of(found: Any, name: str) -> "SettingsTable":
-        """What was found under a name, which must be a table."""
+        """The value `found` under a name, which must be a table."""
         if not isinstance(found, dict):
-            raise SettingError(name.rpartition(".")[2], f"`{name}` is {_kind(found)}, and must be a table")
+            raise SettingError(name.rpartition(".")[2], f"`{name}` is {_kind(found)}; expected a table")
         return SettingsTable(found, name)
 
     @property
     def name(self) -> str:
-        """What it is called, from the top."""
+        """The dotted name of the table."""
         return self._name
 
     def names(self) -> tuple[str, ...]:
-        """The keys that there are, all of which count as asked for."""
-        self._asked |= dict.fromkeys(self._found)
+        """The keys of the table, all of which count as read."""
+        self._known |= dict.fromkeys(self._found)
         return tuple(self._found)
 
     def table(self, key: str) -> "SettingsTable":
-        """A table in this one; an empty one where there is none."""
-        self._asked[key] = None
+        """The table at a key; an empty one if there is none."""
+        self._known[key] = None
         return SettingsTable.of(self._found.get(key, {}), f"{self._name}.{key}" if self._name else key)
 
-    def any_of(self, key: str, types: tuple[type, ...], words: str) -> Any:
-        """A value of one of these types; None where there is none."""
-        self._asked[key] = None
+    def any_of(self, key: str, types: tuple[type, ...], accepted: str) -> Any:
+        """The value at a key, which must be of one of these types; None if there is none."""
+        self._known[key] = None
         found = self._found.get(key)
         if found is not None and type(found) not in types:
-            raise SettingError(key, f"`{key}`{self._where()} is {_kind(found)}", f"accepted: {words}")
+            raise SettingError(key, f"`{key}`{self._where()} is {_kind(found)}", f"accepted: {accepted}")
         return found
 
     def flag(self, key: str, *, default: bool) -> bool:
-        """`true` or `false`."""
+        """The `true` or `false` at a key."""
         found = self.any_of(key, (bool,), "`true` or `false`")
         return default if found is None else bool(found)
 
     def number(self, key: str, least: int, most: int) -> int | None:
-        """A whole number of a range; None where there is none."""
+        """The whole number at a key, which must be in a range; None if there is none."""
         found = self.any_of(key, (int,), f"a whole number from {least} to {most}")
         if found is not None and not least <= found <= most:
             raise SettingError(
@@ -79,16 +79,16 @@ class SettingsTable:
         return None if found is None else int(found)
 
     def texts(self, key: str) -> tuple[str, ...]:
-        """A list of texts, none of them empty."""
-        found = self.any_of(key, (list,), f'a list of texts, as in `{key} = ["drafts"]`') or []
+        """The list of strings at a key, none of which may be empty."""
+        found = self.any_of(key, (list,), f'a list of strings, as in `{key} = ["drafts"]`') or []
         for each in found:
             if not isinstance(each, str) or not each.strip():
-                what = "an empty text" if isinstance(each, str) else _kind(each)
-                raise SettingError(key, f"`{key}`{self._where()} has {what} in its list", "accepted: a list of texts")
+                what = "an empty string" if isinstance(each, str) else _kind(each)
+                raise SettingError(key, f"`{key}`{self._where()} has {what} in its list", "accepted: a list of strings")
         return tuple(found)
 
     def one_of(self, key: str, words: Sequence[T], default: T) -> T:
-        """One of several words."""
+        """The string at a key, which must be one of several words."""
         found = self.any_of(key, (str,), listed(words))
         if found is None:
             return default
@@ -97,36 +97,36 @@ class SettingsTable:
                 return word
         near = nearest(found, words)
         help = f"accepted: {listed(words)}" if near is None else f"did you mean `{near}`?"
-        raise SettingError(key, f"`{found}` is nothing that `{key}`{self._where()} can be", help)
+        raise SettingError(key, f"`{found}` is not a value of `{key}`{self._where()}", help)
 
     def code(self, name: str) -> Code:
-        """The kind of finding that a key of this table names, by its id or its slug; errors cannot be ignored."""
+        """The code that a key of this table names by id or slug. A code of an error is refused."""
         code = code_named(name)
         if code is None:
-            raise SettingError(name, f"there is no code `{name}`", _near_code(name))
+            raise SettingError(name, f"unknown code `{name}`", _near_code(name))
         if code.severity is Severity.ERROR:
             raise SettingError(name, f"`{name}` is an error, and errors cannot be ignored")
         if not can_be_ignored(code):
-            raise SettingError(name, f"`{name}` is about ignores themselves, and cannot be ignored")
+            raise SettingError(name, f"`{name}` is about ignores, and cannot be ignored")
         return code
 
     def reason(self, name: str) -> str:
-        """The reason that stands after the `=` of an ignore."""
-        help = f'say why, as in `{name} = "the authority\'s letter says 30 m"`'
+        """The reason of an ignore, which is the value of its key."""
+        help = f'give a reason, as in `{name} = "the authority\'s letter says 30 m"`'
         found = self._found[name]
         if not isinstance(found, str):
-            raise SettingError(name, f"`{name}`{self._where()} is {_kind(found)}, and must be a reason", help)
+            raise SettingError(name, f"`{name}`{self._where()} is {_kind(found)}; expected a reason", help)
         if not is_reason(found):
             raise SettingError(name, f"`{name}`{self._where()} is ignored without a reason", help)
         return " ".join(found.split())
 
     def close(self) -> None:
-        """Refuse the first key that nothing asked for."""
+        """Refuse the first key that was not read."""
         for key in self._found:
-            if key not in self._asked:
-                near = nearest(key, self._asked)
-                help = f"known: {listed(self._asked)}" if near is None else f"did you mean `{near}`?"
-                raise SettingError(key, f"there is no key `{key}`{self._where()}", help)
+            if key not in self._known:
+                near = nearest(key, self._known)
+                help = f"known: {listed(self._known)}" if near is None else f"did you mean `{near}`?"
+                raise SettingError(key, f"unknown key `{key}`{self._where()}", help)
 
     def _where(self) -> str:
         return f" in `[{self._name}]`" if self._name else ""
@@ -138,9 +138,8 @@ def _near_code(name: str) -> str:
 
 
 def _kind(found: object) -> str:
-    """What TOML calls a value."""
-    words = {bool: "`true` or `false`", int: "a whole number", float: "a number with a point", str: "a text",
-             list: "a list", dict: "a table"}  # fmt: skip
+    """The type of a TOML value."""
     if isinstance(found, bool):
         return f"`{str(found).lower()}`"
-    return words.get(type(found), "a date or a time")
+    kinds = {int: "a whole number", float: "a decimal number", str: "a string", list: "a list", dict: "a table"}
+    return kinds.get(type(found), "a date or a time")

@@ -1,5 +1,5 @@
-"""Why a decision is what it is.
+"""Explanations of decisions.
 
-`trace` tells it step by step, with what its conditions read; `assumed_state` makes a state to begin from, changed by
-hand where that is wanted; `logged_decisions` takes one from a log.
+`trace` explains a decision step by step, with the values that its conditions read; `assumed_state` makes a state for a
+hypothetical decision; `logged_decisions` reads a decision from a log.
 """

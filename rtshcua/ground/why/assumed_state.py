@@ -1,5 +1,5 @@
-"""A state to begin from: where the plan has the vehicle before a step, signals as the contract requires them, and what
-is set by hand: `battery=20 %`, `gps.fix=fix_3d`, `position=47.39 N, 8.54 E`, `wind.speed=unknown`.
+"""A state for a hypothetical decision: the vehicle where the plan has it before a step, signals as the contract
+requires them, and overrides such as `battery=20 %`, `gps.fix=fix_3d`, `position=47.39 N, 8.54 E`, `wind.speed=unknown`.
 """
 
 import re
@@ -27,15 +27,15 @@ from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.flat.zone import MAX_COORDINATE, project
 from rtshcua.model.quantity import UNITS, Dimension
 
-#: one clause may undo what another was content with, so they are gone through again, a few times
+#: passes over the clauses, because a change for one clause may break another
 _ROUNDS = 4
 
-#: what a full cell of a lithium battery gives, mV
+#: the voltage of a full lithium cell, mV
 _FULL_CELL = 4_200
 
 
 def nominal(invocations: Sequence[PreparedInvocation], step: int, policy: PreparedPolicy, now: Now) -> State:
-    """A fresh state in which the step's own clauses hold, as far as changes of single signals can bring that about."""
+    """Return a fresh state in which the step's own clauses hold, as far as changes of single signals allow."""
     invocation, flat = invocations[step], policy.policy
     values = _start(flat)
     x, y, height = place_before(invocations, step)
@@ -53,7 +53,7 @@ def nominal(invocations: Sequence[PreparedInvocation], step: int, policy: Prepar
 
 
 def place_before(invocations: Sequence[PreparedInvocation], step: int) -> tuple[int, int, int]:
-    """Where the plans of the steps before have taken the vehicle: local x, y and height, mm; at home to begin with."""
+    """The planned position before a step: local x, y and height in mm; at home before the first step."""
     x, y, height = 0, 0, 0
     for invocation in invocations[:step]:
         plan = invocation.invocation.plan
@@ -94,7 +94,7 @@ def _satisfy(
     values: list[int | None],
     fixed: set[int],
 ) -> None:
-    """Change the signals that a clause reads, but for where the vehicle is, so that it is true."""
+    """Change the signals that a clause reads, except those in `fixed`, so that the clause holds."""
     sets = situation(_fresh_state(values), policy, now)
     at = environment(sets, policy, invocation.arguments, invocation.phase)
     node = policy.compiler.node(clause, invocation.invocation.contract)
@@ -112,19 +112,19 @@ _PLACE = re.compile(r"([0-9]+(?:\.[0-9]+)?)\s*([NS])\s*,\s*([0-9]+(?:\.[0-9]+)?)
 
 
 class SignalOverride(NamedTuple):
-    """What is set, and to what, as written."""
+    """The name of a signal or condition, and its value as written."""
 
     name: str
     text: str
 
 
 def read_overrides(texts: Sequence[str]) -> tuple[SignalOverride, ...] | Refusal:
-    """Parse `NAME=VALUE` overrides; a name may be given once."""
+    """Parse `NAME=VALUE` overrides. A repeated name is refused."""
     found: dict[str, SignalOverride] = {}
     for each in texts:
         name, equals, text = (" ".join(part.split()) for part in each.rpartition("="))
         if not equals:
-            return Refusal("usage", f"`{each}` sets nothing", "write a signal and its value: `battery=20 %`")
+            return Refusal("usage", f"`{each}` has no `=`", "write a signal and its value: `battery=20 %`")
         if name in found:
             return Refusal("usage", f"`{name}` is given twice", "keep one of them")
         found[name] = SignalOverride(name, text)
@@ -132,9 +132,10 @@ def read_overrides(texts: Sequence[str]) -> tuple[SignalOverride, ...] | Refusal
 
 
 def overridden(state: State, setting: SignalOverride, policy: Policy, dialect: Dialect) -> State | Refusal:
-    """The state with one signal changed; `name=unknown` for one that is missing, `CONDITION=true` over time.
+    """Return the state with one signal changed: `name=unknown` for a missing one, `CONDITION=true` for one over time.
 
-    As in a test, what the signal has under `unknown at` is missing, and what its fields cannot carry is refused.
+    As in a test, a value that the signal lists under `unknown at` is missing, and a value that its fields cannot carry
+    is refused.
     """
     name, text = setting
     signal = next((each for each in policy.signals if each.name == name), None)
@@ -156,17 +157,17 @@ def overridden(state: State, setting: SignalOverride, policy: Policy, dialect: D
 
 
 def _over_time(state: State, name: str, text: str, policy: Policy) -> State | Refusal:
-    """The truth of a condition over time, which is called as it is written."""
+    """Return the state with a changed truth of a condition over time, which is named by its text."""
     conditions = [" ".join(monitor.when.text.split()) for monitor in policy.monitors]
     if name not in conditions:
         names = [signal.name for signal in policy.signals]
         near = nearest(name, [*names, *conditions])
         known = ", ".join(f"`{each}`" for each in [*names, *conditions])
-        help = f"did you mean `{near}`?" if near is not None else f"it reads {known}"
+        help = f"did you mean `{near}`?" if near is not None else f"known: {known}"
         return Refusal("usage", f"the policy reads no signal `{name}`", help)
     truth = _TRUTHS.get(text)
     if truth is None:
-        return Refusal("usage", f"`{text}` is no truth of `{name}`", "write `true`, `false` or `unknown`")
+        return Refusal("usage", f"`{text}` is not a value of `{name}`", "write `true`, `false` or `unknown`")
     monitors = tuple(
         truth if condition == name else old for condition, old in zip(conditions, state.monitors, strict=True)
     )
@@ -180,8 +181,8 @@ def _signal_value(signal: Signal, text: str, policy: Policy, dialect: Dialect) -
         value = next((value for value, label in signal.labels if label == text), None)
         labels = [label for _, label in signal.labels]
         near = nearest(text, labels)
-        help = f"did you mean `{near}`?" if near is not None else f"it is one of {', '.join(labels)}"
-        return Refusal("usage", f"`{text}` is no value of `{signal.name}`", help) if value is None else (value,)
+        help = f"did you mean `{near}`?" if near is not None else f"accepted: {', '.join(labels)}"
+        return Refusal("usage", f"`{text}` is not a value of `{signal.name}`", help) if value is None else (value,)
     return _number_value(signal, text, reported_range(signal, dialect))
 
 
@@ -192,13 +193,13 @@ def _number_value(signal: Signal, text: str, values: Extent) -> tuple[int, ...] 
     help = f"write a {dimension.value} with one of the units {units}" if units else "write a whole number"
     match = _NUMBER.fullmatch(text)
     if match is None:
-        return Refusal("usage", f"`{text}` is no value of `{signal.name}`", help)
+        return Refusal("usage", f"`{text}` is not a value of `{signal.name}`", help)
     found = exact(match[2], match[3] or None, negative=bool(match[1]))
     if found.trouble is not None or found.dimension is not measured or abs(found.value) > MAX_VALUE:
-        return Refusal("usage", f"`{text}` is no {dimension.value} that `{signal.name}` can have", help)
+        return Refusal("usage", f"`{text}` is not a {dimension.value} that `{signal.name}` can have", help)
     if not values.has(found.value):
         accepts = accepted(values, dimension, found.value)
-        return Refusal("usage", f"`{signal.name}` is never `{text}`", accepts)
+        return Refusal("usage", f"`{signal.name}` cannot be `{text}`", accepts)
     return (found.value,)
 
 
@@ -206,7 +207,7 @@ def _place_value(signal: Signal, text: str, policy: Policy) -> tuple[int, ...] |
     match = _PLACE.fullmatch(text)
     help = "write `47.39774 N, 8.54559 E`, within 500 km of home"
     if match is None:
-        return Refusal("usage", f"`{text}` is no value of `{signal.name}`", help)
+        return Refusal("usage", f"`{text}` is not a value of `{signal.name}`", help)
     latitude = exact(match[1], "deg", negative=match[2] == "S")
     longitude = exact(match[3], "deg", negative=match[4] == "W")
     if latitude.trouble is not None or longitude.trouble is not None:

@@ -1,7 +1,7 @@
-"""Decisions of a log: the inputs that a record holds; and a decision on a link, of a step's fallback or of the
-contingency, with what it looked at and what else might have flown.
+"""Decisions of a log: the inputs in a record, and the trace of a decision on a link of a fallback or the contingency.
 
-Links skip most steps of design 4.1 (`decision.fallbacks`): their own `require`, and the airspace where they move.
+A link skips most steps of design 4.1 (`decision.fallbacks`): only its own `require` and the airspace of its motion are
+checked.
 """
 
 from collections.abc import Sequence
@@ -20,33 +20,33 @@ from rtshcua.wire.request import CONTINGENCY_LINK
 
 
 def state_of(record: DecisionRecord) -> State:
-    """The state that was read."""
+    """The state of a decision record."""
     return State(record.state.values, record.state.ages, record.state.monitors)
 
 
 def now_of(record: DecisionRecord) -> Now:
-    """The moment of the decision."""
+    """The time of a decision record."""
     return Now(record.at_us, record.utc_us, record.utc_error_us)
 
 
 def context_of(record: DecisionRecord) -> Context:
-    """Where the mission stood. Raises ValueError where the binding is not hexadecimal."""
-    given = record.context
+    """The context of a decision record. Raises ValueError if the binding is not hexadecimal."""
+    context = record.context
     return Context(
         bytes.fromhex(record.binding),
-        given.vehicle,
-        given.policy_version,
-        given.consumed,
-        given.released_us,
-        given.phase,
-        given.remaining_us,
-        tuple(ConfirmAnswer(*approval) for approval in given.approvals),
+        context.vehicle,
+        context.policy_version,
+        context.consumed,
+        context.released_us,
+        context.phase,
+        context.remaining_us,
+        tuple(ConfirmAnswer(*approval) for approval in context.approvals),
     )
 
 
 class LinkTrace(NamedTuple):
-    """The link asked for, the `degrade` rule that it is the target of (None: of a chain), its conditions with their
-    truths, whether it may fly, and every link of its chain.
+    """The decision on a link: the `degrade` rule whose target it is (None: a link of a chain), its conditions with
+    their truths, whether it may fly, and every link of its chain.
     """
 
     link: PreparedLink
@@ -59,7 +59,7 @@ class LinkTrace(NamedTuple):
 def trace_link(
     record: DecisionRecord, invocation: PreparedInvocation | None, policy: PreparedPolicy
 ) -> LinkTrace | None:
-    """The decision once more, from what its record holds; None for a link that the bundle does not have.
+    """Derive the decision on a link again from its record; None if the bundle does not have the link.
 
     `invocation` is the step whose fallback it is, None for a link of the contingency.
     """
@@ -86,5 +86,5 @@ def trace_link(
 
 
 def of_contingency(record: DecisionRecord) -> bool:
-    """Whether a decision is about a link of the contingency, and so about no step."""
+    """Whether a decision is about a link of the contingency, not about a step."""
     return record.kind == CONTINGENCY_LINK

@@ -1,7 +1,7 @@
-"""A decision step by step: what each step of design 4.1 looked at, what it found, and what decided; and what a
-condition read, by name and value.
+"""The trace of a decision: what each step of design 4.1 checked and found, which step decided, and the values that a
+condition read, by name.
 
-It calls the very steps that `decide` calls, and the conditions that they call; nothing is decided here.
+The trace runs the same steps and conditions as `decide`; it has no rules of its own.
 """
 
 from collections.abc import Iterator
@@ -24,7 +24,7 @@ from rtshcua.model.flat.situation import Context, Now, State
 
 
 class ReadValue(NamedTuple):
-    """A signal with the cells that it owns (None: nothing valid), or an argument of the request; stale if too old."""
+    """A signal with its cells (None: no valid value), or an argument of the request; `stale` if too old."""
 
     name: str
     signal: Signal | None
@@ -35,7 +35,7 @@ class ReadValue(NamedTuple):
 def read_values(
     clause: Decisive, policy: Policy, contract: Contract, arguments: tuple[int, ...], state: State
 ) -> list[ReadValue]:
-    """Signals and arguments in the order in which they are named, each once."""
+    """Return the signals and arguments that a clause reads, each once, in the order of the clause."""
     found: dict[str, ReadValue] = {}
     code = _code(clause)
     for at in range(0, len(code), 3):
@@ -84,7 +84,7 @@ def _note_argument(found: dict[str, ReadValue], cell: int, contract: Contract, a
     found.setdefault(parameter.name, ReadValue(parameter.name, None, arguments[cell : cell + 1], False))
 
 
-#: the steps in their order, by the numbers and names of design 4.1
+#: the numbers and names of the steps of design 4.1, in order
 NAMES = (
     ("1", "integrity"),
     ("2", "freshness"),
@@ -98,7 +98,7 @@ NAMES = (
 
 
 class ConditionCheck(NamedTuple):
-    """One thing that a step looked at: a word for its role, its clause (None: a field), and its truth."""
+    """A condition that a step checked: its role, its clause (None: a field), and its truth."""
 
     role: str
     clause: Decisive
@@ -106,7 +106,7 @@ class ConditionCheck(NamedTuple):
 
 
 class TracedStep(NamedTuple):
-    """A step: `passed` is None where an earlier one decided, so that this one was not reached."""
+    """A step. `passed` is None if an earlier step decided, so that this one was not reached."""
 
     number: str
     name: str
@@ -122,7 +122,7 @@ class TriedLink(NamedTuple):
 
 
 class Trace(NamedTuple):
-    """A decision, the way to it, the links that it chose from, and the nearest values that would have passed."""
+    """A decision, its steps, the links of the fallback chain, and the nearest values that would have passed."""
 
     decision: Decision
     steps: tuple[TracedStep, ...]
@@ -131,7 +131,7 @@ class Trace(NamedTuple):
 
 
 def trace(invocation: PreparedInvocation, state: State, policy: PreparedPolicy, context: Context, now: Now) -> Trace:
-    """Decide, and say how. Pure, and total as `decide` is."""
+    """Return the decision with its trace. Pure and total, like `decide`."""
     decision = decide(invocation, state, policy, context, now)
     sets = situation(state, policy, now)
     at = environment(sets, policy, invocation.arguments, invocation.phase)
@@ -149,7 +149,7 @@ def trace(invocation: PreparedInvocation, state: State, policy: PreparedPolicy, 
 
 
 def _checks(step: str, invocation: PreparedInvocation, at: Environment) -> Iterator[ConditionCheck]:
-    """The conditions of a step, in the order in which it looks at them."""
+    """Yield the conditions of a step, in the order in which it checks them."""
     candidates = invocation.candidates
     if step == "authority":
         for rule in (*candidates.forbids, *candidates.permits):

@@ -279,7 +279,7 @@ def test_an_audit_derives_every_decision(run: Path, capsys: pytest.CaptureFixtur
     assert verify(run, "--audit", "--no-derive") == ExitCode.OK
     out = capsys.readouterr().out
     assert "3 decisions (3 allow)" in out
-    assert "- that decisions follow from what they record" in out
+    assert "- that decisions follow from their recorded inputs" in out
 
 
 def test_a_decision_that_its_own_signers_forged(run: Path, capsys: pytest.CaptureFixture[str]) -> None:

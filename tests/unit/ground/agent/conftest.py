@@ -1,4 +1,4 @@
-"""A good specification, to be spoiled, and how it is compiled."""
+"""A correct specification, and a function that compiles one."""
 
 import json
 from collections.abc import Callable
@@ -19,7 +19,7 @@ Compile = Callable[[str | bytes], tuple[Compiled, tuple[Diagnostic, ...]]]
 
 @pytest.fixture
 def good() -> dict[str, Any]:
-    """The standard mission as an agent writes it."""
+    """The standard mission as a specification."""
     return {
         "format": "rtshcua/mission-spec",
         "version": 1,
@@ -54,7 +54,7 @@ def good() -> dict[str, Any]:
 
 @pytest.fixture
 def compile_text() -> Compile:
-    """Compile the text of a specification, with the shipped library; the findings have their pointers."""
+    """Compile the text of a specification with the shipped library; the findings have pointers."""
 
     def run(text: str | bytes) -> tuple[Compiled, tuple[Diagnostic, ...]]:
         data = text.encode() if isinstance(text, str) else text

@@ -1,4 +1,4 @@
-"""The schema under a policy: what fits it is a specification, what the policy never permits does not fit."""
+"""The schema under a policy accepts only specifications, and no value that the policy never permits."""
 
 import re
 from copy import deepcopy
@@ -40,7 +40,7 @@ STRICT = jsonschema.Draft202012Validator(strict(SCHEMA))
 
 @pytest.mark.parametrize("form", FORMS)
 @pytest.mark.parametrize("narrow", [False, True])
-def test_every_form_holds_a_schema(form: str, narrow: bool) -> None:
+def test_every_form_contains_a_schema(form: str, narrow: bool) -> None:
     tool = FORMS[form](deepcopy(SCHEMA) if narrow else general(), narrow=narrow)
     inner = tool.get("function", tool)
     found = next((inner[key] for key in ("parameters", "input_schema", "inputSchema") if key in inner), tool)
@@ -51,13 +51,13 @@ def test_every_form_holds_a_schema(form: str, narrow: bool) -> None:
         assert inner["description"]
 
 
-def test_the_shipped_proposal_fits() -> None:
+def test_shipped_proposal_fits() -> None:
     CHECK.validate(PROPOSAL)
     jsonschema.Draft202012Validator(general()).validate(PROPOSAL)
 
 
 def filled(proposal: dict[str, Any]) -> dict[str, Any]:
-    """With what the strict forms ask for: no key left out."""
+    """The proposal with every optional key, as the strict forms require."""
     whole: dict[str, Any] = deepcopy(proposal)
     for phase in whole["phases"]:
         for step in phase["steps"]:
@@ -68,14 +68,14 @@ def filled(proposal: dict[str, Any]) -> dict[str, Any]:
     return whole
 
 
-def test_the_proposal_fits_the_strict_forms_when_it_says_everything() -> None:
+def test_proposal_with_every_key_fits_the_strict_forms() -> None:
     assert not STRICT.is_valid(PROPOSAL)
     STRICT.validate(filled(PROPOSAL))
     CHECK.validate(filled(PROPOSAL))
 
 
-def test_strict_forms_say_what_they_may_and_all_that_they_must() -> None:
-    """As documented: every property required, no other one, and none of the keywords that are refused."""
+def test_strict_form_has_only_the_keywords_of_strict_mode() -> None:
+    """Every property is required, there is no other one, and no keyword that the providers refuse."""
     refused = {"allOf", "not", "if", "oneOf", "maxLength", "minLength", "default", "examples", "maxItems", "$schema"}
 
     def walk(value: Any, name: str = "") -> None:
@@ -119,7 +119,7 @@ def test_strict_forms_say_what_they_may_and_all_that_they_must() -> None:
         (("imports", 0), "lib:policies/training_field.rts"),
     ],
 )
-def test_what_the_policy_never_permits_does_not_fit(where: tuple[Any, ...], value: Any) -> None:
+def test_value_that_the_policy_never_permits_does_not_fit(where: tuple[Any, ...], value: Any) -> None:
     proposal = deepcopy(PROPOSAL)
     place: Any = proposal
     for key in where[:-1]:
@@ -129,7 +129,7 @@ def test_what_the_policy_never_permits_does_not_fit(where: tuple[Any, ...], valu
 
 
 def made(schema: dict[str, Any]) -> st.SearchStrategy[Any]:
-    """Values that fit a schema, of the keywords that the narrowed one has."""
+    """Values that fit a schema, for the keywords of the narrowed schema."""
     if "$ref" in schema:
         return made(SCHEMA["$defs"][schema["$ref"].removeprefix("#/$defs/")])
     if "const" in schema:
@@ -147,17 +147,17 @@ def made(schema: dict[str, Any]) -> st.SearchStrategy[Any]:
     if schema["type"] == "object":
         fixed = {name: made(each) for name, each in schema["properties"].items() if name in schema["required"]}
         free = {name: made(each) for name, each in schema["properties"].items() if name not in schema["required"]}
-        # conditions are free texts: of these the language's own parser is the judge
+        # the schema does not limit the texts of conditions; the language's parser checks them
         free = {name: each for name, each in free.items() if name not in ("require", "assume", "maintain")}
         return st.fixed_dictionaries(fixed, optional=free)
-    # JSON Schema has no word for what hides or reorders a text: E0114 refuses that
+    # JSON Schema cannot exclude hiding or reordering characters: the compiler refuses them
     plain = st.characters(exclude_categories=["Cs", "Cc", "Cf", "Zl", "Zp"])
     return st.text(plain, max_size=20).filter(lambda text: hiding(text) is None)
 
 
 @settings(max_examples=settings().max_examples // 5)
 @given(value=made(SCHEMA))
-def test_whatever_fits_is_a_specification(value: Any) -> None:
+def test_value_that_fits_the_schema_is_a_specification(value: Any) -> None:
     CHECK.validate(value)
     specification = parse_specification("spec.json", dumps(value).encode())
     assert specification.diagnostics == ()
@@ -166,7 +166,7 @@ def test_whatever_fits_is_a_specification(value: Any) -> None:
 
 
 @given(low=st.integers(0, 3000), span=st.integers(0, 3000), data=st.data())
-def test_a_pattern_of_a_range_has_just_its_numbers(low: int, span: int, data: st.DataObject) -> None:
+def test_range_pattern_accepts_exactly_its_numbers(low: int, span: int, data: st.DataObject) -> None:
     pattern = re.compile(f"(?:{digits(low, low + span)})")
     number = data.draw(st.integers(0, 2 * (low + span) + 10))
     assert bool(pattern.fullmatch(str(number))) == (low <= number <= low + span)
@@ -174,7 +174,7 @@ def test_a_pattern_of_a_range_has_just_its_numbers(low: int, span: int, data: st
 
 
 @given(name=st.one_of(st.sampled_from(sorted(RESERVED)), st.from_regex(r"[a-z]{1,8}", fullmatch=True)))
-def test_a_pattern_of_names_leaves_out_the_reserved_words_alone(name: str) -> None:
+def test_name_pattern_excludes_exactly_the_reserved_words(name: str) -> None:
     for each in (name, f"{name}s", name[:-1] or "a", f"{name}_1", name.upper()):
         assert bool(re.search(name_but(RESERVED), each)) == (each not in RESERVED)
     assert not re.search(name_but(RESERVED), "1a")

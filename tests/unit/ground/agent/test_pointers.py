@@ -1,4 +1,4 @@
-"""Which value of a specification a finding is about: the smallest that holds it, found fast among many."""
+"""The value of a specification that a finding is about: the smallest one that contains its span."""
 
 import json
 
@@ -16,7 +16,7 @@ VALUES = st.recursive(
 
 
 def smallest(tree: JsonTree, span: Span) -> Path:
-    """The definition, over all places."""
+    """The definition, by a search over all places."""
     holding = [
         (place.end - place.start, path)
         for places in (tree.spans, tree.keys)
@@ -27,7 +27,7 @@ def smallest(tree: JsonTree, span: Span) -> Path:
 
 
 @given(VALUES, st.integers(0, 80), st.integers(0, 80))
-def test_the_smallest_value_that_holds_a_span(value: object, one: int, other: int) -> None:
+def test_innermost_value_is_the_smallest_that_contains_the_span(value: object, one: int, other: int) -> None:
     text = json.dumps(value, indent=1)
     _, tree, _ = read_json("x", text.encode())
     assert tree is not None
@@ -35,5 +35,5 @@ def test_the_smallest_value_that_holds_a_span(value: object, one: int, other: in
     assert JsonPlaces(tree).innermost(span) == smallest(tree, span)
 
 
-def test_a_pointer_is_escaped() -> None:
+def test_pointer_is_escaped() -> None:
     assert pointer(("a/b", 0, "~")) == "/a~1b/0/~0"

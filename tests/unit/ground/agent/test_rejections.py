@@ -1,4 +1,4 @@
-"""Wrong missions are put right by a repairer that knows no code: by pointer, limit and nearest."""
+"""Rejections suffice to correct a mission: a repairer uses only the pointer, the limit and the nearest value."""
 
 import json
 import random
@@ -35,7 +35,7 @@ def missions() -> Missions:
 
 
 def places(value: Any, at: tuple[str | int, ...] = ()) -> list[tuple[str | int, ...]]:
-    """The paths of all values and objects, the outermost left out."""
+    """The paths of all values and objects below the outermost one."""
     items: list[tuple[str | int, Any]] = []
     if isinstance(value, dict):
         items = list(value.items())
@@ -52,7 +52,7 @@ def holder(value: Any, path: tuple[str | int, ...]) -> Any:
 
 
 def mutated(chance: random.Random) -> Any:
-    """A mission with one to three things wrong about it."""
+    """A mission with one to three mistakes."""
     value = deepcopy(PROPOSAL)
     for _ in range(chance.randint(1, 3)):
         path = chance.choice([each for each in places(value) if isinstance(each[-1], str)])
@@ -74,13 +74,13 @@ def mutated(chance: random.Random) -> Any:
 
 
 def chosen(limit: dict[str, Any]) -> Any:
-    """A value of an agent's own choice, where what it wrote is near to none."""
+    """A value that an agent might choose if the rejection names no nearest one."""
     some = limit.get("one_of") or limit.get("places") or [limit.get("least")]
     return {"object": {}, "array": []}.get(limit.get("type", ""), some[0])
 
 
 def repair(value: Any, rejected: list[dict[str, Any]]) -> None:
-    """Put right what can be, by pointer, limit and nearest."""
+    """Correct the mission by pointer, limit and nearest value, as far as possible."""
     for each in sorted(rejected, key=lambda one: -len(one["field"])):
         path = [part.replace("~1", "/").replace("~0", "~") for part in each["field"].split("/")[1:]]
         of = value
@@ -95,12 +95,12 @@ def repair(value: Any, rejected: list[dict[str, Any]]) -> None:
             else:
                 of[key] = chosen(each["limit"] or {})
         except (KeyError, IndexError, TypeError):
-            continue  # what was put right around it took it along
+            continue  # an earlier correction removed or replaced the enclosing value
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("most", [25, pytest.param(100, marks=pytest.mark.soak)])
-def test_wrong_missions_are_put_right(missions: Missions, most: int) -> None:
+def test_wrong_missions_are_corrected_by_their_rejections(missions: Missions, most: int) -> None:
     chance, wrong, stuck = random.Random(21), 0, []
     while wrong < most:
         value = mutated(chance)
@@ -120,7 +120,7 @@ def test_wrong_missions_are_put_right(missions: Missions, most: int) -> None:
     assert not stuck, json.dumps(stuck[:3], indent=1)
 
 
-def test_a_rejection_says_all_that_a_repair_needs(missions: Missions) -> None:
+def test_rejection_has_field_limit_nearest_value_and_repair(missions: Missions) -> None:
     value = deepcopy(PROPOSAL)
     value["phases"][0]["steps"][0]["arguments"]["altitude"] = "4000 m"
     (found,) = missions.check(value, 0).rejections
@@ -131,7 +131,7 @@ def test_a_rejection_says_all_that_a_repair_needs(missions: Missions) -> None:
     assert found["code"].startswith("E")
 
 
-def test_nothing_is_clamped_silently(missions: Missions) -> None:
+def test_value_out_of_range_is_rejected_not_clamped(missions: Missions) -> None:
     value = deepcopy(PROPOSAL)
     value["phases"][0]["steps"][0]["arguments"]["altitude"] = "4000 m"
     answer = missions.check(value, 0)
@@ -142,7 +142,7 @@ ALTITUDE = "/phases/0/steps/0/arguments/altitude"
 
 
 def rejected(missions: Missions, pointer: str, given: Any) -> dict[str, Any]:
-    """The one rejection of the proposal with another value at a place; empty where it is accepted."""
+    """The rejection of the proposal with another value at a place; empty if it is accepted."""
     value = deepcopy(PROPOSAL)
     path: list[Any] = [int(part) if part.isdigit() else part for part in pointer.split("/")[1:]]
     holder(value, tuple(path))[path[-1]] = given
@@ -153,7 +153,7 @@ def rejected(missions: Missions, pointer: str, given: Any) -> dict[str, Any]:
     return found
 
 
-#: what stands where an altitude from 3 m to 40 m is asked, the same value as it is accepted or None, and a word of why
+#: a value for an altitude from 3 m to 40 m, the same value in the accepted form or None, and a part of the reason
 ALTITUDES = (
     ("25 meters", "25 m", "`meters`"), ("25 Metres", "25 m", "`Metres`"), ("0.02 kilometers", "20 m", "20 m"),
     ("82 ft", "24.994 m", "82 ft is 24.9936 m"), ("82feet", "24.994 m", "24.9936 m"),
@@ -162,11 +162,11 @@ ALTITUDES = (
     ("\uff12\uff15 m", "25 m", "same value"), ("25 \uff4d", "25 m", "same value"), ("25,0 m", "25 m", "same value"),
     ("2.5e1 m", "25 m", "same value"), ("\u0662\u0665 m", "25 m", "same value"),
     ("25 m relative", "25 m", "same value"),
-    ("25", "25 m", "if metres are meant"), (25, "25 m", "if metres are meant"), (25.5, "25.5 m", "if metres are meant"),
+    ("25", "25 m", "the value in metres"), (25, "25 m", "the value in metres"), (25.5, "25.5 m", "the value in metres"),
     ("4000 m", "40 m", ""), ("\u221225 m", "3 m", "-25 m, out of range"), ("200 ft", "40 m", "60.96 m, out of range"),
     ("25 m AGL", None, "above ground"), ("25 m AMSL", None, "above sea"), ("25 m/s", None, "unit of speed"),
     ("9 s", None, "unit of duration"), ("25 kt", None, "unit of speed"), ("25 furlongs", None, "`furlongs`"),
-    ("1,000 m", None, "two ways"), ("as high as you can", None, "no number"), ("25\u00b2 m", None, ""),
+    ("1,000 m", None, "ambiguous"), ("as high as you can", None, "expected a number"), ("25\u00b2 m", None, ""),
     ("NaN", None, ""),
     ("", None, ""), ("25 m 30 cm", None, ""), (True, None, ""), (None, None, ""), ([25], None, ""),
     ("25..30 m", None, ""),
@@ -175,7 +175,7 @@ ALTITUDES = (
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("given", "same", "why"), ALTITUDES)
-def test_advice_names_the_same_value_as_it_is_accepted_or_none(
+def test_advice_gives_the_same_value_in_accepted_form_or_none(
     missions: Missions, given: Any, same: str | None, why: str
 ) -> None:
     found = rejected(missions, ALTITUDE, given)
@@ -188,23 +188,23 @@ def test_advice_names_the_same_value_as_it_is_accepted_or_none(
 
 
 @pytest.mark.parametrize("pointer", ["/phases", "/phases/0/steps", "/imports"])
-def test_a_list_as_text_is_told_as_the_list(missions: Missions, pointer: str) -> None:
+def test_advice_for_a_list_in_a_string_is_the_list(missions: Missions, pointer: str) -> None:
     wanted: Any = PROPOSAL
     for part in pointer.split("/")[1:]:
         wanted = wanted[int(part) if part.isdigit() else part]
     found = rejected(missions, pointer, json.dumps(wanted))
     assert found["nearest"] == wanted
-    assert "the list itself, not a text" in found["repair"]
+    assert "the list itself, not a string" in found["repair"]
     assert rejected(missions, pointer, "fly")["nearest"] is None
 
 
-def test_an_object_as_text_is_told_as_the_object(missions: Missions) -> None:
+def test_advice_for_an_object_in_a_string_is_the_object(missions: Missions) -> None:
     found = rejected(missions, "/policy", json.dumps(PROPOSAL["policy"]))
     assert found["nearest"] == PROPOSAL["policy"]
-    assert "the object itself, not a text" in found["repair"]
+    assert "the object itself, not a string" in found["repair"]
 
 
-def test_each_number_with_a_point_is_told_by_itself(missions: Missions) -> None:
+def test_each_number_with_a_decimal_point_is_rejected_separately(missions: Missions) -> None:
     value = deepcopy(PROPOSAL) | {"version": 1.0}
     value["policy"]["version"] = 7.0
     found = {each["field"]: each for each in missions.check(value, 0).rejections}
@@ -212,7 +212,7 @@ def test_each_number_with_a_point_is_told_by_itself(missions: Missions) -> None:
     assert "`7.0`" in found["/policy/version"]["message"]
 
 
-def test_a_place_that_is_none_is_told_the_places(missions: Missions) -> None:
+def test_advice_for_an_unknown_place_lists_the_known_places(missions: Missions) -> None:
     pointer = "/phases/1/steps/0/arguments/target"
     found = rejected(missions, pointer, "somewhere nice")
     assert (found["nearest"], found["limit"]["places"]) == (None, ["bridge_a.entry", "bridge_b.entry"])
@@ -221,12 +221,12 @@ def test_a_place_that_is_none_is_told_the_places(missions: Missions) -> None:
 
 
 @pytest.mark.parametrize(("wrong", "more"), [(39, 0), (40, 0), (41, 1), (3_000, 2_960)])
-def test_of_many_rejections_the_first_are_told_and_others_counted(missions: Missions, wrong: int, more: int) -> None:
+def test_rejections_are_capped_and_the_rest_counted(missions: Missions, wrong: int, more: int) -> None:
     proposal = deepcopy(PROPOSAL)
     proposal["phases"][0]["steps"][0] |= {f"x{number}": 1 for number in range(wrong)}
     answer = missions.check(proposal, 0)
     assert [each["field"] for each in answer.rejections] == [
         f"/phases/0/steps/0/x{number}" for number in range(min(wrong, 40))
     ]
-    assert {each["message"].split("`")[0] for each in answer.rejections} == {"there is no key "}
+    assert {each["message"].split("`")[0] for each in answer.rejections} == {"unknown key "}
     assert answer.more == more

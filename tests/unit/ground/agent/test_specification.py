@@ -1,4 +1,4 @@
-"""A mission specification: the same mission as in the language, and findings that an agent can repair from."""
+"""A mission specification gives the same mission as the language does, and its findings point at the wrong values."""
 
 import copy
 import json
@@ -39,7 +39,7 @@ mission standard under bridge_inspection@7 on quad {
 """
 
 
-def test_it_means_what_the_same_mission_in_the_language_means(
+def test_specification_compiles_like_the_same_mission_in_the_language(
     good: dict[str, Any], compile_text: Compile, dumped: Dump
 ) -> None:
     compiled, found = compile_text(dumped(good))
@@ -59,14 +59,14 @@ def test_it_means_what_the_same_mission_in_the_language_means(
         assert [getattr(mine, f) for f in of_step] == [getattr(theirs, f) for f in of_step]
 
 
-def test_the_schema_is_one_and_accepts_it(good: dict[str, Any]) -> None:
+def test_schema_is_valid_and_accepts_the_good_specification(good: dict[str, Any]) -> None:
     published = schema()
     jsonschema.Draft202012Validator.check_schema(published)
     jsonschema.validate(good, published)
     json.dumps(published)
 
 
-#: what is spoiled: the path and its new value (None: removed), the code, the pointer, and the text under the span
+#: the path of a value, its wrong value (None: removed), the code, the pointer, and the text under the span
 SPOILED: list[tuple[tuple[str | int, ...], Any, str, str, str]] = [
     (("vehicle",), None, "E0902", "", "{"),
     (("vehicel",), "quad", "E0902", "/vehicel", '"vehicel"'),
@@ -125,7 +125,7 @@ SPOILED: list[tuple[tuple[str | int, ...], Any, str, str, str]] = [
 
 
 @pytest.mark.parametrize(("path", "value", "code", "pointer", "text"), SPOILED)
-def test_each_finding_points_at_the_value_to_repair(
+def test_finding_points_at_the_value_to_correct(
     good: dict[str, Any],
     compile_text: Compile,
     dumped: Dump,
@@ -154,7 +154,7 @@ def test_each_finding_points_at_the_value_to_repair(
     assert all(each.pointer is not None for each in found if each.span is not None and each.span.file == "spec.json")
 
 
-def test_a_value_cannot_break_out_of_its_place(good: dict[str, Any], compile_text: Compile, dumped: Dump) -> None:
+def test_value_cannot_inject_syntax_of_the_language(good: dict[str, Any], compile_text: Compile, dumped: Dump) -> None:
     for hostile in (
         "20 m) goto(altitude = 5 m",
         "20 m, altitude = 5 m",
@@ -172,7 +172,7 @@ def test_a_value_cannot_break_out_of_its_place(good: dict[str, Any], compile_tex
         assert {each.pointer for each in found} == {"/phases/0/steps/0/arguments/altitude"}, found
 
 
-def test_an_escaped_text_keeps_its_places(good: dict[str, Any], compile_text: Compile, dumped: Dump) -> None:
+def test_span_is_right_in_a_string_with_escapes(good: dict[str, Any], compile_text: Compile, dumped: Dump) -> None:
     text = dumped(good).replace('"perimeter"', '"per\\u0069meteer"')
     _, found = compile_text(text)
     assert found[0].span is not None
@@ -205,7 +205,7 @@ BROKEN: list[tuple[str | bytes, str]] = [
 
 
 @pytest.mark.parametrize(("text", "code"), BROKEN)
-def test_what_is_no_specification_is_one_clear_finding(compile_text: Compile, text: str | bytes, code: str) -> None:
+def test_malformed_specification_is_one_finding(compile_text: Compile, text: str | bytes, code: str) -> None:
     compiled, found = compile_text(text)
     assert compiled.mission is None
     assert [each.code.id for each in found if each.code.id != "E0206"][:1] == [code]
@@ -220,7 +220,7 @@ def test_what_is_no_specification_is_one_clear_finding(compile_text: Compile, te
         max_leaves=12,
     )
 )
-def test_what_json_writes_is_read_back(value: Any) -> None:
+def test_reader_agrees_with_the_json_module(value: Any) -> None:
     try:
         data = json.dumps(value, ensure_ascii=False).encode()
     except UnicodeEncodeError:
@@ -238,7 +238,7 @@ def test_what_json_writes_is_read_back(value: Any) -> None:
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(st.data())
-def test_a_mutated_specification_is_compiled_or_explained(
+def test_mutated_specification_compiles_or_has_errors(
     good: dict[str, Any], compile_text: Compile, dumped: Dump, data: st.DataObject
 ) -> None:
     text = dumped(good)

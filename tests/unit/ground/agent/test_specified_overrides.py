@@ -1,4 +1,4 @@
-"""What an agent's step is held to beyond its skill: as in the language, and findings point into the JSON."""
+"""Overrides of a step in a specification: the same as in the language, with findings that point into the JSON."""
 
 from collections.abc import Callable
 from typing import Any
@@ -33,7 +33,7 @@ def with_overrides(good: dict[str, Any], overrides: Any) -> dict[str, Any]:
     return good
 
 
-def test_a_step_may_be_held_to_more(good: dict[str, Any], compile_text: Compile, dumped: Dump) -> None:
+def test_step_may_have_every_override(good: dict[str, Any], compile_text: Compile, dumped: Dump) -> None:
     spec = with_overrides(good, ALL)
     jsonschema.validate(spec, schema())
     compiled, found = compile_text(dumped(spec))
@@ -59,7 +59,7 @@ def test_a_step_may_be_held_to_more(good: dict[str, Any], compile_text: Compile,
     ]
 
 
-def test_none_is_none(good: dict[str, Any], compile_text: Compile, dumped: Dump) -> None:
+def test_empty_overrides_change_nothing(good: dict[str, Any], compile_text: Compile, dumped: Dump) -> None:
     plain, _ = compile_text(dumped(good))
     for overrides in ({}, None, {"deadline": None, "require": []}):
         compiled, found = compile_text(dumped(with_overrides(good, overrides)))
@@ -93,7 +93,7 @@ def test_none_is_none(good: dict[str, Any], compile_text: Compile, dumped: Dump)
         ({"record": ["nothing"]}, "E0610", "/record/0", '"nothing"'),
     ],
 )
-def test_findings_point_at_what_is_wrong(
+def test_finding_points_at_the_wrong_override(
     good: dict[str, Any],
     compile_text: Compile,
     dumped: Dump,

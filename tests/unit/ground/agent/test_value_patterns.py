@@ -1,4 +1,4 @@
-"""Patterns of quantities: just the decimals of a range, below zero and with fractions too, whatever the dimension."""
+"""Patterns of quantities accept exactly the decimals of a range, in every dimension, below zero and with fractions."""
 
 import re
 from collections.abc import Iterator
@@ -22,7 +22,7 @@ from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 LINEAR = sorted(Dimension, key=lambda one: one.value)
-#: how many canonical units one of the unit has, by hand
+#: the number of canonical units in the unit of a dimension, by hand
 SCALES = {
     Dimension.LENGTH: 1000, Dimension.ALTITUDE: 1000, Dimension.SPEED: 1000, Dimension.DURATION: 10**6,
     Dimension.ANGLE: 10**7, Dimension.RATIO: 100, Dimension.VOLTAGE: 1000,
@@ -35,7 +35,7 @@ def fits(pattern: str, text: str) -> bool:
 
 
 def texts(value: int, scale: int) -> Iterator[str]:
-    """Every way to write a canonical value: no needless zeros in front, those that may stand behind it."""
+    """Every spelling of a canonical value: without leading zeros, with any number of trailing zeros."""
     sign, (whole, rest) = "-" if value < 0 else "", divmod(abs(value), scale)
     digits = str(rest).zfill(len(str(scale)) - 1) if scale > 1 else ""
     for count in range(len(digits) + 1):
@@ -43,8 +43,8 @@ def texts(value: int, scale: int) -> Iterator[str]:
             yield f"{sign}{whole}{'.' if count else ''}{digits[:count]}"
 
 
-def test_every_decimal_of_a_grid_fits_or_not_as_its_value_does() -> None:
-    """By brute force, in per cent: all limits from -1.3 % to 1.3 %, all numbers around them, in every spelling."""
+def test_pattern_agrees_with_values_on_a_grid() -> None:
+    """Exhaustive in per cent: limits from -1.3 % to 1.3 %, the numbers near them, in every spelling."""
     step = 7
     for low in range(-130, 131, step):
         for high in range(low, 131, step):
@@ -55,7 +55,7 @@ def test_every_decimal_of_a_grid_fits_or_not_as_its_value_does() -> None:
 
 
 @given(dimension=st.sampled_from(LINEAR), data=st.data())
-def test_a_pattern_has_just_the_decimals_of_its_range(dimension: Dimension, data: st.DataObject) -> None:
+def test_pattern_accepts_exactly_the_decimals_of_its_range(dimension: Dimension, data: st.DataObject) -> None:
     scale = SCALES[dimension]
     near = st.integers(-3 * scale, 3 * scale) | st.integers(-400, 400).map(lambda number: number * max(scale // 4, 1))
     low, high = sorted((data.draw(near), data.draw(near)))
@@ -73,7 +73,7 @@ def test_a_pattern_has_just_the_decimals_of_its_range(dimension: Dimension, data
 
 
 @given(dimension=st.sampled_from(LINEAR), value=st.integers(-(10**9), 10**9))
-def test_what_is_written_reads_back(dimension: Dimension, value: int) -> None:
+def test_written_quantity_parses_to_the_same_value(dimension: Dimension, value: int) -> None:
     parsed = parse(Source("x.rts", f"mission m under p@1 on v {{ phase a {{ s(x = {written(value, dimension)}) }} }}"))
     step = parsed.unit.missions[0].phases[0].items[0]
     assert isinstance(step, Step)
@@ -82,13 +82,13 @@ def test_what_is_written_reads_back(dimension: Dimension, value: int) -> None:
     assert read.value == value
 
 
-def test_the_scales_are_those_of_the_units() -> None:
+def test_scales_agree_with_the_units() -> None:
     for dimension, scale in SCALES.items():
         if dimension is not Dimension.COUNT:
             assert UNITS[unit_of(dimension)][1:] == (scale, 1)
 
 
-#: parameters of every dimension, below zero and above, and what some permits leave of an altitude
+#: a skill with parameters of every dimension, and a permit that limits an altitude
 POLICY = """
 import "lib:policies/site.rts"
 import "lib:skills/hover.rts"
@@ -114,7 +114,7 @@ policy q version 1 {
 
 
 def arguments(permitted: str = "altitude <= 20 m") -> dict[str, dict[str, Any]]:
-    """The schemas of the arguments, by their names."""
+    """The schemas of the arguments by name."""
 
     def read(path: str) -> bytes:
         return POLICY.replace("PERMITTED", permitted).encode() if path == "p.rts" else Path(path).read_bytes()
@@ -129,7 +129,7 @@ def arguments(permitted: str = "altitude <= 20 m") -> dict[str, dict[str, Any]]:
     }
 
 
-def test_every_example_fits_its_own_pattern() -> None:
+def test_every_example_fits_its_pattern() -> None:
     found = arguments()
     assert {"turn", "d", "n", "off", "altitude"} <= set(found)
     for name, each in found.items():
@@ -150,10 +150,10 @@ def test_every_example_fits_its_own_pattern() -> None:
         ("altitude in 6 m .. 9.125 m", 6_000, 9_125),
         ("altitude == 12.5 m", 12_500, 12_500),
         ("12.5 m == altitude and altitude != 40 m", 12_500, 12_500),
-        ("altitude < 7 m or altitude > 9 m", 3_000, 60_000),  # of a choice nothing is told: it may be too wide
+        ("altitude < 7 m or altitude > 9 m", 3_000, 60_000),  # `or` is not analysed: the range may be too wide
     ],
 )
-def test_what_a_permit_leaves_of_a_range_to_the_millimetre(permitted: str, least: int, most: int) -> None:
+def test_pattern_has_the_limits_of_the_permit_to_the_millimetre(permitted: str, least: int, most: int) -> None:
     altitude = arguments(permitted)["altitude"]
     for value in (least, most):
         assert fits(altitude["pattern"], written(value, Dimension.ALTITUDE))

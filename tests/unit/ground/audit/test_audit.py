@@ -1,4 +1,4 @@
-"""Whatever the mission does, its log is audited without a flaw; and what it proves is said exactly.
+"""The log of every kind of mission passes the audit, and the report states exactly what it proves.
 
 `test_frames_follow` audits the log of every kind of flight.
 """
@@ -33,13 +33,13 @@ def fly(*faults: Fault, of: Mission | None = None) -> list[bytes]:
 @pytest.mark.parametrize(
     ("behaviour", "kind"), each_once(OnInadmissible, ["wind", "no fix for a while", "low battery"])
 )
-def test_whatever_the_mission_does_when_a_step_is_not_admitted(behaviour: OnInadmissible, kind: str) -> None:
+def test_log_passes_for_every_action_when_a_step_is_not_admitted(behaviour: OnInadmissible, kind: str) -> None:
     mission = case.mission(case.short_steps())
     steps = tuple(replace(step, on_inadmissible=behaviour) for step in mission.invocations)
     sound(fly(*FAULTS[kind], of=replace(mission, invocations=steps)))
 
 
-def test_a_flight_that_was_interrupted() -> None:
+def test_log_of_an_interrupted_flight_passes() -> None:
     interrupted = [False]
 
     def each(run: Flight) -> Sequence[Event]:
@@ -55,7 +55,7 @@ def test_a_flight_that_was_interrupted() -> None:
     sound(flown.lines)
 
 
-def test_what_is_proven_and_what_is_not() -> None:
+def test_report_lists_proven_and_unproven_claims() -> None:
     report = sound(flight()).report
     assert [claim.slug for claim in report.proven] == [
         "trust", "bundle", "chain", "seals", "signed-close", "decisions", "dispatches",
@@ -67,7 +67,7 @@ def test_what_is_proven_and_what_is_not() -> None:
     assert LOG_KEY.kid.hex() in texts
 
 
-def test_one_is_not_many() -> None:
+def test_report_uses_singular_and_plural() -> None:
     lines = fly(BatteryLevel(0, 1_500))
     texts = [claim.text for claim in sound(lines).report.proven]
     decisions = sum(read(line)["type"] == "decision" for line in lines)
@@ -75,14 +75,14 @@ def test_one_is_not_many() -> None:
     assert "0 dispatches, each after a record that permits it" in texts
 
 
-def test_a_log_that_was_cut_still_proves_its_beginning() -> None:
+def test_truncated_log_still_proves_its_beginning() -> None:
     report = prove(flight()[:-1]).report
     assert report.verdict is LogVerdict.INCOMPLETE
     assert [claim.slug for claim in report.proven] == ["trust", "bundle", "chain", "seals", "decisions", "dispatches"]
     assert "signed-close" in [claim.slug for claim in report.unproven]
 
 
-def test_a_log_that_fails_proves_nothing() -> None:
+def test_failed_log_proves_nothing() -> None:
     report = prove([flight()[0], *flight()[2:]]).report
     assert report.proven == ()
     assert [claim.slug for claim in report.unproven] == ["log"]
@@ -92,7 +92,7 @@ def test_a_log_that_fails_proves_nothing() -> None:
 
 
 @pytest.mark.slow
-def test_mode_none_needs_no_permits_and_says_so() -> None:
+def test_report_says_that_mode_none_needs_no_permits() -> None:
     report = sound_without_permits(recorded("wind", "ardupilot", EnforcementMode.NONE).lines)
     assert "enforcement" in [claim.slug for claim in report.report.unproven]
     assert "dispatches" not in [claim.slug for claim in report.report.proven]
@@ -105,13 +105,13 @@ def sound_without_permits(lines: Sequence[bytes]) -> Audit:
 
 
 @pytest.mark.parametrize("length", [16, 32])
-def test_the_pin_is_a_key_or_its_name(length: int) -> None:
+def test_pin_may_be_a_public_key_or_its_kid(length: int) -> None:
     root = case.KEYS[Duty.ROOT]
     pinned = root.kid if length == 16 else root.public
     assert audit(flight(), pinned).report.failure is None
 
 
-def test_another_pin_trusts_nothing() -> None:
+def test_log_fails_under_another_pinned_key() -> None:
     for pinned in (bytes(16), bytes(32), case.KEYS[Duty.POLICY].public):
         report = audit(flight(), pinned).report
         assert report.failure is not None
@@ -119,7 +119,7 @@ def test_another_pin_trusts_nothing() -> None:
         assert report.failure.record == 0
 
 
-def test_a_changed_record_is_named_by_the_chain_before_its_meaning() -> None:
+def test_changed_record_is_reported_as_a_chain_flaw_first() -> None:
     lines = list(flight())
     number = next(n for n, line in enumerate(lines) if read(line)["type"] == "decision")
     lines[number] = edit(lines[number], outcome="deny")
@@ -128,7 +128,7 @@ def test_a_changed_record_is_named_by_the_chain_before_its_meaning() -> None:
     assert (report.failure.slug, report.failure.record) == ("chain/broken", number)
 
 
-def test_a_record_that_means_something_wrong_at_the_very_end() -> None:
+def test_wrong_record_at_the_end_is_reported() -> None:
     lines = flight()
     number = next(n for n, line in enumerate(lines) if read(line)["type"] == "decision")
     report = audit([*lines[:number], edit(lines[number], outcome="deny")], ROOT_KEY).report

@@ -1,4 +1,4 @@
-"""What witnesses saw, in an audit: how far a log is anchored, and that it was rewritten or cut by its own signers."""
+"""Anchors in an audit: how far a log is witnessed, and detection of a log that its own signers rewrote or truncated."""
 
 import json
 from collections.abc import Sequence
@@ -29,7 +29,7 @@ def failure(lines: Sequence[bytes], *anchors: str) -> str:
     return found.slug
 
 
-def test_as_far_as_the_witness_saw() -> None:
+def test_log_is_anchored_as_far_as_the_witness_cosigned() -> None:
     lines = flight()
     for number in signers(lines):
         report = audited(lines, mark(note_of(lines, number))).report
@@ -39,14 +39,14 @@ def test_as_far_as_the_witness_saw() -> None:
         assert "anchor" in [claim.slug for claim in report.proven]
 
 
-def test_without_a_trusted_witness_nothing_is_anchored() -> None:
+def test_untrusted_witness_anchors_nothing() -> None:
     lines = flight()
     for anchors in ((), (mark(note_of(lines, 0), STRANGER),), (mark(note_of(sealed_log().lines, 0)),), ("no note",)):
         report = audited(lines, *anchors).report
         assert (report.failure, report.anchored) == (None, 0)
 
 
-def test_a_log_that_all_its_keys_wrote_anew_is_not_the_one_that_was_seen() -> None:
+def test_log_rewritten_with_all_its_keys_contradicts_the_witness() -> None:
     lines = list(flight())
     last = signers(lines)[-2]
     seen = mark(note_of(lines, last))
@@ -64,7 +64,7 @@ def test_a_log_that_all_its_keys_wrote_anew_is_not_the_one_that_was_seen() -> No
 
 
 @pytest.mark.parametrize("closed", [True, False])
-def test_a_log_whose_end_was_cut_off_is_not_the_one_that_was_seen(closed: bool) -> None:
+def test_truncated_log_contradicts_the_witness(closed: bool) -> None:
     lines = list(flight())
     middle, last = signers(lines)[3], signers(lines)[-2]
     cut = signed([*lines[:middle], lines[-1]]) if closed else lines[:middle]
@@ -72,7 +72,7 @@ def test_a_log_whose_end_was_cut_off_is_not_the_one_that_was_seen(closed: bool) 
     assert failure(cut, mark(note_of(lines, last))) == "anchor/beyond"
 
 
-def test_anchors_that_the_log_itself_holds_count() -> None:
+def test_anchors_in_the_log_itself_count() -> None:
     lines = list(flight())
     number = signers(lines)[1]
     before = signed(lines)
@@ -88,7 +88,7 @@ def test_anchors_that_the_log_itself_holds_count() -> None:
     assert audited(signed([*before[: number + 1], wrong, *before[number + 1 :]])).report.anchored == 0
 
 
-def test_what_the_witness_saw_counts_for_more_than_what_the_records_mean() -> None:
+def test_contradicted_anchor_is_reported_before_wrong_records() -> None:
     lines = list(flight())
     number = next(number for number, line in enumerate(lines) if b'"type":"decision"' in line)
     forged = signed([*lines[:number], edit(lines[number], outcome="deny"), *lines[number + 1 :]])
@@ -98,7 +98,7 @@ def test_what_the_witness_saw_counts_for_more_than_what_the_records_mean() -> No
     assert failure(broken, mark(note_of(lines, signers(lines)[-1]))) == "chain/broken"
 
 
-def test_a_forged_cosignature_is_told() -> None:
+def test_forged_cosignature_is_reported() -> None:
     lines = flight()
     note = mark(note_of(lines, 0))
     forged = note[:-8] + ("A" if note[-8] != "A" else "B") + note[-7:]

@@ -1,4 +1,4 @@
-"""Decisions derived again: about steps, links of a chain, and the contingency; forged by the key's holder too."""
+"""Deriving decisions again: on steps, links of a chain and the contingency, with forgeries by the holder of the key."""
 
 from functools import cache
 
@@ -17,7 +17,7 @@ M = case.M
 
 @cache
 def denied_in_the_air() -> tuple[bytes, ...]:
-    """The inspection is planned higher than the policy permits: denied in the air, the contingency flies."""
+    """A flight whose inspection is planned too high: it is denied in the air, and the contingency flies."""
     mission = case.mission()
     inspect = mission.invocations[2]
     cells = (inspect.arguments[0], 35 * M, *inspect.arguments[2:])
@@ -37,7 +37,7 @@ def forged(lines: tuple[bytes, ...], number: int, **fields: object) -> tuple[str
 
 
 @pytest.mark.slow
-def test_the_contingency_is_derived_again() -> None:
+def test_decision_on_the_contingency_is_derived_again() -> None:
     lines = denied_in_the_air()
     assert decisions(lines, 2)
     assert prove(lines).report.failure is None
@@ -55,7 +55,7 @@ def test_the_contingency_is_derived_again() -> None:
         ({"valid_until_us": 0}, "decision/valid-until-us"),
     ],
 )
-def test_a_forged_link_of_the_contingency(fields: dict[str, object], slug: str) -> None:
+def test_forged_link_of_the_contingency_is_found(fields: dict[str, object], slug: str) -> None:
     lines = denied_in_the_air()
     number = decisions(lines, 2)[0]
     assert forged(lines, number, **fields) == (slug, number)
@@ -66,10 +66,10 @@ def test_a_forged_link_of_the_contingency(fields: dict[str, object], slug: str) 
     ("field", "value", "slug"),
     [("vehicle", "quad-08", "decision/vehicle"), ("policy_version", 8, "decision/policy-version")],
 )
-def test_a_decision_is_of_the_vehicle_and_the_policy_of_its_log(
+def test_decision_for_another_vehicle_or_policy_version_is_found(
     kind: int, field: str, value: object, slug: str
 ) -> None:
-    """Whatever was decided: a refusal for the wrong vehicle would derive from the vehicle that its record names."""
+    """Even a refusal: it would derive correctly from the wrong vehicle in its record."""
     lines = [flight(), fallen_back("px4").lines, denied_in_the_air()][kind]
     number = decisions(lines, kind)[0]
     context = read(lines[number])["context"] | {field: value}
@@ -81,7 +81,7 @@ def test_a_decision_is_of_the_vehicle_and_the_policy_of_its_log(
 
 
 @pytest.mark.parametrize("by_us", [-1, 1])
-def test_a_step_is_released_after_it_was_received_and_before_it_is_decided(by_us: int) -> None:
+def test_release_outside_receipt_and_decision_is_found(by_us: int) -> None:
     lines = flight()
     number = decisions(lines, 0)[0]
     end = read(lines[0])["received_us"] if by_us < 0 else read(lines[number])["at_us"]
@@ -100,20 +100,20 @@ def test_a_step_is_released_after_it_was_received_and_before_it_is_decided(by_us
         ({"invocation": ""}, "decision/invocation"),
     ],
 )
-def test_a_forged_link_of_a_chain(fields: dict[str, object], slug: str) -> None:
+def test_forged_link_of_a_chain_is_found(fields: dict[str, object], slug: str) -> None:
     lines = fallen_back("px4").lines
     number = next(n for n in decisions(lines, 1) if read(lines[n])["link"] >= 0)
     assert forged(lines, number, **fields) == (slug, number)
 
 
-def test_a_degrade_rules_target_is_derived_again() -> None:
+def test_decision_on_the_target_of_a_degrade_rule_is_derived_again() -> None:
     lines = other_flight()
     number = next(n for n in decisions(lines, 1) if read(lines[n])["link"] == -1)
     assert forged(lines, number, reason="state/violated") == ("decision/reason", number)
 
 
-def test_a_link_that_may_not_fly_is_not_allowed() -> None:
-    """Without a fix the vehicle can neither hover nor fly home; the record says it could."""
+def test_allowed_link_that_may_not_fly_is_found() -> None:
+    """Without a fix the vehicle can neither hover nor fly home, but the record allows it."""
     lines = fallen_back("px4").lines
     number = next(n for n in decisions(lines, 1) if read(lines[n])["link"] >= 0)
     state = read(lines[number])["state"]
@@ -121,8 +121,8 @@ def test_a_link_that_may_not_fly_is_not_allowed() -> None:
     assert forged(lines, number, state=state) == ("decision/outcome", number)
 
 
-def test_a_link_that_is_refused_is_recorded_as_such() -> None:
-    """The same, told truly: the link is refused, and flies all the same by the step's standing permit."""
+def test_recorded_refusal_of_a_link_passes() -> None:
+    """The same state with a true record: the link is refused, and flies by the step's standing permit."""
     lines = fallen_back("px4").lines
     number = next(n for n in decisions(lines, 1) if read(lines[n])["link"] >= 0)
     record = read(lines[number])
@@ -132,8 +132,8 @@ def test_a_link_that_is_refused_is_recorded_as_such() -> None:
     assert prove(signed([*lines[:number], true, *lines[number + 1 :]])).report.failure is None
 
 
-def test_a_step_that_was_not_used_up_may_be_asked_for_again() -> None:
-    """A battery that is unknown defers the take-off; it is decided again, with its id still fresh."""
+def test_deferred_step_may_be_decided_again() -> None:
+    """An unknown battery defers the take-off; it is decided again, and its id is not consumed."""
     lines = tuple(
         Flight(
             case.seal(case.mission(case.short_steps())), case.simulated("px4", faults=(BatteryLevel(0, 3_000),)),

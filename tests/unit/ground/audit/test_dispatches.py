@@ -1,4 +1,4 @@
-"""Which dispatches earlier records cover."""
+"""Which dispatches are covered by earlier records."""
 
 import pytest
 
@@ -30,13 +30,13 @@ KEYS = [(STEP, 0, -1), (FALLBACK, 0, 1), (FALLBACK, 0, DEGRADE), (CONTINGENCY, -
 
 
 @pytest.mark.parametrize("key", KEYS)
-def test_nothing_covers_what_nobody_decided(key: tuple[int, int, int]) -> None:
+def test_dispatch_without_a_decision_is_not_covered(key: tuple[int, int, int]) -> None:
     assert slug(DispatchCover(), sent(*key)) == "dispatch/not-permitted"
 
 
 @rows("key", KEYS)
 @rows("outcome", ["deny", "defer", "fallback"])
-def test_only_allow_covers(key: tuple[int, int, int], outcome: str) -> None:
+def test_only_an_allow_covers_a_dispatch(key: tuple[int, int, int], outcome: str) -> None:
     cover = DispatchCover()
     cover.decided(decision(*key, outcome=outcome))
     assert slug(cover, sent(*key)) == "dispatch/not-permitted"
@@ -47,7 +47,7 @@ def test_only_allow_covers(key: tuple[int, int, int], outcome: str) -> None:
 
 
 @pytest.mark.parametrize("key", KEYS)
-def test_an_allow_covers_one_dispatch_in_time(key: tuple[int, int, int]) -> None:
+def test_allow_covers_one_dispatch_while_valid(key: tuple[int, int, int]) -> None:
     cover = DispatchCover()
     cover.decided(decision(*key, until_us=50))
     assert slug(cover, sent(*key, at_us=50)) is None
@@ -58,7 +58,7 @@ def test_an_allow_covers_one_dispatch_in_time(key: tuple[int, int, int]) -> None
 
 
 @pytest.mark.parametrize("key", KEYS)
-def test_an_allow_covers_nothing_else(key: tuple[int, int, int]) -> None:
+def test_allow_covers_no_other_step_or_link(key: tuple[int, int, int]) -> None:
     kind, step, link = key
     cover = DispatchCover()
     cover.decided(decision(*key))
@@ -68,7 +68,7 @@ def test_an_allow_covers_nothing_else(key: tuple[int, int, int]) -> None:
         assert slug(cover, sent(*other)) == "dispatch/not-permitted", other
 
 
-def test_the_allow_of_a_step_stands_for_its_chain_and_the_contingency() -> None:
+def test_allow_of_a_step_covers_its_chain_and_the_contingency() -> None:
     cover = DispatchCover()
     cover.decided(decision(STEP, 3, -1))
     assert slug(cover, sent(FALLBACK, 3, 0, at_us=10_000)) is None
@@ -80,7 +80,7 @@ def test_the_allow_of_a_step_stands_for_its_chain_and_the_contingency() -> None:
     )
 
 
-def test_a_standing_permit_covers_when_the_own_one_is_over() -> None:
+def test_standing_permit_covers_a_link_whose_own_permit_expired() -> None:
     cover = DispatchCover()
     cover.decided(decision(STEP, 3, -1))
     cover.decided(decision(FALLBACK, 3, 0, until_us=50))

@@ -1,4 +1,4 @@
-"""Two tables, written apart, of which frames carry out a command: the auditor's and the boundary's say the same."""
+"""The auditor and the boundary, implemented independently, agree on the frames that belong to a command."""
 
 from functools import cache
 from struct import pack
@@ -34,7 +34,7 @@ def nature_of(octets: bytes) -> FrameNature | None:
     return nature(frame) if frame is not None and frame.component == 191 else None
 
 
-#: values that some field of some frame has where it means something
+#: values with a meaning in some field of some frame
 VALUES = (0, 1, -1, 2, 3, 4, 5, 6, 9, 12, 15.0, 17, 22, 21_196, 176, 178, 192, 400, float("nan"), float("inf"), 0x0DF8)
 POINTS = ((473_978_000, 85_456_000), (473_979_000, 85_457_000))
 
@@ -42,7 +42,7 @@ POINTS = ((473_978_000, 85_456_000), (473_979_000, 85_457_000))
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", AUTOPILOTS)
 @given(data=some.data())
-def test_the_same_frames_carry_out_the_same_commands(kind: str, data: some.DataObject) -> None:
+def test_auditor_and_boundary_accept_the_same_frames(kind: str, data: some.DataObject) -> None:
     frame = data.draw(some.sampled_from(commands(kind)))
     fields = list(frame.fields)
     motion = data.draw(some.sampled_from(list(MotionKind)))
@@ -68,12 +68,12 @@ def test_the_same_frames_carry_out_the_same_commands(kind: str, data: some.DataO
 
 
 @pytest.mark.parametrize("kind", AUTOPILOTS)
-def test_a_flight_is_made_of_many_kinds_of_commands(kind: str) -> None:
+def test_sample_flight_has_many_kinds_of_commands(kind: str) -> None:
     assert len({(frame.message, frame.fields[7]) for frame in commands(kind)}) >= 3
 
 
 @given(some.binary(max_size=120), some.integers(0, 1 << 24))
-def test_whatever_the_octets_reading_them_does_not_fail(payload: bytes, message: int) -> None:
+def test_reading_arbitrary_octets_does_not_raise(payload: bytes, message: int) -> None:
     octets = pack("<BBBBBBB", 0xFD, len(payload), 0, 0, 0, 1, 191) + message.to_bytes(4, "little")[:3] + payload
     for data in (octets, octets + b"\0\0", octets[:-3], payload):
         frame = read(data)
@@ -87,7 +87,7 @@ def test_whatever_the_octets_reading_them_does_not_fail(payload: bytes, message:
 
 
 @given(some.sampled_from(sorted(LAYOUTS)), some.binary(min_size=60, max_size=60))
-def test_both_read_the_same_fields(message: int, payload: bytes) -> None:
+def test_auditor_and_boundary_read_the_same_fields(message: int, payload: bytes) -> None:
     size = LAYOUTS[message].fields.size
     octets = pack("<BBBBBBB", 0xFD, size, 0, 0, 0, 1, 191) + message.to_bytes(3, "little") + payload[:size] + b"\0\0"
     mine, theirs = read(octets), read_frame(octets)

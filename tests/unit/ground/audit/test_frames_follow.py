@@ -1,4 +1,4 @@
-"""The raw frames of every kind of flight agree with its log: each command after its record, and none besides."""
+"""The raw frames of every kind of flight agree with its log: each command follows its record, and there is no other."""
 
 from collections.abc import Sequence
 from itertools import product
@@ -34,7 +34,7 @@ FLAVOURS = ("px4", "ardupilot")
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("fault", "flavour"), each_once(FAULTS, FLAVOURS))
-def test_log_and_frames_of_every_kind_of_flight_are_sound(fault: str, flavour: str) -> None:
+def test_log_and_frames_of_every_kind_of_flight_pass(fault: str, flavour: str) -> None:
     lines, entries = recorded(fault, flavour)
     dispatches = sound(lines).dispatches
     found, frames = joined(lines, entries)
@@ -53,13 +53,13 @@ UNENFORCED = {("low battery", "px4"), ("wind", "ardupilot")}
         if "ground" not in each[0]
     ],
 )
-def test_frames_of_every_kind_of_flight_without_enforcement_follow_its_log(fault: str, flavour: str) -> None:
+def test_frames_of_every_kind_of_flight_without_enforcement_pass(fault: str, flavour: str) -> None:
     found, frames = joined(*recorded(fault, flavour, EnforcementMode.NONE))
     assert found is None
     assert frames.count >= 2, "arm, take off: what is so already is not asked for"
 
 
-def test_a_flight_that_was_interrupted() -> None:
+def test_frames_of_an_interrupted_flight_pass() -> None:
     flight = Flight(case.seal(case.mission(case.short_steps())), case.simulated("px4"))
     entries = kept(flight)
     told = [False]

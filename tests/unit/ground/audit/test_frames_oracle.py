@@ -1,4 +1,4 @@
-"""A frame that is sent once more, at any other moment: found, unless a record then permits it, by a naive reading."""
+"""A frame repeated at another time is found, unless a record permits it then, according to a naive implementation."""
 
 from bisect import insort
 from functools import cache
@@ -29,7 +29,7 @@ AUTOPILOTS = {"px4": PX4, "ardupilot": ARDUPILOT}
 
 
 class Window(NamedTuple):
-    """A command, and from when to when it was under way, UTC us."""
+    """A command with its begin and end, UTC us."""
 
     command: Command
     begin: int
@@ -37,7 +37,7 @@ class Window(NamedTuple):
 
 
 class Case(NamedTuple):
-    """A flight that falls back, its frames, and what a naive reading makes of its log."""
+    """A flight with a fallback, its frames, and the commands that a naive reading of its log gives."""
 
     basis: Basis
     effects: tuple[Effect, ...]
@@ -92,7 +92,7 @@ def covered(of: Case, octets: bytes, at_us: int, autopilot: int) -> bool:
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", AUTOPILOTS)
 @given(data=some.data())
-def test_against_a_naive_reading(kind: str, data: some.DataObject) -> None:
+def test_repeated_frame_is_found_like_in_the_naive_reading(kind: str, data: some.DataObject) -> None:
     of, autopilot = flown(kind), AUTOPILOTS[kind]
     edges = [edge + by for window in of.windows for edge in window[1:] if edge < 1 << 60 for by in (-1, 0, 1)]
     first, last = of.entries[0][0], of.entries[-1][0]
@@ -114,8 +114,8 @@ def test_against_a_naive_reading(kind: str, data: some.DataObject) -> None:
 
 @pytest.mark.parametrize("kind", AUTOPILOTS)
 @given(bits=some.integers(0, 40))
-def test_a_clock_that_stands_still_for_a_while_makes_no_sound_flight_unsound(kind: str, bits: int) -> None:
-    """A paced clock does, so that records and frames that follow one another are of one microsecond."""
+def test_flight_passes_if_the_clock_stands_still_for_a_while(kind: str, bits: int) -> None:
+    """A paced clock stands still, so consecutive records and frames may have the same microsecond."""
     of = flown(kind)
     frames = FrameAudit((at_us >> bits << bits, octets) for at_us, octets in of.entries)
     frames.begin(of.basis)

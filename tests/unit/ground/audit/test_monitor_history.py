@@ -1,4 +1,4 @@
-"""What temporal monitors said is held against the states that the log has."""
+"""Temporal monitors are checked against the recorded states of a log."""
 
 import json
 from functools import cache
@@ -33,7 +33,7 @@ SAID = clause("wind.speed < 8 m/s for the last 3 s", (Op.MONITOR, 0, 0))
         (FOR, "F", "U", 0),
         (FOR, "U", "T", 0),
         (FOR, "U", "F", None),
-        (FOR, "T", "F", None),  # it was false at a moment that no record has
+        (FOR, "T", "F", None),  # it was false at a time without a record
         (FOR, "FTTT", "FFFT", None),  # one second each; false left the window of 3 s
         (FOR, "FTTT", "FFTT", 2),
         (FOR, "UTTT", "UUTT", 2),
@@ -54,7 +54,7 @@ SAID = clause("wind.speed < 8 m/s for the last 3 s", (Op.MONITOR, 0, 0))
         (FALLING, "F", "T", None),
     ],
 )
-def test_by_hand(kind: int, wind: str, said: str, refused: int | None) -> None:
+def test_monitor_value_is_accepted_or_found_by_hand(kind: int, wind: str, said: str, refused: int | None) -> None:
     window_us = 0 if kind in (RISING, FALLING) else 3 * S - S // 2
     observed = MonitorHistory(loaded(replace(POLICY, monitors=(Monitor(kind, window_us, CALM),))))
     found = []
@@ -65,7 +65,7 @@ def test_by_hand(kind: int, wind: str, said: str, refused: int | None) -> None:
     assert [number for number, slug in enumerate(found) if slug is not None] == ([] if refused is None else [refused])
 
 
-def test_a_claim_that_is_ruled_out_is_told_with_what_would_not_be() -> None:
+def test_flaw_names_the_possible_values_of_the_monitor() -> None:
     observed = MonitorHistory(loaded(replace(POLICY, monitors=(Monitor(FOR, S, CALM), Monitor(WITHIN, S, CALM)))))
     flaw = observed.check(replace(flat.state({WIND: None}), monitors=(1, 2)), flat.NOW)
     assert flaw is not None
@@ -75,7 +75,7 @@ def test_a_claim_that_is_ruled_out_is_told_with_what_would_not_be() -> None:
 
 @cache
 def flown() -> tuple[bytes, ...]:
-    """A closed log of a flight whose take-off waited for calm."""
+    """A closed log of a flight whose take-off waited for the wind to calm."""
     takeoff = replace(CONTRACTS[TAKEOFF], require=(SAID,), assume=(), reads=(WIND,), deadline_us=30 * S)
     policy = replace(POLICY, monitors=(Monitor(FOR, 3 * S, CALM),), contracts=(takeoff, *CONTRACTS[1:]))
     first = replace(MISSION.invocations[0], contract=takeoff)
@@ -95,7 +95,7 @@ def decisions() -> list[int]:
     return [number for number, line in enumerate(flown()) if b'"type":"decision"' in line]
 
 
-def test_a_log_with_monitors_is_derived_again() -> None:
+def test_log_with_monitors_passes() -> None:
     report = audit(flown(), ROOT_KEY.public).report
     assert report.failure is None
     assert report.shortfall is None
@@ -103,20 +103,20 @@ def test_a_log_with_monitors_is_derived_again() -> None:
 
 
 @rows("monitors", [[], [1, 1], [0], [3], [8], [-1]])
-def test_what_is_no_truth_of_each_monitor(monitors: list[int]) -> None:
+def test_malformed_monitor_values_are_found(monitors: list[int]) -> None:
     slug, record = forged(decisions()[0], monitors=monitors)
     assert record == decisions()[0]
     assert slug == ("record/not-canonical" if not monitors else "decision/inputs")
 
 
-def test_truths_where_the_policy_has_no_monitor() -> None:
+def test_monitor_values_without_a_monitor_are_found() -> None:
     lines = list(flight())
     number = next(number for number, line in enumerate(lines) if b'"type":"decision"' in line)
     lines[number] = edit(lines[number], state=json.loads(lines[number])["state"] | {"monitors": [1]})
     assert expect(signed_by_the_simulator(lines)) == ("decision/inputs", number)
 
 
-def test_another_truth_makes_another_decision() -> None:
+def test_changed_monitor_value_changes_the_derived_decision() -> None:
     waits, begins = decisions()[:2]
     assert forged(waits, monitors=[1]) == ("decision/outcome", waits)
     assert forged(begins, monitors=[4]) == ("decision/outcome", begins)

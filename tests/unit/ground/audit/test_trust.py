@@ -1,4 +1,4 @@
-"""What a log rests on, refused one piece at a time. All of it is signed by the right keys: it is wrong in itself."""
+"""The basis of a log is refused, one part at a time. Every part is signed by the right key, but wrong."""
 
 from base64 import b64encode
 
@@ -17,25 +17,25 @@ def with_root(*keys: VerificationKey) -> list[bytes]:
     return [edit(LINES[0], root=b64encode(data).decode()), *LINES[1:]]
 
 
-def test_a_log_key_for_another_vehicle() -> None:
+def test_log_key_for_another_vehicle_is_refused() -> None:
     root, _ = case.root()
     keys = tuple(replace(key, vehicles=("quad-08",)) if key.duty is Duty.LOG else key for key in root.keys)
     assert expect(signed(with_root(*keys))) == ("trust/log-key", 0)
 
 
-def test_a_log_key_that_had_expired() -> None:
+def test_expired_log_key_is_refused() -> None:
     root, _ = case.root()
     keys = tuple(replace(key, expires_us=1) if key.duty is Duty.LOG else key for key in root.keys)
     assert expect(signed(with_root(*keys))) == ("trust/log-key", 0)
 
 
-def test_a_root_without_the_log_key() -> None:
+def test_root_without_the_log_key_is_refused() -> None:
     root, _ = case.root()
     keys = tuple(key for key in root.keys if key.kid != LOG_KEY.kid)
     assert expect(signed(with_root(*keys))) == ("trust/log-key", 0)
 
 
-def test_a_root_without_the_policy_key() -> None:
+def test_root_without_the_policy_key_is_refused() -> None:
     root, _ = case.root()
     keys = tuple(key for key in root.keys if key.duty is not Duty.POLICY)
     assert expect(signed(with_root(*keys))) == ("trust/bundle-unknown-key", 0)
@@ -45,19 +45,19 @@ def begun_with(bundle: bytes) -> list[bytes]:
     return signed([edit(LINES[0], bundle=b64encode(bundle).decode()), *LINES[1:]])
 
 
-def test_a_policy_that_makes_no_sense() -> None:
+def test_invalid_policy_is_refused() -> None:
     policy = case.policy()
     broken = replace(policy, contingency=tuple(replace(link, skill=99) for link in policy.contingency))
     assert expect(begun_with(case.seal(case.mission(case.short_steps()), broken))) == ("trust/bundle-malformed", 0)
 
 
-def test_a_mission_that_loosens_its_contract() -> None:
+def test_mission_that_loosens_its_contract_is_refused() -> None:
     first, *others = case.short_steps()
     loose = replace(first, contract=replace(first.contract, require=()))
     assert expect(begun_with(case.seal(case.mission((loose, *others))))) == ("trust/bundle-malformed", 0)
 
 
-def test_a_root_that_is_not_for_development() -> None:
+def test_report_distinguishes_trust_root_from_development_root() -> None:
     root, _ = case.root()
     keys = tuple(replace(key, development=False) for key in root.keys)
     data = replace(root, development=False, keys=keys).sign(case.KEYS[Duty.ROOT])

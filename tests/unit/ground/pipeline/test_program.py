@@ -1,4 +1,4 @@
-"""Whole programs: what ships compiles without a finding, to the same bytes; whatever a source says, nothing raises."""
+"""Whole programs: the shipped sources compile without findings and reproducibly, and no source raises an exception."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -32,7 +32,7 @@ AT = 1_700_000_000_000_000
 
 
 def program_of(path: str, files: Mapping[str, str] | None = None) -> Program:
-    """A program whose files come from memory first; `lib:` is the shipped library."""
+    """A program with files from memory or else from disk; `lib:` is the shipped library."""
     inside = {str(CHECKOUT / name.removeprefix("lib:")): text for name, text in (files or {}).items()}
 
     def read(name: str) -> bytes:
@@ -58,7 +58,7 @@ def ids(found: tuple[Diagnostic, ...]) -> list[str]:
 
 
 @pytest.mark.parametrize("name", MISSIONS)
-def test_what_ships_compiles_without_a_finding_and_is_taken_on_board(name: str) -> None:
+def test_shipped_mission_compiles_without_findings_and_loads_on_board(name: str) -> None:
     found = compiled(f"missions/{name}.rts")
     assert found.diagnostics == ()
     assert found.policy is not None
@@ -70,22 +70,22 @@ def test_what_ships_compiles_without_a_finding_and_is_taken_on_board(name: str) 
 
 
 @rows("name", [path for path in SHIPPED if "/skills/" not in path])
-def test_what_ships_checks_without_a_finding(name: str) -> None:
+def test_shipped_sources_check_without_findings(name: str) -> None:
     assert check_program(program_of(name.removeprefix("lib:")), dialect.load()) == ()
 
 
-def test_the_same_sources_and_time_give_the_same_bytes() -> None:
+def test_same_sources_and_time_give_the_same_bytes() -> None:
     assert payloads(compiled("missions/standard.rts")) == payloads(compiled("missions/standard.rts"))
     other = payloads(compiled("missions/standard.rts", at=AT + 1))
     assert payloads(compiled("missions/standard.rts"))[0] == other[0]
     assert payloads(compiled("missions/standard.rts"))[1] != other[1]
 
 
-def test_a_policy_is_the_same_for_every_mission_under_it() -> None:
+def test_policy_is_the_same_for_every_mission_under_it() -> None:
     assert compiled("missions/standard.rts").policy == compiled("missions/extended.rts").policy
 
 
-def test_a_policy_is_the_same_wherever_its_missions_are() -> None:
+def test_policy_does_not_depend_on_the_folder_of_its_missions() -> None:
     mission = SHIPPED["lib:missions/standard.rts"]
     text = SHIPPED["lib:policies/bridge_inspection.rts"].replace("lib:policies/site.rts", "site.rts")
     files = {
@@ -108,14 +108,14 @@ def test_a_policy_is_the_same_wherever_its_missions_are() -> None:
     assert policy_of("/nowhere/a/m.rts") == policy_of("/nowhere/a/b/c/m.rts")
 
 
-def test_what_is_signed_says_nothing_of_the_machine() -> None:
+def test_bundle_contains_no_paths_of_the_machine() -> None:
     found = compiled("missions/standard.rts")
     assert str(CHECKOUT).encode() not in b"".join(payloads(found))
     assert found.policy is not None
     assert all(source.startswith("lib:") for source in found.policy.sources)
 
 
-def test_a_permit_without_through_is_for_the_operator_and_a_forbid_for_every_source() -> None:
+def test_permit_defaults_to_the_operator_and_forbid_to_every_source() -> None:
     text = SHIPPED["lib:policies/bridge_inspection.rts"].replace(
         "contingency hover",
         "permit goto by role pilot when altitude <= 5 m\n  forbid goto by role trainee\n  contingency hover",
@@ -130,7 +130,7 @@ def test_a_permit_without_through_is_for_the_operator_and_a_forbid_for_every_sou
     assert rules["permit hover, return_home, emergency_land by any"].sources == ()
 
 
-def test_a_rule_about_skills_that_keep_an_argument_in_other_cells_becomes_several() -> None:
+def test_rule_is_split_for_skills_with_arguments_in_different_cells() -> None:
     text = SHIPPED["lib:policies/bridge_inspection.rts"].replace(
         "contingency hover", "forbid takeoff, goto by any when altitude > 50 m\n  contingency hover"
     )
@@ -141,7 +141,7 @@ def test_a_rule_about_skills_that_keep_an_argument_in_other_cells_becomes_severa
     assert {rule.when.code[1] for rule in made if rule.when is not None} == {0, 2}
 
 
-def test_defaults_are_filled_in_where_they_can_be_seen() -> None:
+def test_defaults_are_lowered_into_the_mission() -> None:
     text = (
         SHIPPED["lib:skills/hover.rts"]
         .replace("grace    5 s", "")
@@ -155,7 +155,7 @@ def test_defaults_are_filled_in_where_they_can_be_seen() -> None:
     assert hover.on_inadmissible == 0
 
 
-def test_enumerations_carry_every_value_of_the_dialect() -> None:
+def test_enumeration_has_every_value_of_the_dialect() -> None:
     text = SHIPPED["lib:skills/signals.rts"].replace("  ppp       = 8,\n", "")
     found = compiled("missions/short.rts", {"lib:skills/signals.rts": text})
     assert found.policy is not None, found.diagnostics
@@ -164,18 +164,18 @@ def test_enumerations_carry_every_value_of_the_dialect() -> None:
     assert any(8 in members for members in found.policy.sets)
 
 
-def test_a_missing_import_is_the_only_finding() -> None:
+def test_missing_import_is_the_only_finding() -> None:
     text = SHIPPED["lib:missions/standard.rts"].replace("bridge_inspection.rts", "bridge_inspektion.rts")
     assert ids(compiled("missions/standard.rts", {"lib:missions/standard.rts": text}).diagnostics) == ["E0108"]
 
 
-def test_a_declaration_with_a_syntax_error_is_not_reported_as_unknown() -> None:
+def test_declaration_with_a_syntax_error_is_not_reported_as_unknown() -> None:
     text = SHIPPED["lib:skills/hover.rts"].replace("motion   hold", "motion   hoold")
     found = compiled("missions/standard.rts", {"lib:skills/hover.rts": text}).diagnostics
     assert {diagnostic.code.id for diagnostic in found} == {"E0101"}
 
 
-def test_a_mission_is_chosen_by_name_or_by_being_alone() -> None:
+def test_mission_is_chosen_by_name_or_as_the_only_one() -> None:
     two = SHIPPED["lib:missions/short.rts"] + SHIPPED["lib:missions/short.rts"].split("\n", 2)[2].replace(
         "mission short", "mission other"
     )
@@ -190,7 +190,7 @@ def test_a_mission_is_chosen_by_name_or_by_being_alone() -> None:
     assert check_program(program_of("policies/bridge_inspection.rts"), dialect.load()) == ()
 
 
-def test_a_signal_of_a_mission_never_stands_in_for_one_of_the_policy() -> None:
+def test_signal_of_a_mission_never_replaces_one_of_the_policy() -> None:
     mission = SHIPPED["lib:missions/standard.rts"]
     signals = SHIPPED["lib:skills/signals.rts"]
     line = next(line for line in signals.splitlines() if line.startswith("signal battery"))
@@ -237,7 +237,7 @@ TOKENS = [
 
 @st.composite
 def mutations(draw: st.DrawFn) -> tuple[str, str]:
-    """A shipped file with a few words removed, doubled, swapped for others."""
+    """A shipped file with a few words removed, repeated or replaced."""
     name = draw(st.sampled_from(sorted(SHIPPED)))
     words = SHIPPED[name].split(" ")
     for _ in range(draw(st.integers(1, 4))):
@@ -257,7 +257,7 @@ def mutations(draw: st.DrawFn) -> tuple[str, str]:
 
 @given(mutations())
 @example(("lib:policies/site.rts", ""))
-def test_a_mutated_source_is_compiled_or_explained(mutation: tuple[str, str]) -> None:
+def test_mutated_source_compiles_or_has_errors(mutation: tuple[str, str]) -> None:
     name, text = mutation
     program = program_of("missions/extended.rts", {name: text})
     found = compile_program(program, dialect.load(), mission=None, issued_at_us=AT)
@@ -272,7 +272,7 @@ def test_a_mutated_source_is_compiled_or_explained(mutation: tuple[str, str]) ->
         payloads(found)
 
 
-def test_every_diagnostic_of_one_place_is_told_once() -> None:
+def test_diagnostic_is_reported_once_for_each_place() -> None:
     text = SHIPPED["lib:missions/standard.rts"].replace("altitude = 20 m", "altitude = 20 s")
     found = compiled("missions/standard.rts", {"lib:missions/standard.rts": text}).diagnostics
     assert len(found) == len(set(found)) == 3
@@ -323,13 +323,13 @@ TOO_LARGE = [
 
 
 @pytest.mark.parametrize(("name", "text", "code"), TOO_LARGE)
-def test_what_does_not_fit_on_board_says_so(name: str, text: str, code: str) -> None:
+def test_program_too_large_for_the_vehicle_is_refused(name: str, text: str, code: str) -> None:
     assert text != SHIPPED[name]
     found = compiled("missions/standard.rts", {name: text})
     assert set(ids(found.diagnostics)) == {code}, [d.message for d in found.diagnostics]
 
 
-def test_a_version_that_no_log_could_hold_is_refused() -> None:
+def test_version_too_large_for_a_log_is_refused() -> None:
     text = long_policy("").replace("version 7", f"version {1 << 60}")
     found = compiled("missions/standard.rts", {"lib:policies/bridge_inspection.rts": text})
     assert set(ids(found.diagnostics)) == {"E0701", "E1003"}

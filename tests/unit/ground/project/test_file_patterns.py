@@ -1,4 +1,4 @@
-"""Patterns for files: what each means, against a naive reading; and none takes long, whoever wrote it."""
+"""File patterns agree with a naive implementation, and no pattern takes long."""
 
 from itertools import repeat
 
@@ -20,7 +20,7 @@ _PATH = st.lists(st.text("ab*", min_size=1, max_size=4), min_size=1, max_size=5)
 
 
 def naive(pattern: str, path: str) -> bool:
-    """As the page says it, by trying everything."""
+    """The definition of the docs page, by exhaustive search."""
     written = pattern.removeprefix("./")
     parts = [part for part in written.split("/") if part]
     if "/" not in written.rstrip("/"):
@@ -48,12 +48,12 @@ def _one(part: str, name: str) -> bool:
 
 
 @given(_PATTERN, _PATH)
-def test_as_a_naive_reading_says(pattern: str, path: str) -> None:
+def test_pattern_agrees_with_the_naive_matcher(pattern: str, path: str) -> None:
     assert matches(pattern, path) == naive(pattern, path)
 
 
 @pytest.mark.parametrize("pattern", ["/", "./", "//", ""])
-def test_nothing_means_nothing(pattern: str) -> None:
+def test_empty_pattern_matches_nothing(pattern: str) -> None:
     assert not matches(pattern, "a/b")
 
 
@@ -69,6 +69,6 @@ def test_nothing_means_nothing(pattern: str) -> None:
     ],
     ids=["stars", "parts", "letters", "long", "deep", "both"],
 )
-def test_a_hostile_pattern_is_answered(pattern: str, path: str) -> None:
-    """Backtracking would take longer than anybody waits."""
+def test_hostile_pattern_is_matched_in_time(pattern: str, path: str) -> None:
+    """Full backtracking would take exponential time."""
     assert not matches(pattern, path)

@@ -1,4 +1,4 @@
-"""What a configuration says, and how one that is wrong is refused: with the nearest that would be accepted."""
+"""The settings of a configuration, and the refusals of a wrong one with the nearest accepted value."""
 
 import pytest
 
@@ -26,7 +26,7 @@ exclude = ["slow"]
 """
 
 
-def test_all_keys() -> None:
+def test_every_key_is_read() -> None:
     found = parse_settings(WHOLE, "rtshcua.toml")
     assert isinstance(found, ProjectSettings)
     assert found.lint.ignored == (
@@ -42,7 +42,7 @@ def test_all_keys() -> None:
     assert (found.test.fail_under, found.test.exclude) == (80, ("slow",))
 
 
-def test_nothing_said_is_the_defaults() -> None:
+def test_empty_configuration_gives_the_defaults() -> None:
     assert parse_settings("", "rtshcua.toml") == ProjectSettings()
     assert parse_settings("[project]\nname = 'x'\n[tool.ruff]", "pyproject.toml", shared=True) is None
     assert parse_settings("[tool.rtshcua]", "pyproject.toml", shared=True) == ProjectSettings()
@@ -54,45 +54,45 @@ def test_nothing_said_is_the_defaults() -> None:
 @rows(
     ("text", "told", "help"),
     [
-        ("x =", "r.toml: it is not TOML: invalid value", None),
-        ("\nx y", "r.toml:2: it is not TOML: expected '=' after a key in a key/value pair", None),
-        ("[lnt]", "r.toml:1: there is no key `lnt`", "did you mean `lint`?"),
-        ("[lint]\nexlude = []", "r.toml:2: there is no key `exlude` in `[lint]`", "did you mean `exclude`?"),
-        ("[format]\nxyz = 1", "r.toml:2: there is no key `xyz` in `[format]`", "known: `width`, `exclude`"),
-        ("lint = 3", "r.toml:1: `lint` is a whole number, and must be a table", None),
+        ("x =", "r.toml: not valid TOML: invalid value", None),
+        ("\nx y", "r.toml:2: not valid TOML: expected '=' after a key in a key/value pair", None),
+        ("[lnt]", "r.toml:1: unknown key `lnt`", "did you mean `lint`?"),
+        ("[lint]\nexlude = []", "r.toml:2: unknown key `exlude` in `[lint]`", "did you mean `exclude`?"),
+        ("[format]\nxyz = 1", "r.toml:2: unknown key `xyz` in `[format]`", "known: `width`, `exclude`"),
+        ("lint = 3", "r.toml:1: `lint` is a whole number; expected a table", None),
         ("lint.fail-on = 3", "r.toml:1: `fail-on` in `[lint]` is a whole number",
          "accepted: `error`, `warning`, `note`, `never`"),
-        ("lint.fail-on = 'warn'", "r.toml:1: `warn` is nothing that `fail-on` in `[lint]` can be",
+        ("lint.fail-on = 'warn'", "r.toml:1: `warn` is not a value of `fail-on` in `[lint]`",
          "did you mean `warning`?"),
-        ("lint.exclude = 'x'", "r.toml:1: `exclude` in `[lint]` is a text",
-         'accepted: a list of texts, as in `exclude = ["drafts"]`'),
-        ("lint.exclude = ['']", "r.toml:1: `exclude` in `[lint]` has an empty text in its list",
-         "accepted: a list of texts"),
-        ("lint.exclude = [1.5]", "r.toml:1: `exclude` in `[lint]` has a number with a point in its list",
-         "accepted: a list of texts"),
+        ("lint.exclude = 'x'", "r.toml:1: `exclude` in `[lint]` is a string",
+         'accepted: a list of strings, as in `exclude = ["drafts"]`'),
+        ("lint.exclude = ['']", "r.toml:1: `exclude` in `[lint]` has an empty string in its list",
+         "accepted: a list of strings"),
+        ("lint.exclude = [1.5]", "r.toml:1: `exclude` in `[lint]` has a decimal number in its list",
+         "accepted: a list of strings"),
         ("lint.cache = 3", "r.toml:1: `cache` in `[lint]` is a whole number",
          "accepted: `true` or `false`"),
-        ("lint.ignore = ['E1304']", "r.toml:1: `lint.ignore` is a list, and must be a table", None),
+        ("lint.ignore = ['E1304']", "r.toml:1: `lint.ignore` is a list; expected a table", None),
         ("[lint.ignore]\nE1304 = ' '", "r.toml:2: `E1304` in `[lint.ignore]` is ignored without a reason",
-         'say why, as in `E1304 = "the authority\'s letter says 30 m"`'),
+         'give a reason, as in `E1304 = "the authority\'s letter says 30 m"`'),
         ("[lint.ignore]\nE1304 = '...'", "r.toml:2: `E1304` in `[lint.ignore]` is ignored without a reason",
-         'say why, as in `E1304 = "the authority\'s letter says 30 m"`'),
-        ("[lint.ignore]\nE1304 = true", "r.toml:2: `E1304` in `[lint.ignore]` is `true`, and must be a reason",
-         'say why, as in `E1304 = "the authority\'s letter says 30 m"`'),
-        ("[lint.ignore]\nnamin = 'why not'", "r.toml:2: there is no code `namin`", "did you mean `naming`?"),
+         'give a reason, as in `E1304 = "the authority\'s letter says 30 m"`'),
+        ("[lint.ignore]\nE1304 = true", "r.toml:2: `E1304` in `[lint.ignore]` is `true`; expected a reason",
+         'give a reason, as in `E1304 = "the authority\'s letter says 30 m"`'),
+        ("[lint.ignore]\nnamin = 'why not'", "r.toml:2: unknown code `namin`", "did you mean `naming`?"),
         ("[lint.ignore]\nE0310 = 'why not'", "r.toml:2: `E0310` is an error, and errors cannot be ignored", None),
         ("[lint.ignore]\nE1309 = 'why not'",
-         "r.toml:2: `E1309` is about ignores themselves, and cannot be ignored", None),
+         "r.toml:2: `E1309` is about ignores, and cannot be ignored", None),
         ("format.width = 39", "r.toml:1: `width` in `[format]` is 39", "accepted: a whole number from 40 to 400"),
         ("format.width = true", "r.toml:1: `width` in `[format]` is `true`", "accepted: a whole number from 40 to 400"),
-        ("test.fail-under = 80.5", "r.toml:1: `fail-under` in `[test]` is a number with a point",
+        ("test.fail-under = 80.5", "r.toml:1: `fail-under` in `[test]` is a decimal number",
          "accepted: a whole number from 0 to 100"),
         ("test.fail-under = 101", "r.toml:1: `fail-under` in `[test]` is 101",
          "accepted: a whole number from 0 to 100"),
-        ("x = 2020-01-01", "r.toml:1: there is no key `x`", "known: `lint`, `format`, `test`"),
+        ("x = 2020-01-01", "r.toml:1: unknown key `x`", "known: `lint`, `format`, `test`"),
     ],
 )  # fmt: skip
-def test_refusals(text: str, told: str, help: str | None) -> None:
+def test_wrong_configuration_is_refused_with_place_and_help(text: str, told: str, help: str | None) -> None:
     found = parse_settings(text, "r.toml")
     assert found == Refusal("configuration", told, help or "")
 
@@ -112,14 +112,14 @@ def test_refusals(text: str, told: str, help: str | None) -> None:
         ("[x].rts", ["[x].rts"], ["x.rts"]),
     ],
 )
-def test_patterns(pattern: str, meant: list[str], not_meant: list[str]) -> None:
+def test_per_file_ignore_keeps_its_pattern(pattern: str, meant: list[str], not_meant: list[str]) -> None:
     assert [matches(pattern, path) for path in (*meant, *not_meant)] == [True] * len(meant) + [False] * len(not_meant)
 
 
 @pytest.mark.slow
 @rows("part", ["a", '"a,b"', "a-b_c ", "'a'"])
-def test_a_key_of_very_many_parts_is_refused_unread(part: str) -> None:
-    """The library takes the square of them in time: an hour for a file of a megabyte."""
+def test_key_with_too_many_parts_is_refused_before_parsing(part: str) -> None:
+    """`tomllib` takes quadratic time in the number of parts: an hour for a file of a megabyte."""
     keys = ".".join([part] * 200_000)
     for text in (f"{keys} = 1", f"[{keys}]", f"x = {{{keys} = 1}}"):
         refused = parse_settings(text, "rtshcua.toml")
@@ -127,7 +127,7 @@ def test_a_key_of_very_many_parts_is_refused_unread(part: str) -> None:
         assert "more than 64 parts" in refused.text
 
 
-def test_many_patterns_are_no_key() -> None:
+def test_many_patterns_do_not_count_as_a_long_key() -> None:
     patterns = ", ".join(f'"missions/part.{number}.rts"' for number in range(500))
     found = parse_settings(f"[test]\nexclude = [{patterns}]\n", "rtshcua.toml")
     assert isinstance(found, ProjectSettings)

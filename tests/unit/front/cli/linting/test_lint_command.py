@@ -46,7 +46,7 @@ def test_the_level_that_fails(here: Path, lint: Lint, level: str, code: int) -> 
         (["--format", "sariff"], ExitCode.USAGE, "did you mean `sarif`?"),
         (["--fail-on", "x"], ExitCode.USAGE, "accepted: `error`, `warning`"),
         (["--config", "nowhere.toml"], ExitCode.INPUT, "nowhere.toml: it cannot be read"),
-        (["--config", "policy.rts"], ExitCode.INPUT, "policy.rts:1: it is not toml"),
+        (["--config", "policy.rts"], ExitCode.INPUT, "policy.rts:1: not valid toml"),
         (["--isolated", "--config", "x.toml"], ExitCode.USAGE, "exclude each other"),
         (["nowhere.rts"], ExitCode.INPUT, "cannot read `nowhere.rts`"),
         (["--bogus"], ExitCode.USAGE, "no such option"),
@@ -64,7 +64,7 @@ def test_a_configuration_that_is_malformed_ends_the_run(here: Path, lint: Lint) 
     put({"rtshcua.toml": "[lint]\nexlude = []"})
     code, found = lint(".")
     assert (code, found[0][0]) == (ExitCode.INPUT, "configuration")
-    assert "rtshcua.toml:2: there is no key `exlude`" in found[0][1]
+    assert "rtshcua.toml:2: unknown key `exlude`" in found[0][1]
     assert lint(".", "--isolated") == (ExitCode.DIAGNOSTICS, HABITS)
 
 

@@ -9,10 +9,10 @@ from rtshcua.adapters import link_setup
 from rtshcua.adapters.link_setup import SetUp
 from rtshcua.adapters.simulator import Simulator
 from rtshcua.adapters.store.signing import read_link_key, write_link_key
+from rtshcua.app import key_management
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli import app
-from rtshcua.front.cli.commands import keys
 
 AT = "udpin:127.0.0.1:{}"
 
@@ -52,7 +52,7 @@ def test_what_was_seen_is_told(
 ) -> None:  # fmt: skip
     path = tmp_path / "link.key"
     write_link_key(path, bytes(range(32)))
-    monkeypatch.setattr(keys, "carry_out", lambda *_: seen)
+    monkeypatch.setattr(key_management, "carry_out", lambda *_: seen)
     assert app.main(["keys", "link", str(path), "--connect", AT.format(free_port()), "--trusted-link"]) == code
     told = capsys.readouterr()
     assert (slug or "") in told.err

@@ -387,8 +387,8 @@ def test_an_expired_root_is_renewed_by_another_root_key(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     app.main(["keys", "init", "--days", "1"])
-    now_us = keys.time.time_ns() + 2 * 86_400 * 10**9
-    monkeypatch.setattr(keys.time, "time_ns", lambda: now_us)
+    now_us = time.time_ns() + 2 * 86_400 * 10**9
+    monkeypatch.setattr(time, "time_ns", lambda: now_us)
     assert app.main(["keys", "revoke", "log"]) == ExitCode.UNTRUSTED
     assert "expired" in capsys.readouterr().err
     assert app.main(["keys", "rotate-root", "--days", "3"]) == ExitCode.OK

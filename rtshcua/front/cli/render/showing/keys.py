@@ -1,10 +1,16 @@
-"""A trust root, and a key file: never its secret."""
+"""A trust root, a key store, and a key file: never its secret."""
 
+import json
+
+from rtshcua.adapters.link_setup import SetUp, after_setup
+from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.app.wording import utc
 from rtshcua.front.cli.render.showing.page import TextPage
+from rtshcua.front.cli.stdout import out, out_json
+from rtshcua.front.cli.width import columns
 from rtshcua.wire import cose, key_file
 from rtshcua.wire.keys import ANY, Duty, VerificationKey
-from rtshcua.wire.trust import MAX_ROOT, open_root
+from rtshcua.wire.trust import LINK_ID_BYTES, MAX_ROOT, TrustRoot, open_root
 
 #: how a key file begins
 KEY_FILE = b"duty: "
@@ -103,3 +109,56 @@ def speaks(key: VerificationKey) -> str:
 
 def _any(names: tuple[str, ...], what: str) -> str:
     return f"any {what}" if ANY in names else f"{what} {', '.join(names)}"
+
+
+def show_store(store: KeyStore, root: TrustRoot, *, as_json: bool) -> None:
+    """Prints the keys of a key store, and what its trust root trusts them for."""
+    if as_json:
+        out_json(json.dumps(_store_object(store, root), indent=2, ensure_ascii=False))
+        return
+    kind = "development root: for trying out, its keys are not encrypted" if root.development else "trust root"
+    out(kind, f"  folder   {store.folder}", f"  version  {root.version}")
+    out(f"  valid    {utc(root.issued_at_us)} to {utc(root.expires_at_us)}", "")
+    names = {kid: path.name for kid, path in store.paths(root).items()}
+    wide = max(map(len, names.values()))
+    rows = [("duty", "key", "file", "may speak for")]
+    rows += ((key.duty, key.kid.hex(), names[key.kid], speaks(key)) for key in root.keys)
+    for name in sorted(root.revocations):
+        what = "the key of a link" if len(name) == LINK_ID_BYTES else "never trusted again"
+        rows.append(("revoked", name.hex(), "", what))
+    beside = 2 + 10 + 34 + wide + 2 + max(len(row[3]) for row in rows) <= columns()
+    for duty, key_name, file, last in rows:
+        first = f"  {duty:<9} {key_name:<33} {file:<{wide}}"
+        out(*([f"{first}  {last}"] if beside else [first.rstrip(), f"  {'':<9} {last}"]))
+    if root.witness_threshold > 1:
+        out("", f"  {root.witness_threshold} witnesses must cosign what counts as anchored")
+
+
+def _store_object(store: KeyStore, root: TrustRoot) -> dict[str, object]:
+    paths = store.paths(root)
+    return {
+        "folder": str(store.folder),
+        "root": str(store.root_path),
+        "development": root.development,
+        "version": root.version,
+        "issued_at_us": root.issued_at_us,
+        "expires_at_us": root.expires_at_us,
+        "witness_threshold": root.witness_threshold,
+        "revoked": sorted(name.hex() for name in root.revocations),
+        "keys": [{**as_object(key), "file": str(paths[key.kid])} for key in root.keys],
+    }
+
+
+def link_lines(seen: SetUp) -> list[str]:
+    """What was seen of a vehicle that was given the key of its link."""
+    release = "of an unknown release" if seen.release is None else ".".join(map(str, seen.release))
+    did = "it has this key, nothing was sent" if seen.already else "disarmed, on the ground: the key was sent"
+    yes = {True: "yes", False: "no"}
+    return [
+        f"{seen.autopilot} {release}, system {seen.system}: {did}",
+        f"  signs what it sends           {yes[seen.signs]}",
+        f"  answers a signed request      {yes[seen.answers_signed]}",
+        f"  answers an unsigned request   {yes[seen.answers_unsigned]}",
+        *(f"  it said                       `{text}`" for text in seen.texts),
+        f"  {after_setup(seen.autopilot, seen.release)}",
+    ]

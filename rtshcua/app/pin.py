@@ -1,11 +1,15 @@
 """The root key that an auditor trusts: named on the command line, or the key store's own."""
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore, read_root
+from rtshcua.app.exit_codes import remedy
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.ground.audit.revoked_keys import RevokedKeys
 from rtshcua.wire import cose
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
@@ -48,6 +52,21 @@ def pin(given: str | None) -> Pin:
             raise Untrusted("no-pin", f"`{path}` is its secret half: give `{path.with_suffix('.trust')}`") from None
         raise Untrusted("no-pin", f"`{path}` is neither a root key nor a trust root: {error}") from None
     return Pin(kid, f"{_kind(root)} in {path}", (data,))
+
+
+def trusted(given: str | None, revocations: Iterable[Path] = ()) -> Pin | Refusal:
+    """The pin for `--root GIVEN`, with the trust roots that revoke keys since; a refusal where there is none to trust.
+
+    Raises OSError.
+    """
+    try:
+        found = pin(given)
+        roots = (*found.roots, *map(read_root, revocations))
+        RevokedKeys(roots)
+    except Untrusted as error:
+        help = "`--root` takes the trust root of whoever flew, or its public key" if error.slug == "no-keys" else ""
+        return Refusal(error.slug, f"no root to trust: {error}", help or remedy(error))
+    return found._replace(roots=roots)
 
 
 def _kind(root: TrustRoot) -> str:

@@ -9,63 +9,67 @@ from typing import Annotated
 
 import typer
 
-from rtshcua.adapters.store.keystore import read_root
 from rtshcua.adapters.store.verification import Progress
 from rtshcua.app import verify_log as service
 from rtshcua.app.documents import no_log
 from rtshcua.app.logs import NO_LOG_HELP, is_log, log_of, logs_and_others, report_code
-from rtshcua.app.pin import Pin, pin
+from rtshcua.app.pin import Pin, trusted
 from rtshcua.app.verify_log import VerifyRequest
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.faults import distrust, fail, of_each, say
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli.faults import fail, of_each, refuse, say
 from rtshcua.front.cli.render.verdict import as_object, as_text
 from rtshcua.front.cli.stdout import out_json
-from rtshcua.ground.audit.revoked_keys import RevokedKeys
-from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
 
 _LONG = 32 << 20  # bytes of a log that is worth a progress bar
 
 
+Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="logs, folders of runs, or folders of these")]
+Root = Annotated[
+    str | None, typer.Option(metavar="FILE|KEY", help="the trust root or its key [default: your key store's]")
+]
+Audited = Annotated[bool, typer.Option("--audit", help="read every record, and derive every decision again")]
+NotDerived = Annotated[bool, typer.Option("--no-derive", help="with --audit: read every record, but derive none")]
+Fast = Annotated[bool, typer.Option("--fast", help="hold the octets against the signatures, and nothing more")]
+Jobs = Annotated[
+    int,
+    typer.Option(
+        min=0,
+        metavar="N",
+        show_default=False,
+        help="processes that verify; 0, the default: one a core where the log is long. --audit has one always",
+    ),
+]
+Anchors = Annotated[
+    list[Path] | None, typer.Option("--anchors", metavar="FILE", help="what witnesses cosigned, besides `*.anchors`")
+]
+Revocations = Annotated[
+    list[Path] | None,
+    typer.Option("--revocations", metavar="FILE", help="a newer trust root: what it revokes counts (repeatable)"),
+]
+RequireAnchor = Annotated[
+    bool, typer.Option("--require-anchor", help="a log that witnesses did not see to its end is incomplete")
+]
+Explained = Annotated[int | None, typer.Option(min=0, metavar="N", help="audit the log, and tell of record N in words")]
+AsJson = Annotated[bool, typer.Option("--json", help="one JSON object a log on the standard output")]
+
+
 @app.command()
 def verify_log(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="logs, folders of runs, or folders of these")],
-    root: Annotated[
-        str | None, typer.Option(metavar="FILE|KEY", help="the trust root or its key [default: your key store's]")
-    ] = None,
-    audit: Annotated[bool, typer.Option("--audit", help="read every record, and derive every decision again")] = False,
-    no_derive: Annotated[
-        bool, typer.Option("--no-derive", help="with --audit: read every record, but derive none")
-    ] = False,
-    fast: Annotated[
-        bool, typer.Option("--fast", help="hold the octets against the signatures, and nothing more")
-    ] = False,
-    jobs: Annotated[
-        int,
-        typer.Option(
-            min=0,
-            metavar="N",
-            show_default=False,
-            help="processes that verify; 0, the default: one a core where the log is long. --audit has one always",
-        ),
-    ] = 0,
-    anchors: Annotated[
-        list[Path] | None,
-        typer.Option("--anchors", metavar="FILE", help="what witnesses cosigned, besides `*.anchors`"),
-    ] = None,
-    revocations: Annotated[
-        list[Path] | None,
-        typer.Option("--revocations", metavar="FILE", help="a newer trust root: what it revokes counts (repeatable)"),
-    ] = None,
-    require_anchor: Annotated[
-        bool, typer.Option("--require-anchor", help="a log that witnesses did not see to its end is incomplete")
-    ] = False,
-    explain: Annotated[
-        int | None, typer.Option(min=0, metavar="N", help="audit the log, and tell of record N in words")
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object a log on the standard output")] = False,
+    logs: Logs,
+    root: Root = None,
+    audit: Audited = False,
+    no_derive: NotDerived = False,
+    fast: Fast = False,
+    jobs: Jobs = 0,
+    anchors: Anchors = None,
+    revocations: Revocations = None,
+    require_anchor: RequireAnchor = False,
+    explain: Explained = None,
+    as_json: AsJson = False,
 ) -> ExitCode:
     """Verify logs offline, from the log and one pinned key.
 
@@ -80,16 +84,12 @@ def verify_log(
         return fail(ExitCode.USAGE, "`--fast` does not go with `--audit` or `--explain`", "--fast reads no record")
     if no_derive and not (audit or explain is not None):
         return fail(ExitCode.USAGE, "`--no-derive` goes with `--audit`", "without `--audit` nothing is derived")
-    try:
-        pinned = pin(root)
-        roots = (*pinned.roots, *(read_root(path) for path in revocations or ()))
-        RevokedKeys(roots)
-    except Untrusted as error:
-        help = "`--root` takes the trust root of whoever flew, or its public key" if error.slug == "no-keys" else ""
-        return distrust(error, help, where="no root to trust: ")
+    pinned = trusted(root, revocations or ())
+    if isinstance(pinned, Refusal):
+        return refuse(pinned)
     named = tuple(anchors or ())
     deep = audit or explain is not None
-    request = VerifyRequest(pinned.key, roots, named, deep, not no_derive, fast, jobs, require_anchor)
+    request = VerifyRequest(pinned.key, pinned.roots, named, deep, not no_derive, fast, jobs, require_anchor)
     if explain is not None:
         from rtshcua.front.cli.render.explaining import explained
 

@@ -7,12 +7,12 @@ from typing import Annotated
 import typer
 
 from rtshcua.app import proof_verification as service
-from rtshcua.app.pin import Pin, pin
+from rtshcua.app.pin import Pin, trusted
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.faults import distrust, of_each
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli.faults import of_each, refuse
 from rtshcua.front.cli.render.proof_told import as_object, as_text
 from rtshcua.front.cli.stdout import out_json
-from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
 
@@ -32,11 +32,9 @@ def verify_proof(
 
     With several proofs the exit code is the first that is not 0.
     """
-    try:
-        pinned = pin(root)
-    except Untrusted as error:
-        help = "`--root` takes the trust root of whoever flew, or its public key" if error.slug == "no-keys" else ""
-        return distrust(error, help, where="no root to trust: ")
+    pinned = trusted(root)
+    if isinstance(pinned, Refusal):
+        return refuse(pinned)
     kept = service.read_checkpoint(checkpoint)
     return of_each(proofs, lambda path, first: _verify(path, pinned, kept, as_json=as_json, first=first))
 

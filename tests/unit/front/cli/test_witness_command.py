@@ -17,7 +17,6 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.log_writer import Recorder, origin_of
 from rtshcua.evidence.witnessing.anchors import AnchoredExtent, Anchors
 from rtshcua.front.cli import app
-from rtshcua.front.cli.commands import witness as command
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import open_root
@@ -238,7 +237,7 @@ def test_a_folder_is_watched(
             flown.epoch()
             os.utime(flown.path)
 
-    monkeypatch.setattr(command.time, "sleep", sleep)
+    monkeypatch.setattr(time, "sleep", sleep)
     assert app.main(["witness", str(flown.path.parent), "--watch", "0.5", "--json"]) == ExitCode.OK
     assert [each["anchored"] for each in said(capsys)] == [5, 9]
 
@@ -276,7 +275,7 @@ def test_what_cannot_be_read_keeps_no_other_log_waiting(
             signal.raise_signal(signal.SIGTERM)
         (tmp_path / "b.jsonl").unlink(missing_ok=True)
 
-    monkeypatch.setattr(command.time, "sleep", sleep)
+    monkeypatch.setattr(time, "sleep", sleep)
     assert app.main(["witness", str(tmp_path), "--watch", "0.5", "--json"]) == ExitCode.OK
     told = [(Path(str(each["log"])).name, each["event"], each.get("text")) for each in said(capsys)]
     assert [each[:2] for each in told] == [("b.jsonl", "unread"), ("c.jsonl", "unread"), ("log.jsonl", "cosigned")]
@@ -299,7 +298,7 @@ def test_a_log_whose_anchors_could_not_be_written_is_looked_at_again(
         elif beside.is_dir():
             beside.rmdir()
 
-    monkeypatch.setattr(command.time, "sleep", sleep)
+    monkeypatch.setattr(time, "sleep", sleep)
     assert app.main(["witness", str(flown.path), "--watch", "0.5", "--json"]) == ExitCode.OK
     assert [each["event"] for each in said(capsys)] == ["unread", "cosigned"]
     assert beside.is_file()
@@ -336,7 +335,7 @@ def test_a_request_to_stop_ends_a_witness_as_ctrl_c_does(
     flown: Flown, store: KeyStore, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = signal.getsignal(signal.SIGTERM)
-    monkeypatch.setattr(command.time, "sleep", lambda _: signal.raise_signal(signal.SIGTERM))
+    monkeypatch.setattr(time, "sleep", lambda _: signal.raise_signal(signal.SIGTERM))
     assert app.main(["witness", str(flown.path.parent), "--watch", "0.5"]) == ExitCode.OK
     assert signal.getsignal(signal.SIGTERM) is before
 

@@ -1,6 +1,6 @@
 """A policy, in full: what is permitted, to whom, where, and what every skill then means."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from rtshcua.adapters.loop import WAIT_US
 from rtshcua.app.wording import utc
@@ -79,34 +79,57 @@ _MINUTE_US = 60_000_000
 
 def show_policy(page: TextPage, policy: Policy) -> None:
     """Adds a policy to the page."""
-    vehicle, projection = policy.vehicle, policy.projection
     page.head(f"Policy {policy.name} version {policy.version}")
-    page.row("vehicle", f"`{vehicle.identity}`, declared as {vehicle.name}")
+    for name, value in _of_vehicle(policy):
+        page.row(name, value)
+    page.row("roles", ", ".join(policy.roles))
+    page.rows("sources", policy.sources)
+    page.head("Rules: a forbid wins, and without a permit nothing is allowed")
+    _show_rules(page, policy)
+    if policy.monitors:
+        page.head("Temporal monitors: what conditions of the past look at")
+        for number, monitor in enumerate(policy.monitors):
+            page.row(str(number), words.monitor(monitor), width=2)
+    for title, named in (
+        ("Zones", [(zone.name, words.zone(policy, zone)) for zone in policy.zones]),
+        ("Signals", [(signal.name, _signal(signal)) for signal in policy.signals]),
+    ):
+        page.head(title)
+        width = max((len(name) for name, _ in named), default=0)
+        for name, value in named:
+            page.row(name, value, width=width)
+    page.head("Skills: the contracts, with every default that the compiler filled in")
+    for contract in policy.contracts:
+        show_contract(page, policy, contract)
+
+
+def _of_vehicle(policy: Policy) -> Iterator[tuple[str, str]]:
+    """The vehicle, by the words of the page."""
+    vehicle, projection = policy.vehicle, policy.projection
+    yield "vehicle", f"`{vehicle.identity}`, declared as {vehicle.name}"
     home = words.geographic(projection.latitude, projection.longitude)
-    page.row("home", f"{home}, within {words.length(vehicle.home_within)}")
-    page.row("moves", f"at most {words.speed(vehicle.speed)}, climbs at most {words.speed(vehicle.climb)}")
+    yield "home", f"{home}, within {words.length(vehicle.home_within)}"
+    yield "moves", f"at most {words.speed(vehicle.speed)}, climbs at most {words.speed(vehicle.climb)}"
     if vehicle.speeds is not None:
         kept, wind = vehicle.speeds, words.speed(vehicle.speeds.wind)
         up, down = words.speed(kept.climb), words.speed(kept.descent)
-        page.row("keeps", f"at least {words.speed(kept.cruise)}, {up} up, {down} down, in at most {wind} of wind")
+        yield "keeps", f"at least {words.speed(kept.cruise)}, {up} up, {down} down, in at most {wind} of wind"
     if vehicle.return_altitude:
-        page.row("returns", f"at {words.length(vehicle.return_altitude)} above home, if it flies lower")
+        yield "returns", f"at {words.length(vehicle.return_altitude)} above home, if it flies lower"
     if vehicle.braking:
         braking, reaction = words.speed(vehicle.braking), words.duration(vehicle.reaction_us)
-        page.row("brakes", f"by {braking} in a second, after {reaction}: limits count where it would come to stand")
-    page.row("position", f"true to {words.length(vehicle.position_error)}: every planned path is widened by this")
+        yield "brakes", f"by {braking} in a second, after {reaction}: limits count where it would come to stand"
+    yield "position", f"true to {words.length(vehicle.position_error)}: every planned path is widened by this"
     hover, reserve = words.duration(vehicle.endurance_us), words.ratio(vehicle.reserve)
-    page.row("energy", f"a full battery hovers {hover}; {reserve} stay in reserve")
+    yield "energy", f"a full battery hovers {hover}; {reserve} stay in reserve"
     if vehicle.without:
-        page.row("without", f"{', '.join(vehicle.without)}: not fitted; what reads it `where fitted` is left out")
-    if vehicle.time_zone:
-        page.row("local time", f"{vehicle.time_zone}, by the time-zone data {vehicle.time_zone_data}")
-    else:
-        page.row("local time", f"UTC {vehicle.utc_offset_us / _HOUR_US:+g} h")
-    page.row("roles", ", ".join(policy.roles))
-    page.rows("sources", policy.sources)
+        yield "without", f"{', '.join(vehicle.without)}: not fitted; what reads it `where fitted` is left out"
+    offset, data = f"UTC {vehicle.utc_offset_us / _HOUR_US:+g} h", vehicle.time_zone_data
+    yield "local time", f"{vehicle.time_zone}, by the time-zone data {data}" if vehicle.time_zone else offset
 
-    page.head("Rules: a forbid wins, and without a permit nothing is allowed")
+
+def _show_rules(page: TextPage, policy: Policy) -> None:
+    """The rules, the airspace, the contingency, and what is done without evidence or link."""
     for number, rule in enumerate(policy.rules):
         page.row(str(number), rule.text, width=2)
         if rule.target is not None:
@@ -122,25 +145,6 @@ def show_policy(page: TextPage, policy: Policy) -> None:
     page.row("without", _WITHOUT_EVIDENCE.get(policy.without_evidence, f"evidence: {policy.without_evidence}?"))
     then = _AFTER_SILENCE.get(policy.after_silence, f"{policy.after_silence}?")
     page.row("without", f"link for {words.duration(policy.silence_us)} {then}")
-
-    if policy.monitors:
-        page.head("Temporal monitors: what conditions of the past look at")
-        for number, monitor in enumerate(policy.monitors):
-            page.row(str(number), words.monitor(monitor), width=2)
-
-    page.head("Zones")
-    width = max((len(zone.name) for zone in policy.zones), default=0)
-    for zone in policy.zones:
-        page.row(zone.name, words.zone(policy, zone), width=width)
-
-    page.head("Signals")
-    width = max((len(signal.name) for signal in policy.signals), default=0)
-    for signal in policy.signals:
-        page.row(signal.name, _signal(signal), width=width)
-
-    page.head("Skills: the contracts, with every default that the compiler filled in")
-    for contract in policy.contracts:
-        show_contract(page, policy, contract)
 
 
 def _source(source: SignalSource) -> str:

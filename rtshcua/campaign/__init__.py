@@ -1,6 +1,6 @@
-"""Campaigns: thousands of flights in virtual time with faults that chance draws, judged by what really happened.
+"""Campaigns: thousands of flights in virtual time with random faults, judged by the true state of the simulation.
 
-`drawing` draws scenarios, `rounds` flies, judges and keeps them, by `workers`. `campaign_folder` is where a campaign
-goes on, `campaign_report` tells of it. `shrinking` makes a failure small, `scenario_source` writes it as a source.
-`scenario_trials` flies the scenarios that people wrote, for `rtshcua test`.
+`drawing` draws scenarios; `rounds` flies and judges them with `workers`. `campaign_folder` stores results so that a
+campaign can continue, `campaign_report` summarises them. `shrinking` minimises a failing scenario, `scenario_source`
+writes it as source. `scenario_trials` flies users' scenarios for `rtshcua test`.
 """

@@ -1,9 +1,9 @@
-"""A campaign's folder: what was asked for, the results as they come, the report, and the failures as scenarios.
+"""A campaign's folder: its settings, results, report, and failures as scenarios.
 
-- `campaign.json`: what must be the same when it goes on
-- `results.jsonl`: a line a flight, on the disk before the next is asked about
-- `report.html`, `report.json`: made anew whenever it stops
-- `failures/SLUG.rts`: the smallest flight that fails so, as a scenario
+- `campaign.json`: the settings that must be equal to continue the campaign
+- `results.jsonl`: one line per flight, written to disk at once
+- `report.html`, `report.json`: rewritten whenever the campaign stops
+- `failures/SLUG.rts`: the smallest flight with this failure, as a scenario
 """
 
 from pathlib import Path
@@ -21,10 +21,10 @@ _LARGEST: Final = 1 << 16
 
 
 class CampaignIdentity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What makes a campaign the same one: a flight of this number is drawn and flown alike wherever all of it is equal.
+    """The settings that identify a campaign: with equal settings, flight N is drawn and flown alike.
 
-    `bundle` is the SHA-256 of what is flown, `kinds` those of faults that are drawn, `version` that of this program,
-    `approved` whether whoever is asked for an approval gives it.
+    `bundle` is the SHA-256 of the bundle, `kinds` the kinds of faults, `version` that of this program, `approved`
+    whether requested approvals are given.
     """
 
     mission: str
@@ -38,31 +38,33 @@ class CampaignIdentity(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class CampaignFolder:
-    """The folder, which is made if it is missing."""
+    """A campaign's folder, created if it is missing."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.report = path / "report.html"
 
     def identity(self) -> CampaignIdentity | Refusal | None:
-        """What was begun here; None: nothing yet."""
+        """Return the settings of the campaign in this folder; None if it is empty."""
         if self.path.exists() and not self.path.is_dir():
-            return Refusal("usage", f"`{self.path}` is no folder", "`-o` names a campaign's folder")
+            return Refusal("usage", f"`{self.path}` is not a folder", "`-o` expects a campaign's folder")
         kept = read_if_there(self.path / "campaign.json", _LARGEST)
         if kept is None:
             return None
         try:
             return msgspec.json.decode(kept, type=CampaignIdentity)
         except msgspec.MsgspecError:
-            return Refusal("malformed", f"`{self.path / 'campaign.json'}` is not what a campaign left", _ANOTHER)
+            return Refusal("malformed", f"`{self.path / 'campaign.json'}` is malformed", _ANOTHER)
 
     def begin(self, identity: CampaignIdentity) -> None:
-        """Begin a campaign. Raises OSError; FileExistsError where one was begun meanwhile."""
+        """Begin a campaign. Raise OSError; FileExistsError if another process began one meanwhile."""
         make_folder(self.path)
         write_new(self.path / "campaign.json", msgspec.json.format(msgspec.json.encode(identity)) + b"\n")
 
     def past(self) -> dict[int, CampaignResult]:
-        """What was flown so far. A last line that was torn is ended, so that the next result has a line of its own."""
+        """Return the results so far, by number. A truncated last line is terminated, so that the next result has its
+        own.
+        """
         path = self.path / "results.jsonl"
         try:
             with open_regular(path) as file:
@@ -74,22 +76,22 @@ class CampaignFolder:
         return read_results(lines)
 
     def keep(self, result: CampaignResult) -> None:
-        """Keep a result, on the disk."""
+        """Store a result on disk."""
         append(self.path / "results.jsonl", result_line(result))
 
     def tell(self, summary: CampaignSummary) -> None:
-        """Write the report, over an earlier one."""
+        """Write the report, replacing an earlier one."""
         replace(self.path / "report.json", msgspec.json.format(msgspec.json.encode(as_json(summary))) + b"\n")
         replace(self.report, report_page(summary).encode())
 
     def scenario(self, slug: str) -> Path:
-        """Where the smallest flight that fails so is kept."""
+        """Return the path of the smallest scenario with this failure."""
         return self.path / "failures" / f"{slug}.rts"
 
     def save(self, slug: str, text: str) -> None:
-        """Keep it."""
+        """Store the smallest scenario with this failure."""
         make_folder(self.path / "failures")
         replace(self.scenario(slug), text.encode())
 
 
-_ANOTHER: Final = "give another folder with `-o`, or take this one away"
+_ANOTHER: Final = "name another folder with `-o`, or delete this one"

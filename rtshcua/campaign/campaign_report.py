@@ -1,4 +1,4 @@
-"""What a campaign found: as one object for programs, and as one HTML page that needs no script, file or network."""
+"""The report of a campaign: as JSON, and as one HTML page without scripts or external resources."""
 
 from base64 import b64encode
 from collections import Counter, defaultdict
@@ -17,7 +17,7 @@ from rtshcua.model.faults import KINDS
 
 
 class MarginUnit(NamedTuple):
-    """What a margin is, its unit for people, and how many of its own make one of these."""
+    """A margin's title and displayed unit, and how many of its own units make one displayed unit."""
 
     title: str
     unit: str
@@ -26,21 +26,21 @@ class MarginUnit(NamedTuple):
 
 #: by the names of `rtshcua.virtual.judge.Margins`
 MARGINS: Final[Mapping[str, MarginUnit]] = {
-    "fence_mm": MarginUnit("distance inside the airspace, at its edge", "m", 1_000),
-    "obstacle_mm": MarginUnit("distance to what stands around", "m", 1_000),
+    "fence_mm": MarginUnit("least distance to the airspace's edge, inside", "m", 1_000),
+    "obstacle_mm": MarginUnit("least distance to an obstacle", "m", 1_000),
     "stop_us": MarginUnit("time from the cause of a fallback to its first frame", "s", 1_000_000),
-    "takeover_us": MarginUnit("time from a takeover to the last frame that moves the vehicle", "s", 1_000_000),
-    "ended_us": MarginUnit("time that the vehicle went on after the run had ended", "s", 1_000_000),
+    "takeover_us": MarginUnit("time from a takeover to the last motion frame", "s", 1_000_000),
+    "ended_us": MarginUnit("time until the vehicle stopped moving after the end of the run", "s", 1_000_000),
 }
 
-#: what sources and `--fault` call a kind of fault, by its own name; of two the longer one, which says more
+#: the name of a fault kind in sources and `--fault`, by class name; the longer one if there are two
 FAULTS: Final[Mapping[str, str]] = {
     kind.__name__: word for word, kind in sorted(KINDS.items(), key=lambda each: len(each[0]))
 }
 
 
 def margin_told(name: str, value: int) -> str:
-    """A margin with its unit, to three digits."""
+    """Return a margin with its unit, to three digits."""
     told = MARGINS[name]
     return f"{value / told.parts:.3g} {told.unit}"
 
@@ -50,7 +50,7 @@ _BARS: Final = 24
 
 
 class FindingSummary(msgspec.Struct, frozen=True):
-    """All flights that the judge found the same fault in: how many, and those with the lowest numbers."""
+    """All flights with the same failure: their count, and the lowest numbers."""
 
     slug: str
     flights: int
@@ -62,9 +62,9 @@ class FindingSummary(msgspec.Struct, frozen=True):
 
 
 class MarginSummary(msgspec.Struct, frozen=True):
-    """One of the judge's numbers over all flights: the least and the greatest, in which flight, and the spread.
+    """One margin over all flights: least and greatest values with their flights, median and histogram.
 
-    `name` ends in its unit (us, mm); `title` is for people.
+    `name` ends in the unit (us, mm); `title` is displayed.
     """
 
     name: str
@@ -76,11 +76,11 @@ class MarginSummary(msgspec.Struct, frozen=True):
     greatest: int
     greatest_in: int
     bars: tuple[int, ...]
-    """How many flights in each of as many equal parts from the least to the greatest."""
+    """The number of flights in each of equal intervals from the least to the greatest value."""
 
 
 class CampaignSummary(msgspec.Struct, frozen=True):
-    """What `report.json` holds. Times in us; `endings` by kind of autopilot, `kinds` by kind of fault as in sources."""
+    """The content of `report.json`. Times in us; `endings` by autopilot, `kinds` by kind of fault."""
 
     mission: str
     campaign: int
@@ -94,13 +94,13 @@ class CampaignSummary(msgspec.Struct, frozen=True):
     margins: tuple[MarginSummary, ...]
     kinds: dict[str, dict[str, int]]
     near: dict[str, dict[str, int]]
-    """How often a kind of fault was near a state change."""
+    """How often a kind of fault took place near a state change."""
 
 
 def summarise(
     mission: str, campaign: int, results: Mapping[int, CampaignResult], scenarios: Mapping[str, str]
 ) -> CampaignSummary:
-    """Of results by number; `scenarios` says in which file the shrunken flight of a failure is kept, by slug."""
+    """Summarise results by number; `scenarios` has the file of the smallest scenario of a failure, by slug."""
     ordered = [results[number] for number in sorted(results)]
     endings: defaultdict[str, Counter[str]] = defaultdict(Counter)
     kinds: defaultdict[str, Counter[str]] = defaultdict(Counter)
@@ -171,7 +171,7 @@ def _margins(results: Sequence[CampaignResult]) -> Iterable[MarginSummary]:
 
 
 def as_json(summary: CampaignSummary) -> dict[str, Any]:
-    """For a program."""
+    """Return the summary as JSON values."""
     made: dict[str, Any] = msgspec.to_builtins(summary)
     return made
 
@@ -181,7 +181,7 @@ _WIDTH: Final = 10
 
 
 def report_page(summary: CampaignSummary) -> str:
-    """The page; the same bytes for the same summary."""
+    """Return the HTML page; the same bytes for the same summary."""
     environment, style = _environment()
     labels = sorted({label for counts in summary.near.values() for label in counts})
     endings = sorted({ending for counts in summary.endings.values() for ending in counts})
@@ -201,7 +201,7 @@ def report_page(summary: CampaignSummary) -> str:
 
 
 def _bars(counts: Sequence[int]) -> list[tuple[int, int, int]]:
-    """Left edge, top and height of each bar."""
+    """Return left edge, top and height of each bar."""
     most = max(counts, default=1) or 1
     heights = [0 if count == 0 else max(1, round(count * _HEIGHT / most)) for count in counts]
     return [(number * _WIDTH, _HEIGHT - height, height) for number, height in enumerate(heights)]

@@ -1,14 +1,14 @@
-"""Which faults a flight of a campaign has: how many, of what kind, when and how deep, as chance and coverage have it.
+"""Draw the faults of a campaign's flights: number, kinds, times and parameters, by chance and coverage.
 
-The same campaign, number and tally give the same scenario, in whatever process, on whatever machine.
+The same campaign, number and tally give the same scenario in any process and on any machine.
 
-- How many: 1 to 6, in `HOW_MANY` parts of a hundred.
-- Which kind: half of the time a group by its weight in `GROUPS`, then one of its kinds, each as likely; half of the
-  time that pair of a kind and a state change, of `CANDIDATES` drawn so, which was tried least.
-- When: a fourth of the time close to the fault before it, for what is borne alone may not be borne together; else a
-  fifth of the time anywhere in the flight, and else from `BEFORE_US` before to `AFTER_US` after a state change that was
-  seen, nearer ones likelier.
-- How deep: each parameter as `RANGES` says, evenly, or evenly in its logarithm, in steps that a person would write.
+- Number: 1 to 6, with the probabilities of `HOW_MANY` in percent.
+- Kind: in half of the cases a group by its weight in `GROUPS`, then one of its kinds with equal probability; otherwise
+  the least tried of `CANDIDATES` such pairs of a kind and a state change.
+- Time: in a quarter of the cases close to the previous fault, because faults may only fail in combination; otherwise in
+  a fifth of the cases anywhere in the flight, and else from `BEFORE_US` before to `AFTER_US` after an observed state
+  change, more likely near it.
+- Parameters: by `RANGES`, uniform or uniform in the logarithm, in round steps.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -27,16 +27,16 @@ from rtshcua.wire.approval import confirms
 
 S: Final = 1_000_000
 FLAVOURS: Final = ("px4", "ardupilot")
-#: of a hundred flights, so many have 1, 2, ... faults
+#: the percentage of flights with 1, 2, ... faults
 HOW_MANY: Final = (35, 25, 18, 12, 7, 3)
 CANDIDATES: Final = 8
 BEFORE_US: Final = 3 * S
 AFTER_US: Final = 6 * S
-_LATER: Final = 1.5  # how much likelier near than far, as a power
-#: how often a fault is close to the one before it
+_LATER: Final = 1.5  # exponent of the distance: prefers near times
+#: the probability that a fault is close to the previous one
 TOGETHER: Final = 0.25
 
-#: how likely a group is, and what is in it
+#: the weight and the kinds of each group
 GROUPS: Final[tuple[tuple[int, tuple[type[Fault], ...]], ...]] = (
     (
         20,
@@ -75,7 +75,7 @@ GROUPS: Final[tuple[tuple[int, tuple[type[Fault], ...]], ...]] = (
 
 @dataclass(frozen=True, slots=True)
 class DrawnRange:
-    """Whole numbers from `low` to `high` in steps of `step`; `by_ratio`: small ones as likely as large ones."""
+    """Integers from `low` to `high` in steps of `step`; `by_ratio`: uniform in the logarithm."""
 
     low: int
     high: int
@@ -83,7 +83,7 @@ class DrawnRange:
     by_ratio: bool = False
 
     def draw(self, chance: Random) -> int:
-        """One of them."""
+        """Draw one integer."""
         if not self.by_ratio:
             return self.low + self.step * chance.randrange((self.high - self.low) // self.step + 1)
         drawn = exp(chance.uniform(log(self.low), log(self.high)))
@@ -92,7 +92,7 @@ class DrawnRange:
 
 _LASTS = DrawnRange(200_000, 45 * S, 100_000, by_ratio=True)
 _SOMEWHERE = DrawnRange(-60_000, 60_000, 1_000)
-#: what a parameter of a kind is drawn from, and of all kinds that name it where there is no kind before it
+#: the range of a parameter, by kind and name; kind None: the default for all kinds with this parameter
 RANGES: Final[Mapping[tuple[type[Fault] | None, str], DrawnRange]] = {
     (None, "for_us"): _LASTS,
     (None, "each_us"): DrawnRange(50_000, 5 * S, 50_000, by_ratio=True),
@@ -134,18 +134,18 @@ RANGES: Final[Mapping[tuple[type[Fault] | None, str], DrawnRange]] = {
     (faults.StaleSource, "delay_us"): DrawnRange(200_000, 8 * S, 100_000, by_ratio=True),
     (faults.Babble, "copies"): DrawnRange(5, 200, 5, by_ratio=True),
 }
-#: messages that may fall silent or stick
+#: messages that may be silenced or stuck
 MESSAGES: Final = (
     "GLOBAL_POSITION_INT", "HEARTBEAT", "SYS_STATUS", "BATTERY_STATUS", "GPS_RAW_INT", "EXTENDED_SYS_STATE",
     "POSITION_TARGET_GLOBAL_INT", "DISTANCE_SENSOR", "RADIO_STATUS", "COMMAND_ACK", "TIMESYNC", "ATTITUDE",
 )  # fmt: skip
 _MODES: Final = tuple(FlightMode)
-_LASTS_FOR_GOOD: Final = 0.15  # how often what may last for good does
+_LASTS_FOR_GOOD: Final = 0.15  # the probability that a fault without end is drawn, where allowed
 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """A state change that a flight was seen to make: what it was, without numbers, and when."""
+    """An observed state change of a flight: its label, without numbers, and its time."""
 
     label: str
     at_us: int
@@ -153,10 +153,10 @@ class Moment:
 
 @dataclass
 class CampaignTally:
-    """What a campaign has seen and tried: what the next round is drawn by.
+    """The observations of a campaign that guide the next round.
 
-    `moments` are the state changes of flights, by flavour; `tried` counts pairs of a kind of fault and the state change
-    that it was near.
+    `moments` are the state changes of flights, by flavour; `tried` counts pairs of a fault kind and the state change
+    near it.
     """
 
     moments: dict[str, list[Moment]] = field(default_factory=dict)
@@ -165,7 +165,7 @@ class CampaignTally:
 
 @dataclass(frozen=True, slots=True)
 class FaultSpace:
-    """What a campaign draws from: the skills of its mission's steps, how long it takes by flavour, who may approve."""
+    """The space that a campaign draws from: the skills of the mission's steps, its duration by flavour, the roles."""
 
     skills: tuple[str, ...]
     lasts_us: Mapping[str, int]
@@ -173,25 +173,25 @@ class FaultSpace:
     flavours: tuple[str, ...] = FLAVOURS
     kinds: frozenset[type[Fault]] = frozenset(faults.KINDS.values())
     read: tuple[str, ...] = ()
-    """The messages that the policy reads its signals from: half of those that fall silent or stick are among these."""
+    """The messages of the policy's signals: half of the silenced or stuck messages are drawn from these."""
     answers: tuple[Incident, ...] = ()
-    """What people answer in every flight, besides what is drawn: `answers_of`."""
+    """The approvals of every flight, in addition to the drawn faults: `answers_of`."""
 
 
 @dataclass(frozen=True, slots=True)
 class Drawn:
-    """A scenario of one seed and flavour, and the pairs that it tries."""
+    """A scenario with one seed and flavour, and the pairs that it tries."""
 
     scenario: Scenario
     tries: tuple[tuple[str, str], ...]
 
 
-#: what nothing was near: a time that was drawn from the whole flight
+#: the label of a time drawn from the whole flight
 ANYWHERE: Final = "anywhere"
 
 
 def draw(campaign: int, number: int, space: FaultSpace, tally: CampaignTally) -> Drawn:
-    """Flight `number` of the campaign of that seed."""
+    """Draw flight `number` of the campaign with this seed."""
     chance = Random(f"campaign {campaign} flight {number}")
     flavour = space.flavours[number % len(space.flavours)]
     seed = chance.randrange(1, 1 << 31)
@@ -216,12 +216,12 @@ def draw(campaign: int, number: int, space: FaultSpace, tally: CampaignTally) ->
     return Drawn(scenario, tuple(tries))
 
 
-#: when who is asked for an approval answers, after the step before was sent (or the start of the run)
+#: us: when an approval is given, after the previous step was sent (or the start of the run)
 ANSWERS_US: Final = (1 * S, 5 * S)
 
 
 def answers_of(policy: Policy, mission: Mission) -> Iterator[Incident]:
-    """What people of every role that a `confirm` rule may ask about a step answer: that they approve of it."""
+    """Yield an approval for every step and every role that a `confirm` rule may require."""
     skills = tuple(policy.contracts[each.skill].name for each in mission.invocations)
     for step, invocation in enumerate(mission.invocations):
         for number, role in enumerate(policy.roles):
@@ -264,7 +264,7 @@ def _when(chance: Random, space: FaultSpace, flavour: str, moment: Moment | None
 
 
 def _close(chance: Random, before: When) -> AtTime | AfterStep | None:
-    """A time close to that of the fault before; None: another one."""
+    """Return a time close to that of the previous fault, or None."""
     if chance.random() >= TOGETHER:
         return None
     at = max(before.from_us + _away(chance), 0)
@@ -288,7 +288,7 @@ def _fault(chance: Random, kind: type[Fault], space: FaultSpace) -> Fault:
         values[each.name] = _value(chance, kind, each.name, space)
     made = kind(**values)
     if isinstance(made, faults.LinkSilence) and made.for_us is None:
-        return replace(made, held=False)  # what is held back for good is lost
+        return replace(made, held=False)  # frames that are held forever are lost
     return made
 
 

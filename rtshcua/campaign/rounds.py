@@ -1,8 +1,8 @@
-"""The flights of a campaign, round by round: each flown, judged, and kept as a line of JSON.
+"""Fly a campaign round by round: each flight is flown, judged and stored as a line of JSON.
 
-Flights of a round are drawn by what all rounds before it found, and by nothing else, so that a campaign is the same
-however many workers fly it, in whatever order they come back, and wherever it was interrupted. It goes on from its
-lines; a line that was torn counts as not flown.
+The flights of a round depend only on the results of earlier rounds. A campaign therefore gives the same results with
+any number of workers, in any order of completion, and after any interruption. It continues from its stored lines; a
+truncated line counts as not flown.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -26,7 +26,7 @@ from rtshcua.wire.keys import Duty
 
 
 class JudgeFinding(msgspec.Struct, frozen=True):
-    """What the judge found, or what it excused: `why` says what in the flight allows it."""
+    """A failure, or an excused failure with its cause in `why`."""
 
     slug: str
     text: str
@@ -35,10 +35,10 @@ class JudgeFinding(msgspec.Struct, frozen=True):
 
 
 class CampaignResult(msgspec.Struct, frozen=True):
-    """One flight. `tries` are pairs of a kind of fault and the state change it was near; `margins` the judge's numbers.
+    """The result of one flight. `tries` are pairs of a fault kind and the state change near it; `margins` the judge's.
 
-    `moments` are the state changes that were seen. `took_us` is processor time; it is the only thing that is not the
-    same when it is flown again.
+    `moments` are the observed state changes. `took_us` is processor time, the only field that differs when the flight
+    is repeated.
     """
 
     number: int
@@ -57,18 +57,18 @@ class CampaignResult(msgspec.Struct, frozen=True):
     took_us: int = 0
 
 
-#: how many times of a state change are kept, the first that were seen
+#: how many occurrences of a state change are kept
 _KEPT: Final = 40
 _DECODER: Final = msgspec.json.Decoder(CampaignResult)
 
 
 def result_line(result: CampaignResult) -> bytes:
-    """As it is kept."""
+    """Return the stored line of a result."""
     return msgspec.json.encode(result) + b"\n"
 
 
 def read_results(lines: Iterable[bytes]) -> dict[int, CampaignResult]:
-    """What was kept, by number; a line that is no result is left out."""
+    """Return the stored results by number; malformed lines are skipped."""
     found: dict[int, CampaignResult] = {}
     for each in lines:
         try:
@@ -80,7 +80,7 @@ def read_results(lines: Iterable[bytes]) -> dict[int, CampaignResult]:
 
 
 def tally(results: Iterable[CampaignResult]) -> CampaignTally:
-    """What the next round is drawn by: of results in the order of their numbers."""
+    """Return the tally of results, which must be ordered by number."""
     made = CampaignTally()
     seen: dict[tuple[str, str], int] = {}
     for result in results:
@@ -95,14 +95,14 @@ def tally(results: Iterable[CampaignResult]) -> CampaignTally:
     return made
 
 
-#: a flight in which a process died
+#: the slug and text of a flight whose worker process died
 LOST: Final = "process-died"
-DIED: Final = "the process that flew it died, and the next one too"
+DIED: Final = "the worker process of this flight died twice"
 
 
 @dataclass(frozen=True, slots=True)
 class CampaignFlight:
-    """A flight that is to be flown."""
+    """A flight to be flown."""
 
     number: int
     scenario: Scenario
@@ -111,8 +111,8 @@ class CampaignFlight:
 
 @dataclass(frozen=True, slots=True)
 class FlownMission:
-    """What all flights of a campaign share: the bundle, its trust root (`development_keys`), and the policy's roles, of
-    whom there are people to ask.
+    """The shared inputs of all flights of a campaign: the bundle, its trust root (`development_keys`), and the policy's
+    roles.
     """
 
     bundle: bytes
@@ -121,18 +121,18 @@ class FlownMission:
 
     @classmethod
     def of(cls, policy: Policy, mission: Mission, issued_at_us: int) -> Self:
-        """The field of a mission under a policy."""
+        """Seal a mission under a policy."""
         roles = policy.roles
         return cls(development_keys.seal(policy, mission), development_keys.root(issued_at_us, roles), roles)
 
     def flown(self, scenario: Scenario, flavour: str, seed: int) -> ScenarioFlown:
-        """A flight of a scenario, as it was."""
+        """Fly a scenario and return its record."""
         made = development_keys.keys()
         keys = Keys(made[Duty.LOG], development_keys.approvers(self.roles), made[Duty.MISSION], made[Duty.BOUNDARY])
         return fly(self.bundle, self.root, keys, scenario, flavour, seed)
 
     def fly(self, flight: CampaignFlight) -> CampaignResult:
-        """The flight, judged."""
+        """Fly and judge a flight."""
         began = process_time_ns()
         scenario = flight.scenario
         was = self.flown(scenario, scenario.flavours[0], scenario.first_seed)
@@ -158,7 +158,7 @@ class FlownMission:
         )
 
     def lost(self, flight: CampaignFlight) -> CampaignResult:
-        """The flight, when the process that flew it died, more than once."""
+        """Return the result of a flight whose worker process died repeatedly."""
         scenario = flight.scenario
         flavour, seed = scenario.flavours[0], scenario.first_seed
         failed = JudgeFinding(LOST, DIED)
@@ -167,7 +167,7 @@ class FlownMission:
 
 
 def moments(was: ScenarioFlown) -> Iterator[tuple[str, int]]:
-    """The state changes of a flight: what was sent, and what the vehicle then really did."""
+    """Yield the state changes of a flight: sent commands, endings, and true changes of the vehicle."""
     for life in was.lives:
         for line in life.lines:
             if b'"event":"dispatched"' in line:
@@ -187,14 +187,14 @@ def moments(was: ScenarioFlown) -> Iterator[tuple[str, int]]:
         before = sample
 
 
-#: flights of a round; the first is small, for it knows nothing of the mission
+#: flights per round; the first round is small, because no state changes are known yet
 FIRST: Final = 20
 ROUND: Final = 100
 
 
 @dataclass(frozen=True, slots=True)
 class CampaignOrder:
-    """What is asked for: flights 0 to `flights` - 1 of the campaign of this seed."""
+    """A request for flights 0 to `flights` - 1 of the campaign with this seed."""
 
     seed: int
     flights: int
@@ -202,7 +202,7 @@ class CampaignOrder:
 
 
 def rounds(flights: int) -> Iterator[range]:
-    """The numbers of each round."""
+    """Yield the flight numbers of each round."""
     first = 0
     while first < flights:
         end = min(flights, first + (ROUND if first else FIRST))
@@ -211,7 +211,7 @@ def rounds(flights: int) -> Iterator[range]:
 
 
 def drawn(order: CampaignOrder, number: int, past: Mapping[int, CampaignResult]) -> Drawn:
-    """One flight, as the campaign draws it: `past` has all of the rounds before its own."""
+    """Draw one flight again; `past` must hold the results of all earlier rounds."""
     first = next(each for each in rounds(order.flights) if number in each)[0]
     return draw(order.seed, number, order.space, tally(past[n] for n in range(first)))
 
@@ -223,7 +223,7 @@ def fly_rounds(
     past: dict[int, CampaignResult],
     keep: Callable[[CampaignResult], None],
 ) -> None:
-    """Flies what `past` has not yet, and adds it to that; `keep` is called with each result as it comes."""
+    """Fly the flights that are missing in `past` and add them; `keep` is called with each result at once."""
     for numbers in rounds(order.flights):
         left = [number for number in numbers if number not in past]
         if not left:

@@ -1,4 +1,4 @@
-"""A scenario as its source is written: what a failure is kept as, and what a person reads."""
+"""Write a scenario as source text."""
 
 from collections.abc import Sequence
 from datetime import UTC, datetime, timedelta
@@ -11,7 +11,7 @@ _NAMES = {kind: name.replace("-", "_") for name, kind in KINDS.items()}
 
 
 def scenario_text(scenario: Scenario, mission: str, imported: str, comment: str = "") -> str:
-    """A source with this scenario of a mission of the file `imported`; `comment` says what it is kept for."""
+    """Return a source file with this scenario; `imported` is the file of the mission, `comment` a leading comment."""
     lines = [f"// {line}".rstrip() for line in comment.splitlines()]
     lines += [f'import "{imported}"', "", f'scenario "{scenario.name}" {{', f"  flies  {mission}"]
     lines.append(f"  aboard {', '.join(scenario.flavours)}")
@@ -25,7 +25,7 @@ def scenario_text(scenario: Scenario, mission: str, imported: str, comment: str 
 
 
 def _start(start: Start) -> str:
-    """What it starts with; empty where nothing is said of that."""
+    """Return the values of the `start` line; empty if there are none."""
     said = []
     if start.battery is not None:
         said.append(f"battery = {display(start.battery, Dimension.RATIO)}")
@@ -39,12 +39,12 @@ def _start(start: Start) -> str:
 
 
 def incident_text(when: When, fault: Fault, skills: Sequence[str]) -> str:
-    """`2 s after goto link_silence(for = 5 s, way = up)`; `skills` are those of the mission's steps, in order."""
+    """Return an incident as in `2 s after goto link_silence(for = 5 s)`; `skills` are those of the mission's steps."""
     return f"{_when(when, skills)} {fault_text(fault)}"
 
 
 def fault_text(fault: Fault) -> str:
-    """`link_silence(for = 5 s, way = up)`: what is as it would be if nothing were said is left out."""
+    """Return a fault as in `link_silence(for = 5 s, way = up)`; default values are omitted."""
     said = []
     for each in parameters(type(fault)):
         value = getattr(fault, each.field)

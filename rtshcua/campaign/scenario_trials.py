@@ -1,4 +1,4 @@
-"""A scenario tried: each flight of it, judged, held against what it expects, and counted for what it covers."""
+"""Fly the flights of a scenario: judge each, check its expectations, and count its coverage."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ from rtshcua.wire.request import STEP
 
 @dataclass(frozen=True, slots=True)
 class Try:
-    """A flight of a scenario that is to be flown: on this kind of autopilot, with this seed."""
+    """A flight of a scenario: the autopilot and the seed."""
 
     number: int
     scenario: Scenario
@@ -34,13 +34,13 @@ class Try:
 
 @dataclass(frozen=True, slots=True)
 class ScenarioTrial:
-    """How flights of scenarios of one mission are flown."""
+    """Flies scenarios of one mission."""
 
     field: FlownMission
     with_coverage: bool = False
 
     def fly(self, flight: Try) -> FlightResult:
-        """One of them."""
+        """Fly and judge one flight."""
         began_ns = perf_counter_ns()
         was = self.field.flown(flight.scenario, flight.flavour, flight.seed)
         verdict = judge(was)
@@ -64,13 +64,13 @@ class ScenarioTrial:
         )
 
     def lost(self, flight: Try) -> FlightResult:
-        """One that no process survived."""
+        """Return the result of a flight whose worker process died repeatedly."""
         wrong = (FlightFailure(JUDGED, LOST, DIED),)
         return FlightResult(flight.number, flight.flavour, flight.seed, "none", wrong, (), (), ())
 
 
 def tries(scenario: Scenario) -> Iterator[Try]:
-    """All flights of a scenario: each seed on each kind of autopilot."""
+    """Yield all flights of a scenario: each seed on each autopilot."""
     number = 0
     for seed in range(scenario.first_seed, scenario.last_seed + 1):
         for flavour in scenario.flavours:
@@ -79,12 +79,12 @@ def tries(scenario: Scenario) -> Iterator[Try]:
 
 
 def _reached(was: ScenarioFlown) -> Iterator[ReachedGoals]:
-    """What each decision on a step covers, as `rtshcua why` explains it from its record.
+    """Yield the coverage goals of each decision on a step, as `rtshcua why` explains it from its record.
 
-    One that was not decided as the step that was compiled would be is of a replacement, which covers nothing.
+    A decision that differs from the compiled step's belongs to a replacement and covers nothing.
     """
     policy = prepare(was.policy)
-    if isinstance(policy, Refusal):  # it was flown
+    if isinstance(policy, Refusal):  # cannot happen: the policy was flown
         return
     invocations = prepare_mission(was.mission, policy)
     if isinstance(invocations, Refusal):

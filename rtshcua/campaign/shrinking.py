@@ -1,7 +1,7 @@
-"""The smallest scenario that still fails: fewer faults, then shorter, weaker and rounder ones.
+"""Minimise a failing scenario: fewer faults, then shorter, weaker and rounder ones.
 
-As delta debugging does it (Zeller, Hildebrandt 2002), one fault at a time, for a flight has at most a few. What a
-change does to a flight is not known before it is flown, so each step is tried, and kept if it still fails.
+Delta debugging (Zeller, Hildebrandt 2002), one fault at a time, because a flight has few. Each candidate is flown, and
+kept if it still fails.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -12,7 +12,7 @@ from rtshcua.campaign.scenario_source import incident_text
 from rtshcua.model.faults import UNITS, Fault
 from rtshcua.model.scenario import AfterStep, AtTime, Incident, OnCondition, Scenario, Start, When
 
-#: the steps in which a number of each unit is rounded, coarse ones first, by the end of a field's name
+#: rounding steps by unit (the end of a field's name), coarse ones first
 _ROUND: Final = {
     "_us": (10_000_000, 1_000_000, 100_000), "_mm": (10_000, 1_000), "_mm_s": (5_000, 1_000),
     "_mv": (1_000,), "_deg": (90, 10), "": (1_000, 100),
@@ -23,9 +23,9 @@ _CALM: Final = Start()
 def shrink(
     scenario: Scenario, skills: Sequence[str], still_fails: Callable[[Scenario], bool], most: int = 150
 ) -> tuple[Scenario, int]:
-    """The scenario, as small as `most` flights found it, and how many were flown.
+    """Return the smallest failing scenario found within `most` flights, and the number of flights.
 
-    `still_fails` flies one, and says whether it fails as the first did. What is given is expected to.
+    `still_fails` flies a scenario and returns whether it fails like the original, which must fail.
     """
     flown = 0
     smaller = True
@@ -42,7 +42,7 @@ def shrink(
 
 
 def _smaller(scenario: Scenario, skills: Sequence[str]) -> Iterator[Scenario]:
-    """Simpler ones, the most promising first; each is smaller by some measure, so that this comes to an end."""
+    """Yield simpler scenarios, most promising first; each is smaller by some measure, so that shrinking terminates."""
     incidents = scenario.incidents
     if len(incidents) > 2:
         half = len(incidents) // 2
@@ -91,13 +91,13 @@ def _weaker(fault: Fault) -> Iterator[Fault]:
             yield replace(fault, **{each.name: value // 2})
         for step in _ROUND[suffix]:
             rounded = round(value / step) * step
-            # towards nothing, or it would go back and forth; and never to nothing, which may mean something else
+            # only towards 0, so that shrinking terminates, but never to 0, which may have another meaning
             if 0 < abs(rounded) < abs(value):
                 yield replace(fault, **{each.name: rounded})
 
 
 def _is_simpler(default: object, value: object) -> bool:
-    """Whether it is worth to try what holds if nothing is said; of numbers only what is nearer to nothing."""
+    """Return whether the default is worth a try; for integers only if it is nearer to 0."""
     if type(default) is int and type(value) is int:
         return abs(default) < abs(value)
     return default != value

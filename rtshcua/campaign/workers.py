@@ -1,7 +1,6 @@
-"""Who flies many flights: the cores of this machine, or (extra `cluster`) the workers of a Dask scheduler.
+"""Run many flights in parallel: on the cores of this machine, or (extra `cluster`) on a Dask cluster.
 
-A worker that dies takes no flight with it: it is flown again, by another. Only a flight that a process died of twice is
-given up, and counts as a failure.
+If a worker dies, another one repeats its flight. A flight whose worker dies repeatedly counts as a failure.
 """
 
 import errno
@@ -21,64 +20,64 @@ R_co = TypeVar("R_co", bound="Numbered", covariant=True)
 
 
 class Numbered(Protocol):
-    """A flight, or what came of it."""
+    """A flight or its result."""
 
     @property
     def number(self) -> int:
-        """Which one of those that are to be flown."""
+        """The flight's number."""
         ...
 
 
 class Work(Protocol[F_contra, R_co]):
-    """How flights are flown; it goes to another process, or another machine, with each of them."""
+    """A way to fly flights; it is sent with each flight to another process or machine."""
 
     def fly(self, flight: F_contra) -> R_co:
-        """Fly one."""
+        """Fly one flight."""
         ...
 
     def lost(self, flight: F_contra) -> R_co:
-        """What is to be said of one whose process died, more than once."""
+        """Return the result of a flight whose worker died repeatedly."""
         ...
 
 
 class FlightWorkers(Protocol):
-    """Whoever flies; what comes of flights comes as it is there."""
+    """A pool of workers; results come as they are ready."""
 
     def fly(self, work: Work[F, R], flights: Sequence[F]) -> Iterator[R]:
-        """Flies these."""
+        """Fly the flights; yield each result."""
         ...
 
     def close(self) -> None:
-        """Lets them go."""
+        """Release the workers."""
         ...
 
 
 #: how often a process may die while it flies a flight
 _MOST_DEATHS: Final = 2
-#: how long flights are waited for, in seconds, before `look` is called again; and between two looks at a cluster
+#: s: the interval of calls of `look`, and of polling a cluster
 _LOOK_S: Final = 0.5
 _POLL_S: Final = 0.1
-#: what is called while flights are waited for; it raises where they are not to be waited for any more
+#: a function that is called while waiting for flights; it raises an exception to stop
 Look = Callable[[], None]
 
 
 def _on() -> None:
-    """They are waited for."""
+    """Continue waiting."""
 
 
 class Here:
-    """This process alone."""
+    """Flies in this process."""
 
     def fly(self, work: Work[F, R], flights: Sequence[F]) -> Iterator[R]:
-        """Flies these, one after the other."""
+        """Fly the flights one after the other."""
         return (work.fly(flight) for flight in flights)
 
     def close(self) -> None:
-        """There is nobody to let go."""
+        """Do nothing: there are no workers."""
 
 
 class WorkerProcesses:
-    """`jobs` processes, as many as there are cores if it is not said."""
+    """A pool of `jobs` processes; by default one per core."""
 
     def __init__(self, jobs: int | None = None, look: Look = _on) -> None:
         self._jobs = jobs or cores()
@@ -86,11 +85,11 @@ class WorkerProcesses:
         self._pool: ProcessPoolExecutor | None = None
 
     def fly(self, work: Work[F, R], flights: Sequence[F]) -> Iterator[R]:
-        """Flies these, all at once."""
+        """Fly the flights in parallel."""
         left = {flight.number: flight for flight in flights}
         deaths = 0
         while left:
-            # After a death nobody knows which flight it was: they are flown one by one until it dies again.
+            # After a death the flight that caused it is unknown: fly one by one until a worker dies again.
             together = list(left.values()) if not deaths else list(left.values())[:1]
             try:
                 for result in self._all(work, together):
@@ -121,7 +120,7 @@ class WorkerProcesses:
                 future.cancel()
 
     def close(self) -> None:
-        """Ends the processes; what they fly is not waited for."""
+        """Terminate the processes without waiting for their flights."""
         pool, self._pool = self._pool, None
         if pool is not None:
             for process in list((pool._processes or {}).values()):
@@ -131,9 +130,9 @@ class WorkerProcesses:
 
 
 class DaskWorkers:
-    """The workers of a scheduler, at an address such as `tcp://10.0.0.1:8786`. Raises OSError where there is none.
+    """The workers of a Dask scheduler at an address such as `tcp://10.0.0.1:8786`. Raise OSError if none answers.
 
-    They have this package installed, in this version. How connections are secured (`tls://`) is Dask's configuration.
+    The workers need this version of the package. TLS (`tls://`) is configured in Dask.
     """
 
     def __init__(self, address: str, look: Look = _on) -> None:
@@ -146,7 +145,7 @@ class DaskWorkers:
             raise OSError(errno.EHOSTUNREACH, "no cluster answers", address) from None
 
     def fly(self, work: Work[F, R], flights: Sequence[F]) -> Iterator[R]:
-        """Flies these; one whose worker is lost is given to another."""
+        """Fly the flights; another worker repeats a flight whose worker is lost."""
         from distributed import KilledWorker  # noqa: PLC0415
 
         by_key = {}
@@ -159,7 +158,7 @@ class DaskWorkers:
             waits = list(futures)
             while waits:
                 self._look()
-                done = [future for future in waits if future.done()]  # each asked once: it may be done a moment later
+                done = [future for future in waits if future.done()]  # evaluated once: a future may finish at any time
                 if not done:
                     time.sleep(_POLL_S)
                 for future in done:
@@ -172,28 +171,28 @@ class DaskWorkers:
             self._client.cancel(futures)
 
     def close(self) -> None:
-        """Leaves the cluster."""
+        """Disconnect from the cluster."""
         self._client.close()
 
 
 def cores() -> int:
-    """How many this process may use."""
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _soon(futures: Collection[Future[R]]) -> Iterator[Future[R]]:
-    """Those that are done before it is time to look again."""
+    """Yield the futures that finish before the next call of `look`."""
     with suppress(TimeoutError):
         yield from as_completed(futures, timeout=_LOOK_S)
 
 
 def _loose(untyped: Any) -> Any:
-    """Something of Dask, which says nothing of its types."""
+    """Return an object of Dask, which has no type annotations, as `Any`."""
     return untyped
 
 
 def _quiet() -> None:
-    """Ctrl-C is for the process that was started; it ends these."""
+    """Ignore SIGINT: Ctrl-C is for the parent process, which terminates the workers."""
     import signal  # noqa: PLC0415
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)

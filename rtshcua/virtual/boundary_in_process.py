@@ -1,7 +1,7 @@
-"""A boundary that answers calls in this process and in virtual time, as one of a process of its own does: it may die.
+"""An in-process stand-in for the boundary process, in virtual time, which can die like a process.
 
-It stands where `boundary/home/process.c` stands, and answers what `boundary/enforcement/calls.h` lists by the boundary
-in Python. It has neither the link's key nor the log's: no frame is signed here, and no log begun (LOG is `malformed`).
+It replaces `boundary/home/process.c` and answers the calls of `boundary/enforcement/calls.h` with the boundary in
+Python. It has neither the link's key nor the log's: it signs no frame and begins no log (LOG is `malformed`).
 """
 
 from collections.abc import Mapping
@@ -27,8 +27,8 @@ from rtshcua.wire.trust import TrustRoot
 
 _FINE, _REFUSED = b"\0", b"\1"
 _NONE: Final = b""
-_SESSION: Final = bytes(SESSION_KEY_BYTES)  # nobody is to be kept from making permits in virtual time
-_MALFORMED: Final = Refusal("malformed", "the call makes no sense")
+_SESSION: Final = bytes(SESSION_KEY_BYTES)  # permits need no protection in virtual time
+_MALFORMED: Final = Refusal("malformed", "malformed call")
 _NOT_LOADED: Final = Refusal("not-loaded", "no bundle is in force")
 _TIME, _PART, _LOADED, _SHOWN = Struct(">q"), Struct(">BI"), Struct(">qqqI"), Struct(">qqqII")
 _STANDING, _PERMITTED, _BEGIN, _TOKEN = Struct(">qBb"), Struct(">BhhQq"), Struct(">Q32s"), Struct(">Q")
@@ -37,9 +37,9 @@ _STATED, _TOLD = Struct(">?qqq"), Struct(">BqqqQ")
 
 
 class Served:
-    """Call it with a call, for its answer: `isolated.Call`. Once it is `dead` nobody answers.
+    """A boundary as a callable that answers encoded calls (`isolated.Call`), until it is `dead`.
 
-    It opens bundles for the vehicle of an identity under a trust root; `key` signs its own evidence.
+    It opens bundles for the vehicle `vehicle` under a trust root; `key` signs its own evidence.
     """
 
     def __init__(
@@ -50,12 +50,12 @@ class Served:
         self._settings, self._owed = dict(settings), dict(owed)
         self._staged = {calls.LOAD: b"", calls.PRESENT: b""}
         self._loaded: Loaded | None = None
-        #: what frames leave by, whatever bundle is in force
+        #: the gate of outbound frames, independent of the bundle
         self.gate = FrameSession()
         self.dead = False
 
     def __call__(self, octets: bytes) -> bytes:
-        """The answer to one call; ConnectionResetError once it is dead."""
+        """Answer one call. Raise ConnectionResetError once it is dead."""
         if self.dead:
             raise ConnectionResetError
         try:
@@ -75,7 +75,7 @@ class Served:
                 return bytes(1)
             case calls.SEAL:
                 return self.gate.seal(rest[_TIME.size :], *_TIME.unpack_from(rest))
-            case calls.TIME:  # its time is told to it
+            case calls.TIME:  # it has no clock of its own
                 return _TOLD.pack(ClockSource.SHARED, 0, 0, UTC_UNKNOWN_US, 0)
             case calls.FLIGHT:
                 return bytes(FLIGHT_BYTES)
@@ -84,7 +84,7 @@ class Served:
         return _NOT_LOADED if self._loaded is None else self._answer_of(self._loaded, kind, rest)
 
     def _answer_of(self, loaded: Loaded, kind: int, rest: bytes) -> bytes | Refusal:
-        """What is asked of the bundle that is in force."""
+        """Answer a call about the bundle in force."""
         match kind:
             case calls.ENFORCE:
                 return loaded.boundary.enforce(rest)
@@ -95,20 +95,20 @@ class Served:
                 return loaded.preparation.permit(rest[_TIME.size :], *_TIME.unpack_from(rest))
             case calls.BEGIN:
                 if self._key is None:
-                    return Refusal("no-boundary-key", "it has no key of its own")
+                    return Refusal("no-boundary-key", "the boundary has no key of its own")
                 loaded.attestation.begin(BoundaryKey(self._key, *_BEGIN.unpack(rest)))
                 return rest
             case calls.STATEMENT:
                 final, *now = _STATED.unpack(rest)
                 said = loaded.attestation.statement(Now(*now), final=final)
-                return Refusal("no-boundary-key", "nothing is signed") if said is None else said
+                return Refusal("no-boundary-key", "the boundary signs no evidence") if said is None else said
             case calls.DIGEST:
                 return loaded.attestation.digest
         assert isinstance(loaded.executor, Executor)
         return _executed(loaded.executor, kind, rest)
 
     def _stage(self, rest: bytes) -> bytes | Refusal:
-        """A part of a bundle or a document goes behind those before it; the first one begins anew."""
+        """Append a part of a bundle or document; a part at offset 0 starts over."""
         what, at = _PART.unpack_from(rest)
         if what not in self._staged or at not in (0, len(self._staged[what])):
             return _MALFORMED
@@ -132,7 +132,7 @@ class Served:
 
 
 def _executed(executor: Executor, kind: int, rest: bytes) -> bytes | Refusal:
-    """What the executor is asked or told."""
+    """Answer a call to the executor."""
     match kind:
         case calls.DISPATCH:
             return _dispatch(executor, rest)

@@ -1,7 +1,6 @@
-"""Keys that nobody has to keep secret, and the trust root that names them: for flights that only ever were virtual.
+"""Public development keys and their trust root, for virtual flights only.
 
-A vehicle trusts the root that is pinned on it, and this one is pinned nowhere. It says of itself that it is for
-development, and so does each of its keys.
+No vehicle pins this root. The root and each key are marked as development keys.
 """
 
 from collections.abc import Mapping
@@ -18,14 +17,14 @@ from rtshcua.virtual.flight import LATER_US
 from rtshcua.wire.keys import ANY, Duty, SigningKey
 from rtshcua.wire.trust import HUMAN, TrustRoot
 
-#: how many people there are in each role
+#: the number of people in each role
 _PEOPLE: Final = 2
 _LIFETIME_US: Final = 10 * 366 * 86_400 * 1_000_000
 
 
 @cache
 def keys() -> Mapping[Duty, SigningKey]:
-    """One key for each duty but approvals; the same in each process."""
+    """Return one key for each duty except approvals; the same in each process."""
     return {
         duty: SigningKey.from_seed(bytes([number]) * 32, duty=duty, development=True)
         for number, duty in enumerate(Duty)
@@ -35,7 +34,7 @@ def keys() -> Mapping[Duty, SigningKey]:
 
 @cache
 def approvers(roles: tuple[str, ...]) -> Mapping[str, tuple[SigningKey, ...]]:
-    """By role the approval keys of the people in it; the same in each process."""
+    """Return the approval keys of the people of each role; the same in each process."""
     return {
         role: tuple(
             SigningKey.from_seed(sha256(f"{role} {n}".encode()).digest(), duty=Duty.APPROVAL, development=True)
@@ -47,8 +46,8 @@ def approvers(roles: tuple[str, ...]) -> Mapping[str, tuple[SigningKey, ...]]:
 
 @cache
 def root(issued_at_us: int, roles: tuple[str, ...]) -> bytes:
-    """A signed root that lets them speak for any role, policy and vehicle, from a UTC time on; and people of `roles`
-    answer in person.
+    """Return a signed trust root, valid from a UTC time, that allows the keys any role, policy and vehicle, and names
+    the people of `roles`.
     """
     made = keys()
     people = tuple(
@@ -76,12 +75,12 @@ def root(issued_at_us: int, roles: tuple[str, ...]) -> bytes:
 
 
 def flies_at(mission: Mission, utc_us: int) -> Mission:
-    """The mission, issued so that it flies at this UTC time."""
+    """Return the mission with an issue time such that it flies at this UTC time."""
     issued_us = utc_us - LATER_US
     steps = tuple(replace(step, issued_at_us=issued_us) for step in mission.invocations)
     return replace(mission, issued_at_us=issued_us, invocations=steps)
 
 
 def seal(policy: Policy, mission: Mission) -> bytes:
-    """The bundle, signed with them."""
+    """Return the bundle, signed with the development keys."""
     return sign.sign(policy, mission, policy_key=keys()[Duty.POLICY], mission_key=keys()[Duty.MISSION])

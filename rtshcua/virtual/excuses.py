@@ -1,26 +1,26 @@
-"""What of a failure nobody could have prevented, and why: an exception is told with its cause, and never dropped.
+"""Excuse failures that could not have been prevented. An excused failure is reported with its cause, never dropped.
 
-| cause | excuses | as far as |
+| cause | excuses | condition or limit |
 |---|---|---|
-| `position` | being outside the airspace | the position was off, and a stop takes; without one, the wind carries it |
-| `wind` | being outside, a collision, flying on | it cannot fly against wind and gusts, now or shortly before |
-| `motors` | a collision, being outside | motors stopped, or the autopilot started again, in the air |
-| `battery` | a collision, coming down too hard | the battery was made empty, and is |
-| `pilot` | being outside, a collision, flying on | a pilot took over; sticks that only nudge it, as far as they do |
-| `failsafe` | being outside, flying on | the autopilot took over by itself |
-| `unseen` | motion after a takeover | ArduCopter's pause until it stands, or near an end |
-| `unseen` | motion after a takeover | a velocity or a pause in its takeoff |
-| `unseen` | motion after a takeover | a go-to in its takeoff to where that ends |
-| `unseen` | motion after a takeover | sticks that nudge; PX4's pause in a stop, or a climb's end |
-| `unseen` | motion after a takeover | PX4's pause or go-to in Hold while its report of the target stands still |
-| `unseen` | motion after a takeover | the mode is the one that our last frame asked for, which was lost |
-| `report` | standing down in the air | a HEARTBEAT or position is stuck, or a target is told no more |
-| `crossed` | motion after a takeover | a frame that was on its way undid it, before it showed |
+| `position` | outside the airspace | position error plus stopping distance; without a position, the wind's drift |
+| `wind` | outside, collision, flying on | wind and gusts too strong to fly against, now or shortly before |
+| `motors` | collision, outside | motors stopped, or the autopilot restarted, in the air |
+| `battery` | collision, hard touchdown | a fault emptied the battery |
+| `pilot` | outside, collision, flying on | a pilot took over; sticks that only shift it: as far as they shift it |
+| `failsafe` | outside, flying on | the autopilot's failsafe took over |
+| `unseen` | motion after a takeover | ArduCopter: a pause until it has stopped, or near the end of a leg |
+| `unseen` | motion after a takeover | ArduCopter: a velocity or a pause in its takeoff |
+| `unseen` | motion after a takeover | ArduCopter: a go-to in its takeoff to the end of the takeoff |
+| `unseen` | motion after a takeover | sticks that only shift it; PX4's pause in a stop, or at the end of a climb |
+| `unseen` | motion after a takeover | PX4's pause or go-to in Hold while its report of the target is stuck |
+| `unseen` | motion after a takeover | the mode is that of the runtime's last frame, which was lost |
+| `report` | standing down in the air | a HEARTBEAT or position is stuck, or the target is no longer reported |
+| `crossed` | motion after a takeover | a frame in flight undid the takeover before it was reported |
 | `ground` | motion after a takeover | a landing was sent to a vehicle on the ground |
-| `obstacle` | a collision | it was not to be seen, came too late to stop, or hit a vehicle that stood |
-| `link` | a collision, a late reaction | nothing came from the vehicle, or nothing got there |
-| `process` | a collision, flying on, an unlogged effect | our process was dead, or did not get to run |
-| `disk` | an incomplete log, what it does not have | the disk was full, or took its time |
+| `obstacle` | collision | not visible, too late to stop, or the obstacle hit a hovering vehicle |
+| `link` | collision, late reaction | no frames from the vehicle, or none to it |
+| `process` | collision, flying on, unlogged effect | the runtime's process was dead or suspended |
+| `disk` | incomplete log, unlogged effect | the disk was full or slow |
 """
 
 from collections.abc import Callable, Iterator
@@ -35,35 +35,35 @@ from rtshcua.model.faults import Direction, Fault, FlightMode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.virtual.flight_record import IncidentOccurrence, ScenarioFlown, TruthSample
 
-#: mm/s: what a multirotor of this size does not fly against, and us: how long after it counts
+#: mm/s: wind that a multirotor of this size cannot fly against; us: how long its effect lasts
 STRONG_MM_S: Final = 12_000
 _AFTER_WIND_US: Final = 30_000_000
-#: the estimator goes on believing for so long after the receiver is right again
+#: us: how long the estimate stays wrong after the receiver has recovered
 _AFTER_GLITCH_US: Final = 10_000_000
-#: mm/s: sticks that nudge a landing ArduCopter
+#: mm/s: the speed at which sticks shift a landing ArduCopter
 _NUDGE_MM_S: Final = 1_250
-#: us: what is overtaken comes so much later
+#: us: the additional delay of an overtaken datagram
 _REORDER_US: Final = 60_000
-#: mm/s^2 and us: how a vehicle brakes that declares nothing
+#: mm/s^2 and us: the default braking and reaction time
 _BRAKING: Final = 2_000
 _REACTION_US: Final = 1_000_000
 _STANDS_MM_S: Final = 500
 _TICK_US: Final = 50_000
 #: mm: reported target heights this close count as equal (estimator error)
 _SAME_MM: Final = 1_000
-#: a process that is killed has not written the last of these
+#: us: the records that a killed process has not written yet
 _UNWRITTEN_US: Final = 250_000
-#: us: a mode that a stuck HEARTBEAT told is believed so long after
+#: us: how long the mode of a stuck HEARTBEAT is believed
 _MODE_US: Final = 2_000_000
-#: us until ArduCopter stands in a pause, and until that counts;
-#: mm and mm/s: so far from its target, having moved so fast
+#: us until ArduCopter has stopped in a pause, and until that is detected; mm and mm/s: the least distance from its
+#: target and the least speed for detection
 _STANDS_US: Final = 4_000_000
 _NOTICED_US: Final = 3_000_000
 _FAR_MM: Final = 12_000
 _MOVED_MM_S: Final = 2_000
-#: us: by then a takeoff that rises no further counts as somebody's,
+#: us: after this time a takeoff that no longer climbs counts as a takeover
 _KEPT_US: Final = 13_000_000
-#: mm: but for one who sends it no further than this from its end
+#: mm: a go-to this near the end of the takeoff does not
 _TOLD_MM: Final = 3_000
 _POSITION_TARGET: Final = (86).to_bytes(3, "little")  # SET_POSITION_TARGET_GLOBAL_INT
 _MM: Final = 11.132  # in 1e-7 degree
@@ -72,9 +72,9 @@ _FOREVER: Final = 1 << 60
 
 
 class JudgedFailure(NamedTuple):
-    """What went wrong, when (us of the simulation), and by how much, in mm, mm/s or us, where that can be said.
+    """A failure, its time (us of the simulation), and its amount in mm, mm/s or us, if it has one.
 
-    `cause` None: it should not have happened. Else it is an exception: that caused it, and nothing could be done.
+    `cause` None: a real failure. Otherwise an exception that could not be prevented, and its cause.
     """
 
     slug: str
@@ -85,7 +85,7 @@ class JudgedFailure(NamedTuple):
 
 
 class Excuses:
-    """What excuses failures of one flight."""
+    """Decides which failures of one flight are excused."""
 
     def __init__(self, flown: ScenarioFlown) -> None:
         self._flown = flown
@@ -107,7 +107,7 @@ class Excuses:
         }  # fmt: skip
 
     def judged(self, failure: JudgedFailure) -> JudgedFailure:
-        """The failure, with its cause if there is an excuse."""
+        """Return the failure, with its cause if it is excused."""
         for rule in self._rules.get(failure.slug, ()):
             cause = rule(failure)
             if cause is not None:
@@ -115,9 +115,9 @@ class Excuses:
         return failure
 
     def delay_us(self, from_us: int, to_us: int, *, silences: bool = False) -> int:
-        """How much later than on a good link something may have come between two moments, in one direction: what the
-        link adds, or holds back, and how long nobody read. With `silences` also how long nothing came at all. A link
-        keeps the order: what comes after a delay is over waits for what was sent before.
+        """Return the greatest additional delay of a frame between two times, in one direction, compared with a good
+        link: delays of the link, held frames, and stalls of the receiver; with `silences` also silences of the link. A
+        link keeps the order: a frame after the end of a delay waits for earlier frames.
         """
         total = 0
         for each in self._happened:
@@ -137,19 +137,19 @@ class Excuses:
         return total
 
     def paused_at(self, at_us: int) -> bool:
-        """Whether it was a pilot's pause that happened at that time."""
+        """Return whether a pilot's pause took place at that time."""
         return any(
             isinstance(each.fault, faults.PilotPause) and each.at_us <= at_us <= each.at_us + _TICK_US
             for each in self._happened
         )
 
-    # -------------------------------------------------------- what happened before
+    # -------------------------------------------------------- incidents
 
     def _before(self, at_us: int, *kinds: type[Fault]) -> Iterator[Fault]:
         return (each.fault for each in self._happened if each.at_us <= at_us and isinstance(each.fault, kinds))
 
     def _during(self, from_us: int, to_us: int) -> Iterator[Fault]:
-        """What began before `to_us`, and was not over before `from_us`."""
+        """Yield the faults that were active between two times."""
         return (each.fault for each in self._happened if each.at_us <= to_us and _ends_us(each) >= from_us)
 
     def _sample(self, at_us: int) -> TruthSample | None:
@@ -161,7 +161,7 @@ class Excuses:
         return found
 
     def _stop_mm(self, from_us: int, to_us: int) -> float:
-        """The way that a stop took at the greatest speed between two moments."""
+        """Return the stopping distance from the greatest speed between two times."""
         speeds = [sample.speed_mm_s for sample in self._flown.samples if from_us <= sample.at_us <= to_us]
         speed = max(speeds, default=0)
         return speed * self._reaction_us / 1e6 + speed**2 / (2 * self._braking)
@@ -225,16 +225,16 @@ class Excuses:
         return "position" if off and failure.amount <= off + self._stop_mm(since_us, failure.at_us) else None
 
     def _lands_blind(self, back_us: int, at_us: int) -> bool:
-        """Whether it lands, and did before its position was back: ArduCopter asks for one as a landing begins, and not
-        again (`ModeLand::init`).
+        """Return whether ArduCopter lands without a position: it checks the position only when a landing begins
+        (`ModeLand::init`).
         """
         from_us = min(back_us, at_us)
         lands = [sample.mode is FlightMode.LAND for sample in self._flown.samples if from_us <= sample.at_us <= at_us]
         return self._flown.flavour == "ardupilot" and all(lands)
 
     def _misled(self, failure: JudgedFailure) -> str | None:
-        """The last mode that showed came from a HEARTBEAT that was stuck, as if somebody had chosen it again. So it is
-        with ArduCopter's target that is told no more, and with a position that stands still.
+        """Excuse a stand-down after a stuck HEARTBEAT, whose mode looks like a pilot's choice; for ArduCopter also
+        after a target that is no longer reported, or a stuck position.
         """
         if self._flown.ending != "stood-down":
             return None
@@ -268,10 +268,10 @@ class Excuses:
         return "pilot" if nudged and failure.amount <= nudged + 1_000 else None
 
     def _unseen(self, failure: JudgedFailure) -> str | None:
-        """Nothing reports ArduCopter's pause, nor sticks that nudge it where it lands. PX4's pause ends a climb as the
-        climb itself does, near the height of it.
+        """Excuse takeovers that no report shows: ArduCopter's pause, sticks that shift its landing, and PX4's pause
+        near the end of a climb.
         """
-        since_us = failure.at_us - failure.amount - _TICK_US  # what a pilot told it before changed nothing
+        since_us = failure.at_us - failure.amount - _TICK_US  # earlier actions of a pilot had no effect
         if self._target_stands_still(since_us, failure.at_us):
             return "unseen"
         told = [*self._before(failure.at_us, faults.PilotMode, faults.PilotGoto)]
@@ -291,7 +291,9 @@ class Excuses:
         return None
 
     def _target_stands_still(self, since_us: int, at_us: int) -> bool:
-        """Whether a pilot did nothing but give PX4 another target in Hold, while it reported an old one, or none."""
+        """Return whether a pilot only gave PX4 another target in Hold while the report of the target was stuck or
+        absent.
+        """
         acts = [each for each in self._before(at_us, faults.PilotFault) if each.at_us >= since_us]
         return not self._is_copter and bool(acts) and all(self._shows_nowhere(each, at_us) for each in acts)
 
@@ -302,8 +304,8 @@ class Excuses:
         return isinstance(act, faults.PilotPause | faults.PilotGoto) and in_hold and any(map(_hides_target, stuck))
 
     def _is_silent(self, failure: JudgedFailure) -> bool:
-        """Whether what a pilot did to ArduCopter may not have shown. A pause on a leg does, once it stands, unless
-        something else went wrong, or is at its end.
+        """Return whether a pilot's action on ArduCopter may be invisible. A pause on a leg is visible once the vehicle
+        has stopped, unless other faults are active or it is near the end of the leg.
         """
         others = (faults.PilotPause, faults.PilotSpeed, faults.AgentFault)
         alone = all(isinstance(each.fault, others) for each in self._happened if each.at_us <= failure.at_us)
@@ -312,7 +314,7 @@ class Excuses:
             if isinstance(fault, faults.PilotGoto):
                 is_silent = self._ends_the_climb(fault)
             elif isinstance(fault, faults.PilotVelocity):
-                # in its takeoff it names no target that could vanish, until it rises no further
+                # in a takeoff there is no reported target that could vanish, until the climb stops
                 is_silent = self._left_mm(failure.at_us - failure.amount) is None and failure.amount <= _KEPT_US
             else:
                 noticed = failure.at_us - fault.at_us > _STANDS_US + _NOTICED_US
@@ -322,20 +324,20 @@ class Excuses:
         return False
 
     def _pause_shows(self, fault: Fault) -> bool:
-        """Whether it is a pause of what moved, and far from the end of its leg once it stood."""
+        """Return whether a pause stopped a moving vehicle far from the end of its leg."""
         sample, left_mm = self._sample(fault.at_us), self._left_mm(fault.at_us + _STANDS_US)
         far = left_mm is not None and left_mm > _FAR_MM
         return isinstance(fault, faults.PilotPause) and far and sample is not None and sample.speed_mm_s >= _MOVED_MM_S
 
     def _stands(self, fault: Fault) -> bool:
-        """Whether a pilot chose the mode that ArduCopter was in: that changes nothing (Copter::set_mode, mode.cpp)."""
+        """Return whether a pilot chose ArduCopter's current mode, which has no effect (Copter::set_mode, mode.cpp)."""
         before = self._sample(fault.at_us - _TICK_US)
         return (
             isinstance(fault, faults.PilotMode) and self._is_copter and before is not None and before.mode is fault.mode
         )
 
     def _ends_the_climb(self, fault: Fault) -> bool:
-        """Whether a go-to in ArduCopter's takeoff names the place where that ends, as older ones do themselves."""
+        """Return whether a go-to in ArduCopter's takeoff names the end of the takeoff, as older versions do."""
         if not (isinstance(fault, faults.PilotGoto) and self._is_copter) or self._left_mm(fault.at_us) is not None:
             return False
         start, sample = self._flown.samples[0], self._sample(fault.at_us)
@@ -346,7 +348,7 @@ class Excuses:
         return hypot(north, east) <= _TOLD_MM
 
     def _left_mm(self, at_us: int) -> float | None:
-        """How far it was then from the place that ArduCopter was last sent to; None if it was sent nowhere."""
+        """Return the distance from the last target that ArduCopter received; None if there is none."""
         sample, place = self._sample(at_us), None
         for frame in self._flown.frames:
             if frame.heard_us is None or frame.heard_us > at_us or frame.octets[7:10] != _POSITION_TARGET:
@@ -359,14 +361,14 @@ class Excuses:
         return hypot(north, east * cos(radians(sample.latitude / 1e7)))
 
     def _climbs(self) -> Iterator[int]:
-        """The heights that the mission takes off to."""
+        """Yield the takeoff heights of the mission."""
         for invocation in self._flown.mission.invocations:
             if invocation.plan.kind == MotionKind.CLIMB:
                 yield invocation.plan.altitude
 
     def _link(self, failure: JudgedFailure) -> str | None:
-        """Nothing came from the vehicle, or got there, while something had to be done. When a permit's time is over, or
-        a deadline, our own clock tells, whatever the link does.
+        """Excuse failures while the link was down in one direction. Expired permits and missed deadlines are not
+        excused: they depend only on the runtime's clock.
         """
         if failure.slug == "late" and not failure.text.startswith("a fallback"):
             return None
@@ -386,7 +388,7 @@ class Excuses:
         return None
 
     def _process(self, failure: JudgedFailure) -> str | None:
-        """Nobody was there, or could do anything: dead, or held up, and no longer than a stop after that."""
+        """Excuse failures while the runtime's process was dead or suspended, and until a stop after that."""
         flown = self._flown
         if failure.slug == "not-ended":
             return "process" if flown.left not in (None, "replayed") and not flown.fault else None
@@ -422,7 +424,7 @@ class Excuses:
         return None
 
     def _looks_out(self, at_us: int) -> bool:
-        """Whether the skill that flew read a signal of what is ahead: where none does, nothing could be done."""
+        """Return whether the running skill reads a range finder signal; otherwise it cannot avoid obstacles."""
         policy = self._flown.policy
         slots = {
             slot for signal in policy.signals for slot in signal.slots
@@ -453,14 +455,14 @@ class Excuses:
         return None
 
     def _boundary(self, failure: JudgedFailure) -> str | None:
-        """A log whose boundary was lost in flight proves nothing from there on."""
+        """Excuse a log that is incomplete because the boundary was killed in flight."""
         lost = failure.text.startswith("incomplete: boundary/lost") and any(
             self._before(failure.at_us, faults.BoundaryKilled)
         )
         return "boundary" if lost else None
 
     def _killed(self, failure: JudgedFailure) -> str | None:
-        """What was sent in the last moment before a process died may not be written: a fallback waits for no record."""
+        """Excuse frames just before a process was killed: a fallback does not wait for its record to be written."""
         for life in self._flown.lives:
             if life.ending is None and 0 <= life.ended_us - failure.at_us <= _UNWRITTEN_US:
                 return "process"
@@ -468,7 +470,7 @@ class Excuses:
 
 
 def _hides_target(fault: Fault) -> bool:
-    """Whether a report of the autopilot's target is an old one, or does not come."""
+    """Return whether a fault makes the report of the autopilot's target old or absent."""
     match fault:
         case faults.Freeze():
             return True

@@ -1,7 +1,7 @@
-"""Whether what a scenario expects has come of a flight of it.
+"""Check a flight against the expectations of its scenario.
 
-Endings, decisions and what flew are read from the logs of the flight, distances from where the vehicle really was,
-reactions from the frames that left.
+Endings, decisions and flown skills come from the flight's logs, distances from the true positions, reaction times
+from the sent frames.
 """
 
 import re
@@ -30,13 +30,13 @@ from rtshcua.virtual.judge import Judgement
 from rtshcua.virtual.zone_truth import inside_mm, local_mm
 from rtshcua.wire.request import CONTINGENCY_LINK, STEP
 
-#: the reading of expectations shows so many decisions at most
+#: the most decisions that a message lists
 _SHOWN = 6
 _WORD = re.compile(r"\w+")
 
 
 class Met(NamedTuple):
-    """Whether an expectation was met, and what was found."""
+    """An expectation, whether it was met, and the observed fact."""
 
     expectation: ScenarioExpectation
     met: bool
@@ -44,7 +44,7 @@ class Met(NamedTuple):
 
 
 def expectations(flown: ScenarioFlown, judgement: Judgement) -> tuple[Met, ...]:
-    """One for each expectation of the scenario, in their order."""
+    """Return one result for each expectation of the scenario, in order."""
     records = [record for life in flown.lives for record in _records(life.lines)]
     ending = flown.ending or ("fault" if flown.fault else "killed")
     said = _Said(ending, records, flown.policy, flown.mission)
@@ -57,7 +57,7 @@ def expectations(flown: ScenarioFlown, judgement: Judgement) -> tuple[Met, ...]:
 def recorded(
     expected: Iterable[ScenarioExpectation], ending: str, lines: Iterable[bytes], policy: Policy, mission: Mission
 ) -> list[Met]:
-    """Those that the records of a run can show by themselves, where nobody knows where the vehicle really was."""
+    """Return the results of those expectations that a run's records decide without the true positions."""
     said = _Said(ending, _records(lines), policy, mission)
     return [
         Met(each, *_shows(each.what, said)) for each in expected if isinstance(each.what, EndsWith | Decides | Flies)
@@ -65,7 +65,7 @@ def recorded(
 
 
 class _Said(NamedTuple):
-    """What a flight's records say."""
+    """The records of a flight, with its policy and mission."""
 
     ending: str
     records: list[dict[str, Any]]
@@ -76,12 +76,12 @@ class _Said(NamedTuple):
 def _shows(what: EndsWith | Decides | Flies, said: _Said) -> tuple[bool, str]:
     match what:
         case EndsWith(endings):
-            return said.ending in endings, f"it ended with `{said.ending}`"
+            return said.ending in endings, f"the run ended with `{said.ending}`"
         case Decides():
             return _decided(what, said)
         case Flies(skill, never):
             flew = [record["detail"] for record in said.records if record.get("event") == "dispatched"]
-            return (skill in flew) is not never, f"it flew {_listed(flew) if flew else 'nothing'}"
+            return (skill in flew) is not never, f"flown skills: {_listed(flew) if flew else 'none'}"
 
 
 def _found(what: Expected, flown: ScenarioFlown, judgement: Judgement, said: _Said) -> tuple[bool, str]:
@@ -91,21 +91,21 @@ def _found(what: Expected, flown: ScenarioFlown, judgement: Judgement, said: _Sa
         case ReactsWithin(most_us):
             took_us = judgement.margins.stop_us
             if took_us is None:
-                return True, "it never had to fall back"
-            return took_us <= most_us, f"the latest fallback took {took_us / 1e6:.3f} s"
+                return True, "no fallback was needed"
+            return took_us <= most_us, f"the slowest fallback took {took_us / 1e6:.3f} s"
         case KeepsAway(zone, least_mm):
             return _away(flown, judgement, zone, least_mm)
         case EndsInside(zone):
             last = flown.samples[-1]
             level = inside_mm(_flat(flown, zone), *local_mm(flown.policy, last.latitude, last.longitude), 0.0)
             where = f"{abs(level) / 1000:.1f} m {'inside' if level > 0 else 'outside'}"
-            return level > 0, f"it ended {where} `{flown.policy.zones[zone].name}`"
+            return level > 0, f"the vehicle ended {where} `{flown.policy.zones[zone].name}`"
         case _:
             assert_never(what)
 
 
 class _Decided(NamedTuple):
-    """A decision, or what it comes to when a running step is broken off: the skill that flies then, why, by what."""
+    """A decision, or the fallback of an aborted step: the skill that flies then, the reason and the clause."""
 
     outcome: str
     skill: str
@@ -113,7 +113,7 @@ class _Decided(NamedTuple):
     clause: str
 
     def __str__(self) -> str:
-        return f"{self.outcome} of {self.skill or 'a link'} ({self.reason})"
+        return f"{self.outcome} {self.skill or 'a link'} ({self.reason})"
 
 
 def _decided(what: Decides, said: _Said) -> tuple[bool, str]:
@@ -122,7 +122,7 @@ def _decided(what: Decides, said: _Said) -> tuple[bool, str]:
         if _is(what, each):
             return True, str(each)
     alike = [each for each in decided if each.outcome == what.outcome] or decided
-    return False, f"it decided {_listed(str(each) for each in alike) if alike else 'nothing'}"
+    return False, f"decisions: {_listed(str(each) for each in alike) if alike else 'none'}"
 
 
 def _is(what: Decides, decided: _Decided) -> bool:
@@ -147,7 +147,7 @@ def _decisions(said: _Said) -> Iterator[_Decided]:
 
 
 def _watched(said: _Said, step: int) -> Iterator[tuple[Reason, str]]:
-    """What must hold while a step runs, and why it would not be admitted if it did not."""
+    """Yield the conditions of a running step, each with the reason of a refusal if it does not hold."""
     contract, policy = said.mission.invocations[step].contract, said.policy
     yield from ((Reason.STATE_VIOLATED, each.text) for each in contract.assume)
     yield from ((Reason.DEGRADED, each.text) for each in policy.rules if each.kind == RuleKind.DEGRADE)
@@ -158,7 +158,7 @@ def _watched(said: _Said, step: int) -> Iterator[tuple[Reason, str]]:
 
 
 def _skill(said: _Said, record: dict[str, Any]) -> str:
-    """The skill that a decision lets fly: that of its target, of the link that it is about, or of the step."""
+    """Return the skill of a decision: of its target, of its link, or of the step."""
     policy = said.policy
     step: int = record["step"]
     link: int = record["link"]
@@ -178,7 +178,7 @@ def _first_word(text: str) -> str:
 
 
 def _listed(words: Iterable[str]) -> str:
-    """Each once, in their order."""
+    """Return the different items, in order, shortened."""
     different = list(dict.fromkeys(words))
     more = f", and {len(different) - _SHOWN} more" if len(different) > _SHOWN else ""
     return ", ".join(different[:_SHOWN]) + more
@@ -188,8 +188,8 @@ def _away(flown: ScenarioFlown, judgement: Judgement, zone: int | None, least_mm
     if zone is None:
         nearest = judgement.margins.obstacle_mm
         if nearest is None:
-            return True, "nothing stood around"
-        return nearest >= least_mm, f"it came as near as {nearest / 1000:.1f} m"
+            return True, "there was no obstacle"
+        return nearest >= least_mm, f"the smallest distance to an obstacle was {nearest / 1000:.1f} m"
     flat = flown.policy.zones[zone]
     away = min(
         (
@@ -200,12 +200,12 @@ def _away(flown: ScenarioFlown, judgement: Judgement, zone: int | None, least_mm
         default=inf,
     )
     if away == inf:
-        return True, "it never flew"
-    return away >= least_mm, f"it came as near as {away / 1000:.1f} m to `{flat.name}`"
+        return True, "the vehicle never flew"
+    return away >= least_mm, f"the smallest distance to `{flat.name}` was {away / 1000:.1f} m"
 
 
 def _flat(flown: ScenarioFlown, zone: int) -> Any:
-    """The zone as it is seen from above."""
+    """Return the zone without height limits."""
     return msgspec.structs.replace(flown.policy.zones[zone], floor=-(1 << 30), ceiling=1 << 30)
 
 

@@ -1,4 +1,4 @@
-"""The simulated vehicle that fits a policy."""
+"""Configure a simulated vehicle for a policy."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,7 +13,7 @@ from rtshcua.simulation.config import HOME, STOCK, AutopilotKind, Equipment, Sim
 from rtshcua.simulation.place import HomePosition
 
 _CRUISE_MM_S = 5_000
-#: what a simulated vehicle flies at most, if nothing is chosen, and at all
+#: the maximum speed: default, and limit of the simulation
 _MOST_MM_S = 12_000
 _FASTEST_MM_S = 15_000
 _TOLD_IN = {
@@ -23,14 +23,14 @@ _TOLD_IN = {
 
 
 def _extras(policy: Policy) -> frozenset[Equipment]:
-    """What has to be fitted for the signals of a policy to come."""
+    """Return the equipment that a policy's signals need."""
     messages = {source.message for signal in policy.signals for source in signal.sources}
     return STOCK | {extra for message, extra in _TOLD_IN.items() if message in messages}
 
 
 def fitting(policy: Policy, **chosen: Any) -> SimulationConfig:
-    """A vehicle with a policy's home, its endurance, its return, as fast as it says at least, with the sensors that it
-    reads; `chosen` is what else it is.
+    """Return a vehicle with the policy's home, endurance, return altitude, least speeds and sensors; `chosen` overrides
+    fields.
     """
     vehicle, projection = policy.vehicle, policy.projection
     kept = _CRUISE_MM_S if vehicle.speeds is None else max(vehicle.speeds.cruise, vehicle.speeds.homeward)
@@ -48,8 +48,8 @@ def fitting(policy: Policy, **chosen: Any) -> SimulationConfig:
 
 
 def with_room(config: SimulationConfig, policy: Policy, steps: Sequence[Invocation]) -> SimulationConfig:
-    """The same vehicle, with a fence of its own that is as wide and high as a mission goes: so its owner would have set
-    FENCE_RADIUS and FENCE_ALT_MAX, without which no real one is ready for it. A PX4 comes without such bounds.
+    """Return the vehicle with its own fence widened to hold the mission, as its owner would set FENCE_RADIUS and
+    FENCE_ALT_MAX; otherwise preflight checks fail. PX4 has no such default fence.
     """
     if config.flavour is not AutopilotKind.ARDUPILOT:
         return config

@@ -1,4 +1,4 @@
-"""A whole flight of a signed bundle, turn by turn: simulation, driver, loop, runtime, evidence."""
+"""A whole flight of a signed bundle in virtual time: simulation, driver, loop, runtime and evidence."""
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -36,9 +36,9 @@ from rtshcua.wire.document import FLIGHT_BYTES
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import MAX_ROOT, open_root
 
-#: signs the log where no other key is given; no trust root names it, so whoever audits such a log refuses it
+#: the default log key; no trust root names it, so an audit of such a log fails
 NOBODY: Final = SigningKey.from_seed(bytes(32), duty=Duty.LOG, development=True)
-#: after it was issued, a bundle flies
+#: the default time from the issue of a bundle to its flight
 LATER_US: Final = 60 * SECOND
 
 
@@ -47,12 +47,12 @@ class ReadableSink(EvidenceSink, Protocol):
 
     @property
     def lines(self) -> list[bytes]:
-        """What was kept."""
+        """The stored lines."""
         ...
 
 
 class MemorySink:
-    """Evidence in a list; `full` makes it refuse, keeping the lines as the file does; `slow`, wait for `keep`."""
+    """Evidence in a list. While `full`, appending fails like on a full disk; while `slow`, lines wait for `keep`."""
 
     def __init__(self) -> None:
         self.lines: list[bytes] = []
@@ -61,13 +61,13 @@ class MemorySink:
 
     @property
     def kept(self) -> int:
-        """How many lines were kept; each is as durable as it ever gets."""
+        """The number of stored lines; they are durable at once."""
         return len(self.lines)
 
     synced = kept
 
     def append(self, line: bytes, durability: int) -> int:
-        """Keep a line; `OSError` while `full`."""
+        """Store a line. Raise OSError while `full`."""
         self._waiting.append(line)
         if self.full:
             raise OSError(ENOSPC, "no space left on device")
@@ -76,27 +76,27 @@ class MemorySink:
         return len(self.lines) + len(self._waiting)
 
     def keep(self) -> None:
-        """What waits is kept."""
+        """Store the waiting lines."""
         self.lines += self._waiting
         self._waiting.clear()
 
     def trouble(self) -> str | None:
-        """None: nothing is written behind one's back."""
+        """Return None: there is no background writer."""
         return None
 
     def late(self) -> str | None:
-        """None: nothing is promised."""
+        """Return None: there is no deadline for writing."""
         return None
 
     def close(self) -> None:
-        """Waits until all is kept that can be."""
+        """Store the waiting lines, unless full."""
         if not self.full:
             self.keep()
 
 
 @dataclass
 class FlownFlight:
-    """What came of a flight: how it ended, the log's lines, and its records as they read."""
+    """The result of a flight: its ending, the log's lines and its decoded records."""
 
     ending: Ending
     lines: list[bytes]
@@ -105,29 +105,29 @@ class FlownFlight:
     """How often the runtime was stepped."""
     loaded: Loaded
     root: bytes
-    """The name of the key that signed the trust root (its `kid`): what an audit of the log is pinned to."""
+    """The `kid` of the key that signed the trust root: an audit of the log pins it."""
     records: list[dict[str, Any]] = field(init=False)
 
     def __post_init__(self) -> None:
         self.records = [msgspec.json.decode(line) for line in self.lines]
 
     def audit(self) -> Audit:
-        """What `verify-log --audit` makes of the log."""
+        """Return the audit of the log, as `verify-log --audit` makes it."""
         auditor = Auditor(self.root)
         for line in self.lines:
             auditor.take(line)
         return auditor.audit()
 
     def dispatched(self) -> list[str]:
-        """What was sent to the vehicle, command by command."""
+        """Return the dispatched commands, in order."""
         return [record["detail"] for record in self.effects("dispatched")]
 
     def effects(self, event: str) -> list[dict[str, Any]]:
-        """The records of this event."""
+        """Return the effect records of this event."""
         return [record for record in self.records if record["type"] == "effect" and record["event"] == event]
 
     def decisions(self) -> list[tuple[int, str, str]]:
-        """(step, outcome, reason) of every decision about a step."""
+        """Return (step, outcome, reason) of every decision about a step."""
         return [
             (record["step"], record["outcome"], record["reason"])
             for record in self.records
@@ -138,19 +138,22 @@ class FlownFlight:
 class VirtualFlight:
     """One flight of `bundle` under the signed trust root `root`, turn by turn.
 
-    The same arguments give the same flight, byte by byte. `simulated` is the simulated vehicle, or what makes one for
-    the bundle's policy. `utc_us` is the time of day at the start, a minute after the bundle was issued if it is not
-    given. `log_key` signs the log; it must be one of the root's if that is to be audited. `sink` makes another place
-    for the evidence than memory, and `vehicle` is one that was made already, with the clock that it lives by. What the
-    vehicle says is heard every `tick_us`: a longer tick makes a flight cheaper, and what happens on it as much later.
-    `before` is the hash of the last line of the vehicle's log before this one. `settings` are parameters that are set
-    before the flight, `owed` what earlier ones left to be put back, kept up to date as a file would be. With `boundary`
-    the boundary signs its own evidence, as its first session where only the key is given; it must where the root names
-    a key for that.
-    Raises ValueError for a bundle that is refused, and what `open_root` raises.
+    The same arguments give the same flight, byte for byte.
+
+    - `simulated`: the configuration of the simulated vehicle, or a function that makes one for the bundle's policy.
+    - `utc_us`: UTC at the start; by default one minute after the bundle was issued.
+    - `log_key`: signs the log; the root must name it for an audit to pass.
+    - `sink`: makes the evidence sink; by default evidence is kept in memory.
+    - `vehicle`: an existing vehicle, with its clock.
+    - `tick_us`: how often the vehicle's frames are read. A longer tick makes a flight cheaper and reactions later.
+    - `before`: the hash of the last line of the vehicle's previous log.
+    - `settings`: parameters to set before the flight; `owed`: parameters to restore, updated in place.
+    - `boundary`: the key of the boundary's own evidence, with its session; required if the root names such a key.
+
+    Raise ValueError for a refused bundle, and whatever `open_root` raises.
     """
 
-    #: what it leaves behind
+    #: the type of the result
     flown: type[FlownFlight] = FlownFlight
 
     def __init__(
@@ -169,7 +172,7 @@ class VirtualFlight:
         self._root_key = cose.unverified(root, limit=MAX_ROOT).kid
         trusted = open_root(root, pinned=self._root_key, now_us=now.utc_us)
         first = BoundaryKey(boundary, 1, FIRST) if isinstance(boundary, SigningKey) else boundary
-        #: the boundary elsewhere that it flies by, in mode `process`
+        #: the boundary in mode `process`
         self.served = Served(trusted, policy.vehicle.identity, first and first.key, settings, owed or {})
         loaded = load(
             bundle, root=trusted, vehicle=policy.vehicle.identity, now=now, mode=mode,
@@ -225,30 +228,30 @@ class VirtualFlight:
         self.loop = RunLoop(self.runtime, self.vehicle, self.sink, self.clock, self._watch, wait_us, prepares=False)
 
     def fly(self, each: Callable[[Self], Sequence[Event]] = lambda _: (), most_s: int = 3_600) -> FlownFlight:
-        """Fly until the end; `each` is called before every turn, and may inject faults or give events.
+        """Fly until the end. `each` is called before every turn; it may inject faults and return events.
 
-        Raises TimeoutError for a flight that has not ended after `most_s` seconds of its time.
+        Raise TimeoutError if the flight has not ended after `most_s` simulated seconds.
         """
         ending = self.prepare(each)
         while ending is None:
             if self.clock.elapsed_us >= most_s * SECOND:
-                raise TimeoutError(f"after {most_s} s it flies still: {self.runtime.view(self.clock.now())}")
+                raise TimeoutError(f"the flight has not ended after {most_s} s: {self.runtime.view(self.clock.now())}")
             ending = self.turn(each(self))
         if ending is not Ending.CRASHED:
             self.preparations.end(partial(self._pass, each))
         return self.close(ending)
 
     def prepare(self, each: Callable[[Self], Sequence[Event]] = lambda _: ()) -> Ending | None:
-        """Set what is configured, before the first turn; an ending where that keeps the mission from flying."""
+        """Set the configured parameters before the first turn; return an ending if that fails."""
         return Ending.REFUSED if self.preparations.begin(partial(self._pass, each)) is not None else None
 
     def turn(self, also: Sequence[Event] = ()) -> Ending | None:
-        """One turn of the loop; its ending, once there is one."""
+        """Run one turn of the loop; return the ending, if any."""
         early, self._early = self._early, []
         return self.loop.turn([*early, *also])
 
     def _pass(self, each: Callable[[Self], Sequence[Event]]) -> bool:
-        """Let time pass outside of the loop, which is told afterwards what happened; False if it is to stop."""
+        """Advance outside the loop, keeping events for its next turn; return False to stop."""
         given = each(self)
         self._early += given
         self._early += self.vehicle.poll(self.clock.now().monotonic_us, self._wait_us)
@@ -258,7 +261,7 @@ class VirtualFlight:
         return not any(isinstance(event, Interrupted) for event in given)
 
     def close(self, ending: Ending) -> FlownFlight:
-        """Sign and close the log of a flight that ended so; what came of it."""
+        """Sign and close the log with this ending; return the result."""
         with suppress(OSError):
             append_all(self.sink, self.recorder.closing(self.clock.now(), ending=ending, tlog=None), SYNCED_FIRST)
             self.sink.close()
@@ -275,7 +278,7 @@ class VirtualFlight:
 
 
 class _Seeds:
-    """Secrets of epoch keys, the same in each flight: whoever flies virtually has nothing to hide."""
+    """Fixed secrets of epoch keys: virtual flights need no secrecy."""
 
     def __init__(self) -> None:
         self._drawn = 0
@@ -287,9 +290,9 @@ class _Seeds:
 
 @lru_cache(maxsize=8)
 def claimed(bundle: bytes) -> tuple[Policy, Mission]:
-    """What is in a bundle, whoever signed it: `load` verifies it, once it is known when it flies, and on what.
+    """Return the policy and mission of a bundle without verifying it; `load` verifies it later.
 
-    The flights of a campaign, which are all of one bundle, read it once.
+    Cached: all flights of a campaign use one bundle.
     """
     policy, mission = (cose.unverified(envelope).payload for envelope in bundles.envelopes(bundle))
     return bundles.parse(names.POLICY, policy, Policy), bundles.parse(names.MISSION, mission, Mission)

@@ -1,6 +1,6 @@
-"""What a flight of a scenario leaves behind: plain values, that a judge in another process can read.
+"""The record of a scenario flight: plain values that a judge in another process can read.
 
-All times are those of the simulation, in us since its start, unless a name says otherwise.
+All times are simulation time, in us since its start, unless stated otherwise.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from rtshcua.model.scenario import Scenario
 
 
 class TruthSample(NamedTuple):
-    """What really was at a moment, whatever the vehicle reported (`simulation.world.Truth`)."""
+    """The true state at a moment, whatever the vehicle reported (`simulation.world.Truth`)."""
 
     at_us: int
     latitude: int
@@ -29,16 +29,16 @@ class TruthSample(NamedTuple):
     mode: FlightMode
     battery: int
     obstacle_mm: int | None
-    """How far it is to the nearest thing that stands around; None: nothing does."""
+    """Distance to the nearest obstacle; None: there is none."""
     taken_over_us: int | None
-    """Since when somebody else than we flies it, a pilot or the autopilot itself; None: nobody does."""
+    """When a pilot or the autopilot's failsafe took over; None: no takeover."""
     taken_over_by: str | None
     """`pilot` or `failsafe`."""
 
 
 class SentFrame(NamedTuple):
-    """A frame of ours: when it was sent, when it came to the vehicle, and when the autopilot got to it, to obey,
-    answer or refuse it. None: it never did.
+    """A frame of the runtime: when it was sent, when it reached the vehicle, and when the autopilot handled it. None:
+    never.
     """
 
     sent_us: int
@@ -48,7 +48,7 @@ class SentFrame(NamedTuple):
 
 
 class IncidentOccurrence(NamedTuple):
-    """An incident of the scenario, by its number, that really came. `note`: what became of it, where that is told."""
+    """An incident of the scenario that took place, by its number. `note`: its result, if known."""
 
     number: int
     at_us: int
@@ -58,21 +58,21 @@ class IncidentOccurrence(NamedTuple):
 
 
 class Reaction(NamedTuple):
-    """A fallback was commanded: what it follows from came after `heard_us`, and was acted on at `acted_us`."""
+    """A commanded fallback: its cause was received after `heard_us`, and the command made at `acted_us`."""
 
     heard_us: int
     acted_us: int
 
 
 class HeardReadings(NamedTuple):
-    """What one frame told: when it was measured, on the clock of the logs, and (slot, value) of its signals."""
+    """The readings of one frame: when they were measured, on the clock of the logs, and (slot, value) pairs."""
 
     measured_us: int
     values: tuple[tuple[int, int | None], ...]
 
 
 class Turn(NamedTuple):
-    """A turn of the loop: when, and which values of signals it was given, in their order."""
+    """A turn of the loop: its time, and the readings that it received, in order."""
 
     at_us: int
     heard: tuple[HeardReadings, ...]
@@ -80,22 +80,22 @@ class Turn(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Life:
-    """One process of the runtime, from its first record to its last. `ending` None: it was killed, or it broke."""
+    """One process of the runtime, from its first record to its last. `ending` None: it was killed or failed."""
 
     began_us: int
     ended_us: int
     ending: str | None
     lines: tuple[bytes, ...]
-    """Its log; what was killed is recovered."""
+    """Its log; recovered if the process was killed."""
     reactions: tuple[Reaction, ...]
     turns: tuple[Turn, ...] = ()
-    """What it heard, turn by turn of its loop."""
+    """What it received in each turn of its loop."""
     kept_us: tuple[int, ...] = ()
-    """When each line of its log was kept, but for those that recovery added."""
+    """When each line of its log was stored, except those that recovery added."""
 
 
 def records_of(life: Life) -> list[dict[str, Any]]:
-    """What of its log can be read."""
+    """Return the readable records of its log."""
     records = []
     for line in life.lines:
         try:
@@ -107,7 +107,7 @@ def records_of(life: Life) -> list[dict[str, Any]]:
 
 @dataclass(frozen=True, slots=True)
 class ScenarioFlown:
-    """One flight of a scenario. `start_us` is what the monotonic clock of the logs said at the simulation's start."""
+    """One flight of a scenario. `start_us` is the monotonic time of the logs at the simulation's start."""
 
     scenario: Scenario
     flavour: str
@@ -115,26 +115,26 @@ class ScenarioFlown:
     policy: Policy
     mission: Mission
     root: bytes
-    """The name of the key that signed the trust root: what an audit is pinned to."""
+    """The `kid` of the key that signed the trust root: an audit pins it."""
     start_us: int
     utc_us: int
-    """What time it really was at the simulation's start, whatever any clock showed."""
+    """True UTC at the simulation's start, whatever any clock showed."""
     tick_us: int
     wait_us: int
     lives: tuple[Life, ...]
     happened: tuple[IncidentOccurrence, ...]
     samples: tuple[TruthSample, ...]
     frames: tuple[SentFrame, ...]
-    """All that were sent, in their order."""
+    """All frames that the runtime sent, in order."""
     ended_us: int
-    """When the last process ended; what came after it, the vehicle did alone."""
+    """When the last process ended."""
     left: str | None
-    """Why no process was there any more, though nothing had ended; None: the last one came to its end."""
+    """Why no further process was started although the run had not ended; None: the last process ended normally."""
     fault: str | None
-    """What went wrong inside the runtime, or that it did not end; None: nothing."""
+    """The exception or time-out of the runtime; None: none."""
     notes: tuple[str, ...] = ()
 
     @property
     def ending(self) -> str | None:
-        """How the last process ended."""
+        """The ending of the last process."""
         return self.lives[-1].ending if self.lives else None

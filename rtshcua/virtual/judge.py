@@ -1,25 +1,25 @@
-"""An independent judge of a flight of a scenario: what went wrong, by what really was.
+"""An independent judge of a scenario flight, based on the true state of the simulation.
 
-It reads where the simulated vehicle really was, and which frames of ours it really received. It uses no code of the
-runtime or of the decision (import contracts hold that): zones are judged in floating point, pymavlink reads the frames,
-and supervision is done again in `naive_supervision`. The auditor says whether the logs verify and whether their
-decisions are derived again; what the logs say is then held against the frames.
+The judge reads the true positions of the vehicle and the frames that it received. It uses no code of the runtime or of
+the decision (import contracts enforce this): zones are judged in floating point, pymavlink decodes the frames, and
+`naive_supervision` repeats the supervision. The auditor verifies the logs and derives their decisions again; the judge
+then compares the logs with the frames.
 
-| slug | is a failure |
+| slug | failure |
 |---|---|
-| `outside-fence` | it was outside the policy's airspace, of which each zone counts while it is there |
-| `collision` | it flew into something, or came down too hard |
-| `motion-after-takeover` | a frame that moves it was sent later than W (docs/adr/0034) after somebody took over |
-| `not-ended` | at the end it neither rests on the ground nor stands still in the air |
-| `late` | a frame that moves it was sent later than a permit, a step's deadline, or the bound of a reaction allows |
+| `outside-fence` | the vehicle was outside the policy's airspace; a zone counts while it exists |
+| `collision` | the vehicle hit an obstacle or touched down too hard |
+| `motion-after-takeover` | a motion frame was sent later than W (docs/adr/0034) after a takeover |
+| `not-ended` | at the end the vehicle neither rests on the ground nor hovers |
+| `late` | a motion frame was sent later than a permit, a step's deadline or the reaction bound allows |
 | `log` | a log does not verify |
-| `derive` | a decision of a log is not derived again |
-| `unlogged-effect` | a frame that moves it, which carries out no command that the log has |
-| `fault` | an exception came out of the runtime, or the run did not end |
+| `derive` | a decision of a log cannot be derived again |
+| `unlogged-effect` | a motion frame belongs to no command in the log |
+| `fault` | the runtime raised an exception, or the run did not end |
 
-What it owes besides, from supervision to the order of chains, has slugs of its own (`runtime_checks`).
+`runtime_checks` defines further slugs, from supervision to fallback chains.
 
-A failure that physics does not allow to prevent is an *exception* instead, with its `cause` (`excuses`).
+A failure that could not be prevented is an *exception* instead, with its `cause` (`excuses`).
 """
 
 from bisect import bisect_left
@@ -45,9 +45,9 @@ SLUGS: Final = (
     "outside-fence", "collision", "motion-after-takeover", "not-ended", "late", "log", "derive", "unlogged-effect",
     "fault",
 )  # fmt: skip
-#: us: no frame that moves the vehicle leaves on a mode report that is older (docs/adr/0034)
+#: us: the greatest age of the mode report on which a motion frame may be sent (docs/adr/0034)
 MODE_WITHIN_US: Final[Mapping[str, int]] = {"px4": 300_000, "ardupilot": 200_000}
-#: mm/s: what noise and gusts make of a vehicle that stands still, and us: for how long it must, at the end
+#: mm/s: the speed of a hovering vehicle with noise and gusts; us: how long it must hover at the end
 STILL_MM_S: Final = 700
 LEVEL_MM_S: Final = 300
 STILL_US: Final = 3_000_000
@@ -55,23 +55,23 @@ STILL_US: Final = 3_000_000
 
 @dataclass(frozen=True, slots=True)
 class Margins:
-    """How near it came to going wrong; None: there was nothing to come near to. Negative: by how much it went wrong."""
+    """The distances and times to a failure; None: not applicable. Negative: the amount of the failure."""
 
     fence_mm: int | None = None
-    """How far inside the airspace it was when it was nearest to its edge."""
+    """The least distance to the edge, inside the airspace."""
     obstacle_mm: int | None = None
-    """How near it came to something that stands around."""
+    """The least distance to an obstacle."""
     stop_us: int | None = None
-    """The longest time from what caused a fallback to the first frame of it."""
+    """The longest time from the cause of a fallback to its first frame."""
     takeover_us: int | None = None
-    """The longest time from a takeover to a frame that was sent and moves the vehicle."""
+    """The longest time from a takeover to a sent motion frame."""
     ended_us: int | None = None
-    """How long the vehicle went on after the last process had ended."""
+    """How long the vehicle kept moving after the last process had ended."""
 
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What went wrong and should not have, what had to, and how near it was."""
+    """The failures, the excused failures (exceptions), and the margins."""
 
     failures: tuple[JudgedFailure, ...]
     exceptions: tuple[JudgedFailure, ...]
@@ -79,7 +79,7 @@ class Judgement:
 
 
 def judge(flown: ScenarioFlown) -> Judgement:
-    """What is to be said of a flight. Of each slug the first and the worst occurrence are told."""
+    """Judge a flight. Of each slug the first and the worst occurrence are reported."""
     excuses = Excuses(flown)
     fence, fence_mm = _fence(flown)
     motion = _motion(flown)
@@ -100,7 +100,7 @@ def judge(flown: ScenarioFlown) -> Judgement:
 
 
 def _told(found: Sequence[JudgedFailure]) -> tuple[JudgedFailure, ...]:
-    """The first and the worst of each slug and cause, in the order of time."""
+    """Return the first and the worst failure of each slug and cause, ordered by time."""
     chosen: set[JudgedFailure] = set()
     for slug, cause in {(each.slug, each.cause) for each in found}:
         alike = [each for each in found if (each.slug, each.cause) == (slug, cause)]
@@ -112,10 +112,10 @@ def _told(found: Sequence[JudgedFailure]) -> tuple[JudgedFailure, ...]:
 
 
 def _fence(flown: ScenarioFlown) -> tuple[list[JudgedFailure], int | None]:
-    """Where it left the airspace, the first time and farthest out; how far inside it always was.
+    """Return the times outside the airspace, and the least distance to its edge.
 
-    Between two places that are d apart the distance to an edge changes by d at most: what is far inside for sure is
-    not worked out.
+    Between two places at distance d the distance to an edge changes by at most d: samples that must be far inside are
+    skipped.
     """
     stated = flown.policy.airspace
     if stated is None:
@@ -134,9 +134,7 @@ def _fence(flown: ScenarioFlown) -> tuple[list[JudgedFailure], int | None]:
             there, known = now, -inf
         if len(there.inside) < len(stated.inside):
             found.append(
-                JudgedFailure(
-                    "outside-fence", sample.at_us, "it is in the air while a zone that it must keep is not there"
-                )
+                JudgedFailure("outside-fence", sample.at_us, "in the air while an inclusion zone does not exist")
             )
             continue
         x, y = local_mm(flown.policy, sample.latitude, sample.longitude)
@@ -162,10 +160,13 @@ def _collision(flown: ScenarioFlown) -> list[JudgedFailure]:
     for before, sample in pairwise(flown.samples):
         if sample.crashed and not before.crashed:
             near = min((d for d in (before.obstacle_mm, sample.obstacle_mm) if d is not None), default=None)
-            what = "came down too hard" if near is None or near > _TOUCHES_MM else "flew into something"
+            what = "touched down too hard" if near is None or near > _TOUCHES_MM else "hit an obstacle"
             return [
                 JudgedFailure(
-                    "collision", sample.at_us, f"it {what} at {before.speed_mm_s / 1000:.1f} m/s", before.speed_mm_s
+                    "collision",
+                    sample.at_us,
+                    f"the vehicle {what} at {before.speed_mm_s / 1000:.1f} m/s",
+                    before.speed_mm_s,
                 )
             ]
     return []
@@ -189,14 +190,12 @@ def _end(flown: ScenarioFlown) -> tuple[list[JudgedFailure], int | None]:
     where = f"{last.up_mm / 1000:.1f} m up in {last.mode}, at {last.speed_mm_s / 1000:.1f} m/s"
     if flown.ending == "completed":
         return [
-            JudgedFailure("not-ended", last.at_us, f"the run says that it completed the mission, and it flies {where}")
+            JudgedFailure("not-ended", last.at_us, f"the run ended as `completed` with the vehicle {where}")
         ], ended_us
     if flown.left == "replayed":
-        return [
-            JudgedFailure("not-ended", last.at_us, f"no run began, for it was on the ground; it flies {where}")
-        ], ended_us
+        return [JudgedFailure("not-ended", last.at_us, f"no run was started with the vehicle {where}")], ended_us
     if any(not _is_still(each) for each in samples if each.at_us > last.at_us - STILL_US):
-        return [JudgedFailure("not-ended", last.at_us, f"it flies on {where}", last.speed_mm_s)], ended_us
+        return [JudgedFailure("not-ended", last.at_us, f"the vehicle keeps flying {where}", last.speed_mm_s)], ended_us
     return [], ended_us
 
 
@@ -213,29 +212,29 @@ def _faults(flown: ScenarioFlown) -> list[JudgedFailure]:
 #: HEARTBEAT, PARAM_REQUEST_READ, PARAM_REQUEST_LIST, MISSION_REQUEST, MISSION_REQUEST_LIST, MISSION_ACK,
 #: MISSION_REQUEST_INT, TIMESYNC, STATUSTEXT
 _QUIET: Final = frozenset({0, 20, 21, 40, 43, 47, 51, 111, 253})
-#: about a fence or a parameter: they change how it flies, and move nothing
+#: messages about a fence or a parameter: they cause no motion by themselves
 _SETTINGS: Final = frozenset({"PARAM_SET", "MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_CLEAR_ALL"})
 _FENCE: Final = 1
 _NOWHERE: Final = 0x7FFFFFFF
 _REPOSITION: Final = 192
 _MM: Final = 11.132  # in 1e-7 degree
-#: mm: how far from its target it may stand, for all that its reports tell: a decimetre, and its estimator's error
+#: mm: how far from its reported target the vehicle may stop: a decimetre, and the estimator's error
 _SAME_MM: Final = 2_000
-#: us: so long after a frame arrived no report shows it yet: two at 10 Hz
+#: us: how long no report shows the effect of a received frame: two reports at 10 Hz
 _SHOWS_US: Final = 200_000
-#: where PX4 says that it will stop (`Navigator::calculate_breaking_stop`): MPC_ACC_HOR, and what it adds for the jerk
+#: PX4's reported stopping distance (`Navigator::calculate_breaking_stop`): MPC_ACC_HOR, and its addition for the jerk
 _TOLD_BRAKING_MM_S2: Final = 3_000
 _TOLD_DELAY_S: Final = 0.6
 _REQUEST_MESSAGE, _HEARTBEAT = 512, 0
 _ASKS: Final = frozenset({401, 511, _REQUEST_MESSAGE})  # RUN_PREARM_CHECKS, SET_MESSAGE_INTERVAL
 _LEGS: Final = frozenset({MotionKind.FLY, MotionKind.COVER})
 _SET_MODE: Final = 176
-#: the modes of `_MODES` in which no target is reported
+#: the modes of `_MODES` without a reported target
 _NO_TARGET: Final[Mapping[str, Mapping[tuple[int, int], FlightMode]]] = {
     "px4": {(4, 5): FlightMode.RETURN, (4, 6): FlightMode.LAND},
     "ardupilot": {(17, 0): FlightMode.BRAKE, (6, 0): FlightMode.RETURN, (9, 0): FlightMode.LAND},
 }
-#: what DO_SET_MODE is a part of, by its parameters 2 and 3
+#: the motions that a DO_SET_MODE can belong to, by its parameters 2 and 3
 _MODES: Final[Mapping[str, Mapping[tuple[int, int], frozenset[MotionKind]]]] = {
     "px4": {
         (4, 3): frozenset({MotionKind.CLIMB, MotionKind.HOLD}),
@@ -252,15 +251,15 @@ _MODES: Final[Mapping[str, Mapping[tuple[int, int], frozenset[MotionKind]]]] = {
 
 
 def moves(octets: bytes, flavour: str) -> frozenset[MotionKind] | None:
-    """What kinds of motion a frame can be a part of; none at all where no command of ours looks so. None: it moves
-    nothing.
+    """Return the kinds of motion that a frame can belong to; empty for a frame that the runtime never sends. None: not
+    a motion frame.
     """
     if len(octets) >= 10 and octets[0] == 0xFD and int.from_bytes(octets[7:10], "little") in _QUIET:
         return None
     try:
         message = dialect.MAVLink(None).decode(bytearray(octets))
     except dialect.MAVError:
-        return None  # nobody obeys it
+        return None  # no autopilot obeys it
     name = message.get_type()
     if name in _SETTINGS and getattr(message, "mission_type", _FENCE) == _FENCE:
         return None
@@ -288,7 +287,7 @@ def _moves(message: Any, name: str, flavour: str) -> frozenset[MotionKind] | Non
 
 Obeyed = tuple[SentFrame, frozenset[MotionKind]]
 Motion = Sequence[Obeyed]
-"""Frames that move the vehicle, in the order in which they were sent, and what each can be a part of."""
+"""Motion frames in the order of sending, each with the kinds of motion that it can belong to."""
 
 
 def _motion(flown: ScenarioFlown) -> Motion:
@@ -296,16 +295,15 @@ def _motion(flown: ScenarioFlown) -> Motion:
     return sorted(((frame, kinds) for frame, kinds in read if kinds is not None), key=lambda each: each[0].sent_us)
 
 
-# ---------------------------------------------------------------- somebody took over
+# ---------------------------------------------------------------- takeovers
 
 
 def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[list[JudgedFailure], int | None]:
-    """Frames that left later than W after a takeover took effect.
+    """Return failures for motion frames that were sent later than W after a takeover took effect.
 
-    One that was on its way then undoes the takeover. Where nothing of that shows, ours counts (docs/adr/0034): what
-    follows is an exception. So it is where a pilot stops what stands already or stops, told so by us, and as long as it
-    flies in the mode that the last frame before asked for, which was lost: the report looks as if that frame had
-    arrived.
+    Three cases are exceptions, because no report shows the takeover (docs/adr/0034): a frame in flight undid the
+    takeover; the pilot stopped a vehicle that had stopped, or was stopping, by the runtime's command; the vehicle is in
+    the mode of the runtime's last frame, which was lost, so that the report looks as if that frame had arrived.
     """
     times = [sample.at_us for sample in flown.samples]
     found, latest, crossed = list[JudgedFailure](), None, False
@@ -317,7 +315,7 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
         if after_us <= within_us + excuses.delay_us(since_us, frame.sent_us):
             crossed = crossed or frame.heard_us is not None
             continue
-        text = f"{_name(frame)} was sent {after_us / 1e6:.2f} s after somebody took over at {since_us / 1e6:.2f} s"
+        text = f"{_name(frame)} was sent {after_us / 1e6:.2f} s after the takeover at {since_us / 1e6:.2f} s"
         lands = kinds == {MotionKind.LAND} and not flown.samples[bisect_left(times, frame.sent_us)].in_air
         stood = excuses.paused_at(since_us) and _stood(flown, motion, times, last, since_us)
         as_lost = _flies_as_lost(flown, motion, times, since_us, max(since_us, frame.sent_us - within_us))
@@ -330,8 +328,8 @@ def _takeovers(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
 def _after_takeovers(
     flown: ScenarioFlown, motion: Motion, times: Sequence[int]
 ) -> Iterator[tuple[SentFrame, frozenset[MotionKind], int, Obeyed | None, bool]]:
-    """Frames that came after somebody took over, since when he flies it, our last frame that was obeyed before, and
-    whether one of ours came at the very moment of a takeover.
+    """Yield the motion frames after a takeover, with the time of the takeover, the last frame that was obeyed before,
+    and whether a frame arrived at the very moment of a takeover.
     """
     last, met = None, False
     for frame, kinds in motion:
@@ -345,7 +343,7 @@ def _after_takeovers(
 
 
 def _stood(flown: ScenarioFlown, motion: Motion, times: Sequence[int], last: Obeyed | None, at_us: int) -> bool:
-    """Whether it stood already, or stopped, as we had told it."""
+    """Return whether the vehicle had stopped, or was stopping, by the runtime's command."""
     then = flown.samples[bisect_left(times, at_us)]
     if not then.in_air:
         return False
@@ -354,13 +352,13 @@ def _stood(flown: ScenarioFlown, motion: Motion, times: Sequence[int], last: Obe
 
 
 def _obeyed(motion: Motion, by_us: int) -> Obeyed | None:
-    """Our last frame that had arrived by then: what a report could show at that time."""
+    """Return the last motion frame that had arrived by a time, whose effect a report could show then."""
     return next((each for each in reversed(motion) if each[0].heard_us is not None and each[0].heard_us <= by_us), None)
 
 
 def _ends_at(last: Obeyed | None, sample: TruthSample) -> bool:
-    """Whether a pause there ends what it was told where that ends: to stop, to climb, or a leg, whose end is no farther
-    ahead than PX4 says that it will stop.
+    """Return whether a pause at this place looks like the end of the last command: a stop, a climb, or a leg that ends
+    within PX4's reported stopping distance.
     """
     if last is None:
         return False
@@ -378,7 +376,7 @@ def _ends_at(last: Obeyed | None, sample: TruthSample) -> bool:
 
 
 def _stops(last: Obeyed | None, then: TruthSample, samples: Sequence[TruthSample], times: Sequence[int]) -> bool:
-    """Whether it slows down then, since we told it to stop."""
+    """Return whether the vehicle is slowing down by the runtime's stop command."""
     if last is None or last[1] != {MotionKind.HOLD} or last[0].heard_us is None:
         return False
     told = samples[bisect_left(times, last[0].heard_us)]
@@ -390,7 +388,7 @@ def _fast_mm_s(sample: TruthSample) -> float:
 
 
 def _flies_as_lost(flown: ScenarioFlown, motion: Motion, times: Sequence[int], from_us: int, to_us: int) -> bool:
-    """Whether each mode between two moments is the one that our last frame before it asked for, which was lost."""
+    """Return whether each mode between two times is the one requested by the last frame before it, which was lost."""
     mode, before_us = None, from_us
     for sample in flown.samples[bisect_left(times, from_us) : bisect_left(times, to_us) + 1]:
         if sample.mode is not mode:
@@ -403,7 +401,7 @@ def _flies_as_lost(flown: ScenarioFlown, motion: Motion, times: Sequence[int], f
 
 
 def _lost_mode(frame: SentFrame, flavour: str) -> FlightMode | None:
-    """The mode that a lost frame asked for, where that mode reports no target, which would tell who chose it."""
+    """Return the mode that a lost frame requested, if that mode reports no target by which to tell who chose it."""
     if frame.heard_us is not None:
         return None
     message = dialect.MAVLink(None).decode(bytearray(frame.octets))
@@ -419,12 +417,12 @@ def _name(frame: SentFrame) -> str:
     return str(known.name if known is not None else message.get_type())
 
 
-# ---------------------------------------------------------------- in time
+# ---------------------------------------------------------------- timing
 
 
 def _reactions(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[list[JudgedFailure], int | None]:
-    """From what a fallback follows from to its first frame: a turn of the loop, and what the mode's report takes, which
-    the autopilot may be slow to give.
+    """Check the time from the cause of a fallback to its first frame: a turn of the loop, and the time that the
+    autopilot takes to report its mode.
     """
     sent = [frame.sent_us for frame, _ in motion]
     found, latest = list[JudgedFailure](), None
@@ -434,20 +432,18 @@ def _reactions(flown: ScenarioFlown, motion: Motion, excuses: Excuses) -> tuple[
         for reaction, end_us in zip(life.reactions, ends, strict=False):
             first_us = next((each for each in sent if reaction.acted_us <= each < end_us), None)
             if first_us is None:
-                continue  # nothing had to be sent, or could be
+                continue  # nothing had to be, or could be, sent
             took_us = first_us - reaction.heard_us
             latest = max(latest or 0, took_us)
             slow_us = _slow_mode_us(flown.frames, reaction.heard_us) if took_us > within_us else 0
             if took_us > within_us + slow_us + 2 * excuses.delay_us(reaction.heard_us, first_us, silences=True):
-                text = (
-                    f"a fallback took {took_us / 1e6:.3f} s to its first frame; {within_us / 1e6:.3f} s are the bound"
-                )
+                text = f"a fallback took {took_us / 1e6:.3f} s to its first frame; the bound is {within_us / 1e6:.3f} s"
                 found.append(JudgedFailure("late", first_us, text, took_us))
     return found, latest
 
 
 def _slow_mode_us(frames: Sequence[SentFrame], from_us: int) -> int:
-    """How long the autopilot, from then on, has the question for its mode that it answers next."""
+    """Return how long after `from_us` the autopilot takes to answer the pending request for its mode."""
     for frame in frames:
         if frame.heard_us is not None and (frame.obeyed_us or 0) > from_us and _asks_for_mode(frame.octets):
             return (frame.obeyed_us or 0) - max(frame.heard_us, from_us)
@@ -460,14 +456,14 @@ def _asks_for_mode(octets: bytes) -> bool:
 
 
 def _permits(flown: ScenarioFlown, motion: Motion) -> Iterator[JudgedFailure]:
-    """The first frame of a command leaves within its permit's time, a step's within its deadline."""
+    """Check that first frames are sent within their permit's validity, and those of steps within the deadline."""
     kinds = {contract.name: contract.motion.kind for contract in flown.policy.contracts}
     for life in flown.lives:
         records = records_of(life)
         commands = list(_commands(records, flown.start_us))
         for decision, record in _decided(records):
             kind, at_us = kinds.get(record["detail"]), record["at_us"] - flown.start_us
-            # from the next command of its kind on they are that one's
+            # later frames belong to the next command of the same kind
             later = [each.at_us for each in commands if kinds.get(each.skill) == kind and each.at_us > at_us]
             end_us = min([life.ended_us + 1, *later])
             frames = (frame for frame, parts in motion if kind in parts and at_us <= frame.sent_us < end_us)
@@ -477,7 +473,7 @@ def _permits(flown: ScenarioFlown, motion: Motion) -> Iterator[JudgedFailure]:
 
 
 def _decided(records: Sequence[dict[str, Any]]) -> Iterator[tuple[dict[str, Any], dict[str, Any]]]:
-    """Each decision with what was sent by it first; what is sent again is by another permit, or by a standing one."""
+    """Yield each decision with its first dispatch; a repeated dispatch uses another permit, or a standing one."""
     decided: dict[tuple[int, int, int], dict[str, Any]] = {}
     for record in records:
         ref = (record.get("kind", -1), record.get("step", -1), record.get("link", -1))
@@ -492,7 +488,7 @@ def _in_time(flown: ScenarioFlown, first: SentFrame, decision: dict[str, Any]) -
         return
     after_us = first.sent_us - (decision["valid_until_us"] - flown.start_us)
     if after_us > 0:
-        text = f"{_name(first)} was sent {after_us / 1e6:.3f} s after its permit's time was over"
+        text = f"{_name(first)} was sent {after_us / 1e6:.3f} s after its permit had expired"
         yield JudgedFailure("late", first.sent_us, text, after_us)
     if decision["kind"] == 0:
         contract = flown.mission.invocations[decision["step"]].contract
@@ -509,7 +505,7 @@ def _in_time(flown: ScenarioFlown, first: SentFrame, decision: dict[str, Any]) -
 def _logs(flown: ScenarioFlown) -> Iterator[JudgedFailure]:
     for life in flown.lives:
         if life.ending is None and not any(line.endswith(b"\n") for line in life.lines):
-            continue  # it died before it had begun a log; whatever it sent all the same is an unlogged effect
+            continue  # killed before it began a log; frames that it sent are unlogged effects
         auditor = Auditor(flown.root)
         for line in life.lines:
             auditor.take(line)
@@ -532,7 +528,7 @@ def _logs(flown: ScenarioFlown) -> Iterator[JudgedFailure]:
 
 
 class _Sent(NamedTuple):
-    """A command of a log: when it was dispatched, and when and how it was over (never: None, empty)."""
+    """A command of a log: when it was dispatched, and when and how it ended (never: None, empty)."""
 
     at_us: int
     skill: str
@@ -541,7 +537,7 @@ class _Sent(NamedTuple):
 
 
 def _unlogged(flown: ScenarioFlown, motion: Motion) -> Iterator[JudgedFailure]:
-    """Frames that carry out no command that a log had at that time: its last command is of another kind, or over."""
+    """Yield motion frames without a matching command in the log: the last command has another kind, or has ended."""
     kinds = {contract.name: contract.motion.kind for contract in flown.policy.contracts}
     for life in flown.lives:
         commands = list(_commands(records_of(life), flown.start_us))
@@ -571,13 +567,13 @@ def _commands(records: Sequence[dict[str, Any]], start_us: int) -> Iterator[_Sen
 
 
 def _unexplained(sent_us: int, begun: Sequence[_Sent], parts: frozenset[MotionKind], kinds: Mapping[str, int]) -> str:
-    """Why a frame belongs to no command that had begun; empty: it may, as to any that was dispatched at its moment."""
+    """Return why a frame belongs to no dispatched command; empty if it may belong to one."""
     if not begun:
-        return ", and no command was"
+        return ", but no command was dispatched"
     may_be = [each for each in begun if each.at_us == sent_us] + [each for each in begun if each.at_us < sent_us][-1:]
     fitting = [each for each in may_be if kinds.get(each.skill) in parts]
     if not fitting:
-        return f", and the last command was `{begun[-1].skill}`"
+        return f", but the last command was `{begun[-1].skill}`"
     if all(each.over_us is not None and each.over_us < sent_us for each in fitting):
         return f" after `{fitting[0].skill}` had ended: {fitting[0].over}"
     return ""

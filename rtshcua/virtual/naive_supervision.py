@@ -1,11 +1,11 @@
-"""Supervision for the judge, written apart from what flies: plain and slow, from the signed policy and mission alone.
+"""The judge's own supervision: simple and slow, based only on the signed policy and mission.
 
 Written from docs/flying/supervision.md, speeds.md and returns.md. It imports nothing of `onboard` or `decision` (an
-import contract holds that), so a defect there is not repeated here. Geometry is in floating point: what is nearer to an
-edge than `_SLACK_MM`, or to a charge than `_SLACK_CHARGE`, is in doubt, and the judge claims nothing of it.
+import contract enforces this), so that it does not repeat their defects. Geometry is in floating point: results within
+`_SLACK_MM` of an edge or `_SLACK_CHARGE` of a charge are doubtful, and the judge draws no conclusion from them.
 
-A condition has a set of the truths True, False and None (unknown): one of them where all is known exactly, more where a
-zone is asked about every place of a path. Kleene's `and` is the least in the order False, None, True.
+The value of a condition is a set of truths True, False and None (unknown): one truth for a single place, possibly
+more for all places of a path. Kleene's `and` is the minimum in the order False, None, True.
 """
 
 from collections import deque
@@ -27,24 +27,24 @@ from rtshcua.virtual.flight_record import HeardReadings, Turn
 from rtshcua.virtual.zone_truth import Answers as Truths
 from rtshcua.virtual.zone_truth import Edge, apart_mm, both, daily, edges, exists, is_timed, level_mm, shown
 
-#: a multiple of the height, and what is added to it; None: not known
+#: a number as a multiple of the height plus a constant; None: unknown
 HeightTerm = tuple[int, int] | None
 #: east and north of home, in mm
 GroundPoint = tuple[float, float]
-#: from when until before when, in us since the start
+#: a half-open time interval, in us since the start
 Span = tuple[int, int]
 
-DURATION: Final = "lasts longer than it may"
+DURATION: Final = "maximum duration"
 WAY_HOME: Final = "the reserve and the way home"
 _TRUE: Final[Truths] = frozenset({True})
 _FALSE: Final[Truths] = frozenset({False})
 _UNKNOWN: Final[Truths] = frozenset({None})
-#: mm, and 1/10000 of a charge: what rounding makes of places and of charges
+#: mm and 1/10000: rounding errors of places and of charges
 _SLACK_MM: Final = 10
 _SLACK_CHARGE: Final = 2
-#: s: what a return takes beyond its way (docs/flying/speeds.md)
+#: s: the time of a return in addition to its path (docs/flying/speeds.md)
 _BEGINS_S, _SETTLES_S, _OVER_HOME_S, _LANDED_S = 1, 4, 5, 8
-#: mm: how far below its height a return sets off, and how near home it may fly lower (docs/flying/returns.md)
+#: mm: how far below its height a return may start, and how near home it may fly lower (docs/flying/returns.md)
 _SHORT_MM, _NEAR_MM = 2_000, 10_000
 _MOST_DRAIN: Final = 60 * FULL  # of a charge in a minute
 _RELATIONS: Final[Mapping[int, Callable[[float, float], bool]]] = {
@@ -63,14 +63,14 @@ def _not(truths: Truths) -> Truths:
 
 
 def everywhere(truths: Truths) -> bool | None:
-    """What is so at every place: false if false at one, else unknown if unknown at one."""
+    """Return the truth of "everywhere": False if any is False, otherwise None if any is None."""
     return False if False in truths else None if None in truths else True
 
 
 class SweptPath(NamedTuple):
-    """Every place on the straight way between two, at all heights between two, in mm; widened by `error` over ground.
+    """All places on a straight line, at all heights of an interval, in mm; widened by `error` horizontally.
 
-    `start` is None where the place is not known, `heights` where the height is not.
+    `start` is None if the place is unknown, `heights` if the height is unknown.
     """
 
     start: GroundPoint | None
@@ -80,8 +80,8 @@ class SweptPath(NamedTuple):
 
 
 class ConditionQuery(NamedTuple):
-    """What a condition is asked about: a skill's arguments, the number of the phase among the policy's (-1: none), and
-    either where it is now, or every place of a path at any time until `through_us` from now.
+    """The context of a condition: a skill's arguments, the index of the phase in the policy (-1: none), and either the
+    current place or every place of a path at any time until `through_us` from now.
     """
 
     arguments: Sequence[int] = ()
@@ -91,7 +91,7 @@ class ConditionQuery(NamedTuple):
 
 
 class UnmetCondition(NamedTuple):
-    """The text of something that should hold and does not; `truth` is False or None, `sure`: it is not in doubt."""
+    """The text of a condition that does not hold; `truth` is False or None, `sure`: not doubtful."""
 
     text: str
     truth: bool | None
@@ -99,7 +99,7 @@ class UnmetCondition(NamedTuple):
 
 
 class TruthInterval(NamedTuple):
-    """A time, both ends included, in which a condition had one truth."""
+    """A closed time interval in which a condition had one truth."""
 
     truth: bool | None
     doubtful: bool
@@ -108,19 +108,19 @@ class TruthInterval(NamedTuple):
 
 
 class TruthHistory:
-    """The truth of a temporal monitor's condition over time. Between two observations it is that of the first, and not
-    known where they are more than `MAX_GAP` apart.
+    """The truth of a temporal monitor's condition over time. Between two observations the first truth holds; it is
+    unknown if they are more than `MAX_GAP` apart.
     """
 
     def __init__(self, monitor: Monitor) -> None:
         self.monitor = monitor
         self.doubtful = False
-        """What it said last rests on an answer that was too near to call."""
+        """Whether its last result depends on a doubtful truth."""
         self._stretches: list[TruthInterval] = []
         self._last: tuple[bool | None, bool, int] | None = None
 
     def observed(self, truth: bool | None, doubtful: bool, at_us: int) -> bool | None:
-        """What the monitor says when its condition has this truth."""
+        """Return the monitor's truth when its condition has this truth."""
         before, doubted, since_us = self._last or (None, False, -(1 << 62))
         known = self._last is not None and at_us - since_us <= MAX_GAP
         self._add(TruthInterval(before if known else None, known and doubted, since_us + 1, at_us - 1))
@@ -146,18 +146,18 @@ class TruthHistory:
 
 
 class HeardState:
-    """What was heard of the vehicle, and what the policy's temporal monitors say of it."""
+    """The received state of the vehicle, and the truths of the policy's temporal monitors."""
 
     def __init__(self, policy: Policy) -> None:
         self._policy = policy
         self._values: list[int | None] = [None] * policy.slots
         self._measured_us: list[int | None] = [None] * policy.slots
-        self._new: set[int] = set()  # slots with a value that nobody looked at
+        self._new: set[int] = set()  # slots whose value was not evaluated yet
         self._histories = [TruthHistory(monitor) for monitor in policy.monitors]
         self._says: list[bool | None] = [None] * len(policy.monitors)
 
     def hear(self, heard: HeardReadings) -> None:
-        """Take over what one frame told, but for what is older than what is known."""
+        """Store the readings of a frame, except those older than the stored ones."""
         for slot, value in heard.values:
             before_us = self._measured_us[slot]
             if before_us is None or before_us <= heard.measured_us:
@@ -165,18 +165,18 @@ class HeardState:
                 self._new.add(slot)
 
     def hides(self, heard: HeardReadings) -> bool:
-        """Whether this replaces a value that nobody looked at."""
+        """Return whether this replaces a value that was not evaluated yet."""
         return any(slot in self._new for slot, _ in heard.values)
 
     def look(self, now: Now) -> "JudgedState":
-        """What is known at a moment."""
+        """Return the known state at a moment."""
         self._new.clear()
         ages = [0 if each is None else max(0, now.monotonic_us - each) for each in self._measured_us]
         doubts = [history.doubtful for history in self._histories]
         return JudgedState(self._policy, self._values, ages, self._says, now, doubts)
 
     def observe(self, now: Now) -> None:
-        """Let the temporal monitors look, once a turn; one may ask those before it."""
+        """Update the temporal monitors, once a turn; a monitor may use earlier ones."""
         self._new.clear()
         says: list[bool | None] = []
         for history in self._histories:
@@ -188,7 +188,7 @@ class HeardState:
 
 
 class JudgedState:
-    """What is known at one moment, and what holds then."""
+    """The known state at one moment, and the truths of conditions in it."""
 
     def __init__(
         self,
@@ -201,7 +201,7 @@ class JudgedState:
     ) -> None:
         self.monitors, self._doubts = monitors, doubts
         self.doubtful = False
-        """An answer since this was set was too near to call."""
+        """Whether a truth was doubtful since this was last reset."""
         self._policy, self._ages, self._now = policy, ages, now
         self._slots: list[int | None] = [None] * policy.slots
         for signal in policy.signals:
@@ -223,7 +223,7 @@ class JudgedState:
     # -------------------------------------------------------- conditions
 
     def truths(self, code: Sequence[int], query: "ConditionQuery") -> Truths:
-        """What a condition may be."""
+        """Return the possible truths of a condition."""
         numbers: list[HeightTerm] = []
         found: list[Truths] = []
         for op, a, b in zip(code[::3], code[1::3], code[2::3], strict=True):
@@ -262,7 +262,7 @@ class JudgedState:
         policy, arguments, through_us = self._policy, query.arguments, query.through_us
         match op:
             case Op.POSITION_IN_ARGUMENT if not 0 <= arguments[a] < len(policy.tables[b]):
-                return _UNKNOWN  # an argument out of range is no zone
+                return _UNKNOWN  # an argument out of range names no zone
             case Op.POSITION_IN | Op.POSITION_IN_ARGUMENT:
                 zone = a if op == Op.POSITION_IN else policy.tables[b][arguments[a]]
                 return self.inside(policy.zones[zone], query.path or self._here, through_us)
@@ -284,14 +284,14 @@ class JudgedState:
         return _UNKNOWN if value is None else frozenset({op == Op.KNOWN or value in policy.sets[b]})
 
     def _clock(self, later_us: int = 0) -> tuple[int, int]:
-        """Between which two times of UTC it is."""
+        """Return the earliest and latest possible UTC."""
         at_us, error_us = self._now.utc_us + later_us, max(0, self._now.utc_error_us)
         return at_us - error_us, at_us + error_us
 
     # -------------------------------------------------------- places
 
     def inside(self, zone: Zone, path: SweptPath, through_us: int, *, flat: bool = False) -> Truths:
-        """Whether the places of a path are inside a zone, at any time until `through_us` from now."""
+        """Return whether the places of a path are inside a zone, at any time until `through_us` from now."""
         level = None if path.start is None else level_mm(zone, *path.start)
         wide, narrow = (_covers(zone, path, level, by, flat=flat) for by in (_SLACK_MM, -_SLACK_MM))
         self.doubtful = self.doubtful or wide != narrow
@@ -304,7 +304,7 @@ class JudgedState:
         return both(wide, later | {now})
 
     def in_airspace(self, path: SweptPath, through_us: int) -> bool | None:
-        """Whether all of a path is in the airspace."""
+        """Return whether all of a path is in the airspace."""
         airspace, zones = self._policy.airspace, self._policy.zones
         if airspace is None:
             return True
@@ -313,7 +313,7 @@ class JudgedState:
         return everywhere(frozenset().union(*found))
 
     def ahead(self) -> tuple[SweptPath, int]:
-        """Every place where it may be before it could stand still, and how long that takes at most, in us."""
+        """Return all places that the vehicle may reach before it can stop, and the longest time to stop, in us."""
         vehicle, place = self._policy.vehicle, self._place
         error = vehicle.position_error
         nowhere = SweptPath(None, (0, 0), None, error), 0
@@ -339,10 +339,10 @@ class JudgedState:
             heights = min(self._height[0], to), max(self._height[0], to)
         return SweptPath(place, end, heights, error), round((reaction_s + brakes_s) * 1e6)
 
-    # -------------------------------------------------------- what a running step rests on
+    # -------------------------------------------------------- conditions of a running step
 
     def broken(self, step: "WatchedStep") -> Iterator[UnmetCondition]:
-        """What of it does not hold."""
+        """Yield the conditions of a step that do not hold."""
         contract = step.invocation.contract
         for clause in contract.assume:
             yield from self._broken(clause.text, self.truths(clause.code, step.query))
@@ -367,14 +367,14 @@ class JudgedState:
         return self.truths(rule.when.code, step.query)
 
     def _maintained(self, clause: Clause, step: "WatchedStep", path: SweptPath, lasts_us: int) -> Truths:
-        """Over the whole path; what is wrong already where it is, is wrong wherever it goes."""
+        """Return the truths over the whole path; a condition that is False at the current place is False."""
         over = self.truths(clause.code, step.query._replace(path=path, through_us=lasts_us))
         if everywhere(over) is None:
             over |= self.truths(clause.code, step.query)
         return over
 
     def _way_home(self, step: "WatchedStep", path: SweptPath) -> bool | None:
-        """Whether the battery holds the reserve and the way home from the farthest place of a path."""
+        """Return whether the charge covers the reserve and the way home from the farthest place of a path."""
         vehicle, battery = self._policy.vehicle, self._known(self._policy.vehicle.battery)
         if battery is None or path.start is None or (vehicle.speeds is not None and path.heights is None):
             return None
@@ -394,7 +394,7 @@ class JudgedState:
     # -------------------------------------------------------- links
 
     def first_link(self, step: "WatchedStep") -> int | None:
-        """The link that a step's fallback begins with: -1 for the target of a degrade rule; None: none could fly."""
+        """Return the first link of a step's fallback: -1 for the target of a degrade rule; None: no link can fly."""
         for rule in step.degrades:
             target = rule.target if everywhere(self._matches(rule, step)) is True else None
             if target is not None and self._may_fly(target, step.query.phase):
@@ -403,7 +403,9 @@ class JudgedState:
         return next((number for number, link in enumerate(chain) if self._may_fly(link, step.query.phase)), None)
 
     def _may_fly(self, link: Link, phase: int) -> bool:
-        """What it requires is true, and it leads nowhere out of the airspace; from outside it may always go home."""
+        """Return whether a link can fly: its requirements hold and it stays in the airspace. From outside, a return
+        home is always allowed.
+        """
         contract, vehicle = self._policy.contracts[link.skill], self._policy.vehicle
         for clause in contract.require:
             if everywhere(self.truths(clause.code, ConditionQuery(link.arguments, phase))) is not True:
@@ -427,7 +429,7 @@ class JudgedState:
         return everywhere(frozenset(self.in_airspace(path, longest_us) for path in paths)) is True
 
     def _home(self, here: SweptPath) -> list[SweptPath]:
-        """Up where it is, across to home, and down there."""
+        """Return the paths of a return: up, across to home, and down."""
         vehicle, heights = self._policy.vehicle, here.heights
         returns = vehicle.return_altitude
         up = _reaching(heights, returns if heights is not None and returns > heights[0] else None)
@@ -441,7 +443,7 @@ class JudgedState:
 
 
 class WatchedStep:
-    """A step of a mission, and what is watched of it besides its contract: the rules that degrade it."""
+    """A step of a mission, with its contract and the rules that degrade it."""
 
     def __init__(self, policy: Policy, mission: Mission, step: int) -> None:
         self.invocation: Invocation = mission.invocations[step]
@@ -461,7 +463,7 @@ class WatchedStep:
         self._vehicle = policy.vehicle
 
     def home_s(self, speeds: Speeds, away_mm: float, heights: tuple[float, float]) -> float:
-        """How long the way home takes, and the landing there, by the table of docs/flying/speeds.md."""
+        """Return the time of the way home and the landing, by the table of docs/flying/speeds.md."""
         vehicle, (low, high) = self._vehicle, heights
         asked = min(self._slowest or speeds.homeward, speeds.homeward)
         speed = max(1, min(asked, speeds.air - speeds.wind))
@@ -477,8 +479,8 @@ class WatchedStep:
 class RunningStep(WatchedStep):
     """A step that flies from `since_us` until `until_us` (None: it did not end), in us since the start.
 
-    `sure` is when it first was wrong that it flew on, and the text of what did not hold; `doubtful` the same, where it
-    may have been so. In the `silences` nothing is judged: they count for no grace, nor for the step's own time.
+    `sure`: the first time at which it should have been aborted, and the text of the condition; `doubtful`: the same if
+    a doubtful truth counts. Nothing is judged in the `silences`: they do not count for the grace or the duration.
     """
 
     def __init__(
@@ -490,22 +492,22 @@ class RunningStep(WatchedStep):
         self.doubtful: tuple[int, str] | None = None
         self.looked_us = -1
         self._silences = silences
-        self._unknown: dict[str, int] = {}  # since when, in time that is judged
+        self._unknown: dict[str, int] = {}  # since when a condition is unknown, without silences
 
     def is_silent(self, at_us: int) -> bool:
-        """Whether nothing is judged then."""
+        """Return whether a time is in a silence."""
         return any(start <= at_us < end for start, end in self._silences)
 
     def look(self, situation: "JudgedState", at_us: int) -> None:
-        """Judge what is known then."""
+        """Judge the known state at a time."""
         if self.sure is not None:
             return
         self.looked_us = at_us
         contract = self.invocation.contract
         away_us = sum(max(0, min(at_us, end) - max(self.since_us, start)) for start, end in self._silences)
         if 0 < contract.duration_us < at_us - self.since_us - away_us:
-            besides = f", besides {away_us // 1_000} ms without a link" if away_us else ""
-            self.sure = self.doubtful = at_us, DURATION + besides
+            excluded = f", excluding {away_us // 1_000} ms without a link" if away_us else ""
+            self.sure = self.doubtful = at_us, DURATION + excluded
             return
         unknown: dict[str, int] = {}
         for text, truth, sure in situation.broken(self):
@@ -521,8 +523,8 @@ class RunningStep(WatchedStep):
 
 
 def supervise(policy: Policy, steps: Sequence[RunningStep], turns: Sequence[Turn], clock: Callable[[int], Now]) -> None:
-    """Look at the steps that flew one after the other, as often as the loop turned, and at each of the frames that came
-    at once. `clock` is the moment at a time of the simulation.
+    """Judge the steps in their order, at each turn of the loop and at each of several frames in a turn. `clock`
+    converts simulation time to a moment.
     """
     memory, left = HeardState(policy), deque(steps)
     for turn in turns:
@@ -541,7 +543,7 @@ def supervise(policy: Policy, steps: Sequence[RunningStep], turns: Sequence[Turn
 
 
 def _leg_s(length_mm: float, speed_mm_s: float, gains_mm_s2: float) -> float:
-    """From rest to rest."""
+    """Return the time of a leg from rest to rest."""
     if length_mm <= 0:
         return 0
     if length_mm * gains_mm_s2 < speed_mm_s**2:
@@ -550,7 +552,7 @@ def _leg_s(length_mm: float, speed_mm_s: float, gains_mm_s2: float) -> float:
 
 
 def _one(answers: Truths) -> bool | None:
-    """What is known where one of these is so."""
+    """Return the only truth, or None if there are several."""
     return next(iter(answers)) if len(answers) == 1 else None
 
 
@@ -563,7 +565,7 @@ def _sum(left: HeightTerm, right: HeightTerm, sign: int) -> HeightTerm:
 
 
 def _compared(op: int, difference: HeightTerm, heights: tuple[float, float] | None) -> Truths:
-    """What a difference is to 0, at all heights between two."""
+    """Return the truths of comparing a difference with 0, over an interval of heights."""
     if difference is None:
         return _UNKNOWN
     times, more = difference
@@ -573,8 +575,8 @@ def _compared(op: int, difference: HeightTerm, heights: tuple[float, float] | No
 
 
 def _covers(zone: Zone, path: SweptPath, level: float | None, by: int, *, flat: bool) -> Truths:
-    """Whether the places of a path that is widened by so much more are inside a zone, while that exists. Its start is
-    `level` mm inside over ground.
+    """Return whether the places of a path, widened by `by`, are inside a zone while the zone exists. The start of the
+    path is `level` mm inside horizontally.
     """
     if flat or (zone.floor, zone.ceiling) == (LOWEST, HIGHEST):
         upright = _TRUE
@@ -591,7 +593,7 @@ def _covers(zone: Zone, path: SweptPath, level: float | None, by: int, *, flat: 
 
 
 def _level(zone: Zone, start: GroundPoint, end: GroundPoint, inside: float, error: int, by: int) -> Truths:
-    """The same over ground. What is out of reach from the start needs no closer look."""
+    """Return the same horizontally. Edges out of reach from the start are skipped."""
     away = error * sqrt(2)
     if abs(inside) > hypot(end[0] - start[0], end[1] - start[1]) + away:
         return _TRUE if inside > 0 else _FALSE
@@ -603,14 +605,14 @@ def _level(zone: Zone, start: GroundPoint, end: GroundPoint, inside: float, erro
         corners = [
             (cx + dx - x, cy + dy - y) for cx, cy in (start, end) for dx in (-reach, reach) for dy in (-reach, reach)
         ]
-        # a box of the position error reaches its corners as well: how much of that counts is in doubt
+        # the position error is a box: whether its corners count is doubtful
         gap = apart_mm(x, y, *start, *end) - sqrt(square) - (away if by > 0 else error)
         met = gap <= 0 and max(hypot(*corner) for corner in corners) >= sqrt(square)
     return _TRUE | _FALSE if met else _TRUE if inside > 0 else _FALSE
 
 
 def _touches(start: GroundPoint, end: GroundPoint, error: int, edge: Edge) -> bool:
-    """Whether an edge shares a place with a way that is widened by a box: no line parts them."""
+    """Return whether an edge intersects a line widened by a box (separating axis test)."""
     ax, ay, bx, by = edge
     across = ((1, 0), (0, 1), (end[1] - start[1], start[0] - end[0]), (by - ay, ax - bx))
     for nx, ny in across:

@@ -1,18 +1,18 @@
-"""What a runtime owes besides: held against what it heard, what it wrote down, and what really was.
+"""Further checks of the runtime, from its readings, its log and the true state.
 
-| slug | is a failure |
+| slug | failure |
 |---|---|
-| `untrue` | the log says that a command succeeded, or a place, height or charge taken over was not so since |
-| `no-stop` | a stop got to the vehicle, and it flew on; or it could have got there, and was not sent again |
-| `not-watched` | what a running step rests on did not hold, as heard, and nothing followed |
-| `needless` | a running step was broken off for something that, as heard, held or had grace left |
-| `chain` | a fallback was not the first link that could, not of the right chain, or not tried again |
-| `went-on` | something was decided or sent after a takeover or a crash was told |
-| `release` | a step's deadline was not counted from when the step before it ended |
-| `unrecorded` | a frame that only a step sends left before the record of that step's decision was kept |
+| `untrue` | a logged success, or a received position, height or charge, contradicts the true state |
+| `no-stop` | a stop reached the vehicle without effect, or was not repeated although it could have arrived |
+| `not-watched` | a condition of a running step failed, by the readings, and the step was not aborted |
+| `needless` | a running step was aborted although, by the readings, its conditions held or had grace left |
+| `chain` | a fallback was not the first possible link, belonged to the wrong chain, or was not tried again |
+| `went-on` | a decision or dispatch followed a reported takeover or crash |
+| `release` | a step's deadline was not counted from the end of the step before |
+| `unrecorded` | a frame that only a step sends was sent before the record of the step's decision was stored |
 
-Supervision is done again, by rules of the judge's own (`naive_supervision`), from the values that the loop was given.
-That those are true is judged too (`untrue`).
+The judge repeats the supervision with its own rules (`naive_supervision`) from the readings that the loop received.
+`untrue` checks those readings.
 """
 
 from bisect import bisect_left, bisect_right
@@ -36,39 +36,39 @@ from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
 Record = dict[str, Any]
 Motion = Sequence[tuple[SentFrame, frozenset[MotionKind]]]
 
-#: mm: what noise, lag and a position's own error make of a place that is told, and of one that was reached
+#: mm: the error of a reported and of a reached place, from noise, lag and the position's own error
 TOLD_MM: Final = 4_000
-#: mm and 1/10000: what noise and rounding make of a height and a charge that are told
+#: mm and 1/10000: the error of a reported height and charge, from noise and rounding
 _TOLD_UP_MM, _TOLD_CHARGE = 1_500, 250
 REACHED_MM: Final = 6_000
-#: us: how long after a fact a report of it may come on a good link
+#: us: the greatest age of a report on a good link
 _LATER_US: Final = 1_500_000
-#: mm/s: a vehicle that is told to stop is faster than this, and has lost so much of it after so long on top of its
-#: reaction; no slower than so much is asked for
+#: mm/s: a stop is checked above the first speed; `_STOPS_US` after the reaction time, the vehicle must have lost the
+#: second speed, or be slower than the third
 _FAST_MM_S, _LOST_MM_S, _SLOW_MM_S = 2_500, 800, 1_200
 _STOPS_US: Final = 2_300_000
 _STANDS_MM_S: Final = 1_800
-#: us: in this time a command that got no answer was sent again; and in this all tries of a last link are over
+#: us: within the first, an unanswered command is sent again; within the second, all tries of the last link are over
 _AGAIN_US: Final = 2_000_000
 _HELD_OUT_US: Final = 60_000_000
 _NEVER: Final = 1 << 60
-#: us: a computer that did nothing for longer stood still, and fresh state is awaited for so long; how often the last
-#: link is tried again (docs/flying/supervision.md)
+#: us: a longer pause of the computer is a stall; how long fresh state is awaited; and the number of retries of the
+#: last link (docs/flying/supervision.md)
 _STALLED_US, _FRESH_US, _TRIES = 1_000_000, 1_500_000, 5
 _STOOD_STILL: Final = "stood-still"
-#: how a record writes the truth of a temporal monitor
+#: the truth of a temporal monitor in a record
 _TRUTHS: Final = {1: True, 2: False, 4: None}
 _ONLY_STEPS: Final = frozenset({MotionKind.FLY, MotionKind.COVER, MotionKind.CLIMB})
 _HOMEWARD: Final = frozenset({MotionKind.HOME, MotionKind.LAND})
-#: what makes a vehicle tell what is not so
+#: faults that make reports untrue
 _DECEIVES: Final = (faults.ReceiverFault, faults.Freeze, faults.MessageStuck, faults.Reboot)
-#: and what disturbs how it stops
+#: faults that disturb a stop
 _DISTURBS: Final = (faults.WindStep, faults.Stall, faults.EstimatorUnhealthy)
 
 
 @dataclass(frozen=True, slots=True)
 class LoggedCommand:
-    """A command of a log: from when, until when, and how it ended; `until_us` None: it did not."""
+    """A command of a log: its begin, end, and how it ended; `until_us` None: it did not end."""
 
     kind: int
     step: int
@@ -81,7 +81,7 @@ class LoggedCommand:
 
 
 class RuntimeChecks:
-    """What is to be said of the runtime in one flight. `motion` are its frames that move the vehicle."""
+    """Checks of the runtime in one flight. `motion` are its motion frames."""
 
     def __init__(self, flown: ScenarioFlown, motion: Motion) -> None:
         self._flown = flown
@@ -90,8 +90,8 @@ class RuntimeChecks:
         self._kinds = {contract.name: MotionKind(contract.motion.kind) for contract in flown.policy.contracts}
 
     def failures(self) -> Iterator[JudgedFailure]:
-        """All of them."""
-        lives = [life for life in self._flown.lives if life.turns]  # else what it heard is not told
+        """Yield all failures."""
+        lives = [life for life in self._flown.lives if life.turns]  # without turns its readings are unknown
         if not lives:
             return
         for life in lives:
@@ -107,7 +107,7 @@ class RuntimeChecks:
             yield from self._recorded(life, records)
         yield from self._left()
 
-    # -------------------------------------------------------- what a log says
+    # -------------------------------------------------------- the log
 
     def _at(self, record: Record) -> int:
         return int(record["at_us"]) - self._flown.start_us
@@ -127,10 +127,10 @@ class RuntimeChecks:
 
     @property
     def _bound_us(self) -> int:
-        """How long after its cause a reaction of the loop may come."""
+        """The greatest delay of the loop's reaction."""
         return self._flown.wait_us + 2 * self._flown.tick_us
 
-    # -------------------------------------------------------- what really was
+    # -------------------------------------------------------- the true state
 
     def _between(self, from_us: int, to_us: int) -> Sequence[TruthSample]:
         low = max(bisect_left(self._times, from_us) - 1, 0)
@@ -151,7 +151,7 @@ class RuntimeChecks:
         return False
 
     def _delayed_us(self, at_us: int) -> int:
-        """How long ago what is told now may have been."""
+        """Return the greatest age of a report at a time."""
         late = (faults.LinkFault, faults.StaleSource, faults.Stall, faults.HostStall, faults.MessageSilence)
         return _LATER_US + (8_000_000 if self._during(at_us - 8_000_000, at_us, *late) else 0)
 
@@ -159,7 +159,7 @@ class RuntimeChecks:
         sample = self._sample(at_us)
         return sample.crashed or sample.taken_over_us is not None
 
-    # -------------------------------------------------------- effects are what is seen
+    # -------------------------------------------------------- effects
 
     def _succeeded(self, flights: Sequence[LoggedCommand]) -> Iterator[JudgedFailure]:
         for flight in flights:
@@ -174,8 +174,8 @@ class RuntimeChecks:
             if any(sample.crashed for sample in seen) or any(self._is_so(flight, sample) for sample in seen):
                 continue
             sample = self._sample(at_us)
-            what = "it landed" if flight.how == "landed" else f"a `{flight.motion.name.lower()}` succeeded"
-            text = f"{what}, and it was {sample.up_mm / 1000:.1f} m up at "
+            what = "landed" if flight.how == "landed" else f"`{flight.motion.name.lower()}` succeeded"
+            text = f"logged as {what}, but the vehicle was {sample.up_mm / 1000:.1f} m up at "
             yield JudgedFailure("untrue", at_us, text + f"{sample.speed_mm_s / 1000:.1f} m/s")
 
     def _is_so(self, flight: LoggedCommand, sample: TruthSample) -> bool:
@@ -196,7 +196,7 @@ class RuntimeChecks:
         return local_mm(self._flown.policy, sample.latitude, sample.longitude)
 
     def _told(self, life: Life) -> Iterator[JudgedFailure]:
-        """A place, height or charge was taken over, and was nowhere near the truth since it is said to be measured."""
+        """Check that received places, heights and charges are near the truth at some time since their measurement."""
         found: dict[str, list[tuple[float, int]]] = {}
         for turn in life.turns[::3]:
             if self._before(turn.at_us, *_DECEIVES, faults.EstimatorUnhealthy):
@@ -208,12 +208,11 @@ class RuntimeChecks:
             off, at_us = max(all_off)
             if len(all_off) >= 3:
                 much = f"{off / 100:.1f} %" if what == "charge" else f"{off / 1000:.1f} m"
-                was = "where" if what == "place" else "what"
-                text = f"a {what} was heard that is {much} from {was} it was since it was measured"
+                text = f"a received {what} differs by {much} from the truth since its measurement"
                 yield JudgedFailure("untrue", at_us, text, round(off))
 
     def _off(self, heard: HeardReadings, at_us: int) -> Iterator[tuple[str, float]]:
-        """What was heard that is too far off, and how far, in mm or 1/10000."""
+        """Yield the readings with too large an error, and the error, in mm or 1/10000."""
         vehicle, values = self._flown.policy.vehicle, dict(heard.values)
         x, y = values.get(vehicle.position), values.get(vehicle.position + 1)
         height, charge = values.get(vehicle.height), values.get(vehicle.battery)
@@ -228,14 +227,14 @@ class RuntimeChecks:
                 yield "place", off
         if height is not None and (off := min(abs(height - each.up_mm) for each in samples)) > _TOLD_UP_MM:
             yield "height", off
-        if charge is not None:  # it comes without a time of its own
+        if charge is not None:  # charges have no time stamp
             since = self._between(at_us - self._delayed_us(at_us), at_us)
             off = min(abs(charge - each.battery) for each in since)
             if off > _TOLD_CHARGE:
                 yield "charge", off
 
     def _stops(self, flights: Sequence[LoggedCommand]) -> Iterator[JudgedFailure]:
-        """From the first frame of a stop that got there: so long later it is slower."""
+        """Check that the vehicle slows down after the first frame of a stop that reached it."""
         after_us = (self._flown.policy.vehicle.reaction_us or 1_000_000) + _STOPS_US
         heard = [(frame.sent_us, frame.heard_us) for frame, _ in self._motion if frame.heard_us is not None]
         for flight in flights:
@@ -249,26 +248,26 @@ class RuntimeChecks:
                 yield from self._slows(heard_us, heard_us + after_us)
 
     def _slows(self, at_us: int, then_us: int) -> Iterator[JudgedFailure]:
-        """Whoever hears a stop, and is disturbed by nothing, is slower then."""
+        """Check that an undisturbed vehicle slows down after a stop."""
         if self._is_others(then_us) or self._before(then_us, *_DECEIVES, *_DISTURBS):
             return
         fast, left = self._sample(at_us).speed_mm_s, self._sample(then_us).speed_mm_s
         if fast >= _FAST_MM_S and left > max(fast - _LOST_MM_S, _SLOW_MM_S):
-            text = f"told to stop at {fast / 1000:.1f} m/s, and {left / 1000:.1f} m/s are left"
+            text = f"a stop at {fast / 1000:.1f} m/s left {left / 1000:.1f} m/s"
             yield JudgedFailure("no-stop", then_us, text, left)
 
     def _unheard(self, flight: LoggedCommand) -> Iterator[JudgedFailure]:
-        """A stop of which nothing got there, though it would have in the end, was not said again."""
+        """Check that a stop that did not reach the vehicle was sent again while the link worked."""
         ends_us = flight.until_us
         if ends_us is None or ends_us - flight.since_us < _AGAIN_US or self._is_others(ends_us):
             return
         deaf = (faults.LinkFault, faults.Stall, faults.Reboot, faults.HostStall, faults.MessageSilence)
         sent = any(flight.since_us <= frame.sent_us < ends_us for frame, _ in self._motion)
         if sent and not self._during(ends_us - _AGAIN_US, ends_us, *deaf):
-            yield JudgedFailure("no-stop", ends_us, "no stop got to the vehicle, and none was sent again")
+            yield JudgedFailure("no-stop", ends_us, "no stop reached the vehicle, and none was sent again")
 
     def _left(self) -> Iterator[JudgedFailure]:
-        """Whoever hears it, and is heard, and still has it, does not leave it in the air."""
+        """Check that the run did not end with the vehicle in the air although it had control and a working link."""
         flown = self._flown
         last, ended_us = flown.samples[-1], flown.ended_us
         if not last.in_air or self._is_others(last.at_us):
@@ -277,7 +276,7 @@ class RuntimeChecks:
             return
         deaf = (faults.LinkFault, faults.Stall, faults.Reboot, faults.HostStall, faults.MessageSilence, faults.Freeze)
         if not self._during(ended_us - _HELD_OUT_US, ended_us, *deaf):
-            yield JudgedFailure("not-ended", ended_us, f"the run ended ({flown.ending}), and left it in the air")
+            yield JudgedFailure("not-ended", ended_us, f"the run ended as `{flown.ending}` with the vehicle in the air")
 
     # -------------------------------------------------------- supervision
 
@@ -297,13 +296,13 @@ class RuntimeChecks:
             yield from self._ignored(life, step, watched.sure, waited)
         for step, watched in zip(steps, early, strict=True):
             if step.how == "violated" and watched.doubtful is None and watched.looked_us == step.until_us:
-                text = f"{step_words(step.step)} was broken off, and as heard holds: {step.detail}"
+                text = f"{step_words(step.step)} was aborted, but by the readings this holds: {step.detail}"
                 yield JudgedFailure("needless", watched.looked_us, text)
 
     def _supervised(
         self, life: Life, decision: Record, steps: Sequence[LoggedCommand], silences: Sequence[Span]
     ) -> Sequence[RunningStep]:
-        """What the steps rest on, by what was heard; nothing is judged in the silences."""
+        """Supervise the steps by the readings; nothing is judged in the silences."""
         policy, mission, start_us = self._flown.policy, self._flown.mission, self._flown.start_us
         ahead_us = start_us + decision["utc_us"] - decision["at_us"]
         watched = [RunningStep(policy, mission, each.step, (each.since_us, each.until_us), silences) for each in steps]
@@ -313,22 +312,22 @@ class RuntimeChecks:
     def _ignored(
         self, life: Life, step: LoggedCommand, broken: tuple[int, str] | None, silences: Sequence[Span]
     ) -> Iterator[JudgedFailure]:
-        """What a step rests on broke, and it went on for longer than a turn or two."""
+        """Check that a step was aborted within a turn or two after a condition failed."""
         if broken is None:
             return
         (at_us, what), bound_us = broken, self._bound_us
         if (life.ended_us if step.until_us is None else step.until_us) <= at_us + bound_us:
             return
-        # what answers nothing is not recorded as a silence, and counts for no time limit either
+        # an unanswered link is not recorded as a silence, but does not count for the duration either
         mute = what.startswith(DURATION) and self._before(at_us, faults.LinkFault, faults.Stall)
         silent = any(since_us <= at_us + 2 * bound_us and at_us <= until_us for since_us, until_us in silences)
         if not mute and not silent:
-            end = "it went on" if step.until_us is None else f"it ended {(step.until_us - at_us) / 1e6:.2f} s later"
-            yield JudgedFailure("not-watched", at_us, f"{step_words(step.step)} rests on `{what}`, and {end}")
+            end = "did not end" if step.until_us is None else f"ended {(step.until_us - at_us) / 1e6:.2f} s later"
+            yield JudgedFailure("not-watched", at_us, f"{step_words(step.step)} violated `{what}` and {end}")
 
     def _silences(self, records: Sequence[Record]) -> Iterator[tuple[int, int, int]]:
-        """From when a link was lost, or the computer stood still, until state was judged again, and for how long after
-        that what was not reported yet may still be waited for.
+        """Yield the intervals from a lost link or a stall until fresh state, each with the time after it in which the
+        runtime may still wait for missing reports.
         """
         since_us: int | None = None
         back_us = 0
@@ -369,15 +368,15 @@ class RuntimeChecks:
                     yield from self._hasty(record, records)
 
     def _denied(self, record: Record, later: Sequence[Record]) -> Iterator[JudgedFailure]:
-        """Nothing that a denied step says itself is listened to."""
+        """Check that a denied step does not use its own fallback."""
         if record["kind"] == STEP and record["outcome"] == "deny":
             asked = next((each for each in later if each["type"] == "decision"), None)
             if asked is not None and asked["kind"] == FALLBACK_LINK:
-                text = f"{step_words(record['step'])} was denied, and its own fallback was asked for"
+                text = f"{step_words(record['step'])} was denied, but its own fallback was used"
                 yield JudgedFailure("chain", self._at(record), text)
 
     def _went_on(self, records: Sequence[Record]) -> Iterator[JudgedFailure]:
-        """Nothing is decided or sent after a takeover or a crash was told."""
+        """Check that no decision or dispatch follows a reported takeover or crash."""
         told: Record | None = None
         for record in records:
             effect = record["type"] == "effect"
@@ -385,12 +384,12 @@ class RuntimeChecks:
                 told = told or record
             elif told is not None and (record["type"] == "decision" or (effect and record["event"] == "dispatched")):
                 yield JudgedFailure(
-                    "went-on", self._at(record), f"it went on, though `{told['event']}: {told['detail']}`"
+                    "went-on", self._at(record), f"the run continued after `{told['event']}: {told['detail']}`"
                 )
                 return
 
     def _first(self, asked: Record) -> Iterator[JudgedFailure]:
-        """The first link that a chain begins with is the first that could fly."""
+        """Check that a fallback begins with the first possible link."""
         now = Now(asked["at_us"], asked["utc_us"], asked["utc_error_us"])
         said, policy = asked["state"], self._flown.policy
         monitors = [_TRUTHS[truth] for truth in said.get("monitors", ())]
@@ -399,13 +398,13 @@ class RuntimeChecks:
         if link is None or link == asked["link"] or situation.doubtful:
             return
         of = step_words(asked["step"])
-        text = f"the fallback of {of} begins with link {asked['link']}, and {link} could fly"
+        text = f"the fallback of {of} begins with link {asked['link']}, but link {link} is possible"
         yield JudgedFailure("chain", self._at(asked), text)
 
     def _recalled(
         self, at_us: int, flights: Sequence[LoggedCommand], records: Sequence[Record]
     ) -> Iterator[JudgedFailure]:
-        """A step that goes nowhere near home ends at once."""
+        """Check that a recall or cancellation ends a step at once, unless the step lands or returns."""
         bound_us = self._bound_us
         silent = any(
             since_us <= at_us + bound_us and at_us <= until_us for since_us, until_us, _ in self._silences(records)
@@ -415,29 +414,29 @@ class RuntimeChecks:
                 continue
             if flight.since_us <= at_us and flight.until_us is not None and flight.until_us > at_us + bound_us:
                 lasted_s = (flight.until_us - at_us) / 1e6
-                text = f"{step_words(flight.step)} went on for {lasted_s:.1f} s after it was called off"
+                text = f"{step_words(flight.step)} continued for {lasted_s:.1f} s after it was called off"
                 yield JudgedFailure("chain", at_us, text)
 
     def _stranded(self, record: Record, flights: Sequence[LoggedCommand]) -> Iterator[JudgedFailure]:
-        """The last link was tried as often as may be."""
+        """Check that the last link was tried often enough."""
         last = len(self._flown.policy.contingency) - 1
         tried = sum(each.kind == CONTINGENCY_LINK and each.link == last for each in flights)
         if tried < 1 + _TRIES:
-            yield JudgedFailure("chain", self._at(record), f"given up after the last link was tried {tried} times")
+            yield JudgedFailure("chain", self._at(record), f"gave up after {tried} tries of the last link")
 
     def _hasty(self, record: Record, records: Sequence[Record]) -> Iterator[JudgedFailure]:
-        """Fresh state is waited for as long as it may still come."""
+        """Check that the runtime waited long enough for fresh state."""
         before = [each for each in records if each["type"] == "effect" and each["at_us"] <= record["at_us"]]
         backs = [each for each in before if each["event"] in ("link-back", _STOOD_STILL)]
         ends = [each for each in before if each["event"] in ("fresh", "not-fresh") and each is not record]
         in_this = [each for each in backs if not ends or each["at_us"] > ends[-1]["at_us"]]
         if len(in_this) == 1 and record["at_us"] - in_this[0]["at_us"] < _FRESH_US:
-            yield JudgedFailure("chain", self._at(record), f"fresh state was not waited for: {record['detail']}")
+            yield JudgedFailure("chain", self._at(record), f"did not wait for fresh state: {record['detail']}")
 
     # -------------------------------------------------------- releases and records
 
     def _released(self, records: Sequence[Record]) -> Iterator[JudgedFailure]:
-        """A step is released by the end of the one before it, and by nothing else."""
+        """Check that each step was released by the end of the step before."""
         released: int | None = None
         for record in records:
             if record["type"] == "effect":
@@ -448,11 +447,11 @@ class RuntimeChecks:
                 given = record["context"]["released_us"]
                 if given != released:
                     late_s = (given - released) / 1e6
-                    text = f"{step_words(record['step'])} counts as released {late_s:.1f} s later than it was"
+                    text = f"{step_words(record['step'])} was released {late_s:.1f} s after the step before ended"
                     yield JudgedFailure("release", self._at(record), text, abs(given - released))
 
     def _recorded(self, life: Life, records: Sequence[Record]) -> Iterator[JudgedFailure]:
-        """What only steps send leaves after the record of the last such step's decision was kept."""
+        """Check that a frame that only a step sends was sent after the record of its decision was stored."""
         allowed = list(self._allowed(life, records))
         decided = [decided_us for decided_us, _, _ in allowed]
         only_steps = _ONLY_STEPS - self._kinds_of_links()
@@ -462,19 +461,19 @@ class RuntimeChecks:
             at = bisect_right(decided, frame.sent_us) - 1
             _, kept_us, kind = allowed[at] if at >= 0 else (0, frame.sent_us + 1, MotionKind.HOLD)
             if kept_us > frame.sent_us or kind not in parts:
-                text = "a frame of a step was sent before the record of its decision was kept"
+                text = "a frame of a step was sent before the record of its decision was stored"
                 yield JudgedFailure("unrecorded", frame.sent_us, text)
                 return
 
     def _allowed(self, life: Life, records: Sequence[Record]) -> Iterator[tuple[int, int, MotionKind]]:
-        """When a step was allowed, when the record of that was kept, and what then flies."""
+        """Yield the time of each allowed step, the time its record was stored, and its motion."""
         for record, kept_us in zip(records, life.kept_us, strict=False):
             if record["type"] == "decision" and record["kind"] == STEP and record["outcome"] == "allow":
                 kind = self._flown.mission.invocations[record["step"]].contract.motion.kind
                 yield self._at(record), kept_us, MotionKind(kind)
 
     def _kinds_of_links(self) -> set[int]:
-        """What the links of all chains fly, and the targets of rules."""
+        """Return the motions of all fallback links and rule targets."""
         policy = self._flown.policy
         links = [*policy.contingency, *(link for contract in policy.contracts for link in contract.fallback)]
         links += [rule.target for rule in policy.rules if rule.target is not None]

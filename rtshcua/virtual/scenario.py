@@ -1,11 +1,11 @@
-"""Flies one flight of a scenario: what goes wrong goes wrong when the scenario says so, in virtual time.
+"""Fly one flight of a scenario in virtual time, with its incidents.
 
-The same arguments give the same flight, byte by byte. Where a scenario leaves a time open, incident `number` (from 0)
-happens after a delay that `Random(f"{scenario.name} {number} {seed}")` draws from its range. What a killed process
-loses, and what babble says, is drawn from the same source afterwards.
+The same arguments give the same flight, byte for byte. For a range of times, `Random(f"{scenario.name} {number}
+{seed}")` draws the delay of incident `number` (from 0); the same source then draws the content of babble. A similar
+source draws what a killed process loses.
 
-What goes wrong with the vehicle, its link and its surroundings is the simulation's affair, to its tick. What goes wrong
-with our own computer and with those who hand in documents happens here, between two turns of the loop.
+Faults of the vehicle, its link and its surroundings are injected into the simulation. Faults of the host computer and
+documents from agents take place here, between two turns of the loop.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -64,31 +64,31 @@ from rtshcua.wire.untrusted import Untrusted
 
 
 class Due(NamedTuple):
-    """An incident, by its number, and when it is to happen, in us since the start of the run."""
+    """An incident, by its number, and its time, in us since the start of the run."""
 
     number: int
     at_us: int
 
 
 class Triggers:
-    """What the incidents of a scenario wait for; `chances` is the source of what each of them draws."""
+    """The triggers of a scenario's incidents; `chances` are their random sources."""
 
     def __init__(self, scenario: Scenario, seed: int) -> None:
         self.chances = [Random(f"{scenario.name} {number} {seed}") for number in range(len(scenario.incidents))]
         self._whens = dict(enumerate(each.when for each in scenario.incidents))
 
     def begin(self, policy: PreparedPolicy) -> None:
-        """A process of the runtime begins, under this policy: what it knows, it has to hear first."""
+        """Reset the known state for a new process of the runtime under this policy."""
         self._policy = policy
         self._monitor = StateMonitor(policy)
         self._conditions: dict[int, Condition] = {}
 
     def start(self) -> Iterator[Due]:
-        """What waits for nothing but the time."""
+        """Yield the incidents that depend only on time."""
         yield from [self._due(number, 0) for number, when in list(self._whens.items()) if isinstance(when, AtTime)]
 
     def turned(self, now: Now, events: Sequence[Event], actions: Iterable[Action], at_us: int) -> Iterator[Due]:
-        """What waited for what came in a turn of the loop."""
+        """Yield the incidents triggered by a turn of the loop."""
         if not self._whens:
             return
         for action in actions:
@@ -107,7 +107,7 @@ class Triggers:
                 yield self._due(number, at_us)
 
     def _look(self, now: Now, events: Sequence[Event], at_us: int) -> Iterator[Due]:
-        """Which conditions are true in the state that the runtime knows."""
+        """Yield the incidents whose condition is true in the state known to the runtime."""
         monitor, policy = self._monitor, self._policy
         for event in events:
             if isinstance(event, Readings):
@@ -125,31 +125,31 @@ class Triggers:
                 yield self._due(number, at_us)
 
 
-#: how often what really is is noted, and the longest that the loop waits, in us
+#: the sampling interval of the true state, and the longest wait of the loop, in us
 SAMPLE_US: Final = 50_000
 WAIT_US: Final = 50_000
-#: A run that could not begin after a crash is begun anew after so long.
+#: the delay before a failed restart is repeated
 AGAIN_US: Final = 5 * SECOND
-#: how long a run may take, besides the time in the air and a wait for a silent vehicle
+#: the time limit of a run, in addition to twice the vehicle's endurance
 AROUND_US: Final = 1_800 * SECOND
-#: What `rtshcua run` waits for: a heartbeat, then word of whether the vehicle is in the air.
+#: the waits of `rtshcua run`: for a heartbeat, then for the landed state
 _HEARTBEAT_US: Final = 10 * SECOND
 _AIR_US: Final = 5 * SECOND
-#: After the last process, the vehicle is watched until it rests or stood still for so long, and at most this long.
+#: after the last process, the vehicle is observed until it rests or has hovered for the first time, at most the second
 STILL_US: Final = 5 * SECOND
 SETTLE_US: Final = 240 * SECOND
-#: mm/s: what noise and gusts make of a vehicle that stands still, level and upwards
+#: mm/s: the horizontal and vertical speed of a hovering vehicle with noise and gusts
 STILL_MM_S: Final = 700
 LEVEL_MM_S: Final = 300
-#: how long a document speaks that is handed in
+#: the validity of a submitted document
 _SPEAKS_US: Final = 300 * SECOND
 _LONGEST_BABBLE: Final = 400
 
 
 @dataclass(frozen=True, slots=True)
 class Keys:
-    """Who signs: the log, by role the people who approve (the first of all recalls), replacements. The trust root must
-    name them for that. A second person of a role answers where a rule asks two.
+    """The signing keys of the log, of the approvers by role (the first of all signs recalls) and of replacement
+    missions. The trust root must name them. The second person of a role answers if a rule requires two.
     """
 
     log: SigningKey
@@ -158,7 +158,7 @@ class Keys:
     boundary: SigningKey | None = None
 
     def session(self, number: int, before: bytes) -> BoundaryKey | None:
-        """What the boundary signs with in its session of this number; None where the root asks for nothing."""
+        """Return the boundary's key for a session; None if the root names no such key."""
         return None if self.boundary is None else BoundaryKey(self.boundary, number, before)
 
 
@@ -166,12 +166,11 @@ def fly(
     bundle: bytes, root: bytes, keys: Keys, scenario: Scenario, flavour: str, seed: int, *, utc_us: int | None = None,
     tick_us: int = SAMPLE_US, chosen: Callable[..., SimulationConfig] = fitting,
 ) -> ScenarioFlown:  # fmt: skip
-    """One flight of the bundle under the signed trust root, on the simulated autopilot `flavour`, with this seed.
+    """Fly the bundle once under the signed trust root, on the simulated autopilot `flavour`, with this seed.
 
-    `chosen` makes the simulated vehicle, as `fitting` does, for a policy and what is asked of it. The `fault` of what
-    was flown tells of an exception that comes out of a run, and of a run that has not ended after `AROUND_US` and twice
-    the time that the vehicle can fly, for a silent one is waited for as long. Raises ValueError for a bundle that is
-    refused, and what `open_root` raises.
+    `chosen` makes the configuration of the simulated vehicle, as `fitting` does. An exception of a run, or a run that
+    has not ended after twice the vehicle's endurance plus `AROUND_US` (as long as a run waits for a silent vehicle), is
+    recorded in `fault`. Raise ValueError for a refused bundle, and whatever `open_root` raises.
     """
     return _Flight(bundle, root, keys, scenario, flavour, seed, utc_us, tick_us, chosen).fly()
 
@@ -181,12 +180,12 @@ class _Killed(Exception):
 
 
 class _Sink(MemorySink):
-    """Evidence in memory of a process that may be killed: it knows when each line was kept."""
+    """Evidence of a process that may be killed, in memory, with the time at which each line was stored."""
 
     def __init__(self, clock: VirtualClock, *, full: bool) -> None:
         super().__init__()
         self.full = full
-        self.written = 0  # lines that were kept before the last turn
+        self.written = 0  # lines stored before the last turn
         self.kept_us: list[int] = []
         self._clock = clock
         self._lateness = Lateness()
@@ -208,19 +207,19 @@ class _Sink(MemorySink):
 
 
 class _Watched(Simulation):
-    """The simulation, with what really is noted as time goes, and what it received."""
+    """The simulation, with samples of its true state and a record of received frames."""
 
     def __init__(self, config: SimulationConfig) -> None:
         super().__init__(config)
         self.samples: list[TruthSample] = []
         self.frames: list[SentFrame] = []
-        self._sent: dict[bytes, int] = {}  # the number of the last frame of these octets
-        self._come: dict[bytes, int] = {}  # and of what the autopilot has not got to
+        self._sent: dict[bytes, int] = {}  # the index of the last sent frame with these octets
+        self._come: dict[bytes, int] = {}  # the index of received frames that the autopilot has not handled
         self._due_us = 0
         self.heard, self.obeyed = self._hear, self._get_to
 
     def send(self, frame: bytes) -> bool:
-        """Note that a frame is sent; that none is lost by us."""
+        """Record a sent frame; return False: it is not dropped here."""
         self._sent[frame] = len(self.frames)
         self.frames.append(SentFrame(self._now_us, None, frame))
         return False
@@ -237,7 +236,7 @@ class _Watched(Simulation):
             self.frames[number] = self.frames[number]._replace(obeyed_us=at_us)
 
     def advance(self, to_us: int) -> list[bytes]:
-        """As the simulation does it, and no sample is left out."""
+        """Advance as the simulation does, and take every sample."""
         datagrams: list[bytes] = []
         while True:
             until_us = max(min(to_us, self._due_us), self._now_us)
@@ -262,7 +261,7 @@ class _Watched(Simulation):
 
 
 class _Flight:
-    """One flight of a scenario: one simulated vehicle, and one process of the runtime after the other."""
+    """One flight of a scenario: one simulated vehicle, and one or more processes of the runtime in turn."""
 
     def __init__(
         self, bundle: bytes, root: bytes, keys: Keys, scenario: Scenario, flavour: str, seed: int, utc_us: int | None,
@@ -271,16 +270,16 @@ class _Flight:
         self._bundle, self._root, self._keys, self._scenario = bundle, root, keys, scenario
         self._flavour, self._seed, self._tick_us = flavour, seed, tick_us
         self._configs: list[SimulationConfig] = []
-        self._stepped_us = 0  # by how much the machine's time of day was set
-        self._full_until_us: int | None = 0  # None: for good
+        self._stepped_us = 0  # the total step of the machine's time of day
+        self._full_until_us: int | None = 0  # None: forever
         self._slow_until_us = 0
         self._lives: list[Life] = []
         self._happened: list[IncidentOccurrence] = []
         self._notes: list[str] = []
         self._triggers = Triggers(scenario, seed)
-        self._agenda: list[tuple[int, int]] = []  # when, and the number of what happens to host or documents
+        self._agenda: list[tuple[int, int]] = []  # times and numbers of incidents of the host and of agents
         self._dead_us = 0
-        self._babble: list[tuple[int, int, bytes]] = []  # when, its order, and what is said then
+        self._babble: list[tuple[int, int, bytes]] = []  # times, order and documents
         self._drawn = 0
 
         apart = any(isinstance(each.fault, faults.BoundaryKilled) for each in scenario.incidents)
@@ -296,7 +295,7 @@ class _Flight:
             sink=lambda clock: _Sink(clock, full=False), boundary=keys.session(1, START_DIGEST), mode=self._mode,
         )  # fmt: skip
         self._most_us = 2 * self._flight.loaded.bundle.policy.vehicle.endurance_us + AROUND_US
-        self._kept = self._flight.loaded.attestation.digest  # of the boundary's own evidence, as its store has it
+        self._kept = self._flight.loaded.attestation.digest  # of the boundary's own evidence, as stored
         self._world = self._watch(self._flight.vehicle)
         self._utc_us = self._flight.clock.now().utc_us
         self._began_us = 0
@@ -324,7 +323,7 @@ class _Flight:
         vehicle.simulation = world
         vehicle.lose = world.send
 
-    # -------------------------------------------------------- what happens when
+    # -------------------------------------------------------- incidents
 
     def _schedule(self, due: Iterable[Due]) -> None:
         for number, at_us in due:
@@ -344,14 +343,14 @@ class _Flight:
         self._heard_us = flight.clock.elapsed_us
         self._triggers.begin(flight.loaded.policy)
         self._steps = StepWatch(self._machine_us)
-        flight.loop._watch = self._stepped  # the flight's own only counts
+        flight.loop._watch = self._stepped  # replaces the flight's own counter
 
     def _machine_us(self) -> tuple[int, int]:
         clock = self._flight.clock
         return clock.monotonic_us, self._utc_us + clock.elapsed_us + self._stepped_us
 
     def _stepped(self, now: Now, events: Sequence[Event], actions: Sequence[Action]) -> None:
-        """What a turn of the loop did."""
+        """Record a turn of the loop."""
         at_us = self._flight.clock.elapsed_us
         heard = tuple([HeardReadings(event.at_us, event.values) for event in events if isinstance(event, Readings)])
         self._turns.append(Turn(now.monotonic_us - START.monotonic_us, heard))
@@ -361,10 +360,10 @@ class _Flight:
         self._schedule(self._triggers.turned(now, events, actions, at_us))
         self._heard_us = at_us
 
-    # -------------------------------------------------------- one process after the other
+    # -------------------------------------------------------- processes
 
     def fly(self) -> ScenarioFlown:
-        """Fly until the last process ended and the vehicle rests, or holds."""
+        """Fly until the last process has ended and the vehicle rests or hovers."""
         left: str | None = None
         fault: str | None = None
         also: list[Event] = []
@@ -378,7 +377,7 @@ class _Flight:
                 also, left = self._restart()
                 if left is not None:
                     break
-        except Exception as error:  # noqa: BLE001  whatever comes out of the runtime is what is looked for
+        except Exception as error:  # noqa: BLE001  any exception of the runtime is a finding
             fault = "".join(format_exception(error))
             self._bury(lost=False)
         ended_us = self._flight.clock.elapsed_us
@@ -386,12 +385,12 @@ class _Flight:
         return self._flown(ended_us, left, fault)
 
     def _live(self, also: list[Event]) -> None:
-        """Turn by turn until the end. Raises `_Killed`, and TimeoutError for a run that does not end."""
+        """Run turns until the end. Raise `_Killed`, or TimeoutError for a run that does not end."""
         flight = self._flight
         while True:
             if flight.clock.elapsed_us >= self._most_us:
                 raise TimeoutError(
-                    f"after {self._most_us // SECOND} s it flies still: {flight.runtime.view(flight.clock.now())}"
+                    f"no end after {self._most_us // SECOND} s: {flight.runtime.view(flight.clock.now())}"
                 )
             sink = self._check_disk()
             also += self._happen()
@@ -424,7 +423,7 @@ class _Flight:
         return until_us is None or self._flight.clock.elapsed_us < until_us
 
     def _happen(self) -> list[Event]:
-        """What happens now to the host, and the documents that are handed in now."""
+        """Apply due incidents of the host, and return the documents submitted now."""
         events: list[Event] = []
         clock = self._flight.clock
         while self._agenda and self._agenda[0][0] <= clock.elapsed_us:
@@ -436,7 +435,7 @@ class _Flight:
             if isinstance(fault, AgentFault):
                 documents = list(self._documents(number, fault))
                 if not documents:
-                    self._happened[-1] = happened._replace(note="nothing of the mission asks for it")
+                    self._happened[-1] = happened._replace(note="no step of the mission requires it")
                 self._present(fault, documents)
             else:
                 self._hurt(fault)
@@ -446,14 +445,14 @@ class _Flight:
         return events
 
     def _present(self, fault: AgentFault, documents: Sequence[bytes]) -> None:
-        """All at once; babble comes one document a tick."""
+        """Submit documents at once; babble comes one document per tick."""
         apart_us = self._tick_us if isinstance(fault, faults.Babble) else 0
         for count, document in enumerate(documents):
             self._drawn += 1
             heappush(self._babble, (fault.at_us + count * apart_us, self._drawn, document))
 
     def _hurt(self, fault: Fault) -> None:
-        """What goes wrong with the computer that the runtime runs on."""
+        """Apply a fault of the host computer."""
         match fault:
             case faults.RuntimeKilled(_, for_us):
                 self._dead_us = for_us
@@ -472,10 +471,10 @@ class _Flight:
                 self._stepped_us += by_us
 
     def _bury(self, *, lost: bool) -> None:
-        """Keep what the process leaves behind, and end its log as the next run does.
+        """Keep the log of a dead process, recovered as the next run would.
 
         A process that is killed between two turns may have been writing: in half of the cases the last line of its last
-        turn is torn, or one that it was about to write where that turn wrote none.
+        turn is truncated, or the beginning of a new line is added if that turn wrote none.
         """
         flight, sink = self._flight, self._flight.sink
         assert isinstance(sink, _Sink)
@@ -488,7 +487,7 @@ class _Flight:
         self._lives.append(self._life(None, recovered))
 
     def _life(self, ending: str | None, lines: tuple[bytes, ...]) -> Life:
-        """The process that ends now."""
+        """Return the record of the process that ends now."""
         sink = self._flight.sink
         assert isinstance(sink, _Sink)
         return Life(
@@ -502,29 +501,29 @@ class _Flight:
         kept = [line for line in lines if examination.take(line)]
         found = examination.examined()
         if found.state not in RECOVERABLE:
-            self._notes.append(f"a log was found `{found.state.value}`, and is not recovered")
+            self._notes.append(f"a log is `{found.state.value}` and cannot be recovered")
             return tuple(lines)
         draw = partial(int.to_bytes, 1 << 128 | len(self._lives), 32)
         tail = ending(found, now, lambda text: key.sign(text, duty=Duty.LOG), key.public, draw)
         return (*kept, *tail.splitlines(keepends=True))
 
     def _restart(self) -> tuple[list[Event], str | None]:
-        """Begin a run after the one that was killed, as `rtshcua run` does: what it heard, or why there is none."""
+        """Start the next run as `rtshcua run` does; return its first events, or why no run was started."""
         while True:
             self._world.advance(self._flight.clock.elapsed_us + self._dead_us)
             self._flight.clock.elapsed_us += self._dead_us
             self._skip()
             if self._flight.clock.elapsed_us >= self._most_us:
-                return [], "it was not begun in all that time"
+                return [], "no run could be started in time"
             events, why = self._meet()
             truth = self._world.truth()
             if why is None or not (truth.in_air or truth.armed):
                 return events, why
-            self._notes.append(f"a run did not begin: {why}")
+            self._notes.append(f"a run was not started: {why}")
             self._dead_us = AGAIN_US
 
     def _skip(self) -> None:
-        """What should have happened to a process while there was none, has not; but the disk and the clock go on."""
+        """Skip due incidents of a process that did not exist; faults of the disk and the clock still apply."""
         clock = self._flight.clock
         while self._agenda and self._agenda[0][0] <= clock.elapsed_us:
             at_us, number = heappop(self._agenda)
@@ -536,11 +535,13 @@ class _Flight:
         self._babble = []
 
     def _meet(self) -> tuple[list[Event], str | None]:
-        """A new process hears the vehicle, and begins if that flies; what it heard, or why it does not begin."""
+        """Let a new process listen to the vehicle and start a run if it flies; return its events, or why it did not
+        start.
+        """
         before = self._flight
         clock = VirtualClock(Now(START.monotonic_us, self._utc_us + self._stepped_us, START.utc_error_us))
         clock.elapsed_us = before.clock.elapsed_us
-        self._world.advance(clock.elapsed_us)  # what was said before it listened, nobody heard
+        self._world.advance(clock.elapsed_us)  # frames from before it listened are lost
         bundle = before.loaded.bundle
         policy = bundle.policy
         vehicle = VirtualVehicle(
@@ -581,7 +582,7 @@ class _Flight:
         return events, None
 
     def _settle(self, since_us: int) -> None:
-        """Nobody commands any more: watch until the vehicle rests, disarmed, or stood still in the air for a while."""
+        """Observe the vehicle without commands until it rests disarmed or has hovered for a while."""
         world, still_us = self._world, since_us
         while world.now_us < since_us + SETTLE_US:
             truth = world.truth()
@@ -620,7 +621,7 @@ class _Flight:
     # -------------------------------------------------------- documents
 
     def _documents(self, number: int, fault: AgentFault) -> Iterator[bytes]:
-        """What somebody hands in, signed or not."""
+        """Yield the documents of an agent's incident, signed or not."""
         loaded, utc_us = self._flight.loaded, self._flight.clock.now().utc_us
         match fault:
             case faults.Approval(_, role, copies):
@@ -635,7 +636,7 @@ class _Flight:
                 yield from self._babbled(loaded, utc_us, copies, self._triggers.chances[number])
 
     def _answers(self, loaded: Loaded, role: str, granted: int, utc_us: int) -> list[bytes]:
-        """Answers of a role to all that it is asked about."""
+        """Return the answers of a role to all requests for its approval."""
         bundle = loaded.bundle
         policy, vehicle = bundle.policy, bundle.policy.vehicle.identity
         if role not in policy.roles:
@@ -662,7 +663,7 @@ class _Flight:
         return sign_recall(said, anybody)
 
     def _replacement(self, loaded: Loaded) -> bytes:
-        """The mission in force, its steps after the present one under other ids."""
+        """Return a replacement with the mission in force, where later steps have new ids."""
         bundle = loaded.bundle
         present = self._flight.runtime.view(self._flight.clock.now()).step
         kept = min(present + 1, len(bundle.mission.invocations))
@@ -671,7 +672,7 @@ class _Flight:
         )
 
     def _babbled(self, loaded: Loaded, utc_us: int, copies: int, chance: Random) -> Iterator[bytes]:
-        """Random octets, and documents that were real before an octet of them was changed, lost or doubled."""
+        """Yield random octets, and real documents with a flipped bit, a truncation or repeated octets."""
         real = [self._recall(loaded, utc_us), self._replacement(loaded)]
         for role in loaded.bundle.policy.roles:
             real += self._answers(loaded, role, 1, utc_us)

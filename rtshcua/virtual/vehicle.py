@@ -1,4 +1,4 @@
-"""The simulated vehicle behind its real driver, in one process and explicit time: the `Vehicle` and `Clock` ports."""
+"""The `Vehicle` and `Clock` ports in virtual time: the simulated vehicle behind the real driver, in one process."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
@@ -16,19 +16,19 @@ from rtshcua.onboard.ports import Command, Event, Readings
 from rtshcua.simulation.config import SimulationConfig
 from rtshcua.simulation.world import Simulation
 
-#: as often as the simulation ticks itself
+#: the simulation's own tick
 TICK_US = 20_000
 SECOND = 1_000_000
-#: datagrams that a socket holds while nobody reads, as Linux comes (`net.core.rmem_max`); what comes then is lost
+#: datagrams that a socket buffers by default on Linux (`net.core.rmem_max`); later ones are lost
 MOST_WAITING = 500
-#: and how many of them are taken in by one poll
+#: how many of them one poll reads
 AT_ONCE = 256
-#: where the clock starts: a monotonic time that is not 0, and a UTC time
+#: the initial time: a monotonic time that is not 0, and a UTC time
 START = Now(7_000_000, 1_767_225_600_000_000, 1_000)
 
 
 class VirtualClock:
-    """Time that only moves when it is told to: `elapsed_us` since `start`."""
+    """A clock that only advances when `elapsed_us`, the time since `start`, is set."""
 
     def __init__(self, start: Now = START) -> None:
         self.elapsed_us = 0
@@ -42,18 +42,17 @@ class VirtualClock:
         return self.start_us + self.elapsed_us
 
     def now(self) -> Now:
-        """The present moment."""
+        """Return the current time."""
         start = self._start
         return Now(start.monotonic_us + self.elapsed_us, start.utc_us + self.elapsed_us, start.utc_error_us)
 
 
 class VirtualVehicle:
-    """Steps the simulation tick by tick; what would be datagrams are method calls.
+    """Steps the simulation tick by tick; method calls replace datagrams.
 
-    `received` and `sent` count frames. `lose` decides for each frame to the vehicle whether it is lost, `hurt`, if it
-    is set, gives the bytes that come in place of a datagram from it. Without the `frames` of an executor, whatever is
-    begun counts as permitted. `verifier`, `fence`, `manoeuvres` and `steps` are the driver's. Every `tick_us` it hears
-    what was said since.
+    `received` and `sent` count frames. `lose` decides whether a frame to the vehicle is lost; `hurt`, if set, returns
+    the datagrams that replace one from the vehicle. Without the `frames` of an executor every command counts as
+    permitted. `verifier`, `fence`, `manoeuvres` and `steps` are the driver's. Frames are read every `tick_us`.
     """
 
     def __init__(
@@ -74,13 +73,13 @@ class VirtualVehicle:
         self._waiting: list[bytes] = []
 
     def stand_still(self, for_us: int) -> None:
-        """Let time pass in which nobody reads: what is said waits for the next poll, as far as there is room for it."""
+        """Advance without reading: datagrams wait in the buffer for the next poll."""
         self.clock.elapsed_us += for_us
         self._waiting += self.simulation.advance(self.clock.elapsed_us)
         del self._waiting[MOST_WAITING:]
 
     def poll(self, now_us: int, timeout_us: int) -> Sequence[Event]:
-        """Let time pass, at most `timeout_us`; comes back early for anything but readings."""
+        """Advance by at most `timeout_us`; return early for any event except readings."""
         events, self._pending = self._pending, []
         if self._waiting:
             waiting, self._waiting = self._waiting[:AT_ONCE], self._waiting[AT_ONCE:]
@@ -119,7 +118,7 @@ class VirtualVehicle:
         self._pending += events
 
     def release(self) -> None:
-        """Let go of the vehicle: nothing more is sent for a command."""
+        """Release the vehicle: send no more frames for a command."""
         self.driver.release()
 
     def announce(self, severity: int, text: str) -> None:
@@ -127,7 +126,7 @@ class VirtualVehicle:
         self.driver.announce(severity, text)
 
     def expect(self, steps: Sequence[Invocation]) -> None:
-        """Ask for reports as often as these steps need them."""
+        """Request reports at the rates that these steps need."""
         self.driver.expect(steps)
 
     def _send(self, frames: Sequence[bytes], events: list[Event]) -> None:
@@ -136,7 +135,7 @@ class VirtualVehicle:
             if self.lose(frame):
                 continue
             answers = self.simulation.receive(frame, self.clock.elapsed_us)
-            if self._waiting:  # what is said now comes behind
+            if self._waiting:  # new datagrams queue after the waiting ones
                 self._waiting = (self._waiting + answers)[:MOST_WAITING]
             else:
                 self._take(answers, events)

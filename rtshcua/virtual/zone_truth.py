@@ -1,4 +1,4 @@
-"""Zones for the judge, in floating point: how far inside one a place is, and whether one exists at a time."""
+"""Zone geometry and times for the judge, in floating point."""
 
 from collections.abc import Sequence
 from functools import cache, lru_cache
@@ -10,7 +10,7 @@ from rtshcua.model.flat.limits import DAY, WEEK
 from rtshcua.model.flat.policy import Policy, VehicleLimits
 from rtshcua.model.flat.zone import CIRCLE, POLYGON, SHIFT, Zone
 
-#: True, False, or None where the local time is not known: those that are the answer at some moment
+#: the truths that occur at some moment: True, False, or None if the local time is unknown
 Answers = frozenset[bool | None]
 #: x0, y0, x1, y1 in mm
 Edge = tuple[int, int, int, int]
@@ -18,14 +18,14 @@ _SLACK_US = 1_000_000
 
 
 def inside_mm(zone: Zone, x: float, y: float, up: float) -> float:
-    """How far inside a zone a point is, in mm; negative: how far outside. x is east, y is north of home."""
+    """Return how far a point is inside a zone, in mm; negative outside. x is east, y is north of home."""
     level = level_mm(zone, x, y)
     height = min(zone.ceiling - up, up - zone.floor)
     return -hypot(level, height) if level < 0 and height < 0 else min(level, height)
 
 
 def level_mm(zone: Zone, x: float, y: float) -> float:
-    """The same, whatever the height."""
+    """Return how far a point is inside a zone horizontally, in mm; negative outside."""
     if zone.shape == CIRCLE:
         east, north, square = zone.data
         return sqrt(square) - hypot(x - east, y - north)
@@ -38,7 +38,7 @@ def level_mm(zone: Zone, x: float, y: float) -> float:
 
 
 def apart_mm(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> float:
-    """How far a point is from the line between two."""
+    """Return the distance of a point from a line segment."""
     dx, dy = bx - ax, by - ay
     square = dx * dx + dy * dy
     along = max(0.0, min(1.0, ((x - ax) * dx + (y - ay) * dy) / square)) if square else 0.0
@@ -46,11 +46,11 @@ def apart_mm(x: float, y: float, ax: float, ay: float, bx: float, by: float) -> 
 
 
 def edges(zone: Zone) -> tuple[Edge, ...]:
-    """The edges of all rings of a zone that is no circle."""
+    """Return the edges of all rings of a polygonal zone."""
     return _edges(zone.shape, zone.data)
 
 
-@lru_cache(maxsize=256)  # a flight asks for those of a few zones, thousands of times
+@lru_cache(maxsize=256)  # a flight needs the edges of a few zones, thousands of times
 def _edges(shape: int, data: tuple[int, ...]) -> tuple[Edge, ...]:
     counts, at = ((len(data) // 2,), 0) if shape == POLYGON else (data[1 : 1 + data[0]], 1 + data[0])
     found: list[Edge] = []
@@ -62,7 +62,7 @@ def _edges(shape: int, data: tuple[int, ...]) -> tuple[Edge, ...]:
 
 
 def local_mm(policy: Policy, latitude: int, longitude: int) -> tuple[float, float]:
-    """East and north of home, in mm, as the policy projects."""
+    """Return east and north of home, in mm, by the policy's projection."""
     projection = policy.projection
     scale = 1 / (1 << SHIFT)
     turned = (longitude - projection.longitude + 1_800_000_000) % 3_600_000_000 - 1_800_000_000
@@ -70,15 +70,15 @@ def local_mm(policy: Policy, latitude: int, longitude: int) -> tuple[float, floa
 
 
 class ZonesInForce(NamedTuple):
-    """The zones that must be kept, and those that must be kept out of."""
+    """The zones to stay inside, and those to stay outside of."""
 
     inside: tuple[Zone, ...]
     outside: tuple[Zone, ...]
 
 
 def in_force(policy: Policy, utc_us: int) -> ZonesInForce:
-    """The airspace's zones that are there at a time. Within a second of its first or last moment a zone is there if it
-    must be kept, and is not there if it must be kept out of: no clock is truer than that.
+    """Return the airspace's zones that exist at a time. Within a second of a zone's begin or end, an inclusion zone
+    counts as existing and an exclusion zone as absent, because no clock is more accurate.
     """
     if policy.airspace is None:
         return ZonesInForce((), ())
@@ -96,7 +96,7 @@ def in_force(policy: Policy, utc_us: int) -> ZonesInForce:
 
 
 def airspace_mm(there: ZonesInForce, x: float, y: float, up: float) -> float:
-    """How far inside the airspace a point is, in mm; negative: outside. Infinite where there is none."""
+    """Return how far a point is inside the airspace, in mm; negative outside, infinite without airspace."""
     return min(
         (
             *(inside_mm(zone, x, y, up) for zone in there.inside),
@@ -107,12 +107,12 @@ def airspace_mm(there: ZonesInForce, x: float, y: float, up: float) -> float:
 
 
 def is_timed(zone: Zone) -> bool:
-    """Whether a zone exists at some times only."""
+    """Return whether a zone exists only at some times."""
     return bool(zone.daily or zone.weekly or zone.dates)
 
 
 def exists(zone: Zone, vehicle: VehicleLimits, first_us: int, last_us: int) -> Answers:
-    """Whether a zone exists at the moments between two of UTC, both included."""
+    """Return whether a zone exists at the moments between two UTC times, inclusive."""
     found: Answers = frozenset({True})
     if zone.dates:
         start, end = zone.dates
@@ -127,19 +127,19 @@ def exists(zone: Zone, vehicle: VehicleLimits, first_us: int, last_us: int) -> A
 
 @cache
 def both(left: Answers, right: Answers) -> Answers:
-    """What the conjunction of two may be, whatever each of them is."""
+    """Return the possible truths of a conjunction."""
     return frozenset(False if False in (a, b) else None if None in (a, b) else True for a in left for b in right)
 
 
 def daily(start: int, end: int) -> tuple[int, ...]:
-    """The times of day from one to another, both included, as windows: from each until before the one after it."""
+    """Return the times of day from `start` to `end`, inclusive, as half-open windows."""
     after = min(end + 1, DAY)
     return (start, after) if start < after else (0, after, start, DAY) if after < start else (0, DAY)
 
 
 def shown(windows: Sequence[int], period: int, vehicle: VehicleLimits, first_us: int, last_us: int) -> Answers:
-    """Whether a clock on the wall shows a time in one of some windows of the day or the week, at the moments between
-    two of UTC; None: nobody knows what it shows.
+    """Return whether the local time is in one of the windows of the day or the week, at the moments between two UTC
+    times; None: the local time is unknown.
     """
     changes = {each for each in vehicle.offsets[::2] if first_us < each <= last_us}
     for offset in {_offset(vehicle, each) for each in (first_us, last_us, *changes)} - {None}:
@@ -162,7 +162,7 @@ def _shows(windows: Sequence[int], period: int, vehicle: VehicleLimits, utc_us: 
 
 
 def _offset(vehicle: VehicleLimits, utc_us: int) -> int | None:
-    """How far the local time is from UTC; None: that is not known."""
+    """Return the offset of local time from UTC; None if unknown."""
     if not vehicle.offsets:
         return vehicle.utc_offset_us
     moments = vehicle.offsets[::2]

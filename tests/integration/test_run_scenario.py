@@ -36,7 +36,7 @@ def test_a_scenario_happens_in_a_run_and_what_it_expects_is_told(
     (happened,) = [text for text in notes if text.startswith("the scenario: ")]
     assert happened.endswith("1 s after takeoff pilot_mode(mode = position)")
     assert [text for text in notes if text.startswith(("met: ", "NOT MET: "))] == [
-        "met: expect ends stood_down: it ended with `stood-down`",
-        "met: expect never hover: it flew takeoff",
-        "NOT MET: expect flies hover: it flew takeoff",
+        "met: expect ends stood_down: the run ended with `stood-down`",
+        "met: expect never hover: flown skills: takeoff",
+        "NOT MET: expect flies hover: flown skills: takeoff",
     ]

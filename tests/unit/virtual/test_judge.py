@@ -263,7 +263,7 @@ def pillar(at_us: int, speed_mm_s: int = 0) -> faults.Pillar:
 
 def test_a_collision(good: ScenarioFlown) -> None:
     assert slugs(judged(good, crash())) == ["collision"]
-    assert "flew into something" in judged(good, crash()).failures[0].text
+    assert "hit an obstacle" in judged(good, crash()).failures[0].text
     assert "too hard" in judged(good, crash(near_mm=None)).failures[0].text
     assert judged(good, crash()).margins.obstacle_mm == 0
 
@@ -604,7 +604,7 @@ def test_a_fault_of_the_runtime(good: ScenarioFlown) -> None:
 
 @pytest.mark.parametrize(
     ("signal", "by", "words"),
-    [("position", 5_000, "a place"), ("height", 2_000, "a height"), ("battery", 300, "a charge")],
+    [("position", 5_000, "place"), ("height", 2_000, "height"), ("battery", 300, "charge")],
 )
 def test_what_the_loop_is_given_is_compared_with_what_was(signal: str, by: int, words: str) -> None:
     was = once("judged-flight", lambda: flown(scenario()))
@@ -624,7 +624,7 @@ def test_what_the_loop_is_given_is_compared_with_what_was(signal: str, by: int, 
         if each.slug == "untrue"
     ]
     assert untrue
-    assert all(each.startswith(words) for each in untrue)
+    assert all(each.startswith(f"a received {words}") for each in untrue)
     assert not [each for each in judge(was).failures if each.slug == "untrue"]
 
 

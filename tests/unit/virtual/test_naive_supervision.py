@@ -227,4 +227,4 @@ def test_what_lasts_longer_than_it_may_is_told_without_the_silences() -> None:
     mission = replace(flat.MISSION, invocations=(replace(STEP, contract=contract),))
     step = RunningStep(QUIET, mission, 0, (0, None), ((S, 2 * S),))
     supervise(QUIET, [step], turns((0, 0), 8 * S), lambda us: replace(flat.NOW, monotonic_us=us))
-    assert step.sure == (4 * S + 100_000, "lasts longer than it may, besides 1000 ms without a link")
+    assert step.sure == (4 * S + 100_000, "maximum duration, excluding 1000 ms without a link")

@@ -278,7 +278,7 @@ def test_an_approval_is_refused(low: bytes) -> None:
 
 def test_nobody_answers_what_is_not_asked(bothered: ScenarioFlown) -> None:
     notes = [each.note for each in bothered.happened]
-    assert notes[1] == "nothing of the mission asks for it"
+    assert notes[1] == "no step of the mission requires it"
 
 
 @pytest.mark.slow

@@ -77,7 +77,7 @@ def test_flights_that_are_flown_and_judged(here: Path, capsys: pytest.CaptureFix
     assert (found["mission"], found["flights"], found["failed"], found["campaign"]) == ("short", 2, 0, 1)
     assert set(found["kinds"]) == set(found["near"]) <= {"link-silence", "wind"}, "as sources and `--fault` call them"
     titles = {each["name"]: each["title"] for each in found["margins"]}
-    assert titles["fence_mm"] == "distance inside the airspace, at its edge"
+    assert titles["fence_mm"] == "least distance to the airspace's edge, inside"
     text = Path("made/report.html").read_text()
     assert titles["fence_mm"] in text
     for internal in ("fence_mm", "ended_us", "LinkSilence", "WindStep"):
@@ -202,7 +202,7 @@ def test_another_campaign_in_the_folder_is_refused(
     Path("made/campaign.json").write_text("{}")
     code, _, err = run(capsys, "--flights", "1", "-o", "made")
     assert code == ExitCode.INPUT
-    assert "is not what a campaign left" in err
+    assert "campaign.json` is malformed" in err
 
 
 def test_a_campaign_of_other_faults_does_not_go_on_in_its_folder(
@@ -299,7 +299,7 @@ def test_a_file_is_no_folder_of_a_campaign(here: Path, capsys: pytest.CaptureFix
     Path("made").write_text("mine")
     code, _, err = run(capsys, "-o", "made")
     assert (code, Path("made").read_text()) == (ExitCode.USAGE, "mine")
-    assert "`made` is no folder" in err
+    assert "`made` is not a folder" in err
 
 
 @pytest.mark.parametrize(

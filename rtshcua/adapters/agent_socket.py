@@ -76,7 +76,7 @@ class _Handed(msgspec.Struct, forbid_unknown_fields=True):
 
 
 #: what is said to whoever sends something else than a document
-NO_LINE: Final = ("malformed", "not a line of the kind {id, document}, document in base64")
+NO_LINE: Final = ("malformed", "expected a line `{id, document}` with the document in base64")
 
 
 class Encoded(NamedTuple):
@@ -168,7 +168,7 @@ class _Reader:
             except BlockingIOError:
                 return None
             if not chunk:
-                raise ConnectionResetError(errno.ECONNRESET, "it hung up")
+                raise ConnectionResetError(errno.ECONNRESET, "the client closed the connection")
             self.incoming += chunk
             end = self.incoming.find(b"\n", self.seen)
         if (len(self.incoming) if end < 0 else end) > LONGEST:
@@ -392,7 +392,7 @@ def _listen(path: Path, group: int | None) -> socket.socket:
     except OSError as error:
         listener.close()
         if error.errno == errno.EADDRINUSE:
-            text = "another program listens there, or it is no socket"
+            text = "another program listens there, or the path is not a socket"
             raise SocketTaken(errno.EADDRINUSE, text, str(path)) from None
         raise OSError(error.errno, error.strerror, str(path)) from None
     finally:
@@ -456,13 +456,13 @@ def _flight_of(line: bytes, path: Path) -> bytes:
     """The id of a flight, by the first line that it says. Raises OSError where that is another."""
     said = _told(line)
     if said.type != "hello":
-        raise ConnectionError("what listens there is no flight: it does not say first who it is")
+        raise ConnectionError("the program that listens there is not a flight: it did not send the identity line first")
     return _named(said, path)
 
 
 def _named(said: _Line, path: Path) -> bytes:
     if _FLIGHT.fullmatch(said.flight) is None:
-        raise ConnectionError(f"what listens at `{path}` says no id of a flight")
+        raise ConnectionError(f"what listens at `{path}` sent no flight id")
     return bytes.fromhex(said.flight)
 
 
@@ -478,7 +478,7 @@ class _Told:
         first, *more = chunk.split(b"\n")
         self._rest += first
         if len(self._rest) > self.longest:
-            raise ConnectionError("what listens there is no flight: its line does not end")
+            raise ConnectionError("the program that listens there is not a flight: its line is too long")
         if not more:
             return []
         lines = [bytes(self._rest), *more[:-1]]
@@ -521,16 +521,16 @@ class FlightFollower:
             self._link.settimeout(left_s)
             chunk = self._link.recv(_CHUNK)
             if not chunk:
-                raise ConnectionResetError(errno.ECONNRESET, "the flight hung up", str(self._path))
+                raise ConnectionResetError(errno.ECONNRESET, "the flight closed the connection", str(self._path))
             lines = self._lines.take(chunk)
             if lines:
                 self._lines.longest = LONGEST_TOLD
                 return lines
-        raise TimeoutError("the flight did not say which one it is")
+        raise TimeoutError("the flight did not send its identity")
 
     def receive(self) -> list[bytes | FlightReply] | None:
-        """What came: records as their lines, and answers; None where the flight hung up. Raises OSError for a peer that
-        says what no flight says.
+        """The received records, as lines, and replies; None once the flight closed the connection. Raises OSError
+        where the peer is not a flight.
         """
         lines, self._ahead = self._ahead, []
         if not lines:
@@ -550,7 +550,7 @@ class FlightFollower:
         return found
 
     def hand_in(self, document: bytes) -> None:
-        """Hand a document in; what becomes of it comes with `receive`. Raises OSError where the flight hung up."""
+        """Hand a document in; `receive` returns the reply. Raises OSError where the flight closed the connection."""
         self._number += 1
         self._unsent += msgspec.json.encode({"id": self._number, "document": b64encode(document).decode()}) + b"\n"
         self.flush()
@@ -561,7 +561,7 @@ class FlightFollower:
         return bool(self._unsent)
 
     def flush(self) -> None:
-        """Send what waits, as far as the flight takes it now. Raises OSError where it hung up."""
+        """Send what waits, as far as the flight takes it now. Raises OSError where the client closed the connection."""
         while self._unsent:
             try:
                 sent = self._link.send(self._unsent)
@@ -609,7 +609,7 @@ def _asked_once(path: Path, line: bytes, wanted: Callable[[_Line], bool], until_
             link.settimeout(left_s)
             chunk = link.recv(_CHUNK)
             if not chunk:
-                raise ConnectionResetError("the flight hung up: it is over, or it did not take the document")
+                raise ConnectionResetError("the flight closed the connection: it has ended, or it refused the document")
             for each in told.take(chunk):
                 said = _told(each)
                 if wanted(said):
@@ -630,7 +630,7 @@ def _connect(link: socket.socket, path: Path, patience_s: float) -> None:
         raise
     except OSError as error:
         if path.exists() and not path.is_socket():
-            raise OSError(errno.ENXIO, "no agent socket of a flight", str(path)) from None
+            raise OSError(errno.ENXIO, "no flight has an agent socket there", str(path)) from None
         if error.errno is None:
             raise OSError(errno.ENAMETOOLONG, "the path is too long for a socket", str(path)) from None
         raise OSError(error.errno, error.strerror, str(path)) from None
@@ -641,4 +641,4 @@ def _told(line: bytes) -> _Line:
     try:
         return _read_line(line)
     except (ValueError, msgspec.DecodeError, RecursionError):
-        raise ConnectionError("what listens there is no flight: it says what no flight says") from None
+        raise ConnectionError("the program that listens there is not a flight: its reply is malformed") from None

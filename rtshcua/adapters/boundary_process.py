@@ -48,9 +48,7 @@ _FIRST_LAYOUT: Final = 0x7274736863756100
 _GREETING: Final = 4 + _SAID.size
 
 #: what is told where there is no program, and nobody asked for one
-UNBUILT: Final = (
-    "a run decides in its own process, in reach of whoever takes it over: the boundary's program was not built"
-)
+UNBUILT: Final = "the boundary's program was not built, so the run decides in its own process, without isolation"
 UNBUILT_HELP: Final = "`make setup` builds it in a checkout; the wheels for Linux on x86-64 and aarch64 have it"
 
 
@@ -68,10 +66,10 @@ class Measure(IntFlag):
 
 #: what is missing where a measure is not in force, in words
 MISSING: Final = {
-    Measure.OWN_USER: "a user of its own: whoever runs as this user can read the files of its keys (`--boundary-user`)",
-    Measure.OWN_NETWORK: "a network namespace of its own: that needs root or CAP_SYS_ADMIN",
-    Measure.NO_FILES: "Landlock: this kernel does not have it",
-    Measure.FEW_CALLS: "seccomp: this kernel does not have it",
+    Measure.OWN_USER: "a separate user: every process of the present user can read its key files (`--boundary-user`)",
+    Measure.OWN_NETWORK: "a separate network namespace (needs root or CAP_SYS_ADMIN)",
+    Measure.NO_FILES: "Landlock (not in this kernel)",
+    Measure.FEW_CALLS: "seccomp (not in this kernel)",
     Measure.NOT_DUMPABLE: "protection from being read (PR_SET_DUMPABLE)",
     Measure.LOCKED_MEMORY: "locked memory for its keys: raise RLIMIT_MEMLOCK",
     Measure.SECRET_MEMORY: "memfd_secret: the kernel can read its keys (`secretmem.enable=1`)",
@@ -79,10 +77,10 @@ MISSING: Final = {
 
 _UNTRUSTED, _NO_KEY, _MISSING, _IO, _IN_USE, _DAMAGED = 65, 66, 72, 74, 75, 78
 _ENDED: Final = {
-    64: "its command line or a key of it is wrong",
+    64: "its command line or one of its keys is invalid",
     _UNTRUSTED: "it does not trust the trust root",
-    _NO_KEY: "its link key is none",
-    _MISSING: "a file of its folder is missing or cannot be read, or others may look into that folder",
+    _NO_KEY: "its link key is not a valid key",
+    _MISSING: "a file in its folder is missing or unreadable, or other users have access to the folder",
 }
 #: what to look at, of a boundary that listens
 _ENDED_HELP: Final = {
@@ -90,11 +88,11 @@ _ENDED_HELP: Final = {
     _UNTRUSTED: "`root.trust` and `root.pin` of its folder; `rtshcua keys provision` writes both",
     _NO_KEY: "`link.key` of its folder: 64 hexadecimal digits",
     _MISSING: "its user's folder, mode 0700, of the vehicle's identity: `root.trust`, `root.pin`, `log.seed`; no links",
-    _IO: "`chown -R` its folder to its user, or make room",
+    _IO: "change the owner of its folder to its user (`chown -R`), or free disk space",
 }
 _DAMAGED_HELP: Final = (
-    "docs/flying/isolation.md says what to do; a file that is empty, of another boundary key, or missing in a "
-    "provisioned folder is damage too"
+    "docs/flying/isolation.md says what to do; an empty file, a file of another boundary key, "
+    "or a file missing from a provisioned folder counts as damage too"
 )
 
 
@@ -145,7 +143,7 @@ def measures_here(user: tuple[int, int] | None) -> Measure:
             )  # fmt: skip
             greeting = ours.recv(_ANSWER, socket.MSG_DONTWAIT)
         except (OSError, subprocess.SubprocessError) as error:
-            raise BoundaryError("not-begun", f"the boundary's process does not begin: {error}") from None
+            raise BoundaryError("not-begun", f"the boundary's process did not start: {error}") from None
     return Measure(int.from_bytes(greeting[:4], "little"))
 
 
@@ -221,8 +219,8 @@ class ListeningBoundary(_Connected):
         until_s = time.monotonic() + LISTENING_ENDING_S
         while (greeting := self._greeted(path)) is None:
             if time.monotonic() > until_s:
-                text = f"another run has the boundary at `{path}`, or its program does not start"
-                raise BoundaryError("in-use", text, "wait until that run is over; `journalctl` says more of the latter")
+                text = f"another run uses the boundary at `{path}`, or its program did not start"
+                raise BoundaryError("in-use", text, "wait until that run ends, or look into `journalctl`")
             time.sleep(_ASKING_S)
         self._take_in(greeting)
 
@@ -248,7 +246,7 @@ class ListeningBoundary(_Connected):
             greeting = self._socket.recv(_ANSWER)
         except TimeoutError:
             self._socket.close()
-            raise BoundaryError("not-begun", f"the boundary at `{path}` does not begin") from None
+            raise BoundaryError("not-begun", f"the boundary at `{path}` did not start") from None
         except OSError:
             greeting = b""
         if len(greeting) == _GREETING:
@@ -257,7 +255,7 @@ class ListeningBoundary(_Connected):
         if greeting in (b"", bytes([_IN_USE])):
             return None
         if len(greeting) > 1:
-            raise BoundaryError("not-begun", f"the boundary at `{path}` is of another release")
+            raise BoundaryError("not-begun", f"the boundary at `{path}` belongs to another release")
         code = greeting[0]
         raise _unbegun(code, f"what the boundary at `{path}` keeps", _ENDED_HELP.get(code, ""))
 
@@ -357,8 +355,8 @@ class BoundaryProcess(_Connected):
                 break
             except BlockingIOError:
                 if time.monotonic() > until_s:
-                    text = f"another run's boundary holds what is kept of `{vehicle}`"
-                    raise BoundaryError("in-use", text, "wait until that run is over") from None
+                    text = f"another run's boundary has locked the records of `{vehicle}`"
+                    raise BoundaryError("in-use", text, "wait until that run ends") from None
                 time.sleep(0.02)
         yield "--kept", kept
         for name, data in given.items():
@@ -391,9 +389,9 @@ def _unbegun(code: int, kept: str, help: str = "") -> BoundaryError:
     to look at.
     """
     if code == _DAMAGED:
-        text = f"{kept} is damaged: which bundles the boundary has opened is not known"
+        text = f"{kept} is damaged, so the bundles that the boundary has opened are not known"
         return BoundaryError("damaged", text, _DAMAGED_HELP)
     if code == _IO:
-        return BoundaryError("not-kept", f"{kept} cannot be read or written, or its disk is full", help)
-    text = f"the boundary's process does not begin: {_ENDED.get(code, f'it ended with {code}')}"
+        return BoundaryError("not-kept", f"{kept} cannot be read or written, or the disk is full", help)
+    text = f"the boundary's process did not start: {_ENDED.get(code, f'it ended with {code}')}"
     return BoundaryError("untrusted" if code == _UNTRUSTED else "not-begun", text, help)

@@ -33,6 +33,7 @@ _ANOTHER_US: Final = 1_500_000
 _TELL_US: Final = 6_000_000
 #: how old a report of the motors or the ground may be when the key is sent
 _FRESH_US: Final = 2_500_000
+_SAFE: Final = "a key can only be set on a vehicle that is disarmed and on the ground"
 #: how long a key may take to show, and how often it is sent
 _SHOW_US: Final = 1_500_000
 _TRIES: Final = 3
@@ -78,15 +79,15 @@ def after_setup(autopilot: str, release: tuple[int, int, int] | None) -> str:
     Signing", and the release notes of 1.18.
     """
     if autopilot == "ardupilot":
-        also = ", nor where MAVn_OPTIONS switches signing off" if release is None or release >= (4, 7) else ""
+        also = ", nor on a port where MAVn_OPTIONS switches signing off" if release is None or release >= (4, 7) else ""
         return (
             "ArduPilot keeps the key in its storage over restarts, signs on every port, and obeys nothing unsigned but "
             f"RADIO_STATUS; this does not hold on its first port (SERIAL0, usually USB){also}"
         )
     if release is None:
-        return "PX4 takes a key from 1.17 on; this one does not say which release it is"
+        return "PX4 accepts a key from 1.17 on; this one does not report its release"
     if release < (1, 17):
-        return "PX4 before 1.17 does not know SETUP_SIGNING: it signs nothing, and obeys anyone"
+        return "PX4 before 1.17 does not know SETUP_SIGNING: it signs nothing and obeys every sender"
     if release < (1, 18):
         return (
             "PX4 1.17 takes a key over USB alone and keeps it on the SD card; it obeys nothing unsigned only with "
@@ -198,21 +199,21 @@ class LinkSetup:
         """From the first heartbeat to what was seen."""
         if not (yield from self._until(lambda: self.met, _HEARTBEAT_US)):
             self.result = Refusal(
-                "no-vehicle", "no heartbeat of a vehicle within 10 s", "is it on, and does it send there?"
+                "no-vehicle", "no heartbeat of a vehicle within 10 s", "check that it is on and sends to this address"
             )
             return
         yield from self._until(lambda: self._other is not None, _ANOTHER_US)
         if self._other is not None:
-            text = f"several vehicles speak there: system {self._system}, and another sender's {self._other}"
+            text = f"several vehicles send there: system {self._system}, and another sender's {self._other}"
             if self._other != self._system:
-                text = f"several vehicles speak there: systems {self._system} and {self._other}"
-            self.result = Refusal("two-vehicles", text, "`--system` names the one that is meant")
+                text = f"several vehicles send there: systems {self._system} and {self._other}"
+            self.result = Refusal("two-vehicles", text, "`--system` selects one")
             return
         already = self._verified > 0
         if self._link.counts.forged and not already:
             self.result = Refusal(
-                "other-key", "it signs with another key", "a key that is in use is changed with that key: by the "
-                "ground station that has it, or by removing the old one as the autopilot's own pages say",
+                "other-key", "the vehicle signs with another key", "change the key with the ground station that "
+                "has the present one, or remove the present one as the autopilot's documentation describes",
             )  # fmt: skip
             return
         answer_us = max(_ANSWER_US, _ROUND_TRIPS * (yield from self._ask(signed=already)))
@@ -236,8 +237,8 @@ class LinkSetup:
                 took_us = self._now_us - begun_us
         if took_us is None:
             self.result = Refusal(
-                "no-answer", "it is heard, and answers nothing", "does what is sent reach it? one that wants "
-                "signatures of another key answers nobody else",
+                "no-answer", "the vehicle is heard but answers nothing", "check that frames reach it; a vehicle that "
+                "requires signatures of another key answers nobody else",
             )  # fmt: skip
         return took_us or 0
 
@@ -258,16 +259,14 @@ class LinkSetup:
     def _unfit(self) -> Refusal | None:
         """Why no key is sent now; None where it may be."""
         if not self._is_fresh(self._armed) or not self._is_fresh(self._landed):
-            help = "ask again when it stands on the ground; a vehicle that does not tell is set up by a ground station"
-            return Refusal("not-landed", "it does not tell whether it is disarmed and on the ground", help)
+            help = "try again on the ground; a vehicle that never reports this is set up by a ground station"
+            return Refusal("not-landed", "the vehicle does not report whether it is disarmed and on the ground", help)
         assert self._armed is not None
         assert self._landed is not None
         if self._armed[0]:
-            return Refusal("armed", "its motors are armed", "a key is put on a vehicle that is disarmed, on the ground")
+            return Refusal("armed", "the motors are armed", _SAFE)
         if self._landed[0] != enums.MAV_LANDED_STATE_ON_GROUND:
-            return Refusal(
-                "not-landed", "it is not on the ground", "a key is put on a vehicle that is disarmed, on the ground"
-            )
+            return Refusal("not-landed", "the vehicle is not on the ground", _SAFE)
         return None
 
     def _probe(self, wait_us: int, *, already: bool) -> _Part[None]:
@@ -280,10 +279,12 @@ class LinkSetup:
             answered[True] &= yield from self._answered(wait_us, signed=True)
         if not answered[True] and not answered[False]:
             text = (
-                "the key was sent, and it answers nothing since, signed or not" if not already else "it answers nothing"
+                "the vehicle answers nothing"
+                if already
+                else "since the key was sent the vehicle answers nothing, signed or unsigned"
             )
             self.result = Refusal(
-                "no-answer", text, "is the link still up? the same command again looks, and sends no key twice"
+                "no-answer", text, "check the link; the same command again looks first and does not send the key twice"
             )
             return
         name = _NAMES[self._autopilot]

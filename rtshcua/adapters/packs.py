@@ -48,11 +48,11 @@ def folder(pack: str) -> str | None:
     if not found:
         return None
     if len(found) > 1:
-        raise BrokenPack(f"the pack `{pack}` is brought by {_packages(found)}; one of them may stay")
+        raise BrokenPack(f"the pack `{pack}` is provided by {_packages(found)}; keep one of them")
     given = _load(found[0])
     place = given() if callable(given) else given
     if not isinstance(place, str | Path) or not Path(place).is_dir():
-        raise BrokenPack(f"the pack `{pack}` of {_packages(found)} gives no folder, but `{place}`")
+        raise BrokenPack(f"the pack `{pack}` of {_packages(found)} provides `{place}`, which is not a folder")
     return str(place)
 
 
@@ -70,10 +70,10 @@ def manoeuvres(packs: frozenset[str]) -> Mapping[str, Stages]:
     table: dict[str, Stages] = {}
     for point in _allowed(packs):
         if point.name in table:
-            raise BrokenPack(f"`{point.name}` is brought by two packages, one of them {_packages([point])}")
+            raise BrokenPack(f"`{point.name}` is provided by two packages, one of them {_packages([point])}")
         stages = _load(point)
         if not callable(stages):
-            raise BrokenPack(f"`{point.name}` of {_packages([point])} is no function")
+            raise BrokenPack(f"`{point.name}` of {_packages([point])} is not a function")
         table[point.name] = stages
     return table
 

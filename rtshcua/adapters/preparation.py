@@ -83,7 +83,7 @@ class Preparations:
         except OSError as error:
             if self._flies:
                 return None
-            return f"parameters are not set, for that cannot be recorded: {error.strerror or error}"
+            return f"parameters are not set, because that cannot be recorded: {error.strerror or error}"
         finally:
             self._over()
             self._driver.prepares = False
@@ -97,7 +97,7 @@ class Preparations:
         except _Stopped:
             return f"left: {self._kept()}"
         except OSError as error:
-            return f"{self._kept()}, for that cannot be recorded: {error.strerror or error}"
+            return f"{self._kept()}, because that cannot be recorded: {error.strerror or error}"
         finally:
             self._over()
 
@@ -114,10 +114,10 @@ class Preparations:
         if not stands:
             record = self._tell if self._flies else self._record
             if self.owed:
-                record(NOT_RESTORED, f"it is not known to stand on the ground: {self._kept()}")
+                record(NOT_RESTORED, f"the vehicle is not known to be on the ground: {self._kept()}")
             if self._settings:
-                record(NOT_PREPARED, "it is not known to stand on the ground: nothing is set")
-            return "it is not known to stand on the ground: nothing is set" if self._settings else None
+                record(NOT_PREPARED, "the vehicle is not known to be on the ground: nothing is set")
+            return "the vehicle is not known to be on the ground: nothing is set" if self._settings else None
         if self._trouble is not None:
             return self._refuse(self._trouble)
         self._restore(turn, BEFORE_US)
@@ -126,7 +126,7 @@ class Preparations:
         values = self._read(self._settings, turn)
         missing = [name for name in self._settings if name not in values]
         if missing:
-            return self._refuse(f"it does not tell `{'`, `'.join(missing)}`, which is to be set")
+            return self._refuse(f"the vehicle does not report `{'`, `'.join(missing)}`, which is to be set")
         left = sorted(self._settings.keys() & self.owed)
         if left:
             return self._refuse(f"`{'`, `'.join(left)}` could not be put back first")
@@ -136,7 +136,7 @@ class Preparations:
         unfit = [name for name, value in changes.items() if not self._driver.settings.fits(name, value_of(value))]
         if unfit:
             listed = ", ".join(f"{name} {shown(changes[name])}" for name in unfit)
-            return self._refuse(f"by the type that it says its parameter has, it cannot keep {listed}")
+            return self._refuse(f"the vehicle's type for the parameter cannot hold {listed}")
         self.owed |= {name: Owed(values[name], value) for name, value in changes.items()}
         problem = self._write(changes, values, turn, restoring=False)
         if problem is not None:
@@ -161,7 +161,7 @@ class Preparations:
         if not self.owed:
             return None
         if not self._stands(turn, within_us):
-            text = f"it is not known to stand on the ground: {self._kept()}"
+            text = f"the vehicle is not known to be on the ground: {self._kept()}"
             self._record(NOT_RESTORED, text)
             return text
         values = self._read(self.owed, turn)
@@ -170,7 +170,7 @@ class Preparations:
         left = {name for name in self.owed if name in values}
         problem = self._put_back(left, values, turn) if left else None
         if silent:
-            problem = f"it does not tell `{'`, `'.join(silent)}`: {self._kept()}"
+            problem = f"the vehicle does not report `{'`, `'.join(silent)}`: {self._kept()}"
             self._record(NOT_RESTORED, problem)
         return problem
 
@@ -190,8 +190,8 @@ class Preparations:
             if value is None or (value == each.value and value != each.before):
                 continue
             if value != each.before:
-                set_to = f"which was set to {shown(each.value)}, and is {shown(value)} now"
-                self._record(NOT_RESTORED, f"somebody else changed {name}, {set_to}: it is left so")
+                set_to = f"which was set to {shown(each.value)}, but is {shown(value)} now"
+                self._record(NOT_RESTORED, f"somebody else changed {name}, {set_to}: it is left unchanged")
             del self.owed[name]
             self._keep_owed(self.owed)
 
@@ -221,7 +221,7 @@ class Preparations:
         if not wrong:
             self._record(PREPARED, ", ".join(f"{name} is {shown(value)}" for name, value in found.items()))
             return None
-        said = [f"{name} is {shown(found[name])}" if name in found else f"{name} is not told" for name in wrong]
+        said = [f"{name} is {shown(found[name])}" if name in found else f"{name} is not reported" for name in wrong]
         text = f"{'not put back' if restoring else 'not set'} as it was to be{why or ': ' + ', '.join(said)}"
         if not restoring:  # what the vehicle made of a value is of our making too, and is put back
             self.owed |= {name: Owed(self.owed[name].before, found[name]) for name in wrong if name in found}
@@ -268,4 +268,4 @@ class Preparations:
 
     def _kept(self) -> str:
         listed = ", ".join(f"{name} to {shown(each.before)}" for name, each in sorted(self.owed.items()))
-        return f"to be put back at the next start: {listed}"
+        return f"to be restored at the next start: {listed}"

@@ -61,7 +61,7 @@ class Simulator:
             self._process.stdin.write(fault.encode("ascii") + b"\n")
             self._process.stdin.flush()
         except OSError as error:
-            raise SimulatorError(f"the simulated vehicle is gone: {error.strerror or error}") from error
+            raise SimulatorError(f"the simulated vehicle ended: {error.strerror or error}") from error
 
     def heard(self, boot_us: int) -> None:
         """Tell it which of its positions was heard last, by its time since boot: faster than life it waits for us. That
@@ -113,7 +113,7 @@ class Simulator:
         try:
             _, errors = self._process.communicate(timeout=_STOP_S)
         except subprocess.TimeoutExpired:
-            return "it gave no sign of life in time"
+            return "it did not respond in time"
         lines = errors.decode("utf-8", "replace").strip().splitlines()
-        last = lines[-1] if lines else f"it ended with code {self._process.returncode}"
+        last = lines[-1] if lines else f"it exited with code {self._process.returncode}"
         return last.partition("error: ")[2] or last

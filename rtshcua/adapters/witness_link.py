@@ -226,7 +226,7 @@ class WitnessClient:
                 add_anchors(anchors_path(self._log), anchors)
         except OSError as error:
             troubles.append(
-                WitnessTrouble(f"anchors of the log's end are not kept: {(error.strerror or str(error)).lower()}")
+                WitnessTrouble(f"anchors of the log's end were not stored: {(error.strerror or str(error)).lower()}")
             )
         last = self._submission.last(self._submission.records)
         short = [peer for peer in self._peers if not peer.lost and (last is None or peer.anchored < last)]
@@ -251,7 +251,7 @@ class WitnessClient:
                         self._ask(peer, now_s)
                 self._hear()
         except Exception as error:  # noqa: BLE001  a thread that dies in silence would leave the log without witnesses
-            self._news.put(WitnessTrouble(f"witnesses are not asked any more: {error}"))
+            self._news.put(WitnessTrouble(f"witnesses are no longer asked: {error}"))
 
     def _done(self) -> bool:
         """Whether every witness cosigned the last checkpoint of the whole file."""
@@ -315,7 +315,7 @@ class WitnessClient:
         mark = anchor(asked.note, answer.body, self._witnesses)
         if mark is None:
             peer.due_s = time.monotonic() + LONGEST_S
-            self._tell(peer, "cosigns with a key that the trust root does not name")
+            self._tell(peer, "cosigns with a key that is not in the trust root")
             return
         peer.known = int(asked.note.split("\n", 2)[1])
         if peer.known > peer.anchored:
@@ -329,7 +329,7 @@ class WitnessClient:
             peer.known = size
         else:
             peer.lost = True
-            self._tell(peer, f"saw another log of this vehicle and boot, of {size} records: it cosigns no more")
+            self._tell(peer, f"saw another log of this vehicle and boot, of {size} records, and will not cosign")
 
     def _tell(self, peer: _Peer, text: str) -> None:
         if text not in peer.told:

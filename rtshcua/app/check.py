@@ -143,7 +143,7 @@ def _no_place(target: Path, files: Sequence[Path]) -> Refusal | None:
     if not target.parent.is_dir():
         return Refusal("output", f"there is no folder `{target.parent}` to write to")
     if target.exists() and not target.is_file():
-        return Refusal("output", f"`{target}` is no regular file, and is not replaced by a page")
+        return Refusal("output", f"`{target}` is not a regular file, and is not replaced by a page")
     return overwriting_a_source(target, files, "a page")
 
 

@@ -96,5 +96,5 @@ def _no_target(target: Path, given: Sequence[Path]) -> Refusal | None:
         return Refusal("output", f"there is no folder `{target.parent}` to write to", code=ExitCode.INPUT)
     if not target.exists() or (target.is_file() and not any(each.exists() and target.samefile(each) for each in given)):
         return None
-    what = "one of the sources" if target.is_file() else "no regular file"
+    what = "one of the sources" if target.is_file() else "not a regular file"
     return Refusal("output", f"`{target}` is {what}, and is not replaced by a bundle")

@@ -230,7 +230,7 @@ def revoke(store: KeyStore, keys: Sequence[str], links: Sequence[str], secret: S
         for text in links:
             name = _link_named(text)
             if name is None:
-                return Refusal("usage", f"`{text}` is no link key", "accepted: 16 hexadecimal digits, or its file")
+                return Refusal("usage", f"`{text}` is not a link key", "accepted: 16 hexadecimal digits, or its file")
             if name in root.revocations:
                 return _revoked_already(text)
             names.append(name)

@@ -142,7 +142,7 @@ class DaskWorkers:
         try:
             self._client: Any = _loose(Client)(address, timeout=10)
         except (OSError, ValueError):
-            raise OSError(errno.EHOSTUNREACH, "no cluster answers", address) from None
+            raise OSError(errno.EHOSTUNREACH, "no cluster answered", address) from None
 
     def fly(self, work: Work[F, R], flights: Sequence[F]) -> Iterator[R]:
         """Fly the flights; another worker repeats a flight whose worker is lost."""

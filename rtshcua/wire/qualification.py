@@ -100,7 +100,7 @@ class Qualification(Flat, frozen=True):
         before = dict(self.parameters)
         others = sorted(name for name, value in parameters.items() if before.get(name) != value)
         if others:
-            changes.append(f"changed since: {', '.join(f'`{name}`' for name in others)}")
+            changes.append(f"parameters {', '.join(f'`{name}`' for name in others)}")
         return tuple(changes)
 
 

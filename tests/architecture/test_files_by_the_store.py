@@ -15,7 +15,7 @@ PACKAGE = Path(__file__).resolve().parents[2] / "rtshcua"
 #: who opens or writes files by other means, besides the store itself
 ALLOWED = {
     "adapters/archive/asking.py": "reads the SQL that ships",
-    "adapters/vehicle/transport.py": "a serial device is no regular file",
+    "adapters/vehicle/transport.py": "a serial device is not a regular file",
     "campaign/campaign_report.py": "reads the template that ships",
     "front/cli/commands/agent_bundle.py": "reads the example that ships",
     "front/cli/commands/init.py": "reads the example that ships",

@@ -315,7 +315,7 @@ def test_files_that_do_not_serve(provisioned: Provisioned) -> None:
     ListeningBoundary(provisioned.socket).close()
     provisioned.made.await_gone(1)
     own.chmod(0o750)
-    assert provisioned.why_not() == "not-begun", "others may look into its folder"
+    assert provisioned.why_not() == "not-begun", "other users have access to the folder"
 
 
 def test_no_vehicle_but_that_of_its_socket(provisioned: Provisioned) -> None:

@@ -69,7 +69,7 @@ def test_an_import_leads_to_no_file_of_others(
     assert "hunter2" not in text
     assert "did you mean" not in text
     if "../mine" in text or "../absent" in text:
-        assert "it lies outside of the project" in text
+        assert "it is outside of the project" in text
 
 
 def test_what_the_user_allows_is_imported(
@@ -149,7 +149,7 @@ def test_a_report_is_not_written_to_a_device_nor_to_a_pipe(here: Path, capsys: p
     (here / "good.rts").write_text('import "lib:policies/site.rts"\n')
     (here / "device.xml").symlink_to("/dev/null")
     os.mkfifo(here / "pipe.xml")
-    for target, why in (("device.xml", "symbolic links lead out of"), ("pipe.xml", "nobody reads this pipe")):
+    for target, why in (("device.xml", "symbolic links lead out of"), ("pipe.xml", "no process reads this pipe")):
         for words in (["lint", "--format", "junit", "-o"], ["test", "--junit"]):
             code, text = said([*words, target, "good.rts"], capsys)
             assert (code, why in text.lower()) == (ExitCode.FULL, True), text

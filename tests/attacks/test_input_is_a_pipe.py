@@ -48,7 +48,7 @@ def test_a_pipe_is_refused_and_not_waited_for(commands: Forked, words: list[str]
         assert commands.run(["keys", "init"], tmp_path, PATIENCE_S).code == ExitCode.OK
     done = commands.run(words, tmp_path, PATIENCE_S)
     assert done.code == ExitCode.INPUT, done
-    assert "no regular file" in done.out + done.err
+    assert "not a regular file" in done.out + done.err
 
 
 def test_an_import_of_a_pipe_is_a_finding(commands: Forked, tmp_path: Path) -> None:
@@ -56,7 +56,7 @@ def test_an_import_of_a_pipe_is_a_finding(commands: Forked, tmp_path: Path) -> N
     (tmp_path / "imports.rts").write_text('import "pipe.rts"\n')
     done = commands.run(["check", "imports.rts"], tmp_path, PATIENCE_S)
     assert done.code == ExitCode.DIAGNOSTICS
-    assert "error[E0108]: cannot read `pipe.rts`: no regular file" in done.out + done.err
+    assert "error[E0108]: cannot read `pipe.rts`: not a regular file" in done.out + done.err
 
 
 @pytest.mark.parametrize("command", [["check"], ["lint"], ["compile", "-o", "x"]], ids=" ".join)
@@ -65,7 +65,7 @@ def test_a_zone_from_a_pipe_is_a_finding(commands: Forked, command: list[str], t
     (tmp_path / "zone.rts").write_text('zone yard from "pipe.geojson"\n')
     done = commands.run([*command, "zone.rts"], tmp_path, PATIENCE_S)
     assert done.code == ExitCode.DIAGNOSTICS
-    assert "error[E0108]: cannot read `pipe.geojson`: no regular file" in done.out + done.err
+    assert "error[E0108]: cannot read `pipe.geojson`: not a regular file" in done.out + done.err
 
 
 def test_settings_that_are_a_pipe_count_for_nothing(commands: Forked, tmp_path: Path) -> None:

@@ -84,7 +84,7 @@ def test_each_measure_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, 
     for broken in ("raise SystemExit(3)", "pass"):
         ((slug, verdict, text),) = asked(broken)
         assert (slug, verdict) == ("boundary/process", MissionVerdict.STOP), "as `run` refuses"
-        assert "does not begin" in text
+        assert "did not start" in text
 
 
 def test_a_run_that_decides_in_its_own_process_is_judged_as_one(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -188,8 +188,8 @@ def test_a_disk_that_takes_a_few_bytes_at_a_time_changes_nothing(tmp_path: Path)
 def test_a_disk_that_hangs_for_a_while_is_noted_and_a_longer_one_is_a_failure(tmp_path: Path) -> None:
     flown = Watched(tmp_path, LAND).fly(hangs, 18, 23)
     assert flown.ending is Ending.COMPLETED
-    (noted,) = [each for each in flown.effects("noted") if "on the disk" in each["detail"]]
-    assert noted["detail"] == "what was to be on the disk within 1000 ms is not"
+    (noted,) = [each for each in flown.effects("noted") if "reach the disk" in each["detail"]]
+    assert noted["detail"] == "a write did not reach the disk within 1000 ms"
     verified(flown)
     (tmp_path / "log.jsonl").unlink()
     flown = Watched(tmp_path, LAND).fly(hangs, 18, 40)

@@ -74,7 +74,7 @@ def flown(folder: Path, flavour: str, without: str, hover_us: int, *, battery: i
 def test_a_battery_that_drains_faster_than_declared_is_home_with_its_reserve(tmp_path: Path, flavour: str) -> None:
     found = flown(tmp_path, flavour, "", FAST_US)
     assert found.vehicle.simulation.truth().battery >= RESERVE
-    told = [str(each) for each in found.records if "the way home is counted with what was measured" in str(each)]
+    told = [str(each) for each in found.records if "the way home is computed with the measured value" in str(each)]
     assert told, "the log says so"
     assert any("the charge to come home" in str(each) or "way home" in str(each) for each in found.records)
 
@@ -96,7 +96,7 @@ def test_without_the_measurement_it_is_not(tmp_path: Path) -> None:
 def test_a_battery_that_is_as_declared_finishes_its_mission(tmp_path: Path) -> None:
     found = flown(tmp_path, "ardupilot", "", 18 * 60 * case.S)
     assert found.ending.name == "COMPLETED"
-    assert not any("counted with what was measured" in str(each) for each in found.records)
+    assert not any("computed with the measured value" in str(each) for each in found.records)
 
 
 def refused(of: Flown) -> Any:

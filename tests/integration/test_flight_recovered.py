@@ -52,7 +52,7 @@ def test_a_run_that_was_killed_in_the_air_comes_down_and_its_log_is_ended_by_the
     (other,) = runs() - {killed}
     assert records(other)[0]["before"] == leaf_hash(ended[-1]).hex()
     (noted,) = [record for record in records(other) if record.get("event") == "log-before"]
-    assert f"{len(before)} records of it are kept" in noted["detail"]
+    assert f"was recovered with {len(before)} records" in noted["detail"]
     for folder in (killed, other):
         verified = ground.start("verify-log", str(folder), "--json").end()
         assert verified.code == 0, verified.events

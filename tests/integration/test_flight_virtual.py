@@ -194,11 +194,11 @@ FAILSAFE = "by its own failsafe: "
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_the_autopilots_own_fence_is_a_second_line_of_defence_and_wins(flavour: str) -> None:
-    """ArduCopter returns. PX4 holds, in the mode that it is in already: its state is critical."""
+    """ArduCopter returns. PX4 holds, in the mode that it is in already: the vehicle's state is critical."""
     flown = fly_on(flavour, JUMP)
     assert flown.ending is Ending.STOOD_DOWN
     (taken,) = flown.effects("taken-over")
-    assert taken["detail"] == {"px4": f"{FAILSAFE}its state is critical", "ardupilot": "RTL"}[flavour]
+    assert taken["detail"] == {"px4": f"{FAILSAFE}the vehicle's state is critical", "ardupilot": "RTL"}[flavour]
 
 
 #: what may show it first on PX4, and on ArduCopter: a landing shows in the target, or in the landed state, before the

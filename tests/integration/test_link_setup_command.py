@@ -41,7 +41,7 @@ SEEN = SetUp("ardupilot", 1, (4, 7, 0), False, True, True, False, ("\x1b[2Jhello
         (SEEN._replace(signs=False, answers_unsigned=True), ExitCode.REFUSED, "the key has no effect on this link"),
         (SEEN._replace(answers_signed=False, answers_unsigned=True), ExitCode.REFUSED, "no effect"),
         (SEEN._replace(release=None, already=True), ExitCode.OK, None),
-        (Refusal("armed", "its motors are armed"), ExitCode.REFUSED, "its motors are armed"),
+        (Refusal("armed", "the motors are armed"), ExitCode.REFUSED, "the motors are armed"),
         (Refusal("no-vehicle", "no heartbeat"), ExitCode.LINK, "no heartbeat"),
         (Refusal("no-answer", "it answers nothing"), ExitCode.LINK, "it answers nothing"),
     ],

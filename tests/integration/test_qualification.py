@@ -138,7 +138,7 @@ def test_the_pilot_of_a_real_vehicle_is_asked_and_waited_for(flavour: str) -> No
     flown = Qualifying(flavour, pilot=lands)
     checks = {each.slug: each for each in flown.fly([BY_PILOT])}
     assert checks["takeover/mode"].outcome == CheckOutcome.HELD
-    assert checks["takeover/mode"].measured.endswith("how late is not known")
+    assert checks["takeover/mode"].measured.endswith("the delay is not known")
     assert checks["takeover/pause"].outcome == CheckOutcome.UNCHECKED
     assert flown.observed.sorties[0].down
 

@@ -44,7 +44,7 @@ def test_a_sortie_its_record_and_who_asks_for_it(ground: Any, port: int, tmp_pat
     vehicle = simulated(ground, port, 30)
 
     rehearsal = ground.start("run", "short.bundle", "--dry-run", *as_quad).end()
-    assert any("is not qualified: there is no record" in text for text in notes(rehearsal)), rehearsal.events
+    assert any("is not qualified: no flight test" in text for text in notes(rehearsal)), rehearsal.events
 
     ground.command = ground.afresh
     flown = ground.start("qualify", SHORT, "--sitl", "--only", "climb", *as_quad).end()

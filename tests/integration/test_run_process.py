@@ -145,7 +145,7 @@ def test_what_is_in_the_air_comes_down_where_another_holds_the_boundarys_file(gr
     try:
         second = ground.run(bundle, *words, speed=SPEED).end()
         assert second.code == 6, second.stderr
-        assert any("another run's boundary holds" in event.get("text", "") for event in second.events)
+        assert any("another run's boundary has locked" in event.get("text", "") for event in second.events)
         assert modes(ground) == ["process", "software"]
         third = ground.run(ground.bundle(name="another"), *words, speed=SPEED).end()
         assert (third.code, third.events[-1]["slug"]) == (5, "boundary-in-use"), "nothing new flies"

@@ -116,7 +116,7 @@ class ArchiveReader:
     def _begin(self, folder: ArchiveFolder, conditions: DecisionQuery) -> None:
         engine = self._engine
         if not folder.catalogue.exists():
-            raise Untrusted("no-archive", f"`{folder.path}` is an archive that nothing was ever added to")
+            raise Untrusted("no-archive", f"`{folder.path}` is an empty archive: no log was added yet")
         engine.execute(f"CREATE VIEW logs AS SELECT * FROM read_parquet({quoted(folder.catalogue)})")
         parts = engine.execute("SELECT DISTINCT part FROM logs WHERE part <> '' ORDER BY part").fetchall()
         if not all(is_digest(part, 32) for (part,) in parts):
@@ -140,7 +140,7 @@ class ArchiveReader:
         try:
             statements = duckdb.extract_statements(sql)
             if len(statements) != 1 or statements[0].type != duckdb.StatementType.SELECT:
-                raise Untrusted("malformed", "a question to an archive is one SELECT")
+                raise Untrusted("malformed", "an archive query must be a single SELECT statement")
             cursor = self._engine.execute(statements[0])
             columns = tuple(column[0] for column in cursor.description or ())
             rows = cursor.fetchall() if limit is None else cursor.fetchmany(limit)

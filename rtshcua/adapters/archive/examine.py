@@ -60,7 +60,7 @@ def examine(task: Task) -> VerifiedLog:
     with open_regular(task.path, task.path.parents[3]) as file:  # the archive's folder: see `Folder`
         found = file_digest(file, "sha256").hexdigest()
         if found != entry.log:
-            text = "the file in the archive is not the one that was taken in: it was changed where it lies"
+            text = "the file in the archive was changed after it was added"
             return _failed(entry, Finding("archive/changed", 0, text, found, entry.log))
         file.seek(0)
         auditor = Auditor(task.pinned, derive=entry.checked == AUDIT, anchors=read_anchors(task.path))
@@ -84,7 +84,7 @@ def examine(task: Task) -> VerifiedLog:
 
 def missing(entry: ArchiveEntry) -> VerifiedLog:
     """What comes of a log that does not lie in the archive any more."""
-    text = "the archive does not have the log any more: it was taken away from where it lay"
+    text = "the log was removed from the archive"
     return _failed(entry, Finding("archive/missing", 0, text, "no file", entry.log))
 
 
@@ -226,7 +226,7 @@ class SchedulerWorkers:
         try:
             self._client = Client(address, timeout=10)
         except (OSError, ValueError):
-            raise OSError(errno.EHOSTUNREACH, "no cluster answers", address) from None
+            raise OSError(errno.EHOSTUNREACH, "no cluster answered", address) from None
 
     def examine(self, tasks: Sequence[Task]) -> Iterator[VerifiedLog]:
         """Verifies these logs; one whose worker is lost is given to another."""

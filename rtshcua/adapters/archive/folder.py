@@ -63,7 +63,7 @@ class ArchiveFolder:
         self.path = path.resolve()
         if _PATTERN & set(str(self.path)):
             raise Untrusted(
-                "archive-path", f"`{path}`: the path of an archive has none of {' '.join(sorted(_PATTERN))}"
+                "archive-path", f"`{path}`: the path of an archive must not contain {' '.join(sorted(_PATTERN))}"
             )
         if make and not (self.path / _MARK).exists():
             self._make()
@@ -75,7 +75,7 @@ class ArchiveFolder:
 
     def _make(self) -> None:
         if self.path.exists() and not all(path.name.startswith(UNFINISHED) for path in self.path.iterdir()):
-            raise Untrusted("no-archive", f"`{self.path}` is a folder with other things in it, not an archive")
+            raise Untrusted("no-archive", f"`{self.path}` is not an archive: it holds other files")
         make_folder(self.path)
         replace(self.path / _MARK, json.dumps({"format": FORMAT, "version": VERSION}).encode() + b"\n")
 

@@ -93,7 +93,7 @@ def is_digest(found: object, characters: int) -> bool:
 
 def misleading(folder: ArchiveFolder) -> Untrusted:
     """Why an index is not gone by."""
-    return Untrusted("archive-index", f"the index of `{folder.path}` names files that are not its own")
+    return Untrusted("archive-index", f"the index of `{folder.path}` refers to files outside of the archive")
 
 
 def write_catalogue(folder: ArchiveFolder, entries: Iterable[ArchiveEntry]) -> None:
@@ -171,7 +171,7 @@ def _count(engine: duckdb.DuckDBPyConnection) -> None:
         "GROUP BY log) r ON e.log = r.log WHERE r.found IS DISTINCT FROM e.indexed OR r.numbers <> r.found"
     ).fetchone()
     if wrong is not None:
-        raise RuntimeError(f"the engine did not read the records of log {wrong[0]} that were verified")
+        raise RuntimeError(f"the query engine did not read the verified records of log {wrong[0]}")
 
 
 def _load(

@@ -61,8 +61,8 @@ def told_apart(agent: str, user: int, own: int) -> VehicleFinding:
         return VehicleFinding("agents/user", MissionVerdict.OK, f"{found}, and the flight as another user")
     return VehicleFinding(
         "agents/user", MissionVerdict.WARN,
-        f"{found}, as which it may open the operators' socket: nothing tells it from an operator there",
-        "another user than the flight's, and not root",
+        f"{found}, as which it may open the operators' socket and cannot be told from an operator",
+        "a user other than the flight's and other than root",
         "let the agent run as a user of its own, and give that user's group to `run --agent-group`",
     )  # fmt: skip
 
@@ -126,7 +126,7 @@ _WITHOUT_ANSWERS: Final = (
     "link/signing", "link/loss", "link/component", "link/other-vehicle", "autopilot/kind", "vehicle/airborne",
     "vehicle/armed", "sensor/unwell",
 )  # fmt: skip
-_NOT_ASKED: Final = "not asked: it answers signed frames only, and no key was given (`link/signing`)"
+_NOT_ASKED: Final = "not checked: the vehicle answers signed frames only, and no key was given (`link/signing`)"
 
 
 def _graded(
@@ -152,7 +152,7 @@ def _heartbeat(vehicle: ExaminingDriver, flavour: str) -> VehicleFinding:
     if interval_us is None:
         return VehicleFinding(slug, UNKNOWN, f"{who}: one heartbeat only")
     found = f"{who}, a heartbeat every {interval_us // 1_000} ms"
-    return _graded(slug, found, "one a second, at the least", warns=interval_us > _SLOW_HEARTBEAT_US)
+    return _graded(slug, found, "at least one a second", warns=interval_us > _SLOW_HEARTBEAT_US)
 
 
 def _loss(vehicle: ExaminingDriver) -> VehicleFinding:
@@ -160,7 +160,7 @@ def _loss(vehicle: ExaminingDriver) -> VehicleFinding:
     sent = talker.frames + talker.missing
     lost = 1_000 * talker.missing // sent
     found = f"{talker.missing} of {sent} frames are missing ({lost // 10}.{lost % 10} %)"
-    advice = "lower the stream rates, or look at the radio"
+    advice = "lower the stream rates, or check the radio"
     return _graded("link/loss", found, "less than 2 %", advice, warns=lost >= _LOSSY, stops=lost >= _TOO_LOSSY)
 
 
@@ -170,11 +170,11 @@ def _signing(vehicle: ExaminingDriver, *, keyed: bool) -> VehicleFinding:
     if keyed:
         return VehicleFinding("link/signing", OK if talker.signed else STOP, signed)
     if locked(vehicle):
-        found = f"{signed}, and it answers nothing without them"
+        found = f"{signed}, and the vehicle answers no unsigned frame"
         return VehicleFinding("link/signing", STOP, found, "its key", "give its key with `--signing-key`")
     if talker.signed:
         return VehicleFinding("link/signing", WARN, signed, "", "give its key with `--signing-key`")
-    return VehicleFinding("link/signing", WARN, "nothing is signed", "", _for_signing(vehicle))
+    return VehicleFinding("link/signing", WARN, "no frame is signed", "", _for_signing(vehicle))
 
 
 #: the first PX4 that takes a key for MAVLink 2 signing
@@ -183,20 +183,20 @@ _PX4_SIGNS: Final = (1, 17)
 
 def _for_signing(vehicle: ExaminingDriver) -> str:
     """What can be done about a link that is not signed, with the release that this is."""
-    risk = "whoever reaches this link commands the vehicle"
+    risk = "anyone with access to this link can command the vehicle"
     make = "`rtshcua keys link` makes a key for MAVLink 2 signing"
     message, px4 = vehicle.latest("AUTOPILOT_VERSION"), vehicle.flavour is not None and vehicle.flavour.name == "px4"
     since = ".".join(map(str, _PX4_SIGNS))
     if not px4:
         return f"{risk}: {make}"
     if message is None:
-        return f"{risk}: {make}, which PX4 takes from {since} on"
+        return f"{risk}: {make}, which PX4 accepts from {since} on"
     release = tuple(message.flight_sw_version.to_bytes(4)[:2])
     if release >= _PX4_SIGNS:
         return f"{risk}: {make}"
     has = ".".join(map(str, release))
-    wire = "use a wire that nobody else reaches"
-    return f"{risk}, and PX4 {has} takes no key: {wire}, or PX4 {since} and `rtshcua keys link`"
+    wire = "use a wire that nobody else has access to"
+    return f"{risk}, and PX4 {has} accepts no key: {wire}, or update to PX4 {since} and run `rtshcua keys link`"
 
 
 def locked(vehicle: ExaminingDriver) -> bool:
@@ -212,7 +212,7 @@ def _it_answers(vehicle: ExaminingDriver) -> bool:
 def _answers(vehicle: ExaminingDriver) -> VehicleFinding:
     answers = _it_answers(vehicle)
     found = "it answers requests" if answers else "it answers no request"
-    advice = "it may demand signed frames (`--signing-key`), or the way there may be closed"
+    advice = "it may require signed frames (`--signing-key`), or the link may carry nothing to it"
     return _graded("link/answers", found, "answers", advice, stops=not answers)
 
 
@@ -224,12 +224,12 @@ def _others(vehicle: ExaminingDriver, *, named: bool) -> Iterator[VehicleFinding
     stations, crowd = 0, vehicle.link.crowd  # another vehicle, as a run would refuse it
     for (system, component), talker in vehicle.talkers.items():
         if (system, component) == (vehicle.system, OURS):
-            advice = "stop the other one: two that mediate do not see what the other commands"
-            yield VehicleFinding("link/component", STOP, f"another component {OURS} speaks here", "", advice)
+            advice = "stop the other program: two such programs do not see each other's commands"
+            yield VehicleFinding("link/component", STOP, f"another component {OURS} sends on this link", "", advice)
         elif talker.kind == GROUND_STATION:
             stations += 1
         elif system != vehicle.system and component == AUTOPILOT and _is_vehicle(talker):
-            found, advice = f"another vehicle sends on this link, system {system}", "`--system` says which one is meant"
+            found, advice = f"another vehicle sends on this link, system {system}", "`--system` selects one"
             yield VehicleFinding("link/other-vehicle", WARN if named else STOP, found, "one vehicle", advice)
             crowd = None
         elif system != vehicle.system:
@@ -245,16 +245,16 @@ def _others(vehicle: ExaminingDriver, *, named: bool) -> Iterator[VehicleFinding
 def _round_trip(clock: VehicleClock) -> VehicleFinding:
     slug, median, error = "link/round-trip", clock.round_trip_us, clock.error_us
     if median is None or error is None:
-        found = "TIMESYNC is not answered, so nobody knows how old its reports are"
-        return VehicleFinding(slug, STOP, found, "answers", "a router on the way may drop TIMESYNC (111)")
-    found = f"{median // 1_000} ms there and back; its clock is known to {-(-error // 1_000)} ms"
+        found = "TIMESYNC is not answered, so the age of the reports is not known"
+        return VehicleFinding(slug, STOP, found, "answers", "a router on the link may drop TIMESYNC (111)")
+    found = f"{median // 1_000} ms round trip; the vehicle's clock is known to {-(-error // 1_000)} ms"
     return _graded(slug, found, "at most 200 ms", warns=median > _SLOW_US, stops=median > _TOO_SLOW_US)
 
 
 _FASTER: Final = {
     "px4": "raise the port's `MAV_n_RATE` (octets a second; 1200 as it comes) to what the link carries, or set its "
     "`MAV_n_MODE` to Onboard",
-    "ardupilot": "another program may ask for other rates (REQUEST_DATA_STREAM), or the port carries no more",
+    "ardupilot": "another program may request other rates (REQUEST_DATA_STREAM), or the port is at its limit",
 }
 
 
@@ -264,8 +264,8 @@ def _streams(vehicle: ExaminingDriver, flavour: str) -> VehicleFinding:
     plan = requests.plan
     of = "" if plan.capacity is None else f" of {plan.capacity} that the link carries"
     if plan.shortfall is not None:
-        advice = "a faster link, or longer deadlines and times to stale in the policy"
-        return VehicleFinding(slug, STOP, plan.shortfall, "room for what is needed", advice)
+        advice = "use a faster link, or longer deadlines and `stale after` times in the policy"
+        return VehicleFinding(slug, STOP, plan.shortfall, "room for the needed streams", advice)
     asked = f"{plan.octets} bytes/s requested{of}"
     if requests.measured is None:
         return VehicleFinding(slug, UNKNOWN, f"{asked}; not measured in this time", "", "listen longer (`--seconds`)")
@@ -300,17 +300,17 @@ def _kind(vehicle: ExaminingDriver) -> VehicleFinding:
 def _version(vehicle: ExaminingDriver, flavour: str) -> Iterator[VehicleFinding]:
     message = vehicle.latest("AUTOPILOT_VERSION")
     if message is None:
-        yield VehicleFinding("autopilot/version", UNKNOWN, "it does not tell its version")
+        yield VehicleFinding("autopilot/version", UNKNOWN, "the vehicle does not report its version")
         return
     tested, version = _TESTED[flavour], tuple(message.flight_sw_version.to_bytes(4)[:3])
     found = f"{flavour} {'.'.join(map(str, version))}"
     needed = f"{flavour} {'.'.join(map(str, tested))}, which this release was tested with"
-    advice = "fly it in simulation first: what is known of its answers was recorded of that version"
+    advice = "fly this version in simulation first: the adapter was made from recordings of the tested version"
     yield _graded("autopilot/version", found, needed, advice, warns=version[:2] != tested)
     wanted = _CAPABILITIES[flavour]
     missing = [each for bit, each in wanted.items() if not message.capabilities & bit]
     for name, verdict in missing:
-        yield VehicleFinding("autopilot/capability", verdict, f"it says that it cannot do {name}", name)
+        yield VehicleFinding("autopilot/capability", verdict, f"the autopilot reports that it cannot do {name}", name)
     if not missing:
         yield VehicleFinding("autopilot/capability", OK, ", ".join(name for name, _ in wanted.values()))
 
@@ -323,8 +323,8 @@ def _qualification(
     values = {} if vehicle.parameters is None or vehicle.flavour is None else vehicle.parameters.values
     known = {} if vehicle.flavour is None else those_that_matter(vehicle.flavour, values)
     stands = qualified(None if message is None else firmware_of(flavour, message), known)
-    advice = "`rtshcua qualify` flies a short test of it, and records what holds (docs/flying/qualify.md)"
-    return _graded("autopilot/qualified", stands.text, "qualified, as it is now", advice, warns=not stands.qualified)
+    advice = "`rtshcua qualify` flies a short test of it, and records the results (docs/flying/qualify.md)"
+    return _graded("autopilot/qualified", stands.text, "qualified as it is", advice, warns=not stands.qualified)
 
 
 # ---------------------------------------------------------------- the vehicle as it stands, whatever it is to fly
@@ -339,24 +339,24 @@ def _readiness(vehicle: ExaminingDriver, policy: Policy) -> Iterator[VehicleFind
     if seen.airborne:
         yield VehicleFinding("vehicle/airborne", STOP, "it is in the air", "on the ground", "somebody else flies it")
     elif seen.armed:
-        yield VehicleFinding("vehicle/armed", STOP, "its motors are armed", "disarmed", "somebody else holds it")
+        yield VehicleFinding("vehicle/armed", STOP, "the motors are armed", "disarmed", "somebody else holds it")
     elif not seen.landed_state:
-        found = "it does not say whether it is on the ground (EXTENDED_SYS_STATE)"
+        found = "the vehicle does not report whether it is on the ground (EXTENDED_SYS_STATE)"
         yield VehicleFinding("vehicle/down", UNKNOWN, found, "on the ground, disarmed")
     else:
         yield VehicleFinding("vehicle/down", OK, "on the ground, disarmed")
     unready, astray = seen.unready, seen.estimator.missing(seen.now_us)
-    found = unready or "it reports nothing that prevents arming"
+    found = unready or "the vehicle reports nothing that prevents arming"
     yield _graded("vehicle/ready", found, "ready to arm", stops=unready is not None)
     for name in seen.unwell:
-        yield VehicleFinding("sensor/unwell", STOP, f"{name}: there and in use, and not healthy", "healthy")
+        yield VehicleFinding("sensor/unwell", STOP, f"{name}: present and enabled, but not healthy", "healthy")
     yield _fix(vehicle)
-    found = astray or "its estimator knows place and height"
-    yield _graded("sensor/estimator", found, "a place and a height", stops=astray is not None)
+    found = astray or "the estimator has a position and a height"
+    yield _graded("sensor/estimator", found, "a position and a height", stops=astray is not None)
     yield _battery(vehicle, policy)
     yield from _cells(vehicle, policy)
     for text in vehicle.texts:
-        yield VehicleFinding("vehicle/said", OK, f"its own message: {text}")
+        yield VehicleFinding("vehicle/said", OK, f"the vehicle's message: {text}")
 
 
 def _fix(vehicle: ExaminingDriver) -> VehicleFinding:
@@ -381,7 +381,7 @@ def settling(vehicle: ExaminingDriver) -> str | None:
         return f"a fix accurate to {least} (its receiver reports {display(fix.h_acc, Dimension.LENGTH)})"
     if fix is None:
         return None  # nothing tells that there is a receiver
-    return None if vehicle.seen.estimator.missing(vehicle.seen.now_us) is None else "its estimator's place and height"
+    return None if vehicle.seen.estimator.missing(vehicle.seen.now_us) is None else "the estimator's position"
 
 
 def settled(what: str, seconds: int, still: str | None) -> VehicleFinding:
@@ -389,8 +389,8 @@ def settled(what: str, seconds: int, still: str | None) -> VehicleFinding:
     if still is None:
         found = f"waited {seconds} s for {what}"
         return VehicleFinding("sensor/settled", OK, found)
-    found = f"waited {seconds} s for {still}, which did not come"
-    return VehicleFinding("sensor/settled", WARN, found, "a settled vehicle", "give it a clear sky, and ask again")
+    found = f"waited {seconds} s for {still}, which did not arrive"
+    return VehicleFinding("sensor/settled", WARN, found, "a settled vehicle", "give it a clear sky, and try again")
 
 
 #: a cell of a lithium battery, at rest or nearly so, mV
@@ -404,7 +404,7 @@ def _cells(vehicle: ExaminingDriver, policy: Policy) -> Iterator[VehicleFinding]
         if value is None:
             continue
         found = f"{value / 1_000:.2f} V a cell, by the `cells` that the policy's vehicle declares"
-        advice = "compare `cells` with the battery: by another number its rule on the voltage says nothing"
+        advice = "compare `cells` with the battery: with a wrong number the rule on the voltage means nothing"
         wrong = value not in _CELL_MV
         yield _graded("sensor/cells", found, "3 V to 4.4 V at rest", advice, stops=wrong)
 
@@ -420,8 +420,8 @@ def _battery(vehicle: ExaminingDriver, policy: Policy) -> VehicleFinding:
         charge = None if message is None or message.battery_remaining < 0 else f"{message.battery_remaining} %"
     each = f": {batteries.summary}" if len(batteries.told) > 1 else ""
     if charge is None:
-        advice = "set up its battery monitor: an unknown charge permits nothing"
-        return VehicleFinding("sensor/battery", STOP, f"it does not know its charge{each}", "a charge in %", advice)
+        advice = "set up the battery monitor: no step is permitted with an unknown charge"
+        return VehicleFinding("sensor/battery", STOP, f"the charge is unknown{each}", "a charge in %", advice)
     return VehicleFinding("sensor/battery", OK, f"{charge}{each}")
 
 
@@ -455,21 +455,21 @@ def _signal(
     slug, sources = f"signal/{signal.name}", [source.message for source in signal.sources]
     names = " or ".join(sources)
     if not signed:
-        found = f"`{signal.name}` stays unknown: nobody signs {names}, and nothing unsigned is believed here"
+        found = f"`{signal.name}` stays unknown: {names} comes unsigned, which this link ignores"
         return VehicleFinding(slug, bad, found, names, "`--unsigned-radio`, here and for `run`")
     heard = next((name for name in sources if name in vehicle.streams), None)
     unknown = any(vehicle.values.get(slot) is None for slot in slots)
     if unknown and signal.name == DRAIN and not vehicle.seen.airborne:
         declared = f"{drained(policy.vehicle) / 100:.1f} % a minute"
-        found = f"`{signal.name}` is measured in the air only; until it is, the declared {declared} counts"
+        found = f"`{signal.name}` is measured in the air only; until then the declared {declared} counts"
         return VehicleFinding(slug, UNKNOWN, found, "", "no action needed")
     if unknown and IN_THE_AIR.issuperset(sources) and not vehicle.seen.airborne:
-        found = f"`{signal.name}` is known in the air only, so nothing is known of it yet"
-        return VehicleFinding(slug, UNKNOWN, found, "a step that takes off does not ask for it")
+        found = f"`{signal.name}` is known in the air only, so it is unknown now"
+        return VehicleFinding(slug, UNKNOWN, found, "no rule about a takeoff may depend on it")
     if heard is None:
-        return VehicleFinding(slug, bad, f"`{signal.name}` stays unknown: no {names}", names, _ADVICE)
+        return VehicleFinding(slug, bad, f"`{signal.name}` stays unknown: no {names} arrives", names, _ADVICE)
     if unknown:
-        found = f"`{signal.name}` is unknown now: {heard} comes, and says so or is not vouched for"
+        found = f"`{signal.name}` is unknown now: {heard} reports no value, or one that is not confirmed"
         return VehicleFinding(slug, bad, found, "a value")
     told = next((each for slot in slots if (each := vehicle.told.get(slot))), vehicle.streams[heard])
     interval_us, stale_ms = told.interval_us, signal.stale_us // 1_000
@@ -486,18 +486,18 @@ def _place(vehicle: ExaminingDriver, policy: Policy) -> VehicleFinding:
     preflight = vehicle.preflight
     unknown = preflight.unplaced or preflight.unread
     if preflight.astray is not None:
-        return VehicleFinding("mission/unready", STOP, preflight.astray, "as the policy has it")
+        return VehicleFinding("mission/unready", STOP, preflight.astray, "as in the policy")
     if unknown is not None:
-        return VehicleFinding("mission/place", UNKNOWN, unknown, "as the policy has it")
+        return VehicleFinding("mission/place", UNKNOWN, unknown, "as in the policy")
     if not policy.vehicle.return_altitude:
-        found = "home is that of the policy; no return altitude was compared, for the policy declares no `return at`"
+        found = "home is as in the policy; its return altitude was not compared: the policy has no `return at`"
         return VehicleFinding("mission/place", OK, found)
-    return VehicleFinding("mission/place", OK, "home and return altitude are those of the policy")
+    return VehicleFinding("mission/place", OK, "home and return altitude are as in the policy")
 
 
 _UNSYNCHRONISED: Final = "this machine's clock is not synchronised"
-_STATE: Final = "`--utc-error 500ms`, here and for `run`, states how far its time of day is off"
-_STATE_THERE: Final = "`--utc-error US` in the boundary's own command line states how far its time of day is off"
+_STATE: Final = "`--utc-error 500ms`, here and for `run`, states the largest error of its time of day"
+_STATE_THERE: Final = "`--utc-error US` in the boundary's command line states the largest error of its time of day"
 
 
 def _clock(vehicle: ExaminingDriver, time: TimeSources) -> VehicleFinding:
@@ -505,24 +505,24 @@ def _clock(vehicle: ExaminingDriver, time: TimeSources) -> VehicleFinding:
     ahead_us = vehicle.ahead_us
     if time.machine_us is None:
         if time.vehicle and ahead_us is not None:
-            found = f"{_UNSYNCHRONISED}, and the vehicle's own time counts (SYSTEM_TIME)"
+            found = f"{_UNSYNCHRONISED}, so the vehicle's time counts (SYSTEM_TIME)"
             return VehicleFinding("mission/clock", OK, found)
         if time.stated_us is not None:
-            found = f"{_UNSYNCHRONISED}; it is off by {time.stated_us / 1_000:g} ms at most, as the operator says"
+            found = f"{_UNSYNCHRONISED}; it is off by {time.stated_us / 1_000:g} ms at most, as stated by the operator"
             return VehicleFinding("mission/clock", OK, found)
-        why = "the vehicle tells no time (SYSTEM_TIME)"
+        why = "the vehicle reports no time of day (SYSTEM_TIME)"
         help = f"synchronise this machine; {_STATE_THERE if time.listens else _STATE}"
         if not time.vehicle:
-            why = "a boundary in a process of its own takes the vehicle's time over a link with a key alone"
+            why = "a boundary in a separate process accepts the vehicle's time only over a link with a key"
             help += "; or give a key" + ("" if time.listens else " (`--signing-key`)")
         found = f"{_UNSYNCHRONISED}, and {why}: every step would be deferred"
-        return VehicleFinding("mission/clock", STOP, found, "the time of day, and how far it may be off", help)
+        return VehicleFinding("mission/clock", STOP, found, "the time of day and a bound on its error", help)
     if ahead_us is None:
-        return VehicleFinding("mission/clock", UNKNOWN, "the vehicle does not tell the time (SYSTEM_TIME)")
+        return VehicleFinding("mission/clock", UNKNOWN, "the vehicle does not report the time of day (SYSTEM_TIME)")
     if abs(ahead_us) <= _CLOCK_US + time.machine_us:
         return VehicleFinding("mission/clock", OK, "the vehicle's clock agrees with this machine's")
     found = f"the vehicle's clock and this machine's are {abs(ahead_us) // 1_000_000} s apart"
-    advice = "one of them is wrong; validity and times of day are judged by this machine's"
+    advice = "one of them is wrong; validity periods and times of day are judged by this machine's clock"
     return VehicleFinding("mission/clock", WARN, found, "the same time", advice)
 
 
@@ -542,8 +542,8 @@ def _settings(
         reach = reach_of(flown.invocations, policy, here)
     yield from settings_told(flavour, vehicle.parameters.values, policy, reach, vehicle.meant)
     for names in vehicle.preflight.silent if vehicle.parameters.values else ():
-        found = f"{names} was not answered: if it has it, its way home may not be the one that is proved"
-        yield VehicleFinding("settings/unanswered", UNKNOWN, found, "an answer", "ask again, or look in its parameters")
+        found = f"{names} was not answered: if the vehicle has it, its way home may differ from the proved one"
+        yield VehicleFinding("settings/unanswered", UNKNOWN, found, "an answer", "try again, or look at it yourself")
 
 
 def settings_told(
@@ -561,11 +561,11 @@ def settings_told(
         yield _setting(setting, values[name], setting.needs(policy, reach), meant.get(name), other, alone=alone)
     for name in meant:
         if name not in values:
-            found = f"it does not tell `{name}`, which `--set` names: a run would be refused"
+            found = f"the vehicle does not report `{name}`, which `--set` names: a run would be refused"
             yield VehicleFinding(f"settings/{name.lower()}", STOP, found, "a parameter that it has", "leave it out")
     if not told:
-        absent = "none of the parameters that were asked for was answered"
-        yield VehicleFinding("settings/unread", UNKNOWN, absent, "what the autopilot does by itself")
+        absent = "none of the requested parameters was reported"
+        yield VehicleFinding("settings/unread", UNKNOWN, absent, "the autopilot's own reactions")
 
 
 def _sees_voltage(policy: Policy) -> bool:
@@ -601,7 +601,7 @@ def _setting(
         value = meant
     wrong = None if setting.limit is None else setting.limit.misfit(value, ONLY_ZERO)
     if wrong is not None:
-        proved = f"what is proved of the way home is not proved of it; set `{name}` to {wrong.accepted}"
+        proved = f"the proofs about the way home do not cover this setting; set `{name}` to {wrong.accepted}"
         return _graded(slug, found, wrong.accepted, proved, warns=True)
     why = setting.warns.get(value, "")
     if why:
@@ -609,7 +609,7 @@ def _setting(
         how = f"; set `{name}` to {better:g}" if better is not None else ""
         needed = setting.words.get(better, "") if better is not None else ""
         if alone:
-            why += ", and no condition of the policy reads a voltage: nothing would see a battery that fails"
+            why += ", and no condition of the policy reads a voltage: nothing would notice a failing battery"
         return _graded(slug, found, needed, why + how, warns=True, stops=alone)
     if value == 0 and otherwise is not None:
         value = otherwise

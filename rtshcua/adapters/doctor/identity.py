@@ -99,9 +99,9 @@ def standing(record: Qualification | str | None, firmware: Firmware | None, know
     vehicle: nobody here can tell whether it is one, for both may have the same identity and address.
     """
     if record is None:
-        return Standing(False, "this vehicle is not qualified: there is no record of a flight test of its autopilot")
+        return Standing(False, "this vehicle is not qualified: no flight test of its autopilot is on record")
     if isinstance(record, str):
-        return Standing(False, f"this vehicle is not qualified: its record is not to be trusted: {record}")
+        return Standing(False, f"this vehicle is not qualified: its record cannot be trusted: {record}")
     failed = [each.slug for each in record.failed]
     if not record.qualifies:
         what = f"{_many(len(failed))} did not hold: {', '.join(failed)}" if failed else "nothing was checked"
@@ -109,19 +109,19 @@ def standing(record: Qualification | str | None, firmware: Firmware | None, know
     day = datetime.fromtimestamp(record.issued_at_us / 1_000_000, UTC).date().isoformat()
     changes = record.changes(firmware, known)
     if changes:
-        return Standing(False, f"this vehicle was qualified on {day}, and is another now: {'; '.join(changes)}")
+        return Standing(False, f"this vehicle was qualified on {day} and has changed since: {'; '.join(changes)}")
     if not record.pilot:
         return Standing(False, f"this vehicle was qualified in simulation only, on {day}")
     left_out = unflown(record)
     if left_out:
-        text = f"this vehicle is partly qualified only: not flown: {', '.join(left_out)} (`--only`)"
+        text = f"this vehicle is only partly qualified: not flown: {', '.join(left_out)} (`--only`)"
         return Standing(False, text)
     held = sum(each.outcome == CheckOutcome.HELD for each in record.checks)
     left = sum(each.outcome == CheckOutcome.UNCHECKED for each in record.checks)
-    unsaid = [] if firmware is not None else ["it does not tell its version now"]
+    unsaid = [] if firmware is not None else ["the vehicle does not report its version now"]
     missing = len(dict(record.parameters).keys() - known.keys())
     if missing:
-        unsaid.append(f"{missing} of its parameters are not told now")
+        unsaid.append(f"{missing} of its parameters are not reported now")
     more = f"; {'; '.join(unsaid)}" if unsaid else ""
     return Standing(
         not unsaid,

@@ -157,7 +157,7 @@ SETTINGS: Final[Mapping[str, tuple[VehicleSetting, ...]]] = {
         VehicleSetting(
             "GF_ACTION", "at the fence",
             {0: "nothing", 1: "warns only", 2: "hold", 3: "return", 4: "terminate", 5: "land"},
-            {0: "its fence is no second line of defence", 1: "its fence gives no second protection", 4: _MOTORS_OFF},
+            {0: "the fence gives no second protection", 1: "the fence gives no second protection", 4: _MOTORS_OFF},
             2,
         ),
         VehicleSetting("GF_MAX_HOR_DIST", "radius of its own fence around home (0: no limit)", mm=1_000, needs=_far),
@@ -185,7 +185,7 @@ SETTINGS: Final[Mapping[str, tuple[VehicleSetting, ...]]] = {
         VehicleSetting(
             "COM_RC_OVERRIDE", "sticks take over",
             {0: "never", 1: "in automatic modes", 2: "in offboard", 3: "in automatic modes and offboard"},
-            {0: "the pilot's sticks end nothing: a switch has to", 2: "the pilot's sticks end nothing in Hold"}, 1,
+            {0: "the pilot's sticks do not end it: use the switch", 2: "the pilot's sticks do not end Hold"}, 1,
         ),
         VehicleSetting(
             "COM_OBL_RC_ACT", "when offboard control is lost",
@@ -232,17 +232,17 @@ SETTINGS: Final[Mapping[str, tuple[VehicleSetting, ...]]] = {
             {0: "the autopilot flies on without knowing where it is"}, 1,
         ),
         VehicleSetting(
-            "FENCE_ENABLE", "fence", {0: "off", 1: "on"}, {0: "its fence is off until a flight of ours switches it on"}
+            "FENCE_ENABLE", "fence", {0: "off", 1: "on"}, {0: "the fence is off until a flight switches it on"}
         ),
         VehicleSetting(
             "FENCE_AUTOENABLE", "fence switched on automatically",
             {0: "no", 1: "at takeoff", 2: "at takeoff, without the floor when landing", 3: "when armed"},
         ),
-        VehicleSetting("FENCE_TYPE", "what the fence is, once it is on", _FENCES),
+        VehicleSetting("FENCE_TYPE", "areas of the fence once it is on", _FENCES),
         VehicleSetting("FENCE_RADIUS", "radius of its circular fence around home", mm=1_000, needs=_far),
         VehicleSetting("FENCE_ALT_MAX", "ceiling of its fence above home", mm=1_000, needs=_high),
         VehicleSetting("FENCE_ALT_MIN", "floor of its fence above home", mm=1_000, needs=_low),
-        VehicleSetting("FENCE_MARGIN", "margin that it keeps to its fence", mm=1_000),
+        VehicleSetting("FENCE_MARGIN", "margin kept to the fence", mm=1_000),
         VehicleSetting("RTL_ALT", "height of a return", mm=10, needs=_returns),
         VehicleSetting("RTL_ALT_M", "height of a return", mm=1_000, needs=_returns),
         VehicleSetting(
@@ -287,10 +287,10 @@ SETTINGS: Final[Mapping[str, tuple[VehicleSetting, ...]]] = {
             "FENCE_ACTION", "at the fence",
             {0: "reports only", 1: "return or land", 2: "land", 3: "SmartRTL, return or land", 4: "brake or land",
              5: "SmartRTL or land"},
-            {0: "its fence is no second line of defence"}, 1,
+            {0: "the fence gives no second protection"}, 1,
         ),
         VehicleSetting("ARMING_CHECK", "checks before arming", {0: "none", 1: "all"},
-            {0: "it arms whatever is wrong"}, 1),
+            {0: "the autopilot arms in spite of any fault"}, 1),
         VehicleSetting("ARMING_SKIPCHK", "checks left out before arming", {0: "none"}, {}),
         VehicleSetting("DISARM_DELAY", "seconds until it disarms on the ground", {}, {}),
     ),

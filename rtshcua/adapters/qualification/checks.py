@@ -68,7 +68,7 @@ def _unchecked(slug: str, expected: str, why: str) -> QualificationCheck:
 
 def _why(observed: ObservedQualification, sortie: str) -> str:
     """Why something of a sortie was not seen."""
-    return observed.missing.get(sortie, "it did not come to that")
+    return observed.missing.get(sortie, "not reached")
 
 
 def _metres(mm: int) -> str:
@@ -88,15 +88,15 @@ def _time(us: int) -> str:
 
 def _firmware(observed: ObservedQualification) -> QualificationCheck:
     firmware = observed.firmware
-    told = "it does not report its version" if firmware is None else firmware.text
+    told = "the vehicle does not report its version" if firmware is None else firmware.text
     return _check("firmware/told", firmware is not None, "AUTOPILOT_VERSION", told)
 
 
 def _fence(observed: ObservedQualification) -> Iterator[QualificationCheck]:
-    slug, expected = "fence/read-back", "the airspace is uploaded, and read back the same"
+    slug, expected = "fence/read-back", "the airspace is uploaded and read back unchanged"
     flown = next(iter(observed.sorties), None)
     if flown is None or flown.fence is None:
-        why = "nothing was flown" if flown is None else "its fence was left as it is"
+        why = "nothing was flown" if flown is None else "the vehicle's fence was left unchanged"
         yield _unchecked(slug, expected, why)
         yield _unchecked("fence/on", "enabled in flight", why)
         return
@@ -108,9 +108,7 @@ def _fence(observed: ObservedQualification) -> Iterator[QualificationCheck]:
     ]
     idle = [each for each in observed.settings if each.slug in _FENCE_ACTIONS and each.verdict is not MissionVerdict.OK]
     found = [*off, *[each.found for each in idle]]
-    advice = (
-        idle[0].advice if idle else "something else changes it: a switch of the remote control, a script, a mission"
-    )
+    advice = idle[0].advice if idle else "a switch of the remote control, a script or a mission changes it"
     expected = "enabled in flight, with an action"
     yield _check("fence/on", not found, expected, "; ".join(found) or "enabled", advice=advice)
 
@@ -130,9 +128,9 @@ def _settings(observed: ObservedQualification) -> Iterator[QualificationCheck]:
         outcome = FAILED if each.verdict is MissionVerdict.STOP else TOLD
         yield QualificationCheck(each.slug, int(outcome), each.needed, each.found, advice=each.advice)
     if well:
-        yield _check("settings/others", True, "nothing that interferes", f"{well} other parameters are fine")
+        yield _check("settings/others", True, "no setting that interferes", f"{well} other parameters are fine")
     elif not observed.settings:
-        yield _unchecked("settings/others", "nothing that interferes", "no parameter was read")
+        yield _unchecked("settings/others", "no setting that interferes", "no parameter was read")
 
 
 # ---------------------------------------------------------------- how a sortie went
@@ -148,7 +146,9 @@ def _sortie(flown: ObservedSortie) -> QualificationCheck:
     planned = _PLANNED[flown.name]
     pauses = flown.takeover is not None and flown.takeover.kind is TakeoverKind.PAUSE
     well = flown.down and flown.ending == planned and (pauses or not failed)
-    words = [f"`{each.skill}` {each.how}" for each in failed] + ([] if flown.down else ["it was not seen to be down"])
+    words = [f"`{each.skill}` {each.how}" for each in failed] + (
+        [] if flown.down else ["it was not seen on the ground"]
+    )
     measured = "; ".join([flown.ending, *words])
     return _check(f"sortie/{flown.name}", well, f"{planned}, and down", measured)
 
@@ -182,8 +182,8 @@ def _speeds(observed: ObservedQualification, vehicle: VehicleLimits) -> Iterator
         peak = max(sample.climb for _, samples in climbs for sample in samples)
         kept = max(_kept_climb(samples) for _, samples in climbs)
         slow = kept < least
-        measured = f"{_speed(kept)} over {_KEPT_US // _SECOND} s, {_speed(peak)} at the most"
-        advice = "declare the climb rate that it has, or change the autopilot's (`rtshcua doctor` names the parameter)"
+        measured = f"{_speed(kept)} over {_KEPT_US // _SECOND} s, {_speed(peak)} at most"
+        advice = "declare its real climb rate, or change the autopilot's (`rtshcua doctor` names the parameter)"
         limit, found = (least, kept) if slow else (most, peak)
         yield _check("climb/speed", not slow and peak <= most, expected, measured, limit, found, _MM_S, advice)
     else:
@@ -275,12 +275,12 @@ def _stop(
     stood = _stood(samples)
     until = samples if stood is None else samples[: stood + 1]
     way = max(_way(samples[0], each) for each in until)
-    whose = "`brakes`" if declared else "no `brakes` declared: taken for 1 m/s^2 after 1 s"
+    whose = "`brakes`" if declared else "no `brakes` declared: 1 m/s^2 after 1 s is assumed"
     expected = f"within {_metres(limit)} and {_time(within_us)} from {_speed(speed)} ({whose})"
-    advice = "declare `brakes` a little worse than the worst that was measured, in a new version of the policy"
+    advice = "declare `brakes` slightly worse than the worst measured stop, in a new version of the policy"
     if stood is None:
-        measured = f"it does not stop: {_metres(way)} on, it flies at {_speed(_whole_speed(samples[-1]))}"
-        return _check(slug, False, expected, measured, limit, way, _MM, "its hold cannot be relied on: do not fly it")
+        measured = f"the vehicle does not stop: {_metres(way)} on, it flies at {_speed(_whole_speed(samples[-1]))}"
+        return _check(slug, False, expected, measured, limit, way, _MM, "its hold is not reliable: do not fly it")
     took_us = samples[stood].at_us - told_us
     holds = way <= limit and took_us <= within_us
     return _check(slug, holds, expected, f"{_metres(way)} in {_time(took_us)}", limit, way, _MM, advice)
@@ -296,7 +296,7 @@ def _stood(samples: Sequence[MotionSample]) -> int | None:
 def _hold(slug: str, samples: Sequence[MotionSample], limit: int) -> QualificationCheck:
     expected, stood = f"stays within {_metres(limit)} of where it stopped", _stood(samples)
     if stood is None:
-        return _check(slug, False, expected, "it does not come to stand")
+        return _check(slug, False, expected, "the vehicle does not come to a stop")
     strays = max(_way(samples[stood], each) for each in samples[stood:])
     return _check(slug, strays <= limit, expected, _metres(strays), limit, strays, _MM)
 
@@ -351,7 +351,7 @@ def _ended(
     took = _time(samples[-1].at_us - samples[0].at_us)
     down = command.how == "succeeded" and flown.down
     measured = f"{_metres(off)} off, after {took}" if down else f"{command.how or 'not ended'}, {_metres(off)} off"
-    advice = "every fallback chain ends with it: do not fly it"
+    advice = "every fallback chain ends with this: do not fly it"
     return _check(slug, down and off <= limit, expected, measured, limit, off, _MM, advice)
 
 
@@ -380,11 +380,11 @@ def _lowest_across(observed: ObservedQualification, vehicle: VehicleLimits) -> Q
     start, home = samples[0], flown.samples[0]
     between = [each for each in samples if min(_across(each, start), _across(each, home)) > clear]
     if _across(start, home) <= cone(vehicle.return_altitude) + vehicle.position_error or not between:
-        return _unchecked(slug, expected, "it returned from so near home that it may be low")
+        return _unchecked(slug, expected, "it returned from near home, where a low return is allowed")
     limit = max(vehicle.return_altitude, start.height) - SHORT
     lowest = min(each.height for each in between)
     expected = f"no lower than {_metres(limit)} (`return at {vehicle.return_altitude / 1_000:g} m`)"
-    advice = "what is proved of the way home does not hold: look at its cone over home (docs/flying/returns.md)"
+    advice = "the proofs about the way home do not hold for it: check its cone over home (docs/flying/returns.md)"
     return _check(slug, lowest >= limit, expected, _metres(lowest), limit, lowest, _MM, advice)
 
 
@@ -403,12 +403,12 @@ def _answers(observed: ObservedQualification) -> Iterator[QualificationCheck]:
     lost = sum(each.answered_us is None for each in answers)
     if silent:
         words = f"{len(answers) - lost} of {len(answers)}; none for MAV_CMD {', '.join(map(str, silent))}"
-    advice = "check the link first: unanswered commands are repeated, and fail late"
+    advice = "check the link first: unanswered commands are repeated and fail late"
     yield _check("answers/come", not silent, expected, words, 0, lost, "", advice)
     times = [each.answered_us - each.sent_us for each in answers if each.answered_us is not None]
     if times:
         latest = max(times)
-        expected = f"within {_time(RETRY_US)}: then it is sent again"
+        expected = f"within {_time(RETRY_US)}: after that it is sent again"
         yield _check("answers/late", latest <= RETRY_US, expected, _time(latest), RETRY_US, latest, _US)
     obeyed = {(True, _UNSUPPORTED)}  # whether it flew there, other checks say
     refused = sorted(
@@ -440,11 +440,11 @@ def _heartbeat(observed: ObservedQualification) -> QualificationCheck:
         for earlier, later in pairwise(sortie.beats)
         if not any(_overlaps(each, earlier, later) for each in sortie.silences)
     ]
-    expected = f"every {_time(limit)} while it flies, asked for"
+    expected = f"on request, every {_time(limit)} in flight"
     if not gaps:
         return _unchecked(slug, expected, "none received in flight")
     most = sorted(gaps)[-(-len(gaps) * _MOST_GAPS // 100) - 1]
-    advice = "a motion starts only after the mode is known, so each step would start late"
+    advice = "a motion starts only once the mode is known, so each step would start late"
     return _check(slug, most <= limit, expected, f"{_MOST_GAPS} % within {_time(most)}", limit, most, _US, advice)
 
 
@@ -463,7 +463,7 @@ def _takeovers(observed: ObservedQualification) -> Iterator[QualificationCheck]:
         slug, flown = f"takeover/{kind}", observed.sortie(kind)
         takeover = None if flown is None else flown.takeover
         if flown is None or takeover is None:
-            yield _unchecked(slug, "it is detected, and nothing more is sent", _why(observed, kind))
+            yield _unchecked(slug, "it is detected and nothing more is sent", _why(observed, kind))
         else:
             yield _takeover(slug, flown, takeover, observed)
 
@@ -473,14 +473,14 @@ def _takeover(
 ) -> QualificationCheck:
     sent, shown = takeover.sent_us, takeover.shown_us
     if sent is None:  # by a pilot: nobody knows when
-        found = "not detected" if shown is None else f"detected by `{takeover.how}`; how late is not known"
+        found = "not detected" if shown is None else f"detected by `{takeover.how}`; the delay is not known"
         return _check(slug, shown is not None and flown.ending == Ending.STOOD_DOWN, "it is detected", found)
     limit = _within_us(observed)
     stalls = takeover.kind is TakeoverKind.PAUSE and takeover.how == "paused"
     if stalls:  # ArduCopter's pause changes neither mode nor target: it shows once the vehicle stands (docs/adr/0034)
         limit = _STALLS_US + 2 * _SECOND + observed.mode_within_us
     expected = f"detected within {_time(limit)}, and no motion frame is sent after that"
-    advice = "the program would fly against the pilot: do not fly it"
+    advice = "the program would act against the pilot: do not fly it"
     if shown is None:
         return _check(slug, False, expected, "not detected", limit, None, _US, advice)
     # W counts from when it took effect, which is not long after it was sent
@@ -494,7 +494,7 @@ def _takeover(
     moved = takeover.moved_us is not None and takeover.moved_us - sent > limit and not stalls
     measured = f"after {_time(late)}, by `{takeover.how}`"
     if takeover.kind is TakeoverKind.MODE and takeover.unwatched_us:
-        measured += f", not counting {_time(takeover.unwatched_us)} in which the log was closed and nobody looked"
+        measured += f", not counting {_time(takeover.unwatched_us)} while the log was closed and nothing was watched"
     if moved:
         measured += f"; a motion frame was sent {_time((takeover.moved_us or 0) - sent)} after"
     return _check(slug, late <= limit and not moved, expected, measured, limit, late, _US, advice)
@@ -513,7 +513,7 @@ def _silences(observed: ObservedQualification) -> Iterator[QualificationCheck]:
     fresh_us = Limits().fresh_us
     for for_us in SILENCES_US:
         slug = f"silence/{for_us // _SECOND}s"
-        expected = f"it keeps holding, and all state is fresh within {_time(fresh_us)}"
+        expected = f"it keeps holding, and all signals are fresh within {_time(fresh_us)}"
         silence = found.get(for_us)
         if silence is None:
             yield _unchecked(slug, expected, _why(observed, "leg"))
@@ -549,13 +549,13 @@ def _streams(observed: ObservedQualification) -> Iterator[QualificationCheck]:
                 continue
             if came is None or came > SLOW * asked:
                 slow[name] = asked, came
-    expected = "each at half the rate asked for, at the least"
+    expected = "each at no less than half of the requested rate"
     if not measured:
         yield _unchecked("streams/delivered", expected, "not measured")
         return
     found = [
-        f"{name} {'never' if came is None else f'every {came // 1_000} ms'}, asked for every {asked // 1_000} ms"
+        f"{name} {'never' if came is None else f'every {came // 1_000} ms'}, requested every {asked // 1_000} ms"
         for name, (asked, came) in sorted(slow.items())
     ]
-    advice = "docs/flying/link.md: what limits the rates"
+    advice = "docs/flying/link.md describes what limits the rates"
     yield _check("streams/delivered", not found, expected, "; ".join(found) or "all", advice=advice)

@@ -46,7 +46,7 @@ def expect_inside(path: Path) -> tuple[Path, Path | None]:
         return Path(real), None
     root = os.path.realpath(edge)
     if not lies_in(real, root):
-        raise OutsideCheckout(EACCES, f"symbolic links lead out of `{edge}`; name the place itself", str(path))
+        raise OutsideCheckout(EACCES, f"symbolic links lead out of `{edge}`; use the resolved path", str(path))
     return Path(real), Path(root)
 
 

@@ -201,8 +201,8 @@ class EvidenceFile:
             self._file.close()
 
 
-#: More lines than this that are not kept mean that the disk does not keep up, and evidence fails. They are not dropped,
-#: for the chain has no holes: it goes on, while the flight comes down, up to `TIMES_MOST` times as many.
+#: Evidence fails once more lines than this wait for the disk. None is dropped, because the chain has no gaps: while
+#: the flight comes down, up to `TIMES_MOST` times as many may wait.
 MOST_WAITING = 1_000
 TIMES_MOST = 64
 #: What was written is synced once nothing has come for this time, in seconds, so that a sync stands in nobody's way.
@@ -219,8 +219,8 @@ STUCK_S = 5.0
 #: says nothing of the disk. A loop that goes on looks far more often.
 STOOD_S = 1.0
 
-_BEHIND = OSError(errno.ENOBUFS, "the disk does not keep up")
-_OVER = OSError(errno.ENOSPC, "the disk did not keep up, and the log ends before this")
+_BEHIND = OSError(errno.ENOBUFS, "the disk is too slow for the log")
+_OVER = OSError(errno.ENOSPC, "the disk did not keep up: the log ends before this record")
 
 
 class EvidenceWriter:
@@ -299,7 +299,7 @@ class EvidenceWriter:
         until_s = monotonic() + self._close_s
         while self._keeper.synced < self._given:
             if self._keeper.failing:
-                raise OSError(errno.EIO, self.trouble() or "the disk does not take everything")
+                raise OSError(errno.EIO, self.trouble() or "the disk does not accept all data")
             if monotonic() > until_s:
                 raise self._hangs()
             self._over.wait(0.001)
@@ -477,7 +477,7 @@ class Lateness:
         if self._told_s or self._waited_s(synced, now_s) <= self._late_s:
             return None
         self._told_s = self._late_s
-        return f"what was to be on the disk within {SYNC_US // 1_000} ms is not"
+        return f"a write did not reach the disk within {SYNC_US // 1_000} ms"
 
     def stuck(self, synced: int, now_s: float) -> str | None:
         """That the disk hangs, once for each time that it does."""

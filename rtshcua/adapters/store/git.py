@@ -173,13 +173,13 @@ def _is_below(place: str, folders: tuple[str, ...]) -> bool:
 
 def _merge_base(base: str, top: str, around: _Around) -> str:
     if base.startswith("-") or not _known(base, top, around):
-        raise NoChanges(f"git knows no `{base}`", "fetch it first: a shallow clone has only the last commit")
+        raise NoChanges(f"git does not know `{base}`", "fetch it first: a shallow clone has only the last commit")
     try:
         return os.fsdecode(_git("merge-base", base, "HEAD", folder=top, around=around).strip())
     except NoChanges:
         raise NoChanges(
-            f"`{base}` and the current commit have no commit in common",
-            "fetch the history that lies between: a shallow clone has only the last commit",
+            f"`{base}` and the current commit have no common ancestor",
+            "fetch the history in between: a shallow clone has only the last commit",
         ) from None
 
 
@@ -200,23 +200,23 @@ def _git(*words: str, folder: str, around: _Around) -> bytes:
             command, capture_output=True, check=False, stdin=subprocess.DEVNULL, env=env, timeout=PATIENCE
         )
     except subprocess.TimeoutExpired:
-        raise NoChanges(f"git says nothing about `{folder}` in {PATIENCE:g} s", "name the files instead") from None
+        raise NoChanges(f"git was silent about `{folder}` for {PATIENCE:g} s", "name the files instead") from None
     except FileNotFoundError:
-        raise NoChanges("there is no `git` here to ask what has changed", "install it, or name the files") from None
+        raise NoChanges("`git`, which knows the changes, is not installed", "install it, or name the files") from None
     except OSError as error:
-        raise NoChanges(f"git does not start: {(error.strerror or str(error)).lower()}") from None
+        raise NoChanges(f"git cannot be started: {(error.strerror or str(error)).lower()}") from None
     if done.returncode:
         said = done.stderr.decode(errors="replace").strip().splitlines()
         words_ = said[-1].removeprefix("fatal: ") if said else "it gave no reason"
         if "dubious ownership" in done.stderr.decode(errors="replace"):
             raise NoChanges(
-                f"`{folder}` is in a git repository that belongs to somebody else, and git does not look into it",
-                "name the files instead; git's setting `safe.directory` is for repositories that you trust",
+                f"`{folder}` is in a git repository of another user, which git refuses to read",
+                "name the files instead; for a repository that you trust, set git's `safe.directory`",
             )
         if "not a git repository" in words_:
             raise NoChanges(
-                f"`{folder}` is in no git repository, so it cannot be said what has changed",
+                f"`{folder}` is not in a git repository, so the changed files are not known",
                 "name the files instead",
             )
-        raise NoChanges(f"git could not say what has changed: {words_}")
+        raise NoChanges(f"git could not list the changed files: {words_}")
     return done.stdout

@@ -108,7 +108,7 @@ class KeyStore:
         Raises `KeyStoreError` (`exists`), and `KeyFileError` for keys that are neither encrypted nor for development.
         """
         if self.exists():
-            raise KeyStoreError("exists", f"there are keys already in `{self.folder}`")
+            raise KeyStoreError("exists", f"`{self.folder}` already holds keys")
         keys: list[tuple[SigningKey, VerificationKey]] = []
         for duty in Duty:
             for source in PROPOSERS if duty is Duty.MISSION else range(witnesses) if duty is Duty.WITNESS else (0,):
@@ -154,7 +154,7 @@ class KeyStore:
         key = SigningKey.from_seed(seed, duty=duty, development=root.development)
         newer = _next(root, now_us, keys=(*root.keys, named(key)))
         if any(whose(each) == whose(newer.keys[-1]) for each in root.keys if each.duty is duty is Duty.APPROVAL):
-            raise KeyStoreError("exists", f"there is a key `{whose(newer.keys[-1])}` already")
+            raise KeyStoreError("exists", f"the key `{whose(newer.keys[-1])}` already exists")
         return self._put(root, newer, signer, key, passphrase)
 
     def revoke(self, names: Sequence[bytes], *, signer: SigningKey, now_us: int) -> TrustRoot:
@@ -258,7 +258,7 @@ class KeyStore:
 
     def _expect(self) -> None:
         if not self.exists():
-            raise KeyStoreError("no-keys", f"there are no keys in `{self.folder}`")
+            raise KeyStoreError("no-keys", f"`{self.folder}` holds no keys")
 
 
 def _next(root: TrustRoot, now_us: int, **changes: object) -> TrustRoot:
@@ -293,7 +293,7 @@ def read_key(path: Path, duty: Duty, *, passphrase: bytes | None) -> SigningKey:
     """The signing key in a file. Raises `KeyStoreError` (`exposed`), `KeyFileError`, `WrongDuty` and OSError."""
     with open_regular(path) as file:
         data, why = file.read(MAX_KEY_FILE + 1), exposed(file)
-    told = KeyStoreError("exposed", f"others may read the key `{path}`: {why}")
+    told = KeyStoreError("exposed", f"other users may read the key `{path}`: {why}")
     if why is not None and recognised(data) is KEY:
         raise told
     key = load_signing_key(data, duty=duty, passphrase=passphrase)  # what is no key is told as that, not by its mode
@@ -306,5 +306,5 @@ def read_root(path: Path) -> bytes:
     """The signed trust root in a file, not verified. Raises `KeyStoreError` (`too-large`) and OSError."""
     data = read_regular(path, MAX_ROOT)
     if len(data) > MAX_ROOT:
-        raise KeyStoreError("too-large", f"`{path}` is larger than a trust root may be")
+        raise KeyStoreError("too-large", f"`{path}` is too large for a trust root")
     return data

@@ -76,7 +76,7 @@ class LintCache:
         with suppress(FileExistsError):
             write_new(self._root / FOLDER / "CACHEDIR.TAG", _TAG.encode(), root=self._root)
         if not self._trusted():
-            raise PermissionError("others could write to the cache")
+            raise PermissionError("other users can write to the cache")
 
     def _trusted(self) -> bool:
         """Whether the folder of the checkout, and those above it up to the user's, are the user's own."""

@@ -67,7 +67,7 @@ def read_notes(path: Path) -> list[str]:
 
 def read_named(path: Path) -> list[str]:
     """The notes in a file that somebody named, all of them. Raises OSError for one that cannot be read or is too large,
-    and for what is no regular file, which might be waited for.
+    and for what is not a regular file, which might be waited for.
     """
     data = read_regular(path, _LARGEST)
     if len(data) > _LARGEST:

@@ -39,7 +39,7 @@ class Projects:
     def __init__(self, config: Path | None = None, *, isolated: bool = False) -> None:
         self._given: Project | Refusal | None = None
         if config is not None:
-            self._given = _read(config) or misconfigured(str(config), "it has no table `[tool.rtshcua]`")
+            self._given = _read(config) or misconfigured(str(config), "no table `[tool.rtshcua]` in it")
         elif isolated:
             self._given = Project(ProjectSettings(), _absolute(Path()))
         self._by_folder: dict[Path, Project | Refusal] = {}
@@ -80,11 +80,11 @@ def _read(file: Path) -> Project | Refusal | None:
         data = read_regular(file, LARGEST)
         text = data.decode("utf-8")
     except OSError as error:
-        return misconfigured(name, f"it cannot be read: {(error.strerror or 'it is unreadable').lower()}")
+        return misconfigured(name, f"cannot be read: {(error.strerror or 'unreadable').lower()}")
     except UnicodeDecodeError as error:
-        return misconfigured(name, f"byte {error.start} is not UTF-8, so it is not text")
+        return misconfigured(name, f"byte {error.start} is not UTF-8 text")
     if len(data) > LARGEST:
-        return misconfigured(name, f"it is larger than {LARGEST >> 20} MiB, which no configuration is")
+        return misconfigured(name, f"larger than {LARGEST >> 20} MiB, the limit for a configuration")
     found = parse_settings(text, name, shared=file.name == SHARED)
     return found if found is None or isinstance(found, Refusal) else Project(found, _absolute(file).parent, file)
 

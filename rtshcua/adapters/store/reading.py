@@ -35,7 +35,7 @@ def open_regular(path: str | Path, root: Path | None = None) -> BufferedReader:
                 handle = os.open(Path(path).name, os.O_RDONLY | os.O_NOFOLLOW | UNAWAITED, dir_fd=folder)
     except OSError as error:
         if error.errno == ENXIO:  # a socket
-            raise NotRegular(ENXIO, "no regular file", str(path)) from None
+            raise NotRegular(ENXIO, "not a regular file", str(path)) from None
         error.filename = str(path)
         raise
     expect_regular(handle, path)
@@ -74,7 +74,7 @@ def expect_regular(handle: int, path: str | Path) -> None:
     """Closes a descriptor that is not of a regular file, and raises `NotRegular`."""
     if not stat.S_ISREG(os.fstat(handle).st_mode):
         os.close(handle)
-        raise NotRegular(ENXIO, "no regular file", str(path))
+        raise NotRegular(ENXIO, "not a regular file", str(path))
 
 
 def exposed(file: BinaryIO) -> str | None:
@@ -86,7 +86,7 @@ def exposed(file: BinaryIO) -> str | None:
     if mode & 0o077:
         return f"its mode is {mode:04o}"
     if found.st_uid not in (os.geteuid(), ROOT):
-        return f"it belongs to the user {found.st_uid}"
+        return f"it belongs to user {found.st_uid}"
     return None
 
 

@@ -239,7 +239,7 @@ def _write_plan(path: Path, data: bytes, disk: Disk) -> None:
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
     there = path.exists()
     if there and not _own(path.lstat()):
-        raise OSError(errno.EEXIST, "something else lies there", str(path))
+        raise OSError(errno.EEXIST, "something else is there", str(path))
     _write(disk.reopen(path) if there else disk.create(path), [data])
 
 

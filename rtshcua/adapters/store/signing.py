@@ -64,7 +64,7 @@ def _exposed(path: Path, file: BinaryIO) -> LinkKeyError | None:
     why = exposed(file)
     if why is None:
         return None
-    return LinkKeyError("exposed", f"others may read the key `{path}`: {why}", f"`chmod 600 {path}`")
+    return LinkKeyError("exposed", f"other users may read the key `{path}`: {why}", f"`chmod 600 {path}`")
 
 
 def read_link_key(path: Path) -> bytes:
@@ -90,7 +90,7 @@ def _key_in(data: bytes) -> bytes | None:
 def no_link_key(path: Path) -> LinkKeyError:
     """What a file says is no key."""
     what = f"{KEY_OCTETS} octets, or {2 * KEY_OCTETS} hexadecimal digits, not all 0"
-    return LinkKeyError("malformed", f"`{path}` is no link key", f"{what}; `rtshcua keys link` makes one")
+    return LinkKeyError("malformed", f"`{path}` is not a link key", f"{what}; `rtshcua keys link` makes one")
 
 
 def write_link_key(path: Path, key: bytes) -> None:
@@ -190,8 +190,8 @@ class LinkStore:
             streams |= {each: max(last, streams.get(each, 0)) for each, last in heard.items()}
             return SigningState(int(kept["timestamp"]), streams)
         except (ValueError, TypeError, KeyError):
-            text = f"`{self.path}` is damaged: which timestamps the link used is not known"
-            raise LinkKeyError("damaged", text, "a new key on both ends; `rtshcua keys link` makes one") from None
+            text = f"`{self.path}` is damaged, so the timestamps that the link has used are not known"
+            raise LinkKeyError("damaged", text, "use a new key on both ends; `rtshcua keys link` makes one") from None
 
     def save(self, state: SigningState, ahead: int = 0) -> None:
         """Keep a state, our own timestamp so many ahead. Raises OSError."""

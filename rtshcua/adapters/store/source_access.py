@@ -16,7 +16,7 @@ from rtshcua.ground.language.size_limits import MAX_SIZE
 
 #: folders that imports may lead to besides, parted as in PATH: the user's to say, and no checkout's
 ALLOWED: Final = "RTSHCUA_IMPORTS"
-_WHY: Final = f"it lies outside of the project (`{ALLOWED}` names further folders)"
+_WHY: Final = f"it is outside of the project (`{ALLOWED}` names further folders)"
 
 
 class ReadableSources:
@@ -61,7 +61,7 @@ class ReadableSources:
             return read_regular(real, MAX_SIZE, edge)
         except FileNotFoundError:
             if edge is None and Path(name).exists():  # a pipe by `/dev/stdin`, which leads to no path
-                raise NotRegular(ENXIO, "no regular file", name) from None
+                raise NotRegular(ENXIO, "not a regular file", name) from None
             raise
 
     def listing(self, name: str) -> list[str]:

@@ -106,4 +106,4 @@ class TelemetryFile:
         except OSError:
             return  # then writing tells
         if free < LEFT_TO_THE_LOG:
-            raise OSError(errno.ENOSPC, "the last room on the disk is left to the log")
+            raise OSError(errno.ENOSPC, "the last free space on the disk is reserved for the log")

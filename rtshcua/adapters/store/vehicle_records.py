@@ -55,7 +55,7 @@ class RootStore:
             if data is not None:
                 opened_root(data)
         except Untrusted as error:
-            raise RootError("damaged", f"the root that was accepted last, `{self.path}`, is damaged: {error}") from None
+            raise RootError("damaged", f"the last accepted trust root, `{self.path}`, is damaged: {error}") from None
         return data
 
     def keep(self, signed: bytes) -> None:
@@ -127,7 +127,7 @@ class LastLog:
         try:
             known = _remembered(self.path)
         except (OSError, ValueError) as error:
-            return PreviousLog(None, f"it is not known which log came before: `{self.path}`: {_words(error)}")
+            return PreviousLog(None, f"the previous log is not known: `{self.path}`: {_words(error)}")
         if known is None:
             return PreviousLog(None)
         log = Path(known.log)
@@ -136,11 +136,11 @@ class LastLog:
         try:
             return _told(log, known.before, recover(log))._replace(broken_off=log)
         except FileNotFoundError:
-            text = f"the log before, `{log}`, is no longer there: whether its flight ended is not known"
+            text = f"the previous log, `{log}`, is missing, so it is not known whether its flight ended"
             return PreviousLog(None, text, log, gone=True)
         except (OSError, InUse) as error:
             living = isinstance(error, InUse)  # its run flies on, and broke off nowhere
-            text = f"the log before, `{log}`, was not closed, nor can it be: {_words(error)}"
+            text = f"the previous log, `{log}`, was not closed and cannot be: {_words(error)}"
             return PreviousLog(None, text, None if living else log)
 
     def begin(self, log: Path, before: str | None) -> None:
@@ -180,19 +180,19 @@ def _remembered(path: Path) -> _Kept | None:
 def _told(log: Path, before: str | None, done: Recovered) -> PreviousLog:
     found = done.found
     if done.done:
-        text = f"the log before, `{log}`, was not closed: it is recovered, {found.records} records of it are kept"
+        text = f"the previous log, `{log}`, was not closed: it was recovered with {found.records} records"
         note = text if not found.discarded else f"{text}, {found.discarded} octets discarded"
         return PreviousLog(done.last, note, log=log)
     if found.state is LogState.CLOSED:
         return PreviousLog(done.last, log=log)
     if found.state in RECOVERABLE:
-        text = f"the log before, `{log}`, was not closed: `rtshcua recover` ends it, where the log's key is"
+        text = f"the previous log, `{log}`, was not closed: run `rtshcua recover` where the log's key is"
         return PreviousLog(done.last, text, log=log)
     if found.state is LogState.UNBEGUN:
         return PreviousLog(before)
     reason = "" if found.reason is None else f" (record {found.reason.record}: {found.reason.text})"
-    what = "was tampered with" if found.state is LogState.TAMPERED else "is of another log key"
-    return PreviousLog(done.last, f"the log before, `{log}`, {what} and is left as it is{reason}")
+    what = "was tampered with" if found.state is LogState.TAMPERED else "belongs to another log key"
+    return PreviousLog(done.last, f"the previous log, `{log}`, {what} and is left unchanged{reason}")
 
 
 def _words(error: Exception) -> str:
@@ -244,10 +244,10 @@ class OwedParameters:
                 left = self._read()  # whoever held it before has put back some of it since
             self.left = left
         except BlockingIOError:
-            self.trouble = f"another run of `{vehicle}` sets its parameters, and puts them back"
+            self.trouble = f"another run of `{vehicle}` has changed its parameters and will restore them"
         except (OSError, ValueError) as error:
             why = str(error) if isinstance(error, ValueError) else (error.strerror or str(error)).lower()
-            self.trouble = f"it is not known which parameters are to be put back: {why}"
+            self.trouble = f"the parameters to restore are not known: {why}"
 
     def close(self) -> None:
         """Let another run have it."""
@@ -316,7 +316,7 @@ class BoundaryStore:
             return BoundarySession(0, START)
         said = _KEPT.fullmatch(data)
         if said is None:
-            raise DamagedState(f"`{self.path}` is damaged: which session of the boundary came before is not known")
+            raise DamagedState(f"`{self.path}` is damaged, so the previous session of the boundary is not known")
         return BoundarySession(int(said[1]), bytes.fromhex(said[2].decode()))
 
     def keep(self, session: int, digest: bytes) -> None:

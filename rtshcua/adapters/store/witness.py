@@ -78,7 +78,7 @@ class WitnessStore:
             kept, signer = _Kept("", "", 0), b""
         checkpoint = parse(kept.text)
         if isinstance(checkpoint, Flaw) or checkpoint.origin != origin or len(signer) != 32:
-            raise WitnessError("damaged", f"`{path}` is damaged: what was cosigned of `{origin}` is not known")
+            raise WitnessError("damaged", f"`{path}` is damaged: what was cosigned of `{origin}` is unknown")
         return LastCosigned(kept.text, signer), kept.time_s
 
     def keep(self, origin: str, seen: LastCosigned, time_s: int) -> None:
@@ -192,7 +192,7 @@ def drop(log: Path, witness: FileWitness, root: Path | None = None) -> Cosigned 
         contradiction = answer.contradiction or unlike
         return NotCosigned(log, f"witness/{answer.status}", answer.text, contradiction, proof)
     note = anchor(request.note, answer.body, (witness.public,))
-    assert note is not None, "a witness knows its own cosignature"
+    assert note is not None, "a witness checks its own cosignature"
     fresh = known is None or known < found.size
     if fresh or not _beside(log, split(note)[0], witness.public):
         add_anchors(anchors_path(log), [note], root)

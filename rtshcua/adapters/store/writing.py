@@ -117,7 +117,7 @@ def rewrite(path: Path, before: bytes, data: bytes) -> None:
                 os.fchown(handle, known.st_uid, known.st_gid)
             os.fchmod(handle, stat.S_IMODE(known.st_mode))  # after that: giving it away takes set-id bits
             if read_regular(real, len(before), root) != before:
-                raise Changed(errno.EBUSY, "it was changed meanwhile")
+                raise Changed(errno.EBUSY, "it was changed in the meantime")
 
 
 def write_out(path: Path, data: bytes, *, mode: int = PUBLIC_FILE) -> None:
@@ -133,7 +133,7 @@ def write_out(path: Path, data: bytes, *, mode: int = PUBLIC_FILE) -> None:
             except OSError as error:
                 if error.errno != errno.ENXIO:
                     raise
-                raise PermissionError(errno.EACCES, "nobody reads this pipe") from None
+                raise PermissionError(errno.EACCES, "no process reads this pipe") from None
             try:
                 os.set_blocking(handle, True)
                 write_all(handle, data)
@@ -233,7 +233,7 @@ def append(path: Path, data: bytes, root: Path | None = None) -> None:
         expect_regular(handle, path)
         try:
             if os.fstat(handle).st_nlink > 1:
-                raise NotRegular(errno.ENXIO, "it is the same file as one of another name")
+                raise NotRegular(errno.ENXIO, "it is a hard link to another file")
             write_all(handle, data)
             sync_data(handle)
         finally:

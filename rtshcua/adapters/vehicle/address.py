@@ -87,43 +87,57 @@ class Address(NamedTuple):
 
 
 def parse(text: str, ways: Collection[LinkCarrier] = tuple(LinkCarrier)) -> Address:
-    """The address in a text, in one of the `ways` that are accepted here. Raises AddressError."""
+    """Return the address in a text; its kind has to be one of `ways`. Raises AddressError."""
+    word, _, rest = text.partition(":")
+    host, colon, number = rest.rpartition(":")
+    way = _carrier(text, word, ways)
+    place, value = ("device", "baud rate") if way is LinkCarrier.SERIAL else ("host", "port")
+    example, begin, end = f"write it as `{_EXAMPLES[way]}`", len(word) + 1, len(word) + 1 + len(host)
+    if not colon:
+        missing = f"{value} of the link is missing" if rest else f"{place} and {value} of the link are missing"
+        raise AddressError(f"the {missing}", text, len(text), len(text), example)
+    if not host:
+        raise AddressError(f"the {place} of the link is missing", text, begin, begin, example)
+    fault = _fault_of_place(way, host)
+    if fault is not None:
+        raise AddressError(fault[0], text, begin, end, f"{fault[1]}{example}")
+    if _NUMBER.fullmatch(number) is None:
+        found = f"`{number}` is not a {value}" if number else f"the {value} of the link is missing"
+        raise AddressError(found, text, end + 1, len(text), f"a {value} is a number: {example}")
+    fault = _fault_of_number(way, int(number))
+    if fault is not None:
+        raise AddressError(f"`{number}` {fault[0]}", text, end + 1, len(text), fault[1])
+    return Address(way, host, int(number))
+
+
+def _carrier(text: str, word: str, ways: Collection[LinkCarrier]) -> LinkCarrier:
     accepted = " or ".join(f"`{_EXAMPLES[way]}`" for way in LinkCarrier if way in ways)
     if not text:
         raise AddressError("the address is empty", text, 0, 0, f"write {accepted}")
-    word, colon, rest = text.partition(":")
-    if word not in [way.value for way in ways]:
-        near = nearest(word, [way.value for way in ways])
-        found = f"`{word}` is no way to connect here" if word in list(LinkCarrier) else f"`{word}` is no kind of link"
-        help = f"did you mean `{near}`?" if near and word not in list(LinkCarrier) else f"write {accepted}"
-        raise AddressError(found, text, 0, len(word), help)
-    way, begin = LinkCarrier(word), len(word) + 1
-    serial = way is LinkCarrier.SERIAL
-    place, number = ("device", "baud rate") if serial else ("host", "port")
-    example = f"write it as `{_EXAMPLES[way]}`"
-    host, second, port = rest.rpartition(":")
-    if not colon or not second:
-        missing = f"{number} of the link is missing" if rest else f"{place} and {number} of the link are missing"
-        raise AddressError(f"the {missing}", text, len(text), len(text), example)
-    end = begin + len(host)
-    if not host:
-        raise AddressError(f"the {place} of the link is missing", text, begin, begin, example)
-    if serial:
-        if not host.startswith("/") or "\0" in host:
-            found = f"`{host}` is no path of a device"
-            raise AddressError(found, text, begin, end, f"a device is an absolute path: {example}")
-    elif _HOST.fullmatch(host) is None:
-        found = f"`{host}` is no host name and no IPv4 address"
-        raise AddressError(found, text, begin, end, f"IPv6 is not supported; {example}")
-    if _NUMBER.fullmatch(port) is None:
-        found = f"`{port}` is no {number}" if port else f"the {number} of the link is missing"
-        raise AddressError(found, text, end + 1, len(text), f"a {number} is a number: {example}")
-    value = int(port)
-    if serial and value not in BAUDS:
-        close = min(BAUDS, key=lambda baud: abs(baud - value))
-        known = ", ".join(map(str, BAUDS))
-        found = f"`{port}` is no baud rate of this system"
-        raise AddressError(found, text, end + 1, len(text), f"the nearest is {close}; accepted are {known}")
-    if not serial and not 1 <= value <= 65_535:
-        raise AddressError(f"`{port}` is no port", text, end + 1, len(text), "a port is from 1 to 65535")
-    return Address(way, host, value)
+    if word in ways:
+        return LinkCarrier(word)
+    if word in list(LinkCarrier):
+        raise AddressError(f"`{word}` cannot be used here", text, 0, len(word), f"write {accepted}")
+    near = nearest(word, [way.value for way in ways])
+    help = f"did you mean `{near}`?" if near else f"write {accepted}"
+    raise AddressError(f"`{word}` is not a kind of link", text, 0, len(word), help)
+
+
+def _fault_of_place(way: LinkCarrier, host: str) -> tuple[str, str] | None:
+    """What is wrong with a device or a host, and what is accepted; None for a valid one."""
+    if way is LinkCarrier.SERIAL:
+        valid = host.startswith("/") and "\0" not in host
+        return None if valid else (f"`{host}` is not the path of a device", "a device is an absolute path: ")
+    valid = _HOST.fullmatch(host) is not None
+    return None if valid else (f"`{host}` is not a host name or an IPv4 address", "IPv6 is not supported; ")
+
+
+def _fault_of_number(way: LinkCarrier, value: int) -> tuple[str, str] | None:
+    """What is wrong with a baud rate or a port, and what is accepted; None for a valid one."""
+    if way is not LinkCarrier.SERIAL:
+        return None if 1 <= value <= 65_535 else ("is not a port", "a port is a number from 1 to 65535")
+    if value in BAUDS:
+        return None
+    close = min(BAUDS, key=lambda baud: abs(baud - value))
+    help = f"the nearest is {close}; accepted are {', '.join(map(str, BAUDS))}"
+    return "is not a baud rate of this system", help

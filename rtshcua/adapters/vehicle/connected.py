@@ -52,14 +52,14 @@ class ConnectedVehicle:
             return self._transport.trouble
         if counts.old:
             return (
-                f"{counts.old} frames of MAVLink 1 came, and this program speaks MAVLink 2: set `MAV_PROTO_VER` to 2 "
+                f"{counts.old} frames of MAVLink 1 arrived, but this program uses MAVLink 2: set `MAV_PROTO_VER` to 2 "
                 "(PX4) or the port's `SERIALn_PROTOCOL` to 2 (ArduPilot)"
             )
         if self._transport.capacity is None:
-            return f"{counts.octets} octets came, and no MAVLink frame is among them: something else sends there"
+            return f"{counts.octets} octets arrived, but no MAVLink frame: another kind of program sends there"
         return (
-            f"{counts.octets} octets came, and no MAVLink frame is among them: the baud rate is probably wrong, or "
-            "something else is on this port"
+            f"{counts.octets} octets arrived, but no MAVLink frame: the baud rate is probably wrong, or another kind "
+            "of device is on this port"
         )
 
     def poll(self, now_us: int, timeout_us: int) -> Sequence[Event]:

@@ -204,8 +204,8 @@ class Consumption:
             return
         self._told = drain
         self.notes.append(
-            f"the battery gives {gives}, and the policy's vehicle says {declared} at the worst: the way home is "
-            "counted with what was measured"
+            f"the battery loses {gives}, more than the {declared} that the policy declares as the worst case: the way "
+            "home is computed with the measured value"
         )
 
 

@@ -59,10 +59,10 @@ WHO_US = 200_000
 #: so long what no waiting changes must stand until it is told: somebody may be about to set a parameter right
 UNFIT_US = 5_000_000
 #: why a vehicle that signs answers nothing to whoever does not
-KEYLESS = "it signs what it sends, and answers nothing that is not signed: give the link's key with `--signing-key`"
+KEYLESS = "the vehicle signs its frames and answers no unsigned frame: give the link's key with `--signing-key`"
 
-_UNDATED = "nobody has told the time of day yet, without which no step is decided: its SYSTEM_TIME is awaited"
-_YOUNG = "the time of day is not certain enough yet to say that the mission was issued before now"
+_UNDATED = "the time of day is not known yet, and no step is decided without it: waiting for the vehicle's SYSTEM_TIME"
+_YOUNG = "the time of day is not certain enough yet: the mission might have been issued in the future"
 _WITHIN_STALE = 8  # so that a poor link does not silence the estimator
 #: how many kinds of others that speak under its ids are told of: whoever makes them up has 65,536
 _MOST_STRANGERS = 8
@@ -105,7 +105,7 @@ class Driver:
     ) -> None:  # fmt: skip
         self._policy = policy
         self._signed = verifier is not None
-        self._mute = "it answers nothing that it is asked"
+        self._mute = "the vehicle answers no request"
         self._capacity: int | None = None
         self._steps = steps
         #: what parameters are judged to be, though they are not set
@@ -157,7 +157,7 @@ class Driver:
         self._commander = Commander(slack)
         self._manoeuvre: Manoeuvre | None = None
         self._left_mode: int | None = None  # one report says that it left this mode, by nobody of ours
-        self._others: str | None = None  # what showed that somebody else flies it: nothing of ours is begun any more
+        self._others: str | None = None  # how a takeover showed; nothing of ours begins after it
         self._unsent: int | None = None  # the token of a command of which no frame left yet
         self._steered_us: int | None = None  # when a frame that moves the vehicle last left, and nothing was said of it
         self._moving = False  # a frame that moves the vehicle is among those to be packed
@@ -238,9 +238,7 @@ class Driver:
         pass.
         """
         number = self.batteries.awaited(self.seen.now_us)
-        return (
-            None if number is None else f"battery {number} was reported once: whether it is one, a second report tells"
-        )
+        return None if number is None else f"battery {number} was reported once: waiting for a second report"
 
     @property
     def _undated(self) -> str | None:
@@ -258,7 +256,7 @@ class Driver:
         """That reports under its ids contradict each other, in words."""
         if not self._aids.contradictions.stand(self.seen.now_us):
             return None
-        return f"two speak as {self.system}/{AUTOPILOT}: its mode, or whether it is armed, is reported both ways"
+        return f"two senders use the ids {self.system}/{AUTOPILOT}: their reports contradict each other"
 
     @property
     def keyless(self) -> bool:
@@ -461,7 +459,7 @@ class Driver:
             if frame.signed and not self._signed:
                 self._mute = KEYLESS
             if frame.message.type not in MULTIROTORS:
-                self.other_kind = f"it is no multirotor (MAV_TYPE {frame.message.type})"
+                self.other_kind = f"the vehicle is not a multirotor (MAV_TYPE {frame.message.type})"
             self.link.settle(frame.system)
             self.seen.estimator = Estimator(flavour.estimator)
             needed = [group for group in self._telemetry.sources if not group <= IN_THE_AIR]
@@ -503,7 +501,7 @@ class Driver:
             self.seen.disputed = self._hears_both(frame.message, now_us)
             return False
         kind = frame.message.type, frame.message.autopilot
-        text = two_speak(self.system, f"one with MAV_TYPE {kind[0]} and MAV_AUTOPILOT {kind[1]}")
+        text = two_speak(self.system, f"a vehicle with MAV_TYPE {kind[0]} and MAV_AUTOPILOT {kind[1]}")
         if is_another(*kind):
             self.link.meets(text)
         if text not in self._strangers and len(self._strangers) < _MOST_STRANGERS:
@@ -667,9 +665,9 @@ class Driver:
                 ports.LinkBack(now_us) if was == SILENT else ports.LinkLost(now_us, SILENT, self._watch.heard_us or 0)
             )
         if down == UNANSWERED:
-            events.append(ports.Noted(now_us, "it is heard, but answers nothing"))
+            events.append(ports.Noted(now_us, "the vehicle is heard but answers nothing"))
         elif was == UNANSWERED and down is None:
-            events.append(ports.Noted(now_us, "it answers again"))
+            events.append(ports.Noted(now_us, "the vehicle answers again"))
 
     def _advance(self, now_us: int, send: list[Message], events: list[Event]) -> None:
         """Go on with the manoeuvre; where a frame of it waits until it is known who flies, ask at once."""
@@ -699,8 +697,8 @@ class Driver:
         suspicion = aids.suspicion
         if suspicion.refuted is not None:
             self.seen.notes.append(
-                f"two speak as {self.system}/{AUTOPILOT}: `{suspicion.refuted}` was reported, and the next report says "
-                "otherwise; what the vehicle does counts"
+                f"two senders use the ids {self.system}/{AUTOPILOT}: `{suspicion.refuted}` was reported, and then "
+                "contradicted; the vehicle's observed behaviour counts"
             )
             suspicion.refuted = None
         doubts = suspicion.stands or self.seen.disarms or self._left_mode is not None

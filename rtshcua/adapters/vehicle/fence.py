@@ -63,15 +63,15 @@ def _can_include(zone: Zone, habits: FenceHabits, left_out: list[str]) -> bool:
         left_out.append(f"the times of `{zone.name}`")
     parts = sum(_is_outer(ring) for ring in _rings(zone))
     if parts > 1 and habits.all_inclusions:
-        left_out.append(f"`{zone.name}`, whose {parts} parts this autopilot would require all at once")
+        left_out.append(f"`{zone.name}`, because this autopilot would require all of its {parts} parts at once")
         return False
     return True
 
 
 def _can_exclude(zone: Zone, left_out: list[str]) -> bool:
     for there, what in (
-        (zone.floor > 0 or zone.ceiling < HIGHEST, "flying above or below it is allowed"),
-        (timed(zone), "it is not always there"),
+        (zone.floor > 0 or zone.ceiling < HIGHEST, "it may be flown over or under"),
+        (timed(zone), "it applies at times only"),
         (not all(map(_is_outer, _rings(zone))), "it has holes"),
     ):
         if there:
@@ -211,7 +211,7 @@ class Upload:
         item = self._items[self._read]
         same = (message.command, message.x, message.y) == (item.command, item.latitude, item.longitude)
         if not (same and isclose(message.param1, item.parameter, abs_tol=0.01)):
-            return self._fail(f"holds another item {self._read} than it was sent")
+            return self._fail(f"holds an item {self._read} that differs from the one it was sent")
         self._read += 1
         if self._read < len(self._items):
             return self._ask(UploadState.READING, messages.fence_request(system, self._read), now_us)
@@ -285,7 +285,7 @@ class Fencing:
             return None
         if self._state is UploadState.DONE and all(self._parameters.has(*each) for each in self._habits.switches):
             return None
-        return self._failure() or self._problem or "its fence is being set"
+        return self._failure() or self._problem or "the vehicle's fence is being set"
 
     @property
     def read_back(self) -> bool:
@@ -297,9 +297,9 @@ class Fencing:
         """What became of it, once nothing is outstanding."""
         fence = self._fence
         if fence is None:
-            return "its own fence was left as it is"
+            return "the vehicle's own fence was left unchanged"
         if self._state is UploadState.UNSUPPORTED:
-            return "it takes no fence: the policy's airspace is watched by this program alone"
+            return "the vehicle accepts no fence: only this program watches the policy's airspace"
         left_out = "; ".join(fence.left_out)
         if not fence.items:
             return f"no fence was set, because this autopilot cannot represent the airspace: {left_out}"
@@ -325,8 +325,8 @@ class Fencing:
 
     def _failure(self) -> str | None:
         if self._upload is not None and self._upload.state is UploadState.FAILED:
-            return f"its fence could not be set: it {self._upload.problem}; `--no-fence` flies without"
+            return f"the vehicle's fence could not be set: it {self._upload.problem} (`--no-fence` flies without)"
         for name, _ in self._habits.switches if self._state is UploadState.DONE else ():
             if self._parameters.is_absent(name):
-                return f"its fence could not be switched on: no answer about `{name}`; `--no-fence` flies without"
+                return f"the vehicle's fence could not be switched on: no answer about `{name}` (see `--no-fence`)"
         return None

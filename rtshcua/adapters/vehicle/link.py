@@ -35,7 +35,7 @@ def is_radio(frame: ReceivedFrame) -> bool:
 
 def two_speak(system: int, who: str) -> str:
     """That somebody else speaks under the ids of the vehicle, for a person."""
-    return f"two speak as {system}/{AUTOPILOT}: {who} besides the vehicle; give each component ids of its own"
+    return f"two senders use the ids {system}/{AUTOPILOT}: {who} besides the vehicle; give each component its own ids"
 
 
 class DatagramContents(NamedTuple):
@@ -112,9 +112,9 @@ class VehicleLink:
                 continue
             ours, theirs = self._system, frame.system
             if theirs == ours:
-                self.crowd = f"two vehicles speak here as system {ours}: give each an id of its own"
+                self.crowd = f"two vehicles send here as system {ours}: give each its own id"
             elif not self._named and self.crowd is None:
-                self.crowd = f"two vehicles speak here, systems {ours} and {theirs}: `--system` says which one is meant"
+                self.crowd = f"two vehicles send here, systems {ours} and {theirs}: `--system` selects one"
 
     def meets(self, other: str) -> None:
         """Another vehicle speaks under the ids of ours, in words: before the flight that keeps it from being ready."""
@@ -179,7 +179,7 @@ UNANSWERED_US: Final = 3_000_000
 STOOD_US: Final = 500_000
 
 SILENT: Final = "silent"
-UNANSWERED: Final = "heard, but it answers nothing"
+UNANSWERED: Final = "heard, but answers nothing"
 
 
 class LinkWatch:

@@ -514,8 +514,8 @@ class Manoeuvre:
         pace = self._pace
         if pace is None or not self._aids.targets.shown or not pace.look(seen, self._way_left(seen)):
             return ()
-        told = f"it flies at {(pace.slow or 0) / 1_000:.1f} m/s where {self.command.speed / 1_000:.1f} m/s were told"
-        return [Hindered(now_us, self.token, f"{told}: somebody else may have set its speed")]
+        told = f"it flies at {(pace.slow or 0) / 1_000:.1f} m/s instead of {self.command.speed / 1_000:.1f} m/s"
+        return [Hindered(now_us, self.token, f"{told}: somebody else may have changed its speed")]
 
     # -------------------------------------------------------- what is sent
 
@@ -705,7 +705,7 @@ class Manoeuvre:
         if seen.landing and not homeward and not self._was_landing:
             return "landing", "landing", seen.landings
         if seen.critical and seen.airborne and not homeward and self._flavour.critical_acts:
-            return "failsafe", "its state is critical", seen.beats
+            return "failsafe", "the vehicle's state is critical", seen.beats
         if self._aids.targets.is_foreign(seen):
             return "target", "another target", seen.targets
         return None

@@ -124,12 +124,12 @@ class Estimator:
     def missing(self, now_us: int) -> str | None:
         """What it has not got, in words; None when it has a position and a height."""
         if self._at_us is None:
-            return f"its estimator says nothing (no {self.report})"
+            return f"no report of the estimator ( {self.report})"
         if now_us - self._at_us > STALE_US:
-            return f"its estimator fell silent (no {self.report})"
+            return f"the estimator's reports have stopped ( {self.report})"
         if not self.position(now_us):
-            return f"its estimator has no position (flags 0x{self._flags:x})"
-        return None if self.height(now_us) else f"its estimator has no height (flags 0x{self._flags:x})"
+            return f"the estimator has no position (flags 0x{self._flags:x})"
+        return None if self.height(now_us) else f"the estimator has no height (flags 0x{self._flags:x})"
 
 
 # ---------------------------------------------------------------- all that it says of itself
@@ -349,7 +349,7 @@ class ObservedVehicle:
         name. A mistake between the two has crashed real vehicles: they are made of each other here and in `_place`.
         """
         if self.home_amsl is None:
-            raise NoDatum("the vehicle has not said how high its home lies, so no altitude can be commanded")
+            raise NoDatum("the vehicle has not reported the altitude of its home, so no altitude can be commanded")
         return self.home_amsl + height
 
     def hush(self) -> None:
@@ -401,15 +401,15 @@ class ObservedVehicle:
         if self.heartbeat_us is None:
             return "no heartbeat of an autopilot"
         if self.landed_state == 0:
-            return "it does not say whether it is on the ground"
+            return "the vehicle does not report whether it is on the ground"
         if self.fix < _FIX_3D:
             return "no 3D position fix"
         astray = self.estimator.missing(self.now_us)
         if astray is not None:
             return astray
         if not (self.located and self.levelled):
-            return "no position report since its estimator has one"
-        return None if self.prearm else f"its own checks before arming fail{self._reasons()}"
+            return "no position report since the estimator has a position"
+        return None if self.prearm else f"the vehicle's checks before arming fail{self._reasons()}"
 
     @property
     def prearm_fails(self) -> bool:
@@ -435,7 +435,7 @@ class ObservedVehicle:
         """A failsafe need not change the mode: a low battery on the way home does not."""
         critical = status in _CRITICAL
         if critical != self.critical:
-            says = "it says that its state is critical" if critical else "its state is not critical any more"
+            says = "the vehicle reports a critical state" if critical else "the vehicle's state is no longer critical"
             self.notes.append(says)
         self.critical = critical
 

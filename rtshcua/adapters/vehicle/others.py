@@ -23,12 +23,12 @@ STEERS: Final[Mapping[int, str]] = {
 GRANTED: Final = (0, 5)
 WARNING: Final = 4  # MAV_SEVERITY
 #: to ground stations, in at most 50 octets
-CROSSED: Final = "ours crossed yours: look, and command it again"
+CROSSED: Final = "our command crossed yours: check and repeat it"
 
 
 def crossed(what: str, ago_us: int) -> str:
     """That a frame of ours left so long before something showed, in words."""
     return (
-        f"a frame of ours left {ago_us // 1_000} ms before this showed: {what}; where the vehicle does not do it, "
-        "it has to be commanded again"
+        f"a frame of ours left {ago_us // 1_000} ms before this was seen: {what}; if the vehicle does not "
+        "do it, repeat the command"
     )

@@ -83,14 +83,14 @@ class Preflight:
             if names not in self._missed:
                 self._missed.add(names)
                 self.notes.append(
-                    f"{names} was not answered within {RETRIES * RETRY_US // 1_000_000} s, so it counts as one that it "
-                    "does not have; if it has it, its way home may not be the one that is proved"
+                    f"{names} was not answered within {RETRIES * RETRY_US // 1_000_000} s, so the vehicle counts as "
+                    "one without it; if it has the parameter, its way home may differ from the proved one"
                 )
         if self._rally.silent and not self._rally_told:
             self._rally_told = True
             self.notes.append(
-                f"it did not say within {(RETRIES + 1) * RETRY_US // 1_000_000} s how many rally points it has, so it "
-                "counts as a vehicle without; if it has any, its way home may not be the one that is proved"
+                f"the number of rally points was not reported within {(RETRIES + 1) * RETRY_US // 1_000_000} s, so the "
+                "vehicle counts as one without; if it has any, its way home may differ from the proved one"
             )
         if not self._told and self._fencing.unready is None:
             self._told = True
@@ -113,8 +113,8 @@ class Preflight:
             self._flavour.own_fence, self._values, bounds.airspace_reach(self._policy), 0, armed=self._arms
         )
         return [
-            f"its own fence is narrower than the airspace: `{each.parameter}` is {each.value:g}, and the airspace goes "
-            f"{each.needed} m {each.about}"
+            f"the vehicle's own fence is narrower than the airspace: `{each.parameter}` is {each.value:g}, and the "
+            f"airspace goes {each.needed} m {each.about}"
             for each in found
         ]
 
@@ -149,7 +149,7 @@ class Preflight:
     @property
     def unplaced(self) -> str | None:
         """That it is not known where it stands, in words."""
-        return None if self._seen.located else "it does not say where it stands"
+        return None if self._seen.located else "the vehicle does not report its position"
 
     @property
     def unread(self) -> str | None:
@@ -159,8 +159,8 @@ class Preflight:
         names = [each.parameter for each in self._flavour.returns]
         quoted = " or ".join(f"`{name}`" for name in names)
         if all(map(self._parameters.is_absent, names)):
-            return f"it does not tell its return altitude ({quoted})"
-        return f"its return altitude ({quoted}) was not read yet"
+            return f"the vehicle does not report its return altitude ({quoted})"
+        return f"the vehicle's return altitude ({quoted}) was not read yet"
 
     def _bounds_unread(self) -> str | None:
         """That the bounds of its own fence are not known, in words. One that the vehicle lacks bounds nothing."""
@@ -168,11 +168,11 @@ class Preflight:
         if not self._steps:
             return None
         if not all(name in parameters.values or parameters.is_absent(name) for name in own.names):
-            return "the bounds of its own fence were not read yet"
+            return "the bounds of the vehicle's own fence were not read yet"
         missing = bounds.unknown(own, self._values, armed=self._arms)
         if missing is None or missing == own.types:
             return None
-        return f"it does not tell a bound of its own fence (`{missing}`)"
+        return f"the vehicle does not report a bound of its own fence (`{missing}`)"
 
     def _bounded(self) -> str | None:
         """That its own fence keeps it from where the mission goes."""
@@ -187,8 +187,8 @@ class Preflight:
         least = "most" if found.bit == bounds.FLOOR_BIT else "least"
         off = "" if own.types is None else f", or take {found.bit} out of `{own.types}`, which is {values[own.types]:g}"
         return (
-            f"its own fence ends {found.value:g} m {found.about} (`{found.parameter}`), where the mission has targets "
-            f"beyond, which it would ignore: set `{found.parameter}` to {self._advice(found)} at the {least}{off}"
+            f"the vehicle's own fence ends {found.value:g} m {found.about} (`{found.parameter}`), and the mission has "
+            f"targets beyond it, which are ignored: set `{found.parameter}` to at {least} {self._advice(found)}{off}"
         )
 
     def _reach(self) -> bounds.FlightReach:
@@ -216,7 +216,7 @@ class Preflight:
         away = distance_from_home(self._projection, self._seen.latitude, self._seen.longitude)
         if away <= self._home_within:
             return None
-        return f"it stands {away // 1_000} m from the policy's home, more than {self._home_within // 1_000} m"
+        return f"the vehicle is {away // 1_000} m from the policy's home, more than {self._home_within // 1_000} m"
 
     @property
     def _values(self) -> Mapping[str, float]:
@@ -238,8 +238,8 @@ class Preflight:
         has = "no number" if height is None else f"{height / 1_000:g} m"
         should = quantise(self._wanted_mm, 1, found.mm)
         return (
-            f"it returns at {has} (`{found.parameter}`), and the policy says {self._wanted_mm / 1_000:g} m: set "
-            f"`{found.parameter}` to {should} (for one flight: `--set {found.parameter}={should}`), "
+            f"the vehicle returns at {has} (`{found.parameter}`), and the policy says {self._wanted_mm / 1_000:g} m: "
+            f"set `{found.parameter}` to {should} (for one flight: `--set {found.parameter}={should}`), "
             "or change `return at`"
         )
 

@@ -20,7 +20,7 @@ _LEGS = (MotionKind.FLY, MotionKind.COVER)
 def flown_by(left: Left, flavour: AutopilotFlavour, seen: ObservedVehicle) -> str:
     """How it is flown by somebody else; empty where a command that was left in force may be what it does."""
     if left.taken:
-        return f"{left.taken}, as the run before told"
+        return f"{left.taken}, as the previous run commanded"
     assert seen.mode is not None
     last = len(left.in_force) - 1
     showing = [(n, each) for n, each in enumerate(left.in_force) if seen.mode in flavour.shows[each.command.kind]]

@@ -75,7 +75,7 @@ class ReturnLimit(NamedTuple):
     need: Callable[[VehicleLimits], Need | None]
     may_be_off: bool = False
     words: Mapping[float, str] = {}
-    proved: str = "at the height that is proved"
+    proved: str = "at the proved height"
 
     def wrong(self, value: float, vehicle: VehicleLimits) -> WrongSetting | None:
         """What is wrong with its value for the vehicle of a policy."""
@@ -99,11 +99,11 @@ class ReturnLimit(NamedTuple):
 
 
 #: PX4 and ArduCopter: to a rally point instead of home, along a mission, above the terrain
-ELSEWHERE: Final = "to the place that is proved"
-ABOVE_HOME: Final = "at heights above home, as is proved"
+ELSEWHERE: Final = "to the proved place"
+ABOVE_HOME: Final = "at the proved heights above home"
 RETURNS_TO: Final[Mapping[float, str]] = {
     0: "home, or a rally point that is nearer", 1: "a rally point or a mission's landing", 2: "along the mission",
-    3: "the shortest of rally point, mission and home", 4: "as is shorter, home or along the mission",
+    3: "the shortest of rally point, mission and home", 4: "home or along the mission, whichever is shorter",
     5: "a rally point or a landing that is safe",
 }  # fmt: skip
 HEIGHTS_FROM: Final[Mapping[float, str]] = {0: "home", 1: "the terrain"}
@@ -132,7 +132,7 @@ class ReturnLimits:
         for group in self._limits:
             names = [each.parameter for each in group]
             if not any(name in parameters.values for name in names) and not all(map(parameters.is_absent, names)):
-                return f"what limits its way home (`{names[0]}`) was not read yet"
+                return f"the limit of the way home (`{names[0]}`) was not read yet"
         return None
 
     def wrong(self, values: Mapping[str, float]) -> str | None:
@@ -196,7 +196,7 @@ class RallyPoints:
     def unread(self) -> str | None:
         """That their number is not known yet, in words."""
         waits = self._wanted and self._count is None and not self.silent
-        return "its rally points were not counted yet" if waits else None
+        return "the vehicle's rally points were not counted yet" if waits else None
 
     @property
     def wrong(self) -> str | None:
@@ -204,4 +204,4 @@ class RallyPoints:
         if not self._count:
             return None
         many = "1 rally point" if self._count == 1 else f"{self._count} rally points"
-        return f"its way home would not be {ELSEWHERE} (it has {many}): clear them, and upload none"
+        return f"its way home would not be {ELSEWHERE} (it has {many}): clear them and upload none"

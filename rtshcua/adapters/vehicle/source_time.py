@@ -218,7 +218,7 @@ class SourceTime:
     @property
     def unready(self) -> str | None:
         """What stands against trusting any age, in words."""
-        return "its clock is not known yet: no TIMESYNC answer" if self.clock.answered_us is None else None
+        return "the vehicle's clock is not known yet: no TIMESYNC answer" if self.clock.answered_us is None else None
 
     def utc(self, now_us: int) -> tuple[int, int] | None:
         """UTC as the vehicle has it less our monotonic time, and how far the way of the frames leaves it open, in us.

@@ -78,8 +78,8 @@ class StreamPlan(NamedTuple):
         would = next((baud for baud in BAUDS if baud // BITS_OF_AN_OCTET * SHARE // 100 >= self.least), None)
         better = f"; {would} baud would" if would is not None else ""
         return (
-            f"the link carries {self.capacity} octets a second, of which {SHARE} % may be streams, and the program "
-            f"needs {self.least} at the least{better}"
+            f"the link carries {self.capacity} octets a second, {SHARE} % of them for streams; the program needs at "
+            f"least {self.least}{better}"
         )
 
 
@@ -282,7 +282,7 @@ class StreamRequests:
         if names:
             self._off.update(names)
             self._queue += names
-            self.notes.append(f"turned off on this link, for lack of room: {', '.join(names)}")
+            self.notes.append(f"turned off on this link for lack of capacity: {', '.join(names)}")
 
     def _compare_each(self, passed_us: int) -> None:
         for name, asked_us in self._wanted.items():
@@ -295,9 +295,9 @@ class StreamRequests:
             self._slow ^= {name}
             if name in self._slow:
                 self._queue.append(name)  # somebody may have asked for another rate since
-                self.notes.append(f"{name} comes every {came_us // 1_000} ms, asked for every {asked_us // 1_000} ms")
+                self.notes.append(f"{name} comes every {came_us // 1_000} ms, requested every {asked_us // 1_000} ms")
             else:
-                self.notes.append(f"{name} comes as often as asked for again")
+                self.notes.append(f"{name} comes at the requested rate again")
 
     def _is_quiet(self, name: str, now_us: int) -> bool:
         last_us = max(self._heard_us.get(name, 0), self._since_us or 0)

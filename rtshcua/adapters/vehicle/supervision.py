@@ -516,7 +516,7 @@ class CrashWatch:
             return None
         if off.by_us - flew[0] > RECENT_US or flew[1] < ABOVE or flew[2]:
             return None
-        return f"its motors stopped {flew[1] // 1_000} m above home"
+        return f"the motors stopped {flew[1] // 1_000} m above home"
 
     def _attitude(self, seen: ObservedVehicle) -> str | None:
         if seen.tilt < TILTED or not (seen.armed or seen.airborne):
@@ -529,7 +529,7 @@ class CrashWatch:
         self._tilted = since_us, at_us
         # it may lie on its side after it landed, and be carried
         stands = _says_air(seen, at_us) or (seen.armed and not seen.disarms and _is_recent(seen, "HEARTBEAT", at_us))
-        return f"it leans {seen.tilt} degrees" if stands and at_us - since_us >= LASTS_US else None
+        return f"the vehicle is tilted by {seen.tilt} degrees" if stands and at_us - since_us >= LASTS_US else None
 
     def _fall(self, at_us: int, descent: int, *, flies: bool) -> str | None:
         if descent >= FALLS:
@@ -545,7 +545,7 @@ class CrashWatch:
         if at_us - self._impact[0] > LIES_WITHIN_US:
             self._impact = None
             return None
-        return None if flies else f"it came down at {self._impact[1] / 1_000:.1f} m/s"
+        return None if flies else f"the vehicle came down at {self._impact[1] / 1_000:.1f} m/s"
 
 
 def _says_air(seen: ObservedVehicle, at_us: int) -> bool:

@@ -277,7 +277,7 @@ class Batteries:
         new = number not in self.told
         self.told[number] = function, remaining
         if new and len(self.told) > 1:
-            self.notes.append(f"it has {len(self.told)} batteries: {self.summary}")
+            self.notes.append(f"the vehicle has {len(self.told)} batteries: {self.summary}")
 
     @property
     def summary(self) -> str:
@@ -332,8 +332,8 @@ def _check(signal: Signal, source: SignalSource) -> None:
         field = None if message is None else message.fields.get(name)
         if field is None or field.length or field.type == "char":
             raise UnknownSource(
-                f"the policy reads `{signal.name}` from `{source.message}.{name}`, which is no number that a vehicle "
-                "reports"
+                f"the policy reads `{signal.name}` from `{source.message}.{name}`, which is not a number that a "
+                "vehicle reports"
             )
 
 

@@ -259,7 +259,7 @@ class _Streams:
         close()
         self._past = StreamCounts(*map(sum, zip(self._past, line.frames.counts, strict=True)))
         self.trouble = line.gone
-        self._notes.append(f"`{self.address}` is gone ({line.gone}): it is opened again as soon as it is back")
+        self._notes.append(f"`{self.address}` was lost ({line.gone}): it is opened again as soon as it is back")
 
     def _told(self) -> list[str]:
         for line, _, _ in list(self.lines.values()):
@@ -422,7 +422,7 @@ def _make_raw(device: int, baud: int) -> None:
     except termios.error as error:
         raise OSError(*error.args) from None
     if taken != speed:
-        raise OSError(errno.EINVAL, f"it does not take {baud} baud")
+        raise OSError(errno.EINVAL, f"it does not support {baud} baud")
 
 
 def _reason(error: OSError) -> str:

@@ -99,7 +99,7 @@ _TOLD_S: Final = 4.0
 _QUALIFY_HELP: Final = "`rtshcua qualify` flies a short test of it"
 _LOOPBACK: Final = "127.0.0.1"
 _POLL_S = 0.05
-_HELP: Final = "is it on, and does it send there? PX4 and ArduPilot are known; `rtshcua sim` starts one to try"
+_HELP: Final = "check that it is on and sends to this address (PX4 or ArduPilot); `rtshcua sim` simulates one"
 _KEY_HELP: Final = "has the vehicle the key of `--signing-key`, and are both clocks right?"
 _SILENCE_HELP: Final = "look at the address, the cable and the vehicle's own port settings"
 _SYSTEM_HELP: Final = "`--system` names another id, or leave it out"
@@ -406,7 +406,7 @@ def too_slow(driver: Driver) -> Refusal | None:
     """Why a link carries too little for a policy; None where it carries enough."""
     if driver.shortfall is None:
         return None
-    help = "a faster link, or longer deadlines and times to stale in the policy; docs/flying/link.md counts octets"
+    help = "use a faster link, or longer deadlines and `stale after` times in the policy; see docs/flying/link.md"
     return Refusal("link-too-slow", driver.shortfall, help, ExitCode.REFUSED)
 
 

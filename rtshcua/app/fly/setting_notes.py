@@ -21,7 +21,7 @@ def untold(names: Iterable[str], told: Container[str], flavour: str) -> str | No
     missing = [name for name in names if name not in told]
     if not missing:
         return None
-    said = f"it does not tell `{'`, `'.join(missing)}`, which is to be set"
+    said = f"the vehicle does not report `{'`, `'.join(missing)}`, which is to be set"
     return "; ".join([said, *foreign(missing, flavour)])
 
 

@@ -70,7 +70,7 @@ class Bodies:
         return None if session is None or not {"id", "method"} <= message.keys() else (session, str(message["id"]))
 
     async def _body(self, scope: Scope, receive: Receive, held: AsyncExitStack) -> bytes | int | None:
-        """All of it; the status with which it is refused; None where whoever sent it hung up."""
+        """All of it; the status with which it is refused; None where whoever sent the client closed the connection."""
         said = next((value for name, value in scope["headers"] if name == b"content-length"), b"0")
         if int(said) > MOST_OCTETS:
             return 413

@@ -363,13 +363,13 @@ def test_a_client_hands_in_and_waits_for_its_answer(agents: AgentSocket) -> None
 @pytest.mark.parametrize(
     ("says", "found"),
     [
-        (b"\xff\xfeno JSON\n", "says what no flight says"),
-        (b"[" * 100_000 + b"\n", "says what no flight says"),
-        (b'{"type":"hello","x":' + b"[" * 100_000 + b"\n", "says what no flight says"),
-        (b'{"type":5}\n', "says what no flight says"),
-        (b'{"type":"hello","flight":"abcd"}\n', "says no id of a flight"),
-        (b'{"type":"hello","flight":"' + b"zz" * 16 + b'"}\n', "says no id of a flight"),
-        (b"x" * 400_000, "its line does not end"),
+        (b"\xff\xfeno JSON\n", "its reply is malformed"),
+        (b"[" * 100_000 + b"\n", "its reply is malformed"),
+        (b'{"type":"hello","x":' + b"[" * 100_000 + b"\n", "its reply is malformed"),
+        (b'{"type":5}\n', "its reply is malformed"),
+        (b'{"type":"hello","flight":"abcd"}\n', "sent no flight id"),
+        (b'{"type":"hello","flight":"' + b"zz" * 16 + b'"}\n', "sent no flight id"),
+        (b"x" * 400_000, "its line is too long"),
     ],
 )
 def test_a_client_of_what_is_no_flight(folder: Path, monkeypatch: pytest.MonkeyPatch, says: bytes, found: str) -> None:
@@ -427,10 +427,13 @@ def test_a_follower_of_what_never_says_which_flight_it_is_waits_so_long_in_all(f
 @pytest.mark.parametrize(
     ("says", "found"),
     [
-        ((b'{"a":1}\n' * 8_000,) * 50, "does not say first who it is"),
-        ((b'{"type":"effect"}\n{"type":"hello","flight":"' + b"ab" * 16 + b'"}\n',), "does not say first who it is"),
-        ((b" " * 65_536,) * 50, "its line does not end"),
-        ((b'{"type":"hello"}\n',), "says no id of a flight"),
+        ((b'{"a":1}\n' * 8_000,) * 50, "did not send the identity line first"),
+        (
+            (b'{"type":"effect"}\n{"type":"hello","flight":"' + b"ab" * 16 + b'"}\n',),
+            "did not send the identity line first",
+        ),
+        ((b" " * 65_536,) * 50, "its line is too long"),
+        ((b'{"type":"hello"}\n',), "sent no flight id"),
     ],
     ids=["a flood", "a late hello", "no end", "no id"],
 )
@@ -482,7 +485,7 @@ def test_a_socket_in_no_folder_is_named(folder: Path) -> None:
     assert refused.value.filename == str(folder / "none" / "x")
     (folder / "file").write_text("no socket")
     for path in (folder, folder / "file"):
-        with pytest.raises(OSError, match="no agent socket of a flight"):
+        with pytest.raises(OSError, match="no flight has an agent socket there"):
             flight_at(path)
     with pytest.raises(OSError, match="too long for a socket"):
         hand_in(folder / ("x" * 120), b"")

@@ -91,7 +91,7 @@ def test_a_vehicle_that_is_well(flavour: str) -> None:
     assert found["link/answers"].verdict is found["link/round-trip"].verdict is MissionVerdict.OK
     assert found["link/streams"].verdict is MissionVerdict.OK
     assert "bytes/s requested" in found["link/streams"].found
-    assert found["link/round-trip"].found == "0 ms there and back; its clock is known to 3 ms"
+    assert found["link/round-trip"].found == "0 ms round trip; the vehicle's clock is known to 3 ms"
     assert found["signal/battery"].found.startswith("`battery`: BATTERY_STATUS every ")
     assert {slug for slug in found if slug.startswith("settings/")} >= {
         "px4": {"settings/gf_action", "settings/nav_dll_act"},
@@ -116,7 +116,7 @@ def test_a_vehicle_that_is_well(flavour: str) -> None:
         ("ardupilot", {"RTL_ALT_TYPE": 1.0}, "settings/rtl_alt_type", "0, home", "set `RTL_ALT_TYPE` to 0"),
         ("ardupilot", {"WPNAV_SPEED": 5_000.0}, "settings/wpnav_speed", "at most 12 m/s", "to 1200"),
         ("px4", {"MPC_Z_VEL_MAX_UP": 8.0}, "settings/mpc_z_vel_max_up", "at most ", "set `MPC_Z_VEL_MAX_UP` to "),
-        ("px4", {"GF_ACTION": 0.0}, "settings/gf_action", "hold", "second line of defence; set `GF_ACTION` to 2"),
+        ("px4", {"GF_ACTION": 0.0}, "settings/gf_action", "hold", "second protection; set `GF_ACTION` to 2"),
         ("ardupilot", {"FS_EKF_ACTION": 0.0}, "settings/fs_ekf_action", "land", "set `FS_EKF_ACTION` to 1"),
     ],
 )
@@ -201,7 +201,7 @@ def test_what_is_no_multirotor_is_refused() -> None:
         vehicle.hurt = hurt
 
     found = examine(case.simulated("ardupilot"), prepare=winged)
-    assert found["autopilot/kind"].found == "it is no multirotor (MAV_TYPE 1)"
+    assert found["autopilot/kind"].found == "the vehicle is not a multirotor (MAV_TYPE 1)"
     assert "autopilot/kind" in stops(found)
 
 
@@ -275,7 +275,7 @@ def test_what_lowers_or_lifts_the_way_home_stops_a_mission(
 
 
 @rows(("flavour", "release", "says"), [
-    ("px4", None, "PX4 1.16 takes no key: use a wire"),
+    ("px4", None, "PX4 1.16 accepts no key: use a wire"),
     ("px4", (1, 17), "`rtshcua keys link` makes a key"),
     ("ardupilot", None, "`rtshcua keys link` makes a key"),
 ])  # fmt: skip
@@ -394,7 +394,7 @@ def test_a_vehicle_whose_clock_is_not_known(flavour: str) -> None:
 
     found = examine(case.simulated(flavour), prepare=without_time)
     assert "link/round-trip" in stops(found)
-    assert found["link/round-trip"].found == "TIMESYNC is not answered, so nobody knows how old its reports are"
+    assert found["link/round-trip"].found == "TIMESYNC is not answered, so the age of the reports is not known"
     assert found["link/answers"].verdict is MissionVerdict.OK
     assert any(slug.startswith("signal/") for slug in stops(found)), "no signal is known"
 
@@ -403,7 +403,7 @@ def test_a_signal_that_nobody_sends() -> None:
     found = examine(case.simulated("px4", extras=EQUIPPED - {Equipment.RANGE}))
     (obstacle,) = [each for slug, each in found.items() if slug.startswith("signal/obstacle")]
     assert obstacle.verdict in (MissionVerdict.STOP, MissionVerdict.WARN)
-    assert obstacle.found.endswith("no DISTANCE_SENSOR")
+    assert obstacle.found.endswith("no DISTANCE_SENSOR arrives")
 
 
 @FLAVOURS
@@ -421,7 +421,7 @@ def test_where_the_boundary_would_not_take_it_the_vehicles_time_does_not_count(f
     config = case.simulated(flavour, utc_us=case.flat.ISSUED)
     stop = examine(config, utc_error_us=None, vehicle_counts=False)["mission/clock"]
     assert stop.verdict is MissionVerdict.STOP
-    assert "over a link with a key alone" in stop.found
+    assert "only over a link with a key" in stop.found
     assert "`--signing-key`" in stop.advice
     assert "`--utc-error 500ms`" in stop.advice
     stated = examine(config, utc_error_us=None, vehicle_counts=False, stated_us=500_000)["mission/clock"]
@@ -432,7 +432,7 @@ def test_where_the_boundary_would_not_take_it_the_vehicles_time_does_not_count(f
 def test_the_wind_is_not_asked_for_on_the_ground(flavour: str) -> None:
     wind = examine(case.simulated(flavour))["signal/wind.speed"]
     assert wind.verdict is MissionVerdict.UNKNOWN
-    assert wind.found == "`wind.speed` is known in the air only, so nothing is known of it yet"
+    assert wind.found == "`wind.speed` is known in the air only, so it is unknown now"
 
 
 def test_a_lossy_link() -> None:
@@ -559,7 +559,7 @@ def test_two_vehicles_of_one_id() -> None:
         vehicle.hurt = also
 
     found = examine(case.simulated("px4"), prepare=crowded, seconds=6)
-    assert "an id of its own" in found["link/other-vehicle"].found
+    assert "its own id" in found["link/other-vehicle"].found
     assert found["link/loss"].verdict is MissionVerdict.OK, "the other one's frames are not counted as this one's"
 
 

@@ -209,7 +209,7 @@ def test_a_key_that_is_lost_on_the_way_is_sent_again_and_a_lost_link_is_no_proof
         ("px4", (1, 16, 0), "does not know SETUP_SIGNING"),
         ("px4", (1, 17, 0), "MAV_SIGN_CFG"),
         ("px4", (1, 18, 0), "USB included"),
-        ("px4", None, "does not say which release"),
+        ("px4", None, "does not report its release"),
     ],
 )
 def test_what_each_release_does_is_said(autopilot: str, release: tuple[int, int, int] | None, says: str) -> None:

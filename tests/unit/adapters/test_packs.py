@@ -110,7 +110,7 @@ def test_no_pack_replaces_how_everything_else_is_flown(install: Install) -> None
     ("more", "says"),
     [
         ("raise ValueError('no licence')", "cannot be loaded: no licence"),
-        ("stages = 3", "is no function"),
+        ("stages = 3", "is not a function"),
         ("", "cannot be loaded"),
     ],
 )
@@ -123,11 +123,11 @@ def test_a_broken_manoeuvre_stops_the_flight_before_it_begins(install: Install, 
 def test_a_pack_that_two_packages_bring_is_nobodys(install: Install) -> None:
     package(install, "acme")
     package(install, "evil", pack="acme")
-    with pytest.raises(packs.BrokenPack, match=r"is brought by the package `\w+` and the package `\w+`"):
+    with pytest.raises(packs.BrokenPack, match=r"is provided by the package `\w+` and the package `\w+`"):
         packs.folder("acme")
 
 
 def test_the_shipped_pack_cannot_be_claimed(install: Install) -> None:
     package(install, "evil", "[rtshcua.manoeuvres]\npx4 = evil_code:stages\n", OWN, pack="lib")
-    with pytest.raises(packs.BrokenPack, match="is brought by two packages"):
+    with pytest.raises(packs.BrokenPack, match="is provided by two packages"):
         packs.manoeuvres(frozenset())

@@ -70,7 +70,7 @@ def test_a_parameter_that_it_does_not_have_refuses_the_mission() -> None:
     assert flown.ending is Ending.REFUSED
     assert sent == []
     (said,) = flown.effects("not-prepared")
-    assert said["detail"] == "it does not tell `GF_ACTION`, which is to be set"
+    assert said["detail"] == "the vehicle does not report `GF_ACTION`, which is to be set"
 
 
 def test_a_vehicle_that_keeps_its_own_value_refuses_the_mission(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -97,7 +97,7 @@ def test_what_its_owner_changed_meanwhile_is_left_so() -> None:
     flown = one.fly(each)
     assert flown.ending is Ending.COMPLETED
     (said,) = flown.effects("not-restored")
-    assert "which was set to 80, and is 60 now" in said["detail"]
+    assert "which was set to 80, but is 60 now" in said["detail"]
     assert has(one) == 60.0
     assert owed == {}
 
@@ -208,7 +208,7 @@ def test_a_value_that_the_parameter_cannot_keep_is_not_written(flavour: str) -> 
     flown = one.fly()
     assert flown.ending is Ending.REFUSED
     (said,) = flown.effects("not-prepared")
-    assert f"it cannot keep {name} {value:g}" in said["detail"]
+    assert f"cannot hold {name} {value:g}" in said["detail"]
     assert sent == []
 
 

@@ -184,7 +184,7 @@ def test_a_pilot_and_a_failsafe_take_over_with_different_words() -> None:
 def test_what_no_waiting_changes_ends_the_wait_at_once() -> None:
     run = start(ready=False)
     began_us = run.clock.now().monotonic_us
-    run.tick(VehicleUnfit(0, "it returns at 15 m (`RTL_ALT`), and the policy says 30 m"))
+    run.tick(VehicleUnfit(0, "the vehicle returns at 15 m (`RTL_ALT`), and the policy says 30 m"))
     over(run, 3)
     assert run.ending is Ending.REFUSED
     assert run.clock.now().monotonic_us - began_us < 5 * S
@@ -202,7 +202,7 @@ def test_a_command_that_was_late_says_that_the_computer_was_busy() -> None:
 
 def test_a_count_of_a_note_is_not_told_as_new_in_the_middle_of_its_opposite() -> None:
     run = flying(vehicle=FakeVehicle(deaf={"goto"}))
-    bad, good = "it says that its state is critical", "its state is not critical any more"
+    bad, good = "the vehicle reports a critical state", "the vehicle's state is no longer critical"
     for text in (bad, good, bad, good):
         run.tick(Noted(0, text))
     for _ in range(35):

@@ -188,12 +188,12 @@ def test_what_kept_a_skill_from_getting_on_is_named_where_its_time_is_over() -> 
     run = start(vehicle=FakeVehicle(deaf={"goto"})).until_flies("goto")
     token = run.vehicle.commands[-1].token
     run.step(Hindered(0, token - 1, "of the one before"))
-    run.step(Hindered(0, token, "it flies at 1.0 m/s where 5.0 m/s were told"))
+    run.step(Hindered(0, token, "it flies at 1.0 m/s instead of 5.0 m/s"))
     run.until_over(400)
     details = [record["detail"] for record in run.records if record.get("event") in ("violated", "noted")]
     assert details == [
-        "it flies at 1.0 m/s where 5.0 m/s were told",
-        "lasts longer than it may: it flies at 1.0 m/s where 5.0 m/s were told",
+        "it flies at 1.0 m/s instead of 5.0 m/s",
+        "lasts longer than it may: it flies at 1.0 m/s instead of 5.0 m/s",
     ]
     assert run.flown == ["takeoff", "goto", "hover", "return_home"]
 

@@ -566,7 +566,7 @@ def test_interrupted_in_a_silence_falls_back_once_the_state_is_fresh() -> None:
     assert run.until_over().ending is Ending.INTERRUPTED
 
 
-# ------------------------------------------------------------------------------- heard, but it answers nothing
+# ------------------------------------------------------------------------------- heard, but answers nothing
 
 DEAF = {"takeoff", "goto", "inspect_area", "hover", "return_home", "emergency_land"}
 
@@ -594,7 +594,7 @@ def test_one_that_answers_nothing_is_waited_for_as_long_as_it_can_fly(situation:
     go_on(run, 3 * TICK)
     assert run.ending is Ending.LINK_LOST
     assert [record["detail"] for record in run.records if record.get("event") == "link-lost"] == [
-        "it is heard, but answers nothing"
+        "the vehicle is heard but answers nothing"
     ]
     assert "stranded" not in run.events
     assert_audited(run)

@@ -247,7 +247,7 @@ class OperatorConsole:
         self._follower.close()
         self._follower = None
         self._lost_s = time.monotonic()
-        self.tell("lost", "the flight hung up, and did not say that it is over: it is tried again")
+        self.tell("lost", "the flight closed the connection, and did not say that it is over: it is tried again")
         return False
 
     def _hear(self, follower: FlightFollower) -> bool:
@@ -312,7 +312,7 @@ class OperatorConsole:
         try:
             told = _read_told(line)
         except (ValueError, RecursionError):
-            raise ConnectionError("what listens there is no flight: it says what no flight says") from None
+            raise ConnectionError("the program that listens there is not a flight: its reply is malformed") from None
         if told.type != "mission":
             return
         flying = self._flying

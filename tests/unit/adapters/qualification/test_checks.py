@@ -77,7 +77,7 @@ def test_what_never_stands_does_not_stop_and_does_not_hold() -> None:
     flown.samples[-1] = flown.samples[-1]._replace(speed=900)
     found = checks(BRAKED, flown)
     assert found["stop/fly"].outcome == found["hold/fly"].outcome == FAILED
-    assert found["stop/fly"].measured.startswith("it does not stop")
+    assert found["stop/fly"].measured.startswith("the vehicle does not stop")
 
 
 def test_what_strays_while_it_holds_is_seen_at_any_speed() -> None:
@@ -199,7 +199,7 @@ def test_a_climb_is_judged_by_the_speed_that_it_comes_to() -> None:
     command = ObservedCommand(MotionKind.CLIMB, "takeoff", 0, 0, False, 0, 5 * S, "succeeded")
     flown = ObservedSortie("climb", samples, [command], ending="completed", down=True)
     found = checks(BRAKED, flown)["climb/speed"]
-    assert (found.outcome, found.measured) == (HELD, "1.2 m/s over 2 s, 1.5 m/s at the most")
+    assert (found.outcome, found.measured) == (HELD, "1.2 m/s over 2 s, 1.5 m/s at most")
 
 
 @pytest.mark.parametrize(
@@ -243,7 +243,7 @@ def test_whatever_does_not_go_as_planned_ends_it() -> None:
     assert ends_after(taken(TakeoverKind.MODE, 0)) is None
     aloft = leg(7_000, 4 * S)
     aloft.down = False
-    assert "not seen to be down" in (ends_after(aloft) or "")
+    assert "not seen on the ground" in (ends_after(aloft) or "")
     ended = leg(7_000, 4 * S)
     ended.ending = "stood-down"
     assert "stood-down" in (ends_after(ended) or "")

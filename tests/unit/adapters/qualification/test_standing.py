@@ -33,7 +33,7 @@ def test_one_that_is_as_it_was_is_qualified() -> None:
 def test_one_of_which_a_part_was_flown_is_partly_qualified() -> None:
     assert [each.name for each in SORTIES if each.takeover is None] == list(WHOLE)
     stands = standing(replace(RECORD, checks=(FLOWN[0], HELD, LEFT)), VERSION, dict(PARAMETERS))
-    assert stands == (False, "this vehicle is partly qualified only: not flown: leg (`--only`)")
+    assert stands == (False, "this vehicle is only partly qualified: not flown: leg (`--only`)")
 
 
 def test_a_simulation_qualifies_no_vehicle() -> None:
@@ -45,8 +45,8 @@ def test_a_simulation_qualifies_no_vehicle() -> None:
 @pytest.mark.parametrize(
     ("record", "says"),
     [
-        (None, "there is no record"),
-        ("unknown key", "its record is not to be trusted: unknown key"),
+        (None, "is on record"),
+        ("unknown key", "its record cannot be trusted: unknown key"),
         (replace(RECORD, checks=(HELD, FAILED)), "1 check did not hold: fence/on"),
         (replace(RECORD, checks=(LEFT,)), "nothing was checked"),
     ],
@@ -64,11 +64,11 @@ def test_one_that_was_not_or_did_not_hold_is_none(record: Any, says: str) -> Non
         (
             replace(VERSION, version=0x01110000),
             PARAMETERS,
-            "is another now: its firmware is px4 1.17.0, and was px4 1.16.0",
+            "has changed since: its firmware is px4 1.17.0, and was px4 1.16.0",
         ),
-        (VERSION, (("GF_ACTION", as_octets(0)), PARAMETERS[1]), "is another now: changed since: `GF_ACTION`"),
-        (None, PARAMETERS, "it does not tell its version now"),
-        (VERSION, PARAMETERS[:1], "1 of its parameters are not told now"),
+        (VERSION, (("GF_ACTION", as_octets(0)), PARAMETERS[1]), "has changed since: parameters `GF_ACTION`"),
+        (None, PARAMETERS, "the vehicle does not report its version now"),
+        (VERSION, PARAMETERS[:1], "1 of its parameters are not reported now"),
     ],
 )
 def test_one_that_changed_or_does_not_say_is_none(firmware: Any, parameters: Any, says: str) -> None:

@@ -23,5 +23,5 @@ def test_damage_is_told(tmp_path: Path, data: bytes) -> None:
     store = BoundaryStore(tmp_path, "quad-07")
     store.keep(1, b"a" * 32)
     store.path.write_bytes(data)
-    with pytest.raises(DamagedState, match="which session"):
+    with pytest.raises(DamagedState, match="previous session"):
         store.kept()

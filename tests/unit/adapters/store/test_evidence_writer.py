@@ -89,7 +89,7 @@ def test_a_line_that_is_not_on_the_disk_in_time_is_told_and_then_counts_as_a_fai
     writer.append(b"promised\n", SYNCED_FIRST)
     told: list[str | None] = []
     until(lambda: told.append(writer.late()) or any(told))
-    assert (told[-1], writer.late()) == ("what was to be on the disk within 1000 ms is not", None)
+    assert (told[-1], writer.late()) == ("a write did not reach the disk within 1000 ms", None)
     until(lambda: told.append(writer.trouble()) or told[-1] is not None)
     assert (told[-1], writer.trouble()) == ("the disk has not answered for 0.02 s", None)
     disk.open["sync"].set()
@@ -107,7 +107,7 @@ def test_a_full_queue_is_a_failure_and_loses_nothing(writer: EvidenceWriter, dis
     disk.open["write"].clear()
     for _ in range(4):
         writer.append(b"x\n", WRITTEN)
-    with pytest.raises(OSError, match="does not keep up"):
+    with pytest.raises(OSError, match="is too slow for the log"):
         writer.append(b"y\n", WRITTEN)
     disk.open["write"].set()
     until(lambda: writer.kept == 5)
@@ -209,7 +209,7 @@ def test_who_can_wait_may_wait_until_all_is_on_the_disk(disk: FaultyDisk, path: 
     writer.append(b"four\n", WRITTEN)
     with pytest.raises(OSError, match="Read-only file system"):
         writer.settle()
-    with pytest.raises(OSError, match="does not take everything"):
+    with pytest.raises(OSError, match="does not accept all data"):
         writer.settle()
     disk.heal()
     writer.close()

@@ -38,7 +38,7 @@ def test_a_closed_log_is_remembered_and_not_read_again(last: LastLog, tmp_path: 
     assert [entry.name for entry in last.path.parent.iterdir()] == ["vehicle-quad%2007%2F%C3%A9"]
 
 
-@pytest.mark.parametrize(("more", "told"), [(b"", "20 records of it are kept"), (b"x", "1 octets discarded")])
+@pytest.mark.parametrize(("more", "told"), [(b"", "it was recovered with 20 records"), (b"x", "1 octets discarded")])
 def test_a_log_that_broke_off_is_recovered(last: LastLog, tmp_path: Path, more: bytes, told: str) -> None:
     path, lines = unfinished(tmp_path, more)
     last.begin(path, None)
@@ -61,7 +61,7 @@ def test_a_log_that_was_tampered_with_is_told_and_named_as_far_as_it_goes(last: 
     last.begin(path, None)
     earlier = last.settle(mend)
     assert earlier.last == json.loads(lines[4])["_prev"]
-    assert "was tampered with and is left as it is (record 4: " in earlier.note
+    assert "was tampered with and is left unchanged (record 4: " in earlier.note
 
 
 def test_a_log_that_is_not_there_any_more_is_told(last: LastLog, tmp_path: Path) -> None:
@@ -70,7 +70,7 @@ def test_a_log_that_is_not_there_any_more_is_told(last: LastLog, tmp_path: Path)
     assert earlier.last is None
     assert earlier.broken_off == tmp_path / "gone"
     assert earlier.gone
-    assert earlier.note.endswith("is no longer there: whether its flight ended is not known")
+    assert earlier.note.endswith("is missing, so it is not known whether its flight ended")
 
 
 def test_a_log_that_is_still_written_is_told(last: LastLog, tmp_path: Path) -> None:
@@ -91,5 +91,5 @@ def test_what_nobody_wrote_is_told(last: LastLog, data: bytes) -> None:
     last.path.write_bytes(data)
     earlier = last.settle(mend)
     assert earlier.last is None
-    assert "it is not known which log came before" in earlier.note
+    assert "the previous log is not known" in earlier.note
     assert earlier.note.endswith("it is damaged")

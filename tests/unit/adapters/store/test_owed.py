@@ -46,7 +46,7 @@ def test_a_file_that_says_something_else_is_damage(text: str, tmp_path: Path) ->
 def test_a_file_that_cannot_be_read_is_said_so(tmp_path: Path) -> None:
     OwedParameters(tmp_path, "quad").path.mkdir(parents=True)
     found = OwedParameters(tmp_path, "quad")
-    assert "it is not known which parameters" in (found.trouble or "")
+    assert "the parameters to restore are not known" in (found.trouble or "")
 
 
 @pytest.mark.parametrize("first", [True, False], ids=["it sets", "something is left to it"])

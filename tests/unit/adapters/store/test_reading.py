@@ -32,10 +32,10 @@ def test_what_is_no_file_is_not_waited_for(root: Path, monkeypatch: pytest.Monke
         listener.bind("socket")
         before = len(list(Path("/proc/self/fd").iterdir()))
         for name in ("pipe", "socket", "sub", os.devnull):
-            with pytest.raises(NotRegular, match=f"no regular file: '{name}'"):
+            with pytest.raises(NotRegular, match=f"not a regular file: '{name}'"):
                 open_regular(name)
         for name in ("pipe", "socket", "sub"):
-            with pytest.raises(NotRegular, match="no regular file"):
+            with pytest.raises(NotRegular, match="not a regular file"):
                 open_regular(root / name, root)
         assert len(list(Path("/proc/self/fd").iterdir())) == before
 
@@ -74,6 +74,6 @@ def test_whose_file_it_is_counts_too(root: Path, monkeypatch: pytest.MonkeyPatch
     with open_regular(root / "sub/a") as file:
         assert exposed(file) is None
         monkeypatch.setattr(os, "geteuid", lambda: own + 1)
-        assert exposed(file) == f"it belongs to the user {own}"
+        assert exposed(file) == f"it belongs to user {own}"
         monkeypatch.setattr(reading, "ROOT", own)
         assert exposed(file) is None, "root may read it anyway"

@@ -136,12 +136,12 @@ def test_a_stream_that_somebody_slows_down_is_told_and_asked_for_again() -> None
     one.run(10)
     one.every["GLOBAL_POSITION_INT"] = 1_000_000
     assert one.run(2 * MEASURE_US / S) == ["GLOBAL_POSITION_INT"]
-    assert told(one) == ["GLOBAL_POSITION_INT comes every 1000 ms, asked for every 100 ms"]
+    assert told(one) == ["GLOBAL_POSITION_INT comes every 1000 ms, requested every 100 ms"]
     one.run(30)
     assert len(told(one)) == 1, "told once"
     one.every["GLOBAL_POSITION_INT"] = 100_000
     one.run(2 * MEASURE_US / S)
-    assert told(one)[1:] == ["GLOBAL_POSITION_INT comes as often as asked for again"]
+    assert told(one)[1:] == ["GLOBAL_POSITION_INT comes at the requested rate again"]
 
 
 def test_a_stream_that_stops_is_asked_for_again_and_again() -> None:

@@ -175,7 +175,7 @@ def crowd(link: ConnectedVehicle) -> str | None:
     return link.driver.link.crowd
 
 
-@pytest.mark.parametrize(("system", "autopilot", "says"), [(2, 3, "systems 1 and 2"), (1, 12, "two vehicles speak")])
+@pytest.mark.parametrize(("system", "autopilot", "says"), [(2, 3, "systems 1 and 2"), (1, 12, "two vehicles send")])
 def test_a_second_vehicle_keeps_the_first_from_being_ready(
     link: ConnectedVehicle, vehicle: Peer, system: int, autopilot: int, says: str
 ) -> None:

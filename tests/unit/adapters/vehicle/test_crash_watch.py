@@ -78,7 +78,7 @@ def test_motors_that_stop_just_after_it_flew_are_a_crash_as_soon_as_two_reports_
     one.beat(12_500_000, armed=False)
     assert not one.told
     one.beat(13_500_000, armed=False)
-    assert one.told == ["its motors stopped 16 m above home"]
+    assert one.told == ["the motors stopped 16 m above home"]
 
 
 def test_a_crash_in_what_waited_is_told_however_late_it_is_read() -> None:
@@ -86,7 +86,7 @@ def test_a_crash_in_what_waited_is_told_however_late_it_is_read() -> None:
     one.now_us = 90 * S
     one.flew()
     one.motors_off(12_500_000)
-    assert one.told == ["its motors stopped 16 m above home"]
+    assert one.told == ["the motors stopped 16 m above home"]
 
 
 def test_motors_that_are_off_after_a_gap_stopped_at_a_height_that_nobody_knows() -> None:
@@ -156,7 +156,7 @@ def test_what_leans_while_it_was_just_seen_to_fly_has_crashed() -> None:
     one.leans(12_500_000, 1.5)
     assert not one.told
     one.leans(13 * S, 1.5)
-    assert one.told == ["it leans 86 degrees"]
+    assert one.told == ["the vehicle is tilted by 86 degrees"]
 
 
 def test_what_leans_after_a_gap_may_have_landed_and_be_carried() -> None:
@@ -184,7 +184,7 @@ def test_a_fall_that_ends_at_once_is_an_impact_by_the_time_of_the_reports() -> N
     one.at(12_600_000, 0)
     one.says(12_650_000, ON_GROUND)
     one.at(12_700_000, 0)
-    assert one.told == ["it came down at 8.0 m/s"]
+    assert one.told == ["the vehicle came down at 8.0 m/s"]
 
 
 def test_a_descent_that_is_read_at_once_with_its_end_is_no_impact() -> None:

@@ -320,7 +320,7 @@ def test_telemetry_tells_the_drain_beside_the_charge_and_says_when_it_is_more_th
     assert values[BATTERY] == left * 100
     assert abs((values[slot] or 0) - 3 * declared) * 10 <= 3 * declared
     assert telemetry.notes
-    assert "the way home is counted with what was measured" in telemetry.notes[-1]
+    assert "the way home is computed with the measured value" in telemetry.notes[-1]
 
 
 def test_telemetry_counts_the_way_over_ground_too() -> None:

@@ -178,7 +178,7 @@ def test_no_answer_at_all_is_no_success_and_is_waited_out(flyer: Make) -> None:
     one.vehicle.lose = lambda frame: True
     token = one.begin(MotionKind.CLIMB, altitude=20_000)
     happened = one.wait(30)
-    assert "it is heard, but answers nothing" in [event.text for event in happened if isinstance(event, Noted)]
+    assert "the vehicle is heard but answers nothing" in [event.text for event in happened if isinstance(event, Noted)]
     assert not any(isinstance(event, (Succeeded, CommandFailed, LinkLost)) for event in happened)
     assert [event.answers for event in happened if isinstance(event, VehicleAnswers)] == [False]
     one.vehicle.lose = lambda frame: False
@@ -194,7 +194,7 @@ def test_in_the_air_it_is_ready_once_it_answers_and_what_it_says_has_its_time(al
     happened = one.wait(30)
     assert [event.answers for event in happened if isinstance(event, VehicleAnswers)] == [False]
     assert not any(isinstance(event, (Ready, LinkLost)) for event in happened)
-    assert one.vehicle.driver.unready == "it answers nothing that it is asked"
+    assert one.vehicle.driver.unready == "the vehicle answers no request"
     one.vehicle.lose = lambda frame: False
     before = len(one.events)
     one.until(Ready, 10)
@@ -248,7 +248,7 @@ def test_a_link_that_fails_upward_first_and_then_downward_is_lost(aloft: Make) -
     one.wait(1)
     one.vehicle.lose = lambda frame: True
     noted = one.until(Noted, 10)
-    while noted.text != "it is heard, but answers nothing":
+    while noted.text != "the vehicle is heard but answers nothing":
         noted = one.until(Noted, 10)
     one.vehicle.simulation.inject(LinkSilence(one.vehicle.simulation.now_us, 5_000_000))
     begun = one.now_us
@@ -257,7 +257,7 @@ def test_a_link_that_fails_upward_first_and_then_downward_is_lost(aloft: Make) -
     assert 900_000 <= lost.at_us - begun <= 1_400_000
     one.vehicle.lose = lambda frame: False
     said = one.until((LinkBack, Noted, VehicleAnswers), 10)
-    assert isinstance(said, LinkBack), "not that it answers again, before it was heard"
+    assert isinstance(said, LinkBack), "not that the vehicle answers again, before it was heard"
     assert one.until(VehicleAnswers, 3).answers, "it goes on to answer nothing until it is heard to answer"
     assert sum(isinstance(event, VehicleAnswers) for event in one.events) == answering + 1
 
@@ -367,7 +367,7 @@ def test_streams_that_stop_are_asked_for_again(flyer: Make) -> None:
 def test_a_vehicle_far_from_the_policys_home_is_not_ready(flyer: Make) -> None:
     one = flyer(home=HomePosition(473_977_400, 85_475_900, 488_000))
     assert not any(isinstance(event, Ready) for event in one.wait(10))
-    assert one.vehicle.driver.unready == "it stands 150 m from the policy's home, more than 50 m"
+    assert one.vehicle.driver.unready == "the vehicle is 150 m from the policy's home, more than 50 m"
 
 
 def test_a_vehicle_without_a_fix_is_not_ready(flyer: Make) -> None:
@@ -380,7 +380,7 @@ def test_a_battery_too_low_to_arm_is_not_ready(flyer: Make) -> None:
     one = flyer(battery=500)
     assert not any(isinstance(event, Ready) for event in one.wait(10))
     assert one.vehicle.driver.unready is not None
-    assert one.vehicle.driver.unready.startswith("its own checks before arming fail")
+    assert one.vehicle.driver.unready.startswith("the vehicle's checks before arming fail")
 
 
 @pytest.mark.slow

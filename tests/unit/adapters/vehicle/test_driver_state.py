@@ -130,15 +130,15 @@ def test_each_reason_in_its_turn(autopilot: int) -> None:
         one.tick()
         reasons.append(one.driver.unready)
     assert reasons == [
-        "its clock is not known yet: no TIMESYNC answer",
-        "it does not say whether it is on the ground",
+        "the vehicle's clock is not known yet: no TIMESYNC answer",
+        "the vehicle does not report whether it is on the ground",
         "no 3D position fix",
-        f"its estimator says nothing (no {report})",
-        "its estimator has no position (flags 0xa7)",
-        "no position report since its estimator has one",
-        "its own checks before arming fail",
-        "its own checks before arming fail: magnetometer not healthy",
-        "its own checks before arming fail: PreArm: Compass not calibrated",
+        f"no report of the estimator ( {report})",
+        "the estimator has no position (flags 0xa7)",
+        "no position report since the estimator has a position",
+        "the vehicle's checks before arming fail",
+        "the vehicle's checks before arming fail: magnetometer not healthy",
+        "the vehicle's checks before arming fail: PreArm: Compass not calibrated",
         None,
     ]
 
@@ -149,7 +149,7 @@ def test_without_a_clock_nothing_is_known_and_it_is_not_ready(autopilot: int) ->
     one.answers = False
     one.well()
     one.tick(5)
-    assert one.driver.unready == "its clock is not known yet: no TIMESYNC answer"
+    assert one.driver.unready == "the vehicle's clock is not known yet: no TIMESYNC answer"
     assert not [event for event in one.events if isinstance(event, Readings | Ready)]
     asked = [frame for frame in one.sent if frame.name == "TIMESYNC"]
     assert len(asked) > 30, "ten times a second at first"
@@ -180,7 +180,7 @@ def test_it_is_not_ready_before_the_time_of_day_is_known_or_was_waited_for(autop
     one = Bench(autopilot)
     one.well()
     one.driver.issued_from_us = one.now_us + 2 * S
-    assert "was issued before now" in live(1)
+    assert "might have been issued in the future" in live(1)
     assert not live(1.5)
 
 
@@ -193,7 +193,7 @@ def test_a_vehicle_that_signs_and_does_not_answer_asks_for_the_key(autopilot: in
         return one.driver.unready
 
     assert unready(deaf=True) == KEYLESS
-    assert unready(deaf=True, keyed=True) == "its clock is not known yet: no TIMESYNC answer"
+    assert unready(deaf=True, keyed=True) == "the vehicle's clock is not known yet: no TIMESYNC answer"
     assert unready(deaf=False) != KEYLESS, "it signs, and obeys anyone"
 
 
@@ -214,7 +214,7 @@ def test_the_estimator_must_go_on_speaking() -> None:
     one.well()
     assert one.driver.unready is None
     one.tick(2.5)
-    assert one.driver.unready == "its estimator fell silent (no ESTIMATOR_STATUS)"
+    assert one.driver.unready == "the estimator's reports have stopped ( ESTIMATOR_STATUS)"
 
 
 def test_the_prearm_bit_counts_though_px4_does_not_declare_it() -> None:
@@ -330,7 +330,7 @@ def test_a_critical_state_is_told() -> None:
         one.beat(0, status=status)
         one.tick()
     assert [event.text for event in one.events if isinstance(event, Noted) and "state" in event.text] == [
-        "it says that its state is critical", "its state is not critical any more",
+        "the vehicle reports a critical state", "the vehicle's state is no longer critical",
     ]  # fmt: skip
 
 

@@ -37,12 +37,12 @@ def test_flags_as_recorded_and_as_documented(flags: int, fields: set[str]) -> No
 
 def test_a_report_that_is_old_vouches_for_nothing() -> None:
     estimator = Estimator("ESTIMATOR_STATUS")
-    assert estimator.missing(0) == "its estimator says nothing (no ESTIMATOR_STATUS)"
+    assert estimator.missing(0) == "no report of the estimator ( ESTIMATOR_STATUS)"
     estimator.take(0x33F, S)
     assert known(estimator, S + STALE_US) == set(ALL)
     assert estimator.missing(S + STALE_US) is None
     assert known(estimator, S + STALE_US + 1) == set()
-    assert estimator.missing(S + STALE_US + 1) == "its estimator fell silent (no ESTIMATOR_STATUS)"
+    assert estimator.missing(S + STALE_US + 1) == "the estimator's reports have stopped ( ESTIMATOR_STATUS)"
 
 
 def test_a_report_that_was_overtaken_is_set_aside() -> None:
@@ -57,9 +57,9 @@ def test_a_report_that_was_overtaken_is_set_aside() -> None:
 def test_it_says_what_is_missing() -> None:
     estimator = Estimator("ESTIMATOR_STATUS")
     estimator.take(0x0E5, S)
-    assert estimator.missing(S) == "its estimator has no position (flags 0xe5)"
+    assert estimator.missing(S) == "the estimator has no position (flags 0xe5)"
     estimator.take(0x013, S)
-    assert estimator.missing(S) == "its estimator has no height (flags 0x13)"
+    assert estimator.missing(S) == "the estimator has no height (flags 0x13)"
 
 
 def test_what_does_not_come_from_it_needs_no_voucher() -> None:

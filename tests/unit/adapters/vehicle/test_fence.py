@@ -92,9 +92,9 @@ def test_heights_and_times_of_the_inside_are_left_out_and_said(flavour: Any) -> 
 
 @FLAVOURS
 @pytest.mark.parametrize(("more", "why"), [
-    ({"ceiling": 50 * M}, "flying above or below it is allowed"),
-    ({"floor": 10 * M}, "flying above or below it is allowed"),
-    ({"dates": (1, 2)}, "it is not always there"),
+    ({"ceiling": 50 * M}, "it may be flown over or under"),
+    ({"floor": 10 * M}, "it may be flown over or under"),
+    ({"dates": (1, 2)}, "it applies at times only"),
     ({"shape": AREA, "data": (2, 4, 4, *SQUARE, *HOLE)}, "it has holes"),
 ])  # fmt: skip
 def test_what_is_only_at_times_or_heights_forbidden_is_not_excluded(flavour: Any, more: Any, why: str) -> None:

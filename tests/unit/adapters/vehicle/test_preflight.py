@@ -146,18 +146,18 @@ def test_arducopters_fence_is_switched_on_and_its_other_kinds_stay_on() -> None:
 
 
 @rows(("flavour", "parameters", "says"), [
-    (PX4, {"RTL_RETURN_ALT": 60.0}, "it returns at 60 m (`RTL_RETURN_ALT`), and the policy says 30 m: "
+    (PX4, {"RTL_RETURN_ALT": 60.0}, "the vehicle returns at 60 m (`RTL_RETURN_ALT`), and the policy says 30 m: "
                                     "set `RTL_RETURN_ALT` to 30 (for one flight: `--set RTL_RETURN_ALT=30`), "
                                     "or change `return at`"),
-    (PX4, {"RTL_RETURN_ALT": 3_000.0}, "it returns at 3000 m"),
-    (PX4, {"RTL_RETURN_ALT": float("nan")}, "it returns at no number"),
-    (PX4, {}, "it does not tell its return altitude (`RTL_RETURN_ALT`)"),
-    (ARDUPILOT, {"RTL_ALT": 1_500.0}, "it returns at 15 m (`RTL_ALT`), and the policy says 30 m: "
+    (PX4, {"RTL_RETURN_ALT": 3_000.0}, "the vehicle returns at 3000 m"),
+    (PX4, {"RTL_RETURN_ALT": float("nan")}, "the vehicle returns at no number"),
+    (PX4, {}, "the vehicle does not report its return altitude (`RTL_RETURN_ALT`)"),
+    (ARDUPILOT, {"RTL_ALT": 1_500.0}, "the vehicle returns at 15 m (`RTL_ALT`), and the policy says 30 m: "
                                      "set `RTL_ALT` to 3000"),
-    (ARDUPILOT, {"RTL_ALT": 30.0}, "it returns at 0.3 m"),
-    (ARDUPILOT, {"RTL_ALT_M": 15.0}, "it returns at 15 m (`RTL_ALT_M`), and the policy says 30 m: "
+    (ARDUPILOT, {"RTL_ALT": 30.0}, "the vehicle returns at 0.3 m"),
+    (ARDUPILOT, {"RTL_ALT_M": 15.0}, "the vehicle returns at 15 m (`RTL_ALT_M`), and the policy says 30 m: "
                                      "set `RTL_ALT_M` to 30"),
-    (ARDUPILOT, {}, "it does not tell its return altitude (`RTL_ALT` or `RTL_ALT_M`)"),
+    (ARDUPILOT, {}, "the vehicle does not report its return altitude (`RTL_ALT` or `RTL_ALT_M`)"),
 ])  # fmt: skip
 def test_another_return_altitude_keeps_it_from_being_ready(flavour: Flavour, parameters: Any, says: str) -> None:
     one = preflight(flavour, fence=False)
@@ -184,10 +184,10 @@ def test_the_same_return_altitude_is_ready(flavour: Flavour, parameters: Any) ->
     (ARDUPILOT, {"RTL_CONE_SLOPE": 1.0}, "(`RTL_CONE_SLOPE` is 1): set `RTL_CONE_SLOPE` to at least 3"),
     (ARDUPILOT, {"RTL_CLIMB_MIN": 100.0}, "set `RTL_CLIMB_MIN` to at most 0"),
     (ARDUPILOT, {"WPNAV_RADIUS": 500.0}, "set `WPNAV_RADIUS` to at most 200"),
-    (PX4, {"RTL_TYPE": 1.0}, "its way home would not be to the place that is proved (`RTL_TYPE` is 1, a rally point or "
+    (PX4, {"RTL_TYPE": 1.0}, "its way home would not be to the proved place (`RTL_TYPE` is 1, a rally point or "
                              "a mission's landing): set `RTL_TYPE` to 0, home, or a rally point that is nearer"),
     (PX4, {"RTL_TYPE": 9.0}, "(`RTL_TYPE` is 9): set `RTL_TYPE` to 0"),
-    (ARDUPILOT, {"RTL_ALT_TYPE": 1.0}, "its way home would not be at heights above home, as is proved (`RTL_ALT_TYPE` "
+    (ARDUPILOT, {"RTL_ALT_TYPE": 1.0}, "its way home would not be at the proved heights above home (`RTL_ALT_TYPE` "
                                        "is 1, the terrain): set `RTL_ALT_TYPE` to 0, home"),
     (ARDUPILOT, {"RALLY_TOTAL": 2.0}, "(`RALLY_TOTAL` is 2): set `RALLY_TOTAL` to 0, none"),
 ])  # fmt: skip
@@ -218,7 +218,7 @@ def test_what_limits_the_way_home_is_waited_for() -> None:
     one, port = preflight(PX4, fence=False), Port(PX4)
     port.lose = lambda name: name == "PARAM_VALUE" and len(port.heard) > 1
     port.settle(one, 3)
-    assert one.unready == "what limits its way home (`RTL_MIN_DIST`) was not read yet"
+    assert one.unready == "the limit of the way home (`RTL_MIN_DIST`) was not read yet"
 
 
 @FLAVOURS
@@ -229,8 +229,8 @@ def test_a_limit_of_the_way_home_that_stays_silent_is_told_once(flavour: Flavour
     port.settle(one)
     assert one.unready is None
     assert [note for note in one.notes if name in note] == [
-        f"`{name}` was not answered within 5 s, so it counts as one that it does not have; if it has it, its way home "
-        "may not be the one that is proved"
+        f"`{name}` was not answered within 5 s, so the vehicle counts as one without it; if it has the "
+        "parameter, its way home may differ from the proved one"
     ]
 
 
@@ -240,7 +240,7 @@ def test_px4s_rally_points_keep_it_from_being_ready(count: int, told: str) -> No
     one, port = preflight(PX4), Port(PX4)
     port.rally = lambda: [mavlink.MAVLink_mission_count_message(1, 191, count, 2)]
     port.settle(one, 10)
-    wrong = f"its way home would not be to the place that is proved (it has {told}): clear them, and upload none"
+    wrong = f"its way home would not be to the proved place (it has {told}): clear them and upload none"
     assert (one.unready, one.unfit) == (wrong, wrong)
     assert "MISSION_ACK" in port.heard, "the vehicle waits for no more questions"
     assert "MISSION_COUNT" not in port.heard, "its fence stays as it is"
@@ -264,15 +264,15 @@ def test_px4_that_tells_of_no_rally_points_is_asked_again_and_that_is_told() -> 
     one, port = preflight(PX4, fence=False), Port(PX4)
     port.rally = list
     port.settle(one, 3)
-    assert one.unready == "its rally points were not counted yet"
+    assert one.unready == "the vehicle's rally points were not counted yet"
     port.settle(one)
     assert one.unready is None
     (told,) = [note for note in one.notes if "rally" in note]
-    assert told.startswith("it did not say within 6 s how many rally points it has")
+    assert told.startswith("the number of rally points was not reported within 6 s")
     busy = preflight(PX4, fence=False)
     port.rally = lambda: [mavlink.MAVLink_mission_ack_message(1, 191, 1, 2)]
     port.settle(busy, 3)
-    assert busy.unready == "its rally points were not counted yet"
+    assert busy.unready == "the vehicle's rally points were not counted yet"
 
 
 @FLAVOURS
@@ -281,7 +281,7 @@ def test_a_policy_that_says_no_return_altitude_asks_for_none(flavour: Flavour) -
     port.settle(one)
     one.due(1, 0)
     assert (one.unready, port.heard) == (None, [])
-    assert one.notes == ["its own fence was left as it is"]
+    assert one.notes == ["the vehicle's own fence was left unchanged"]
 
 
 @FLAVOURS
@@ -290,7 +290,7 @@ def test_a_vehicle_that_takes_no_fence_flies_without_and_says_so(flavour: Flavou
     port.result = mavlink.MAV_MISSION_UNSUPPORTED
     port.settle(one)
     assert one.unready is None
-    assert one.notes == ["it takes no fence: the policy's airspace is watched by this program alone"]
+    assert one.notes == ["the vehicle accepts no fence: only this program watches the policy's airspace"]
 
 
 @FLAVOURS
@@ -298,7 +298,7 @@ def test_a_fence_that_is_refused_or_kept_otherwise_keeps_it_from_being_ready(fla
     one, port = preflight(flavour), Port(flavour)
     port.result = mavlink.MAV_MISSION_NO_SPACE
     port.settle(one)
-    assert one.unready == "its fence could not be set: it refuses it (no space); `--no-fence` flies without"
+    assert one.unready == "the vehicle's fence could not be set: it refuses it (no space) (`--no-fence` flies without)"
 
     def moved(message: Any) -> Any:
         if message.get_type() == "MISSION_ITEM_INT" and message.seq == 2:
@@ -308,7 +308,7 @@ def test_a_fence_that_is_refused_or_kept_otherwise_keeps_it_from_being_ready(fla
     other, port = preflight(flavour), Port(flavour)
     port.bend = moved
     port.settle(other)
-    assert "it holds another item 2 than it was sent" in (other.unready or "")
+    assert "it holds an item 2 that differs from the one it was sent" in (other.unready or "")
 
     def shorter(message: Any) -> Any:
         if message.get_type() == "MISSION_COUNT" and message.mission_type == 1:
@@ -341,7 +341,7 @@ def test_a_fence_without_its_switch_is_none() -> None:
     one = preflight(ARDUPILOT)
     Port(ARDUPILOT, {"RTL_ALT": 3_000.0, "FENCE_TYPE": 7.0}).settle(one)
     assert (
-        one.unready == "its fence could not be switched on: no answer about `FENCE_ENABLE`; `--no-fence` flies without"
+        one.unready == "the vehicle's fence could not be switched on: no answer about `FENCE_ENABLE` (see `--no-fence`)"
     )
 
 
@@ -433,7 +433,7 @@ def test_a_fence_is_written_only_where_place_and_return_altitude_are_right(flavo
     one = Preflight(CITY, flavour, seen, fence=True)
     port.settle(one)
     assert not port.items
-    says = {"far away": "m from the policy's home", "nowhere": "where it stands"}.get(what, "it returns at 60 m")
+    says = {"far away": "m from the policy's home", "nowhere": "report its position"}.get(what, "returns at 60 m")
     assert says in (one.unready or "")
     assert (one.astray is None) == (what == "nowhere")
     seen.latitude, seen.located = PROJECTION.latitude, True

@@ -119,7 +119,7 @@ def test_after_our_last_command_the_failsafe_takes_over(flown: Recorded) -> None
 def test_nothing_answers_so_streams_are_asked_for_and_their_rates_told(watched: Recorded) -> None:
     """The recorded client had asked for 1 Hz of some; a 4 Hz stream was what it got of most."""
     notes = [event.text for _, event in watched.of(Noted)]
-    assert "its own fence was left as it is" in notes
+    assert "the vehicle's own fence was left unchanged" in notes
     assert not any("GLOBAL_POSITION_INT" in note for note in notes)
 
 
@@ -127,8 +127,8 @@ def test_a_critical_state_is_told_though_the_mode_stays(watched: Recorded) -> No
     """The battery's failsafe came at 111.1, on a return that was under way."""
     told = [(at, event.text) for at, event in watched.of(Noted) if "critical" in event.text]
     assert [text for _, text in told][:3] == [
-        "it says that its state is critical", "its state is not critical any more",
-        "it says that its state is critical",
+        "the vehicle reports a critical state", "the vehicle's state is no longer critical",
+        "the vehicle reports a critical state",
     ]  # fmt: skip
     assert abs(told[0][0] - TAKEN) < 0.2
     assert 111 < told[2][0] < 113

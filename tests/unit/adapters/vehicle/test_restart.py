@@ -60,7 +60,7 @@ def test_each_command_that_may_be_in_force_counts() -> None:
 def test_what_had_landed_is_flown_by_others_and_so_is_what_was_taken_over_before() -> None:
     assert flown_by(Left(()), PX4, seen(Px4Mode.HOLD)) == "Hold"
     taken = Left((told(MotionKind.HOLD),), "Position")
-    assert flown_by(taken, PX4, seen(Px4Mode.HOLD)) == "Position, as the run before told"
+    assert flown_by(taken, PX4, seen(Px4Mode.HOLD)) == "Position, as the previous run commanded"
 
 
 def near(place: tuple[int, int, int], north: int = 0, up: int = 0) -> tuple[int, int, int]:

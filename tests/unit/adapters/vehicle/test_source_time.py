@@ -81,7 +81,7 @@ def test_a_stamp_is_moved_to_our_clock(message: Any, made_us: int) -> None:
 
 def test_nothing_is_known_before_the_first_answer() -> None:
     source = SourceTime()
-    assert source.unready == "its clock is not known yet: no TIMESYNC answer"
+    assert source.unready == "the vehicle's clock is not known yet: no TIMESYNC answer"
     for number, message in enumerate([place(4_000), HEARTBEAT, gps(4_000_000), radio()]):
         frame = ReceivedFrame(message, message.get_type(), 1, 68 if number == 3 else 1, number, False, b"")
         assert source.of(frame, 10 * S) is None

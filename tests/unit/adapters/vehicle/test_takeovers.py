@@ -235,7 +235,7 @@ def test_a_leg_that_somebody_slows_down_says_so_once(flavour: str) -> None:
     one.wait(5)
     one.vehicle.simulation.inject(PilotSpeed(0, 1_000))
     told = [event.text for event in one.wait(20) if isinstance(event, Hindered)]
-    assert told == ["it flies at 1.0 m/s where 5.0 m/s were told: somebody else may have set its speed"]
+    assert told == ["it flies at 1.0 m/s instead of 5.0 m/s: somebody else may have changed its speed"]
     assert not any(isinstance(event, (TakenOver, CommandFailed)) for event in one.events)
 
 

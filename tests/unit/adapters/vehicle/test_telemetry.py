@@ -137,7 +137,7 @@ def test_of_several_flight_batteries_the_one_with_the_least_charge_counts() -> N
         assert charge(telemetry, 1, -1, function) == ((BATTERY, None),)
         assert charge(telemetry, 0, 79, function) == ((BATTERY, None),)
         assert telemetry.batteries.notes == [
-            "it has 2 batteries: 0 with 80 %, 1 with 20 %, and the one with the least charge counts"
+            "the vehicle has 2 batteries: 0 with 80 %, 1 with 20 %, and the one with the least charge counts"
         ]
 
 

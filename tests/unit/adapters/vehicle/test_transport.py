@@ -79,7 +79,7 @@ def test_a_cable_that_is_pulled_is_told_and_found_again_when_it_is_put_back(term
     live(vehicle, 3)
     terminal.pull()
     said = live(vehicle, 3)
-    assert any("is gone" in text for text in notes(said))
+    assert any("was lost" in text for text in notes(said))
     assert [event for event in said if isinstance(event, LinkLost)]
     assert vehicle.transport.trouble == os.strerror(errno.ENOENT).lower()
     terminal.plug_in()
@@ -114,7 +114,7 @@ def test_garbage_is_told_from_silence(terminal: Terminal) -> None:
     terminal.write(Random(2).randbytes(600))
     live(vehicle, 1)
     assert vehicle.connected.silence is not None
-    assert "600 octets came, and no MAVLink frame" in vehicle.connected.silence
+    assert "600 octets arrived, but no MAVLink frame" in vehicle.connected.silence
     assert "baud rate is probably wrong" in vehicle.connected.silence
     vehicle.close()
 
@@ -128,7 +128,7 @@ def test_a_vehicle_that_speaks_the_old_protocol_is_told(terminal: Terminal) -> N
         terminal.write(beat)
         live(vehicle, 0.2)
     assert vehicle.connected.silence is not None
-    assert vehicle.connected.silence.startswith("3 frames of MAVLink 1 came")
+    assert vehicle.connected.silence.startswith("3 frames of MAVLink 1 arrived")
     assert "MAV_PROTO_VER" in vehicle.connected.silence
     vehicle.close()
 
@@ -168,7 +168,7 @@ def test_it_connects_and_connects_again() -> None:
     server.close()
     vehicle.end = None
     said = live(vehicle, 3)
-    assert any("is gone" in text for text in notes(said))
+    assert any("was lost" in text for text in notes(said))
     assert vehicle.transport.trouble == "connection refused"
     server = socket.socket()
     server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

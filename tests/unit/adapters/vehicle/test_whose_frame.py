@@ -117,7 +117,7 @@ def test_a_heartbeat_of_no_autopilot_under_its_ids_is_no_mode_and_is_noted_once(
     assert one.vehicle.driver.seen.mode == before
     assert one.vehicle.driver.seen.armed
     assert isinstance(one.until((Succeeded, CommandFailed, TakenOver), 60), Succeeded)
-    assert len([text for text in noted(one) if text.startswith("two speak as 1/1")]) == 1
+    assert len([text for text in noted(one) if text.startswith("two senders use the ids 1/1")]) == 1
 
 
 def test_a_heartbeat_of_another_under_its_ids_is_no_sign_of_life(aloft: Make) -> None:
@@ -150,7 +150,7 @@ def test_another_vehicle_under_its_ids_keeps_it_from_being_ready(flavour: str, k
     says(one, beat(*kind))
     one.wait(60)
     assert not any(isinstance(each, Ready) for each in one.events)
-    assert (one.vehicle.driver.unready or "").startswith("two speak as 1/1")
+    assert (one.vehicle.driver.unready or "").startswith("two senders use the ids 1/1")
 
 
 # ---------------------------------------------------------------- whom an answer is for
@@ -274,7 +274,7 @@ def test_who_contradicts_the_vehicle_in_the_air_is_noted_and_ends_nothing(
     end = one.until((Succeeded, CommandFailed, TakenOver, Crashed), 60)
     assert isinstance(end, Succeeded), end
     if says_ is Voice.STRAYED:
-        assert any(text.startswith("two speak as 1/1") for text in noted(one))
+        assert any(text.startswith("two senders use the ids 1/1") for text in noted(one))
 
 
 @pytest.mark.parametrize("says_", [Voice.STRAYED])
@@ -282,7 +282,7 @@ def test_what_contradicts_the_vehicle_on_the_ground_keeps_it_from_being_ready(fl
     one = Flyer(flavour, faults=(SecondVoice(0, says_, 250_000, 30 * S),))
     one.wait(20)
     assert not any(isinstance(each, Ready) for each in one.events)
-    assert (one.vehicle.driver.unready or "").startswith("two speak as 1/1")
+    assert (one.vehicle.driver.unready or "").startswith("two senders use the ids 1/1")
     one.until(Ready, 60)
 
 
@@ -305,7 +305,7 @@ def test_a_parameter_that_no_waiting_changes_is_told_once_and_soon(flavour: str)
     one.vehicle = VirtualVehicle(policy, SimulationConfig(flavour=AutopilotKind(flavour), return_mm=22_000))
     told = one.until(VehicleUnfit, 30)
     one.wait(30)
-    assert "it returns at 22 m" in told.why
+    assert "returns at 22 m" in told.why
     assert sum(isinstance(each, VehicleUnfit) for each in one.events) == 1
 
 

@@ -188,7 +188,7 @@ def test_a_select_of_ones_own(capsys: pytest.CaptureFixture[str]) -> None:
     (row,) = as_json(capsys)
     assert 100 < row["n"] < 600
     assert archive("query", "--sql", "DROP TABLE logs") == ExitCode.INPUT
-    assert "is one SELECT" in capsys.readouterr().err
+    assert "a single SELECT" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("archived")
@@ -238,7 +238,7 @@ def test_a_cluster_that_is_none_is_told(runs: Path) -> None:
     run = subprocess.run(
         [sys.executable, "-m", "rtshcua", *words], capture_output=True, text=True, check=False, timeout=120
     )
-    assert (run.returncode, run.stderr) == (ExitCode.LINK, "error: no cluster answers: `nonsense`\n")
+    assert (run.returncode, run.stderr) == (ExitCode.LINK, "error: no cluster answered: `nonsense`\n")
 
 
 def test_what_is_no_log_is_not_taken_in(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -325,7 +325,7 @@ def test_what_is_no_log_keeps_no_log_of_its_folder_out(
     assert archive("add", "flown", *ROOT) == ExitCode.INPUT
     out = capsys.readouterr().out
     assert out.count("it is not a log of this program") == 2
-    assert "flown/log.jsonl: no regular file" in out
+    assert "flown/log.jsonl: not a regular file" in out
     assert out.splitlines()[-1] == "1 log, 1 of them verified now, under the key that you gave: 1 verified"
     assert archive("add", "flown", *ROOT, "--json") == ExitCode.INPUT
     assert [Path(each["path"]).parent.name for each in as_json(capsys)["skipped"]] == ["a", "b", "flown"]

@@ -133,7 +133,7 @@ def test_what_cannot_be_known_or_kept_holds_back_nothing_that_is_in_the_air(tmp_
     store.path.unlink()
     sound = session_of(store, case.BOUNDARY_KEY, aloft=True)
     store.path.mkdir()
-    with pytest.raises(OSError, match="no regular file"):
+    with pytest.raises(OSError, match="not a regular file"):
         session_of(store, case.BOUNDARY_KEY, aloft=False)
     sound.begun(b"a" * 32, None)
     sound.ended(b"b" * 32)

@@ -329,7 +329,7 @@ def test_a_cluster_that_does_not_answer_is_named(
     flies(good)
     code = app.main(["campaign", SHORT, *AT, "--cluster", "tcp://127.0.0.1:9", "--flights", "1"])
     assert code == ExitCode.LINK
-    assert "no cluster answers: `tcp://127.0.0.1:9`" in capsys.readouterr().err
+    assert "no cluster answered: `tcp://127.0.0.1:9`" in capsys.readouterr().err
 
 
 def test_what_is_no_scheduler_and_what_is_no_source_is_refused_before_anything_flies(

@@ -52,7 +52,7 @@ def test_garbage_is_told_from_no_heartbeat(line: tuple[str, int], capsys: pytest
     over.set()
     thread.join()
     assert code == ExitCode.LINK
-    assert "octets came, and no MAVLink frame is among them: the baud rate is probably wrong" in said
+    assert "octets arrived, but no MAVLink frame: the baud rate is probably wrong" in said
 
 
 def test_a_busy_port(line: tuple[str, int], capsys: pytest.CaptureFixture[str]) -> None:
@@ -81,7 +81,7 @@ def test_a_line_that_is_no_address(capsys: pytest.CaptureFixture[str]) -> None:
     code, said = says("serial:ttyUSB0:57600", capsys)
     assert code == ExitCode.USAGE
     assert said.splitlines() == [
-        "error[usage]: `ttyUSB0` is no path of a device",
+        "error[usage]: `ttyUSB0` is not the path of a device",
         "   --> --connect",
         "    | serial:ttyUSB0:57600",
         "    |        ^^^^^^^",

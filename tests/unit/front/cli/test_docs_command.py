@@ -166,7 +166,7 @@ def test_where_nothing_earlier_is_found_it_says_so(capsys: pytest.CaptureFixture
         (["spec.json"], ExitCode.USAGE, "specification"),
         (["none.rts", "--at", "yesterday"], ExitCode.USAGE, "yesterday"),
         (["none.rts", "-o", "none.rts"], ExitCode.USAGE, "one of the sources"),
-        (["none.rts", "-o", "folder"], ExitCode.USAGE, "no regular file"),
+        (["none.rts", "-o", "folder"], ExitCode.USAGE, "not a regular file"),
         (["none.rts", "-o", "nowhere/page.html"], ExitCode.INPUT, "nowhere"),
         (["none.rts", "--since", "missing.rts"], ExitCode.INPUT, "missing.rts"),
     ],

@@ -40,7 +40,7 @@ class World:
         self.s = 0.0
         self.said: list[str] = []
         self._ready_s, self._speed, self._wish_s, self._missing = ready_s, speed, wish_s, missing
-        self.driver = SimpleNamespace(unready="its own checks before arming fail", flavour=PX4, settings=Told())
+        self.driver = SimpleNamespace(unready="the vehicle's checks before arming fail", flavour=PX4, settings=Told())
 
     def monotonic(self) -> float:
         return self.s
@@ -87,7 +87,7 @@ def test_it_says_what_it_waits_for(monkeypatch: pytest.MonkeyPatch, capsys: pyte
     world = World(12)
     code, said = rehearsed(world, monkeypatch, capsys, notes=["the radio"])
     assert (code, said["ready"], said["notes"]) == (ExitCode.OK, True, ["the radio"])
-    waits = "waiting for the vehicle: its own checks before arming fail; until 60 s"
+    waits = "waiting for the vehicle: the vehicle's checks before arming fail; until 60 s"
     assert world.said == ["note: the radio", waits]
 
 
@@ -110,7 +110,7 @@ def test_what_it_does_not_tell_is_not_set_and_would_not_begin(
     world = World(1)
     code, said = rehearsed(world, monkeypatch, capsys, sets=["RTL_RETURN_ALT", "FENCE_RADIUS"])
     assert code is ExitCode.REFUSED
-    untold = "it does not tell `FENCE_RADIUS`, which is to be set"
+    untold = "the vehicle does not report `FENCE_RADIUS`, which is to be set"
     assert said["refusal"] == f"{untold}; `FENCE_RADIUS` is a parameter of ArduPilot, and this is PX4"
     assert dry_run.SETTINGS_S <= world.s <= dry_run.SETTINGS_S + 1
 

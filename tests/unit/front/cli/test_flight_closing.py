@@ -78,7 +78,7 @@ def test_a_frame_log_with_a_gap_is_not_vouched_for(ended: Ended, monkeypatch: py
     monkeypatch.setattr(telemetry, "free_bytes", lambda folder: 0)
     ended.frames.write(NOW.utc_us, FRAME)
     (missing,) = ended.close()
-    assert missing.endswith("missing: the last room on the disk is left to the log (telemetry.tlog)")
+    assert missing.endswith("missing: the last free space on the disk is reserved for the log (telemetry.tlog)")
     assert ended.notes == [f"the frame log is not whole: {missing.removesuffix(' (telemetry.tlog)')}"]
     _, effect, close = ended.records()
     assert (effect["event"], effect["detail"]) == ("frames-lost", missing.removesuffix(" (telemetry.tlog)"))

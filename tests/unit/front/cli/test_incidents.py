@@ -51,7 +51,7 @@ class Vehicle:
 
     def inject(self, fault: str) -> None:
         if self.gone:
-            raise SimulatorError("the simulated vehicle is gone: broken pipe")
+            raise SimulatorError("the simulated vehicle ended: broken pipe")
         self.told.append(fault)
 
 
@@ -129,7 +129,7 @@ def test_a_vehicle_that_is_gone_does_not_end_the_run(source: Path) -> None:
     made, vehicle = incidents(source, "gusts and a lost fix"), Vehicle(gone=True)
     made.begin(prepared(source), chosen(f"{source}:killed", ISSUED_US).mission, vehicle)  # type: ignore[arg-type]
     made.around(lambda *_: None, 0)(Now(1 * S, ISSUED_US, 0), [], [])
-    assert made.happened == ["1.00 s: at 1 s link_silence(for = 2 s): the simulated vehicle is gone: broken pipe"]
+    assert made.happened == ["1.00 s: at 1 s link_silence(for = 2 s): the simulated vehicle ended: broken pipe"]
 
 
 def test_another_mission_than_the_scenarios_is_refused(source: Path) -> None:

@@ -113,7 +113,7 @@ def test_show_gives_the_pin(capsys: pytest.CaptureFixture[str]) -> None:
 def test_without_keys(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert app.main(["keys", *words]) == ExitCode.INPUT
     err = capsys.readouterr().err
-    assert "there are no keys" in err
+    assert "holds no keys" in err
     assert " help: `rtshcua keys init` makes a development root" in err
 
 
@@ -159,7 +159,7 @@ def test_a_passphrase_file_that_others_may_read_is_refused(
     capsys.readouterr()
     assert app.main([*words, str(file)]) == ExitCode.UNTRUSTED
     said = capsys.readouterr().err
-    assert (f"its mode is {what}" if what[0] == "0" else "it belongs to the user") in said
+    assert (f"its mode is {what}" if what[0] == "0" else "it belongs to user") in said
     assert "passphrase" in said
     assert not (tmp_path / "link.key").exists()
 
@@ -404,7 +404,7 @@ def test_an_expired_root_is_renewed_by_another_root_key(
         (["revoke", "0123456789"], "is no key that the trust root names"),
         (["replace", "nobody"], "is no key that the trust root names"),
         (["revoke", "--link", "0123"], "no such file"),
-        (["revoke", "--link", "no.key"], "is no link key"),
+        (["revoke", "--link", "no.key"], "is not a link key"),
     ],
 )
 def test_keys_that_are_none_are_not_revoked(
@@ -433,7 +433,7 @@ def test_a_vehicle_says_what_it_accepted(tmp_path: Path, capsys: pytest.CaptureF
     (tmp_path / "trust").mkdir()
     (tmp_path / "trust" / "vehicle-quad-07").mkdir()
     assert app.main(accept) == ExitCode.INPUT
-    assert "no regular file" in capsys.readouterr().err
+    assert "not a regular file" in capsys.readouterr().err
     damaged = tmp_path / "damaged.trust"
     damaged.write_bytes(b"nothing")
     accept[2] = str(damaged)

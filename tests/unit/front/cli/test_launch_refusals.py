@@ -221,7 +221,7 @@ def test_a_flight_whose_log_is_gone_is_not_said_to_have_broken_off(tmp_path: Pat
     assert "before broke off" in hanging(before, loaded())
     shutil.rmtree(log.parent)
     told = hanging(LogBefore.settle(tmp_path, VEHICLE, None), loaded())
-    assert "is no longer there: whether its flight ended is not known" in told
+    assert "is missing, so it is not known whether its flight ended" in told
     assert "broke off" not in told
 
 

@@ -33,7 +33,7 @@ def test_a_log_under_way_is_held_and_then_ended_by_the_next(tmp_path: Path, log:
     assert "is still being written" in second.note
     first._held.close()  # as the system does when the process dies
     third = past(tmp_path)
-    assert "12 records of it are kept" in third.note
+    assert "it was recovered with 12 records" in third.note
     assert json.loads(log.read_bytes().splitlines()[-1])["ending"] == "recovered"
     assert past(tmp_path).hash == third.hash
 

@@ -23,6 +23,6 @@ def test_a_pipe_or_a_folder(
     Path("proof").write_bytes(b"none")
     for name in ("pipe", "folder", os.devnull):
         assert verify(name) == ExitCode.INPUT
-        assert f"no regular file: `{name}`" in capsys.readouterr().err
+        assert f"not a regular file: `{name}`" in capsys.readouterr().err
         assert verify("proof", "--checkpoint", name) == ExitCode.INPUT
-        assert f"no regular file: `{name}`" in capsys.readouterr().err
+        assert f"not a regular file: `{name}`" in capsys.readouterr().err

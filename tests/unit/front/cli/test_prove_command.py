@@ -152,7 +152,7 @@ def test_several_proofs(capsys: pytest.CaptureFixture[str]) -> None:
         ([99], ExitCode.INPUT, "the log has no record 99"),
         ([3, "--at", 4], ExitCode.INPUT, "record 4 is no signed record"),
         ([7, "--at", 6], ExitCode.INPUT, "was signed before record 7"),
-        ([3, "--cose"], ExitCode.UNTRUSTED, "there are no keys"),
+        ([3, "--cose"], ExitCode.UNTRUSTED, "holds no keys"),
     ],
 )
 def test_what_cannot_be_proven(

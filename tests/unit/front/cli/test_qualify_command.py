@@ -46,7 +46,7 @@ LINK = ["--connect", "udpin:127.0.0.1:14550", "--vehicle", "quad-07"]
         ([SHORT, *LINK[:2], "--vehicle", "quad-08", "--sitl"], 5, "the policy is for `quad-07`"),
         ([SHORT, *LINK[:2], "--vehicle", "quad-08", "--sitl"], 5, "`identity` of the policy's `vehicle` says"),
         (["missing.rts", *LINK, "--sitl"], 3, "missing.rts"),
-        ([SHORT, *LINK, "--sitl"], 4, "there are no keys"),
+        ([SHORT, *LINK, "--sitl"], 4, "holds no keys"),
     ],
 )  # fmt: skip
 def test_what_does_not_fly(

@@ -132,7 +132,7 @@ def test_json(capsys: pytest.CaptureFixture[str]) -> None:
     ("words", "message"),
     [
         ({"port": 1, "connect": "udpout:127.0.0.1:1"}, "say the same thing"),
-        ({"connect": "udpin:127.0.0.1:1"}, "is no way to connect here"),
+        ({"connect": "udpin:127.0.0.1:1"}, "cannot be used here"),
         ({"connect": "udpout:192.0.2.1:1"}, "is not for the simulated vehicle"),
         ({"connect": "nonsense"}, "nonsense"),
     ],

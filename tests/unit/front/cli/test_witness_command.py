@@ -279,9 +279,9 @@ def test_what_cannot_be_read_keeps_no_other_log_waiting(
     assert app.main(["witness", str(tmp_path), "--watch", "0.5", "--json"]) == ExitCode.OK
     told = [(Path(str(each["log"])).name, each["event"], each.get("text")) for each in said(capsys)]
     assert [each[:2] for each in told] == [("b.jsonl", "unread"), ("c.jsonl", "unread"), ("log.jsonl", "cosigned")]
-    assert told[1][2] == "no regular file"
+    assert told[1][2] == "not a regular file"
     assert app.main(["witness", str(tmp_path)]) == ExitCode.INPUT
-    assert f"{tmp_path / 'c.jsonl'}: not looked at: no regular file" in capsys.readouterr().out
+    assert f"{tmp_path / 'c.jsonl'}: not looked at: not a regular file" in capsys.readouterr().out
     assert app.main(["witness", str(tmp_path / "c.jsonl")]) == ExitCode.INPUT
 
 

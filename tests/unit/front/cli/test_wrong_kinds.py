@@ -24,7 +24,7 @@ def test_a_source_that_is_no_file_is_told_as_that(
     os.mkfifo("pipe.rts")
     assert main([command, name]) == ExitCode.INPUT
     said = "".join(capsys.readouterr())
-    assert f"cannot read `{name}`: {'there is no such file' if name == '-' else 'no regular file'}" in said
+    assert f"cannot read `{name}`: {'there is no such file' if name == '-' else 'not a regular file'}" in said
     assert "a source must be a file, because imports are found beside it: write it to one that ends in `.rts`" in said
 
 
@@ -64,9 +64,9 @@ def test_what_is_no_key_is_told_as_that_and_a_key_by_its_mode(tmp_path: Path) ->
         each.chmod(0o644)
         with pytest.raises(KeyFileError, match="not a key file"):
             read_key(each, Duty.LOG, passphrase=None)
-        with pytest.raises(LinkKeyError, match="is no link key"):
+        with pytest.raises(LinkKeyError, match="is not a link key"):
             read_link_key(each)
-    with pytest.raises(LinkKeyError, match="is no link key"):
+    with pytest.raises(LinkKeyError, match="is not a link key"):
         open_link_key(long)
     write_link_key(link, bytes(range(32)))
     own.write_bytes(dump_signing_key(SigningKey.from_seed(bytes(32), duty=Duty.LOG, development=True), passphrase=None))
@@ -75,8 +75,8 @@ def test_what_is_no_key_is_told_as_that_and_a_key_by_its_mode(tmp_path: Path) ->
     assert read_key(own, Duty.LOG, passphrase=None).duty is Duty.LOG
     for each in (link, own):
         each.chmod(0o644)
-    with pytest.raises(KeyStoreError, match="others may read"):
+    with pytest.raises(KeyStoreError, match="other users may read"):
         read_key(own, Duty.LOG, passphrase=None)
     for reads in (read_link_key, open_link_key):
-        with pytest.raises(LinkKeyError, match="others may read"):
+        with pytest.raises(LinkKeyError, match="other users may read"):
             reads(link)

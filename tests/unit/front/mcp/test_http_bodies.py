@@ -86,7 +86,7 @@ def test_a_body_that_is_too_large_is_refused_by_what_it_says_or_is() -> None:
     async def play(host: Host) -> None:
         assert await host.ask(b"", content_length=str(MOST_OCTETS + 1)) == (413, b"")
         assert await host.ask(*[b" " * LARGE] * (MOST_OCTETS // LARGE), b" ", ends=False) == (413, b"")
-        assert await host.ask(b"{", ends=False) == (0, b""), "it hung up"
+        assert await host.ask(b"{", ends=False) == (0, b""), "the client closed the connection"
         assert not host.served
 
     played(play)

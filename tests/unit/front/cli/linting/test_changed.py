@@ -54,7 +54,7 @@ def test_since_a_branch_was_left(repository: Path, lint: Lint) -> None:
     assert lint(".", "--changed") == (ExitCode.OK, [])
     assert lint(".", "--base", "main") == (ExitCode.DIAGNOSTICS, HABITS[1:])
     code, found = lint(".", "--base", "nowhere")
-    assert (code, found) == (ExitCode.INPUT, [("changed", "git knows no `nowhere`")])
+    assert (code, found) == (ExitCode.INPUT, [("changed", "git does not know `nowhere`")])
     assert lint(".", "--base", "--output=x")[0] != ExitCode.OK
     assert not Path("x").exists()
 
@@ -68,10 +68,10 @@ def test_without_a_repository_or_git(here: Path, lint: Lint, monkeypatch: pytest
     monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(here.parent))
     code, found = lint(".", "--changed")
     assert (code, found[0][0]) == (ExitCode.INPUT, "changed")
-    assert "no git repository" in found[0][1]
+    assert "not in a git repository" in found[0][1]
     monkeypatch.setenv("PATH", str(here))
     code, found = lint(".", "--changed")
-    assert (code, found) == (ExitCode.INPUT, [("changed", "there is no `git` here to ask what has changed")])
+    assert (code, found) == (ExitCode.INPUT, [("changed", "`git`, which knows the changes, is not installed")])
 
 
 def test_through_links_and_from_elsewhere(
@@ -115,7 +115,7 @@ def test_outside_of_any_repository(
     monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(outside.parent))
     code, found = lint("one.rts", str(outside / "policy.rts"), "--changed")
     assert (code, found[0][0]) == (ExitCode.INPUT, "changed")
-    assert "no git repository" in found[0][1]
+    assert "not in a git repository" in found[0][1]
     Path("one.rts").unlink()
     Path("one.rts").symlink_to(outside / "policy.rts")  # what nobody can tell of is linted
     git("add", ".")

@@ -158,4 +158,4 @@ def test_what_somebody_else_changed_meanwhile_is_left(
     monkeypatch.setattr("rtshcua.adapters.store.writing.rewrite", meanwhile)
     assert main(["lint", ".", "--fix"]) == ExitCode.FULL
     assert Path("policy.rts").read_text() == "// mine\n"
-    assert "cannot write `policy.rts`: it was changed meanwhile" in capsys.readouterr().err
+    assert "cannot write `policy.rts`: it was changed in the meantime" in capsys.readouterr().err

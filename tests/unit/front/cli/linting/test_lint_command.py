@@ -45,7 +45,7 @@ def test_the_level_that_fails(here: Path, lint: Lint, level: str, code: int) -> 
     [
         (["--format", "sariff"], ExitCode.USAGE, "did you mean `sarif`?"),
         (["--fail-on", "x"], ExitCode.USAGE, "accepted: `error`, `warning`"),
-        (["--config", "nowhere.toml"], ExitCode.INPUT, "nowhere.toml: it cannot be read"),
+        (["--config", "nowhere.toml"], ExitCode.INPUT, "nowhere.toml: cannot be read"),
         (["--config", "policy.rts"], ExitCode.INPUT, "policy.rts:1: not valid toml"),
         (["--isolated", "--config", "x.toml"], ExitCode.USAGE, "exclude each other"),
         (["nowhere.rts"], ExitCode.INPUT, "cannot read `nowhere.rts`"),

@@ -1,1 +1,1 @@
-"""How every layer speaks to a person: spans, stable codes, diagnostics, exit codes. Below everything else."""
+"""Diagnostics: spans, stable codes, findings, refusals, exit codes. The lowest layer."""

@@ -1,12 +1,12 @@
-"""The one registry of diagnostic codes. A code is never reused and never changes its meaning."""
+"""The registry of diagnostic codes. A code is never reused and never changes its meaning."""
 
 from dataclasses import dataclass
 from enum import Enum
 
 
 class Severity(Enum):
-    """`ERROR` forbids compiling; `WARNING` is a best-effort finding; `NOTE` says that a check could not decide, and
-    stays a note when warnings are denied.
+    """How serious a finding is. `ERROR` stops compilation. `WARNING` is best effort. `NOTE` reports an inconclusive
+    check, and stays a note when warnings are treated as errors.
     """
 
     ERROR = "error"
@@ -28,12 +28,12 @@ REGISTRY: dict[str, Code] = {}
 
 
 def code_named(name: str) -> Code | None:
-    """The code with this id or slug."""
+    """Return the code with this id or slug, or None."""
     return REGISTRY.get(name) or next((code for code in REGISTRY.values() if code.slug == name), None)
 
 
 def can_be_ignored(code: Code) -> bool:
-    """Whether `lint` may be told to ignore findings of a code: never errors, nor what is said of ignores themselves."""
+    """Whether an `ignore` may suppress a code: errors and findings about `ignore` itself cannot be ignored."""
     return code.severity is not Severity.ERROR and code not in (UNUSED_IGNORE, IGNORE_WITHOUT_REASON, UNKNOWN_IGNORE)
 
 
@@ -204,7 +204,7 @@ OVER_CHARGE = _code("E0812", "over-charge", "a mission may need more energy than
 RETURN_ENERGY = _code("E0815", "return-energy", "a return may exceed its skill's declared energy", Severity.WARNING)
 STEP_ENERGY = _code("E0814", "step-energy", "a step may exceed its skill's declared energy")
 
-# E09: mission specifications (structured input of an agent)
+# E09: mission specifications (structured input from an agent)
 NOT_JSON = _code("E0901", "not-json", "the specification is not JSON")
 SPECIFICATION_SHAPE = _code("E0902", "specification-shape", "the specification does not follow its schema")
 DUPLICATE_KEY = _code("E0903", "duplicate-key", "an object repeats a key")
@@ -214,18 +214,18 @@ CLAIMED_AUTHORITY = _code(
 )
 POLICY_NOT_NAMED = _code("E0906", "policy-not-named", "only the specification itself names its policy")
 
-# E10: limits of what fits on board
+# E10: onboard limits
 TOO_MANY = _code("E1001", "too-many", "a count exceeds what fits on board")
 CONDITION_SIZE = _code("E1002", "condition-size", "a condition exceeds the instruction or stack limit on board")
 NUMBER_SIZE = _code("E1003", "number-size", "a number exceeds the range of the onboard arithmetic")
 REFUSED_ON_BOARD = _code("E1004", "refused-on-board", "the compiled result would be refused on board")
 
-# E11: what conditions mean together
+# E11: combined conditions
 CONTRADICTION = _code("E1101", "contradiction", "conditions contradict each other")
 ALWAYS_HOLDS = _code("E1102", "always-holds", "a condition is always true", Severity.WARNING)
 UNDECIDED = _code("E1103", "undecided", "a check was inconclusive", Severity.NOTE)
 
-# E12: what can be observed and recorded
+# E12: observability and evidence
 UNOBSERVABLE = _code("E1201", "unobservable", "a signal does not arrive often enough to be monitored")
 INSUFFICIENT_EVIDENCE = _code(
     "E1202", "insufficient-evidence", "the evidence does not suffice to derive a decision again"
@@ -234,7 +234,7 @@ UNWATCHED = _code("E1203", "unwatched", "a maintained condition reads nothing th
 FLEETING_EVIDENCE = _code("E1204", "fleeting-evidence", "`buffered` evidence is only allowed for reflex skills")
 TWO_DURABILITIES = _code("E1205", "two-durabilities", "a contract requires evidence of more than one durability")
 
-# E13: habits, which `lint` looks for
+# E13: lint
 UNUSED = _code("E1301", "unused", "unused declaration", Severity.WARNING)
 NAMING = _code("E1302", "naming", "a name violates the naming convention", Severity.WARNING)
 BROAD_AUTHORITY = _code("E1303", "broad-authority", "a rule permits unusually much", Severity.WARNING)
@@ -263,7 +263,7 @@ NEVER_TAKES_OFF = _code(
     Severity.WARNING,
 )
 
-# E14: tests and where they start from
+# E14: tests and nominals
 NO_NOMINAL = _code("E1401", "no-nominal", "a test has no nominal, or does not say which")
 INCOMPLETE_TEST = _code("E1402", "incomplete-test", "a test or its nominal is incomplete")
 UNKNOWN_REASON = _code("E1403", "unknown-reason", "unknown reason")
@@ -278,7 +278,7 @@ WITHOUT_EFFECT = _code(
 UNKNOWN_CLAUSE = _code("E1410", "unknown-clause", "a test quotes an unknown clause")
 NOT_MET = _code("E1411", "not-met", "the decision differs from the expected one")
 
-# E15: how sources are laid out
+# E15: formatting
 NOT_FORMATTED = _code("E1501", "not-formatted", "a source is not formatted", Severity.WARNING)
 UNSAFE_FORMAT = _code("E1502", "unsafe-format", "formatting would change the meaning of a source")
 

@@ -1,4 +1,4 @@
-"""One finding for the person who reads it: a stable code, the exact span, what was found, what would be accepted."""
+"""A diagnostic: a stable code, a message, the exact span, and the nearest fix."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -17,7 +17,7 @@ class Applicability(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Label:
-    """A further place that explains the finding, with a few words under it."""
+    """A further place that explains the finding, with a short text."""
 
     span: Span
     text: str
@@ -25,7 +25,7 @@ class Label:
 
 @dataclass(frozen=True, slots=True)
 class Fix:
-    """Replace the text under `span` by `replacement`: the nearest change that would be accepted."""
+    """A change that makes the source valid: replace the text under `span` by `replacement`."""
 
     span: Span
     replacement: str
@@ -57,19 +57,19 @@ class Diagnostic:
 
 
 def has_errors(diagnostics: Iterable[Diagnostic]) -> bool:
-    """Whether any of the findings forbids going on."""
+    """Whether any of the findings is an error."""
     return any(d.severity is Severity.ERROR for d in diagnostics)
 
 
-#: how many of the other places are shown
+#: how many further places of a folded finding are shown
 MOST_PLACES = 3
 _FOLDED = (UNKNOWN_NAME, UNKNOWN_ROLE)
 
 
 def folded(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
-    """The findings, with those that tell of one missing name in one, where the first of them stands, with a count.
+    """Merge the findings about the same missing name into the first of them, with a count.
 
-    Findings on a specification stay apart, for each has its own pointer.
+    Findings on a specification are not merged: each has its own pointer.
     """
     kept: list[Diagnostic] = []
     at: dict[tuple[str, str], int] = {}
@@ -84,7 +84,7 @@ def folded(found: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
             at[key] = len(kept)
             kept.append(each)
     for place, more in others.items():
-        labels = tuple(Label(each.span, "here too") for each in more[:MOST_PLACES] if each.span is not None)
-        message = f"{kept[place].message}; it is named in {len(more) + 1} places"
+        labels = tuple(Label(each.span, "also here") for each in more[:MOST_PLACES] if each.span is not None)
+        message = f"{kept[place].message} ({len(more) + 1} places)"
         kept[place] = replace(kept[place], message=message, labels=(*kept[place].labels, *labels))
     return tuple(kept)

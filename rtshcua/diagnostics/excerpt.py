@@ -1,4 +1,4 @@
-"""One line of a source as a terminal shows it, with parts of it underlined."""
+"""Show a source line on a terminal, with spans underlined, and make untrusted text safe to print."""
 
 from collections.abc import Sequence
 from re import compile as pattern
@@ -7,30 +7,30 @@ from unicodedata import category, east_asian_width
 from rtshcua.diagnostics.span import Source, Span
 
 TAB_WIDTH = 4
-#: a longer line is cut around what is underlined
+#: a longer line is cut around the underlined span
 MAX_WIDTH = 110
-#: how much is shown before the underlined part of a line that is cut
+#: how many columns of a cut line are shown before the underlined span
 BEFORE = 30
-#: of a long line no more characters than these on either side of what is underlined are looked at
+#: how many characters of a long line are examined on either side of the underlined span
 NEAR = 300
 CUT = "..."
 
-#: letters and marks that Unicode counts as printable and shows as nothing (Default_Ignorable_Code_Point, and the blanks
-#: of Hangul and Braille): words can be kept apart by them, or be written in them
+#: invisible characters that Unicode counts as printable (Default_Ignorable_Code_Point, and the blanks of Hangul and
+#: Braille): two names could differ in them alone
 _BLANK = "\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180d\u180f\u2800\u3164\ufe00-\ufe0f\uffa0\U000e0100-\U000e01ef"
 _BLANKS = pattern(f"[{_BLANK}]")
-#: controls other than white space, a carriage return that ends no line, what reorders text, and what is not seen
+#: control characters other than white space, a lone carriage return, and reordering or invisible characters
 _HIDING = pattern(
     "[\x00-\x08\x0b\x0e-\x1f\x7f-\x9f\u00ad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb"
     f"\U0001bca0-\U0001bca3\U0001d173-\U0001d17a\U000e0000-\U000e0fff{_BLANK}]|\r(?!\n)"
 )
 
-#: a span to underline, with which character, and the words after it
+#: a span to underline, the underline character, and the text after it
 Mark = tuple[Span, str, str]
 
 
 def together(source: Source, number: int, marks: Sequence[Mark], width: int = MAX_WIDTH) -> list[list[Mark]]:
-    """The marks of a line in groups, such that of each mark of a group at least the beginning is in view at once."""
+    """Group the marks of a line so that the beginnings of all marks of a group fit in one excerpt."""
     text = source.line(number)
     groups: list[tuple[tuple[int, int], list[Mark]]] = []
     for mark in marks:
@@ -48,10 +48,10 @@ def together(source: Source, number: int, marks: Sequence[Mark], width: int = MA
 
 
 def excerpt(source: Source, number: int, marks: Sequence[Mark], width: int = MAX_WIDTH) -> tuple[str, list[str]]:
-    """The text of a line, in at most `width` columns, and an underline for each mark: a span that begins on the line, a
-    character, and words, which stand beneath where there is no room beside.
+    """Return the text of a line in at most `width` columns, and the underlines of its marks.
 
-    A span that goes on over further lines is underlined up to the end of this one; an empty one has one character.
+    The text of a mark follows its underline, or goes below it if there is no room. A span over several lines is
+    underlined to the end of this line; an empty span has an underline of one character.
     """
     text = source.line(number)
     column = source.position(marks[0][0].start).column - 1
@@ -82,7 +82,7 @@ def excerpt(source: Source, number: int, marks: Sequence[Mark], width: int = MAX
 
 
 def _starts(cells: Sequence[tuple[str, int]]) -> list[int]:
-    """The column at which each character begins, and the one after the last."""
+    """The column of each character, and the column after the last one."""
     starts = [0]
     for _, width in cells:
         starts.append(starts[-1] + (width if width >= 0 else TAB_WIDTH - starts[-1] % TAB_WIDTH))
@@ -90,7 +90,7 @@ def _starts(cells: Sequence[tuple[str, int]]) -> list[int]:
 
 
 def _window(starts: Sequence[int], column: tuple[int, int], width: int) -> tuple[int, int]:
-    """The characters of a line to show: all, or those around a column that fit, with room for what marks a cut."""
+    """The range of characters to show: all, or those around a column that fit beside the marks of a cut."""
     count = len(starts) - 1
     if starts[-1] <= width:
         return 0, count
@@ -105,7 +105,7 @@ def _window(starts: Sequence[int], column: tuple[int, int], width: int) -> tuple
 
 
 def _cell(character: str) -> tuple[str, int]:
-    """How a character is shown, and how many columns it takes; -1 for a tab."""
+    """The text shown for a character and its width in columns; -1 for a tab."""
     if character == "\t":
         return " ", -1
     shown = visible(character)
@@ -117,14 +117,15 @@ def _cell(character: str) -> tuple[str, int]:
 
 
 def hiding(text: str, start: int = 0) -> int | None:
-    """Where in a text, from `start` on, the first character stands that hides or reorders what a person reads."""
+    """The offset of the first invisible or reordering character from `start` on; None if there is none."""
     found = _HIDING.search(text, start)
     return None if found is None else found.start()
 
 
 def visible(text: str) -> str:
-    """The text on one line, with every character that a terminal would obey, or that hides others, written as
-    `<U+202E>`: all that comes from outside passes this before a person sees it.
+    """The text on one line, with control, invisible and reordering characters written as `<U+202E>`.
+
+    All untrusted text passes this function before it is printed.
     """
     if text.isprintable() and (text.isascii() or _BLANKS.search(text) is None):
         return text
@@ -132,8 +133,9 @@ def visible(text: str) -> str:
 
 
 def escaped(json: str) -> str:
-    """JSON with every character that `visible` would not show as it is written as an escape: it says the same to who
-    parses it. Line feeds stay, which JSON has between its values only.
+    """JSON with every character that `visible` would replace written as an escape; its value is unchanged.
+
+    Line feeds stay: JSON has them only between values.
     """
     lines = json.split("\n")
     if all(visible(line) == line for line in lines):
@@ -150,7 +152,7 @@ SHOWN = 40  # characters
 
 
 def short(text: str) -> str:
-    """`text` on one line, printable, and cut where it is long."""
+    """`text` on one line, printable, and cut to `SHOWN` characters."""
     text = text[: SHOWN + 1]
     plain = text if text.isprintable() else text.encode("unicode_escape").decode()
     return plain if len(plain) <= SHOWN else plain[: SHOWN - 3] + "..."

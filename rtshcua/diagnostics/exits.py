@@ -1,10 +1,10 @@
-"""The one table of exit codes. A code never changes its meaning; the README shows `as_markdown()`."""
+"""The exit codes. A code never changes its meaning. The README has the table of `as_markdown()`."""
 
 from enum import IntEnum
 
 
 class ExitCode(IntEnum):
-    """How a command ended: the value for the shell, a stable `slug` for programs, one line of `meaning` for people.
+    """An exit code: the value for the shell, a stable `slug` for programs, one line of `meaning` for people.
 
     70 and 74 follow sysexits.h (EX_SOFTWARE, EX_IOERR); 130 is the shell's 128 + SIGINT.
     """
@@ -53,6 +53,6 @@ class ExitCode(IntEnum):
 
 
 def as_markdown() -> str:
-    """The table for the README, one row a code, ending in a newline."""
+    """Return the table for the README: one row per code, ending in a newline."""
     rows = [f"| {code.value} | `{code.slug}` | {code.meaning} |" for code in ExitCode]
     return "\n".join(["| code | slug | meaning |", "|---:|---|---|", *rows, ""])

@@ -1,17 +1,17 @@
-"""What a file is, by how it begins: so that whoever hands in another kind than was asked for is told which one it is.
+"""Recognise the kind of a file by its first bytes, so that an error can name the kind that was given.
 
-Only for messages: nothing is accepted for what is said here.
+For messages only: no input is accepted because of the result.
 """
 
 import re
 from typing import Final, NamedTuple
 
-#: octets at the beginning of a file that are looked at
+#: how many bytes of a file are examined
 LOOKED_AT: Final = 1 << 13
 
 
 class FileKind(NamedTuple):
-    """What a file is, in words, and what is done with one; empty where nothing of ours is."""
+    """A kind of file: its name, and a help on how to use it, which may be empty."""
 
     name: str
     help: str
@@ -20,31 +20,32 @@ class FileKind(NamedTuple):
 BUNDLE: Final = FileKind(
     "a compiled bundle", "`rtshcua show` prints it, `rtshcua run` flies it; its source ends in `.rts`"
 )
-LOG: Final = FileKind("a log of a flight", "`rtshcua verify-log` proves it, `rtshcua why` explains it")
+LOG: Final = FileKind("a flight log", "`rtshcua verify-log` verifies it, `rtshcua why` explains it")
 PROOF: Final = FileKind("a proof of a record", "`rtshcua verify-proof` verifies it")
-DOCUMENT: Final = FileKind("a signed document", "`rtshcua show` says which")
-KEY: Final = FileKind("a key", "`rtshcua show` says which; keep it to yourself")
+DOCUMENT: Final = FileKind("a signed document", "`rtshcua show` prints it")
+KEY: Final = FileKind("a key", "`rtshcua show` names its duty; keep a private key secret")
 SPECIFICATION: Final = FileKind("a mission specification", "`rtshcua compile FILE.json --with POLICY.rts` compiles it")
 SOURCE: Final = FileKind("a source", "`rtshcua compile FILE.rts -o FILE.bundle` makes a bundle of it")
 PLAN: Final = FileKind(
-    "a plan of QGroundControl", "nothing reads plans: write the mission as a source, its fence and zones as `zone`"
+    "a QGroundControl plan", "plans are not supported: write the mission as a source, its fence and zones as `zone`"
 )
-WAYPOINTS: Final = FileKind("a list of waypoints (QGC WPL)", "nothing reads these: write the mission as a source")
-GEOJSON: Final = FileKind("GeoJSON", 'a source reads it: `zone NAME from "FILE.geojson"`')
+WAYPOINTS: Final = FileKind(
+    "a waypoint list (QGC WPL)", "waypoint lists are not supported: write the mission as a source"
+)
+GEOJSON: Final = FileKind("GeoJSON", 'read it from a source: `zone NAME from "FILE.geojson"`')
 ED269: Final = FileKind(
-    "a list of geographical zones (ED-269)", "nothing reads it: write each zone with its heights and times as `zone`"
+    "a list of geographical zones (ED-269)",
+    "ED-269 is not supported: write each zone with its heights and times as `zone`",
 )
-KML: Final = FileKind("KML", 'convert it to GeoJSON, and read it from a source: `zone NAME from "FILE.geojson"`')
-ARCHIVE: Final = FileKind("a ZIP archive", "take out of it what you mean")
+KML: Final = FileKind("KML", 'convert it to GeoJSON and read it from a source: `zone NAME from "FILE.geojson"`')
+ARCHIVE: Final = FileKind("a ZIP archive", "extract the file that you need")
 PDF: Final = FileKind("a PDF document", "")
 HTML: Final = FileKind("a web page", "")
-MARKDOWN: Final = FileKind("a page of text (Markdown)", "")
+MARKDOWN: Final = FileKind("a Markdown document", "")
 SCRIPT: Final = FileKind("a script", "")
-EMPTY: Final = FileKind("an empty file", "it was not written whole: make it again, or copy it again")
-ULOG: Final = FileKind("a log of PX4 (ULog)", "a run writes `log.jsonl`: name that, or the run's folder")
-DATAFLASH: Final = FileKind(
-    "a log of ArduPilot (DataFlash)", "a run writes `log.jsonl`: name that, or the run's folder"
-)
+EMPTY: Final = FileKind("an empty file", "it was not written completely: create or copy it again")
+ULOG: Final = FileKind("a PX4 log (ULog)", "give the `log.jsonl` of a run, or the run's folder")
+DATAFLASH: Final = FileKind("an ArduPilot log (DataFlash)", "give the `log.jsonl` of a run, or the run's folder")
 
 _GEOMETRIES = "Point|MultiPoint|LineString|MultiLineString|Polygon|MultiPolygon|GeometryCollection"
 _BEGINS: Final = (
@@ -64,7 +65,7 @@ _BEGINS: Final = (
     (re.compile(rb"#!"), SCRIPT),
     (re.compile(rb"\s*#{1,6} \S"), MARKDOWN),
 )
-#: of JSON objects, by what stands in them; the first that fits
+#: kinds of JSON objects by their content; the first match counts
 _SAYS: Final = (
     (re.compile(rb'"format"\s*:\s*"rtshcua/mission-spec"'), SPECIFICATION),
     (re.compile(rb'"fileType"\s*:\s*"Plan"'), PLAN),
@@ -75,7 +76,7 @@ _SAYS: Final = (
 
 
 def recognised(data: bytes, name: str = "") -> FileKind | None:
-    """What a file is, by its first octets, or else by the end of its name; None where nothing tells."""
+    """Return the kind of a file by its first bytes, or else by its name's suffix; None if neither is known."""
     head = data[:LOOKED_AT].removeprefix(b"\xef\xbb\xbf")
     for pattern, kind in _BEGINS:
         if pattern.match(head):
@@ -87,9 +88,9 @@ def recognised(data: bytes, name: str = "") -> FileKind | None:
 
 
 def foreign(data: bytes, name: str = "") -> FileKind | None:
-    """What a file is that stands where a source or a specification is asked for; None where it may be one.
+    """Return the kind of a file that is neither a source nor a specification; None if it may be one of them.
 
-    One that is called a source may begin as a comment of other languages does: that is told where it stands.
+    A file named `.rts` that begins with `#` counts as a source: the parser reports the character in place.
     """
     found = recognised(data, name)
     called = name.endswith(".rts") and found in (MARKDOWN, SCRIPT)

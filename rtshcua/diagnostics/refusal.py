@@ -1,4 +1,4 @@
-"""The one way to say that something which was asked for is refused."""
+"""The value that a service returns when it refuses a request."""
 
 from typing import NamedTuple
 
@@ -6,9 +6,9 @@ from rtshcua.diagnostics.exits import ExitCode
 
 
 class Refusal(NamedTuple):
-    """Why something is refused. `slug` is stable and for programs; `text` says what was found, and `help` what to do
-    about it, for a person: lower case, no full stop. `help` is empty where there is nothing to add. `code` is how a
-    command ends with it; None: as with any refusal of this slug.
+    """Why a request is refused. `slug` is stable, for programs. `text` says what was found and `help` what to do, for a
+    person: lower case, no full stop; `help` may be empty. `code` is the exit code of a command; None means the one of
+    its `slug`.
     """
 
     slug: str

@@ -1,17 +1,17 @@
-"""What is taken out of a text so that no trace is left of a part: its whole line, or the part alone."""
+"""The span to delete when a part of a source is removed: its whole lines, or the part alone."""
 
 import re
 
 from rtshcua.diagnostics.span import Span
 
-#: what may stand behind a part that goes with its line: blanks, a comment, and the line's end
+#: the rest of a line that is deleted with the part: blanks, a comment, the line end
 _REST = re.compile(r"[ \t]*(?://[^\r\n]*)?(?:\r?\n|\Z)")
 
 
 def whole_line(text: str, span: Span) -> Span:
-    """The lines of a part that stands alone on them, with a comment behind it; else the part with the blanks before it.
+    """The lines of a part if they have no other text but a trailing comment; else the part and the blanks around it.
 
-    Comments on lines of their own stay: they may be about what follows.
+    Comments on lines of their own stay: they may be about the next part.
     """
     start = text.rfind("\n", 0, span.start) + 1
     rest = _REST.match(text, span.end)

@@ -1,7 +1,7 @@
-"""Findings as plain text: what was found, the line it stands on, underlined, and what would be accepted.
+"""Findings as plain text: the message, the source line with the span underlined, and the help.
 
-Nothing here is coloured; a caller may colour the lines by how they begin. A source is not trusted: control characters
-and those that change the direction of writing are shown by their number and never reach the terminal.
+The text has no colours; a caller may colour lines by their beginning. Sources are untrusted: control characters and
+characters that change the writing direction are shown by their number and never reach the terminal.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -12,16 +12,14 @@ from rtshcua.diagnostics.excerpt import MAX_WIDTH, Mark, excerpt, together, visi
 from rtshcua.diagnostics.span import Source
 
 PRIMARY, SECONDARY = "^", "-"
-#: so many findings are shown to a person, and of one finding so many places
+#: the most findings that are shown to a person, and the most places of one finding
 MOST_SHOWN, MOST_PLACES = 200, 20
-#: so many characters of a message, for it may quote a source
+#: the most characters of a message, which may quote a source
 MOST_TEXT = 2_000
 
 
 def most_severe(diagnostics: Sequence[Diagnostic], most: int = MOST_SHOWN) -> tuple[Diagnostic, ...]:
-    """At most so many findings, in their order: errors rather than warnings, warnings rather than notes, what is first
-    rather than what comes later.
-    """
+    """Return at most `most` findings, in their order: errors before warnings before notes, then the earlier ones."""
     if len(diagnostics) <= most:
         return tuple(diagnostics)
     rank = {severity: number for number, severity in enumerate(Severity)}
@@ -30,14 +28,12 @@ def most_severe(diagnostics: Sequence[Diagnostic], most: int = MOST_SHOWN) -> tu
 
 
 def render(diagnostics: Iterable[Diagnostic], sources: Mapping[str, Source], width: int = MAX_WIDTH) -> str:
-    """All findings, parted by empty lines; ends in a newline unless there are none. Lines of sources take at most
-    `width` columns, with their numbers.
-    """
+    """Render all findings, separated by empty lines. Source lines take at most `width` columns, with their numbers."""
     return "\n".join(render_one(diagnostic, sources, width) for diagnostic in diagnostics)
 
 
 def render_one(diagnostic: Diagnostic, sources: Mapping[str, Source], width: int = MAX_WIDTH) -> str:
-    """One finding, ending in a newline."""
+    """Render one finding, ending in a newline."""
     code = diagnostic.code
     lines = [f"{diagnostic.severity.value}[{code.id}]: {_shown(diagnostic.message)}"]
     places = _places(diagnostic, sources)
@@ -74,7 +70,7 @@ def _shown(text: str) -> str:
 
 
 def _places(diagnostic: Diagnostic, sources: Mapping[str, Source]) -> list[tuple[str, int, list[Mark]]]:
-    """The lines to show, the finding's own first, then those of its labels by file; each with its marks."""
+    """The lines to show with their marks: first the line of the finding, then those of its labels, by file."""
     marks: list[Mark] = [] if diagnostic.span is None else [(diagnostic.span, PRIMARY, "")]
     marks += [(label.span, SECONDARY, label.text) for label in diagnostic.labels]
     by_line: dict[tuple[str, int], list[Mark]] = {}

@@ -1,4 +1,4 @@
-"""Findings as JSON: for agents, editors and scripts. Offsets count characters from 0, lines and columns from 1."""
+"""Findings as JSON for agents, editors and scripts. Offsets count characters from 0, lines and columns from 1."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any, Final
@@ -11,7 +11,7 @@ VERSION: Final = 1
 
 
 def as_json(diagnostics: Iterable[Diagnostic], sources: Mapping[str, Source]) -> dict[str, Any]:
-    """All findings as one value that `json.dumps` takes; every key is always there, null where it does not apply."""
+    """Return all findings as a value for `json.dumps`. Every key is present, with null where it does not apply."""
     found = [_diagnostic(diagnostic, sources) for diagnostic in diagnostics]
     return {"format": FORMAT, "version": VERSION, "diagnostics": found}
 

@@ -1,4 +1,4 @@
-"""Where in a source text something stands: offsets are kept, line and column are computed on demand."""
+"""Positions in a source text: spans keep offsets, line and column are computed on demand."""
 
 from bisect import bisect_right
 from dataclasses import dataclass, field
@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 
 class Span(NamedTuple):
-    """A half-open range `[start, end)` of character offsets in the source called `file`."""
+    """A half-open range `[start, end)` of character offsets in the source named `file`."""
 
     file: str
     start: int
@@ -18,7 +18,7 @@ class Span(NamedTuple):
 
 
 class Position(NamedTuple):
-    """A place for a person: `line` and `column` both count from 1, the column in characters."""
+    """A position for a person: `line` and `column` both count from 1, the column in characters."""
 
     line: int
     column: int
@@ -26,7 +26,7 @@ class Position(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Source:
-    """A source text with its name; finds lines and columns of offsets without scanning the text each time."""
+    """A source text with its name, and an index of its lines."""
 
     file: str
     text: str
@@ -50,7 +50,7 @@ class Source:
         return Position(line, offset - starts[line - 1] + 1)
 
     def line(self, number: int) -> str:
-        """The text of line `number` (from 1) without its line ending; empty when there is no such line."""
+        """The text of line `number` (from 1) without its line ending; empty if there is no such line."""
         starts = self._line_starts()
         if not 1 <= number <= len(starts):
             return ""

@@ -1,30 +1,30 @@
-"""The one place that answers "did you mean": used by the compiler, the agent interface and the command line."""
+"""Suggestions for misspelt names ("did you mean"): for the compiler, the agent interface and the command line."""
 
 import re
 from collections.abc import Iterable
 from difflib import SequenceMatcher, get_close_matches
 from functools import lru_cache
 
-#: from this likeness on a name differs from a word by a slip of the finger
+#: names at least this similar differ by a typing error
 TYPO = 0.85
-#: how long a part of a name must be to tell something alone: not the `a` of `bridge_a`
+#: a shorter part of a name (the `a` of `bridge_a`) is not enough for a suggestion
 TELLING = 3
 #: how many names a help lists
 LISTED = 12
 
 
 def nearest(word: str, known: Iterable[str], about: str = "") -> str | None:
-    """The known name nearest to `word`, or None when none is near enough to be worth a suggestion.
+    """Return the known name nearest to `word`, or None if no name is near enough.
 
-    A name that is spelt alike goes first, then one with the same parts (`battery_remaining` for `remaining`), of those
-    the one that shares most with `about`, the words that stand around.
+    A similar spelling comes first, then a name with the same parts (`battery_remaining` for `remaining`); of those, the
+    one that shares most parts with `about`, the surrounding text.
     """
     return _nearest(word, frozenset(known), about)
 
 
 @lru_cache(maxsize=512)
 def _nearest(word: str, known: frozenset[str], about: str) -> str | None:
-    """Remembered, for what one misspelt declaration leaves behind is the same unknown name in many places."""
+    """Cached: one misspelt declaration makes the same name unknown in many places."""
     folded = {name.casefold(): name for name in sorted(known)}
     wanted = word.casefold()
     alike = get_close_matches(wanted, list(folded), n=1, cutoff=0.6)
@@ -42,14 +42,14 @@ def _nearest(word: str, known: frozenset[str], about: str) -> str | None:
 
 
 def listed(names: Iterable[str]) -> str:
-    """Names for a sentence, in backticks; of many the first ones, and how many more there are."""
+    """Names for a sentence, in backticks: at most `LISTED`, then the number of further names."""
     known = list(names)
     shown = ", ".join(f"`{name}`" for name in known[:LISTED])
     return shown if len(known) <= LISTED else f"{shown} and {len(known) - LISTED} more"
 
 
 def likeness(one: str, other: str) -> float:
-    """How much of two words is alike, from 0 to 1."""
+    """The similarity of two words, from 0 to 1."""
     return SequenceMatcher(None, one, other).ratio()
 
 

@@ -1,24 +1,24 @@
-"""Lines for a terminal of 80 columns: what does not fit goes on beneath, under the text that it belongs to."""
+"""Wrap lines for a terminal of 80 columns; continuation lines are indented to the text of the first line."""
 
 import re
 from typing import Final
 
 WIDTH: Final = 80
-#: the least room for text beneath what stands before it
+#: the least width of the text column
 _ROOM: Final = 32
-#: what stands before the text of a line: marks, and names in columns, parted by two spaces or more
+#: the prefix of a line (a mark or a label), and columns, separated by two spaces or more
 _BEFORE: Final = re.compile(r" *(?:[-+=·] +|\d+\. )?(?:(?:error|warning|note|help)(?:\[[\w/-]+\])?: )?")
 _COLUMN: Final = re.compile(r" {2,}+(?=[^ ])")
-#: a part of a word; words in backticks are one: a command or a name is not taken apart where it fits
+#: a part of a word; text in backticks counts as one word, so that a command is not broken where it fits
 _PART: Final = re.compile(r"( *+)([^ `]++|`[^`]*+`|`)")
-#: a command of ours is to be typed: it is not broken, whatever room it takes
+#: one of our commands is never broken, because people copy it
 _COMMAND: Final = "`rtshcua "
-#: what sets a colour, and takes no room
+#: a colour sequence, which has no width
 _COLOUR: Final = re.compile(r"\x1b\[[0-9;]*m")
 
 
 def wrapped(line: str, width: int = WIDTH) -> list[str]:
-    """A line of text in lines of at most so many characters. A longer word stays whole, on a line of its own."""
+    """Wrap a line to `width` columns. A word that is longer stays whole, on a line of its own."""
     if _columns(line) <= width:
         return [line]
     beneath = _beneath(_COLOUR.sub("", line), width)
@@ -40,7 +40,7 @@ def _columns(text: str) -> int:
 
 
 def _words(line: str, room: int) -> list[tuple[str, str]]:
-    """What is kept together, each with the spaces before it."""
+    """The unbreakable pieces of a line, each with the spaces before it."""
     found: list[tuple[str, str]] = []
     whole: list[tuple[str, str]] = []
     for space, part in _PART.findall(line):
@@ -58,7 +58,7 @@ def _words(line: str, room: int) -> list[tuple[str, str]]:
 
 
 def _beneath(line: str, width: int) -> int:
-    """The column at which what does not fit goes on."""
+    """The column at which continuation lines start."""
     before = _BEFORE.match(line)
     at = before.end() if before is not None else 0
     while (column := _COLUMN.search(line, at)) is not None and column.end() <= width - _ROOM:

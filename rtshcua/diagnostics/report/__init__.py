@@ -1,1 +1,1 @@
-"""Findings and outcomes in the forms that other programs read: SARIF, GitHub's workflow commands, JUnit."""
+"""Findings and outcomes in formats of other programs: SARIF, GitHub workflow commands, JUnit."""

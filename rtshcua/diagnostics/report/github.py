@@ -1,6 +1,6 @@
-"""Findings as workflow commands of GitHub Actions, which shows them beside the lines that they are about.
+"""Findings as workflow commands of GitHub Actions, which shows them as annotations of the source lines.
 
-GitHub shows ten errors, ten warnings and ten notices a step, and drops what is more; the log has all of them.
+GitHub shows at most ten errors, ten warnings and ten notices per step; the log has all of them.
 """
 
 from collections.abc import Iterable, Mapping
@@ -14,10 +14,10 @@ _COMMANDS = {Severity.ERROR: "error", Severity.WARNING: "warning", Severity.NOTE
 
 
 def github(found: Iterable[Diagnostic], sources: Mapping[str, Source], folder: str = "") -> str:
-    """One line a finding, each ended by a newline, to be printed as they are.
+    """Return one line per finding, each ended by a newline.
 
-    `folder` is the absolute folder that the names of sources are relative to: the runner finds their place in the
-    repository by it, where it is not the repository's own.
+    `folder` is the absolute folder that the names of sources are relative to: the runner needs it if it is not the root
+    of the repository.
     """
     return "".join(f"{_command(diagnostic, sources, folder)}\n" for diagnostic in found)
 
@@ -37,7 +37,7 @@ def _command(diagnostic: Diagnostic, sources: Mapping[str, Source], folder: str)
 
 
 def _placed(span: Span, source: Source | None, folder: str) -> dict[str, str]:
-    """Columns go with a place within one line only: the runner takes no others."""
+    """The runner accepts columns only for a place within one line."""
     file = span.file if span.file.startswith("/") or not folder else f"{folder.rstrip('/')}/{span.file}"
     if source is None:
         return {"file": file}
@@ -55,10 +55,10 @@ def _place(span: Span, sources: Mapping[str, Source]) -> str:
 
 
 def _data(text: str) -> str:
-    """Escaped as the toolkit of GitHub does what stands after the second `::`."""
+    """Escape a message, as GitHub's toolkit does."""
     return text.replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
 
 
 def _property(text: str) -> str:
-    """Escaped as the toolkit of GitHub does the value of a property."""
+    """Escape the value of a property, as GitHub's toolkit does."""
     return _data(text).replace(":", "%3A").replace(",", "%2C")

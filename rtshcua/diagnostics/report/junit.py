@@ -1,7 +1,7 @@
-"""Outcomes as JUnit XML: what Jenkins (`junit-10.xsd` of its xUnit plugin) and GitLab read.
+"""Outcomes as JUnit XML, for Jenkins (`junit-10.xsd` of its xUnit plugin) and GitLab.
 
-There is no standard of it. The schema of Jenkins refuses attributes that it does not know, `file` and `line` of a test
-case among them, so the file is that of the suite and the case's `classname`, and the line stands in the text.
+JUnit XML has no standard. The schema of Jenkins rejects unknown attributes, also `file` and `line` of a test case. So
+the suite and the `classname` of the case carry the file, and the text carries the line.
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -21,10 +21,10 @@ _HEAD: Final = '<?xml version="1.0" encoding="utf-8"?>\n'
 
 @dataclass(frozen=True, slots=True)
 class CaseOutcome:
-    """How one test ended: passed, unless `failure` or `skipped` says why not.
+    """The outcome of one test: passed, unless `failure` or `skipped` gives a reason.
 
-    `kind` is a short name for what failed, for programs; `broken` says that the test could not be run, which JUnit
-    calls an error; `time_us` is how long it took, None where nobody measured. `line` counts from 1.
+    `kind` is a short name of the failure, for programs. `broken` means that the test could not run: an error of JUnit.
+    `time_us` is the duration, None if not measured. `line` counts from 1.
     """
 
     name: str
@@ -40,7 +40,7 @@ class CaseOutcome:
 
 @dataclass(frozen=True, slots=True)
 class Suite:
-    """The tests of one file, `name`; `properties` are names and values for whoever reads the report."""
+    """The tests of one file, `name`; `properties` are names and values for the reader of the report."""
 
     name: str
     cases: tuple[CaseOutcome, ...]
@@ -48,7 +48,9 @@ class Suite:
 
 
 def junit(suites: Iterable[Suite], name: str = "rtshcua") -> str:
-    """A whole document, ended by a newline. What XML cannot hold, or a terminal would obey, is shown as `<U+001B>`."""
+    """Return a whole document, ended by a newline. Characters that XML forbids or a terminal would obey are shown as
+    `<U+001B>`.
+    """
     root = ElementTree.Element("testsuites")
     each = tuple(suites)
     _count(root, name, [case for suite in each for case in suite.cases], skipped=False)
@@ -110,7 +112,7 @@ def _place(case: CaseOutcome) -> str:
 
 
 def _seconds(microseconds: int) -> str:
-    """To the millisecond, which is all that the schema of Jenkins takes; what took less counts as one."""
+    """Seconds with three decimals, the most that the schema of Jenkins accepts, rounded up."""
     milliseconds = -(-microseconds // 1_000)
     return f"{milliseconds // 1000}.{milliseconds % 1000:03}"
 
@@ -124,7 +126,7 @@ def _text(text: str) -> str:
     return "\n".join(visible(line) for line in text.split("\n"))
 
 
-#: the name of the suite of what is about no file
+#: the name of the suite of findings without a file
 NO_FILE = "rtshcua"
 
 
@@ -134,9 +136,9 @@ def suites(
     files: Iterable[str] = (),
     failing: Collection[Severity] = (Severity.ERROR, Severity.WARNING),
 ) -> tuple[Suite, ...]:
-    """Suites for `junit`, by name. Each of `files` has one, in which a test passes where nothing was found.
+    """Return suites for `junit`, by name. Each of `files` has a suite; one without findings has one passing test.
 
-    A finding of a severity that is not among `failing` is a test that passes, and says in its output what was found.
+    A finding of a severity outside `failing` is a passing test with the finding as its output.
     """
     of_file = sorted(found, key=_file)
     grouped = {

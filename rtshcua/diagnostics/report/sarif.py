@@ -1,7 +1,7 @@
-"""Findings as SARIF 2.1.0 (OASIS standard, errata 01): for code scanning, editors, and whoever keeps findings.
+"""Findings as SARIF 2.1.0 (OASIS standard, errata 01), for code scanning and editors.
 
 Numbers in comments and docstrings are sections of the standard. Columns and offsets count characters (`columnKind`
-`unicodeCodePoints`), lines end at a line feed, and ends are exclusive, as everywhere here.
+`unicodeCodePoints`), lines end at a line feed, and ends are exclusive.
 """
 
 import hashlib
@@ -15,7 +15,7 @@ from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.span import Source, Span
 
-#: what relative names of files are relative to
+#: the base of relative file names
 ROOT: Final = "SRCROOT"
 
 
@@ -25,7 +25,7 @@ def physical(span: Span, sources: Mapping[str, Source]) -> dict[str, Any]:
 
 
 def region(span: Span, source: Source | None) -> dict[str, int]:
-    """A region (3.30) in both ways that the standard has."""
+    """A region (3.30), by lines and columns and by offsets."""
     offsets = {"charOffset": span.start, "charLength": span.end - span.start}
     if source is None:
         return offsets
@@ -39,23 +39,23 @@ def region(span: Span, source: Source | None) -> dict[str, int]:
 
 
 def artifact(file: str) -> dict[str, str]:
-    """An artifactLocation (3.4): a name that is relative stays so, for it is the same on every machine."""
+    """An artifactLocation (3.4). A relative name stays relative: it is the same on every machine."""
     return {"uri": uri(file)} if file.startswith("/") else {"uri": uri(file), "uriBaseId": ROOT}
 
 
 def uri(file: str) -> str:
-    """RFC 3986; octets of a name that are no UTF-8 keep their value, and a colon is no scheme's."""
+    """The name as a URI reference (RFC 3986). Bytes that are not UTF-8 keep their value; a colon is escaped."""
     path = quote(file, safe="/", errors="surrogateescape")
     return f"file://{path}" if file.startswith("/") else path
 
 
-#: name and version of the mark (SARIF, 3.27.17); another way to compute it needs another version
+#: name and version of the fingerprint (3.27.17); a change of its computation needs a new version
 FINGERPRINT: Final = "findingInLine/v1"
 
 
 def fingerprints(found: Iterable[Diagnostic], sources: Mapping[str, Source]) -> list[str]:
-    """The mark of each finding, in order: of its code, the words of its line, and its number among those of the same
-    file that are alike.
+    """The fingerprint of each finding, in order: a digest of its code and the words of its line, and its number among
+    equal ones in the same file.
     """
     seen: dict[tuple[str, str], int] = {}
     marks = []
@@ -75,12 +75,12 @@ def fingerprints(found: Iterable[Diagnostic], sources: Mapping[str, Source]) -> 
 
 VERSION: Final = "2.1.0"
 SCHEMA: Final = "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
-#: how a run ends that did its work, whatever it found
+#: exit codes of a run that finished its work, with or without findings
 _DONE = (ExitCode.OK, ExitCode.DIAGNOSTICS)
 
 
 class CodePage(Protocol):
-    """The page of a code, in Markdown: `text` whole, `what` the section that says what the code means."""
+    """The page of a code in Markdown: `text` is the whole page, `what` the section on its meaning."""
 
     @property
     def text(self) -> str: ...
@@ -89,9 +89,7 @@ class CodePage(Protocol):
 
 
 class Ignored(NamedTuple):
-    """A finding that the author wants not to be told of, why, and where that is written in a source; None where it is
-    written in a configuration.
-    """
+    """A finding that the author ignores, the reason, and the place of the `ignore`; None if a configuration has it."""
 
     diagnostic: Diagnostic
     reason: str
@@ -108,11 +106,11 @@ def sarif(
     pages: Mapping[str, CodePage] | None = None,
     base: str | None = None,
 ) -> dict[str, Any]:
-    """One run as a value that `json.dumps` takes.
+    """Return one run as a value for `json.dumps`.
 
-    `version` is ours and `code` how the command ends; `pages` has the page of each code by its id, where it has any;
-    `base` is the absolute folder that the names of sources are relative to. A finding that is about no text at all, of
-    a file that cannot be read, is a notification of the run (3.20.21); so that one did not succeed.
+    `version` is the version of rtshcua and `code` the exit code; `pages` has the page of each code by its id; `base` is
+    the absolute folder that the names of sources are relative to. A finding without a place, as of an unreadable file,
+    becomes a notification of the run (3.20.21).
     """
     each = [(diagnostic, None) for diagnostic in found] + [(one.diagnostic, one) for one in ignored]
     rules = list(dict.fromkeys(diagnostic.code for diagnostic, _ in each))
@@ -157,7 +155,7 @@ def _has_place(diagnostic: Diagnostic) -> bool:
 
 
 def _rule(code: Code, page: CodePage | None) -> dict[str, Any]:
-    """A reportingDescriptor (3.49). What it holds takes no arguments, so braces are written as they are."""
+    """A reportingDescriptor (3.49). Its texts take no arguments, so braces are not escaped."""
     sentence = f"{code.meaning[:1].upper()}{code.meaning[1:]}."
     rule: dict[str, Any] = {
         "id": code.id,
@@ -179,7 +177,7 @@ def _result(
         "ruleId": diagnostic.code.id,
         "ruleIndex": rule,
         "level": diagnostic.severity.value,
-        "message": _told(diagnostic),
+        "message": _message_of(diagnostic),
         "locations": [_location(diagnostic, sources)],
         "partialFingerprints": {FINGERPRINT: mark},
         "suppressions": [] if ignored is None else [_suppression(ignored, sources)],
@@ -198,7 +196,7 @@ def _notification(diagnostic: Diagnostic, index: Mapping[Code, int]) -> dict[str
     code = diagnostic.code
     return {
         "level": code.severity.value,
-        "message": _told(diagnostic),
+        "message": _message_of(diagnostic),
         "associatedRule": {"id": code.id, "index": index[code]},
     }
 
@@ -232,12 +230,12 @@ def _suppression(ignored: Ignored, sources: Mapping[str, Source]) -> dict[str, A
     return suppression
 
 
-def _told(diagnostic: Diagnostic) -> dict[str, str]:
-    """The message and, in a paragraph of its own, the help, which few readers show from anywhere else."""
+def _message_of(diagnostic: Diagnostic) -> dict[str, str]:
+    """The message and, in a paragraph of its own, the help: few viewers show a help from elsewhere."""
     lines = [diagnostic.message] + ([] if diagnostic.help is None else [f"help: {diagnostic.help}"])
     return {"text": "\n".join(_message(line)["text"] for line in lines)}
 
 
 def _message(text: str) -> dict[str, str]:
-    """A message (3.11) of anybody's words: no placeholder (3.11.5), no link (3.11.6), nothing that hides."""
+    """A message (3.11) of untrusted text: no placeholder (3.11.5), no link (3.11.6), no hidden characters."""
     return {"text": visible(text).replace("{", "{{").replace("}", "}}").replace("](", "] (")}

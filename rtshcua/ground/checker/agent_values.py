@@ -33,7 +33,7 @@ def parse_value(text: str, span: Span, moved: Moved) -> tuple[Value | None, Foun
         return None, found
     if step is not None and len(step.arguments) == 1 and step.arguments[0].name is not None and not step.overrides:
         return given.placed(step.arguments[0].value), ()
-    return None, (given.more("a value is a quantity, a name, a place or a choice", "20 m"),)
+    return None, (given.more("expected one value: a quantity, a name, coordinates or a choice", "20 m"),)
 
 
 def parse_quantity(words: str, text: str, span: Span, moved: Moved) -> tuple[Quantity | None, Found]:
@@ -45,7 +45,7 @@ def parse_quantity(words: str, text: str, span: Span, moved: Moved) -> tuple[Qua
     for value in () if step is None else _only(step):
         if isinstance(value, Quantity):
             return given.placed(value), ()
-    return None, (given.more("this is one quantity", "2 s"),)
+    return None, (given.more("expected one quantity", "2 s"),)
 
 
 def parse_clauses(words: str, text: str, span: Span, moved: Moved) -> tuple[tuple[ClauseDecl, ...], Found]:
@@ -57,7 +57,7 @@ def parse_clauses(words: str, text: str, span: Span, moved: Moved) -> tuple[tupl
     for value in () if step is None else _only(step):
         if isinstance(value, tuple) and value and isinstance(value[0], ClauseDecl):
             return tuple(given.placed(clause) for clause in value), ()
-    return (), (given.more("this is one condition", "battery > 50 %"),)
+    return (), (given.more("expected one condition", "battery > 50 %"),)
 
 
 def _only(step: Step) -> Iterator[Any]:
@@ -80,8 +80,8 @@ class _Given(NamedTuple):
     def step(self) -> tuple[Step | None, Found]:
         """The one step that was parsed, or the first finding."""
         if "//" in self.text or "/*" in self.text:
-            message = "a value holds a comment, which is no part of what is asked for"
-            return None, (Diagnostic(codes.SPECIFICATION_SHAPE, message, self.span, "leave the comment out"),)
+            message = "a value contains a comment"
+            return None, (Diagnostic(codes.SPECIFICATION_SHAPE, message, self.span, "remove the comment"),)
         parsed = parse(Source(self.span.file, self.before + self.text + self.after))
         found = tuple(self._finding(diagnostic) for diagnostic in parsed.diagnostics)
         if found:
@@ -97,9 +97,8 @@ class _Given(NamedTuple):
         return _moved(node, self._place)  # type: ignore[no-any-return]
 
     def more(self, what: str, example: str) -> Diagnostic:
-        """The finding on a text that is more than one of what is asked."""
-        message = f"{what}, and nothing more"
-        return Diagnostic(codes.SPECIFICATION_SHAPE, message, self.span, f'write one value, such as "{example}"')
+        """The finding on a text with other parts than the expected one."""
+        return Diagnostic(codes.SPECIFICATION_SHAPE, what, self.span, f'write one value, such as "{example}"')
 
     def _place(self, old: Span) -> Span:
         start, end = (min(max(at - len(self.before), 0), len(self.text)) for at in (old.start, old.end))

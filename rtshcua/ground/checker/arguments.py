@@ -40,43 +40,13 @@ def bind_arguments(
 def pair(
     context: CheckContext, skill: SkillDecl | TemplateDecl, written: Sequence[ArgumentValue], span: Span
 ) -> dict[str, Value] | None:
-    """The written arguments by the name of their parameter; None after a finding."""
-    names = [parameter.name.text for parameter in skill.parameters]
-    known = set(names)
+    """Return the written arguments by the name of their parameter; None after a finding."""
     report = context.report
-    declared = [(skill.name.span, f"`{skill.name.text}` is declared here")]
-    pairs: dict[str, ArgumentValue] = {}
     before = len(report.found)
-    named = False
+    pairs: dict[str, ArgumentValue] = {}
     for position, argument in enumerate(written):
-        if argument.name is not None:
-            named = True
-            name = argument.name.text
-            if name not in known:
-                takes = "it takes " + ", ".join(f"`{each}`" for each in names) if names else "it takes no arguments"
-                report.add(
-                    codes.UNKNOWN_ARGUMENT,
-                    argument.name.span,
-                    f"`{skill.name.text}` has no parameter `{name}`",
-                    help=suggestion(name, known) or takes,
-                    fix=correction(report, argument.name.span, name, known),
-                    labels=declared,
-                )
-                continue
-        elif named or position >= len(names):
-            report.add(
-                codes.TOO_MANY_ARGUMENTS,
-                argument.span,
-                "an argument without a name stands after a named one"
-                if named
-                else f"`{skill.name.text}` takes {_count(len(names))}, and this is one more",
-                help=_decimal(context, written, position) or ("write its name before it" if named else None),
-                labels=declared,
-            )
-            continue
-        else:
-            name = names[position]
-        first = pairs.setdefault(name, argument)
+        name = _parameter_of(context, skill, written, position)
+        first = argument if name is None else pairs.setdefault(name, argument)
         if first is not argument:
             report.add(
                 codes.DUPLICATE_ARGUMENT,
@@ -89,11 +59,47 @@ def pair(
         report.add(
             codes.MISSING_ARGUMENT,
             span,
-            f"`{skill.name.text}` is called without " + " and ".join(f"`{p.name.text}`" for p in missing),
+            f"`{skill.name.text}` lacks {' and '.join(f'`{p.name.text}`' for p in missing)}",
             help="add " + ", ".join(f"`{p.name.text} = ...`" for p in missing),
             labels=[(p.span, f"`{p.name.text}` is declared here, without a default") for p in missing],
         )
     return None if len(report.found) > before else {name: argument.value for name, argument in pairs.items()}
+
+
+def _parameter_of(
+    context: CheckContext, skill: SkillDecl | TemplateDecl, written: Sequence[ArgumentValue], position: int
+) -> str | None:
+    """The name of the parameter of an argument; None after a finding."""
+    report, argument = context.report, written[position]
+    names = [parameter.name.text for parameter in skill.parameters]
+    declared = [(skill.name.span, f"`{skill.name.text}` is declared here")]
+    if argument.name is not None:
+        name = argument.name.text
+        if name in names:
+            return name
+        takes = "its parameters are " + ", ".join(f"`{each}`" for each in names) if names else "it takes no arguments"
+        report.add(
+            codes.UNKNOWN_ARGUMENT,
+            argument.name.span,
+            f"`{skill.name.text}` has no parameter `{name}`",
+            help=suggestion(name, names) or takes,
+            fix=correction(report, argument.name.span, name, names),
+            labels=declared,
+        )
+        return None
+    named = any(each.name is not None for each in written[:position])
+    if not named and position < len(names):
+        return names[position]
+    report.add(
+        codes.TOO_MANY_ARGUMENTS,
+        argument.span,
+        "a positional argument follows a named one"
+        if named
+        else f"`{skill.name.text}` takes {_count(len(names))}; this one is too many",
+        help=_decimal(context, written, position) or ("write its name" if named else None),
+        labels=declared,
+    )
+    return None
 
 
 def _decimal(context: CheckContext, written: Sequence[ArgumentValue], position: int) -> str | None:
@@ -103,7 +109,7 @@ def _decimal(context: CheckContext, written: Sequence[ArgumentValue], position: 
     whole, rest = context.report.text(written[position - 1].value.span), context.report.text(written[position].span)
     touching = written[position - 1].span.end + 1 == written[position].span.start
     if touching and whole.isdigit() and rest[:1].isdigit():
-        return f"decimals stand behind a point: write `{whole}.{rest}`"
+        return f"use a decimal point: write `{whole}.{rest}`"
     return None
 
 
@@ -124,7 +130,7 @@ def bind_value(scope: Scope, argument: Argument, value: Value) -> Bound | None:
             codes.NOT_CONSTANT,
             value.span,
             f"`{scope.report.text(value.span)}` is not known before the flight",
-            help="an argument is written out, such as a number with its unit",
+            help="write a constant, such as a number with its unit",
         )
         return None
     number = stored(scope, value, argument.type, found.constant)
@@ -158,7 +164,7 @@ def _wider(scope: Scope, argument: Argument, value: Value, low: bool) -> str:
         return ""
     size = named_at(scope.report, owner, (parameter.range.low if low else parameter.range.high).span)
     written = scope.report.text(value.span)
-    return "" if size is None else f"; with `sizes {owner.name.text}({size} = {written})` it would be inside"
+    return "" if size is None else f"; `sizes {owner.name.text}({size} = {written})` extends the range"
 
 
 def in_range(scope: Scope, argument: Argument, value: Value, constant: int) -> None:
@@ -174,9 +180,9 @@ def in_range(scope: Scope, argument: Argument, value: Value, constant: int) -> N
     scope.report.add(
         codes.ARGUMENT_RANGE,
         value.span,
-        f"`{display(constant, dimension)}` is outside of `{parameter.name.text}`'s range "
+        f"`{display(constant, dimension)}` is outside the range of `{parameter.name.text}`, "
         f"{display(low, dimension)} .. {display(high, dimension)}",
-        help=f"the nearest value inside is `{nearest}`" + _wider(scope, argument, value, constant < low),
+        help=f"the nearest accepted value is `{nearest}`" + _wider(scope, argument, value, constant < low),
         labels=[(parameter.range.span, "the range is declared here")],
         fix=(value.span, nearest, f"write `{nearest}`"),
     )

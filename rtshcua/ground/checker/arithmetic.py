@@ -71,7 +71,7 @@ def function(scope: Scope, node: Function, found: Sequence[Typed]) -> Typed | No
         return None
     leading = next((each for each in found if each.constant is None or each.type.datum is not None), found[0])
     fitted = [
-        fit(scope, operand, each, leading.type, (node.span, f"`{node.name}` takes numbers of one dimension and datum"))
+        fit(scope, operand, each, leading.type, (node.span, f"`{node.name}` needs operands of one dimension and datum"))
         for operand, each in zip(node.operands, found, strict=True)
     ]
     values = [each.constant for each in fitted if each is not None and each.constant is not None]
@@ -89,7 +89,7 @@ def _numbers(scope: Scope, word: str, nodes: Sequence[Value], found: Sequence[Ty
             scope.report.add(
                 codes.BAD_ARITHMETIC,
                 node.span,
-                f"`{word}` takes numbers, and this is {each.type.describe()}",
+                f"the operands of `{word}` must be numbers, not {each.type.describe()}",
                 labels=declaration_labels(scope, node),
             )
             return False
@@ -108,7 +108,7 @@ def _product(scope: Scope, node: Arithmetic, left: Typed, right: Typed) -> Typed
         scope.report.add(
             codes.BAD_ARITHMETIC,
             node.span,
-            f"{left.type.describe()} times {right.type.describe()} is nothing that has a unit here",
+            f"{left.type.describe()} times {right.type.describe()} has no supported unit",
             help=PRODUCTS,
             labels=_sides(node, left, right),
         )
@@ -117,7 +117,7 @@ def _product(scope: Scope, node: Arithmetic, left: Typed, right: Typed) -> Typed
         scope.report.add(
             codes.BAD_ARITHMETIC,
             node.span,
-            "one side of `*` must be known before the flight, and neither is",
+            "one operand of `*` must be known before the flight",
             help="write a number on one side, as in `2 * altitude` or `speed * 3 s`",
             labels=_sides(node, left, right),
         )
@@ -136,9 +136,9 @@ def _quotient(scope: Scope, node: Arithmetic, left: Typed, right: Typed) -> Type
         scope.report.add(
             codes.BAD_DIVISION,
             node.right.span,
-            f"`{text}` is not known before the flight, so nothing can be divided by it"
+            f"cannot divide by `{text}`: it is not known before the flight"
             if unknown
-            else f"`{text}` is zero, and nothing can be divided by it",
+            else f"cannot divide by `{text}`: it is zero",
             help="multiply the other side of the comparison instead" if unknown else None,
             labels=declaration_labels(scope, node.right),
         )

@@ -32,7 +32,7 @@ def check_link(context: CheckContext, link: LinkDecl) -> SkillDecl | None:
         context.report.add(
             codes.COVERING_LINK,
             link.span,
-            f"`{skill.name.text}` flies a survey, and a chain leads to the ground",
+            f"`{skill.name.text}` flies a survey, which a fallback must not do",
             labels=[(skill.motion.span, "its motion")],
         )
     return skill
@@ -41,9 +41,7 @@ def check_link(context: CheckContext, link: LinkDecl) -> SkillDecl | None:
 def check_chain(context: CheckContext, links: Sequence[LinkDecl], owner: SkillDecl | None, span: Span) -> None:
     """Report a chain that might not end; `owner` is the skill whose fallback it is, `span` the whole chain."""
     if len(links) > MAX_LINKS:
-        context.report.add(
-            codes.TOO_MANY, span, f"the chain has {len(links)} links, and at most {MAX_LINKS} fit on board"
-        )
+        context.report.add(codes.TOO_MANY, span, f"the chain has {len(links)} links; the limit is {MAX_LINKS}")
     for index, link in enumerate(links):
         skill = check_link(context, link)
         if skill is None:
@@ -52,9 +50,9 @@ def check_chain(context: CheckContext, links: Sequence[LinkDecl], owner: SkillDe
             context.report.add(
                 codes.CHAIN_CYCLE,
                 link.skill.span,
-                f"`{skill.name.text}` is a link of its own fallback chain",
-                help="what has just failed is no way out: leave the link away",
-                labels=[(skill.name.span, "the chain belongs to this skill")],
+                f"`{skill.name.text}` is in its own fallback chain",
+                help="remove this link: the skill has just failed when its fallback starts",
+                labels=[(skill.name.span, "the chain of this skill")],
             )
         elif index == len(links) - 1:
             _last(context, link, skill)
@@ -68,8 +66,8 @@ def check_end(context: CheckContext, link: LinkDecl, skill: SkillDecl) -> None:
         context.report.add(
             codes.ENDLESS_LINK,
             link.span,
-            f"`{skill.name.text}` does not end by itself, so the links after it would never run",
-            help=f"say for how long, as in `{context.report.text(link.span)} for 20 s`",
+            f"`{skill.name.text}` does not end by itself, so the next link would never fly",
+            help=f"add a time limit, as in `{context.report.text(link.span)} for 20 s`",
             labels=[(skill.name.span, f"`{skill.name.text}` declares no `lasts at most`")],
             fix=(link.span, f"{context.report.raw(link.span)} for 20 s", "hold for 20 s"),
         )
@@ -85,10 +83,10 @@ def _limit(context: CheckContext, link: LinkDecl, skill: SkillDecl) -> None:
         context.report.add(
             codes.INCOHERENT_TIMING,
             limit.span,
-            f"the link is to fly for {display(limit.value, Dimension.DURATION)}, and `{skill.name.text}` lasts at "
+            f"the limit of the link is {display(limit.value, Dimension.DURATION)}, but `{skill.name.text}` lasts at "
             f"most {most}",
-            help=f"at most `{most}` fits",
-            labels=[(lasts.span, "does not fit with this")],
+            help=f"write at most `{most}`",
+            labels=[(lasts.span, "conflicts with this")],
         )
 
 
@@ -103,8 +101,8 @@ def _last(context: CheckContext, link: LinkDecl, skill: SkillDecl) -> None:
         context.report.add(
             codes.NEEDY_LAST_LINK,
             link.span,
-            f"the last link `{skill.name.text}` needs something that may be missing",
-            help="end the chain in a skill without `require` and `assume`, such as a landing on the spot",
+            f"the last link `{skill.name.text}` has a precondition, which may not hold",
+            help="end the chain with a skill without `require` and `assume`, such as a landing on the spot",
             labels=[(need.span, "it needs this") for need in needs],
         )
     elif skill.motion is not None and skill.motion.kind != "land":
@@ -112,13 +110,13 @@ def _last(context: CheckContext, link: LinkDecl, skill: SkillDecl) -> None:
             codes.NEEDY_LAST_LINK,
             link.span,
             f"the last link `{skill.name.text}` does not land on the spot, so it needs a position",
-            help="end the chain in a skill whose motion is `land`",
+            help="end the chain with a skill whose motion is `land`",
             labels=[(skill.motion.span, "its motion")],
         )
     elif link.limit is not None:
         context.report.add(
             codes.NEEDY_LAST_LINK,
             link.limit.span,
-            "the last link has a time limit, and nothing comes after it",
-            help="leave the limit out",
+            "the last link cannot have a time limit",
+            help="remove the limit: no link follows",
         )

@@ -49,19 +49,19 @@ def check_inside(scope: Scope, node: Inside) -> None:
         scope.report.add(
             codes.BAD_SUBJECT,
             node.subject.span,
-            f"`{scope.report.text(node.subject.span)}` cannot be inside or outside of a zone",
-            help=f"of all signals, it is `{POSITION_SIGNAL}` that is read as the vehicle's place: call this one so"
+            f"`{scope.report.text(node.subject.span)}` cannot be inside or outside a zone",
+            help=f"rename the signal to `{POSITION_SIGNAL}`: only that signal is the vehicle's position"
             if isinstance(found, SignalDecl) and subject.type == POSITION
-            else f"ask it of `{POSITION_SIGNAL}`, or of an argument that is a position or a zone",
+            else f"use `{POSITION_SIGNAL}`, or an argument that is a position or a zone",
             labels=declaration_labels(scope, node.subject),
         )
     elif is_argument and not isinstance(scope.find(region.name), ZoneDecl):
         scope.report.add(
             codes.BAD_SUBJECT,
             node.region.span,
-            "an argument is compared with a declared zone only, not with another argument",
-            help=f"write a declared zone instead of `{region.name}`, in which only `{POSITION_SIGNAL}` can be; "
-            "or make this a rule of a template, whose parameters stand for declared zones",
+            "an argument can only be compared with a declared zone, not with another argument",
+            help=f"write a declared zone instead of `{region.name}`, or move the rule into a template, whose "
+            "parameters stand for declared zones",
             labels=declaration_labels(scope, region),
         )
 
@@ -76,7 +76,7 @@ def _margin(scope: Scope, node: Value) -> None:
         scope.report.add(
             codes.DIMENSION_MISMATCH,
             node.span,
-            f"a zone grows by a length, and `{text}` is {found.type.describe()}",
+            f"`{text}` is {found.type.describe()}; a zone can only grow by a length",
             help="write a length, such as `15 m`",
             labels=declaration_labels(scope, node),
         )
@@ -84,8 +84,8 @@ def _margin(scope: Scope, node: Value) -> None:
         scope.report.add(
             codes.NOT_CONSTANT,
             node.span,
-            f"a zone grows by what is known before the flight, and `{text}` is not",
-            help="write a length, such as `15 m`, or the parameter of a template or a mission",
+            f"`{text}` is not known before the flight",
+            help="write a constant length, such as `15 m`, or a parameter of a template or a mission",
             labels=declaration_labels(scope, node),
         )
     elif abs(found.constant) > MAX_COORDINATE:
@@ -118,16 +118,16 @@ def phase_compared(scope: Scope, node: Comparison) -> None:
     """`phase == x`, `phase != x`."""
     name = node.right
     if not is_phase(scope, node.left):
-        _report(scope, node.left, "the mission's phase stands on the left side of a comparison")
+        _report(scope, node.left, "`phase` must be the left side of a comparison")
     elif node.operator not in ("==", "!="):
-        scope.report.add(codes.PHASE_NAME, node.span, "the phases of a mission have no order", help=_HELP)
+        scope.report.add(codes.PHASE_NAME, node.span, "phases have no order", help=_HELP)
     elif not isinstance(name, Reference) or name.name in (PHASE, LOCAL_TIME) or "." in name.name:
         _report(scope, name, f"`{scope.report.text(name.span)}` is not the name of a phase")
 
 
 def phase_in_range(scope: Scope, node: Within) -> None:
-    """A phase is in no range."""
-    _report(scope, node.range.low, "a phase is in no range: the phases of a mission have no order")
+    """Report a range of phases."""
+    _report(scope, node.range.low, "`phase` cannot be in a range: phases have no order")
 
 
 def _report(scope: Scope, node: Value, message: str) -> None:
@@ -135,14 +135,14 @@ def _report(scope: Scope, node: Value, message: str) -> None:
 
 
 def check_known(scope: Scope, node: Known) -> None:
-    """Report what is asked to be known and is no signal."""
+    """Report an `is known` of anything but a signal."""
     if typed(scope, node.subject) is None or isinstance(scope.find(node.subject.name), SignalDecl):
         return
     scope.report.add(
         codes.WRONG_KIND,
         node.subject.span,
-        f"`{node.subject.name}` is no signal, so it is always known",
-        help="ask it of a signal, as in `position is known`",
+        f"`{node.subject.name}` is not a signal and is always known",
+        help="use `is known` with a signal, as in `position is known`",
         labels=declaration_labels(scope, node.subject),
     )
 
@@ -155,8 +155,8 @@ def check_unturned(scope: Scope, node: Not | Edge) -> None:
             scope.report.add(
                 codes.TURNED_KNOWN,
                 part.span,
-                f"`{scope.report.text(part.span)}` is true or unknown, never false: `{word}` has nothing to turn",
-                help="what follows where a signal is not known, the contract's `fallback` says; ask that it is known",
+                f"`{scope.report.text(part.span)}` is true or unknown, never false, so `{word}` has no effect on it",
+                help="require that the signal is known; the `fallback` of the contract handles an unknown signal",
                 labels=[(node.span, f"under this `{word}`")],
             )
 
@@ -225,8 +225,8 @@ def _same(scope: Scope, node: Comparison, left: Typed, right: Typed) -> None:
         scope.report.add(
             codes.DATUM_MISMATCH if both else codes.DIMENSION_MISMATCH,
             node.span,
-            f"{left.type.describe()} is compared with {right.type.describe()}",
-            help="a length becomes an altitude only when it is added to one" if _lengths(left, right) else None,
+            f"cannot compare {left.type.describe()} with {right.type.describe()}",
+            help="add the length to an altitude" if _lengths(left, right) else None,
             labels=[*declaration_labels(scope, node.left), *declaration_labels(scope, node.right)],
         )
     if len(scope.report.found) == before:
@@ -245,7 +245,7 @@ def _enumerated(scope: Scope, node: Comparison, left: Typed, right: Typed) -> No
         scope.report.add(
             codes.NOT_COMPARABLE,
             node.span,
-            "a value of an enumeration is compared with one of its names",
+            "a value of an enumeration can only be compared with one of its names",
             help="write one of " + ", ".join(f"`{member}`" for member in enumeration.members),
             labels=declaration_labels(scope, node.left),
         )
@@ -253,7 +253,7 @@ def _enumerated(scope: Scope, node: Comparison, left: Typed, right: Typed) -> No
         scope.report.add(
             codes.NOT_COMPARABLE,
             node.span,
-            f"the choices of `{enumeration.name}` have no order",
+            f"the values of `{enumeration.name}` have no order",
             help="compare them with `==`, `!=` or `in { ... }`",
             labels=[(enumeration.declared, "declared here")],
         )
@@ -264,14 +264,14 @@ def _clock(scope: Scope, node: Comparison, left: Typed, right: Typed) -> None:
     if left.type != right.type:
         odd, other = (node.left, left) if right.type == TIME_OF_DAY else (node.right, right)
         message = (
-            f"`{scope.report.text(odd.span)}` is {other.type.describe()}, and is compared with {TIME_OF_DAY.describe()}"
+            f"cannot compare `{scope.report.text(odd.span)}`, {other.type.describe()}, with {TIME_OF_DAY.describe()}"
         )
-        help = "a time of day is compared with `local time`, as in `local time >= 19:00`"
+        help = "compare a time of day with `local time`, as in `local time >= 19:00`"
     elif (left.constant is None) == (right.constant is None):
-        message = f"`{node.operator}` compares `local time` with a time of day that is written out"
+        message = "`local time` can only be compared with a constant time of day"
         help = "write `local time >= 19:00`, or `local time in 08:00 .. 18:00`"
     elif node.operator in ("==", "!="):
-        message = f"`{node.operator}` asks for one moment of the day, which no clock can be held to"
+        message = f"`{node.operator}` compares with a single moment, which no clock can measure exactly"
         help = "write a window, such as `local time in 08:00 .. 08:10`, or a comparison, such as `local time >= 08:00`"
     else:
         return
@@ -279,11 +279,11 @@ def _clock(scope: Scope, node: Comparison, left: Typed, right: Typed) -> None:
 
 
 def _incomparable(scope: Scope, node: Comparison, left: Typed) -> None:
-    help = "ask whether it is `inside` or `outside` a zone" if left.type in (ZONE, POSITION) else None
+    help = "use `inside` or `outside` with a zone" if left.type in (ZONE, POSITION) else None
     scope.report.add(
         codes.NOT_COMPARABLE,
         node.span,
-        f"`{node.operator}` compares numbers and enumerations, and `{scope.report.text(node.left.span)}` is "
+        f"`{node.operator}` compares numbers and enumerations; `{scope.report.text(node.left.span)}` is "
         f"{left.type.describe()}",
         help=help,
         labels=declaration_labels(scope, node.left),
@@ -303,7 +303,7 @@ def check_within(scope: Scope, node: Within) -> None:
         scope.report.add(
             codes.NOT_COMPARABLE,
             node.span,
-            f"only `local time` is on days of the week, and `{scope.report.text(node.subject.span)}` is "
+            f"only `local time` can have days of the week; `{scope.report.text(node.subject.span)}` is "
             f"{subject.type.describe()}",
             help="write `local time in 08:00 .. 18:00 on monday .. friday`",
             labels=declaration_labels(scope, node.subject),
@@ -313,8 +313,8 @@ def check_within(scope: Scope, node: Within) -> None:
         scope.report.add(
             codes.NOT_COMPARABLE,
             node.span,
-            f"`{scope.report.text(node.subject.span)}` is {subject.type.describe()}, and a range has numbers",
-            help="ask whether it is `inside` or `outside` a zone",
+            f"`{scope.report.text(node.subject.span)}` is {subject.type.describe()}; a range needs a number",
+            help="use `inside` or `outside` with a zone",
             labels=declaration_labels(scope, node.subject),
         )
         return
@@ -322,7 +322,7 @@ def check_within(scope: Scope, node: Within) -> None:
         scope.report.add(
             codes.NOT_COMPARABLE,
             node.span,
-            f"the choices of `{subject.type.enumeration.name}` have no order",
+            f"the values of `{subject.type.enumeration.name}` have no order",
             help="write `in { ... }`",
             labels=[(subject.type.enumeration.declared, "declared here")],
         )
@@ -337,7 +337,7 @@ def check_within(scope: Scope, node: Within) -> None:
         scope.report.add(
             codes.NOT_COMPARABLE,
             node.span,
-            "only `local time` can be in a range of times, and both its ends are written out",
+            "a range of times needs `local time` and two constant ends",
             help="write `local time in 08:00 .. 18:00`",
         )
 
@@ -354,8 +354,8 @@ def check_one_of(scope: Scope, node: OneOf) -> None:
         scope.report.add(
             codes.NOT_COMPARABLE,
             node.subject.span,
-            f"`in {{ ... }}` asks for a value of an enumeration, and this is {subject.type.describe()}",
-            help="write `in low .. high` for numbers" if subject.type.kind is Kind.NUMBER else None,
+            f"`in {{ ... }}` needs a value of an enumeration, not {subject.type.describe()}",
+            help="write `in LOW .. HIGH` for numbers" if subject.type.kind is Kind.NUMBER else None,
             labels=declaration_labels(scope, node.subject),
         )
         return
@@ -375,10 +375,10 @@ def check_window(scope: Scope, window: Quantity) -> None:
     scope.report.add(
         codes.WINDOW_LENGTH,
         window.span,
-        f"`{scope.report.text(window.span)}` is longer than what is kept on board"
+        f"the window `{scope.report.text(window.span)}` is longer than the onboard history"
         if longer
-        else f"a window of `{scope.report.text(window.span)}` has no moment in it",
-        help=f"a window is longer than `0 s`, and at most `{display(MAX_WINDOW, Dimension.DURATION)}`",
+        else f"the window `{scope.report.text(window.span)}` is empty",
+        help=f"write a window above `0 s`, at most `{display(MAX_WINDOW, Dimension.DURATION)}`",
     )
 
 
@@ -389,18 +389,18 @@ def check_observable(scope: Scope, node: Temporal) -> None:
             scope.report.add(
                 codes.TIMED_ARGUMENT,
                 part.span,
-                "what is observed over time cannot ask for the mission's phase",
-                help="ask for the phase beside it, as in `phase == inspection and ... for the last 3 s`",
-                labels=[(node.span, "this is observed whether or not a mission flies")],
+                "a temporal condition cannot read the phase",
+                help="test the phase separately, as in `phase == inspection and ... for the last 3 s`",
+                labels=[(node.span, "this is observed also without a mission")],
             )
         elif isinstance(part, Reference) and isinstance(found := scope.find(part.name), Argument):
             scope.report.add(
                 codes.TIMED_ARGUMENT,
                 part.span,
-                f"what is observed over time cannot read the argument `{part.name}`",
-                help="compare signals, zones and times with what is written out",
+                f"a temporal condition cannot read the argument `{part.name}`",
+                help="compare signals, zones and times with constants",
                 labels=[
-                    (node.span, "this is observed whether or not the skill runs"),
+                    (node.span, "this is observed also when the skill does not run"),
                     (found.declaration.span, f"`{part.name}` is declared here"),
                 ],
             )
@@ -420,8 +420,8 @@ def _exact(scope: Scope, edge: Edge) -> None:
                 codes.TIMED_ARGUMENT,
                 part.span,
                 f"`{'rising' if edge.rising else 'falling'}` cannot read a grown zone",
-                help="declare a zone of the shape that you mean",
-                labels=[(edge.span, "an edge reads its condition both ways, and a grown zone is safe one way only")],
+                help="declare a zone with the grown shape",
+                labels=[(edge.span, "an edge needs an exact zone, and a grown zone is a safe approximation")],
             )
 
 
@@ -440,9 +440,9 @@ def _banded(scope: Scope, edge: Edge, region: Reference) -> None:
         "exactly",
         help="declare a zone whose floor and ceiling are above home",
         labels=[
-            (edge.span, "an edge reads its condition both ways, and the band is safe one way only"),
+            (edge.span, "an edge needs an exact zone"),
             (above_sea.span, "above sea"),
-            (error.span, "how far the real elevation may differ"),
+            (error.span, "the error of the elevation"),
         ],
     )
 

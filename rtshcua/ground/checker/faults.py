@@ -38,7 +38,7 @@ def fault_of(context: CheckContext, call: FaultCall) -> Fault | None:
         context.report.add(
             codes.MISSING_ARGUMENT,
             call.span,
-            f"`{call.name.text}` is written without {' and '.join(f'`{name}`' for name in missing)}",
+            f"`{call.name.text}` lacks {' and '.join(f'`{name}`' for name in missing)}",
             help=f"add {', '.join(f'`{name} = {example(known[name])}`' for name in missing)}",
         )
     return kind(at_us=0, **values) if len(context.report.found) == before else None
@@ -57,16 +57,18 @@ def example(parameter: FaultField) -> str:
 def _given(context: CheckContext, call: FaultCall, known: dict[str, FaultField]) -> dict[str, ArgumentValue]:
     """The arguments that have the name of a parameter, each once."""
     report, given = context.report, dict[str, ArgumentValue]()
-    takes = f"it takes {listed(known)}" if known else "it takes nothing"
+    takes = f"its arguments are {listed(known)}" if known else "it takes no arguments"
     for argument in call.arguments:
         if argument.name is None:
             only = next(iter(known)) if len(known) == 1 else None
             report.add(
                 codes.TOO_MANY_ARGUMENTS,
                 argument.span,
-                f"what is said of `{call.name.text}` has no name before it",
+                f"an argument of `{call.name.text}` lacks its name",
                 help=takes if only is None else f"write `{only} = {report.text(argument.span)}`",
-                fix=None if only is None else (argument.span, f"{only} = {report.raw(argument.span)}", "name it"),
+                fix=None
+                if only is None
+                else (argument.span, f"{only} = {report.raw(argument.span)}", f"add `{only} =`"),
             )
             continue
         name = argument.name.text
@@ -74,7 +76,7 @@ def _given(context: CheckContext, call: FaultCall, known: dict[str, FaultField])
             report.add(
                 codes.UNKNOWN_ARGUMENT,
                 argument.name.span,
-                f"`{call.name.text}` has no `{name}`",
+                f"`{call.name.text}` has no argument `{name}`",
                 help=suggestion(name, known) or takes,
                 fix=correction(report, argument.name.span, name, known),
             )
@@ -108,8 +110,8 @@ def _word(
         context.report.add(
             codes.WRONG_TYPE if word is None else codes.UNKNOWN_MEMBER,
             value.span,
-            f"`{context.report.text(value.span)}` is no `{parameter.name}` of `{call.name.text}`",
-            help=(None if word is None else suggestion(word, words)) or f"there are {listed(words)}",
+            f"`{context.report.text(value.span)}` is not a value of `{parameter.name}` of `{call.name.text}`",
+            help=(None if word is None else suggestion(word, words)) or f"its values are {listed(words)}",
             fix=None if word is None else correction(context.report, value.span, word, words),
         )
         return None
@@ -123,7 +125,7 @@ def _name(context: CheckContext, parameter: FaultField, value: Value) -> str | N
         context.report.add(
             codes.WRONG_TYPE,
             value.span,
-            f"`{context.report.text(value.span)}` is no name, and `{parameter.name}` is one",
+            f"`{context.report.text(value.span)}` is not a name, as `{parameter.name}` needs",
         )
         return None
     known = context.dialect.messages
@@ -164,8 +166,8 @@ def _number(context: CheckContext, parameter: FaultField, value: Value) -> int |
         context.report.add(
             codes.NOT_EXACT,
             value.span,
-            f"`{written}` is finer than `{parameter.name}` can be",
-            help=f"the nearest below is `{near}`",
+            f"`{written}` is finer than the resolution of `{parameter.name}`",
+            help=f"the nearest lower value is `{near}`",
         )
         return None
     return whole // canonical if _fits(context, parameter, value, whole // canonical, dimension) else None
@@ -184,8 +186,8 @@ def _fits(context: CheckContext, parameter: FaultField, value: Value, least: int
         context.report.add(
             codes.NUMBER_SIZE,
             value.span,
-            f"`{written}` is more than `{parameter.name}` can be",
-            help=f"at most {display(most * canonical, dimension)}",
+            f"`{written}` exceeds the maximum of `{parameter.name}`",
+            help=f"the maximum is {display(most * canonical, dimension)}",
         )
         return False
     return True

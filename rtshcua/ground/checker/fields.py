@@ -82,8 +82,8 @@ def size(context: CheckContext, node: Node, dimension: Dimension, value: int, mo
     context.report.add(
         codes.NUMBER_SIZE,
         node.span,
-        f"`{context.report.text(node.span)}` is larger than what fits on board",
-        help=f"at most {display(limit, dimension)}",
+        f"`{context.report.text(node.span)}` is too large",
+        help=f"the maximum is {display(limit, dimension)}",
     )
     return False
 
@@ -95,8 +95,8 @@ def one_of(context: CheckContext, code: Code, name: Name, known: Collection[str]
     context.report.add(
         code,
         name.span,
-        f"there is no {what} `{name.text}`",
-        help=suggestion(name.text, known) or "there are " + ", ".join(f"`{each}`" for each in known),
+        f"unknown {what} `{name.text}`",
+        help=suggestion(name.text, known) or "accepted: " + ", ".join(f"`{each}`" for each in known),
         fix=correction(context.report, name.span, name.text, known),
     )
     return False
@@ -109,7 +109,7 @@ def on_globe(context: CheckContext, place: Coordinates) -> bool:
     context.report.add(
         codes.BAD_COORDINATES,
         place.span,
-        f"`{context.report.text(place.span)}` is not a place that can be flown to",
-        help="latitudes go from 85 S to 85 N, longitudes from 180 W to 180 E",
+        f"`{context.report.text(place.span)}` is outside the supported coordinates",
+        help="latitudes are from 85 S to 85 N, longitudes from 180 W to 180 E",
     )
     return False

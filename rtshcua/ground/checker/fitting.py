@@ -18,10 +18,10 @@ def fit(scope: Scope, node: Value, found: Typed, expected: Type, asked: tuple[Sp
     """`found` as a value of type `expected`; a constant length is an altitude above home where one is asked."""
     if found.type == expected:
         return found
-    asked_altitude = expected.dimension is Dimension.ALTITUDE
-    if asked_altitude and found.type == LENGTH and found.constant is not None and expected.datum is Datum.HOME:
+    is_altitude = expected.dimension is Dimension.ALTITUDE
+    if is_altitude and found.type == LENGTH and found.constant is not None and expected.datum is Datum.HOME:
         return Typed(expected, found.constant)
-    datum = asked_altitude and (
+    datum = is_altitude and (
         found.type.dimension is Dimension.ALTITUDE or (found.type == LENGTH and found.constant is not None)
     )
     if datum:
@@ -53,7 +53,8 @@ def stored(scope: Scope, node: Value, type: Type, constant: Fraction) -> int | N
     unit = CANONICAL[Dimension.LENGTH if type.dimension is Dimension.ALTITUDE else type.dimension]
     below = floor(constant)
     near = " and ".join(f"`{display(each, type.dimension)}`" for each in (below, below + 1))
-    kept = "it is a plain number" if type.dimension is Dimension.COUNT else f"{type.describe()} is kept in whole {unit}"
+    plain = type.dimension is Dimension.COUNT
+    kept = "a number without a unit must be whole" if plain else f"{type.describe()} must be whole {unit}"
     scope.report.add(
         codes.NOT_EXACT,
         node.span,
@@ -71,12 +72,12 @@ def _accepted(scope: Scope, node: Value, expected: Type, replacement: str | None
     if expected == POSITION:
         zone = scope.find(node.name) if isinstance(node, Reference) else None
         if replacement is not None:
-            return f"write `{replacement}` for the place where the zone is entered"
+            return f"write `{replacement}` for the entry of the zone"
         if isinstance(zone, ZoneDecl):
-            return f"give the zone `{zone.name.text}` an `entry` to fly to, or write coordinates"
+            return f"add an `entry` to the zone `{zone.name.text}`, or write coordinates"
         return "write coordinates, as in `47.3977 N, 8.5456 E`, or a zone's entry, as in `bridge.entry`"
     if replacement is not None:
-        return f"write `{replacement}`, if that is what you mean"
+        return f"did you mean `{replacement}`?"
     if expected.kind is Kind.NUMBER and expected.dimension is not None:
         example = EXAMPLES[expected.dimension] + (" above sea" if expected.datum is Datum.SEA else "")
         return f"write {expected.describe()}, such as `{example}`"

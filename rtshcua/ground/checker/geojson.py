@@ -96,14 +96,14 @@ def refuse_unread(tree: dict[str, Any], pointer: str = "") -> None:
     found = [*_members(tree.get("geometry"), f"{pointer}/geometry"), *_members(tree, pointer)]
     if not found:
         return
-    told = [f"a {what.value} at `{place}`" for place, what in found[:MOST_TOLD]]
+    named = [f"a {what.value} at `{place}`" for place, what in found[:MOST_TOLD]]
     more = f" and {len(found) - MOST_TOLD} more" if len(found) > MOST_TOLD else ""
-    raise NoArea(codes.GEOJSON_UNREAD, f"it says what a zone does not take over: {', '.join(told)}{more}", _HELP)
+    raise NoArea(codes.GEOJSON_UNREAD, f"it has members that a zone ignores: {', '.join(named)}{more}", _HELP)
 
 
 _HELP = (
     "write heights as `floor` and `ceiling`, times as `active`, a circle as `circle(...)` in the source, "
-    "and take these members out of the file"
+    "and remove these members from the file"
 )
 
 
@@ -113,8 +113,8 @@ def refuse_height(numbers: list[str], pointer: str) -> None:
         if Decimal(text):
             raise NoArea(
                 codes.GEOJSON_UNREAD,
-                f"the position at `{pointer}` has a height, {text}, which a zone does not take over",
-                "write heights as `floor` and `ceiling` in the source, and take them out of the file's positions",
+                f"the position at `{pointer}` has a height, {text}, which a zone ignores",
+                "write heights as `floor` and `ceiling` in the source, and remove them from the positions of the file",
             )
 
 
@@ -177,7 +177,7 @@ def chosen(tree: Any, feature: str | None) -> tuple[dict[str, Any], str]:
     if not isinstance(kind, str) or kind not in (*GEOMETRIES, "Feature", "FeatureCollection"):
         raise NoArea(
             codes.NOT_GEOJSON,
-            "it is JSON, and no GeoJSON object",
+            "it is JSON, but not a GeoJSON object",
             'a GeoJSON object has a `"type"`, such as `"FeatureCollection"` (RFC 7946, 3)',
         )
     _reference_system(tree)
@@ -185,10 +185,10 @@ def chosen(tree: Any, feature: str | None) -> tuple[dict[str, Any], str]:
         return _among(tree, feature)
     if kind == "Feature":
         if feature is not None and feature not in _names(tree):
-            raise NoArea(codes.GEOJSON_SHAPE, f"its one feature is not called `{feature}`", _known([tree]))
+            raise NoArea(codes.GEOJSON_SHAPE, f"its only feature is not named `{feature}`", _known([tree]))
         return _geometry(tree, "")
     if feature is not None:
-        raise NoArea(codes.GEOJSON_SHAPE, f"it is a {kind}, and has no features", "leave out `feature`")
+        raise NoArea(codes.GEOJSON_SHAPE, f"it is a {kind} without features", "remove `feature`")
     refuse_unread(tree)
     return _area(tree, "")
 
@@ -206,16 +206,16 @@ def _among(tree: dict[str, Any], feature: str | None) -> tuple[dict[str, Any], s
         what = "are areas"
     else:
         found = [number for number, each in enumerate(features) if feature in _names(each)]
-        what = f"are called `{feature}`"
+        what = f"are named `{feature}`"
     if len(found) == 1:
         refuse_unread(tree)
         return _geometry(features[found[0]], f"/features/{found[0]}")
     if feature is not None and not found:
-        raise NoArea(codes.GEOJSON_SHAPE, f"none of its features is called `{feature}`", _known(features, feature))
+        raise NoArea(codes.GEOJSON_SHAPE, f"no feature is named `{feature}`", _known(features, feature))
     raise NoArea(
         codes.GEOJSON_SHAPE,
         f"{len(found) or 'none'} of its {len(features)} features {what}",
-        _known([features[number] for number in found]) if feature is None else "give each an id of its own",
+        _known([features[number] for number in found]) if feature is None else "give each feature a unique id",
     )
 
 
@@ -265,16 +265,16 @@ def _names(feature: dict[str, Any]) -> Iterator[str]:
             yield text
 
 
-def _known(features: list[dict[str, Any]], asked: str | None = None) -> str | None:
+def _known(features: list[dict[str, Any]], wanted: str | None = None) -> str | None:
     """A hint at the features' names."""
     names = [name for name in dict.fromkeys(name for each in features for name in _names(each)) if name.isprintable()]
-    near = None if asked is None else nearest(asked, names)
+    near = None if wanted is None else nearest(wanted, names)
     if near is not None:
         return f"did you mean `{near}`?"
     if not names:
         return "give the feature an `id`, or a property `name`"
     more = "" if len(names) <= MOST_NAMED else f" and {len(names) - MOST_NAMED} more"
-    return "name one of them with `feature`: " + ", ".join(f"`{name}`" for name in names[:MOST_NAMED]) + more
+    return "select one with `feature`: " + ", ".join(f"`{name}`" for name in names[:MOST_NAMED]) + more
 
 
 def _reference_system(tree: dict[str, Any]) -> None:
@@ -284,10 +284,10 @@ def _reference_system(tree: dict[str, Any]) -> None:
     properties = crs.get("properties") if isinstance(crs, dict) else None
     name = properties.get("name") if isinstance(properties, dict) else None
     if crs is not None and not (isinstance(name, str) and _WGS84.fullmatch(name)):
-        told = f", `{name}`," if isinstance(name, str) and name.isprintable() and len(name) < 80 else ""
+        shown = f" `{name}`" if isinstance(name, str) and name.isprintable() and len(name) < 80 else ""
         raise NoArea(
             codes.GEOJSON_SHAPE,
-            f"its `crs`{told} does not name WGS 84, the one reference system of GeoJSON",
+            f"its `crs`{shown} is not WGS 84, the only reference system of GeoJSON",
             "convert it to longitudes and latitudes in WGS 84 (RFC 7946, 4)",
         )
 
@@ -360,7 +360,7 @@ def read_area(data: bytes, feature: str | None) -> tuple[GeoPolygon, ...]:
     """The polygons of the one area in a file, or of the feature with that id or name; raises `NoArea`."""
     kind = recognised(data)
     if kind is not None and kind is not GEOJSON:
-        raise NoArea(codes.NOT_GEOJSON, f"it is {kind.name}, and no GeoJSON", kind.help or None)
+        raise NoArea(codes.NOT_GEOJSON, f"it is {kind.name}, not GeoJSON", kind.help or None)
     geometry, pointer = chosen(_json(data), feature)
     return _polygons(geometry, pointer)
 
@@ -448,12 +448,12 @@ def _read(text: str, constant: Callable[[str], Any]) -> Any:
 
 def _too_many() -> NoArea:
     return _not_json(
-        f"it has more than {MAX_VALUES} values beside its positions: leave the features out that are not needed"
+        f"it has more than {MAX_VALUES} values besides its positions: remove the features that are not needed"
     )
 
 
 def _nested() -> NoArea:
-    return _not_json(f"it is nested more than {MAX_DEPTH} deep")
+    return _not_json(f"it is nested more than {MAX_DEPTH} levels deep")
 
 
 def _too_deep(bare: bytes) -> bool:
@@ -485,9 +485,9 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     made: dict[str, Any] = {}
     for key, value in pairs:
         if key in made:  # RFC 7493, 2.3: names must be unique; RFC 8259 leaves open what else they mean
-            raise _not_json(f"the key `{key}` is written twice in one object")
+            raise _not_json(f"an object repeats the key `{key}`")
         if isinstance(value, Run) and value.count() > 1:
-            raise _not_json(f"the key `{key}` has several values, without brackets around them")
+            raise _not_json(f"the key `{key}` has several values without brackets")
         made[key] = value
     return made
 
@@ -503,8 +503,8 @@ def _polygons(geometry: dict[str, Any], pointer: str) -> tuple[GeoPolygon, ...]:
     if count > MAX_VERTICES + MAX_RINGS:  # what is really too much is known in the local plane
         raise NoArea(
             codes.GEOJSON_SHAPE,
-            f"the area at `{pointer}` has {count:,} positions, and at most {MAX_VERTICES:,} corners fit on board",
-            "simplify it to what matters for a flight",
+            f"the area at `{pointer}` has {count:,} positions; the limit is {MAX_VERTICES:,} corners",
+            "simplify the outline",
         )
     coordinates = _array(_laid_out(written), pointer)
     if geometry["type"] == "Polygon":
@@ -555,18 +555,18 @@ def _holes(rings: Sequence[GeoRing], pointer: str) -> None:
             codes.GEOJSON_SHAPE,
             f"the hole at `{pointer}/{max(one, other)}` crosses or touches the ring at `{pointer}/{min(one, other)}`: "
             f"the edge from {_written(rings[one][i])} meets the one from {_written(rings[other][j])}",
-            "a hole lies within the polygon, apart from all others",
+            "a hole must be inside the polygon and outside all other holes",
         )
     for number, hole in enumerate(rings[1:], 1):
         around = next((i for i, each in enumerate(rings[1:], 1) if i != number and contains(each, hole[0])), None)
         if around is not None or not contains(rings[0], hole[0]):
             where = (
-                f"outside of its polygon, `{pointer}/0`" if around is None else f"in the hole at `{pointer}/{around}`"
+                f"outside its polygon, `{pointer}/0`" if around is None else f"inside the hole at `{pointer}/{around}`"
             )
             raise NoArea(
                 codes.GEOJSON_SHAPE,
-                f"the hole at `{pointer}/{number}` lies {where}",
-                "a hole lies within the polygon, apart from all others",
+                f"the hole at `{pointer}/{number}` is {where}",
+                "a hole must be inside the polygon and outside all other holes",
             )
 
 
@@ -577,15 +577,15 @@ def _ring(positions: Sequence[Any], pointer: str) -> GeoRing:
     if len(positions) < 4:
         raise NoArea(
             codes.GEOJSON_SHAPE,
-            f"the ring at `{pointer}` has too few positions: {len(positions)}, and it needs four",
-            "a ring ends with the position that it begins with (RFC 7946, 3.1.6)",
+            f"the ring at `{pointer}` has {len(positions)} positions; it needs four",
+            "a ring ends with its first position (RFC 7946, 3.1.6)",
         )
     corners = [_position(_array(each, f"{pointer}/{i}"), f"{pointer}/{i}") for i, each in enumerate(positions)]
     if corners[0] != corners[-1]:
         raise NoArea(
             codes.GEOJSON_SHAPE,
             f"the ring at `{pointer}` is not closed",
-            "a ring ends with the position that it begins with (RFC 7946, 3.1.6)",
+            "a ring ends with its first position (RFC 7946, 3.1.6)",
         )
     for i, (a, b) in enumerate(pairwise(corners)):
         if abs(a[0] - b[0]) > MAX_LONGITUDE * int(_DEGREE):
@@ -596,7 +596,7 @@ def _ring(positions: Sequence[Any], pointer: str) -> GeoRing:
             )
     ring = [a for a, b in pairwise(corners) if a != b]
     if len(ring) < 3:
-        raise NoArea(codes.GEOJSON_SHAPE, f"the ring at `{pointer}` encloses nothing")
+        raise NoArea(codes.GEOJSON_SHAPE, f"the ring at `{pointer}` encloses no area")
     met = crossing(ring)
     if met is not None:
         one, other = (_written(ring[i]) for i in met)
@@ -624,10 +624,10 @@ def _position(numbers: Sequence[Any], pointer: str) -> Point:
         swapped = east <= MAX_LATITUDE and north <= MAX_LONGITUDE
         raise NoArea(
             codes.GEOJSON_SHAPE,
-            f"`{pointer}` is {longitude}, {latitude}, which is not a place that can be flown to",
+            f"`{pointer}` is {longitude}, {latitude}, outside the supported coordinates",
             "the longitude comes first (RFC 7946, 3.1.1)"
             if swapped
-            else "longitudes go from -180 to 180, latitudes from -85 to 85",
+            else "longitudes are from -180 to 180, latitudes from -85 to 85",
         )
     return _whole(longitude), _whole(latitude)
 

@@ -64,7 +64,7 @@ def find_mission(context: CheckContext, name: str) -> MissionDecl | None:
         context.report.add(
             codes.UNKNOWN_NAME,
             None,
-            f"nothing declares a mission `{name}`",
+            f"the mission `{name}` is not declared",
             help=suggestion(name, context.symbols.missions),
         )
     return found
@@ -76,13 +76,13 @@ def _find(context: CheckContext, name: Name, table: Mapping[str, D], kind: type[
         return found
     if name.text in context.symbols.broken:
         return None
-    asked = WORDS[kind]
+    expected = WORDS[kind]
     other = context.symbols.declared.get(name.text)
     if other is None:
         context.report.add(
             codes.UNKNOWN_NAME,
             name.span,
-            f"nothing declares {asked} `{name.text}`",
+            f"`{name.text}` is not declared; expected {expected}",
             help=suggestion(name.text, table),
             fix=correction(context.report, name.span, name.text, table),
         )
@@ -90,7 +90,7 @@ def _find(context: CheckContext, name: Name, table: Mapping[str, D], kind: type[
         context.report.add(
             codes.WRONG_KIND,
             name.span,
-            f"`{name.text}` is {WORDS[type(other)]}; expected {asked}",
+            f"`{name.text}` is {WORDS[type(other)]}; expected {expected}",
             help=suggestion(name.text, table),
             fix=correction(context.report, name.span, name.text, table),
             labels=[(other.name.span, "declared here")],

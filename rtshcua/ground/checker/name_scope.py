@@ -85,7 +85,7 @@ class Scope:
                 f"`{name}` is {kind}, not a value",
                 help=None
                 if not of_type
-                else f"did you mean the signal `{of_type[0]}`, which is of this type?"
+                else f"did you mean the signal `{of_type[0]}` of this type?"
                 if len(of_type) == 1
                 else f"the signals of this type are {listed(of_type)}",
                 labels=[(self.symbols.declared[name].name.span, "declared here")],
@@ -97,7 +97,7 @@ class Scope:
             self.report.add(
                 codes.NO_ENTRY,
                 span,
-                f"the zone `{zone.name.text}` declares no entry",
+                f"the zone `{zone.name.text}` has no entry",
                 help="add `entry` and its coordinates to the zone",
                 labels=[(zone.name.span, "declared here")],
             )
@@ -109,7 +109,7 @@ class Scope:
                 codes.UNKNOWN_NAME,
                 span,
                 f"a zone has no `{name.rpartition('.')[2]}`",
-                help=f"the one place that is asked of a zone by name is its entry: write `{entry}`",
+                help=f"a zone has one named place, its entry: write `{entry}`",
                 labels=[(zone.name.span, "the zone is declared here")],
                 fix=(span, entry, f"write `{entry}`"),
             )
@@ -119,7 +119,7 @@ class Scope:
                 self.report.add(
                     codes.WRONG_KIND,
                     span,
-                    f"`{name}` is a value of `{enum.name.text}`, and nothing here has that type",
+                    f"`{name}` is a value of `{enum.name.text}`, which is not expected here",
                     help=f"compare it with a signal of the type `{enum.name.text}`",
                     labels=[(enum.name.span, "declared here")],
                 )
@@ -128,7 +128,7 @@ class Scope:
         self.report.add(
             codes.UNKNOWN_NAME,
             span,
-            f"nothing declares `{name}`",
+            f"`{name}` is not declared",
             help=suggestion(name, known),
             fix=correction(self.report, span, name, known),
         )

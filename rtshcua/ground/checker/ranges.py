@@ -84,11 +84,11 @@ def reported(dialect: Dialect, signal: SignalDecl, dimension: Dimension) -> Exte
 def accepted(extent: Extent, dimension: Dimension, value: Fraction | int) -> str:
     """What a signal can have instead of a value."""
     low = "" if extent.low is None else f"from `{display(ceil(extent.low), dimension)}`"
-    high = "" if extent.high is None else f"up to `{display(floor(extent.high), dimension)}`"
+    high = "" if extent.high is None else f"to `{display(floor(extent.high), dimension)}`"
     nearest = extent.low if extent.low is not None and value < extent.low else extent.high
     assert nearest is not None
     near = display(ceil(nearest) if nearest is extent.low else floor(nearest), dimension)
-    return f"it goes {low} {high or 'on'}".replace("  ", " ") + f"; the nearest value is `{near}`"
+    return f"its values are {' '.join(filter(None, (low, high)))}; the nearest is `{near}`"
 
 
 def check_compared(scope: Scope, node: Comparison, left: Typed, right: Typed) -> None:
@@ -124,9 +124,9 @@ def beyond(
     scope.report.add(
         codes.BEYOND_RANGE,
         written.span,
-        f"`{what}` is never as {'low' if low else 'high'} as `{text}`",
+        f"`{text}` is {'below' if low else 'above'} the range of `{what}`",
         help=accepted(extent, dimension, value),
-        labels=[] if signal is None else [(signal.name.span, "declared here, with the fields that carry it")],
+        labels=[] if signal is None else [(signal.name.span, "declared here, with its fields")],
     )
 
 

@@ -93,7 +93,7 @@ class Report:
                 if each is not worst:
                     del told[each]
             if len(some) > 1:
-                others = "other values of the mission's parameters fail here too"
+                others = "it also fails for other values of the mission's parameters"
                 told[worst] = replace(told[worst], help="; ".join(filter(None, (worst.help, others))))
         return tuple(told.values())
 

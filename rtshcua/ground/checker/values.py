@@ -77,8 +77,8 @@ def _parted(scope: Scope, node: Arithmetic) -> bool:
     scope.report.add(
         codes.UNKNOWN_NAME,
         name.span,
-        f"nothing declares `{name.name}`",
-        help=f"write `{meant}`: there is no space in a unit",
+        f"`{name.name}` is not declared",
+        help=f"write the unit without spaces: `{meant}`",
         fix=(number.span.to(name.span), meant, f"write `{meant}`"),
     )
     return True
@@ -130,7 +130,7 @@ def typed_range(scope: Scope, node: Range, expected: Type | None) -> tuple[Typed
         scope.report.add(
             codes.EMPTY_RANGE,
             node.span,
-            f"the range `{scope.report.text(node.span)}` is empty: its first end is above its second",
+            f"the range `{scope.report.text(node.span)}` is empty: its lower end is above its upper end",
             help=f"write `{swapped}`",
             fix=(node.span, swapped, "swap the ends"),
         )

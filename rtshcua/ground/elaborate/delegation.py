@@ -45,8 +45,8 @@ def delegated(
             context.report.add(
                 codes.TOO_MANY,
                 delegation.span,
-                f"with its delegations the policy has more than {MAX_RULES} rules, which do not fit on board",
-                help="delegate fewer skills, or along fewer ways",
+                f"the policy has more than {MAX_RULES} rules with its delegations, the limit",
+                help="delegate fewer skills, or to fewer roles",
             )
             break
     return tuple(found)
@@ -58,8 +58,9 @@ def _too_many(report: Report, delegations: Sequence[Delegation]) -> bool:
     for number, each in enumerate(delegations, 1):
         roles |= {each.grantor.text, each.grantee.text}
         if len(roles) > MAX_ROLES or number > MOST_DELEGATIONS:
-            what, most = ("roles", MAX_ROLES) if len(roles) > MAX_ROLES else ("delegations", MOST_DELEGATIONS)
-            report.add(codes.TOO_MANY, each.span, f"the policy delegates by more than {most} {what}")
+            many = len(roles) > MAX_ROLES
+            what, most = ("roles in delegations", MAX_ROLES) if many else ("delegations", MOST_DELEGATIONS)
+            report.add(codes.TOO_MANY, each.span, f"the policy has more than {most} {what}, the limit")
             return True
     return False
 
@@ -97,8 +98,8 @@ def _report_circle(report: Report, circle: Sequence[Delegation]) -> None:
         last.span,
         f"the role `{last.grantor.text}` delegates to itself"
         if own
-        else f"the role `{last.grantee.text}` is delegated what it has passed on itself",
-        help="leave it out: a role has what it is permitted anyway" if own else "delegate in one direction only",
+        else f"delegation cycle: the role `{last.grantee.text}` receives its own delegation",
+        help="remove it: a role keeps its own permissions" if own else "delegate in one direction only",
         labels=[
             (each.span, f"`{each.grantor.text}` delegates to `{each.grantee.text}` here")
             for each in circle
@@ -188,7 +189,7 @@ def _nothing(
 ) -> None:
     """Report every delegated skill that the grantor is not permitted. What anybody may needs no delegation."""
     if not delegation.skills and not made:
-        _report_nothing(context, delegation, delegation.grantor, "anything of its own", permits)
+        _report_nothing(context, delegation, delegation.grantor, "any skill", permits)
     for name in delegation.skills:
         about = [rule for rule in permits if not rule.skills or _names(rule.skills, name.text)]
         if any(not rule.roles for rule in about):
@@ -206,6 +207,6 @@ def _report_nothing(
         codes.NOTHING_DELEGATED,
         at.span,
         f"the role `{delegation.grantor.text}` is not permitted {what}" + (f" through {through}" if named else ""),
-        help="a role passes on what it has; permit it first, or leave this out",
+        help="a role can only delegate its own permissions: add a permit, or remove this",
         labels=[(rule.span, "permitted here, through other sources") for rule in named[:3]],
     )

@@ -30,7 +30,7 @@ def unrolled(report: Report, mission: MissionDecl) -> MissionDecl:
         report.add(
             codes.MISSION_STEPS,
             mission.name.span,
-            f"the mission `{mission.name.text}` has {total} steps, and at most {MAX_INVOCATIONS} fit on board",
+            f"the mission `{mission.name.text}` has {total} steps; the limit is {MAX_INVOCATIONS}",
             help="repeat less, or split it into several missions",
             labels=[(most.count.span, f"these are {most.count.value * _total(most.items)} steps")],
         )
@@ -53,7 +53,7 @@ def _is_positive(report: Report, repeat: Repeat) -> bool:
             codes.NOT_POSITIVE,
             count.span,
             f"`{report.text(count.span)}` must be above zero",
-            help="what is never done is left out",
+            help="remove a `repeat` that is never flown",
         )
         return False
     return True
@@ -147,8 +147,8 @@ def _fitting(context: CheckContext, policy: PolicyDecl, rules: tuple[RuleDecl, .
     context.report.add(
         codes.TOO_MANY,
         policy.name.span,
-        f"`{policy.name.text}` has more than {MAX_RULES:,} rules, which is what fits on board",
-        help="the rules after those are not looked at; write fewer, with wider conditions",
+        f"`{policy.name.text}` has more than {MAX_RULES:,} rules, the limit",
+        help="later rules were not checked; write fewer rules, with wider conditions",
     )
     return rules[:MAX_RULES]
 

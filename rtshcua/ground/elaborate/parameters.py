@@ -79,7 +79,7 @@ def parse_settings(options: Sequence[str]) -> ParameterSettings:
         start += len(text) + 1
         if not separator or not here.text or not written.strip():
             whole = Span(FILE, here.span.start, place.end)
-            message = f"`{text}` gives no value to a parameter"
+            message = f"`{text}` is not a parameter with a value"
             found.append(Diagnostic(codes.SYNTAX, message, whole, 'write a name and a value, as in `height="20 m"`'))
             continue
         value, wrong = parse_value(written, place, at.__add__)
@@ -122,7 +122,7 @@ def assigned(context: CheckContext, mission: MissionDecl, settings: ParameterSet
         context.report.add(
             codes.MISSING_ARGUMENT,
             declared.span,
-            f"the mission `{mission.name.text}` is compiled without a value for `{name}`",
+            f"the mission `{mission.name.text}` has no value for `{name}`",
             help=f"compile it with `--set {name}=...`, or declare a default",
         )
     if len(context.report.found) > before or len(values) < len(known):
@@ -135,7 +135,9 @@ def _given(context: CheckContext, mission: MissionDecl, settings: ParameterSetti
     known = {parameter.name.text for parameter in mission.parameters}
     for name, _ in settings.values:
         if name.text not in known:
-            takes = "its parameters are " + ", ".join(f"`{each}`" for each in known) if known else "it has none"
+            takes = (
+                "its parameters are " + ", ".join(f"`{each}`" for each in known) if known else "it has no parameters"
+            )
             context.report.add(
                 codes.UNKNOWN_ARGUMENT,
                 name.span,
@@ -160,9 +162,9 @@ def instances(context: CheckContext, mission: MissionDecl, files: frozenset[str]
                 context.report.found.append(
                     Diagnostic(
                         codes.UNDECIDED,
-                        f"the mission `{mission.name.text}` is not checked, for nothing is known of `{name}`",
+                        f"the mission `{mission.name.text}` was not checked: `{name}` has no value",
                         argument.declaration.span,
-                        "declare a default place, with which it is checked",
+                        "declare a default position",
                     )
                 )
             return
@@ -212,7 +214,7 @@ def ambiguous(context: CheckContext, mission: MissionDecl) -> bool:
                     context.report.add(
                         codes.SHADOWED_NAME,
                         reference.span,
-                        f"`{name}` is a parameter of the mission, and {other}",
+                        f"`{name}` is both a parameter of the mission and {other}",
                         help="give the mission's parameter another name",
                         labels=[(own[name].span, "the mission's")],
                     )

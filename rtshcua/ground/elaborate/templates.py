@@ -94,7 +94,7 @@ def _bound(context: CheckContext, template: TemplateDecl, use: Use) -> TemplateB
 
 
 def _role(context: CheckContext, parameter: ParameterDecl, written: Value) -> str | None:
-    kind = "no name"
+    kind = "not a name"
     if isinstance(written, Reference) and "." not in written.name:
         declared = context.symbols.kind_of(written.name)
         if declared is None:

@@ -20,17 +20,17 @@ class Formatted:
 
 
 def formatted(source: Source, width: int = WIDTH) -> Formatted:
-    """`source` in the one style, in lines of at most `width` characters where that can be.
+    """Return `source` in the standard style, in lines of at most `width` characters where possible.
 
-    A text that the parser does not take is refused with what `parse` says of it. So is one of which the result would
-    not say the same, with the same comments in the same places (E1502).
+    A text with syntax errors is refused with the findings of `parse`, and a text whose meaning or comments would change
+    with E1502.
     """
     made = format_text(source.text, width)
     if isinstance(made, str):
         return Formatted(made)
     if made is None:
-        told = parse(source).diagnostics
-        if not told and (taken := read(source.text)) is not None and has_too_many_comments(taken):
-            told = (too_many_comments(source.file),)
-        return Formatted(None, told or (FormatDifference("what can be read", 0).told(source),))
-    return Formatted(None, (made.told(source),))
+        found = parse(source).diagnostics
+        if not found and (tokens := read(source.text)) is not None and has_too_many_comments(tokens):
+            found = (too_many_comments(source.file),)
+        return Formatted(None, found or (FormatDifference("the syntax", 0).finding(source),))
+    return Formatted(None, (made.finding(source),))

@@ -26,14 +26,14 @@ class FormatDifference(NamedTuple):
     what: str
     offset: int
 
-    def told(self, source: Source) -> Diagnostic:
-        """As a finding: a fault of ours, for which nothing was written."""
+    def finding(self, source: Source) -> Diagnostic:
+        """The finding on this internal fault."""
         start = max(0, min(self.offset, len(source.text) - 1))
         return Diagnostic(
             UNSAFE_FORMAT,
-            f"formatting would change {self.what} here, so the file is left as it is",
+            f"formatting would change {self.what} here, so the file was not changed",
             Span(source.file, start, min(start + 1, len(source.text))),
-            "this is a fault of ours: please report it, with the file",
+            "this is an internal fault: please report it with the file",
         )
 
 
@@ -56,10 +56,10 @@ def difference(before: TokenizedText, after: TokenizedText | None) -> FormatDiff
     and go.
     """
     if after is None:
-        return FormatDifference("what can be read", 0)
+        return FormatDifference("the syntax", 0)
     one, other = _comparable(before), _comparable(after)
     if one.words != other.words:
-        return FormatDifference("a word", _offset_of(one, _first(one.words, other.words)))
+        return FormatDifference("a token", _offset_of(one, _first(one.words, other.words)))
     if before.rules != after.rules:
         return FormatDifference("the meaning", 0)
     if one.comments != other.comments:
@@ -67,7 +67,7 @@ def difference(before: TokenizedText, after: TokenizedText | None) -> FormatDiff
         words = one.comments[number][0] if number < len(one.comments) else len(one.words)
         return FormatDifference("a comment", _offset_of(one, words))
     if one.ignored != other.ignored:
-        return FormatDifference("what a comment ignores", 0)
+        return FormatDifference("the line of an `ignore` comment", 0)
     return None
 
 
@@ -177,8 +177,8 @@ def not_formatted(source: Source, text: str) -> Diagnostic | None:
     end = start + len(old[same]) if same < len(old) else start
     return Diagnostic(
         NOT_FORMATTED,
-        "this is not laid out in the one style",
+        "the source is not formatted",
         Span(source.file, start, end),
-        f"`rtshcua fmt {source.file}` lays it out",
-        fixes=(Fix(Span(source.file, 0, len(source.text)), text, "lay the file out", Applicability.SAFE),),
+        f"run `rtshcua fmt {source.file}`",
+        fixes=(Fix(Span(source.file, 0, len(source.text)), text, "format the file", Applicability.SAFE),),
     )

@@ -1,5 +1,5 @@
-"""The language: text to typed IR. `parse` one text, `load` a file and all it imports.
+"""The language: from text to typed IR. `parse` parses one text, `load` loads a file and its imports.
 
-`grammar/rtshcua.lark` is the grammar; `generate` has Lark make the LALR table of it, `automaton` runs on that table,
-`build` makes the IR.
+`grammar/rtshcua.lark` is the grammar. `generate` makes its LALR table with Lark, `automaton` parses with that table,
+and `build` makes the IR.
 """

@@ -1,11 +1,10 @@
-"""Runs the LALR table over a text: reads a token, shifts it or reduces, and stops at the first that does not fit.
+"""The LALR parser: reads a token, shifts it or reduces, and stops at the first token that does not fit.
 
-Lark's own driver makes an object of each token and a tree of each rule. This one keeps offsets, hands the parts of a
-rule straight to its action, and leaves its stacks as they are when it stops, so that `recovery` can go on from there.
+Lark's own driver makes an object for each token and a tree for each rule. This driver keeps offsets and passes the
+parts of a rule directly to its action. When it stops, it keeps its stacks, so that `recovery` can continue.
 
-Fast twin of Lark's driver. Goal: text to IR in at most the time of a bare Lark parse (bench/parse.py); 0.34 of it,
-where Lark's tree would have to be walked besides (docs/adr/0006 and 0037). tests/unit/ground/language/test_any_text.py
-holds that both take the same texts.
+It is the fast counterpart of Lark's driver: text to IR takes 0.34 of the time of a bare Lark parse (bench/parse.py;
+docs/adr/0006 and 0037). tests/unit/ground/language/test_any_text.py checks that both accept the same texts.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,12 +17,12 @@ from rtshcua.ground.language.build.actions import ACTIONS
 from rtshcua.ground.language.build.reader import Action, Reader
 from rtshcua.ground.language.table import END, ParserTable, Production, table
 
-#: from the stack of values, where the rule's own begin in it, and the offsets at which its text starts and ends
+#: makes the value of a rule from the stack of values, the index of its first value, and its start and end offsets
 Make = Callable[[list[Any], int, int, int], object]
 
 
 class Reduction(NamedTuple):
-    """Pop `length` values, push what `make` makes of them, and go on with `origin`."""
+    """A reduction: pop `length` values, push the value of `make`, and continue with `origin`."""
 
     origin: str
     length: int
@@ -31,7 +30,7 @@ class Reduction(NamedTuple):
 
 
 def reduction(rule: Production, reader: Reader) -> Reduction:
-    """The reduction of `rule`, by its action or, if it has none, by what it keeps."""
+    """Return the reduction of `rule`: by its action, or by the values that it keeps."""
     if rule.action:
         make = _call(rule.kept, reader, ACTIONS[rule.action])
     elif rule.repeats:
@@ -43,7 +42,7 @@ def reduction(rule: Production, reader: Reader) -> Reduction:
 
 
 class Reductions(dict[int, Reduction]):
-    """The reductions by the rule's number, each made when it is first needed: a short text has need of few."""
+    """The reductions by the rule's number, made on demand: a short text needs few."""
 
     def __init__(self, rules: Sequence[Production], reader: Reader) -> None:
         super().__init__()
@@ -62,7 +61,7 @@ def _keep(at: int) -> Make:
 
 
 def _repeat(first: int, *more: int) -> Make:
-    """A list that begins with `first`, or is that list itself, so that a long list is not copied at every step."""
+    """Append to the list `first`, or start a list with it; a long list is not copied at every step."""
 
     def make(values: list[Any], base: int, start: int, end: int) -> object:
         made = [values[base + first]] if first >= 0 else values[base + ~first]
@@ -94,7 +93,7 @@ def _call(kept: tuple[int | None, ...], reader: Reader, action: Action) -> Make:
 
 
 class Failure(NamedTuple):
-    """The token at `[start, end)` does not fit: `kind` is its kind, empty for a character that begins no token."""
+    """The token at `[start, end)` does not fit. `kind` is its kind, empty if no token starts at this character."""
 
     start: int
     end: int
@@ -103,9 +102,9 @@ class Failure(NamedTuple):
 
 @dataclass(slots=True)
 class Automaton:
-    """The stacks of the parser: `values` and `starts` (offsets) have one entry for each state above the first.
+    """The parser and its stacks: `values` and `starts` (offsets) have one entry for each state above the first.
 
-    The action of a rule is called with the reader, the rule's span and the kept values.
+    It calls the action of a rule with the reader, the rule's span and the kept values.
     """
 
     reader: Reader
@@ -113,17 +112,17 @@ class Automaton:
     states: list[int] = field(default_factory=lambda: [0])
     values: list[Any] = field(default_factory=list)
     starts: list[int] = field(default_factory=list)
-    end: int = 0  # of the last token that was taken, when the parser has stopped
+    end: int = 0  # of the last shifted token, once the parser has stopped
     source: Source = field(init=False)
     rules: Reductions = field(init=False)
 
     def __post_init__(self) -> None:
-        """Binds each rule to its action, once for the text, however often the parser stops in it."""
+        """Bind each rule to its action, once for the text."""
         self.source = self.reader.source
         self.rules = Reductions(self.table.rules, self.reader)
 
     def run(self, offset: int) -> Failure | None:
-        """Parses from `offset` on; None when the text was read to its end."""
+        """Parse from `offset` on. Return the failure that stops the parser, or None at the end of the text."""
         rows, lexers, last = self.table.rows, self.table.lexers, self.table.end
         rules, states, values, starts = self.rules, self.states, self.values, self.starts
         text, skipped = self.source.text, self.table.skipped
@@ -145,7 +144,7 @@ class Automaton:
                     return self._failure(start)
             while True:
                 row = rows[states[-1]]
-                step = row.get(word)  # a word or a mark of the language, where it may stand here
+                step = row.get(word)  # a keyword or mark that fits here
                 if step is None:
                     step = row.get(kind)
                     if step is None:
@@ -172,7 +171,7 @@ class Automaton:
                     return None
 
     def _failure(self, start: int) -> Failure:
-        """No token that fits begins at `start`; perhaps one of another kind does."""
+        """The failure at `start`, where no fitting token starts; another kind of token may start there."""
         lexer = self.table.lexers.any
         token = lexer.match(self.source.text, start)
         if token and token.start(token.lastindex or 0) == start:

@@ -1,4 +1,4 @@
-"""Numbers and moments as they are written, made whole in the canonical unit; never through a float.
+"""Convert written numbers and moments to whole canonical units, without floats.
 
 Moments are those of RFC 3339 (section 5.6), in microseconds since 1970-01-01T00:00Z.
 """
@@ -17,7 +17,7 @@ LIMIT = 2**63 - 1
 PLAIN = UnitOfMeasure(Dimension.COUNT, 1)
 DEGREE = UNITS["deg"]
 
-#: What canonical units are called in the plural; a count has none.
+#: The plural names of canonical units; a count has none.
 CANONICAL: dict[Dimension, str] = {
     Dimension.LENGTH: "mm",
     Dimension.SPEED: "mm/s",
@@ -28,11 +28,11 @@ CANONICAL: dict[Dimension, str] = {
     Dimension.COUNT: "",
 }
 
-_DIGITS = 40  # more than any quantity has; keeps a text of a million digits from being computed
+_DIGITS = 40  # more than any quantity has; bounds the work for a text of a million digits
 
 
 class Trouble(Enum):
-    """Why a number has no exact value."""
+    """The reason why a number has no exact value."""
 
     UNKNOWN_UNIT = "unknown unit"
     NOT_EXACT = "not exact"
@@ -40,7 +40,7 @@ class Trouble(Enum):
 
 
 class Exact(NamedTuple):
-    """`value` in canonical units; where `trouble` is `NOT_EXACT`, the whole number nearest to what was written."""
+    """`value` in canonical units; if `trouble` is `NOT_EXACT`, the whole number nearest to the written one."""
 
     value: int
     dimension: Dimension
@@ -49,7 +49,7 @@ class Exact(NamedTuple):
 
 @lru_cache(maxsize=4096)
 def exact(number: str, unit: str | None, negative: bool = False) -> Exact:
-    """The value of `number` (digits, perhaps `_` and one `.`) in `unit`; no unit is a plain count."""
+    """Return the value of `number` (digits, with `_` and one `.` allowed) in `unit`; without a unit, a plain count."""
     known = PLAIN if unit is None else UNITS.get(unit)
     if known is None:
         return Exact(0, Dimension.COUNT, Trouble.UNKNOWN_UNIT)
@@ -79,28 +79,28 @@ _SECOND = 1_000_000  # us
 
 
 def utc_us(text: str) -> int:
-    """`text` in us since the epoch; the seconds may be left out. Raises ValueError with what is wrong with it.
+    """Return `text` in us since the epoch; the seconds are optional. Raises ValueError with the reason.
 
-    A leap second (`:60`) is refused: it has no place of its own in the time that the vehicle keeps.
+    A leap second (`:60`) is refused: the vehicle's time scale has no value for it.
     """
     found = _FORM.fullmatch(text)
     if found is None:
-        raise ValueError("it is not written as a date, `T`, a time, and `Z` or the distance from UTC")
+        raise ValueError("expected a date, `T`, a time, and `Z` or an offset from UTC")
     year, month, day, hour, minute, second, fraction, sign, hours, minutes = found.groups()
     fraction = (fraction or "").rstrip("0")
     if len(fraction) > 6:
-        raise ValueError("it has more than 6 decimals, and times are kept in whole us")
+        raise ValueError("seconds have at most 6 decimals")
     if int(hour) > 23 or int(minute) > 59 or int(second or 0) > 59:
-        raise ValueError("times go from `00:00:00` to `23:59:59`")
+        raise ValueError("times are from `00:00:00` to `23:59:59`")
     if int(hours or 0) > 23 or int(minutes or 0) > 59:
-        raise ValueError("the distance from UTC goes up to `23:59`")
+        raise ValueError("the offset from UTC is at most `23:59`")
     try:
         days = date(int(year), int(month), int(day)).toordinal() - _EPOCH
     except ValueError:
-        raise ValueError("there is no such day") from None
+        raise ValueError("the day does not exist") from None
     offset = (int(hours or 0) * 60 + int(minutes or 0)) * (-1 if sign == "-" else 1)
     seconds = (int(hour) * 60 + int(minute) - offset) * 60 + int(second or 0)
     value = days * DAY + seconds * _SECOND + int(fraction.ljust(6, "0"))
     if not 0 <= value <= MAX_VALUE:
-        raise ValueError("only moments from 1970 to 2255 are kept")
+        raise ValueError("the year must be from 1970 to 2255")
     return value

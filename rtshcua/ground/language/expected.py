@@ -1,4 +1,4 @@
-"""What the parser would take where it stands, in a person's words."""
+"""Describe the tokens that the parser accepts at its position."""
 
 import re
 from collections.abc import Iterable
@@ -10,7 +10,7 @@ from rtshcua.ground.language.table import END
 WORDS = {
     "<NAME>": "a name",
     "<NUMBER>": "a number",
-    "<STRING>": "a text in quotes",
+    "<STRING>": "a string in quotes",
     "<TIME_OF_DAY>": "a time of day",
     "<UNIT>": "a unit",
     "<COMPARE>": "a comparison",
@@ -37,26 +37,26 @@ WORDS = {
 _QUOTED = re.compile("`([^`]+)`")
 
 VALUE = {"<NAME>", "<NUMBER>", "<TIME_OF_DAY>", "<LOCAL_TIME>", "<FUNCTION>", "-", "("}
-CONDITION = {"not", "<_RISING>", "<_FALLING>"}  # what only a condition begins with
+CONDITION = {"not", "<_RISING>", "<_FALLING>"}  # tokens that only start a condition
 NUMBER = {"-", "<NUMBER>"}
 ARITHMETIC = {"+", "-", "*", "<DIVIDE>"}
-CONNECTING = {"and", "or", "for", "within"}  # what may follow a condition
+CONNECTING = {"and", "or", "for", "within"}  # tokens that may follow a condition
 SHAPE = {"<_CIRCLE>", "<_POLYGON>", "<_CORRIDOR>", "<COMBINE>"}
 
 
 def accepted(automaton: Automaton) -> set[str]:
-    """Every word, mark and kind of token that would be taken next."""
+    """The keywords, marks and kinds of token that are accepted next."""
     row = automaton.table.rows[automaton.states[-1]]
     return {symbol for symbol in row if _is_token(symbol) and _after(automaton, symbol) is not None}
 
 
 def beginnings(automaton: Automaton) -> set[str]:
-    """The words that begin a declaration."""
+    """The keywords that start a declaration."""
     return {word for word in automaton.table.words if shifts(automaton.table.rows[0], word)}
 
 
 def parts(automaton: Automaton, symbols: Iterable[str]) -> set[str]:
-    """Those of `symbols` that begin a part of the innermost open block."""
+    """Those of `symbols` that start a part of the innermost open block."""
     block = open_block(automaton)
     if block is None:
         return set()
@@ -65,20 +65,20 @@ def parts(automaton: Automaton, symbols: Iterable[str]) -> set[str]:
 
 
 def phrase(automaton: Automaton, word: str) -> str:
-    """`word` with the words that can only follow it: `stale after`, `lasts at most`."""
-    said, state = [word], _after(automaton, word) if word.isalpha() else None
+    """`word` with the keywords that must follow it: `stale after`, `lasts at most`."""
+    sequence, state = [word], _after(automaton, word) if word.isalpha() else None
     while state is not None:
         tokens = {symbol: step for symbol, step in automaton.table.rows[state].items() if _is_token(symbol)}
         (only, state) = next(iter(tokens.items())) if len(tokens) == 1 else ("", None)
         if state is not None and state >= 0 and only.isalpha():
-            said.append(only)
+            sequence.append(only)
         else:
             state = None
-    return " ".join(said)
+    return " ".join(sequence)
 
 
 def describe(automaton: Automaton, symbols: set[str]) -> str:
-    """`symbols` as a list for a sentence: groups by what they are, words and marks in backticks."""
+    """`symbols` as a list for a sentence: names of groups where possible, keywords and marks in backticks."""
     rest = set(symbols)
     said: list[str] = []
     if beginnings(automaton) <= rest:
@@ -112,7 +112,7 @@ def describe(automaton: Automaton, symbols: set[str]) -> str:
 
 
 def words(symbols: Iterable[str]) -> set[str]:
-    """The words of the language among `symbols`, also those that are kinds of token."""
+    """The keywords among `symbols`, also those that are kinds of token."""
     return {
         word for symbol in symbols for word in (_QUOTED.findall(WORDS.get(symbol, "")) or [symbol]) if _is_word(word)
     }
@@ -127,10 +127,10 @@ def _is_token(symbol: str) -> bool:
 
 
 def _after(automaton: Automaton, symbol: str) -> int | None:
-    """The state in which `symbol` leaves the parser, None where it does not fit; on a copy of the states."""
+    """The state of the parser after `symbol`, None if it does not fit. The parser itself stays unchanged."""
     rows, rules = automaton.table.rows, automaton.table.rules
     popped = 0
-    pushed: list[int] = []  # on what is left of the states: the copy, without copying what stays as it is
+    pushed: list[int] = []  # states above the remaining ones, so that the stack is not copied
     while True:
         state = pushed[-1] if pushed else automaton.states[len(automaton.states) - 1 - popped]
         if symbol == END and state == automaton.table.end:

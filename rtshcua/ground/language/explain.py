@@ -1,15 +1,15 @@
-"""Says what does not fit, what would, and where there is one, the change that would make it fit.
+"""Explain a syntax error: what was found, what is accepted, and the nearest correction.
 
-`habit` knows what people write who know other notations.
+`recognise` knows notations of other languages.
 """
 
 import re
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rtshcua.diagnostics.codes import SYNTAX, UNCLOSED
 from rtshcua.diagnostics.diagnostic import Diagnostic, Fix, Label
 from rtshcua.diagnostics.excerpt import SHOWN, short
-from rtshcua.diagnostics.span import Span
+from rtshcua.diagnostics.span import Source, Span
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.language.automaton import Automaton, Failure
 from rtshcua.ground.language.expected import (
@@ -27,7 +27,7 @@ from rtshcua.ground.language.recovery import at_line_start, open_braces, owner, 
 from rtshcua.ground.language.table import END, NAME
 from rtshcua.model.faults import KINDS
 
-#: Words of other policies and programs, and those that mean the same here.
+#: Words of other languages, and the keywords with the same meaning.
 WORDS = {
     "allow": "permit", "grant": "permit", "accept": "permit", "deny": "forbid", "prohibit": "forbid", "block": "forbid",
     "reject": "forbid", "disallow": "forbid", "if": "when", "where": "when", "is": "==", "equals": "==",
@@ -35,177 +35,206 @@ WORDS = {
     "cases": "table", "permit": "allow", "forbid": "deny", "setup": "nominal",
 }  # fmt: skip
 
-#: What charts call the datum of an altitude.
+#: Names of altitude datums on charts.
 DATUMS = {"agl": "above home", "ahl": "above home", "amsl": "above sea", "msl": "above sea", "asl": "above sea"}
 
-#: what the texts are that stand behind these words
+#: the help for a missing string after these keywords
 TEXTS = {
-    "test": 'a test is called by a text, as in `test "low battery" { ... }`',
-    "scenario": 'a scenario is called by a text, as in `scenario "gust at the bridge" { ... }`',
-    "at": 'a moment is written as in `at "2026-06-01T08:00:00Z"`',
+    "test": 'a test has a quoted name, as in `test "low battery" { ... }`',
+    "scenario": 'a scenario has a quoted name, as in `scenario "gust at the bridge" { ... }`',
+    "at": 'write a moment as in `at "2026-06-01T08:00:00Z"`',
 }
 _IS = re.compile(r"\bis\s+\Z")
-_TOLD = re.compile(r"\b(test|scenario|at)\s+\Z")
+_KEYWORD = re.compile(r"\b(import|test|scenario|at)\s+\Z")
 
 _EXPONENT = re.compile(r"(?<![A-Za-z0-9_.])[0-9][0-9_.]*[eE][0-9]*\s*\Z")
 _SIGNED = re.compile(r"-\s*([0-9][0-9_.]*)\s*([NSEW])\b")
 _OPPOSITE = {"N": "S", "S": "N", "E": "W", "W": "E"}
 _FILE = re.compile(r"<([^<>\"\n]*)>|([^\s\"<>]+)")
 _LAST = re.compile(r"[A-Za-z0-9_.]+\Z|\S\Z")
-LOOK_BACK = 80  # characters before a failure that may tell what was begun
+LOOK_BACK = 80  # characters before a failure that are searched for the keyword of an unfinished part
 
 
-class Habit(NamedTuple):
-    """What to say, the change that would make it fit, if there is one, and what is at fault, if not what was found."""
+class Advice(NamedTuple):
+    """A help, a fix if there is one, and the span and message of the finding if they are not those of the token."""
 
     help: str
     fix: Fix | None = None
-    at: tuple[Span, str] | None = None  # and the message for it
+    at: tuple[Span, str] | None = None
 
 
-def habit(automaton: Automaton, failure: Failure, symbols: set[str]) -> Habit | None:
-    """The notation that the author probably had in mind."""
-    source = automaton.source
-    span = Span(source.file, failure.start, failure.end)
-    found = source.slice(span)
-    before = source.text[max(0, failure.start - LOOK_BACK) : failure.start]
-    if symbols == {"<STRING>"} and re.search(r"\bimport\s+\Z", before):
-        return _import(automaton, failure)
-    if symbols == {"<STRING>"} and (told := _TOLD.search(before)):
-        return Habit(TEXTS[told[1]])
-    if symbols == {"known"} and (told := _IS.search(before)):
-        word = Span(source.file, failure.start - len(told[0]), failure.start - len(told[0]) + len("is"))
-        return Habit("did you mean `==`? `is` stands before `known` alone", Fix(word, "==", "write `==`"))
-    if found == "=" and before[-1:] == "=" and "<NUMBER>" in symbols:
-        return Habit("a value is given with one `=`", Fix(span, "", "write one `=`"))
-    if "<FAULT>" in symbols and found.replace("_", "-") in KINDS:
-        end = Span(source.file, failure.end, failure.end)
-        return Habit(f"a fault is written with brackets, as in `{found}(...)`", Fix(end, "()", "write `()`"))
-    meant = "=" if found == ":" and "=" in symbols else WORDS.get(found)
-    if meant is not None and (
-        meant in words(symbols) or meant in symbols or (meant == "==" and "<COMPARE>" in symbols)
-    ):
-        return Habit(f"did you mean `{meant}`?", Fix(span, meant, f"write `{meant}`"))
-    datum = DATUMS.get(found.casefold())
-    if datum is not None and "above" in symbols:
-        return Habit(f"write `{datum}`", Fix(span, datum, f"write `{datum}`"))
-    if found == "when" and symbols == {"by"}:
-        return _by_whom(automaton, span)
-    if found == "-":
-        return _signed(automaton, failure)
-    power = _EXPONENT.search(before)
-    if power is not None and (found[:1].isalnum() or found in ("-", "%", "+")):
-        number = power[0].rstrip()
-        start = failure.start - len(power[0])
-        at = Span(source.file, start, start + len(number)), f"`{number}` is not a number: there are no exponents"
-        return Habit("write all digits, which `_` may group, as in `20_000 m`", at=at)
-    if found == "," and re.match(r"\d", source.text[failure.end :][:1]) and before[-1:].isdigit():
-        return Habit("decimals stand behind a point, as in `20.5 m`", Fix(span, ".", "write a point"))
+class Stop(NamedTuple):
+    """Where the parser stopped: the token that does not fit, the text before it, and the symbols that would fit."""
+
+    source: Source
+    span: Span
+    found: str
+    before: str
+    symbols: set[str]
+
+
+def recognise(stop: Stop, values: list[Any]) -> Advice | None:
+    """Return the advice for a notation of other languages; `values` is the stack of the parser."""
+    return _string(stop) or _equality(stop) or _other_word(stop) or _missing_role(stop, values) or _number(stop)
+
+
+def _string(stop: Stop) -> Advice | None:
+    keyword = _KEYWORD.search(stop.before) if stop.symbols == {"<STRING>"} else None
+    if keyword is None:
+        return None
+    return _import(stop) if keyword[1] == "import" else Advice(TEXTS[keyword[1]])
+
+
+def _import(stop: Stop) -> Advice:
+    help = 'write the file name in quotes, as in `import "lib:skills/goto.rts"`'
+    named = _FILE.match(stop.source.text, stop.span.start)
+    if named is None or "\\" in named[0]:
+        return Advice(help)
+    quoted = f'"{named[1] or named[2] or ""}"'
+    return Advice(help, Fix(stop.span._replace(end=named.end()), quoted, f"write `{quoted}`"))
+
+
+def _equality(stop: Stop) -> Advice | None:
+    """`is` and `=` as comparisons."""
+    if stop.symbols == {"known"} and (found := _IS.search(stop.before)):
+        start = stop.span.start - len(found[0])
+        fix = Fix(Span(stop.span.file, start, start + len("is")), "==", "write `==`")
+        return Advice("did you mean `==`? `is` is only used in `is known`", fix)
+    if stop.found == "=" and stop.before[-1:] == "=" and "<NUMBER>" in stop.symbols:
+        return Advice("assign a value with a single `=`", Fix(stop.span, "", "write a single `=`"))
     return None
 
 
+def _other_word(stop: Stop) -> Advice | None:
+    """A word of another language, or a fault without parentheses."""
+    span, found, symbols = stop.span, stop.found, stop.symbols
+    if "<FAULT>" in symbols and found.replace("_", "-") in KINDS:
+        fix = Fix(span._replace(start=span.end), "()", "write `()`")
+        return Advice(f"a fault needs parentheses, as in `{found}(...)`", fix)
+    meant = "=" if found == ":" and "=" in symbols else WORDS.get(found)
+    if meant in words(symbols) | symbols or (meant == "==" and "<COMPARE>" in symbols):
+        return Advice(f"did you mean `{meant}`?", Fix(span, str(meant), f"write `{meant}`"))
+    datum = DATUMS.get(found.casefold())
+    if datum is not None and "above" in symbols:
+        return Advice(f"write `{datum}`", Fix(span, datum, f"write `{datum}`"))
+    return None
+
+
+def _missing_role(stop: Stop, values: list[Any]) -> Advice | None:
+    """`permit goto when ...`, without `by`."""
+    if stop.found != "when" or stop.symbols != {"by"}:
+        return None
+    fix = Fix(stop.span._replace(end=stop.span.start), "by any ", "write `by any`") if "forbid" in values else None
+    return Advice("add the role: `by role operator when ...` for one role, `by any when ...` for all", fix)
+
+
+def _number(stop: Stop) -> Advice | None:
+    """A signed coordinate, an exponent or a decimal comma."""
+    source, span, found = stop.source, stop.span, stop.found
+    if found == "-":
+        return _signed(source, span)
+    power = _EXPONENT.search(stop.before)
+    if power is not None and (found[:1].isalnum() or found in ("%", "+")):
+        number = power[0].rstrip()
+        start = span.start - len(power[0])
+        at = Span(span.file, start, start + len(number)), f"`{number}` is not a number: exponents are not supported"
+        return Advice("write all digits, which `_` may group, as in `20_000 m`", at=at)
+    if found == "," and re.match(r"\d", source.text[span.end :][:1]) and stop.before[-1:].isdigit():
+        return Advice("use a decimal point, as in `20.5 m`", Fix(span, ".", "write a point"))
+    return None
+
+
+def _signed(source: Source, span: Span) -> Advice | None:
+    """A latitude or a longitude with a sign."""
+    signed = _SIGNED.match(source.text, span.start)
+    if signed is None:
+        return None
+    plain = f"{signed[1]} {_OPPOSITE[signed[2]]}"
+    help = f"coordinates have no sign: write `{plain}` or `{signed[1]} {signed[2]}`"
+    return Advice(help, Fix(span._replace(end=signed.end()), plain, f"write `{plain}`"))
+
+
 def last_word(automaton: Automaton) -> Span:
-    """The last word or mark that the parser took."""
+    """The last token that the parser shifted."""
     text, end = automaton.source.text, automaton.end
     found = _LAST.search(text[max(0, end - LOOK_BACK) : end])
     return Span(automaton.source.file, end - len(found[0]) if found else end, end)
 
 
-def _import(automaton: Automaton, failure: Failure) -> Habit:
-    help = 'a file is named in quotes, as in `import "lib:skills/goto.rts"`'
-    named = _FILE.match(automaton.source.text, failure.start)
-    if named is None or "\\" in named[0]:
-        return Habit(help)
-    quoted = f'"{named[1] or named[2] or ""}"'
-    return Habit(help, Fix(Span(automaton.source.file, failure.start, named.end()), quoted, f"write `{quoted}`"))
-
-
-def _by_whom(automaton: Automaton, span: Span) -> Habit:
-    if "forbid" in automaton.values:
-        insert = Fix(Span(span.file, span.start, span.start), "by any ", "write `by any`")
-        return Habit("say to whom: `by any when ...` is for every role, `by role operator when ...` for one", insert)
-    return Habit("say to whom: `by role operator when ...`, or `by any when ...` for every role")
-
-
-def _signed(automaton: Automaton, failure: Failure) -> Habit | None:
-    """A latitude or a longitude with a sign."""
-    signed = _SIGNED.match(automaton.source.text, failure.start)
-    if signed is None:
-        return None
-    plain = f"{signed[1]} {_OPPOSITE[signed[2]]}"
-    span = Span(automaton.source.file, failure.start, signed.end())
-    return Habit(
-        f"a place has no sign: write `{plain}`, or `{signed[1]} {signed[2]}`", Fix(span, plain, f"write `{plain}`")
-    )
-
-
-#: Characters and words of other notations, and what stands for them here.
+#: Characters of other languages, and their replacements.
 FOREIGN = {
     "≤": "<=", "≥": ">=", "≠": "!=", "–": "-", "−": "-", "×": "*", "÷": "/", "“": '"', "”": '"', "'": '"', "‘": '"',
     "’": '"', "#": "//", "&": "and", "&&": "and", "|": "or", "||": "or", "!": "not", "…": "..",
 }  # fmt: skip
 
-LISTED = 20  # words that a help lists
+LISTED = 20  # the most words in a help
 
 
 def explain(automaton: Automaton, failure: Failure) -> Diagnostic:
-    """The finding for the token that stopped the parser. The stacks must be as `Automaton.run` left them."""
+    """Return the finding for the token that stopped the parser; its stacks must be as `Automaton.run` left them."""
     if not failure.kind:
         return _foreign(automaton, failure)
-    span = Span(automaton.source.file, failure.start, failure.end)
+    source = automaton.source
+    span = Span(source.file, failure.start, failure.end)
     symbols = accepted(automaton)
-    found = automaton.source.slice(span)
+    found = source.slice(span)
     if "}" in symbols and (failure.kind == END or _begins_declaration(automaton, failure, found)):
         return _unclosed_block(automaton, span, found)
     shown = f"`{short(found)}`" if found else "the end of the file"
     message = f"found {shown}, expected {describe(automaton, symbols)}"
-    known = habit(automaton, failure, symbols)
-    if known is not None:
-        place, message = (span, message) if known.at is None else known.at
-        return Diagnostic(SYNTAX, message, place, known.help, fixes=() if known.fix is None else (known.fix,))
-    if ".." in symbols and symbols & ARITHMETIC:
-        at = _in(automaton)
-        if at is not None:
-            return _not_in_range(automaton, span, at)
-    if found == "not" and symbols & CONDITION:
-        return Diagnostic(SYNTAX, message, span, "put it in brackets, as in `(not a > b)`")
-    if NAME in symbols and automaton.table.words.get(found) is False:
-        return Diagnostic(SYNTAX, f"`{found}` is a reserved word, so it is no name", span, "choose another name")
-    if found == "{" and symbols == {"("}:
-        insert = Fix(Span(span.file, span.start, span.start), "() ", "write `()`")
-        begun = pending(automaton)
-        what = "template" if begun is not None and begun[0] == "template" else "skill"
-        return Diagnostic(SYNTAX, message, span, f"a {what} that takes nothing is written with `()`", fixes=(insert,))
-    meant = _meant(found, symbols)
-    if meant is not None:
-        fix = Fix(span, meant, f"write `{meant}`")
-        return Diagnostic(SYNTAX, message, span, f"did you mean `{meant}`?", fixes=(fix,))
+    stop = Stop(source, span, found, source.text[max(0, failure.start - LOOK_BACK) : failure.start], symbols)
+    advice = recognise(stop, automaton.values)
+    at = _in(automaton, symbols)
+    if advice is None and at is not None:
+        return _not_in_range(automaton, span, at)
+    advice = advice or _correction(automaton, stop)
+    if advice is not None:
+        place, message = advice.at or (span, message)
+        return Diagnostic(SYNTAX, message, place, advice.help, fixes=(advice.fix,) if advice.fix else ())
     help = _help(automaton, failure, symbols)
-    if "\n" in automaton.source.text[automaton.end : failure.start] and not _may_end(automaton, symbols):
+    if "\n" in source.text[automaton.end : failure.start] and not _may_end(automaton, symbols):
         return _broken_off(automaton, span, shown, symbols, help)
     return Diagnostic(SYNTAX, message, span, help)
 
 
+def _correction(automaton: Automaton, stop: Stop) -> Advice | None:
+    """The nearest correction of a misplaced or misspelt word."""
+    span, found, symbols = stop.span, stop.found, stop.symbols
+    if found == "not" and symbols & CONDITION:
+        return Advice("put it in parentheses, as in `(not a > b)`")
+    if NAME in symbols and automaton.table.words.get(found) is False:
+        return Advice("choose another name", at=(span, f"`{found}` is a reserved word and cannot be a name"))
+    if found == "{" and symbols == {"("}:
+        begun = pending(automaton)
+        what = "template" if begun is not None and begun[0] == "template" else "skill"
+        fix = Fix(span._replace(end=span.start), "() ", "write `()`")
+        return Advice(f"a {what} without parameters needs `()`", fix)
+    meant = _meant(found, symbols)
+    return None if meant is None else Advice(f"did you mean `{meant}`?", Fix(span, meant, f"write `{meant}`"))
+
+
 def _may_end(automaton: Automaton, symbols: set[str]) -> bool:
-    """Whether what was begun could be over, so that what follows on another line is itself at fault."""
+    """Whether the current part may end here, so that the error is on the next line."""
     return "}" in symbols or beginnings(automaton) <= symbols or bool(parts(automaton, symbols))
 
 
 def _broken_off(automaton: Automaton, span: Span, shown: str, symbols: set[str], help: str | None) -> Diagnostic:
-    """A line ends before what it begins; the finding is there, not on the line that follows."""
+    """An unfinished line: the finding is at its end, not on the next line."""
     last = last_word(automaton)
     text = short(automaton.source.slice(last))
     labels = (Label(span, f"found {shown}"),) if span.start < span.end else ()
     message = f"expected {describe(automaton, symbols)} after `{text}`"
     fixes: tuple[Fix, ...] = ()
     if symbols == {"("}:
-        help = "what takes nothing is written with `()`"
+        help = "write `()` where there are no arguments"
         fixes = (Fix(Span(last.file, last.end, last.end), "()", "write `()`"),)
     return Diagnostic(SYNTAX, message, last, help, labels, fixes)
 
 
-def _in(automaton: Automaton) -> int | None:
-    """Where the `in` stands after which a single value was read."""
+def _in(automaton: Automaton, symbols: set[str]) -> int | None:
+    """The offset of an `in` that is followed by a single value instead of a range."""
+    if ".." not in symbols or not symbols & ARITHMETIC:
+        return None
     for value, start in zip(reversed(automaton.values[-3:]), reversed(automaton.starts[-3:]), strict=True):
         if value == "in":
             return start
@@ -218,16 +247,16 @@ def _not_in_range(automaton: Automaton, span: Span, at: int) -> Diagnostic:
     inside = Fix(word, "inside", "write `inside`")
     return Diagnostic(
         SYNTAX,
-        "`in` is followed by a range, or by names in `{ }`",
+        "expected a range or names in `{ }` after `in`",
         word,
-        "a place is `inside` a zone; a number is `in 5 m .. 20 m`, a name `in {fix_2d, fix_3d}`",
-        labels=(Label(span, "before this, `..` is missing"),) if span.start < span.end else (),
+        "write `inside` for a zone, `in 5 m .. 20 m` for a range, `in {fix_2d, fix_3d}` for names",
+        labels=(Label(span, "`..` is missing before this"),) if span.start < span.end else (),
         fixes=(inside,) if re.search(r"\bposition\s+\Z", automaton.source.text[:at][-40:]) else (),
     )
 
 
 def _meant(found: str, symbols: set[str]) -> str | None:
-    """The word or mark that the author probably meant."""
+    """The keyword or mark that is most similar to `found`."""
     if found in ("=", "==") and symbols & {"=", "<COMPARE>"}:
         return "==" if found == "=" else "="
     known = words(symbols) - {found}
@@ -236,20 +265,20 @@ def _meant(found: str, symbols: set[str]) -> str | None:
 
 def _help(automaton: Automaton, failure: Failure, symbols: set[str]) -> str | None:
     if failure.kind == "<COMPARE>" and "+" in symbols:
-        return "comparisons are not chained: write `height in 5 m .. 10 m`, or join two by `and`"
+        return "comparisons cannot be chained: write `height in 5 m .. 10 m`, or join two with `and`"
     begin = beginnings(automaton)
     if begin <= symbols:
-        return f"declarations begin with {_listed(begin)}"
+        return f"a declaration begins with {_listed(begin)}"
     items = parts(automaton, symbols)
     whose = owner(automaton)
     if len(items) > 3 and whose is not None:
-        return f"parts of a {whose[0]} begin with {_listed({phrase(automaton, item) for item in items})}"
+        return f"a part of a {whose[0]} begins with {_listed({phrase(automaton, item) for item in items})}"
     if "the" in symbols or symbols == {"last"}:
-        return "a look back is written as in `for the last 3 s` or `within the last 3 s`"
+        return "write a time window as in `for the last 3 s` or `within the last 3 s`"
     if symbols in ({"N", "S"}, {"E", "W"}):
-        return "a place is its latitude and longitude, as in `47.3977 N, 8.5456 E`"
+        return "write latitude and longitude as in `47.3977 N, 8.5456 E`"
     if automaton.source.slice(Span(automaton.source.file, failure.start, failure.end)) in words(symbols):
-        return "its parts go in `(` and `)`"
+        return "write its arguments in parentheses"
     if symbols >= SHAPE:
         return f"shapes are {_listed(words(SHAPE))}"
     return None
@@ -271,7 +300,7 @@ def _unclosed_block(automaton: Automaton, span: Span, found: str) -> Diagnostic:
     where = "the next declaration begins here" if found else "the file ends here"
     return Diagnostic(
         UNCLOSED,
-        f"this `{{` of the {what} is not closed",
+        f"the `{{` of the {what} is not closed",
         brace,
         "add the missing `}`",
         labels=(Label(span, where),),
@@ -280,7 +309,7 @@ def _unclosed_block(automaton: Automaton, span: Span, found: str) -> Diagnostic:
 
 
 def _foreign(automaton: Automaton, failure: Failure) -> Diagnostic:
-    """A character at which no token begins."""
+    """A character that starts no token."""
     source, start = automaton.source, failure.start
     text, file = source.text, source.file
     char = text[start]
@@ -288,11 +317,11 @@ def _foreign(automaton: Automaton, failure: Failure) -> Diagnostic:
         line = re.compile(r"[^\r\n]*").match(text, start)
         end = line.end() if line else start + 1
         return Diagnostic(
-            UNCLOSED, "this text is not closed on its line", Span(file, start, end),
-            'a text goes from `"` to `"`; within it write `\\"` and `\\\\`',
+            UNCLOSED, "the string is not closed on its line", Span(file, start, end),
+            'close it with `"`; inside a string write `\\"` for a quote and `\\\\` for a backslash',
         )  # fmt: skip
     if text.startswith("/*", start):
-        return Diagnostic(UNCLOSED, "this comment is not closed", Span(file, start, start + 2), "close it by `*/`")
+        return Diagnostic(UNCLOSED, "the comment is not closed", Span(file, start, start + 2), "close it with `*/`")
     twice = text[start : start + 2]
     written = twice if twice in FOREIGN else char
     span = Span(file, start, start + len(written))
@@ -300,11 +329,11 @@ def _foreign(automaton: Automaton, failure: Failure) -> Diagnostic:
     other = FOREIGN.get(written)
     if other is not None and (other != '"' or "<STRING>" in accepted(automaton)):
         fix = Fix(span, other, f"write `{other}`")
-        return Diagnostic(SYNTAX, f"{shown} is not used here", span, f"write `{other}`", fixes=(fix,))
+        return Diagnostic(SYNTAX, f"{shown} is not part of the language", span, f"write `{other}`", fixes=(fix,))
     if char == ";":
-        fix = Fix(span, "", "leave it out")
-        return Diagnostic(SYNTAX, "nothing ends with `;` here", span, "leave it out", fixes=(fix,))
+        fix = Fix(span, "", "remove it")
+        return Diagnostic(SYNTAX, "`;` is not part of the language", span, "remove it", fixes=(fix,))
     symbols = accepted(automaton)
     message = f"found {shown}, expected {describe(automaton, symbols)}"
-    help = "names are of the letters `a` to `z`, digits and `_`" if char.isalpha() or NAME in symbols else None
+    help = "names consist of the letters `a` to `z`, digits and `_`" if char.isalpha() or NAME in symbols else None
     return Diagnostic(SYNTAX, message, span, help or _help(automaton, failure, symbols))

@@ -1,4 +1,4 @@
-"""The findings about files that are asked for and cannot be had as they must be."""
+"""Findings about input files: missing, unreadable, too large, or of the wrong kind."""
 
 import posixpath
 from errno import ENXIO
@@ -14,21 +14,22 @@ from rtshcua.ground.language.size_limits import MAX_TOKENS
 from rtshcua.model.ir.places import GeoJson
 from rtshcua.model.ir.program import Import
 
-_SOURCES = "sources are plain text, in files that end in `.rts`"
-_A_FILE = "a source must be a file, because imports are found beside it: write it to one that ends in `.rts`"
-Wanted = Import | GeoJson  # what names a file: its `path` as written, and the `span` of all that it is written with
+_SOURCES = "a source is a plain text file that ends in `.rts`"
+_A_FILE = "save the source as a file that ends in `.rts`: its imports are relative to that file"
+_SPLIT = "split it into several files and import them"
+Wanted = Import | GeoJson  # a declaration that names a file by its `path`
 
 
 def not_portable(by: Wanted) -> Diagnostic:
-    """A path that means nothing on another machine, or in a pack that is not there."""
+    """A path that is not portable, or that names a pack which is not installed."""
     pack = pack_of(by.path)
     if pack is not None:
         where = "the library" if pack == "lib" else f"the pack `{pack}`"
         if not is_direct(by.path.removeprefix(f"{pack}:")):
-            message = f"`{by.path}` does not lead straight into {where}"
+            message = f"`{by.path}` is not a direct path into {where}"
             return Diagnostic(IMPORT_PATH, message, by.span, "write it without `..`, as in `lib:skills/goto.rts`")
-        message = f"`{by.path}` is in {where}, and there is none here"
-        help = None if pack == "lib" else f"a Python package brings it, by an entry point `{pack}` of `rtshcua.skills`"
+        message = f"`{by.path}` is in {where}, which is not installed"
+        help = None if pack == "lib" else f"install the package with the entry point `{pack}` of `rtshcua.skills`"
         return Diagnostic(IMPORT_PATH, message, by.span, help)
     what, example = ("importing file", "../skills/goto.rts") if isinstance(by, Import) else ("source", "bridge.geojson")
     library = f"{LIBRARY}{example.removeprefix('../')}"
@@ -36,24 +37,25 @@ def not_portable(by: Wanted) -> Diagnostic:
         IMPORT_PATH,
         f"`{by.path}` is not a path relative to the {what}",
         by.span,
-        f"write it with `/`, as in `{example}` or `{library}`",
+        f"write a path such as `{example}` or `{library}`",
     )
 
 
 def no_source(by: Wanted) -> Diagnostic:
-    """A path to what is no source, or no GeoJSON, by its name: it is not read, and so nothing of it is shown."""
+    """A path whose suffix is not that of a source or GeoJSON. The file is not read, so a message cannot leak it."""
     if isinstance(by, Import):
-        return Diagnostic(IMPORT_PATH, f"`{by.path}` is not a source, by its name", by.span, "sources end in `.rts`")
-    help = "accepted: names that end in `.geojson` or `.json`"
-    return Diagnostic(IMPORT_PATH, f"`{by.path}` is not GeoJSON, by its name", by.span, help)
+        help = "names of sources end in `.rts`"
+        return Diagnostic(IMPORT_PATH, f"`{by.path}` is not the name of a source", by.span, help)
+    help = "names of GeoJSON files end in `.geojson` or `.json`"
+    return Diagnostic(IMPORT_PATH, f"`{by.path}` is not the name of a GeoJSON file", by.span, help)
 
 
 def unreadable(name: str, by: Wanted | None, error: OSError | ValueError, near: str | None) -> Diagnostic:
-    """A file that cannot be read; `near` is the name beside it that was probably meant."""
+    """A file that cannot be read; `near` is a similar name in the same folder."""
     written = name if by is None else by.path
     strerror = error.strerror if isinstance(error, OSError) else str(error)
-    why = "there is no such file" if is_missing(error) else _lowered(strerror or "it is unreadable")
-    looked = None if written == name else f"looked for it at `{name}`"
+    why = "no such file" if is_missing(error) else _lowered(strerror or "unreadable")
+    looked = None if written == name else f"the file was expected at `{name}`"
     fixes: tuple[Fix, ...] = ()
     help = looked
     if near is not None:
@@ -71,65 +73,63 @@ def _lowered(text: str) -> str:
 
 
 def is_no_file(name: str, error: OSError | ValueError) -> bool:
-    """Whether the standard input is meant, or what is there is a pipe, a device or a socket."""
+    """Whether the path is the standard input, a pipe, a device or a socket."""
     return (name == "-" and is_missing(error)) or (isinstance(error, OSError) and error.errno == ENXIO)
 
 
 def is_missing(error: OSError | ValueError) -> bool:
-    """Whether there is no such file, rather than one that cannot be read."""
+    """Whether the file does not exist, as opposed to cannot be read."""
     return isinstance(error, FileNotFoundError | NotADirectoryError)
 
 
 def too_large(file: str, size: int, by: GeoJson | None = None) -> Diagnostic:
-    """A file of `size` bytes or characters, which is not looked at."""
+    """A file of `size` bytes or characters, above the limit."""
     limit = MAX_SIZE >> 20
-    message = f"`{file}` is {-(-size >> 20)} MiB large; at most {limit} MiB are read"
+    message = f"`{file}` is {-(-size >> 20)} MiB; the limit is {limit} MiB"
     if by is None:
-        return Diagnostic(TOO_LARGE, message, None, "split it into several files, and import them")
-    return Diagnostic(TOO_LARGE, message, by.span, "keep only the areas that are needed in it")
+        return Diagnostic(TOO_LARGE, message, None, _SPLIT)
+    return Diagnostic(TOO_LARGE, message, by.span, "keep only the areas that are needed")
 
 
 def too_long(file: str) -> Diagnostic:
-    """A file of more words and marks than are read, which is not looked at."""
-    message = f"`{file}` has more than {MAX_TOKENS:,} words and marks; no more are read"
-    return Diagnostic(TOO_LARGE, message, None, "split it into several files, and import them")
+    """A source with too many tokens."""
+    return Diagnostic(TOO_LARGE, f"`{file}` has more than {MAX_TOKENS:,} tokens, the limit", None, _SPLIT)
 
 
 def too_many_comments(file: str) -> Diagnostic:
-    """A file of more comments than are laid out."""
-    message = f"`{file}` has more than {MAX_TOKENS:,} comments; no more are laid out"
-    return Diagnostic(TOO_LARGE, message, None, "split it into several files, and import them")
+    """A source with too many comments to format."""
+    return Diagnostic(TOO_LARGE, f"`{file}` has more than {MAX_TOKENS:,} comments, the limit", None, _SPLIT)
 
 
 def too_many_files(by: Import) -> Diagnostic:
-    """An import that, with those before it, names more files than a program may have."""
-    message = f"the program has more than {MAX_FILES:,} files; this import and what comes after it are not looked at"
+    """The import that exceeds the number of files of a program."""
+    message = f"the program has more than {MAX_FILES:,} files; this import and all later ones were skipped"
     return Diagnostic(TOO_LARGE, message, by.span, "import only what is used")
 
 
 def not_a_source(file: str, kind: FileKind) -> Diagnostic:
-    """A file of another kind."""
-    return Diagnostic(NOT_A_SOURCE, f"this is {kind.name}, and no source", Span(file, 0, 0), kind.help or _SOURCES)
+    """A file of another kind than a source."""
+    return Diagnostic(NOT_A_SOURCE, f"this is {kind.name}, not a source", Span(file, 0, 0), kind.help or _SOURCES)
 
 
 def not_text(source: Source, data: bytes, start: int) -> Diagnostic:
-    """A source that is no UTF-8 from byte `start` on; `source` has what could be made of it."""
+    """A source with invalid UTF-8 at byte `start`; `source` has the text with replacement characters."""
     kind = foreign(data, source.file)
     if kind is not None:
         return not_a_source(source.file, kind)
     at = len(data[:start].decode("utf-8", errors="replace"))
     return Diagnostic(
         NOT_TEXT,
-        f"byte {start} (0x{data[start]:02x}) is not UTF-8, so the file is not text",
+        f"byte {start} (0x{data[start]:02x}) is not UTF-8",
         Span(source.file, at, at + 1),
-        "save it as UTF-8; if it is a compiled bundle, `rtshcua show` prints it",
+        "save the file as UTF-8; if it is a compiled bundle, `rtshcua show` prints it",
     )
 
 
 def data_not_text(name: str, by: GeoJson, data: bytes, start: int) -> Diagnostic:
-    """A GeoJSON file that is no UTF-8 from byte `start` on."""
-    message = f"byte {start} (0x{data[start]:02x}) of `{name}` is not UTF-8, so the file is not text"
-    return Diagnostic(NOT_TEXT, message, by.span, "save it as UTF-8")
+    """A GeoJSON file with invalid UTF-8 at byte `start`."""
+    message = f"byte {start} (0x{data[start]:02x}) of `{name}` is not UTF-8"
+    return Diagnostic(NOT_TEXT, message, by.span, "save the file as UTF-8")
 
 
 def _fix(by: Wanted, meant: str) -> Fix:

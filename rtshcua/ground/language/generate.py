@@ -1,8 +1,8 @@
-"""Has Lark turn `grammar/rtshcua.lark` into `table.json`: `python -m rtshcua.ground.language.generate`.
+"""Make `table.json` from `grammar/rtshcua.lark` with Lark: `python -m rtshcua.ground.language.generate`.
 
-Making the LALR table takes Lark a fifth of a second, which every start would pay; reading it takes a few milliseconds.
-A test keeps the committed table current. States are numbered in the order in which they are reached, so that the same
-grammar gives the same bytes whatever the order of Lark's sets.
+Lark needs 0.2 s for the LALR table; reading the file takes a few milliseconds at each start. A test keeps the committed
+table current. States are numbered in the order in which they are reached, so that the same grammar always gives the
+same bytes.
 """
 
 import json
@@ -26,12 +26,12 @@ Row = dict[str, tuple[Any, Any]]
 
 @cache
 def lark(grammar: str) -> Lark:
-    """Lark's own parser of the grammar: what the table is made of, and the oracle of the tests and the benchmark."""
+    """Lark's own parser of the grammar: the source of the table, and the oracle of the tests and the benchmark."""
     return Lark(grammar, start=START, parser="lalr", lexer="contextual", propagate_positions=True)
 
 
 def generate(grammar: str) -> str:
-    """The table as JSON text, ending in a newline; `rtshcua.ground.language.table.ParserTable` says what is in it."""
+    """Return the table as JSON text, ending in a newline; `table.ParserTable` describes it."""
     made = lark(grammar)
     fixed = {t.name: t.pattern.value for t in made.terminals if isinstance(t.pattern, PatternStr)}
     ignored = [t for t in made.terminals if t.name in made.ignore_tokens]
@@ -59,7 +59,7 @@ def _first(terminal: TerminalDef) -> tuple[int, str]:
 
 
 def _reached(states: dict[int, Row], start: int) -> dict[int, int]:
-    """Lark's number of each state, mapped to the place at which a walk from `start` in alphabetical order meets it."""
+    """Map Lark's number of each state to its number in a breadth-first walk from `start`, in alphabetical order."""
     order = {start: 0}
     queue = [start]
     for state in queue:
@@ -71,7 +71,7 @@ def _reached(states: dict[int, Row], start: int) -> dict[int, int]:
 
 
 def _row(row: Row, keys: dict[str, str], order: dict[int, int], rules: dict[Rule, int]) -> dict[str, int]:
-    """What a state does with each symbol: go to a state (0 or more), or reduce by rule `~n` (negative)."""
+    """The row of a state: for each symbol the next state (0 or more), or the rule `~n` to reduce by (negative)."""
     return {
         keys.get(symbol, f"<{symbol}>"): order[to] if action is Shift else ~rules[to]
         for symbol, (action, to) in sorted(row.items())
@@ -81,8 +81,8 @@ def _row(row: Row, keys: dict[str, str], order: dict[int, int], rules: dict[Rule
 def _rule(rule: Rule) -> list[Any]:
     """[origin, name of the action or "", length, kept]: `kept` lists positions, None for an absent `[...]`.
 
-    Lark makes the rules `__x_star_0` for repetitions; their value is a list that goes into its parent item by item,
-    which is written as the position's complement. A `?rule` with one child that is kept has no action.
+    Lark makes the rules `__x_star_0` for repetitions. Their value is a list whose items are passed to the parent, which
+    the complement of the position marks. A `?rule` with one kept child has no action.
     """
     absent = iter("".join(str(int(empty)) for empty in rule.options.empty_indices or ()).split("0"))
     kept: list[int | None] = [None] * len(next(absent, ""))
@@ -97,7 +97,7 @@ def _rule(rule: Rule) -> list[Any]:
 
 
 def _lines(value: Any) -> str:
-    """JSON with one line for each entry, so that a change of the grammar shows as a readable difference."""
+    """JSON with one line for each entry, so that a change of the grammar gives a readable diff."""
     if isinstance(value, dict):
         return "{\n" + ",\n".join(f" {json.dumps(key)}: {json.dumps(item)}" for key, item in value.items()) + "\n}"
     if isinstance(value, list):

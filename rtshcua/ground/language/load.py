@@ -1,8 +1,8 @@
-"""Loads files and everything they import. It reads no file itself: `read` and `listing` are given by the caller.
+"""Load files and their imports. This module reads no files: the caller passes `read` and `listing`.
 
-An import names a file relative to the importing one, or, as `lib:skills/goto.rts`, in the library that ships with the
-compiler, or, as `acme:skills/spray.rts`, in a pack that is installed; so does a zone that is read from GeoJSON.
-Declarations have no order, so files may import each other in a circle, which is worth a warning: each is read once.
+An import names a file relative to the importing one, in the library that ships with the compiler
+(`lib:skills/goto.rts`), or in an installed pack (`acme:skills/spray.rts`); so does a zone read from GeoJSON.
+Declarations have no order and each file is read once, so an import cycle is only a warning.
 """
 
 import posixpath
@@ -33,20 +33,18 @@ from rtshcua.ground.language.paths import LIBRARY, Packs, imported, shown, stabl
 from rtshcua.model.ir.places import GeoJson
 from rtshcua.model.ir.program import Import, Unit
 
-NAMED = 12  # files of one circle; more are counted, so that many long circles cannot swamp a person
+NAMED = 12  # the most files of a cycle that a message names
 
 
 class ImportEdge(NamedTuple):
-    """A file has `by`, which imports the file `to`."""
+    """An import of the file `to` by the declaration `by`."""
 
     by: Import
     to: str
 
 
 def circles(files: Iterable[str], imports: Mapping[str, Sequence[ImportEdge]]) -> list[Diagnostic]:
-    """A finding for each import that leads back to where a walk came from; the walk follows `imports` depth first, in
-    the order in which they are written, and begins with each of `files` that it has not met.
-    """
+    """Return a finding for each import that closes a cycle, in a depth-first walk in source order."""
     found: list[Diagnostic] = []
     done: set[str] = set()
     for file in files:
@@ -83,19 +81,19 @@ def _circle(files: list[str], taken: list[ImportEdge], last: ImportEdge) -> Diag
         names[half:-half] = [f"({len(names) - NAMED} more)"]
     return Diagnostic(
         IMPORT_CYCLE,
-        f"this import closes a circle: `{' -> '.join(names)}`",
+        f"import cycle: `{' -> '.join(names)}`",
         last.by.span,
-        "move what the files need of each other into one that imports none of them"
+        "move the shared declarations into a file that imports none of these"
         if len(files) > 1
-        else "a file sees its own declarations, so leave the import out",
-        labels=tuple(Label(edge.by.span, "and this one leads there") for edge in taken[:NAMED]),
+        else "remove the import: a file sees its own declarations",
+        labels=tuple(Label(edge.by.span, "part of the cycle") for edge in taken[:NAMED]),
     )
 
 
-#: how the names of sources end, and of files that zones are read from: nothing else is read for an import
+#: the suffixes of sources and of zone files; an import reads no other files
 _SOURCES, _DATA = (".rts",), (".geojson", ".json")
 
-#: for so many files that are not there it is looked for the one that was meant
+#: the most missing files for which a similar name is suggested
 _SUGGESTED = 100
 
 Read = Callable[[str], bytes]
@@ -104,18 +102,18 @@ Listing = Callable[[str], Iterable[str]]
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """The import closure of what was asked for, in the order in which it was reached.
+    """The loaded files and their imports, in the order in which they were reached.
 
-    A file is called by its path, relative to the working folder where it lies in it. `sources` has every file that was
-    read, `broken` the names of declarations that have an error. `stable` gives each file a name that is the same on
-    every machine, for what is signed: `lib:skills/goto.rts` in the library, likewise in a pack, else relative to the
-    first file's folder.
+    The name of a file is its path, relative to the working folder if it is inside. `sources` has every source that was
+    read, `broken` the names of declarations with an error. `stable` gives each file the name that is signed, which is
+    the same on every machine: `lib:skills/goto.rts` in the library, likewise in a pack, else relative to the folder of
+    the first file.
 
-    `data` has the bytes, UTF-8 and not looked at further, of the files that zones are read from, and `stable` their
-    names too; `data_names` says which of them a source's `from "..."` means, by the source and the path as written. A
-    file that could not be had has its finding already, and is in neither.
+    `data` has the bytes of the zone files, checked to be UTF-8 only; `stable` has their names too. `data_names` maps a
+    source and the path of its `from "..."` to the name of the file. A file that could not be read has a finding and is
+    in neither.
 
-    `whole` is false where an import has a syntax error, so that a name may be declared in a file that was not read.
+    `whole` is false if an import has a syntax error: a name may then be declared in a file that was not read.
     """
 
     units: tuple[Unit, ...]
@@ -130,12 +128,12 @@ class Program:
 
 @lru_cache(maxsize=1024)
 def remembered(source: Source) -> Parsed:
-    """What `parse` makes of a text, which never changes: programs that share files parse them once."""
+    """Parse a text once for all programs that share it."""
     return parse(source)
 
 
 def no_packs(_name: str) -> str | None:
-    """Nothing is installed but the library."""
+    """Find no pack: only the library is installed."""
     return None
 
 
@@ -147,12 +145,12 @@ def load(
     parse: Callable[[Source], Parsed] = remembered,
     packs: Packs = no_packs,
 ) -> Program:
-    """Reads `paths` and all they import, each file once.
+    """Load `paths` and their imports, each file once.
 
-    `read(path)` gives a file's bytes or raises OSError; `library` is the folder that `lib:` stands for, and `packs`
-    finds those of other packs; `listing(path)` gives the names in a folder, for suggestions, and may raise OSError;
-    `parse` is `parse.parse`, or one that remembers it. Every fault of a file is a finding, never an exception; one of a
-    file in `paths` itself has no span.
+    `read(path)` returns a file's bytes or raises OSError. `library` is the folder of `lib:`, and `packs` finds those of
+    other packs. `listing(path)` returns the names in a folder, for suggestions, and may raise OSError. `parse` is
+    `parse.parse` or a cached one. Every fault of a file is a finding, never an exception; a fault of a file in `paths`
+    itself has no span.
     """
     folders = {} if library is None else {LIBRARY.removesuffix(":"): library}
     loader = _Loader(read, packs, folders, listing, parse)
@@ -177,7 +175,7 @@ def load(
 class _Loader:
     read: Read
     packs: Packs
-    folders: dict[str, str]  # of the packs that were asked for, by name
+    folders: dict[str, str]  # of the packs used so far, by name
     listing: Listing | None
     parse: Callable[[Source], Parsed]
     queue: list[tuple[str, Import | None]] = field(default_factory=list)
@@ -187,14 +185,14 @@ class _Loader:
     sources: dict[str, Source] = field(default_factory=dict)
     diagnostics: list[Diagnostic] = field(default_factory=list)
     broken: set[str] = field(default_factory=set)
-    tried: set[str] = field(default_factory=set)  # of the files that zones are read from
+    tried: set[str] = field(default_factory=set)  # zone files
     data: dict[str, bytes] = field(default_factory=dict)
     data_names: dict[tuple[str, str], str] = field(default_factory=dict)
     whole: bool = True
     suggested: int = 0
 
     def want(self, path: str, by: Import | None) -> str:
-        """Queues a file, unless it was met before; gives its name."""
+        """Queue a file unless it was queued before, and return its name."""
         name = shown(path)
         if name not in self.seen:
             self.seen.add(name)
@@ -202,7 +200,7 @@ class _Loader:
         return name
 
     def take(self, name: str, by: Import | None) -> None:
-        """Reads and parses one file, and queues what it imports."""
+        """Read and parse one file, and queue its imports."""
         source = self._source(name, by)
         if source is None:
             return
@@ -247,7 +245,7 @@ class _Loader:
             self.data[name] = data
 
     def _source(self, name: str, by: Import | None) -> Source | None:
-        """The text of a file; None, with a finding, where there is none."""
+        """The text of a file; None, with a finding, if it cannot be read."""
         data = self._bytes(name, by)
         if data is None:
             return None
@@ -263,7 +261,7 @@ class _Loader:
         return source
 
     def _path(self, by: Wanted, source: str) -> str | None:
-        """The path that `by` means in the file `source`; None, with a finding, where it means none."""
+        """The path that `by` names in the file `source`; None, with a finding, if it is invalid."""
         path = imported(by.path, source, self._folder)
         if path is None:
             self.diagnostics.append(not_portable(by))
@@ -278,7 +276,7 @@ class _Loader:
         return self.folders.get(pack)
 
     def _bytes(self, name: str, by: Wanted | None) -> bytes | None:
-        """What is in a file; None, with a finding, where it cannot be read."""
+        """The bytes of a file; None, with a finding, if it cannot be read."""
         try:
             return self.read(name)
         except (OSError, ValueError) as error:  # ValueError: a NUL in the path
@@ -287,7 +285,7 @@ class _Loader:
             return None
 
     def _near(self, name: str) -> str | None:
-        """The name in the same folder that was probably meant."""
+        """The most similar name in the same folder, if any."""
         if self.listing is None or self.suggested >= _SUGGESTED:
             return None
         self.suggested += 1

@@ -1,4 +1,4 @@
-"""Parses one text into the IR; never raises for what the text says, and reports every error in it once."""
+"""Parse one text into the IR. Every error of the text is reported once, as a finding, never as an exception."""
 
 import re
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ from rtshcua.model.ir.tests import NominalDecl, TestDecl
 
 T = TypeVar("T", bound=Node)
 
-#: what other files begin with that begin with a letter
+#: beginnings of other kinds of files that start with a letter
 _FOREIGN = ("QGC WPL", "ULog", "PK", "c2sp.org/", "rtshcua/", "duty: ")
 _TOKENS = re.compile(
     r"""//[^\n]*+ | /\*(?s:.)*?(?:\*/|\Z) | \s++
@@ -39,10 +39,10 @@ _TOKENS = re.compile(
 
 @dataclass(frozen=True, slots=True)
 class Parsed:
-    """The declarations without errors, all findings in the order of the text, and the names of what was dropped.
+    """The declarations without errors, all findings in source order, and the names of the dropped declarations.
 
-    `broken` keeps the checker from reporting as unknown a name whose declaration is there, but has an error. Where an
-    import has one, `whole` is false: any name may be declared in a file that was not read.
+    With `broken` the checker does not report a name as unknown whose declaration has an error. `whole` is false if an
+    import has an error: any name may then be declared in a file that was not read.
     """
 
     unit: Unit
@@ -52,7 +52,7 @@ class Parsed:
 
 
 def parse(source: Source) -> Parsed:
-    """Parses `source`; a text that is too large, or no text, is one finding and no declarations."""
+    """Parse `source`. A text that is too large or not text gives one finding and no declarations."""
     reader = Reader(source)
     found = refused(source)
     if found is not None:
@@ -61,22 +61,22 @@ def parse(source: Source) -> Parsed:
         try:
             run(Automaton(reader), beginning(source))
         except Enough:
-            help = f"correct the first {MAX_FINDINGS}, then look again"
+            help = f"correct the first {MAX_FINDINGS} errors, then check again"
             last = reader.diagnostics[-1].span
-            reader.diagnostics.append(Diagnostic(TOO_MANY_FINDINGS, "there are more findings than these", last, help))
+            reader.diagnostics.append(Diagnostic(TOO_MANY_FINDINGS, "the file has more errors", last, help))
     return parsed(source, reader.declarations, reader.diagnostics, frozenset(reader.broken), whole=reader.whole)
 
 
 def parsed(
     source: Source, declarations: list[Node], found: list[Diagnostic], broken: frozenset[str], *, whole: bool
 ) -> Parsed:
-    """What was read of a text, its findings in the order of the text."""
+    """The result of parsing a text, with the findings in source order."""
     ordered = tuple(sorted(found, key=lambda d: d.span.start if d.span else 0))
     return Parsed(_unit(source, declarations), ordered, broken, whole)
 
 
 def refused(source: Source) -> Diagnostic | None:
-    """The finding on a text that is not looked at further."""
+    """The finding on a text that is not parsed at all; None if it is acceptable."""
     if len(source.text) > MAX_SIZE:
         return too_large(source.file, len(source.text))
     kind = _foreign(source)
@@ -84,21 +84,21 @@ def refused(source: Source) -> Diagnostic | None:
         return not_a_source(source.file, kind)
     nul = source.text.find("\0")
     if nul >= 0:
-        help = "is this a compiled bundle? sources are plain text in UTF-8"
+        help = "sources are plain UTF-8 text; this may be a compiled bundle"
         span = Span(source.file, nul, nul + 1)
-        return Diagnostic(NOT_TEXT, "the file holds a NUL character, so it is not text", span, help)
+        return Diagnostic(NOT_TEXT, "the file contains a NUL character", span, help)
     at = hiding(source.text, beginning(source))
     if at is not None:
-        message = f"`{visible(source.text[at])}` hides or reorders what a person reads"
+        message = f"`{visible(source.text[at])}` is an invisible or reordering character"
         span = Span(source.file, at, at + 1)
-        return Diagnostic(HIDDEN_CHARACTER, message, span, "remove it, from comments and texts too")
+        return Diagnostic(HIDDEN_CHARACTER, message, span, "remove it; comments and strings must not have it either")
     if len(source.text) > MAX_TOKENS and _exceeds(source.text, MAX_TOKENS):
         return too_long(source.file)
     return None
 
 
 def _foreign(source: Source) -> FileKind | None:
-    """The kind of a text that is no source; one that begins with a letter, as sources do, is seldom looked at."""
+    """The kind of a text that is not a source; most texts that start with a letter, as sources do, are not examined."""
     text = source.text
     if text[:1].isalpha() and not text.startswith(_FOREIGN):
         return None
@@ -106,18 +106,18 @@ def _foreign(source: Source) -> FileKind | None:
 
 
 def _exceeds(text: str, most: int) -> bool:
-    """Whether a text has more words and marks than so many; only those are looked at."""
+    """Whether a text has more than `most` tokens; stops at the limit."""
     tokens = (match for match in _TOKENS.finditer(text) if match.lastgroup)
     return next(islice(tokens, most, None), None) is not None
 
 
 def beginning(source: Source) -> int:
-    """Where the text begins, after a byte order mark."""
+    """The offset of the text after a byte order mark."""
     return 1 if source.text.startswith("\ufeff") else 0
 
 
 def run(automaton: Automaton, start: int) -> None:
-    """Parses from `start` to the end of the text, and goes on after every failure."""
+    """Parse from `start` to the end of the text, and recover after every failure."""
     reader = automaton.reader
     offset: int | None = start
     while offset is not None:

@@ -1,4 +1,4 @@
-"""How files are called: one name for each, one that means the same on every machine, and what an import means."""
+"""Names of files: the name for people, the stable name that is signed, and the path of an import."""
 
 import posixpath
 import re
@@ -8,17 +8,17 @@ from os.path import join, normpath
 from pathlib import Path
 
 LIBRARY = "lib:"
-#: A pack of skills by its name, as in `acme:skills/spray.rts`. One letter would be a drive.
+#: The name of a pack of skills, as in `acme:skills/spray.rts`. A single letter would be a drive.
 _PACK = re.compile(r"([a-z][a-z0-9_-]+):(?!//)", re.ASCII)
 
 Packs = Callable[[str], str | None]
-"""The folder that a pack's name stands for; None where no such pack is installed."""
-#: the folders of the library that sources come from; in a checkout it has others beside them
+"""Returns the folder of a pack by its name; None if it is not installed."""
+#: the folders of the library with sources; a checkout has other folders beside them
 SHELVES = ("skills", "policies", "missions")
 
 
 def shown(path: str) -> str:
-    """The file's name for people: absolute, or relative to the working folder where it lies in it."""
+    """The file's name for people: relative to the working folder if it is inside, else absolute."""
     here = getcwd()  # noqa: PTH109  # thousands of times in a run: a Path costs ten times as much
     place = normpath(join(here, path))  # noqa: PTH118
     if place == here:
@@ -28,12 +28,12 @@ def shown(path: str) -> str:
 
 
 def from_here(path: str) -> str:
-    """The file's name as seen from the working folder, whether it lies in it or not: never an absolute one."""
+    """The file's name relative to the working folder, also if it is outside."""
     return posixpath.relpath(path.replace(sep, "/"), getcwd().replace(sep, "/"))  # noqa: PTH109  # as in `shown`
 
 
 def stable(path: str, folders: Mapping[str, str], first: str) -> str:
-    """The file's name for what is signed: in a pack (`folders` by name), or else relative to the file `first`."""
+    """The file's name as it is signed: in a pack (`folders` by name), or else relative to the file `first`."""
     place = _absolute(path)
     for name, folder in folders.items():
         if place.is_relative_to(_absolute(folder)):
@@ -42,9 +42,9 @@ def stable(path: str, folders: Mapping[str, str], first: str) -> str:
 
 
 def imported(written: str, importer: str, packs: Packs) -> str | None:
-    """The path of an import that is `written` in the file `importer`; None where it means nothing elsewhere.
+    """The path of an import `written` in the file `importer`; None if it is not portable.
 
-    What stands after the name of a pack (`lib:` is the one that ships) never leaves it, and takes no detour.
+    A path in a pack (`lib:` is the one that ships) never leaves the pack and has no `..`.
     """
     pack = pack_of(written)
     if pack is not None:
@@ -57,19 +57,20 @@ def imported(written: str, importer: str, packs: Packs) -> str | None:
 
 
 def pack_of(written: str) -> str | None:
-    """The name of the pack that a path as written, or a stable name, begins with."""
+    """The name of the pack in a written path or a stable name, if any."""
     match = _PACK.match(written)
     return None if match is None else match[1]
 
 
 def is_direct(inside: str) -> bool:
-    """Whether a path after the name of a pack leads straight down."""
+    """Whether a path in a pack has no empty, `.` or `..` part."""
     return all(part not in ("", ".", "..") for part in inside.split("/")) and "\\" not in inside and ":" not in inside
 
 
 def on_a_shelf(written: str) -> bool:
-    """Whether an import names a file that ships: what an agent proposes may import no other, for in a checkout the
-    library has folders beside its shelves, in which the agent may have written something.
+    """Whether an import names a file that ships with the library.
+
+    A proposal of an agent may import no other file: a checkout has folders in which the agent may have written.
     """
     shelf, _, rest = written.removeprefix(LIBRARY).partition("/")
     return written.startswith(LIBRARY) and shelf in SHELVES and is_direct(rest)

@@ -1,8 +1,7 @@
-"""Where to go on after a token that does not fit: the next part of the same block, its end, or the next declaration.
+"""Error recovery: continue at the next part of the same block, at its end, or at the next declaration.
 
-A place to go on is a word at the start of a line that the parser can take where that block or the file stands, or the
-brace that closes the block. The word or brace is then taken, so every recovery makes progress and a text of any kind
-comes to its end.
+Parsing continues at a keyword at the start of a line that fits in the block or in the file, or at the closing brace of
+the block. That token is shifted, so every recovery makes progress and parsing terminates for any text.
 """
 
 import re
@@ -19,11 +18,11 @@ _SCAN = re.compile(
       | [^\n/"A-Za-z_{}]++ | (?s:.)""",
     re.VERBOSE,
 )
-_NOT_BEGUN = re.compile(r"\s*[:=,(){]")  # what follows a parameter or an argument, not the first word of a declaration
+_NOT_BEGUN = re.compile(r"\s*[:=,(){]")  # follows a parameter or an argument, never the keyword of a declaration
 
 
 def at_line_start(source: Source, offset: int) -> bool:
-    """Whether only blanks stand before `offset` on its line."""
+    """Whether only blanks precede `offset` on its line."""
     text = source.text
     while offset and text[offset - 1] in " \t\r\f":
         offset -= 1
@@ -31,18 +30,18 @@ def at_line_start(source: Source, offset: int) -> bool:
 
 
 def shifts(row: Row, word: str) -> bool:
-    """Whether a state takes `word` as it is, without closing something first."""
+    """Whether a state shifts `word` directly, without a reduction."""
     return row.get(word, -1) >= 0
 
 
 def file_level(automaton: Automaton) -> int:
-    """How many states belong to the file itself: the first, and the list of declarations if there is one."""
+    """The number of states of the file itself: the first, and the list of declarations if there is one."""
     rows, states = automaton.table.rows, automaton.states
     return 2 if len(states) > 1 and shifts(rows[states[1]], "import") else 1
 
 
 def pending(automaton: Automaton) -> tuple[str, Name | Quoted | None] | None:
-    """The first word and the name, if it was read, of the declaration that is not complete yet."""
+    """The keyword of the incomplete declaration, and its name if it was read."""
     begun = automaton.values[file_level(automaton) - 1 :]
     if not begun:
         return None
@@ -51,7 +50,7 @@ def pending(automaton: Automaton) -> tuple[str, Name | Quoted | None] | None:
 
 
 def open_braces(automaton: Automaton) -> list[int]:
-    """Where in the values the braces are that were opened and not closed, the innermost last."""
+    """The indices of the open braces in the values, the innermost last."""
     found: list[int] = []
     for at, value in enumerate(automaton.values):
         if value == "{":
@@ -62,7 +61,7 @@ def open_braces(automaton: Automaton) -> list[int]:
 
 
 def owner(automaton: Automaton) -> tuple[str, Name | Quoted | None] | None:
-    """What the innermost open block belongs to, and its name: a phase, a step, or else the pending declaration."""
+    """The owner of the innermost open block, and its name: a phase, a step, or else the pending declaration."""
     values, braces = automaton.values, open_braces(automaton)
     inner = values[braces[0] + 1 : braces[-1]] if len(braces) > 1 else []
     while inner:
@@ -77,18 +76,19 @@ def owner(automaton: Automaton) -> tuple[str, Name | Quoted | None] | None:
 
 
 def open_block(automaton: Automaton) -> tuple[int, int] | None:
-    """The innermost open block: the place in the states where its next part is read, and how many braces lie deeper."""
+    """The innermost open block: the index of the state that reads its next part, and the number of deeper braces."""
     rows, states = automaton.table.rows, automaton.states
     for depth, brace in enumerate(reversed(open_braces(automaton))):
-        for at in (brace + 2, brace + 1):  # after the parts that were read, or after the brace
+        for at in (brace + 2, brace + 1):  # after the parts, or after the brace
             if at < len(states) and shifts(rows[states[at]], "}"):
                 return at, depth
     return None
 
 
 def misread(automaton: Automaton, failure: Failure) -> Failure:
-    """Where a block is not closed, the word that begins the next declaration may have been read as the name of a step;
-    then that word is what failed, and the stacks are left as they were before it.
+    """Correct a failure after an unclosed block, where the keyword of the next declaration was read as a step's name.
+
+    Then that keyword is the failure, and the stacks are unwound to before it.
     """
     word, at = (automaton.values[-1], automaton.starts[-1]) if automaton.values else ("", 0)
     begins = isinstance(word, str) and shifts(automaton.table.rows[0], word)
@@ -102,7 +102,7 @@ def misread(automaton: Automaton, failure: Failure) -> Failure:
 
 
 def resume(automaton: Automaton, failed: int) -> int | None:
-    """Unwinds the stacks and gives the offset to go on from; None when nothing after `failed` can be taken."""
+    """Unwind the stacks and return the offset to continue from; None if nothing after `failed` fits."""
     rows, states = automaton.table.rows, automaton.states
     text, base = automaton.source.text, file_level(automaton)
     block, depth = open_block(automaton) or (None, 0)
@@ -126,6 +126,6 @@ def resume(automaton: Automaton, failed: int) -> int | None:
 
 
 def _unwind(automaton: Automaton, keep: int, offset: int) -> int:
-    """Keeps `keep` states, and the values and offsets that belong to them."""
+    """Keep `keep` states with their values and offsets, and return `offset`."""
     del automaton.states[keep:], automaton.values[keep - 1 :], automaton.starts[keep - 1 :]
     return offset

@@ -1,31 +1,31 @@
-"""How large a file may be; apart, so that whoever asks only for that imports no model."""
+"""Size limits of files, in a module of their own that imports no model."""
 
 import re
 
-#: a text without escapes, closed or not: what is not closed is looked at once
+#: a string without escapes, closed or not
 _TEXT = re.compile(rb'"[^"]*"?')
 
 MAX_SIZE = 8 << 20  # bytes or characters of one file
-MAX_TOKENS = 500_000  # words, numbers, texts and marks of one file: above 100,000 lines as people write them
+MAX_TOKENS = 500_000  # tokens of one file: more than 100,000 lines of ordinary source
 MAX_FILES = 4_096  # of one program
 
 
 def without_texts(data: bytes, most: int) -> bytes | None:
-    """JSON without its texts and keys; None where it has more than `most` values (objects, lists, texts, numbers).
+    """Return JSON without its strings; None if it has more than `most` values (objects, lists, strings, numbers).
 
-    That is found out before any of them is built: reading millions takes seconds and hundreds of megabytes.
+    No value is built before the check: millions of values take seconds and hundreds of megabytes.
     """
     bare = bare_of(data, most)
     return None if bare is None or values_of(bare) > most else bare
 
 
 def bare_of(data: bytes, most: int) -> bytes | None:
-    """JSON without its texts and keys; None where it has more of those than `most` values have."""
-    if data.count(b'"') > 4 * most:  # a value may have a key, and a text has two quotes; few have more of them inside
+    """Return JSON without its strings; None if it has more strings than `most` values could have."""
+    if data.count(b'"') > 4 * most:  # a value and its key have four quotes at most, apart from escaped ones
         return None
     return _TEXT.sub(b"", data.replace(b"\\\\", b"").replace(b'\\"', b""))
 
 
 def values_of(bare: bytes) -> int:
-    """How many values JSON without texts has: each but the first of an object or a list is behind a comma."""
+    """Count the values of JSON without strings: each one follows a comma or opens an object or a list."""
     return sum(map(bare.count, (b",", b"[", b"{")))

@@ -1,4 +1,4 @@
-"""The LALR table that Lark made of the grammar (see `generate`), as the automaton reads it."""
+"""The LALR table of the grammar, made by `generate`, in the form that the automaton uses."""
 
 import json
 import re
@@ -13,17 +13,16 @@ PATH = Path(__file__).with_name("table.json")
 END = "<END>"
 NAME = "<NAME>"
 WORD = "[A-Za-z_][A-Za-z0-9_]*"
-MAX_SKIPPED = 1000  # comments and runs of blanks that one match takes
+MAX_SKIPPED = 1000  # comments and runs of blanks per match
 
 Row = dict[str, int]
 
 
 class Production(NamedTuple):
-    """A production: pop `length` values and hand those at `kept` to `action`; the result is an `origin`.
+    """A production: pop `length` values and pass those at `kept` to `action`; the result is an `origin`.
 
-    `kept` lists positions; None is an optional part that is absent, and the complement `~n` is a list that is handed on
-    item by item. Without an action the one value that is kept passes unchanged; `repeats` says that it is a list that
-    grows.
+    `kept` lists positions; None is an absent optional part, and the complement `~n` is a list whose items are passed
+    singly. Without an action the one kept value passes unchanged, or grows a list if the rule `repeats`.
     """
 
     origin: str
@@ -38,10 +37,10 @@ class Production(NamedTuple):
 
 
 class Lexer(NamedTuple):
-    """Reads one token where the parser stands: `match(text, offset)` skips what is ignored and reads what follows.
+    """Reads one token: `match(text, offset)` skips blanks and comments and matches the token after them.
 
-    The match's `lastindex` is the token's group and the index of its kind in `kinds`; empty for a word or a mark, which
-    is its own kind. There is no match at the end of the text, nor where no token begins.
+    The match's `lastindex` is the token's group and the index of its kind in `kinds`. A keyword or a mark is its own
+    kind: its entry is empty. There is no match at the end of the text, nor where no token starts.
     """
 
     match: Callable[[str, int], re.Match[str] | None]
@@ -49,8 +48,8 @@ class Lexer(NamedTuple):
 
 
 class Lexers(dict[int, Lexer]):
-    """The lexer of each state, compiled when the parser first stands there: most texts never reach most of them, and to
-    compile them all took as long as to read a small policy.
+    """The lexer of each state, compiled on demand: most texts reach few states, and compiling all of them took as long
+    as parsing a small policy.
     """
 
     def __init__(self, raw: dict[str, Any]) -> None:
@@ -66,11 +65,11 @@ class Lexers(dict[int, Lexer]):
 
     @property
     def any(self) -> Lexer:
-        """Reads every kind of token."""
+        """The lexer for every kind of token."""
         return self.accepting(self._kinds)
 
     def accepting(self, kinds: tuple[str, ...]) -> Lexer:
-        """Reads words, marks, and tokens of these kinds; states that accept the same share it."""
+        """The lexer for keywords, marks and these kinds of token, shared by states that accept the same kinds."""
         if kinds not in self._known:
             self._known[kinds] = _lexer(self._raw, kinds)
         return self._known[kinds]
@@ -78,11 +77,11 @@ class Lexers(dict[int, Lexer]):
 
 @dataclass(frozen=True, slots=True)
 class ParserTable:
-    """One row a state: from a symbol to the next state (0 or more) or to the rule `~n` to reduce by (negative).
+    """One row per state: maps a symbol to the next state (0 or more) or to the rule `~n` to reduce by (negative).
 
-    A symbol is a word or mark as it is written (`deadline`, `{`), a kind of token (`<NAME>`), or a rule (`<skill>`).
-    `words` says of each word of the language whether it may also be a name. `lexers` has one entry a state, `skip`
-    matches what is ignored.
+    A symbol is a keyword or mark as written (`deadline`, `{`), a kind of token (`<NAME>`), or a rule (`<skill>`).
+    `words` maps each keyword to whether it may also be a name. `lexers` has one entry per state; `skip` matches blanks
+    and comments.
     """
 
     rows: tuple[Row, ...]
@@ -93,7 +92,7 @@ class ParserTable:
     skip: re.Pattern[str]
 
     def skipped(self, text: str, offset: int) -> int:
-        """Where the comments and blanks end that begin at a place; a lexer skips at most `MAX_SKIPPED` of them."""
+        """The end of the comments and blanks at `offset`; a lexer skips at most `MAX_SKIPPED` of them."""
         while (found := self.skip.match(text, offset)) and found.end() > offset:
             offset = found.end()
         return offset
@@ -101,7 +100,7 @@ class ParserTable:
 
 @cache
 def table() -> ParserTable:
-    """The committed table. Read once in a process, in a few milliseconds."""
+    """The committed table, read once per process."""
     raw = json.loads(PATH.read_text(encoding="utf-8"))
     return ParserTable(
         rows=tuple(raw["states"]),
@@ -114,7 +113,10 @@ def table() -> ParserTable:
 
 
 def _ignored(raw: dict[str, Any]) -> str:
-    """Bounded, for each repetition of a group costs memory: `Automaton.run` goes on behind what one match skipped."""
+    """The pattern of blanks and comments, bounded because each repetition of a group costs memory.
+
+    `Automaton.run` skips the rest.
+    """
     return f"(?>(?:{'|'.join(raw['ignored'])}){{0,{MAX_SKIPPED}}})"
 
 

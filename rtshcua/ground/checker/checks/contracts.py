@@ -67,8 +67,8 @@ def more_than_full(context: CheckContext, energy: Quantity | None, what: str) ->
         context.report.add(
             codes.BEYOND_VEHICLE,
             energy.span,
-            f"the {what} may take `{context.report.text(energy.span)}`, and a full battery has 100 %",
-            help="write what it takes at most, as a share of a full battery and with the reserve left over",
+            f"the {what} may use `{context.report.text(energy.span)}`, more than a full battery",
+            help="write its maximum consumption as a share of a full battery, less the reserve",
         )
 
 
@@ -92,7 +92,7 @@ def _complete(context: CheckContext, skill: SkillDecl) -> None:
             codes.INCOMPLETE_CONTRACT,
             skill.name.span,
             f"the contract of `{skill.name.text}` lacks " + ", ".join(missing),
-            help="a decision needs these, and no default for them would be safe",
+            help="a decision needs these clauses, and they have no safe default",
         )
 
 
@@ -107,7 +107,7 @@ def _motion(context: CheckContext, skill: SkillDecl, motion: MotionDecl) -> None
             context.report.add(
                 codes.BAD_MOTION,
                 motion.target.span,
-                f"the vehicle flies to the first position of its parameters, which is `{first.name.text}`",
+                f"`fly to` needs the first parameter that is a position, `{first.name.text}`",
                 labels=[(first.span, "declared here")],
             )
     if motion.pattern is not None:
@@ -127,13 +127,15 @@ def _parameter(context: CheckContext, skill: SkillDecl, name: Name | None, type:
         _not_parameter(context, skill, name, type.describe())
 
 
-def _not_parameter(context: CheckContext, skill: SkillDecl, name: Name, asked: str) -> None:
+def _not_parameter(context: CheckContext, skill: SkillDecl, name: Name, expected: str) -> None:
     names = [parameter.name.text for parameter in skill.parameters]
     labels = [(p.span, f"`{name.text}` is declared here") for p in skill.parameters if p.name.text == name.text]
     context.report.add(
         codes.BAD_MOTION,
         name.span,
-        f"`{name.text}` is no parameter of `{skill.name.text}` that is {asked}",
+        f"`{name.text}` is not a parameter of `{skill.name.text}`; expected {expected}"
+        if not labels
+        else f"the parameter `{name.text}` is not {expected}",
         help=None if labels else suggestion(name.text, names),
         labels=labels,
     )
@@ -146,8 +148,8 @@ def check_fallbacks(context: CheckContext) -> None:
             check_chain(context, skill.fallback, skill, skill.fallback[0].span.to(skill.fallback[-1].span))
 
 
-_ASKED = ("decision", "state", "authorization")
-NEEDED = {"semantic": _ASKED, "tactical": _ASKED, "reflex": ("decision", "state", "effect")}
+_AUTHORIZED = ("decision", "state", "authorization")
+NEEDED = {"semantic": _AUTHORIZED, "tactical": _AUTHORIZED, "reflex": ("decision", "state", "effect")}
 
 
 def check_records(context: CheckContext) -> None:
@@ -165,10 +167,10 @@ def check_records(context: CheckContext) -> None:
             context.report.add(
                 codes.INSUFFICIENT_EVIDENCE,
                 span,
-                f"`{skill.name.text}` does not record {' and '.join(missing)}, so no decision derives again",
-                help=f"record {' and '.join(missing)} too, or write no `record` at all: then everything is recorded",
-                labels=[(skill.timing_class.span, "what a skill of this class needs")],
-                fix=(span, whole, "record it too"),
+                f"`{skill.name.text}` does not record {' and '.join(missing)}, so its decisions cannot be verified",
+                help=f"add {' and '.join(missing)}, or remove `record`: then everything is recorded",
+                labels=[(skill.timing_class.span, "required by this class")],
+                fix=(span, whole, "add what is missing"),
             )
 
 
@@ -182,9 +184,9 @@ def check_durability(context: CheckContext) -> None:
             context.report.add(
                 codes.FLEETING_EVIDENCE,
                 words.span,
-                f"`{skill.name.text}` is no reflex, and its records would be lost with the process",
-                help=f"write `{WORDS[WRITTEN]}` or more, or leave the word out: then it is `synced`",
-                labels=[(skill.timing_class.span, "`buffered` is for reflexes alone")],
+                f"`{skill.name.text}` is not a reflex, so its records cannot be `buffered`",
+                help=f"write `{WORDS[WRITTEN]}`, or remove the word: the default is `synced`",
+                labels=[(skill.timing_class.span, "only a reflex may be `buffered`")],
                 fix=(words.span, WORDS[WRITTEN], f"write `{WORDS[WRITTEN]}`"),
             )
 
@@ -198,8 +200,8 @@ def durability(context: CheckContext, record: Sequence[Name]) -> Name | None:
             codes.TWO_DURABILITIES,
             other.span,
             f"records cannot be both `{words[0].text}` and `{other.text}`",
-            help=f"write one of them; {listed(WORDS)} go from least to most",
-            labels=[(words[0].span, "asked for here")],
+            help=f"keep one of them; from least to most durable: {listed(WORDS)}",
+            labels=[(words[0].span, "also written here")],
         )
         return None
     return words[0] if words else None

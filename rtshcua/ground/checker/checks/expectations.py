@@ -33,7 +33,7 @@ def _reason(context: CheckContext, expected: Expectation, name: Name) -> None:
         context.report.add(
             codes.UNKNOWN_REASON,
             name.span,
-            f"there is no reason `{name.text}`",
+            f"unknown reason `{name.text}`",
             help=f"did you mean `{near}`?" if near else f"the reasons of `{expected.outcome}` are {listed(fitting)}",
             fix=None if near is None else (name.span, near, f"write `{near}`"),
         )
@@ -43,7 +43,7 @@ def _reason(context: CheckContext, expected: Expectation, name: Name) -> None:
         context.report.add(
             codes.NEVER_DECIDED,
             name.span,
-            f"`{name.text}` is a reason of `{outcome}`, never of `{expected.outcome}`",
+            f"`{name.text}` is a reason for `{outcome}`, not for `{expected.outcome}`",
             help=f"write `expect {outcome}`, or another reason",
             labels=[(expected.span, "expected here")],
         )
@@ -58,9 +58,9 @@ def _target(context: CheckContext, target: Name, skill: SkillDecl, policy: Polic
     context.report.add(
         codes.NEVER_DECIDED,
         target.span,
-        f"`{target.text}` never flies in the place of `{skill.name.text}`",
-        help=f"did you mean `{near}`?" if near else f"what may fly is {listed(names)}" if names else None,
-        labels=[(span, f"`{name}` may fly") for name, span in places[:3]],
+        f"`{target.text}` never replaces `{skill.name.text}`",
+        help=f"did you mean `{near}`?" if near else f"possible replacements: {listed(names)}" if names else None,
+        labels=[(span, f"`{name}` may replace it") for name, span in places[:3]],
         fix=None if near is None else (target.span, near, f"write `{near}`"),
     )
 

@@ -42,9 +42,9 @@ def _header(context: CheckContext, mission: MissionDecl) -> None:
         context.report.add(
             codes.POLICY_VERSION,
             mission.policy.span,
-            f"`{policy.name.text}` has version {policy.version}, and the mission is under version "
-            f"{mission.policy_version}",
-            help=f"write `{policy.name.text}@{policy.version}`, if the mission fits the newer policy",
+            f"the mission names version {mission.policy_version} of `{policy.name.text}`, which has version "
+            f"{policy.version}",
+            help=f"write `{policy.name.text}@{policy.version}` if the mission fits that version",
             labels=[(policy.name.span, "the policy is declared here")],
         )
     quantity(context, mission.most_time, Dimension.DURATION)
@@ -53,7 +53,7 @@ def _header(context: CheckContext, mission: MissionDecl) -> None:
         context.report.add(
             codes.NO_PROPOSER,
             mission.name.span,
-            f"the mission `{mission.name.text}` does not say who proposes it and for which role",
+            f"the mission `{mission.name.text}` lacks `proposed by`",
             help="add `proposed by agent NAME for role operator`, or `proposed by operator NAME for role operator`",
         )
     if mission.source is not None:
@@ -110,14 +110,12 @@ def _shorter(context: CheckContext, skill: SkillDecl, overrides: Overrides) -> N
 def _looser(
     context: CheckContext, skill: SkillDecl, words: str, mine: Quantity, skills: Quantity | None, limit: str, side: str
 ) -> None:
-    less = "" if side == "at most" else ", so less would be kept ready"
-    at = (skill.name.span, f"`{skill.name.text}` is declared here, with {limit} where nothing is said")
+    at = (skill.name.span, f"`{skill.name.text}` is declared here; the default is {limit}")
     context.report.add(
         codes.NOT_TIGHTER,
         mine.span,
-        f"`{words} {context.report.text(mine.span)}` is looser than the contract of `{skill.name.text}`, which says "
-        f"{limit}{less}",
-        help=f"a step may only be held to more than its skill: write {side} `{limit}`, or leave it out",
+        f"`{words} {context.report.text(mine.span)}` is looser than `{limit}` of the contract of `{skill.name.text}`",
+        help=f"a step may only tighten the contract: write {side} `{limit}`, or remove it",
         labels=[at if skills is None else (skills.span, "the skill's own")],
         fix=(mine.span, limit, f"write `{limit}`"),
     )
@@ -130,13 +128,13 @@ def _durable(context: CheckContext, skill: SkillDecl, overrides: Overrides) -> N
     if mine is None or WORDS.index(mine.text) >= least:
         return
     skills = next((name for name in skill.record if name.text == WORDS[least]), skill.name)
-    said = "the skill's own" if skills is not skill.name else f"declared here; without a word it is `{WORDS[least]}`"
+    label = "the skill's own" if skills is not skill.name else f"declared here; the default is `{WORDS[least]}`"
     context.report.add(
         codes.NOT_TIGHTER,
         mine.span,
         f"`{mine.text}` is less durable than the records of `{skill.name.text}`, which are `{WORDS[least]}`",
-        help=f"a step may only be held to more than its skill: write `{WORDS[least]}` or more, or leave it out",
-        labels=[(skills.span, said)],
+        help=f"a step may only tighten the contract: write `{WORDS[least]}` or a more durable word, or remove it",
+        labels=[(skills.span, label)],
         fix=(mine.span, WORDS[least], f"write `{WORDS[least]}`"),
     )
 
@@ -150,7 +148,7 @@ def _phases(context: CheckContext, skill: SkillDecl, overrides: Overrides) -> No
             context.report.add(
                 codes.NOT_TIGHTER,
                 name.span,
-                f"the step would be valid during `{name.text}`, and `{skill.name.text}` is valid during {words} alone",
-                help="a step may only be held to more than its skill: leave the phase out",
+                f"the step is valid during `{name.text}`, but `{skill.name.text}` only during {words}",
+                help="a step may only tighten the contract: remove the phase",
                 labels=[(phase.span, "the skill's own") for phase in skill.phases],
             )

@@ -23,7 +23,7 @@ def check_names(context: CheckContext) -> None:
             codes.DUPLICATE_NAME,
             nearer.name.span,
             f"`{nearer.name.text}` is declared twice",
-            help="give it another name: one name has one meaning, whatever it is declared as",
+            help="rename one of them: a name has one meaning in a program",
             labels=[(other.name.span, f"{words}, as {WORDS[type(other)]}")],
         )
     enumerators = {member.name.text: enum for enum in symbols.enums.values() for member in enum.members}
@@ -74,7 +74,7 @@ def _ambiguous(context: CheckContext, template: TemplateDecl) -> None:
                 context.report.add(
                     codes.SHADOWED_NAME,
                     reference.span,
-                    f"`{reference.name}` is a parameter of the template, and an argument of `{owner.name.text}`",
+                    f"`{reference.name}` is both a parameter of the template and an argument of `{owner.name.text}`",
                     help="give the template's parameter another name",
                     labels=[
                         (own[reference.name].span, "the template's"),
@@ -98,7 +98,7 @@ def _called_phase(context: CheckContext) -> None:
             context.report.add(
                 codes.SHADOWED_NAME,
                 name.span,
-                f"`{PHASE}` is the mission's phase in a condition, so nothing that has a value is called so",
+                f"`{PHASE}` is reserved for the mission's phase",
                 help="give it another name",
             )
 

@@ -35,7 +35,7 @@ def check_parameters(context: CheckContext) -> None:
                 context.report.add(
                     codes.BAD_PARAMETER,
                     parameter.type.span,
-                    f"no parameter can be of the type `{parameter.type.text}`",
+                    f"a parameter cannot have the type `{parameter.type.text}`",
                     help=suggestion(parameter.type.text, NAMED) or "the types of parameters are " + _types(type(owner)),
                     fix=correction(context.report, parameter.type.span, parameter.type.text, NAMED),
                 )
@@ -69,8 +69,8 @@ def _unknown_end(scope: Scope, range: Range) -> None:
             scope.report.add(
                 codes.NOT_CONSTANT,
                 end.span,
-                f"a range is known before the flight, and `{scope.report.text(end.span)}` is not",
-                help="write both ends as numbers with their units; ask for the rest in a `require` clause or a rule",
+                f"`{scope.report.text(end.span)}` is not known before the flight, as the end of a range must be",
+                help="write both ends as numbers with their units; put other limits in a `require` clause or a rule",
                 labels=declaration_labels(scope, end),
             )
 
@@ -92,7 +92,7 @@ def _of_template(context: CheckContext, parameter: ParameterDecl) -> bool:
         context.report.add(
             codes.BAD_PARAMETER,
             parameter.type.span,
-            f"no parameter of a template can be {'a choice' if parameter.choices else 'a position'}",
+            f"a parameter of a template cannot be {'a choice' if parameter.choices else 'a position'}",
             help="the types of its parameters are " + _types(TemplateDecl),
         )
         return True
@@ -109,13 +109,16 @@ def no_range(context: CheckContext, parameter: ParameterDecl) -> None:
             codes.BAD_PARAMETER,
             parameter.span,
             f"the parameter `{name}` has no range",
-            help=f"say which values are accepted, such as `in 0 {example.partition(' ')[2]} .. {example}`".replace(
+            help=f"add the accepted values, such as `in 0 {example.partition(' ')[2]} .. {example}`".replace(
                 "0  ..", "0 .."
             ),
         )
     elif parameter.range is not None:
         context.report.add(
-            codes.BAD_PARAMETER, parameter.range.span, f"`{name}` is no number, so it has no range", help="leave it out"
+            codes.BAD_PARAMETER,
+            parameter.range.span,
+            f"`{name}` is not a number and cannot have a range",
+            help="remove the range",
         )
 
 
@@ -133,7 +136,7 @@ def check_sizes(context: CheckContext) -> None:
             codes.DUPLICATE_NAME,
             nearer.skill.span,
             f"the sizes of `{nearer.skill.text}` are given twice",
-            help="give them once: a skill has one contract in a program",
+            help="keep one of them: a skill has one contract in a program",
             labels=[(other.skill.span, "also given here")],
         )
 
@@ -146,7 +149,7 @@ def _declared(context: CheckContext, size: ParameterDecl) -> None:
         context.report.add(
             codes.BAD_PARAMETER,
             size.type.span if not size.choices else size.span,
-            f"the size `{name}` is no number",
+            f"the size `{name}` is not a number",
             help="the types of sizes are " + ", ".join(f"`{each}`" for each in numbers),
         )
     elif size.range is None:
@@ -157,8 +160,8 @@ def _declared(context: CheckContext, size: ParameterDecl) -> None:
             size.span if default is None else default.span,
             f"the size `{name}` has no default"
             if default is None
-            else f"the default of the size `{name}` is no number",
-            help="write the number with its unit that counts where no program gives another, such as `= 60 m`",
+            else f"the default of the size `{name}` is not a number",
+            help="write a default with its unit, such as `= 60 m`; a program may change it",
         )
     else:
         check_range(context, argument, size.range)
@@ -184,7 +187,7 @@ def _named(context: CheckContext, skill: SkillDecl) -> None:
             context.report.add(
                 codes.UNKNOWN_NAME,
                 span,
-                f"`{name}` is no size of `{skill.name.text}`",
+                f"`{name}` is not a size of `{skill.name.text}`",
                 help=suggestion(name, known) or "write a number with its unit, or declare it: `sizes (... = ...)`",
                 fix=correction(context.report, span, name, known),
             )
@@ -195,7 +198,7 @@ def _given(context: CheckContext, declaration: SizesDecl) -> None:
     if skill is None:
         return
     known = {size.name.text: size for size in reversed(skill.sizes)}
-    takes = "its sizes are " + ", ".join(f"`{size.name.text}`" for size in skill.sizes) if known else "it has none"
+    takes = "its sizes are " + ", ".join(f"`{size.name.text}`" for size in skill.sizes) if known else "it has no sizes"
     seen: dict[str, GivenSize] = {}
     for each in declaration.given:
         name = each.name.text

@@ -26,8 +26,8 @@ def check_policies(context: CheckContext) -> None:
             context.report.add(
                 codes.NUMBER_SIZE,
                 policy.name.span,
-                f"the version of `{policy.name.text}` is larger than what fits on board",
-                help=f"at most {MAX_VALUE}",
+                f"the version of `{policy.name.text}` is too large",
+                help=f"the maximum is {MAX_VALUE}",
             )
         for rule in policy.rules:
             with context.report.within(brought_about(rule)):
@@ -51,7 +51,7 @@ def _contingency(context: CheckContext, policy: PolicyDecl) -> None:
         codes.NO_CONTINGENCY,
         policy.name.span,
         f"the policy `{policy.name.text}` has no contingency",
-        help="say what flies when a step is denied in the air, as in "
+        help="add the skills to fly when a step is denied in flight, as in "
         "`contingency hover for 10 s, return_home, emergency_land`",
     )
 
@@ -79,7 +79,7 @@ def _confirm(context: CheckContext, rule: RuleDecl) -> None:
     context.report.add(
         codes.CONFIRM_WITHOUT_WITHIN,
         rule.span,
-        "the rule does not say how long an approval is awaited",
+        "the rule has no time limit for the approval",
         help="add `within` and a duration, as in `within 30 s`; after that the step is denied",
     )
 
@@ -100,9 +100,9 @@ def shared_arguments(context: CheckContext, rule: RuleDecl, skills: Sequence[Ski
                 context.report.add(
                     codes.RULE_ARGUMENT,
                     reference.span,
-                    f"a rule about any skill cannot read the argument `{name}`, which not every skill has",
-                    help="name the skills that the rule is about",
-                    labels=[(rule.span, "this rule is about any skill")],
+                    f"a rule for any skill cannot read the argument `{name}`, which some skills lack",
+                    help="name the skills of the rule",
+                    labels=[(rule.span, "this rule is for any skill")],
                 )
                 failed = True
             continue
@@ -118,7 +118,7 @@ def shared_arguments(context: CheckContext, rule: RuleDecl, skills: Sequence[Ski
             context.report.add(
                 codes.RULE_ARGUMENT,
                 reference.span,
-                f"`{lacking.name.text}` has no argument `{name}` of this type, so the rule cannot be about it",
+                f"`{lacking.name.text}` has no argument `{name}` of this type, which the rule reads",
                 help="write one rule for each skill",
                 labels=[
                     (lacking.name.span, "declared here"),

@@ -75,9 +75,9 @@ def check_subject(context: CheckContext, subject: Subject) -> None:
         context.report.add(
             codes.WRONG_TYPE,
             subject.condition.span,
-            f"expected a temporal condition; `{written}` is about the moment",
-            help="give the signals that it reads; set by hand is what is written with `for the last`, `within the "
-            "last`, `rising` or `falling`",
+            f"expected a temporal condition; `{written}` reads current values only",
+            help="set the signals that it reads; only conditions with `for the last`, `within the "
+            "last`, `rising` or `falling` can be set",
         )
 
 
@@ -149,7 +149,7 @@ def _truth(context: CheckContext, cell: TableCell) -> None:
         context.report.add(
             codes.WITHOUT_EFFECT,
             cell.measured.span,
-            "the truth of a condition over time has no age",
+            "the value of a temporal condition has no age",
             help="leave `measured ... ago` out",
         )
 
@@ -159,7 +159,7 @@ def _order(context: CheckContext, order: tuple[Name, ...]) -> None:
         context.report.add(
             codes.TOO_MANY,
             order[0].span.to(order[-1].span),
-            f"there are {len(order)} phases, and at most {MAX_PHASES} fit on board",
+            f"the test names {len(order)} phases; the limit is {MAX_PHASES}",
         )
     seen: dict[str, Name] = {}
     for name in order:
@@ -209,10 +209,8 @@ def nominal_of(context: CheckContext, test: TestDecl) -> NominalDecl | None:
         context.report.add(
             codes.NO_NOMINAL,
             test.name.span,
-            f"there are {len(own)} nominals, and the test does not say from which it starts"
-            if own
-            else "nothing says where the test starts from",
-            help=f"write `test ... from {own[0].name.text} {{ ... }}`; there are {names}"
+            f"the test does not say which of {len(own)} nominals it starts from" if own else "the test has no nominal",
+            help=f"write `test ... from {own[0].name.text} {{ ... }}`; the nominals are {names}"
             if own
             else "declare or import a `nominal`, with the policy, the vehicle and the signals that a test starts with",
             labels=[(each.name.span, "a nominal") for each in own[:2]],

@@ -70,7 +70,8 @@ def _role(context: CheckContext, name: Name) -> None:
     context.report.add(
         codes.UNKNOWN_ROLE,
         name.span,
-        f"there is no role `{name.text}`",
-        help=suggestion(name.text, known) or f"`role {name.text}` declares it, in this file or one that it imports",
+        f"the role `{name.text}` is not declared",
+        help=suggestion(name.text, known)
+        or f"declare it with `role {name.text}`, in this file or in one that it imports",
         fix=correction(context.report, name.span, name.text, known),
     )

@@ -55,9 +55,9 @@ def check_scenarios(context: CheckContext) -> None:
             context.report.add(
                 codes.SAME_SCENARIO,
                 scenario.name.span,
-                f"two scenarios are called `{short(scenario.name.text)}`",
-                help="give it another name: reports tell scenarios by their names",
-                labels=[(first.name.span, "the first one")],
+                f"two scenarios have the name `{short(scenario.name.text)}`",
+                help="rename one of them: reports identify scenarios by name",
+                labels=[(first.name.span, "first declared here")],
             )
         _check(context, scenario)
 
@@ -94,9 +94,8 @@ def _values(context: CheckContext, scenario: ScenarioDecl, mission: MissionDecl)
         context.report.add(
             codes.MISSING_ARGUMENT,
             scenario.mission.span,
-            f"`{mission.name.text}` is flown without a value for "
-            + " and ".join(f"`{each.name.text}`" for each in lacking),
-            help="a scenario flies a mission with the defaults of its parameters: declare them",
+            f"`{mission.name.text}` has no value for " + " and ".join(f"`{each.name.text}`" for each in lacking),
+            help="declare a default: a scenario flies a mission with the defaults of its parameters",
             labels=[(each.span, f"`{each.name.text}` is declared here, without a default") for each in lacking],
         )
 
@@ -121,7 +120,7 @@ def _seeds(context: CheckContext, seeds: Seeds) -> None:
         context.report.add(
             codes.TOO_MANY,
             seeds.span,
-            f"these are {last.value - first.value + 1} seeds, and a scenario has at most {MAX_SEEDS}",
+            f"the scenario has {last.value - first.value + 1} seeds; the limit is {MAX_SEEDS}",
         )
 
 
@@ -133,7 +132,7 @@ def _ascending(context: CheckContext, low: Quantity, high: Quantity) -> bool:
     context.report.add(
         codes.EMPTY_RANGE,
         span,
-        f"the range `{context.report.text(span)}` is empty: its first end is above its second",
+        f"the range `{context.report.text(span)}` is empty: its lower end is above its upper end",
         help=f"write `{swapped}`",
         fix=(span, swapped, "swap the ends"),
     )
@@ -153,7 +152,7 @@ def _beginning(context: CheckContext, beginning: Beginning) -> None:
         context.report.add(
             codes.BAD_START,
             beginning.span,
-            f"a flight does not start with `{name.text}`",
+            f"`{name.text}` is not allowed in `start`",
             help=f"write `at 0 s {written}`, outside of `start`",
         )
     else:
@@ -162,7 +161,7 @@ def _beginning(context: CheckContext, beginning: Beginning) -> None:
         context.report.add(
             codes.BAD_START,
             beginning.span,
-            f"a flight does not start with `{written}`",
+            f"`{written}` is not allowed in `start`",
             help=(suggestion(name.text, known) if misspelt else None)
             or "write `start battery = 80 %`, `start wind(speed = 3 m/s, from = 270 deg)`, or both with a comma",
             fix=correction(context.report, name.span, name.text, known) if misspelt else None,
@@ -210,7 +209,7 @@ def _step(context: CheckContext, moment: AfterStepDecl, mission: MissionDecl | N
         fix = correction(context.report, moment.skill.span, name, steps)
     else:
         message = f"`{mission.name.text}` has no step `{name}` number {number}"
-        help = f"it has {count} of `{name}`, counted from 1"
+        help = f"it has {count} steps `{name}`, counted from 1"
         fix = None
     context.report.add(
         codes.NO_SUCH_STEP,
@@ -232,15 +231,15 @@ def _condition(context: CheckContext, condition: Condition) -> None:
             context.report.add(
                 codes.BAD_TRIGGER,
                 part.span,
-                "a fault cannot wait for a condition over time",
-                help="leave `for the last`, `within the last`, `rising` and `falling` out: `when` waits until its "
-                "condition is true for the first time, and `2 s after when ...` is later",
+                "a fault cannot wait for a temporal condition",
+                help="remove `for the last`, `within the last`, `rising` and `falling`: `when` triggers once its "
+                "condition becomes true, `2 s after when ...` 2 s later",
             )
         elif is_about_phase(part):
             context.report.add(
                 codes.BAD_TRIGGER,
                 part.span,
-                "a fault cannot wait for a phase of the mission",
+                "a fault cannot wait for a phase",
                 help="write `after` and the first step of that phase",
             )
 

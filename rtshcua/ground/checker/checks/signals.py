@@ -40,8 +40,8 @@ def _enum(context: CheckContext, enum: EnumDecl) -> None:
             report.add(
                 codes.ENUM_VALUE,
                 member.span,
-                f"`{member.name.text}` has the value of `{first.text}`",
-                labels=[(first.span, "this one")],
+                f"`{member.name.text}` and `{first.text}` have the same value",
+                labels=[(first.span, "first used here")],
             )
     if enum.dialect is None:
         return
@@ -76,7 +76,7 @@ def _signal(context: CheckContext, signal: SignalDecl) -> None:
         context.report.add(
             codes.SIGNAL_TYPE,
             signal.type.span,
-            f"no signal can be of the type `{name}`",
+            f"a signal cannot have the type `{name}`",
             help=suggestion(name, types) or "the types of signals are " + ", ".join(f"`{each}`" for each in types),
             fix=correction(context.report, signal.type.span, name, types),
         )
@@ -120,7 +120,7 @@ def _source(context: CheckContext, signal: SignalDecl, source: SourceDecl, type:
                 codes.FIELD_TYPE,
                 name.span,
                 f"`{name.text}` is {'text' if field.type == 'char' else f'an array of {field.length} numbers'}",
-                help="a signal is read from a field that is one number",
+                help="choose a field that is a single number",
             )
         else:
             _field(context, signal, source, name, field, type)
@@ -145,18 +145,18 @@ def _selector(context: CheckContext, source: SourceDecl, message: Message) -> No
             report.add(
                 codes.FIELD_TYPE,
                 name.span,
-                f"`{name.text}` is not one whole number",
-                help="a message is chosen by a field that is one whole number, such as `orientation` or `id`",
+                f"`{name.text}` is not an integer field",
+                help="select a message by an integer field, such as `orientation` or `id`",
             )
         elif name.text in seen:
-            report.add(codes.UNSELECTED, name.span, f"`{name.text}` is selected twice", help="say it once")
+            report.add(codes.UNSELECTED, name.span, f"`{name.text}` is selected twice", help="keep one of them")
         elif selected_value(context.dialect, source.message.text, each) is None:
             members = {} if field.enum is None else context.dialect.enums.get(field.enum, {})
             low, high = INTEGERS[field.type]
             report.add(
                 codes.UNKNOWN_AT,
                 each.value.span,
-                f"`{value}` is no value of `{source.message.text}.{name.text}`",
+                f"`{value}` is not a value of `{source.message.text}.{name.text}`",
                 help=suggestion(value, members)
                 or (f"its values are {listed(members)}" if members else f"its values go from {low} to {high}"),
             )
@@ -166,9 +166,9 @@ def _selector(context: CheckContext, source: SourceDecl, message: Message) -> No
         report.add(
             codes.UNSELECTED,
             source.span,
-            f"`{source.message.text}` comes from sensors that look into different directions, and none is selected",
-            help="say which one is meant: `where orientation = MAV_SENSOR_ROTATION_NONE` looks ahead, "
-            "`MAV_SENSOR_ROTATION_PITCH_270` down",
+            f"`{source.message.text}` comes from sensors in different directions, and the source selects none",
+            help="select a direction: `where orientation = MAV_SENSOR_ROTATION_NONE` is forward, "
+            "`MAV_SENSOR_ROTATION_PITCH_270` is down",
         )
 
 
@@ -190,11 +190,11 @@ def _count(context: CheckContext, signal: SignalDecl, source: SourceDecl, type: 
     allowed = (2,) if type == POSITION else (1, 2) if type == SPEED else (1,)
     if given in allowed:
         return True
-    what = "latitude and longitude" if type == POSITION else "one field"
+    what = "two fields, latitude and longitude" if type == POSITION else "one field"
     context.report.add(
         codes.FIELD_COUNT,
         source.span,
-        f"the type `{signal.type.text}` is read from {what}, and here {'is' if given == 1 else 'are'} {given}",
+        f"a signal of type `{signal.type.text}` is read from {what}; the source has {given}",
         labels=[(signal.type.span, "this type")],
     )
     return False
@@ -222,7 +222,7 @@ def _field(
             context.report.add(
                 codes.FIELD_ENUM,
                 name.span,
-                f"`{name.text}` {has}, and the signal is a `{signal.type.text}`",
+                f"`{name.text}` {has}, but the signal is a `{signal.type.text}`",
                 help=help,
                 labels=[(enum.name.span, f"`{enum.name.text}` is declared here")],
             )
@@ -241,7 +241,7 @@ def _altitude(
         context.report.add(
             codes.FIELD_DATUM,
             name.span,
-            f"it is not known what `{source.message.text}.{name.text}` is measured from",
+            f"the datum of `{source.message.text}.{name.text}` is unknown",
             help="read altitudes from "
             + ", ".join(f"`{message}.{each}`" for message, each in list(DATUM)[:2])
             + ", or declare a `length`",
@@ -250,8 +250,8 @@ def _altitude(
         context.report.add(
             codes.FIELD_DATUM,
             name.span,
-            f"`{source.message.text}.{name.text}` is above {datum.value}, and the source before it is not",
-            labels=[(signal.sources[0].span, "this one")],
+            f"`{source.message.text}.{name.text}` is above {datum.value}, but the first source is not",
+            labels=[(signal.sources[0].span, "the first source")],
         )
 
 
@@ -262,7 +262,7 @@ def _unit(context: CheckContext, signal: SignalDecl, name: Name, field: Field, a
     context.report.add(
         codes.FIELD_UNIT,
         name.span,
-        f"`{name.text}` {has}, which does not measure `{signal.type.text}`",
+        f"`{name.text}` {has}, which does not fit `{signal.type.text}`",
         help=f"declare the signal as `{fits[0]}`, or read a field in {words}" if fits else f"read a field in {words}",
         labels=[(signal.type.span, "this type")],
     )
@@ -278,7 +278,7 @@ def _sentinels(context: CheckContext, signal: SignalDecl, field: Field) -> None:
             context.report.add(
                 codes.UNKNOWN_AT,
                 name.span,
-                f"`{name.text}` is no value of a field of type `{field.type}`",
+                f"`{name.text}` is not a value of a field of type `{field.type}`",
                 help=suggestion(name.text, members)
                 or (f"its values are {listed(members)}; as numbers they " if members else "its values ")
                 + f"go from {low} to {high}",

@@ -44,9 +44,9 @@ def check_tests(context: CheckContext) -> None:
             context.report.add(
                 codes.SAME_TEST,
                 test.name.span,
-                f"two tests are called `{short(test.name.text)}`",
-                help="give it another name: reports tell tests by their names",
-                labels=[(first.name.span, "the first one")],
+                f"two tests have the name `{short(test.name.text)}`",
+                help="rename one of them: reports identify tests by name",
+                labels=[(first.name.span, "first declared here")],
             )
         _check(context, test)
 
@@ -59,7 +59,7 @@ def _too_many(context: CheckContext, tests: tuple[TestDecl, ...]) -> bool:
             context.report.add(
                 codes.TOO_MANY,
                 test.name.span,
-                f"with this test the file has more than {MAX_CASES} cases, and so many are run of one file",
+                f"with this test the file has more than {MAX_CASES} cases, the limit of a file",
                 help="split it into several files",
             )
             return True
@@ -70,15 +70,15 @@ def _check(context: CheckContext, test: TestDecl) -> None:
     check_premises(context, test.premises)
     request = test.request
     if request is None:
-        _lacks(context, test, "what is asked", "add `when` and a request, as in `when hover(10 s) by role operator`")
+        _report(context, test, "the test has no request", "add `when`, as in `when hover(10 s) by role operator`")
     else:
         check_asker(context, request.asker)
     if (test.expectation is None) == (test.table is None):
-        _lacks(
+        _report(
             context,
             test,
-            "what must be decided" if test.table is None else "which decision is meant: it has a table too",
-            "add `expect` and an outcome, or a `table`" if test.table is None else "keep `expect`, or the `table`",
+            "the test has no expected outcome" if test.table is None else "the test has both `expect` and a `table`",
+            "add `expect` and an outcome, or a `table`" if test.table is None else "remove one of them",
         )
     nominal = nominal_of(context, test)
     policy = None
@@ -97,37 +97,37 @@ def _check(context: CheckContext, test: TestDecl) -> None:
         check_expectation(context, expected, skill, policy)
 
 
-def _lacks(context: CheckContext, test: TestDecl, what: str, help: str) -> None:
-    message = f"the test does not say {what}"
+def _report(context: CheckContext, test: TestDecl, message: str, help: str) -> None:
     context.report.add(codes.INCOMPLETE_TEST, test.name.span, message, help=help)
 
 
 def _complete(context: CheckContext, test: TestDecl, start: TestStart) -> None:
-    """Report what neither the test nor its nominal says; nothing is made up."""
+    """Report what both the test and its nominal lack; there are no defaults."""
     lacking = [
         (what, help)
-        for said, what, help in (
-            (start.role, "who asks", "`by role operator through agent`"),
-            (start.instant, "when it is", '`at "2026-06-01T08:00:00Z"`'),
-            (start.phase, "in which phase of its mission that is", "`phase inspection`"),
+        for value, what, help in (
+            (start.role, "the requester", "`by role operator through agent`"),
+            (start.instant, "the time", '`at "2026-06-01T08:00:00Z"`'),
+            (start.phase, "the phase of the mission", "`phase inspection`"),
         )
-        if said is None
+        if value is None
     ]
     for what, help in lacking:
         context.report.add(
             codes.INCOMPLETE_TEST,
             test.name.span,
-            f"neither the test nor its nominal says {what}",
+            f"neither the test nor its nominal gives {what}",
             help=f"add it to the nominal, as in {help}",
-            labels=[(start.nominal.name.span, "it starts from here")],
+            labels=[(start.nominal.name.span, "the nominal of the test")],
         )
     if start.phase is not None and start.phase.phase.text not in {name.text for name in start.order}:
         names = [name.text for name in start.order]
         context.report.add(
             codes.UNKNOWN_NAME,
             start.phase.phase.span,
-            f"`{start.phase.phase.text}` is none of the phases of the mission",
-            help=suggestion(start.phase.phase.text, names) or "they are " + ", ".join(f"`{each}`" for each in names),
+            f"`{start.phase.phase.text}` is not a phase of the mission",
+            help=suggestion(start.phase.phase.text, names)
+            or "its phases are " + ", ".join(f"`{each}`" for each in names),
             fix=correction(context.report, start.phase.phase.span, start.phase.phase.text, names),
             labels=[(start.order[0].span.to(start.order[-1].span), "its phases in order")],
         )
@@ -169,14 +169,14 @@ def check_table(context: CheckContext, test: TestDecl, table: CaseTable, skill: 
         context.report.add(
             codes.TOO_MANY,
             table.columns[MAX_COLUMNS].span,
-            f"the table has {len(table.columns)} columns, and at most {MAX_COLUMNS} are read",
+            f"the table has {len(table.columns)} columns; the limit is {MAX_COLUMNS}",
         )
         return
     if not table.rows:
         context.report.add(
             codes.INCOMPLETE_TEST,
             test.name.span,
-            "the table of the test has no row, so nothing is decided",
+            "the table of the test has no row",
             help="add a row, as in `20 %, 3 m/s expect allow`",
             labels=[(table.span, "the table")],
         )
@@ -221,8 +221,8 @@ def _whole(context: CheckContext, table: CaseTable, row: TableRow) -> bool:
     context.report.add(
         codes.ROW_CELLS,
         row.cells[0].span.to(row.cells[-1].span),
-        f"this row has {len(row.cells)} cell{'' if len(row.cells) == 1 else 's'}, and the table has {words}",
-        help="leave out what is too many" if more > 0 else "add what is missing; `unknown` stands for a missing signal",
+        f"the row has {len(row.cells)} cell{'' if len(row.cells) == 1 else 's'}, but the table has {words}",
+        help="remove the extra cells" if more > 0 else "add the missing cells; write `unknown` for a missing signal",
         labels=[(table.columns[0].span.to(table.columns[-1].span), words)],
     )
     return False
@@ -236,9 +236,9 @@ def _cell(context: CheckContext, column: Subject, cell: TableCell, arguments: di
         context.report.add(
             codes.WRONG_TYPE,
             cell.span,
-            "an argument is never unknown" if cell.value is None else "an argument is not measured, and has no age",
+            "an argument cannot be unknown" if cell.value is None else "an argument has no age",
             help=f"write a value for `{argument.declaration.name.text}`",
-            labels=[(argument.declaration.span, "it is declared here")],
+            labels=[(argument.declaration.span, "declared here")],
         )
     else:
         bound = bind_value(context.scope(), unranged(argument), cell.value)

@@ -72,9 +72,14 @@ def _coherent(context: CheckContext, times: _Times, of: Iterable[Quantity | None
     own = {quantity for quantity in of if quantity is not None}
     deadline, validity, duration, grace = times
     for short, long, words, help in (
-        (validity, deadline, "the deadline is {}, and the decision is valid for {}", "a step could begin too late"),
-        (validity, duration, "it lasts up to {}, and the decision is valid for {}", "it could go on too long"),
-        (duration, grace, "the grace is {}, and it all lasts at most {}", "a clause could be unknown all along"),
+        (
+            validity,
+            deadline,
+            "the deadline {} is longer than the validity {}",
+            "the decision may expire before the start",
+        ),
+        (validity, duration, "the duration {} is longer than the validity {}", "the decision may expire in flight"),
+        (duration, grace, "the grace {} is longer than the duration {}", "a clause could be unknown all the time"),
     ):
         if short is None or long is None or long.value <= short.value:
             continue
@@ -85,8 +90,8 @@ def _coherent(context: CheckContext, times: _Times, of: Iterable[Quantity | None
             codes.INCOHERENT_TIMING,
             at.span,
             words.format(_words(long), _words(short)),
-            help=f"{help}: at most `{_words(short)}` fits",
-            labels=[(other.span, "does not fit with this")],
+            help=f"{help}; the maximum is `{_words(short)}`",
+            labels=[(other.span, "conflicts with this")],
         )
     if grace is not None or duration is None or (own and duration not in own):
         return
@@ -94,8 +99,8 @@ def _coherent(context: CheckContext, times: _Times, of: Iterable[Quantity | None
         context.report.add(
             codes.INCOHERENT_TIMING,
             duration.span,
-            f"the grace is {display(DEFAULT_GRACE_US, Dimension.DURATION)} where none is written, and it all lasts "
-            f"at most {_words(duration)}",
+            f"the default grace {display(DEFAULT_GRACE_US, Dimension.DURATION)} is longer than the duration "
+            f"{_words(duration)}",
             help="write a shorter `grace`",
         )
 
@@ -111,9 +116,9 @@ def _class(context: CheckContext, skill: SkillDecl) -> None:
         context.report.add(
             codes.CLASS_TIMING,
             deadline.span,
-            f"a `{skill.timing_class.text}` skill is decided within {most}, and this deadline is {_words(deadline)}",
-            help=f"write at most `{most}`, or make the skill `{slower}`",
-            labels=[(skill.timing_class.span, "its class")],
+            f"the deadline {_words(deadline)} exceeds the maximum of a `{skill.timing_class.text}` skill, {most}",
+            help=f"write at most `{most}`, or change the class to `{slower}`",
+            labels=[(skill.timing_class.span, "the class")],
             fix=(deadline.span, most, f"write `{most}`"),
         )
 
@@ -127,10 +132,10 @@ def _approval(context: CheckContext, rule: RuleDecl) -> None:
             context.report.add(
                 codes.INCOHERENT_TIMING,
                 within.span,
-                f"an approval is awaited for {_words(within)}, and a decision on `{name.text}` is valid for "
+                f"the time for an approval, {_words(within)}, is longer than the validity of `{name.text}`, "
                 f"{_words(validity)}",
-                help=f"at most `{_words(validity)}` fits",
-                labels=[(validity.span, "does not fit with this")],
+                help=f"write at most `{_words(validity)}`",
+                labels=[(validity.span, "conflicts with this")],
             )
 
 
@@ -148,10 +153,9 @@ def _awaited(context: CheckContext, policy: Name, step: Step) -> None:
             context.report.add(
                 codes.INCOHERENT_TIMING,
                 own.span,
-                f"an approval is awaited for {_words(within)}, and the decision on this step is valid for "
-                f"{_words(own)}",
-                help=f"at least `{_words(within)}` fits",
-                labels=[(within.span, "does not fit with this")],
+                f"the validity of the step, {_words(own)}, is shorter than the time for an approval, {_words(within)}",
+                help=f"write at least `{_words(within)}`",
+                labels=[(within.span, "conflicts with this")],
             )
 
 

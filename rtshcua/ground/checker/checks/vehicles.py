@@ -32,7 +32,7 @@ def check_vehicles(context: CheckContext) -> None:
             context.report.add(
                 codes.NUMBER_SIZE,
                 vehicle.reserve.span,
-                "the reserve leaves nothing to fly with: it must be below 100 %",
+                "the reserve must be below 100 %",
             )
         elevation(context, vehicle.elevation)
         quantity(context, vehicle.elevation_within, Dimension.LENGTH, positive=False)
@@ -43,7 +43,7 @@ def check_vehicles(context: CheckContext) -> None:
         _without(context, vehicle)
         offset = vehicle.utc_offset
         if offset is not None and abs(offset.value) > MAX_OFFSET_US:
-            context.report.add(codes.NUMBER_SIZE, offset.span, "local times are at most 14 h before or after UTC")
+            context.report.add(codes.NUMBER_SIZE, offset.span, "the offset from UTC must be at most 14 h")
         if vehicle.time_zone is not None:
             _time_zone(context, vehicle.time_zone)
 
@@ -54,8 +54,8 @@ def _time_zone(context: CheckContext, name: Name) -> None:
         context.report.add(
             codes.UNKNOWN_TIME_ZONE,
             name.span,
-            f"there is no time zone `{name.text}`",
-            help=suggestion(name.text, known) or 'write its IANA name, as in `clock "Europe/Berlin"`',
+            f"unknown time zone `{name.text}`",
+            help=suggestion(name.text, known) or 'write an IANA name, as in `clock "Europe/Berlin"`',
         )
 
 
@@ -68,18 +68,18 @@ def _without(context: CheckContext, vehicle: VehicleDecl) -> None:
             context.report.add(
                 codes.WRITTEN_TWICE,
                 name.span,
-                f"`{name.text}` is written twice in what `{vehicle.name.text}` is without",
+                f"`{name.text}` is repeated in `without` of `{vehicle.name.text}`",
                 help="keep one of them",
                 labels=[(first[name.text], "first written here")],
             )
         first.setdefault(name.text, name.span)
         if name.text in needed:
-            why = "every decision reads it" if name.text in WELL_KNOWN else "a vehicle that `brakes` is watched by it"
+            why = "every decision reads it" if name.text in WELL_KNOWN else "`brakes` requires it"
             context.report.add(
                 codes.NEEDED_SIGNAL,
                 name.span,
-                f"no vehicle can be without the signal `{name.text}`: {why}",
-                help="leave it out of `without`" + ("" if name.text in WELL_KNOWN else ", or leave `brakes` out"),
+                f"the signal `{name.text}` cannot be in `without`: {why}",
+                help="remove it from `without`" + ("" if name.text in WELL_KNOWN else ", or remove `brakes`"),
             )
         else:
             find_signal(context, name)
@@ -100,7 +100,7 @@ def _speeds(context: CheckContext, vehicle: VehicleDecl) -> None:
         quantity(context, gains.time, Dimension.DURATION)
         if len(context.report.found) == before and not 1 <= gained(gains) <= MAX_SPEED:
             context.report.add(
-                codes.NUMBER_SIZE, gains.span, "what it gains in a second must be from 1 mm/s to 1000 m/s"
+                codes.NUMBER_SIZE, gains.span, "the acceleration per second must be from 1 mm/s to 1000 m/s"
             )
     first: dict[str, Span] = {}
     for each in vehicle.speeds:
@@ -111,7 +111,7 @@ def _speeds(context: CheckContext, vehicle: VehicleDecl) -> None:
             context.report.add(
                 codes.WRITTEN_TWICE,
                 each.name.span,
-                f"`{name}` is written twice in the speeds of `{vehicle.name.text}`",
+                f"`{name}` is repeated in `speeds` of `{vehicle.name.text}`",
                 help="keep one of them",
                 labels=[(first[name], "first written here")],
             )
@@ -119,13 +119,13 @@ def _speeds(context: CheckContext, vehicle: VehicleDecl) -> None:
             context.report.add(
                 codes.UNKNOWN_NAME,
                 each.name.span,
-                f"a vehicle has no speed `{name}`",
-                help=suggestion(name, SPEEDS) or f"its speeds are {listed(SPEEDS)}",
+                f"unknown speed `{name}`",
+                help=suggestion(name, SPEEDS) or f"the speeds are {listed(SPEEDS)}",
                 fix=correction(context.report, each.name.span, name, SPEEDS),
             )
         if each.below is not None and name != "landing":
             context.report.add(
-                codes.SYNTAX, each.below.span, f"a height stands with the speed of a `landing` alone, not with `{name}`"
+                codes.SYNTAX, each.below.span, f"only the speed `landing` can have a height, not `{name}`"
             )
         first.setdefault(name, each.name.span)
         most = {"cruise": vehicle.speed, "return": vehicle.speed, "climb": vehicle.climb}.get(name)
@@ -133,7 +133,7 @@ def _speeds(context: CheckContext, vehicle: VehicleDecl) -> None:
             context.report.add(
                 codes.NUMBER_SIZE,
                 each.speed.span,
-                f"`{name}` is more than the vehicle does at most, {display(most.value, Dimension.SPEED)}",
+                f"`{name}` exceeds the maximum of the vehicle, {display(most.value, Dimension.SPEED)}",
                 labels=[(most.span, "declared here")],
             )
     _against_wind(context, vehicle)
@@ -146,8 +146,8 @@ def _against_wind(context: CheckContext, vehicle: VehicleDecl) -> None:
         context.report.add(
             codes.NUMBER_SIZE,
             wind.span,
-            f"against so much wind it gets nowhere: through the air it flies {display(air.value, Dimension.SPEED)}",
-            help="write how fast it is through the air, as in `speeds air 16 m/s`, or fly it in less wind",
+            f"the wind is not below the airspeed of the vehicle, {display(air.value, Dimension.SPEED)}",
+            help="declare the airspeed, as in `speeds air 16 m/s`, or reduce the wind",
             labels=[(air.span, "declared here")],
         )
 
@@ -171,5 +171,5 @@ def _braking(context: CheckContext, braking: Braking) -> None:
         context.report.add(
             codes.NUMBER_SIZE,
             braking.span,
-            "what it loses of its speed in a second must be from 1 mm/s to 1000 m/s",
+            "the deceleration per second must be from 1 mm/s to 1000 m/s",
         )

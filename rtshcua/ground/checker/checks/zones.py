@@ -71,24 +71,24 @@ def _corridor(context: CheckContext, shape: Corridor) -> None:
         context.report.add(
             codes.BAD_CORRIDOR,
             shape.span,
-            f"the corridor has {len(shape.points)} place{'' if len(shape.points) == 1 else 's'}, and needs two",
-            help="all places within a distance of a single one are a `circle`",
+            f"the corridor has {len(shape.points)} point{'' if len(shape.points) == 1 else 's'}; it needs two",
+            help="write a `circle` for the area around one point",
         )
     for a, b in zip(shape.points, shape.points[1:], strict=False):
         if _corner(a, a) == _corner(b, a):
             context.report.add(
                 codes.BAD_CORRIDOR,
                 b.span,
-                "the corridor stays at a place",
-                help="leave out the second one",
-                labels=[(a.span, "the same place")],
+                "the corridor repeats a point",
+                help="remove the second one",
+                labels=[(a.span, "the same point")],
             )
     if shape.width.value < LEAST_WIDTH:
         context.report.add(
             codes.BAD_CORRIDOR,
             shape.width.span,
             "the corridor has no width" if shape.width.value == 0 else "the corridor is too narrow to fly in",
-            help="write how wide it is from edge to edge, at least `10 cm`",
+            help="write the width from edge to edge, at least `10 cm`",
         )
 
 
@@ -103,7 +103,7 @@ def _polygon(context: CheckContext, zone: ZoneDecl, shape: Polygon) -> None:
     count = sum(map(len, rings))
     if count > MAX_VERTICES or len(rings) > MAX_RINGS:
         what, most = (f"{count} corners", MAX_VERTICES) if count > MAX_VERTICES else (f"{len(rings)} rings", MAX_RINGS)
-        context.report.add(codes.TOO_MANY, shape.span, f"the polygon has {what}, and at most {most} fit on board")
+        context.report.add(codes.TOO_MANY, shape.span, f"the polygon has {what}; the limit is {most}")
         return
     if not _holes(context, zone, shape):
         return
@@ -121,7 +121,7 @@ def _ring(context: CheckContext, zone: ZoneDecl, shape: Polygon, ring: tuple[Coo
         report.add(
             codes.BAD_POLYGON,
             whole,
-            f"the {what} has {len(corners)} corner{'' if len(corners) == 1 else 's'}, and needs three",
+            f"the {what} has {len(corners)} corner{'' if len(corners) == 1 else 's'}; it needs three",
         )
         return False
     if corners[0] == corners[-1]:
@@ -129,7 +129,7 @@ def _ring(context: CheckContext, zone: ZoneDecl, shape: Polygon, ring: tuple[Coo
             codes.BAD_POLYGON,
             ring[-1].span,
             "the last corner repeats the first one",
-            help=f"leave it out: a {what} is closed by itself",
+            help=f"remove it: a {what} closes itself",
             labels=[(ring[0].span, "the first corner")],
         )
         return False
@@ -141,7 +141,7 @@ def _ring(context: CheckContext, zone: ZoneDecl, shape: Polygon, ring: tuple[Coo
         codes.BAD_POLYGON,
         zone.name.span,
         f"the edges of `{zone.name.text}` cross or touch each other",
-        help="write the corners in the order in which one walks around the zone",
+        help="write the corners in their order along the outline",
         labels=[
             (ring[i].span, "the edge that begins here"),
             (ring[j].span, "meets the edge that begins here"),
@@ -161,7 +161,7 @@ def _holes(context: CheckContext, zone: ZoneDecl, shape: Polygon) -> bool:
             codes.BAD_POLYGON,
             zone.name.span,
             f"a hole in `{zone.name.text}` crosses or touches another edge",
-            help="what reaches over the edge, or overlaps, is taken away with `difference`",
+            help="cut out an area that overlaps the edge with `difference`",
             labels=[
                 (rings[one][i].span, "the edge that begins here"),
                 (rings[other][j].span, "meets the edge that begins here"),
@@ -175,8 +175,8 @@ def _holes(context: CheckContext, zone: ZoneDecl, shape: Polygon) -> bool:
             context.report.add(
                 codes.BAD_POLYGON,
                 hole[0].span,
-                "the hole lies in another hole" if around else "the hole lies outside of its polygon",
-                help="a hole lies within the polygon, apart from all others",
+                "the hole is inside another hole" if around else "the hole is outside its polygon",
+                help="a hole must be inside the polygon and outside all other holes",
                 labels=[(zone.name.span, "the zone is declared here")],
             )
             return False
@@ -184,13 +184,13 @@ def _holes(context: CheckContext, zone: ZoneDecl, shape: Polygon) -> bool:
 
 
 def entry_outside(report: Report, zone: ZoneDecl) -> None:
-    """Report an entry that is not strictly inside of its zone."""
+    """Report an entry that is not strictly inside its zone."""
     assert zone.entry is not None
     report.add(
         codes.ENTRY_OUTSIDE,
         zone.entry.span,
-        f"the entry of `{zone.name.text}` does not lie inside of it",
-        help="an entry lies inside, not on the edge: a vehicle must be in the zone when it is there",
+        f"the entry of `{zone.name.text}` is not inside the zone",
+        help="move the entry into the zone, away from its edge",
         labels=[(zone.shape.span, "the zone is here")],
     )
 
@@ -249,8 +249,8 @@ def _circle(context: CheckContext, closing: Reference, way: list[str]) -> None:
     context.report.add(
         codes.ZONE_CYCLE,
         closing.span,
-        f"`{closing.name}` is made of itself"
-        + (": " + ", which is made of ".join(f"`{each}`" for each in (*around, closing.name)) if around[1:] else ""),
-        help="a zone is made of shapes, and of zones that are made of shapes",
+        f"`{closing.name}` is defined by itself"
+        + (f": {' -> '.join(f'`{each}`' for each in (*around, closing.name))}" if around[1:] else ""),
+        help="define the zone by shapes, or by zones that do not depend on it",
         labels=[(context.symbols.zones[each].name.span, "declared here") for each in around],
     )

@@ -62,7 +62,7 @@ def local_time(reader: Reader, span: Span, text: str) -> Reference:
 def function(reader: Reader, span: Span, name: Literal["abs", "min", "max"], *operands: Value) -> Node:
     """`abs(value)`, `min(value, value, ...)`, `max(value, value, ...)`."""
     if (len(operands) == 1) != (name == "abs"):
-        takes = "one value" if name == "abs" else "two values or more"
+        takes = "one value" if name == "abs" else "two or more values"
         help = "write it as in `abs(a - b)`" if name == "abs" else f"write it as in `{name}(a, b)`"
         reader.report(SYNTAX, f"`{name}` takes {takes}, not {len(operands)}", span, help)
     return reader.nested(Function(span=span, name=name, operands=operands), *operands)

@@ -53,7 +53,7 @@ def quantity(
     if dimension is not Dimension.LENGTH and trouble is not Trouble.UNKNOWN_UNIT:
         reader.report(
             DATUM_NOT_ALLOWED,
-            f"only a length can be above {datum}, this is a {dimension.value}",
+            f"only a length can be above {datum}, not a {dimension.value}",
             span,
             f"write a length, as in `20 m above {datum}`",
         )
@@ -72,10 +72,10 @@ def coordinates(reader: Reader, span: Span, latitude: str, north: str, longitude
         swapped = abs(values[1]) <= 90 * UNITS["deg"].numerator and not beyond[1]
         reader.report(
             BAD_COORDINATES,
-            f"`{short(written)}` is not a {what}: a {what} goes up to {most} degrees",
+            f"`{short(written)}` is not a {what}: the maximum is {most} degrees",
             span,
-            "are latitude and longitude the wrong way round? the latitude, `N` or `S`, stands first" * swapped
-            or "a place is its latitude and longitude in degrees, as in `47.3977 N, 8.5456 E`",
+            "write the latitude (`N` or `S`) first: latitude and longitude seem to be swapped" * swapped
+            or "write latitude and longitude in degrees, as in `47.3977 N, 8.5456 E`",
         )
     return Coordinates(span=span, latitude=values[0], longitude=values[1])
 
@@ -85,7 +85,7 @@ def time_of_day(reader: Reader, span: Span, text: str) -> TimeOfDay:
     hours, minutes = text.split(":")
     value = int(hours) * 60 + int(minutes)
     if value >= DAY or int(minutes) >= 60:
-        reader.report(OUT_OF_BOUNDS, f"`{text}` is not a time of day", span, "times go from `00:00` to `23:59`")
+        reader.report(OUT_OF_BOUNDS, f"`{text}` is not a time of day", span, "times are from `00:00` to `23:59`")
     return TimeOfDay(span=span, value=value * UNITS["min"].numerator)
 
 
@@ -104,8 +104,8 @@ def _day(reader: Reader, name: Name) -> int:
     if name.text in DAYS:
         return DAYS.index(name.text)
     near = nearest(name.text, DAYS)
-    help = f"did you mean `{near}`?" if near else f"they are {', '.join(f'`{day}`' for day in DAYS)}"
-    reader.report(SYNTAX, f"`{short(name.text)}` is no day of the week", name.span, help)
+    help = f"did you mean `{near}`?" if near else f"the days are {', '.join(f'`{day}`' for day in DAYS)}"
+    reader.report(SYNTAX, f"`{short(name.text)}` is not a day of the week", name.span, help)
     return 0
 
 

@@ -68,7 +68,7 @@ def degrees(reader: Reader, span: Span, number: str, what: str, negative: bool) 
             NOT_EXACT,
             f"the {what} `{short(number)}` has more than 7 decimals",
             span,
-            "places are kept in 1e-7 degree, which is about 1 cm",
+            "the resolution of coordinates is 1e-7 degree, about 1 cm",
         )
     return found.value
 
@@ -92,7 +92,7 @@ def report_trouble(
             limit = LARGEST.get(found.dimension, MAX_VALUE)
             whole_units = 0 if unit is None else limit * UNITS[unit].denominator // UNITS[unit].numerator
             most = f"{whole_units} {unit}" if whole_units else display(limit, found.dimension)
-            reader.report(OUT_OF_BOUNDS, f"`{short(written)}` is too large", span, f"at most `{most}` fits")
+            reader.report(OUT_OF_BOUNDS, f"`{short(written)}` is too large", span, f"the maximum is `{most}`")
 
 
 def _unknown_unit(reader: Reader, unit: str, written: str, span: Span) -> None:
@@ -116,7 +116,7 @@ def _not_exact(
 ) -> None:
     whole = CANONICAL[found.dimension]
     message = f"`{short(written)}` is not a whole number"
-    kept = f"a {found.dimension.value} is kept in whole {whole}" if whole else "it is a plain number"
+    kept = f"a {found.dimension.value} must be whole {whole}" if whole else "a number without a unit must be whole"
     if plain is not None and datum is None:
         if _place(reader, written, span):
             return
@@ -158,14 +158,14 @@ def _no_unit(reader: Reader, unit: str, written: str, span: Span) -> None:
     if unit in POINTS:
         plain = written.removeprefix("-").strip()
         opposite = plain[: -len(unit)] + POINTS[unit]
-        help = "a place is its latitude and longitude, as in `47.3977 N, 8.5456 E`"
+        help = "write latitude and longitude as in `47.3977 N, 8.5456 E`"
         if written.startswith("-"):
-            help = f"a place has no sign: write `{opposite}`, or `{plain}`"
+            help = f"coordinates have no sign: write `{opposite}` or `{plain}`"
         last = reader.diagnostics[-1].span if reader.diagnostics else None
         if unit in "EW" and last is not None and reader.source.text[last.end : span.start].strip() == ",":
             return  # the longitude of a latitude that was reported
     else:
-        help = "numbers have no exponents: write all digits, which `_` may group, as in `20_000 m`"
+        help = "exponents are not supported: write all digits, which `_` may group, as in `20_000 m`"
     reader.report(UNKNOWN_UNIT, f"`{short(unit)}` is not a unit", span, help)
 
 

@@ -142,9 +142,9 @@ def _overrides(reader: Reader, skill: Name, span: Span, given: tuple[Part, ...])
         if each.key in ("require", "assume", "maintain") and any(clause.where_fitted for clause in each.value):
             reader.report(
                 SYNTAX,
-                "`where fitted` says nothing in a step, whose mission names its vehicle",
+                "`where fitted` is not allowed in a step: the mission names its vehicle",
                 each.span,
-                "leave `where fitted` out; if the vehicle is without the sensor, leave the clause out",
+                "remove `where fitted`; if the vehicle lacks the sensor, remove the clause",
             )
     validity, phases = found.get("valid", (None, ()))
     return Overrides(

@@ -97,17 +97,17 @@ class Reader:
             shown = short(name.text)
             self.report(
                 SYNTAX,
-                f"the name of a {what} has no dot: `{shown}`",
+                f"the name of a {what} cannot have a dot: `{shown}`",
                 name.span,
-                "only a signal's name may have dots",
-                fixes=(Fix(name.span, plain, f"call it `{short(plain)}`"),),
+                "only names of signals may have dots",
+                fixes=(Fix(name.span, plain, f"write `{short(plain)}`"),),
             )
 
-    def nested(self, node: Node, *inner: Node, help: str = "split it into several clauses, joined by `and`") -> Node:
+    def nested(self, node: Node, *inner: Node, help: str = "split it into several clauses joined by `and`") -> Node:
         """`node`, counting how deeply such are nested; one level too many is reported once, and not built."""
         depth = 1 + max((self._depths.get(part.span, 0) for part in inner), default=0)
         if depth == MAX_DEPTH + 1:
-            self.report(TOO_DEEP, f"this is nested more than {MAX_DEPTH} deep", node.span, help)
+            self.report(TOO_DEEP, f"this is nested more than {MAX_DEPTH} levels deep", node.span, help)
         if depth > MAX_DEPTH:
             node = inner[0]
         self._depths[node.span] = depth
@@ -132,7 +132,7 @@ class Reader:
             elif part.key in first:
                 self.report(
                     WRITTEN_TWICE,
-                    f"`{part.key}` is written twice in {owner} `{short(name.text)}`",
+                    f"`{part.key}` is repeated in {owner} `{short(name.text)}`",
                     part.span,
                     "keep one of them",
                     labels=(Label(first[part.key].span, "first written here"),),
@@ -142,9 +142,7 @@ class Reader:
         missing = [key for key in required if key not in found]
         if missing and self.sound:
             lacks = ", ".join(f"`{key}`" for key in missing)
-            self.report(
-                NOT_WRITTEN, f"{owner} `{short(name.text)}` does not say its {lacks}", name.span, f"add {lacks}"
-            )
+            self.report(NOT_WRITTEN, f"{owner} `{short(name.text)}` lacks {lacks}", name.span, f"add {lacks}")
         return found
 
 

@@ -99,12 +99,12 @@ def source(reader: Reader, span: Span, *parts: Any) -> SourceDecl:
         if other.text != messages[0].text:
             reader.report(
                 SYNTAX,
-                f"one source reads one message, not `{short(messages[0].text)}` and `{short(other.text)}`",
+                f"a source reads one message, not `{short(messages[0].text)}` and `{short(other.text)}`",
                 span,
-                "`or` goes between alternatives of different messages",
+                "write `or` between sources of different messages",
             )
     if len(fields) > 2:
-        reader.report(SYNTAX, f"a source has one field or two, not {len(fields)}", span, "write one field, or a pair")
+        reader.report(SYNTAX, f"a source has one or two fields, not {len(fields)}", span, "write one field or a pair")
     return SourceDecl(span=span, message=messages[0], fields=fields[:2], where=where)
 
 
@@ -162,14 +162,14 @@ def corridor(reader: Reader, span: Span, *parts: Any) -> Corridor:
 def combination(reader: Reader, span: Span, operator: Any, *shapes: Shape) -> Node:
     """`union(shape, ...)`, `difference(shape, ...)`."""
     made = Combination(span=span, operator=operator, shapes=shapes)
-    return reader.nested(made, *shapes, help="declare the inner ones as zones of their own, and name them here")
+    return reader.nested(made, *shapes, help="declare the inner shapes as zones and name them here")
 
 
 def daily(reader: Reader, span: Span, start: TimeOfDay, end: TimeOfDay, days: tuple[int, ...] | None) -> Part:
     """`active 08:00 .. 18:00`, `active 08:00 .. 18:00 on monday .. friday`."""
     if start.value == end.value:
-        help = "leave `active` out if the zone is there all day"
-        reader.report(BAD_PERIOD, "the zone would be active for no time at all", span, help)
+        help = "remove `active` if the zone applies all day"
+        reader.report(BAD_PERIOD, "the active period of the zone is empty", span, help)
     return Part(DAILY, span, Daily(span=span, start=start, end=end, days=days or ()))
 
 
@@ -177,15 +177,15 @@ def on_days(reader: Reader, span: Span, days: tuple[int, ...]) -> Part:
     """`active on saturday, sunday`."""
     start, end = TimeOfDay(span=span, value=0), TimeOfDay(span=span, value=LAST_US)
     if len(days) == len(DAYS):
-        help = "leave `active` out if the zone is always there"
-        reader.report(BAD_PERIOD, "the zone would be active on all days of the week", span, help)
+        help = "remove `active` if the zone always applies"
+        reader.report(BAD_PERIOD, "`active` names all days of the week", span, help)
     return Part(DAILY, span, Daily(span=span, start=start, end=end, days=days))
 
 
 def dates(reader: Reader, span: Span, start: int, end: int) -> Part:
     """`active "2026-05-01T08:00Z" .. "2026-05-02T18:00Z"`."""
     if reader.sound and start >= end:
-        reader.report(BAD_PERIOD, "the zone's time ends before it begins", span, "write the earlier moment first")
+        reader.report(BAD_PERIOD, "the active period ends before it begins", span, "write the earlier moment first")
     return Part(DATES, span, Dates(span=span, start_us=start, end_us=end))
 
 
@@ -211,7 +211,7 @@ def zone(reader: Reader, span: Span, name: Name, shape: Shape, *given: Part) -> 
 def identity(reader: Reader, span: Span, text: str) -> Part:
     """`identity "quad-07"`."""
     if not text.strip():
-        help = 'say what the vehicle calls itself, as in `identity "quad-07"`: a bundle runs nowhere else'
+        help = 'write the identity of the vehicle, as in `identity "quad-07"`: a bundle runs only on that vehicle'
         reader.report(NOT_WRITTEN, "the identity is empty", span, help)
     return Part("identity", span, text)
 
@@ -222,7 +222,7 @@ def endurance(reader: Reader, span: Span, charge: Quantity, hover: Quantity, fli
         written = short(reader.source.slice(charge.span))
         reader.report(
             SYNTAX,
-            f"the hover time is that of a full battery, not of `{written}`",
+            f"the hover time must be that of a full battery, not of `{written}`",
             charge.span,
             "write it as in `energy 100 % = 18 min hover`",
         )
@@ -232,7 +232,7 @@ def endurance(reader: Reader, span: Span, charge: Quantity, hover: Quantity, fli
 def cells(reader: Reader, span: Span, count: Quantity) -> Part:
     """`cells 4`."""
     if not 1 <= count.value <= MOST_CELLS:
-        found = f"`{reader.source.slice(count.span)}` cells in series, where 1 to {MOST_CELLS} are possible"
+        found = f"the number of cells must be from 1 to {MOST_CELLS}, not `{reader.source.slice(count.span)}`"
         reader.report(SYNTAX, found, count.span, "write it as in `cells 4`")
     return Part("cells", span, count)
 

@@ -220,9 +220,9 @@ def _answers(reader: Reader, given: Sequence[Answer]) -> tuple[Answer, ...]:
         else:
             reader.report(
                 WRITTEN_TWICE,
-                f"`{short(answer.role.text)}` answers more than twice",
+                f"the role `{short(answer.role.text)}` has more than two answers",
                 answer.span,
-                "keep two of them: a rule asks two people at most",
+                "keep two of them: a rule needs at most two approvals",
                 labels=(Label(same[0].span, "first written here"),),
             )
     return tuple(kept)
@@ -255,13 +255,13 @@ def demand(reader: Reader, span: Span, decision: Part) -> Part:
 
 def reaction(reader: Reader, span: Span, operator: Name, most: Quantity) -> Part:
     """`expect reaction <= 200 ms`."""
-    _bounded(reader, operator, "<=", "a reaction is bounded from above")
+    _bounded(reader, operator, "<=", "a reaction time has an upper bound")
     return Part("demand", span, Reacts(span=span, most=most))
 
 
 def distance(reader: Reader, span: Span, place: Name, operator: Name, least: Quantity) -> Part:
     """`expect distance to school >= 20 m`."""
-    _bounded(reader, operator, ">=", "a distance is bounded from below")
+    _bounded(reader, operator, ">=", "a distance has a lower bound")
     return Part("demand", span, Keeps(span=span, place=place, least=least))
 
 

@@ -30,7 +30,7 @@ PLAN: Final = FileKind(
     "a QGroundControl plan", "plans are not supported: write the mission as a source, its fence and zones as `zone`"
 )
 WAYPOINTS: Final = FileKind(
-    "a waypoint list (QGC WPL)", "waypoint lists are not supported: write the mission as a source"
+    "a list of waypoints (QGC WPL)", "waypoint lists are not supported: write the mission as a source"
 )
 GEOJSON: Final = FileKind("GeoJSON", 'read it from a source: `zone NAME from "FILE.geojson"`')
 ED269: Final = FileKind(

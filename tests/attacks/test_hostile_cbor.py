@@ -189,7 +189,7 @@ def test_borders_that_fill_a_file_are_read() -> None:
             tracemalloc.stop()
         assert len(area.outer) == 3
         assert most < MOST_BYTES // _PART, "of the positions, only those of the area are read"
-        with pytest.raises(NoArea, match="positions, and at most 4,096 corners fit on board"):
+        with pytest.raises(NoArea, match="positions; the limit is 4,096 corners"):
             read_area(whole, "b")
 
 

@@ -46,7 +46,7 @@ def test_more_words_and_marks_than_are_read(monkeypatch: pytest.MonkeyPatch, tok
     assert TOO_LARGE not in [each.code for each in parse(Source("a.rts", token * MOST)).diagnostics]
     found = parse(Source("a.rts", token * (MOST + 1))).diagnostics
     assert [each.code for each in found] == [TOO_LARGE]
-    assert f"{MAX_TOKENS:,} words and marks" in found[0].message
+    assert f"{MAX_TOKENS:,} tokens" in found[0].message
 
 
 def test_comments_and_blanks_count_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -85,7 +85,7 @@ def test_more_rules_than_fit_are_not_looked_at(monkeypatch: pytest.MonkeyPatch, 
     program = load(["x.rts"], lambda path: text.encode() if path == "x.rts" else Path(path).read_bytes(), LIBRARY)
     found = examine_program(program, dialect.load()).diagnostics
     assert [each.code.id for each in found] == ["E1001"]
-    assert found[0].message == "`many` has more than 20 rules, which is what fits on board"
+    assert found[0].message == "`many` has more than 20 rules, the limit"
 
 
 def test_a_long_text_that_a_finding_quotes_is_cut_for_a_person() -> None:
@@ -195,7 +195,7 @@ def test_more_comments_than_are_laid_out(monkeypatch: pytest.MonkeyPatch, tmp_pa
     many.write_text("//" * 50 + "\n" + fits)
     laid = of_file(many, 100, write=True)
     assert [each.message for each in laid.diagnostics] == [
-        f"`{shown(str(many))}` has more than 500,000 comments; no more are laid out"
+        f"`{shown(str(many))}` has more than 500,000 comments, the limit"
     ]
     assert laid.unreadable
     assert [each.code for each in laid.diagnostics] == [TOO_LARGE]

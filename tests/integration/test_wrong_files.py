@@ -10,16 +10,16 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 FILES = {
     "survey.plan": (
         b'{"fileType":"Plan","groundStation":"QGroundControl","mission":{},"version":1}',
-        "a plan of QGround",
+        "a QGroundControl plan",
     ),
     "area.geojson": (b'{"type":"FeatureCollection","features":[]}', "GeoJSON"),
     "zones.json": (b'{"features":[{"geometry":[{"horizontalProjection":{"type":"Circle"}}]}]}', "(ED-269)"),
-    "README.md": (b"# Read me\n\nAll about drones.\n", "a page of text"),
+    "README.md": (b"# Read me\n\nAll about drones.\n", "a Markdown document"),
     "a.waypoints": (b"QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t47.3\t8.5\t488\t1\n", "waypoints"),
     "a.kml": (b'<?xml version="1.0"?><kml xmlns="http://www.opengis.net/kml/2.2"></kml>', "KML"),
     "proposal.json": ((CHECKOUT / "missions/proposal.json").read_bytes(), "a mission specification"),
     "short.rts": ((CHECKOUT / "missions/short.rts").read_bytes(), "a source"),
-    "log.jsonl": ((CHECKOUT / "tests/vectors/log/sealed.jsonl").read_bytes(), "a log of a flight"),
+    "log.jsonl": ((CHECKOUT / "tests/vectors/log/sealed.jsonl").read_bytes(), "a flight log"),
     "a.bundle": (b"\x83nrtshcua/bundle\x01\x82\x40\x40", "a compiled bundle"),
 }
 #: commands by the kinds that they take, and how each is called

@@ -577,7 +577,7 @@ def _ring(positions: Sequence[Any], pointer: str) -> GeoRing:
     if len(positions) < 4:
         raise NoArea(
             codes.GEOJSON_SHAPE,
-            f"the ring at `{pointer}` has {len(positions)} positions; it needs four",
+            f"the ring at `{pointer}` has fewer than four positions",
             "a ring ends with its first position (RFC 7946, 3.1.6)",
         )
     corners = [_position(_array(each, f"{pointer}/{i}"), f"{pointer}/{i}") for i, each in enumerate(positions)]

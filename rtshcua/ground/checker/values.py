@@ -78,7 +78,7 @@ def _parted(scope: Scope, node: Arithmetic) -> bool:
         codes.UNKNOWN_NAME,
         name.span,
         f"`{name.name}` is not declared",
-        help=f"write the unit without spaces: `{meant}`",
+        help=f"write `{meant}`, without spaces in the unit",
         fix=(number.span.to(name.span), meant, f"write `{meant}`"),
     )
     return True

@@ -82,15 +82,15 @@ def test_nothing_leaves_a_pack(install: Install, path: str) -> None:
 
     (found,) = load(["m.rts"], bytes_of, packs=packs.folder).diagnostics
     assert found.code.id == "E0109"
-    assert found.message == f"`{path}` does not lead straight into the pack `acme`"
+    assert found.message == f"`{path}` is not a direct path into the pack `acme`"
     assert read == ["m.rts"]
 
 
 def test_a_pack_that_is_not_there() -> None:
     (found,) = load(["m.rts"], lambda _: b'import "nobody:skills/spray.rts"', packs=packs.folder).diagnostics
     assert found.code.id == "E0109"
-    assert found.message == "`nobody:skills/spray.rts` is in the pack `nobody`, and there is none here"
-    assert found.help == "a Python package brings it, by an entry point `nobody` of `rtshcua.skills`"
+    assert found.message == "`nobody:skills/spray.rts` is in the pack `nobody`, which is not installed"
+    assert found.help == "install the package with the entry point `nobody` of `rtshcua.skills`"
 
 
 def test_a_manoeuvre_is_taken_only_from_packs_that_the_policy_was_compiled_from(install: Install) -> None:

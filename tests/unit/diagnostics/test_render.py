@@ -89,13 +89,13 @@ def test_labels_are_shown_with_their_files() -> None:
     sources = {"a.rts": Source("a.rts", "one\ntwo\n"), "b.rts": Source("b.rts", "\nthree")}
     found = Diagnostic(
         codes.UNKNOWN_NAME,
-        "nothing declares `two`",
+        "`two` is not declared",
         Span("a.rts", 4, 7),
         "did you mean `three`?",
         (Label(Span("a.rts", 0, 3), "not this"), Label(Span("b.rts", 1, 6), "declared here")),
     )
     assert render([found], sources).splitlines() == [
-        "error[E0201]: nothing declares `two`",
+        "error[E0201]: `two` is not declared",
         " --> a.rts:2:1",
         "  |",
         "2 | two",

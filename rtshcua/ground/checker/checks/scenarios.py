@@ -209,7 +209,7 @@ def _step(context: CheckContext, moment: AfterStepDecl, mission: MissionDecl | N
         fix = correction(context.report, moment.skill.span, name, steps)
     else:
         message = f"`{mission.name.text}` has no step `{name}` number {number}"
-        help = f"it has {count} steps `{name}`, counted from 1"
+        help = f"the last `{name}` is number {count}"
         fix = None
     context.report.add(
         codes.NO_SUCH_STEP,

@@ -115,8 +115,8 @@ def test_what_is_no_source_is_left_and_the_others_are_done(
 @pytest.mark.parametrize(
     ("words", "code", "told"),
     [
-        (["none.rts"], ExitCode.INPUT, "there is no such file"),
-        (["b/notes.txt/x.rts"], ExitCode.INPUT, "there is no such file"),
+        (["none.rts"], ExitCode.INPUT, "no such file"),
+        (["b/notes.txt/x.rts"], ExitCode.INPUT, "no such file"),
         (["empty"], ExitCode.INPUT, "there is no source (.rts) in `empty`"),
         (["-", "a.rts"], ExitCode.USAGE, "with `-` nothing else can be formatted"),
         (["--stdin-filename", "x.rts", "a.rts"], ExitCode.USAGE, "`--stdin-filename` is for `-`"),

@@ -100,7 +100,7 @@ def test_a_file_that_is_not_there_is_bad_input(source: Path) -> None:
     found = refusal_of(planned(source, ""))
     assert (found.code, found.text) == (
         ExitCode.INPUT,
-        f"cannot read `{source}`: there is no such file",
+        f"cannot read `{source}`: no such file",
     )
 
 

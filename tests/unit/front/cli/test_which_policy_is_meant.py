@@ -40,5 +40,5 @@ def test_a_missing_name_is_told_once(
     )
     assert app.main(["check", "a.rts"]) == 1
     told = "".join(capsys.readouterr())
-    assert "nothing declares a skill `fly`; it is named in 3 places" in told
+    assert "`fly` is not declared; expected a skill (3 places)" in told
     assert "1 error" in told

@@ -24,8 +24,8 @@ def test_a_source_that_is_no_file_is_told_as_that(
     os.mkfifo("pipe.rts")
     assert main([command, name]) == ExitCode.INPUT
     said = "".join(capsys.readouterr())
-    assert f"cannot read `{name}`: {'there is no such file' if name == '-' else 'not a regular file'}" in said
-    assert "a source must be a file, because imports are found beside it: write it to one that ends in `.rts`" in said
+    assert f"cannot read `{name}`: {'no such file' if name == '-' else 'not a regular file'}" in said
+    assert "save the source as a file that ends in `.rts`: its imports are relative to that file" in said
 
 
 def test_the_standard_input_is_no_file_where_it_is_a_pipe(capsys: pytest.CaptureFixture[str]) -> None:
@@ -53,7 +53,7 @@ def test_the_help_about_a_page_names_what_is_taken(tmp_path: Path, capsys: pytes
     assert mistaken.help == "accepted: a bundle, as `rtshcua compile` makes it"
     assert no_log(page, page, "accepted: a log")[1] == "accepted: a log"
     main(["check", str(page)])
-    assert "sources are plain text, in files that end in `.rts`" in "".join(capsys.readouterr())
+    assert "a source is a plain text file that ends in `.rts`" in "".join(capsys.readouterr())
 
 
 def test_what_is_no_key_is_told_as_that_and_a_key_by_its_mode(tmp_path: Path) -> None:

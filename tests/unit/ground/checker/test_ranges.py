@@ -74,10 +74,10 @@ def test_what_a_signal_never_is_is_a_finding(when: str, written: list[str]) -> N
 
 def test_what_it_goes_to_is_said() -> None:
     (high,), (low,) = beyond("battery < 150 %"), beyond("wind > -1 m/s")
-    assert high.message == "`battery` is never as high as `150 %`"
-    assert high.help == "it goes from `0 %` up to `100 %`; the nearest value is `100 %`"
-    assert low.message == "`wind` is never as low as `-1 m/s`"
-    assert low.help == "it goes from `0 m/s` on; the nearest value is `0 m/s`"
+    assert high.message == "`150 %` is above the range of `battery`"
+    assert high.help == "its values are from `0 %` to `100 %`; the nearest is `100 %`"
+    assert low.message == "`-1 m/s` is below the range of `wind`"
+    assert low.help == "its values are from `0 m/s`; the nearest is `0 m/s`"
 
 
 TESTED = """
@@ -103,4 +103,4 @@ def test_what_a_template_is_used_with_counts() -> None:
     template = "template low(most: ratio in 0 % .. 200 %) { degrade takeoff when battery < most to return_home }\n"
     (found,) = findings(program(template, policy("use low(most = 150 %)")))
     assert found.code.id == "E0325"
-    assert found.message == "`battery` is never as high as `150 %`"
+    assert found.message == "`150 %` is above the range of `battery`"

@@ -101,15 +101,15 @@ def test_the_library_has_the_limits_that_it_had() -> None:
     ("before", "after", "code", "says"),
     [
         ("= 50 m,", ",", "E0607", "has no default"),
-        ("= 50 m,", "= 5 m + 5 m,", "E0607", "is no number"),
-        ("= 50 m,", "= 500 m,", "E0605", "outside of `highest`'s range"),
+        ("= 50 m,", "= 5 m + 5 m,", "E0607", "is not a number"),
+        ("= 50 m,", "= 500 m,", "E0605", "outside the range of `highest`"),
         ("= 50 m,", "= 50 s,", "E0310", ""),
         ("highest: altitude in 10 m .. 200 m = 50 m,", "highest: altitude = 50 m,", "E0607", "has no range"),
-        ("highest: altitude in 10 m .. 200 m = 50 m,", "highest: zone,", "E0607", "`highest` is no number"),
+        ("highest: altitude in 10 m .. 200 m = 50 m,", "highest: zone,", "E0607", "`highest` is not a number"),
         ("share: ratio", "longest: ratio", "E0202", "`longest` is declared twice"),
         ("share: ratio", "altitude: ratio", "E0202", "`altitude` is declared twice"),
         ("share: ratio", "battery: ratio", "E0203", "the size `battery` has the name of a signal"),
-        ("at most share", "at most shar", "E0201", "`shar` is no size of `probe`"),
+        ("at most share", "at most shar", "E0201", "`shar` is not a size of `probe`"),
         ("lasts    at most longest", "lasts    at most share", "E0310", ""),
     ],
 )
@@ -150,5 +150,5 @@ def test_a_mission_gives_no_sizes_to_what_its_policy_is_signed_with() -> None:
 def test_a_value_beyond_a_size_says_which_size_would_let_it_through() -> None:
     checked = examined({"/w/m.rts": IMPORTS + PROBE + RULES + ON_WHICH.replace("20 m", "70 m")}, "/w/m.rts")
     assert [each.help for each in checked.diagnostics] == [
-        "the nearest value inside is `50 m`; with `sizes probe(highest = 70 m)` it would be inside"
+        "the nearest accepted value is `50 m`; `sizes probe(highest = 70 m)` extends the range"
     ]

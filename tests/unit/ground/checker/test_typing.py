@@ -242,17 +242,20 @@ def test_it_has_none_and_a_finding_says_why(condition: str, code: str) -> None:
 
 
 HELPS = [
-    ("1.5 * wind.speed < 8 m/s", "it is a plain number; in a product, write `(3/2)`, or `150 %`"),
-    ("-/* minus */1.000001 * wind.speed < 8 m/s", "it is a plain number; in a product, write `(1000001/1000000)`"),
+    ("1.5 * wind.speed < 8 m/s", "a number without a unit must be whole; in a product, write `(3/2)`, or `150 %`"),
+    (
+        "-/* minus */1.000001 * wind.speed < 8 m/s",
+        "a number without a unit must be whole; in a product, write `(1000001/1000000)`",
+    ),
     (
         "local time == 08:00",
         "a window, such as `local time in 08:00 .. 08:10`, or a comparison, such as `local time >=",
     ),
-    ("local time < 8 s", "a time of day is compared with `local time`, as in `local time >= 19:00`"),
-    ("area inside area", "write a declared zone instead of `area`, in which only `position` can be"),
-    ("aim inside grow(area, 5 m)", "write a declared zone instead of `area`, in which only `position` can be"),
-    ("other.place inside city", "of all signals, it is `position` that is read as the vehicle's place"),
-    ("height inside city", "ask it of `position`, or of an argument that is a position or a zone"),
+    ("local time < 8 s", "compare a time of day with `local time`, as in `local time >= 19:00`"),
+    ("area inside area", "write a declared zone instead of `area`, or move the rule into a template"),
+    ("aim inside grow(area, 5 m)", "write a declared zone instead of `area`, or move the rule into a template"),
+    ("other.place inside city", "rename the signal to `position`"),
+    ("height inside city", "use `position`, or an argument that is a position or a zone"),
 ]
 
 
@@ -283,4 +286,4 @@ def test_nothing_that_has_a_value_is_called_phase(declaration: str) -> None:
         )
 
     found = check_program(load(["x.rts"], read, str(CHECKOUT)), dialect.load())
-    assert any(each.code.id == "E0203" and "`phase` is the mission's phase" in each.message for each in found)
+    assert any(each.code.id == "E0203" and "`phase` is reserved" in each.message for each in found)

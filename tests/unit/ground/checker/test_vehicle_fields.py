@@ -62,7 +62,7 @@ def test_what_a_vehicle_keeps_at_least(parts: str, codes: list[str]) -> None:
 
 def test_a_misspelt_speed_is_corrected() -> None:
     [(_, message)] = found(VEHICLE.replace("reserve", "speeds crusie 5 m/s  reserve"))
-    assert message == "a vehicle has no speed `crusie`"
+    assert message == "unknown speed `crusie`"
 
 
 @rows(

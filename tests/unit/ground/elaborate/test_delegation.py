@@ -241,7 +241,7 @@ mission m under p@1 on quad {{
         ),
         (["delegate inspect_area by role operator to role trainee"], [("E0714", "`inspect_area`")]),
         (["delegate goto, inspect_area by role operator to role trainee"], [("E0714", "`inspect_area`")]),
-        (["delegate any by role nobody to role trainee"], [("E0714", "anything of its own")]),
+        (["delegate any by role nobody to role trainee"], [("E0714", "any skill")]),
         (["delegate goto by role operator to role trainee through onboard"], [("E0714", "through `onboard`")]),
         (["delegate goto by role operator to role trainee through agnt"], [("E0709", "agnt")]),
         (["delegate got by role operator to role trainee"], [("E0201", "got")]),
@@ -300,4 +300,4 @@ def test_more_delegations_than_anybody_means_are_refused_before_they_are_ordered
     text = site + policy("permit goto by role r0 through agent when altitude <= 30 m", *ways)
     found = [each for each in check_text(text).diagnostics if each.code.severity.value == "error"]
     assert [each.code.id for each in found] == ["E1001"]
-    assert "delegates by more than" in found[0].message
+    assert "the policy has more than" in found[0].message

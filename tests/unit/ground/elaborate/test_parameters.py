@@ -166,7 +166,7 @@ def test_what_several_values_bring_about_at_one_place_is_one_finding_the_worst(c
     for each in found:
         assert "with `pace = 1 m/s`" in {label.text for label in each.labels}
         assert each.help is not None
-        assert each.help.endswith("; other values of the mission's parameters fail here too")
+        assert each.help.endswith("; it also fails for other values of the mission's parameters")
 
 
 def test_a_place_without_a_default_leaves_the_mission_undecided(check_text: Check, site: str) -> None:

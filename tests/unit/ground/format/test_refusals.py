@@ -53,17 +53,17 @@ def test_nothing_is_nothing(text: str) -> None:
 
 
 CHANGES: dict[str, tuple[Callable[[str], str], str]] = {
-    "a word lost": (lambda text: text.replace("battery", ""), "what can be read"),
-    "a number": (lambda text: text.replace("20 m", "21 m"), "a word"),
-    "a unit": (lambda text: text.replace("20 m", "20 km"), "a word"),
-    "parts in another order": (lambda text: text.replace("p: length, q: speed", "q: length, p: speed"), "a word"),
+    "a word lost": (lambda text: text.replace("battery", ""), "the syntax"),
+    "a number": (lambda text: text.replace("20 m", "21 m"), "a token"),
+    "a unit": (lambda text: text.replace("20 m", "20 km"), "a token"),
+    "parts in another order": (lambda text: text.replace("p: length, q: speed", "q: length, p: speed"), "a token"),
     "a comment lost": (lambda text: text.replace("// b\n", "\n"), "a comment"),
     "a comment of other words": (lambda text: text.replace("// b", "// c"), "a comment"),
     "a comment twice": (lambda text: text.replace("// b", "// b\n// b"), "a comment"),
     "a comment past a word": (lambda text: text.replace("  // b\n  grace 1 s\n", "  grace 1 s // b\n"), "a comment"),
     "comments in another order": (lambda text: text.replace("// a", "// z").replace("// b", "// a"), "a comment"),
-    "code in a comment": (lambda text: text.replace("// b\n", "// b "), "a word"),
-    "a line that an ignore speaks of": (lambda text: text.replace("and battery", "\nand battery"), "what a comment"),
+    "code in a comment": (lambda text: text.replace("// b\n", "// b "), "a token"),
+    "a line that an ignore speaks of": (lambda text: text.replace("and battery", "\nand battery"), "the line of an"),
 }
 
 
@@ -98,7 +98,7 @@ def test_only_the_comma_at_the_end_of_a_list_may_come_and_go() -> None:
 
     assert compared("skill s(a: b) { }", "skill s(a: b,) { }") is None
     assert compared("skill s() { require a in {b, c} }", "skill s() { require a in {b, c,} }") is None
-    assert compared("skill s(a: one of b, c) { }", "skill s(a: one of b c) { }") == "what can be read"
+    assert compared("skill s(a: one of b, c) { }", "skill s(a: one of b c) { }") == "the syntax"
 
 
 def test_the_finding_for_lint_and_editor() -> None:

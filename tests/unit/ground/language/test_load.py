@@ -61,7 +61,7 @@ def circles(program: Program) -> list[tuple[str, str]]:
     """The file of each import that closes a circle, and the circle by the first letters of its files."""
     found = [each for each in program.diagnostics if each.code is IMPORT_CYCLE]
     assert all(each.severity is Severity.WARNING for each in found)
-    said = [each.message.removeprefix("this import closes a circle: ").strip("`") for each in found]
+    said = [each.message.removeprefix("import cycle: ").strip("`") for each in found]
     files = [each.span.file if each.span else "" for each in found]
     return [
         (file[3:-4], "".join(name[3:-4] for name in text.split(" -> "))) for file, text in zip(files, said, strict=True)
@@ -95,7 +95,7 @@ def test_circles_of_imports(files: dict[str, str], expected: list[tuple[str, str
 
 def test_a_circle_is_shown_whole() -> None:
     (found,) = Files(a='import "b.rts"', b='\nimport "a.rts"').load("a").diagnostics
-    assert found.message == "this import closes a circle: `/w/a.rts -> /w/b.rts -> /w/a.rts`"
+    assert found.message == "import cycle: `/w/a.rts -> /w/b.rts -> /w/a.rts`"
     assert (found.span, [label.span for label in found.labels]) == (Span("/w/b.rts", 1, 15), [Span("/w/a.rts", 0, 14)])
 
 
@@ -142,8 +142,8 @@ def test_a_file_of_a_zone_that_is_missing() -> None:
     program = files.load("a")
     (found,) = program.diagnostics
     assert found.code is NO_SUCH_FILE
-    assert found.message == "cannot read `brigde.geojson`: there is no such file"
-    assert found.help == "looked for it at `/w/brigde.geojson`; did you mean `bridge.geojson`?"
+    assert found.message == "cannot read `brigde.geojson`: no such file"
+    assert found.help == "the file was expected at `/w/brigde.geojson`; did you mean `bridge.geojson`?"
     assert found.fixes[0].replacement == 'from "bridge.geojson" feature "x \\"y\\""'
     assert found.span is not None
     assert program.sources["/w/a.rts"].slice(found.span) == 'from "brigde.geojson" feature "x \\"y\\""'
@@ -158,7 +158,7 @@ def test_paths_of_zones_that_mean_nothing_elsewhere(path: str) -> None:
     files = Files(a=f'zone z from "{path}"')
     (found,) = files.load("a").diagnostics
     assert found.code is IMPORT_PATH
-    assert found.help == "write it with `/`, as in `bridge.geojson` or `lib:bridge.geojson`"
+    assert found.help == "write a path such as `bridge.geojson` or `lib:bridge.geojson`"
     assert files.reads == ["/w/a.rts"]
 
 
@@ -171,7 +171,7 @@ def test_files_of_zones_that_are_no_text_or_huge() -> None:
         (TOO_LARGE, Span("/w/a.rts", 31, 47)),
         (IMPORT_PATH, Span("/w/a.rts", 55, 67)),
     ]
-    assert program.diagnostics[0].message == "byte 1 (0xff) of `/w/y.geojson` is not UTF-8, so the file is not text"
+    assert program.diagnostics[0].message == "byte 1 (0xff) of `/w/y.geojson` is not UTF-8"
     assert (program.data, program.data_names) == ({}, {})
 
 
@@ -189,19 +189,19 @@ def test_findings_and_broken_names_of_all_files() -> None:
 def test_a_missing_file_is_named_with_where_it_was_looked_for() -> None:
     (found,) = Files(a='import "sub/gotoo.rts"', sub__goto="").load("a").diagnostics
     assert found.code is NO_SUCH_FILE
-    assert found.message == "cannot read `sub/gotoo.rts`: there is no such file"
-    assert found.help == "looked for it at `/w/sub/gotoo.rts`; did you mean `sub/goto.rts`?"
+    assert found.message == "cannot read `sub/gotoo.rts`: no such file"
+    assert found.help == "the file was expected at `/w/sub/gotoo.rts`; did you mean `sub/goto.rts`?"
     assert found.fixes[0].replacement == 'import "sub/goto.rts"'
     assert found.span is not None
     (found,) = Files(a='import "none/x.rts"').load("a").diagnostics
-    assert found.help == "looked for it at `/w/none/x.rts`"
+    assert found.help == "the file was expected at `/w/none/x.rts`"
     assert found.fixes == ()
 
 
 def test_a_missing_file_that_was_asked_for_has_no_span() -> None:
     (found,) = Files(mission="").load("misson").diagnostics
     assert (found.code, found.span) == (NO_SUCH_FILE, None)
-    assert found.message == "cannot read `/w/misson.rts`: there is no such file"
+    assert found.message == "cannot read `/w/misson.rts`: no such file"
     assert found.help == "did you mean `/w/mission.rts`?"
 
 
@@ -232,7 +232,7 @@ def test_bytes_that_are_no_text() -> None:
     program = Files(a='import "b.rts"' + zone("a"), b="é".encode() + b"zone \xff\xfe").load("a")
     (found,) = program.diagnostics
     assert found.code is NOT_TEXT
-    assert found.message == "byte 7 (0xff) is not UTF-8, so the file is not text"
+    assert found.message == "byte 7 (0xff) is not UTF-8"
     assert found.span is not None
     assert program.sources["/w/b.rts"].slice(found.span) == "\ufffd"
     assert [unit.file for unit in program.units] == ["/w/a.rts"]
@@ -241,7 +241,7 @@ def test_bytes_that_are_no_text() -> None:
 def test_a_huge_file_is_not_parsed() -> None:
     (found,) = Files(a=b" " * (MAX_SIZE + 1)).load("a").diagnostics
     assert (found.code, found.span) == (TOO_LARGE, None)
-    assert found.message == "`/w/a.rts` is 9 MiB large; at most 8 MiB are read"
+    assert found.message == "`/w/a.rts` is 9 MiB; the limit is 8 MiB"
 
 
 def test_byte_order_mark_and_line_ends() -> None:

@@ -108,11 +108,11 @@ def test_a_seed_alone_is_a_range_of_one(unit: Read, plain: Plain) -> None:
 
 
 WRONG = [
-    ("flies m flies n", "`flies` is written twice in scenario `it`"),
-    ("flies m seeds 1 seeds 2", "`seeds` is written twice in scenario `it`"),
+    ("flies m flies n", "`flies` is repeated in scenario `it`"),
+    ("flies m seeds 1 seeds 2", "`seeds` is repeated in scenario `it`"),
     ("flies m at 20 s kill", "found `kill`, expected a fault, `..` or `above`"),
-    ("flies m expect reaction < 20 ms", "found `<`, expected `<=`: a reaction is bounded from above"),
-    ("flies m expect distance to z <= 20 m", "found `<=`, expected `>=`: a distance is bounded from below"),
+    ("flies m expect reaction < 20 ms", "found `<`, expected `<=`: a reaction time has an upper bound"),
+    ("flies m expect distance to z <= 20 m", "found `<=`, expected `>=`: a distance has a lower bound"),
     ("flies m at 20 s wind(speed = )", None),
     ("flies m seeds 1.5", "`1.5` is not a whole number"),
 ]
@@ -128,15 +128,15 @@ def test_what_is_not_written_as_it_must_be(body: str, message: str | None) -> No
 
 def test_a_mission_must_be_named() -> None:
     parsed = parse(Source("x.rts", 'scenario "it" { at 20 s kill() }\nscenario "next" { flies m }'))
-    assert [each.message for each in parsed.diagnostics] == ["scenario `it` does not say its `flies`"]
+    assert [each.message for each in parsed.diagnostics] == ["scenario `it` lacks `flies`"]
     assert [each.name.text for each in parsed.unit.scenarios] == ["next"]
 
 
 @pytest.mark.parametrize(
     ("text", "help", "fixed"),
     [
-        ('scenario "it" { flies m at 2 s kill }', "a fault is written with brackets, as in `kill(...)`", "kill()"),
-        ("scenario it { }", 'a scenario is called by a text, as in `scenario "gust at the bridge" { ... }`', None),
+        ('scenario "it" { flies m at 2 s kill }', "a fault needs parentheses, as in `kill(...)`", "kill()"),
+        ("scenario it { }", 'a scenario has a quoted name, as in `scenario "gust at the bridge" { ... }`', None),
         ('scenario "it" { flies m expect reaction < 20 ms }', "write `<=`", "<="),
     ],
 )

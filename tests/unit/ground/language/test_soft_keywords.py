@@ -78,7 +78,7 @@ def test_soft(word: str) -> None:
 def test_reserved(word: str) -> None:
     (found,) = parse(Source("x", f"signal {word} : ratio = A.b stale after 5 s")).diagnostics
     assert found.code is SYNTAX
-    assert found.message == f"`{word}` is a reserved word, so it is no name"
+    assert found.message == f"`{word}` is a reserved word and cannot be a name"
 
 
 @rows("word", [*LED, "repeat", "on"])

@@ -82,18 +82,18 @@ def test_times(plain: Plain, unit: Read) -> None:
 @pytest.mark.parametrize(
     ("text", "code", "message"),
     [
-        ("08:00 .. 08:00", BAD_PERIOD, "the zone would be active for no time at all"),
-        ('"2026-05-02T08:00Z" .. "2026-05-02T10:00+02:00"', BAD_PERIOD, "the zone's time ends before it begins"),
+        ("08:00 .. 08:00", BAD_PERIOD, "the active period of the zone is empty"),
+        ('"2026-05-02T08:00Z" .. "2026-05-02T10:00+02:00"', BAD_PERIOD, "the active period ends before it begins"),
         (
             '"2026-02-29T08:00Z" .. "2026-05-02T18:00Z"',
             BAD_PERIOD,
-            "`2026-02-29T08:00Z` is not a moment: there is no such day",
+            "`2026-02-29T08:00Z` is not a moment: the day does not exist",
         ),
-        ("08:00 .. 09:00 active 10:00 .. 11:00", WRITTEN_TWICE, "`active (times of day)` is written twice in zone `z`"),
+        ("08:00 .. 09:00 active 10:00 .. 11:00", WRITTEN_TWICE, "`active (times of day)` is repeated in zone `z`"),
         (
             '"2026-05-01T08:00Z" .. "2026-05-02T08:00Z" active "2027-05-01T08:00Z" .. "2027-05-02T08:00Z"',
             WRITTEN_TWICE,
-            "`active (dates)` is written twice in zone `z`",
+            "`active (dates)` is repeated in zone `z`",
         ),
     ],
 )

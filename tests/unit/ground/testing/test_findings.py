@@ -4,7 +4,7 @@ from reference.deciding import IMPORT, NOMINAL, WHEN, found
 from virtual.rows import rows
 
 WRONG = [
-    ("given batery = 20 %", "E0201", "nothing declares `batery`", "did you mean `battery`?"),
+    ("given batery = 20 %", "E0201", "`batery` is not declared", "did you mean `battery`?"),
     ("given city = 20 %", "E0204", "`city` is a zone, not a value", None),
     ("given battery = 20 m", "E0310", "expected a ratio; `20 m` is a length", None),
     (
@@ -21,7 +21,7 @@ WRONG = [
     (
         "given (battery < 30 %) = true",
         "E0312",
-        "expected a temporal condition; `battery < 30 %` is about the moment",
+        "expected a temporal condition; `battery < 30 %` reads current values only",
         None,
     ),
     (
@@ -46,7 +46,7 @@ WRONG = [
     (
         "given (battery < 30 % for the last 5 s) = true measured 2 s ago",
         "E1409",
-        "the truth of a condition over time has no age",
+        "the value of a temporal condition has no age",
         "leave `measured ... ago` out",
     ),
     (
@@ -63,7 +63,7 @@ WRONG = [
     ),
     ("released 3 m ago", "E0310", "expected a duration; `3 m` is a length", None),
     ("released -3 s ago", "E0319", "`-3 s` must not be negative", None),
-    ("phase inspektion", "E0201", "`inspektion` is none of the phases of the mission", "did you mean `inspection`?"),
+    ("phase inspektion", "E0201", "`inspektion` is not a phase of the mission", "did you mean `inspection`?"),
     ("phase a of a, b, a", "E0202", "the phase `a` is named twice", None),
     (
         "phase a of a, b",
@@ -83,12 +83,12 @@ def test_a_premise(part: str, code: str, message: str, help: str | None) -> None
 
 
 ASKED = [
-    ("inspect_aria(bridge_a)", "E0201", "nothing declares a skill `inspect_aria`"),
-    ("inspect_area(bridge_a)", "E0603", "`inspect_area` is called without `altitude`"),
+    ("inspect_aria(bridge_a)", "E0201", "`inspect_aria` is not declared; expected a skill"),
+    ("inspect_area(bridge_a)", "E0603", "`inspect_area` lacks `altitude`"),
     ("inspect_area(bridge_a, hight = 3 m)", "E0601", "`inspect_area` has no parameter `hight`"),
     ("inspect_area(bridge_a, 3 s)", "E0310", "expected an altitude above home; `3 s` is a duration"),
     ("inspect_area(bridge_a, 3 m, zigzag)", "E0313", "`zigzag` is not a value of `pattern`"),
-    ("inspect_area(bridge_a, 3 m) through ajent", "E0709", "there is no source of requests `ajent`"),
+    ("inspect_area(bridge_a, 3 m) through ajent", "E0709", "unknown source of requests `ajent`"),
     ("inspect_area(bridge_a, 3 m) by operater", "E0702", "no rule of `bridge_inspection` is about the role `operater`"),
     ("spin()", "E0702", "no rule of `bridge_inspection` is about `spin`"),
     ("inspect_area(own, 20 m)", "E0207", "the zone `own` is not one that the policy `bridge_inspection` imports"),
@@ -113,16 +113,16 @@ TABLES = [
     ("city { 3 m/s expect allow }", "E0204", "`city` is a zone, not a value"),
     ("battery, battery { 3 %, 3 % expect allow }", "E1406", "`battery` is given twice"),
     ("altitude { 3 m expect allow }", "E0602", "`altitude` is given twice"),
-    ("speed { unknown expect allow }", "E0312", "an argument is never unknown"),
-    ("speed { 3 m/s measured 2 s ago expect allow }", "E0312", "an argument is not measured, and has no age"),
+    ("speed { unknown expect allow }", "E0312", "an argument cannot be unknown"),
+    ("speed { 3 m/s measured 2 s ago expect allow }", "E0312", "an argument has no age"),
     ("speed { 3 m expect allow }", "E0310", "expected a speed; `3 m` is a length"),
     ("battery { 3 m expect allow }", "E0310", "expected a ratio; `3 m` is a length"),
-    ("battery { 3 %, 4 % expect allow }", "E1405", "this row has 2 cells, and the table has 1 column"),
-    ("battery { }", "E1402", "the table of the test has no row, so nothing is decided"),
+    ("battery { 3 %, 4 % expect allow }", "E1405", "the row has 2 cells, but the table has 1 column"),
+    ("battery { }", "E1402", "the table of the test has no row"),
     (
         "battery { 3 % expect deny because state/violated }",
         "E1404",
-        "`state/violated` is a reason of `fallback`, never of `deny`",
+        "`state/violated` is a reason for `fallback`, not for `deny`",
     ),
 ]
 
@@ -137,10 +137,10 @@ def test_a_table(table: str, code: str, message: str) -> None:
 def test_a_test_says_what_is_asked_and_what_must_be_decided() -> None:
     both = found(f'test "it" {{ {WHEN} expect allow table battery {{ 80 % expect allow }} }}')
     neither = found('test "it" { }')
-    assert [each[1] for each in both] == ["the test does not say which decision is meant: it has a table too"]
+    assert [each[1] for each in both] == ["the test has both `expect` and a `table`"]
     assert [each[1] for each in neither] == [
-        "the test does not say what is asked",
-        "the test does not say what must be decided",
+        "the test has no request",
+        "the test has no expected outcome",
     ]
 
 
@@ -148,19 +148,19 @@ def test_who_asks_and_when_and_in_which_phase_is_never_made_up() -> None:
     bare = IMPORT + "nominal bare { under bridge_inspection on quad }\n"
     findings = found(f'test "it" {{ {WHEN} expect allow }}', bare)
     assert [each[1] for each in findings] == [
-        "neither the test nor its nominal says who asks",
-        "neither the test nor its nominal says when it is",
-        "neither the test nor its nominal says in which phase of its mission that is",
+        "neither the test nor its nominal gives the requester",
+        "neither the test nor its nominal gives the time",
+        "neither the test nor its nominal gives the phase of the mission",
     ]
 
 
 def test_a_nominal_has_a_policy_and_a_vehicle() -> None:
     findings = found('test "it" { expect allow }', IMPORT + "nominal bare { }\n")
-    assert findings[0] == ("E0107", "nominal `bare` does not say its `under`, `on`", "add `under`, `on`")
+    assert findings[0] == ("E0107", "nominal `bare` lacks `under`, `on`", "add `under`, `on`")
     findings = found("", IMPORT + NOMINAL.replace("on quad", "on quat").replace("under bridge", "under brid"))
     assert [each[:2] for each in findings] == [
-        ("E0201", "nothing declares a policy `brid_inspection`"),
-        ("E0201", "nothing declares a vehicle `quat`"),
+        ("E0201", "`brid_inspection` is not declared; expected a policy"),
+        ("E0201", "`quat` is not declared; expected a vehicle"),
     ]
 
 
@@ -171,11 +171,11 @@ def test_a_nominal_is_named_imported_or_the_only_one() -> None:
     assert found(test.replace("FROM", ""), 'import "good.rts"\n', **beside) == []
     assert found(test.replace("FROM", "from noon"), imports, **beside) == []
     (ambiguous,) = found(test.replace("FROM", ""), imports, **beside)
-    assert ambiguous[:2] == ("E1401", "there are 2 nominals, and the test does not say from which it starts")
+    assert ambiguous[:2] == ("E1401", "the test does not say which of 2 nominals it starts from")
     (none,) = found(test.replace("FROM", ""), IMPORT)
-    assert none[:2] == ("E1401", "nothing says where the test starts from")
+    assert none[:2] == ("E1401", "the test has no nominal")
     (unknown,) = found(test.replace("FROM", "from mornin"))
-    assert unknown == ("E0201", "nothing declares a nominal `mornin`", "did you mean `morning`?")
+    assert unknown == ("E0201", "`mornin` is not declared; expected a nominal", "did you mean `morning`?")
     own = NOMINAL.replace("morning", "own")
     assert found(test.replace("FROM", ""), imports + own, **beside) == []
 
@@ -225,10 +225,10 @@ def test_a_clause_is_quoted_whole_or_up_to_what_is_left_out() -> None:
 def test_hostile_tables_end_at_a_limit() -> None:
     rows = "80 % expect allow\n" * 5_000
     (many,) = found(f'test "it" {{ {WHEN} table battery {{ {rows} }} }}')
-    assert many[:2] == ("E1001", "with this test the file has more than 4096 cases, and so many are run of one file")
+    assert many[:2] == ("E1001", "with this test the file has more than 4096 cases, the limit of a file")
     columns = ", ".join(f"c{number}" for number in range(65))
     (wide,) = found(f'test "it" {{ {WHEN} table {columns} {{ }} }}')
-    assert wide[:2] == ("E1001", "the table has 65 columns, and at most 64 are read")
+    assert wide[:2] == ("E1001", "the table has 65 columns; the limit is 64")
     phases = ", ".join(f"p{number}" for number in range(65))
     assert "E1001" in {each[0] for each in found(f'test "it" {{ {WHEN} phase p1 of {phases} expect allow }}')}
 

@@ -1,5 +1,6 @@
-"""Design section 4: the one function that decides, and what it needs. Pure; one file for each kind of rule.
+"""The decision function (design section 4) and everything that it needs. Pure, with one module for each kind of rule.
 
-`prepare` checks a policy and a mission once and compiles them; `decide` then decides as often as asked; `fallbacks`
-says what flies when it refuses; `watch` looks while a skill runs; `nearest` says what would have passed.
+`prepare` checks a policy and a mission once and compiles them, and `decide` then decides as often as needed.
+`fallbacks` selects the link that flies after a refusal, `watch` monitors a skill while it runs, and `nearest`
+computes the smallest change with which a refused request would have passed.
 """

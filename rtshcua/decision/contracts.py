@@ -1,5 +1,5 @@
-"""What follows from a contract and its vehicle alone: its argument cells, how long it may fly, and the charge that it
-needs.
+"""Values derived from a contract and its vehicle: argument cells, the longest duration, and the charge that is
+needed.
 """
 
 from rtshcua.decision.flying import MINUTE, MOST_DRAIN, SECOND, charge, drained, home_us
@@ -12,12 +12,12 @@ from rtshcua.model.flat.zone import MAX_COORDINATE
 
 
 def cells(contract: Contract) -> int:
-    """How many argument cells a contract has."""
+    """The number of argument cells of a contract."""
     return sum(2 if parameter.kind == PLACE else 1 for parameter in contract.parameters)
 
 
 def misfit(arguments: tuple[int, ...], contract: Contract) -> Parameter | None:
-    """The first parameter whose argument is out of its range; a place has no range but that of all coordinates."""
+    """The first parameter whose argument is out of range. A place is only bounded by the range of coordinates."""
     for parameter in contract.parameters:
         if parameter.kind == PLACE:
             low, high, last = -MAX_COORDINATE, MAX_COORDINATE, parameter.cell + 1
@@ -29,37 +29,38 @@ def misfit(arguments: tuple[int, ...], contract: Contract) -> Parameter | None:
 
 
 def first_cell(contract: Contract, kind: int) -> int:
-    """The cell of the first parameter of a kind, of which there is one: that is what a skill flies to, or covers."""
+    """The cell of the only parameter of a kind: the place that a skill flies to, or the zone that it covers."""
     return next(parameter.cell for parameter in contract.parameters if parameter.kind == kind)
 
 
 def longest(contract: Contract, vehicle: VehicleLimits, limit_us: int = 0) -> int:
-    """A link's own limit, else what its skill's contract allows, else as long as anything can fly, in us."""
+    """The longest duration in us: the link's own limit, else that of the skill's contract, else the longest of any
+    flight.
+    """
     return limit_us or contract.duration_us or vehicle.endurance_us
 
 
 def drains(measured: Value) -> tuple[int, int]:
-    """The least and the most that a minute may take by the signal `battery.drain`, 1/10000; 0 where it tells nothing:
-    then what is declared counts.
+    """The least and the greatest drain per minute according to the signal `battery.drain`, in 1/10000; 0 where the
+    signal is missing, so that the declared value counts.
     """
     low, high, gap, _ = measured
     least = 0 if gap != PRESENT else min(max(low, 0), MOST_DRAIN)
     return least, 0 if gap == ABSENT else min(max(high, 0), MOST_DRAIN)
 
 
-#: nothing was measured
+#: : the drain was not measured
 UNMEASURED: Value = (0, 0, ABSENT, None)
 
 
 class Energy:
-    """What one contract needs of the charge, in 1/10000 of a full battery: to finish, to come home from the farthest
-    planned place, and the vehicle's reserve.
+    """The charge that a contract needs, in 1/10000 of a full battery: to finish, to return from the farthest planned
+    place, and the vehicle's reserve.
 
-    The way home is counted with what is declared of the battery, or with what was measured (`drain`, taken in a
-    minute) if that is worse.
+    The return is computed with the declared battery, or with the measured `drain` per minute if that is worse.
 
-    A skill that ends on the ground needs no way home, and it is what the reserve is kept for; the others are those that
-    `stays` is true of. `asked` is the slowest speed that the step and those before it ask for, 0 if none does.
+    A skill that ends on the ground needs neither the return nor the reserve; `stays` marks those that need both.
+    `asked` is the slowest speed that this step and the ones before it request, 0 if none does.
     """
 
     __slots__ = ("_asked", "_fixed", "_vehicle", "stays")
@@ -70,7 +71,7 @@ class Energy:
         self._vehicle, self._asked = vehicle, asked
 
     def way_home(self, distance: int, heights: tuple[int, int], drain: int = 0) -> int:
-        """The charge for the way home from `distance` mm away and anywhere between two heights, rounded up."""
+        """The charge for the return from `distance` mm away, from any height between two bounds; rounded up."""
         vehicle, speeds = self._vehicle, self._vehicle.speeds
         if speeds is None:
             declared = -(-distance * SECOND * FULL // (vehicle.speed * vehicle.endurance_us))
@@ -79,12 +80,12 @@ class Energy:
         return max(charge(speeds, time_us), drained(time_us, drain))
 
     def needed(self, distance: int, heights: tuple[int, int] = (0, 0), drain: int = 0) -> int:
-        """The charge needed when the farthest planned place is `distance` mm from home, rounded up."""
+        """The charge that is needed when the farthest planned place is `distance` mm from home, rounded up."""
         return self._fixed + self.way_home(distance, heights, drain) if self.stays else self._fixed
 
     def suffices(self, battery: Value, volume: Volume, drain: Value = UNMEASURED) -> Truth:
-        """Whether the battery holds what is needed; unknown when the charge is, or the place that counts. `drain` is
-        what was measured of it.
+        """Whether the battery holds the needed charge; unknown when the charge or the farthest place is. `drain` is
+        the measured drain.
         """
         low, high, gap, _ = battery
         if self.stays:

@@ -1,32 +1,32 @@
-"""The decision (paper: `admissible(I, S_t, t)`, eta): one pure function, wherever it is called from.
+"""The decision (paper: `admissible(I, S_t, t)`, eta): one pure function for the runtime, the tests and the audit.
 
-The steps are those of design 4.1. The first that does not pass decides. They judge sets of situations, so that the same
-ones serve the checker, which asks what is possible, and the runtime, which asks about one situation: a set of one,
-which has exactly one verdict.
+The steps are those of design 4.1, and the first that does not pass decides. They judge sets of situations. The
+checker passes sets to learn which verdicts are possible; the runtime passes one situation, a set with exactly one
+verdict.
 
-1: the request is for this vehicle and the policy in force, and within its own ranges. Signatures were verified once, at
-load; what is compared here is the digest that they cover.
+1: the request is for this vehicle, for the policy in force, and within the ranges of its skill. Signatures were
+verified once, at load; this step compares the digest that they cover.
 
-2: not used before, not issued in the future, and its validity (paper symbol `vw`) is not over. UTC is known to within
-an error, so each question has a third answer: the clock does not tell.
+2: the invocation was not used before, was not issued in the future, and is still valid (paper symbol `vw`). UTC is
+known within an error, so each comparison can also be undetermined.
 
-3: the source may use the timing class, no `forbid` matches, and some `permit` does. An unknown `forbid` may match, so
-it defers; an unknown `permit` may not, so it does not count.
+3: the source may use the timing class, no `forbid` matches, and some `permit` does. An unknown `forbid` may match,
+so it defers. An unknown `permit` does not count.
 
-3b: a `confirm` rule that matches, or may match, needs an approval by its role, or by two different people, one for
-each of its two roles. The approval (of two, the later one) moves the release (design 4.3). A refusal, or an approval
-that did not come within the rule's time after the release, denies.
+3b: a `confirm` rule that matches, or may match, needs an approval by its role, or by two different people, one in
+each of its two roles. The approval (of two, the later one) moves the release (design 4.3). A refusal denies; so
+does a missing approval once the rule's time after the release is over.
 
-4: the decision means something in the mission's current phase (`vw`).
+4: the invocation is valid in the mission's current phase (`vw`).
 
-5: what remains to be done fits before the deadline, `L_rem <= ddl - t`, with t since the release.
+5: the remaining work fits before the deadline, `L_rem <= ddl - t`, with t since the release.
 
 6: the preconditions (`require`, paper symbol `pre`) and the assumptions (`assume`, `sc`) hold now.
 
-7: the vehicle's envelope, airspace and invariants over the planned volume, energy, and `degrade` rules. The invariants
-(`maintain`, `inv`) are evaluated with position and height ranging over the planned volume, with zones as they exist
-from now to the end of the contract's longest duration, everything else as it is now; a temporal monitor says what it
-says now.
+7: the vehicle's envelope, airspace and invariants over the planned volume, energy, and `degrade` rules. The
+invariants (`maintain`, `inv`) are evaluated with position and height ranging over the planned volume, with zones
+as they exist from now to the end of the contract's longest duration, and everything else as it is now. A temporal
+monitor has its present value.
 """
 
 from collections.abc import Iterator, Sequence
@@ -43,7 +43,7 @@ from rtshcua.model.flat.policy import Rule
 from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 
-#: the `step` of a decision that all steps passed
+#: : the `step` of a decision in which all steps passed
 _PASSED_ALL = 8
 
 
@@ -63,7 +63,7 @@ PASSED: Found = (PASS,)
 
 
 class Possible(NamedTuple):
-    """What some situation of a set may be decided to be."""
+    """One decision that is possible for some situation of a set."""
 
     outcome: Outcome
     reason: Reason
@@ -73,7 +73,7 @@ class Possible(NamedTuple):
 def decide(
     invocation: PreparedInvocation, state: State, policy: PreparedPolicy, context: Context, now: Now
 ) -> Decision:
-    """Decide on an invocation in one situation. Total: one outcome, whatever the state, the context and the time."""
+    """Decide on an invocation in one situation. Every state, context and time has exactly one outcome."""
     sets = situation(state, policy, now)
     at = environment(sets, policy, invocation.arguments, invocation.phase)
     for step, found in steps(invocation, policy, context, sets, at, exact=True):
@@ -91,7 +91,9 @@ def decide(
 def possible(
     invocation: PreparedInvocation, sets: Sets, policy: PreparedPolicy, context: Context
 ) -> frozenset[Possible]:
-    """Every (outcome, reason, target) that some situation of the sets may have, and perhaps some that none has."""
+    """Every (outcome, reason, target) that is possible for a situation of the sets. The result may contain impossible
+    ones.
+    """
     exact, at = is_situation(sets, policy), environment(sets, policy, invocation.arguments, invocation.phase)
     found: set[Possible] = set()
     for _, verdicts in steps(invocation, policy, context, sets, at, exact):
@@ -111,9 +113,9 @@ def possible(
 def steps(
     invocation: PreparedInvocation, policy: PreparedPolicy, context: Context, sets: Sets, at: Environment, exact: bool
 ) -> Iterator[tuple[int, Found]]:
-    """Number and verdicts of each step, made when they are asked for; 3b has the number 3 and reasons of its own.
+    """Each step's number with its verdicts, computed lazily. Step 3b has the number 3 and reasons of its own.
 
-    `at` is the set of situations as conditions read it; `exact`: it has one only.
+    `at` is the set of situations as conditions read it; `exact` is true if it has one situation only.
     """
     yield 1, integrity(invocation, policy, context)
     yield 2, freshness(invocation, context, sets)
@@ -126,7 +128,7 @@ def steps(
 
 
 def concluded(verdicts: list[RuleVerdict], doubt: RuleVerdict | None, passes: bool) -> Found:
-    """The verdicts of a step, `doubt` after those that are certain of what they judge; it may also pass."""
+    """The verdicts of a step: the certain ones, then `doubt`, then a pass."""
     if doubt is not None:
         verdicts.append(doubt)
     if passes:
@@ -143,7 +145,9 @@ _ARGUMENT = (RuleVerdict(Outcome.DENY, Reason.ARGUMENT_RANGE, None),)
 
 
 def integrity(invocation: PreparedInvocation, policy: PreparedPolicy, context: Context) -> Found:
-    """Denies what differs from what was signed. An invocation prepared under another policy is of another version."""
+    """Denies a request that differs from what was signed. An invocation that was prepared under another policy has
+    the wrong version.
+    """
     if context.binding != invocation.invocation.binding:
         return _BINDING
     if context.vehicle != policy.policy.vehicle.identity:
@@ -162,7 +166,7 @@ _UNCERTAIN = RuleVerdict(Outcome.DEFER, Reason.CLOCK_UNCERTAIN, None)
 
 
 def freshness(invocation: PreparedInvocation, context: Context, sets: Sets) -> Found:
-    """Valid from the moment of issue to its end, both included."""
+    """Checks the validity, from the moment of issue to its end, both included."""
     issued = invocation.invocation.issued_at_us
     end = issued + invocation.invocation.contract.validity_us
     utc, (least, most) = sets.utc_us, sets.utc_error_us
@@ -189,7 +193,7 @@ def freshness(invocation: PreparedInvocation, context: Context, sets: Sets) -> F
 
 # ---------------------------------------------------------------- 3: authority
 
-#: the timing classes that a source may use: an agent never reacts, a reflex does nothing else
+#: : the timing classes that a source may use: an agent may not request reflexes, and a reflex may only react
 CLASSES: dict[int, frozenset[int]] = {
     SourceKind.AGENT: frozenset({TimingClass.SEMANTIC, TimingClass.TACTICAL}),
     SourceKind.OPERATOR: frozenset({TimingClass.SEMANTIC, TimingClass.TACTICAL}),
@@ -202,7 +206,7 @@ _NOT_PERMITTED = RuleVerdict(Outcome.DENY, Reason.NOT_PERMITTED, None)
 
 
 def authority(invocation: PreparedInvocation, at: Environment) -> Found:
-    """Denied when a `forbid` is true or no `permit` is, even where another `forbid` is unknown; then that defers."""
+    """Denied when a `forbid` is true or no `permit` is; a `forbid` that is unknown defers."""
     if invocation.invocation.contract.timing_class not in CLASSES[invocation.invocation.source]:
         return _CLASS
     candidates = invocation.candidates
@@ -227,7 +231,7 @@ def authority(invocation: PreparedInvocation, at: Environment) -> Found:
             break
         permitted = permitted or truth & TRUE != 0
     else:
-        rules = candidates.permits  # none speaks of this skill, role and source at all, or no condition is met
+        rules = candidates.permits  # no rule names this skill, role and source, or no condition is true
         verdicts.append(RuleVerdict(Outcome.DENY, Reason.OUT_OF_SCOPE, rules[0].rule) if rules else _NOT_PERMITTED)
         if not permitted:
             return tuple(verdicts)
@@ -240,8 +244,8 @@ def authority(invocation: PreparedInvocation, at: Environment) -> Found:
 
 
 class ConfirmState(NamedTuple):
-    """What became of a `confirm` rule that may match: whether it surely does, until when an answer is waited for
-    (monotonic us), whether somebody refused, and when grants that came in time were enough.
+    """The state of a `confirm` rule that may match: whether it certainly matches, how long an answer is awaited
+    (monotonic us), whether somebody refused, and when enough grants had arrived in time.
     """
 
     rule: Rule
@@ -267,7 +271,7 @@ def _asked(invocation: PreparedInvocation, context: Context, at: Environment) ->
 
 
 def _granted(rule: Rule, answers: Sequence[ConfirmAnswer]) -> list[int]:
-    """When grants that came in time were enough, monotonic us: one of the role, or those of two people."""
+    """When enough grants had arrived in time, monotonic us: one of the role, or one of each of two people."""
     first = [each for each in answers if each.role == rule.approver]
     if rule.second == -1:
         return [each.monotonic_us for each in first]
@@ -280,7 +284,7 @@ def _granted(rule: Rule, answers: Sequence[ConfirmAnswer]) -> list[int]:
 
 
 def confirmation(invocation: PreparedInvocation, context: Context, at: Environment, monotonic_us: Span) -> Found:
-    """Denied when any rule's answer denies, else deferred when any is awaited."""
+    """Denied when the answer to any rule denies, else deferred while any answer is awaited."""
     verdicts: list[RuleVerdict] = []
     doubt: RuleVerdict | None = None
     passes = True
@@ -304,7 +308,7 @@ def confirmation(invocation: PreparedInvocation, context: Context, at: Environme
 
 
 def release(invocation: PreparedInvocation, context: Context, at: Environment) -> Span:
-    """When the step was released, monotonic us: an approval moves it."""
+    """The release of the step, monotonic us. An approval moves it."""
     first = last = context.released_us
     if not invocation.candidates.confirms:
         return first, last
@@ -321,8 +325,8 @@ _LATE = (RuleVerdict(Outcome.DENY, Reason.PHASE_PASSED, None),)
 
 
 def phase(invocation: PreparedInvocation, context: Context) -> Found:
-    """Deferred while one of its phases is still to come, denied when none is."""
-    current = max(context.phase, -1) + 1  # the phases from the current one on; before the first, all are to come
+    """Deferred while one of the invocation's phases is still to come, denied when none is left."""
+    current = max(context.phase, -1) + 1  # the phases from the current one on; before the first phase, all are to come
     coming = invocation.invocation.phases << 1 >> current
     if coming & 1:
         return PASSED
@@ -335,7 +339,9 @@ _NO_SLACK = RuleVerdict(Outcome.FALLBACK, Reason.NO_SLACK, None)
 
 
 def timing(invocation: PreparedInvocation, context: Context, at: Environment, monotonic_us: Span) -> Found:
-    """What would come too late is not wanted: the vehicle falls back. A release still to come gains nothing."""
+    """Checks that the step can end before its deadline; otherwise the vehicle falls back. A later release does not
+    help.
+    """
     spare = invocation.invocation.contract.deadline_us - context.remaining_us
     (earliest, latest), (released_first, released_last) = monotonic_us, release(invocation, context, at)
     if max(latest - released_first, 0) <= spare:
@@ -344,10 +350,11 @@ def timing(invocation: PreparedInvocation, context: Context, at: Environment, mo
 
 
 def valid_until(invocation: PreparedInvocation, state: State, context: Context, sets: Sets, at: Environment) -> int:
-    """The earliest of deadline, end of validity and the moment when something that was read is stale, monotonic us.
-    What a temporal monitor looked at counts as read; and what it says stands for `MAX_GAP` after its observation.
+    """The earliest of deadline, end of validity and the moment when a value that was read becomes stale, monotonic
+    us. Values that a temporal monitor read count too, and its result stays valid for `MAX_GAP` after its
+    observation.
 
-    The end of validity is mapped from UTC with the clock's error taken off.
+    The end of validity is mapped from UTC and reduced by the clock's error.
     """
     contract = invocation.invocation.contract
     (now, _), ((utc, _),), (error, _) = sets.monotonic_us, sets.utc_us, sets.utc_error_us
@@ -367,10 +374,11 @@ _TOO_FAST = (RuleVerdict(Outcome.FALLBACK, Reason.ENVELOPE, None),)
 
 
 class ConditionTally:
-    """A step that passes when all its conditions are true: false falls back, else unknown defers.
+    """Collects the conditions of a step, which passes when all of them are true: false falls back, else unknown
+    defers.
 
-    `exact` says that a single situation is judged, so that a mixed truth is one over the places of one volume, where
-    the condition must hold everywhere. Otherwise it is one over many situations, each with a volume of its own.
+    With `exact`, one situation is judged. A mixed truth then ranges over the places of one volume, where the
+    condition must hold everywhere. Otherwise it ranges over many situations, each with a volume of its own.
     """
 
     __slots__ = ("_doubt", "_exact", "_passes", "_unknown", "_verdicts")
@@ -382,7 +390,9 @@ class ConditionTally:
         self._passes = True
 
     def fails(self, truth: Truth, reason: Reason, clause: Decisive) -> bool:
-        """Count a condition that is not simply TRUE; whether the step surely fails, so that no other needs a look."""
+        """Count a condition that is not TRUE. Return whether the step certainly fails, so that the other conditions
+        need no evaluation.
+        """
         if self._exact:
             truth = EVERYWHERE[truth]
         if truth & FALSE:
@@ -393,7 +403,7 @@ class ConditionTally:
         return truth == FALSE
 
     def found(self, failed: bool) -> Found:
-        """The verdicts, given whether some condition surely fails."""
+        """The verdicts, given whether some condition certainly fails."""
         if failed:
             return tuple(self._verdicts)
         if self._passes and not self._verdicts and self._doubt is None:

@@ -1,4 +1,4 @@
-"""Conditions compiled, once, at load, into functions from what is known to an abstract truth."""
+"""Compiles conditions once, at load, into functions from an environment to an abstract truth."""
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
@@ -9,15 +9,16 @@ from rtshcua.decision.times import LocalTime, Window, daily, weekly
 from rtshcua.decision.values import ABSENT, AND, FALSE, NOT, OR, TRUE, UNKNOWN, Span, Truth, Value
 from rtshcua.decision.zones import PlaceSet, PreparedZone, WellKnown, here
 
-#: the phase of what belongs to no mission, and of a phase that the policy does not name
+#: : the phase of an invocation without a mission, and of a phase that the policy does not name
 NO_PHASE: Final = -1
 
 
 class Environment:
-    """What a condition is evaluated over: a value for each slot (and MISSING after the last), the arguments, where the
-    vehicle is (None: where the state says; found when first asked), UTC with its error, the truth of each temporal
-    monitor (none at all: nothing is said about any), and the number of the invocation's phase among the policy's phase
-    names. Zones are asked about every moment from now to `through` us from now."""
+    """The inputs of a condition: a value for each slot (and MISSING after the last), the arguments, the vehicle's
+    position (None to derive it from the state, on first use), UTC with its error, the truth of each temporal
+    monitor (empty if nothing is known), and the index of the invocation's phase among the policy's phase names.
+    Zones are evaluated at every moment from now to `through` us from now.
+    """
 
     __slots__ = ("arguments", "error", "monitors", "phase", "place", "slots", "through", "utc")
 
@@ -38,7 +39,7 @@ class Environment:
         self.monitors, self.phase, self.through = monitors, phase, through
 
     def over(self, slots: Sequence[Value], place: PlaceSet | None, through: int) -> "Environment":
-        """The same, with other values in the slots, and the vehicle elsewhere, until `through` us from now."""
+        """A copy with other slot values and another vehicle position, until `through` us from now."""
         return Environment(slots, self.arguments, self.utc, self.error, place, self.monitors, self.phase, through)
 
 
@@ -46,7 +47,7 @@ Condition: TypeAlias = Callable[[Environment], Truth]
 
 
 class Tables(NamedTuple):
-    """What code refers to by index, ready for use."""
+    """The tables that code refers to by index, prepared for evaluation."""
 
     zones: tuple[PreparedZone, ...]
     tables: tuple[tuple[int, ...], ...]
@@ -56,18 +57,18 @@ class Tables(NamedTuple):
 
 
 def within(place: PlaceSet, zone: PreparedZone, at: Environment, through: int) -> Truth:
-    """Whether a place is inside a zone, at any moment from now to `through` us from now."""
+    """Whether a place is inside a zone at some moment from now to `through` us from now."""
     truth = place.inside(zone)
     return truth if zone.times is None else AND[truth][zone.times.truth(at.utc, at.error, through)]
 
 
 def always(_: Environment) -> Truth:
-    """The condition of a rule without one."""
+    """The condition of a rule that has none: always true."""
     return TRUE
 
 
 def build(node: tree.Node, tables: Tables) -> Condition:
-    """The function that evaluates a condition."""
+    """Compile a condition into a function."""
     match node:
         case tree.Both(left, right):
             return _both(build(left, tables), build(right, tables))
@@ -134,14 +135,14 @@ def _not(operand: Condition) -> Condition:
 
 
 def known(truth: Truth, gap: int) -> Truth:
-    """A truth about a value that may be missing."""
+    """The truth of a statement about a value that may be missing."""
     if not gap:
         return truth
     return UNKNOWN if gap == ABSENT else truth | UNKNOWN
 
 
 def total(terms: tuple[tree.LinearTerm, ...], at: Environment) -> tuple[int, int, int]:
-    """The least and the greatest the sum can be, and whether a part of it is missing."""
+    """The least and the greatest possible sum, and whether one of its parts is missing."""
     low = high = gap = 0
     for argument, index, factor in terms:
         least, most, missing, _ = at.arguments[index] if argument else at.slots[index]
@@ -155,7 +156,7 @@ def total(terms: tuple[tree.LinearTerm, ...], at: Environment) -> tuple[int, int
 
 
 def at_most(low: int, high: int, bound: int) -> Truth:
-    """Whether what lies in `low`..`high` is at most `bound`."""
+    """Whether a value in `low`..`high` is at most `bound`."""
     if high <= bound:
         return TRUE
     return FALSE if low > bound else TRUE | FALSE
@@ -239,7 +240,7 @@ def _inside_argument(cell: int, table: tuple[int, ...], tables: Tables) -> Condi
     each = tuple(_inside(tables.zones[zone], tables.known) for zone in table)
 
     def inside(zone: int, at: Environment) -> Truth:
-        return each[zone](at) if 0 <= zone < len(each) else UNKNOWN  # an argument out of range is no zone
+        return each[zone](at) if 0 <= zone < len(each) else UNKNOWN  # an argument out of range does not name a zone
 
     def run(at: Environment) -> Truth:
         low, high, _, elements = at.arguments[cell]

@@ -1,8 +1,8 @@
-"""Which link flies when something is refused (paper symbol `f_b`, design 4.4).
+"""Selects the link that flies after a refusal (paper symbol `f_b`, design 4.4).
 
-A link skips steps 2 to 5 and `degrade`, for a vehicle in trouble must not be left without an answer: its own `require`
-must be true now, and it must not lead out of the airspace. Holding and landing lead nowhere; a vehicle that is out of
-the airspace already, as far as its position error tells, may always go home.
+A link skips steps 2 to 5 and `degrade`, because a vehicle in trouble must always have an answer. The link's own
+`require` must be true now, and it must not lead out of the airspace. Holding and landing do not leave the place. A
+vehicle that is already outside the airspace, as far as its position error can tell, may always go home.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,7 +16,7 @@ from rtshcua.decision.values import AND, EVERYWHERE, FALSE, TRUE, UNKNOWN, Sets,
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now, State
 
-#: the index of the link that a `degrade` rule flies, and of having tried nothing yet
+#: : the index of the link that a `degrade` rule flies, and the index that means that no link was tried yet
 DEGRADE = -1
 START = -2
 
@@ -26,7 +26,7 @@ def choose_fallback(
 ) -> LinkChoice | None:
     """The target of a matching `degrade` rule, else the first link of the chain after `after` that may fly now.
 
-    Pass the index of the link that failed or whose time is over as `after`: the choice never goes backwards.
+    `after` is the index of the link that failed or ran out of time: the choice never goes backwards.
     """
     seen = remembered(state, policy, now)
     for known, known_after, choice in seen.choices:
@@ -43,8 +43,8 @@ def choose_contingency(state: State, policy: PreparedPolicy, now: Now, after: in
 
 
 def look_ahead(invocation: PreparedInvocation, state: State, policy: PreparedPolicy, now: Now) -> None:
-    """Ask of every link that may have to follow an invocation whether it may fly now. What depends on the place alone
-    is remembered (`Planner`, `Place`), and need not be found when one has to.
+    """Evaluate in advance every link that may have to follow an invocation. Results that depend on the place alone
+    are remembered (`Planner`, `Place`), so that a later fallback is chosen faster.
     """
     sets = situation(state, policy, now)
     for rule in invocation.candidates.degrades:
@@ -56,14 +56,16 @@ def look_ahead(invocation: PreparedInvocation, state: State, policy: PreparedPol
 
 
 def link_admissible(link: PreparedLink, state: State, policy: PreparedPolicy, now: Now, phase: int = NO_PHASE) -> bool:
-    """Whether a link of a prepared chain may fly now; `phase` is that of the invocation whose chain it is."""
+    """Whether a link of a prepared chain may fly now. `phase` is the phase of the invocation whose chain it belongs
+    to.
+    """
     return admissible(link, situation(state, policy, now), policy, True, phase) == TRUE
 
 
 def fallbacks(
     invocation: PreparedInvocation, sets: Sets, policy: PreparedPolicy, after: int, exact: bool
 ) -> Iterator[LinkChoice | None]:
-    """The links that may be the choice, in order, and None if perhaps none flies; one situation has one answer."""
+    """The links that may be chosen, in order, and None if possibly none may fly. A single situation has one answer."""
     phase = invocation.phase
     if after < DEGRADE:
         at = environment(sets, policy, invocation.arguments, phase)
@@ -113,7 +115,7 @@ def _admissible(link: PreparedLink, sets: Sets, policy: PreparedPolicy, exact: b
 
 
 def _deepens_no_breach(link: PreparedLink, at: Environment, policy: PreparedPolicy, exact: bool) -> Truth:
-    """Whether a link that moves stays in the airspace, or goes home from where the vehicle should not be."""
+    """Whether a link that moves the vehicle stays in the airspace, or returns it home from outside."""
     airspace, known = policy.airspace, policy.tables.known
     assert airspace is not None
     through = longest(policy.policy.contracts[link.link.skill], policy.policy.vehicle, link.link.limit_us)

@@ -1,12 +1,12 @@
-"""How long a vehicle takes at most for what it flies, and what that takes of its charge, by the speeds it declares.
+"""The greatest duration of each manoeuvre and the charge that it takes, computed from the vehicle's declared speeds.
 
-An autopilot flies a leg from rest to rest: with v its speed over ground and a its acceleration, a leg of length d takes
-d / v + v / a, or 2 * sqrt(d / a) where it is so short that it never comes to speed (d < v*v / a). Height on a leg is
-counted as if it were flown after the leg. Against a head wind w the speed over ground is what is asked for, and no more
-than what its speed through the air leaves, `air` - w. The charge is that of the time: `flight_us` is how long a full
-battery flies, whatever it flies.
+An autopilot flies a leg from rest to rest. With v its speed over ground and a its acceleration, a leg of length d
+takes d / v + v / a, or 2 * sqrt(d / a) where the leg is too short to reach the speed (d < v*v / a). A change of
+height on a leg is counted as if it were flown after the leg. Against a head wind w the speed over ground is the
+requested speed, limited to what the air speed leaves, `air` - w. The charge follows from the time: `flight_us` is
+how long a full battery lasts, whatever the vehicle flies.
 
-The constants are what recorded flights took beyond that (PX4 1.16, ArduCopter 4.7: docs/flying/speeds.md).
+The constants are delays measured in recorded flights (PX4 1.16, ArduCopter 4.7: docs/flying/speeds.md).
 """
 
 from math import isqrt
@@ -16,9 +16,9 @@ from rtshcua.model.flat.policy import Speeds, VehicleLimits
 
 SECOND = 1_000_000  # us
 MINUTE = 60 * SECOND
-#: the most that is counted to be taken of a charge in a minute, 1/10000: all of it in a second
+#: : upper bound of the measured drain per minute, 1/10000: a full charge in a second
 MOST_DRAIN = 60 * FULL
-#: from a command to the motion that it asks for
+#: : from a command to the motion that it requests
 BEGINS = SECOND
 #: from arming to leaving the ground: the motors run up
 LIFTS = 5 * SECOND
@@ -31,12 +31,12 @@ LANDED = 8 * SECOND
 
 
 def slower(one: int, other: int) -> int:
-    """The slower of two speeds that steps ask for, mm/s; 0 asks for none."""
+    """The slower of two requested speeds, mm/s; 0 means no request."""
     return min(one or other, other or one)
 
 
 def over_ground(speeds: Speeds, asked: int, wind: int | None = None) -> int:
-    """The speed over ground that is sure where `asked` is flown, against the declared wind or another, mm/s."""
+    """The speed over ground that is certain when `asked` is flown, against the declared wind or another, mm/s."""
     return max(1, min(asked, speeds.air - (speeds.wind if wind is None else wind)))
 
 
@@ -48,25 +48,25 @@ def leg_us(speeds: Speeds, distance: int, speed: int) -> int:
 
 
 def rising_us(speeds: Speeds, height: int) -> int:
-    """A climb by this height; nothing where there is none."""
+    """The duration of a climb by this height; 0 for no climb."""
     return leg_us(speeds, height, speeds.climb) if height > 0 else 0
 
 
 def sinking_us(speeds: Speeds, height: int) -> int:
-    """A descent by this height, in the air; nothing where there is none."""
+    """The duration of a descent by this height in the air; 0 for no descent."""
     return leg_us(speeds, height, speeds.descent) if height > 0 else 0
 
 
 def landing_us(speeds: Speeds, height: int) -> int:
-    """From a height down to the ground, until the motors have stopped."""
+    """The duration of a landing from a height, until the motors have stopped."""
     slow = min(max(height, 0), speeds.landing_below)
     return sinking_us(speeds, height - slow) + _over(slow * SECOND, speeds.landing) + LANDED
 
 
 def home_us(vehicle: VehicleLimits, speeds: Speeds, distance: int, heights: tuple[int, int], asked: int = 0) -> int:
-    """Home from anywhere within a distance of where it is declared and between two heights, and down there.
+    """The duration of a return and landing, from anywhere within a distance of home and between two heights.
 
-    An autopilot may go on with a speed that this step or one before it asked for (PX4: DO_CHANGE_SPEED outlives the
+    An autopilot may keep a speed that this step or an earlier one requested (PX4: DO_CHANGE_SPEED outlives the
     mode): `asked` is the slowest of these, 0 if none did.
     """
     low, high = heights
@@ -77,12 +77,12 @@ def home_us(vehicle: VehicleLimits, speeds: Speeds, distance: int, heights: tupl
 
 
 def charge(speeds: Speeds, time_us: int) -> int:
-    """What flying so long takes of a full charge, 1/10000, rounded up."""
+    """The charge that a flight of this duration takes, 1/10000, rounded up."""
     return _over(time_us * FULL, speeds.flight_us)
 
 
 def drained(time_us: int, drain: int) -> int:
-    """What flying so long takes where `drain` is taken in a minute, 1/10000, rounded up."""
+    """The charge that a flight of this duration takes at `drain` per minute, 1/10000, rounded up."""
     return _over(time_us * drain, MINUTE)
 
 

@@ -1,7 +1,7 @@
-"""What would have passed: computed only on refusal, from the condition that decided.
+"""Computes, after a refusal, the smallest change with which the request would have passed.
 
-`ChangeSearch` finds the smallest change of values that makes a condition true, or false, read off the condition itself;
-`offer` tells it to a person or an agent, by names and in its dimension; `nearest` tries what is offered.
+`ChangeSearch` finds the smallest change of values that makes a condition true or false. `offer` presents it to a
+person or an agent, with names and units. `nearest` returns the changes that pass when tried.
 """
 
 from collections.abc import Iterable, Sequence
@@ -26,7 +26,7 @@ from rtshcua.model.outcome import Reason
 
 
 class NearestChange(NamedTuple):
-    """An argument cell or a state slot (None: the local time) should be in `low`..`high`, or one of `choices`."""
+    """A change of an argument cell, a state slot, or (None) the local time, to `low`..`high` or to one of `choices`."""
 
     argument: bool
     at: int | None
@@ -36,31 +36,32 @@ class NearestChange(NamedTuple):
 
     @property
     def subject(self) -> "Subject":
-        """What changes."""
+        """The argument or slot that changes, or None for the local time."""
         return (self.argument, self.at)
 
     def allows(self, value: int) -> bool:
-        """Whether a value satisfies it."""
+        """Whether the change allows a value."""
         return self.low <= value <= self.high if self.choices is None else value in self.choices
 
 
 Subject: TypeAlias = tuple[bool, int | None]
-#: the value that each subject is given
+#: : the proposed value of each subject
 Made: TypeAlias = dict[Subject, int]
 
 
 class ChangeSearch:
-    """Looks for changes to what an environment knows. None means that no change of a value helps, or none is known.
+    """Searches for changes to the values of an environment. None means that no change of a value helps, or that none
+    is known.
 
-    What a temporal monitor says, no value of this moment changes; and an invocation stays in its phase. With
-    `signals_only` the arguments stay as they are too, where a comparison has both.
+    No present value changes the result of a temporal monitor, and an invocation stays in its phase. With
+    `signals_only` the arguments stay fixed too, where a comparison has both.
     """
 
     def __init__(self, at: Environment, tables: Tables, *, signals_only: bool = False) -> None:
         self._at, self._tables, self._signals_only = at, tables, signals_only
 
     def find(self, node: tree.Node, goal: bool) -> tuple[NearestChange, ...] | None:
-        """Changes which, made together, give the condition the truth `goal`; as few as possible."""
+        """The fewest changes that, made together, give the condition the truth `goal`."""
         if build(node, self._tables)(self._at) == (TRUE if goal else FALSE):
             return ()
         match node:
@@ -85,9 +86,10 @@ class ChangeSearch:
                 return None
 
     def help(self, node: tree.Node, goal: bool, made: Made) -> bool:
-        """Whether the condition has the truth `goal` once subjects have the values given.
+        """Whether the condition has the truth `goal` once the subjects have these values.
 
-        A time of day is the next one there is, for zones may exist on some days only, and the clock is then exact.
+        A time of day means its next occurrence, because zones may exist on some days only. The clock is then
+        exact.
         """
         here = self._at
         slots, arguments, utc, error = list(here.slots), list(here.arguments), here.utc, here.error
@@ -103,7 +105,9 @@ class ChangeSearch:
         return build(node, self._tables)(changed) == (TRUE if goal else FALSE)
 
     def _today(self, windows: tuple[int, ...]) -> tuple[NearestChange, ...] | None:
-        """The next window of this day of the local week, else the last; None if it has none. Other days are no help."""
+        """The next window of this day of the local week, else the last; None if the day has none. Other days do not
+        help.
+        """
         moment = self._at.utc[0][0]
         day, now = divmod(time_of_week(moment + self._tables.local.offset(moment)), DAY)
         found = [
@@ -127,8 +131,9 @@ class ChangeSearch:
     def _within(
         self, terms: tuple[tree.LinearTerm, ...], least: int | None, most: int | None
     ) -> tuple[NearestChange, ...] | None:
-        """The sum is in `least`..`most` whatever the other terms are, when one is changed: an argument rather than a
-        signal."""
+        """The change that brings the sum into `least`..`most` with all other terms fixed; an argument is preferred to
+        a signal.
+        """
         movable = sorted((term for term in terms if term.factor), key=lambda term: term.argument == self._signals_only)
         low, high, gap = total(tuple(term for term in terms if term not in movable[:1]), self._at)
         if gap or not movable:
@@ -143,7 +148,7 @@ class ChangeSearch:
 
 
 def _merged(changes: Sequence[NearestChange]) -> tuple[NearestChange, ...] | None:
-    """One change for each subject, None when two contradict."""
+    """One change for each subject, or None when two contradict each other."""
     merged: dict[Subject, NearestChange] = {}
     for new in changes:
         old = merged.setdefault(new.subject, new)
@@ -166,7 +171,7 @@ def _both(a: NearestChange, b: NearestChange) -> NearestChange | None:
 
 
 def nearest_in(change: NearestChange, value: Value) -> int:
-    """The value nearest to the present one that the change allows; the nearer end of a window for a time of day."""
+    """The allowed value that is nearest to the present one; for a time of day, the nearer end of a window."""
     low, high = change.low, change.high
     present, _, gap, _ = value
     if change.at is None:
@@ -179,12 +184,12 @@ def nearest_in(change: NearestChange, value: Value) -> int:
 LOCAL_TIME = "local time"
 DAYTIME = "daytime"
 
-#: a value and its name; a quantity has none
+#: : a value and its name; a quantity has no name
 Option = tuple[int, str]
 
 
 class Offer(NamedTuple):
-    """The values that a change allows its subject: the nearest quantity, or each ordinal or zone with its name."""
+    """The allowed values of a subject: the nearest quantity, or each ordinal or zone with its name."""
 
     change: NearestChange
     subject: str
@@ -193,7 +198,7 @@ class Offer(NamedTuple):
 
 
 def offer(change: NearestChange, contract: Contract, policy: Policy, at: Environment) -> Offer:
-    """What a change offers; there are no options where the subject has no such value."""
+    """The offer that corresponds to a change; without options where the subject has no such value."""
     if change.at is None:
         local = point(at.utc[0][0] + local_time(policy.vehicle).offset(at.utc[0][0]))
         return Offer(change, LOCAL_TIME, DAYTIME, ((nearest_in(change, local), ""),))
@@ -226,10 +231,10 @@ def _named(change: NearestChange, labels: Iterable[Option]) -> tuple[Option, ...
 
 
 class Nearest(NamedTuple):
-    """A value of `subject` (a parameter, a signal, or the local time) that would have passed, the nearest there is.
+    """A value of `subject` (a parameter, a signal, or the local time) that would have passed, the nearest one.
 
-    `value` is in the canonical unit of `dimension` (`daytime`: us since local midnight). For an enumeration or a zone,
-    `choices` are the names that would pass, and `value` is the ordinal or index of the first.
+    `value` is in the canonical unit of `dimension` (`daytime`: us since local midnight). For an enumeration or a
+    zone, `choices` are the names that would pass, and `value` is the ordinal or index of the first.
     """
 
     subject: str
@@ -241,7 +246,7 @@ class Nearest(NamedTuple):
 def nearest(
     decision: Decision, invocation: PreparedInvocation, state: State, policy: PreparedPolicy, now: Now
 ) -> tuple[Nearest, ...]:
-    """The changes which, made together, satisfy what decided; empty when no change of a value is known to."""
+    """The changes that, made together, satisfy the condition that decided; empty when no such change is known."""
     sets = situation(state, policy, now)
     at = environment(sets, policy, invocation.arguments, invocation.phase)
     match decision.reason:
@@ -258,7 +263,7 @@ def nearest(
 
 
 def _conditions(decision: Decision, invocation: PreparedInvocation, policy: PreparedPolicy) -> list[tuple[Node, bool]]:
-    """Conditions with the truth they should have had; any one of them would do."""
+    """Pairs of a condition and the truth that it needed; satisfying any one pair is enough."""
     compiler, clause = policy.compiler, decision.clause
     match decision.reason:
         case Reason.OUT_OF_SCOPE:
@@ -287,7 +292,7 @@ def _fewest(
 
 
 def _tried(offers: list[Offer], changes: ChangeSearch, node: Node, goal: bool) -> tuple[Nearest, ...] | None:
-    """The offers that hold when tried, for a change may undo what another part of the condition was content with."""
+    """The offers that pass when tried. A change can break another part of the condition."""
     first: Made = {one.change.subject: one.options[0][0] for one in offers}
     kept: list[Nearest] = []
     for one in offers:

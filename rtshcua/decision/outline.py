@@ -1,21 +1,23 @@
-"""The rings that bound a zone which is no circle, and what is asked of them: is a place inside, is a way clear of them?
+"""The rings that bound a zone other than a circle, with two queries: is a place inside, and is a way clear of the
+rings?
 
-`Slabs` answers the first. The plane is cut into horizontal slabs at the heights of all corners. The edges through a
-slab do not meet there, so they have an order from west to east, and bisection finds how many are west of a place:
-inside when that number is odd. So a place costs two bisections, of the slabs and of the edges in one.
+`Slabs` answers the first. The plane is cut into horizontal slabs at the heights of all corners. The edges through
+a slab do not meet there, so they have an order from west to east, and bisection finds how many are west of a
+place: the place is inside when that number is odd. A query thus costs two bisections, one over the slabs and one
+over the edges of a slab.
 
-An edge may run through many slabs. Where that would make more than `MOST` entries for each edge, as in a long zig-zag,
-slabs are the leaves of a tree instead, each edge is kept at the few nodes that it spans whole, and a slab has the nodes
-from its leaf to the root. The tree is as wide as may be. With `n` corners there are thus never more than `MOST * n`
-entries, as a binary tree's `2 * log2(n)` is no more than that for as many corners as fit on board, and a place costs at
-most `log2(n) + 2` bisections, about half as many for 1,000 corners or fewer.
+An edge may run through many slabs, as in a long zig-zag. Where that would make more than `MOST` entries for each
+edge, slabs are the leaves of a tree instead. Each edge is kept at the few nodes that it spans completely, and a
+slab has the nodes from its leaf to the root. The tree is as wide as possible. With `n` corners there are thus
+never more than `MOST * n` entries, because a binary tree's `2 * log2(n)` is no more than that for as many corners
+as fit on board. A query costs at most `log2(n) + 2` bisections, about half as many for 1,000 corners or fewer.
 
-Asking stays within 64 bits as long as coordinates do (see `zones`). Sorting, done once at load, takes exact rationals
-scaled to integers; an evaluator in C would compare by the ends' cross products instead.
+Queries stay within 64 bits as long as coordinates do (see `zones`). Sorting happens once, at load, and uses exact
+rationals scaled to integers; an evaluator in C would compare by the ends' cross products instead.
 
-`Bands` answers the second: does any edge meet a widened leg? Edges are kept in horizontal bands, so that a question
-looks at few. An edge is kept once for each band that it runs through; there are fewer bands where that would be more
-than `REPEATS` times the number of edges.
+`Bands` answers the second query: does any edge meet a widened leg? Edges are kept in horizontal bands, so that a
+query compares few edges. An edge is kept once for each band that it runs through. Where that would make more than
+`REPEATS` entries for each edge, there are fewer bands.
 """
 
 from bisect import bisect_right
@@ -59,7 +61,7 @@ REPEATS = 4
 
 
 class Bands:
-    """Edges, by where they are."""
+    """Edges, indexed by horizontal band."""
 
     __slots__ = ("_bands", "_before", "_height", "_south")
 
@@ -83,15 +85,16 @@ class Bands:
         return (y - self._south) // self._height
 
     def clear(self, x0: int, y0: int, x1: int, y1: int, box: Box) -> bool:
-        """Whether no edge meets the widened leg: each is parted from it by a line (separating axes).
+        """Whether no edge meets the widened leg: a separating axis exists for each.
 
-        Both are convex, so an edge that lies wholly within the leg, as a swallowed hole's does, is not parted from it.
+        Both are convex. An edge that lies completely within the leg, such as one of an enclosed hole, has no
+        separating axis.
         """
         west, east = (x0, x1) if x0 < x1 else (x1, x0)
         south, north = (y0, y1) if y0 < y1 else (y1, y0)
         west, south, east, north = west + box[0], south + box[1], east + box[2], north + box[3]
         first, last = max(self._band(south), 0), min(self._band(north), len(self._bands) - 1)
-        for band in self._bands[first : last + 1]:  # an edge that spans bands comes once for each
+        for band in self._bands[first : last + 1]:  # an edge that spans several bands appears once in each
             for ax, ay, bx, by, edge_west, edge_east, edge_south, edge_north in band:
                 if edge_east < west or edge_west > east or edge_north < south or edge_south > north:
                     continue
@@ -101,13 +104,13 @@ class Bands:
         return True
 
     def compared(self, y0: int, y1: int, box: Box) -> int:
-        """How many edges `clear` compares with a leg between these heights at most."""
+        """The greatest number of edges that `clear` compares with a leg between these heights."""
         first = max(self._band(min(y0, y1) + box[1]), 0)
         last = min(self._band(max(y0, y1) + box[3]), len(self._bands) - 1)
         return self._before[last + 1] - self._before[first] if first <= last else 0
 
     def entries(self) -> int:
-        """How many edges are kept, each counted once for each band."""
+        """The number of stored edges, each counted once for each band."""
         return self._before[-1]
 
 
@@ -116,7 +119,9 @@ def _edge(x0: int, y0: int, x1: int, y1: int) -> Edge:
 
 
 def _parted(x: int, y: int, edge: Leg, leg: Leg, box: Box) -> bool:
-    """Whether a line in the direction (x, y) parts an edge from a widened leg: their cross products do not overlap."""
+    """Whether a line in the direction (x, y) separates an edge from a widened leg: their cross products do not
+    overlap.
+    """
     west, south, east, north = box
     a, b, c, d = x * edge[1] - y * edge[0], x * edge[3] - y * edge[2], x * leg[1] - y * leg[0], x * leg[3] - y * leg[2]
     least = (x * south if x > 0 else x * north) - (y * east if y > 0 else y * west)
@@ -126,7 +131,7 @@ def _parted(x: int, y: int, edge: Leg, leg: Leg, box: Box) -> bool:
 
 #: the lower end x, y, and how far the upper end lies east (or west, if negative) and north of it
 Rise: TypeAlias = tuple[int, int, int, int]
-#: edges through all of the same slabs, from west to east
+#: : edges through the same slabs, from west to east
 Row: TypeAlias = tuple[Rise, ...]
 
 MOST = 32
@@ -136,12 +141,12 @@ SCALE = 61
 
 
 class Slabs:
-    """The inside of some rings, by the even-odd rule; their edges are outside."""
+    """The interior of some rings, by the even-odd rule; the edges themselves are outside."""
 
     __slots__ = ("_east", "_levels", "_tables", "_west", "_ys")
 
     def __init__(self, edges: Iterable[Leg]) -> None:
-        """The rings must be simple and apart from each other."""
+        """The rings must be simple and must not touch each other."""
         edges = tuple(edges)
         self._west, self._east = min(edge[0] for edge in edges), max(edge[0] for edge in edges)
         self._ys = sorted({edge[1] for edge in edges})
@@ -183,8 +188,8 @@ class Slabs:
         return inside
 
     def entries(self) -> int:
-        """How many edges are kept, each counted once for each node."""
-        # slabs share the rows of a node, and two nodes may have rows that are equal
+        """The number of stored edges, each counted once for each node."""
+        # slabs share the rows of a node, and two nodes may have equal rows
         return sum(len(row) for row in {id(row): row for table in self._tables for row in table}.values())
 
 
@@ -202,7 +207,7 @@ def _levels(edges: Iterable[Leg], index: dict[int, int]) -> tuple[tuple[int, ...
 
 
 def _joined(parts: list[tuple[int, int]]) -> tuple[int, ...]:
-    """Sorted intervals, with those that overlap made one."""
+    """The sorted intervals, with overlapping ones joined."""
     joined: list[int] = []
     for west, east in parts:
         if joined and west <= joined[-1]:
@@ -230,8 +235,9 @@ def _tree(rises: tuple[Rise, ...], spans: tuple[tuple[int, int], ...], count: in
 
 
 def _shape(count: int) -> tuple[int, int]:
-    """The widest tree with so many leaves that keeps no edge at more than `MOST` nodes: a node has `2**bits` children,
-    and an edge is at fewer than that at either end of each level below the root."""
+    """The widest tree with this many leaves that keeps no edge at more than `MOST` nodes. A node has `2**bits`
+    children, and an edge is stored at fewer nodes than that at either end of each level below the root.
+    """
     bits = 3
     while bits > 1 and 2 * ((1 << bits) - 1) * _depth(count, bits) > MOST:
         bits -= 1
@@ -243,8 +249,9 @@ def _depth(count: int, bits: int) -> int:
 
 
 def _spread(rise: Rise, low: int, high: int, nodes: list[list[Rise]], bits: int) -> None:
-    """Put an edge at the fewest nodes whose leaves are `low` up to before `high`; the parent of node `n` is
-    `n >> bits`."""
+    """Store an edge at the fewest nodes that cover the leaves from `low` to before `high`; the parent of node `n` is
+    `n >> bits`.
+    """
     others = (1 << bits) - 1
     while low < high:
         while low & others and low < high:
@@ -258,7 +265,7 @@ def _spread(rise: Rise, low: int, high: int, nodes: list[list[Rise]], bits: int)
 
 
 def _row(rises: list[Rise]) -> Row:
-    """The edges of a node from west to east: by where they are at the middle of the heights that they share."""
+    """The edges of a node from west to east, ordered at the middle of their common heights."""
     if len(rises) < 2:
         return tuple(rises)
     twice = max(y for _, y, _, _ in rises) + min(y + dy for _, y, _, dy in rises)

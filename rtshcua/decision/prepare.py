@@ -1,7 +1,8 @@
-"""Check a policy and a mission once, at load, and compile them for many decisions; what is held between the two.
+"""Checks a policy and a mission once, at load, and compiles them for many decisions.
 
-The bundle may come from the wrong people or be damaged, so everything that deciding relies on is checked here; what is
-malformed is refused with a value that names it. Signatures, digests and bindings are verified before, by `wire`.
+A bundle may be damaged or come from the wrong people, so this module checks everything that deciding relies on. It
+refuses a malformed bundle with a value that names the problem. `wire` verifies signatures, digests and bindings
+before.
 """
 
 from collections import defaultdict
@@ -32,7 +33,7 @@ from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.flat.zone import MAX_COORDINATE
 from rtshcua.model.step_number import step_words
 
-#: a clause, and the function that evaluates it
+#: : a clause and its compiled function
 Guards = tuple[tuple[Clause, Condition], ...]
 
 
@@ -44,7 +45,7 @@ class LinkChoice(msgspec.Struct, frozen=True):
 
 
 class PreparedLink(NamedTuple):
-    """A link, its arguments as values, its skill's `require`, its kind of motion and what it may fly through."""
+    """A link with its argument values, its skill's `require`, its kind of motion and its planned volume."""
 
     link: Link
     arguments: tuple[Value, ...]
@@ -65,7 +66,7 @@ class PreparedRule(NamedTuple):
 
 
 class PreparedDegrade(NamedTuple):
-    """A degrade rule, and the link that it flies."""
+    """A `degrade` rule and the link that it flies."""
 
     rule: Rule
     condition: Condition
@@ -73,9 +74,9 @@ class PreparedDegrade(NamedTuple):
 
 
 class Candidates(NamedTuple):
-    """The rules for one skill, role and source, in the order of the policy. Their conditions remain to be evaluated.
+    """The rules for one skill, role and source, in the order of the policy. Their conditions are not evaluated yet.
 
-    A rule that degrades to the skill itself is not among them: it would refuse what it asks for.
+    A rule that degrades to this same skill is left out, because it would refuse its own target.
     """
 
     forbids: tuple[PreparedRule, ...]
@@ -85,11 +86,11 @@ class Candidates(NamedTuple):
 
 
 class RuleIndex:
-    """The rules that may speak of an invocation, found by skill and role without looking at any other.
+    """The rules that may apply to an invocation, found by skill and role without a look at the others.
 
-    Rules for any skill or role are kept once, and merged in for a key that is asked for. A rule lists at most four
-    sources, so these are compared when merging. What was merged is remembered: asking again gives the same answer, and
-    a loaded mission asks for few keys.
+    Rules for any skill or role are stored once and merged when a key is first requested. A rule lists at most four
+    sources, so these are compared while merging. The merged result is cached: it never changes, and a loaded
+    mission uses few keys.
     """
 
     __slots__ = ("_buckets", "_compiler", "_known", "_rules")
@@ -104,7 +105,7 @@ class RuleIndex:
                     self._buckets.setdefault((skill, role), []).append(number)
 
     def candidates(self, skill: int, role: int, source: int) -> Candidates:
-        """The rules that name this skill, role and source, or any."""
+        """The rules that name this skill, role and source, or any of them."""
         key = (skill, role, source)
         found = self._known.get(key)
         if found is None:
@@ -129,7 +130,7 @@ class RuleIndex:
 
 
 class Compiler:
-    """Compiles what was checked: a clause is read again here, and cannot fail any more."""
+    """Compiles checked clauses. It parses them again, which cannot fail any more."""
 
     def __init__(self, policy: Policy) -> None:
         self._policy = policy
@@ -155,17 +156,17 @@ class Compiler:
         return node
 
     def monitor_node(self, monitor: Monitor, number: int) -> Node:
-        """The tree of what the temporal monitor of this number looks at."""
+        """The tree of the condition that the temporal monitor of this number observes."""
         node = parse(monitor.when.code, self._scope.inside_monitor(number))
         assert not isinstance(node, str), node
         return node
 
     def monitored(self, monitor: Monitor, number: int) -> Condition:
-        """The condition that the temporal monitor of this number looks at."""
+        """The condition that the temporal monitor of this number observes."""
         return build(self.monitor_node(monitor, number), self.tables)
 
     def guards(self, clauses: tuple[Clause, ...], contract: Contract) -> Guards:
-        """The clauses of a contract. Those that stand in the policy are compiled once: most steps have no others."""
+        """The clauses of a contract. The policy's own clauses are compiled once, because most steps have no others."""
         found = self._guards.get(clauses)
         if found is None:
             found = tuple((clause, build(self.node(clause, contract), self.tables)) for clause in clauses)
@@ -180,7 +181,7 @@ class Compiler:
         return self.node(rule.when, *(self._policy.contracts[skill] for skill in rule.skills))
 
     def condition(self, rule: Rule, number: int) -> Condition:
-        """The condition of a rule, compiled when it is first asked for."""
+        """The condition of a rule, compiled on first use."""
         found = self._conditions.get(number)
         if found is None:
             node = self.when(rule)
@@ -205,7 +206,7 @@ class Compiler:
 
 
 def _well_known(policy: Policy) -> WellKnown:
-    """A slot that no signal owns is the one after the last, which is always missing."""
+    """A slot without a signal is the one after the last, which is always missing."""
     vehicle, absent = policy.vehicle, policy.slots
     x, y = (absent, absent) if vehicle.position == -1 else (vehicle.position, vehicle.position + 1)
     others = (vehicle.height, vehicle.battery, vehicle.north, vehicle.east, vehicle.down)
@@ -222,7 +223,7 @@ class PreparedAirspace(NamedTuple):
     outside: tuple[PreparedZone, ...]
 
     def keeps(self, place: PlaceSet, at: Environment, through: int) -> Truth:
-        """Whether a place is in the airspace at every moment from now to `through` us from now."""
+        """Whether a place stays in the airspace at every moment from now to `through` us from now."""
         truth = TRUE
         for zone in self.inside:
             truth = AND[truth][place.inside(zone) if zone.times is None else within(place, zone, at, through)]
@@ -232,14 +233,14 @@ class PreparedAirspace(NamedTuple):
 
 
 class SlotLimit(NamedTuple):
-    """What a state slot may hold: no older than `stale_us`, no further from 0 than `most`."""
+    """The limits of a state slot: the greatest age is `stale_us`, the greatest magnitude `most`."""
 
     stale_us: int
     most: int
 
 
 class PreparedMonitor(NamedTuple):
-    """A temporal monitor: its kind, how far back it looks, and the condition that it looks at."""
+    """A temporal monitor: its kind, how far back it looks, and the condition that it observes."""
 
     kind: int
     window_us: int
@@ -247,8 +248,9 @@ class PreparedMonitor(NamedTuple):
 
 
 class SeenSituation(NamedTuple):
-    """A single situation, as sets of values, and as conditions read it, by arguments and phase; and what was found in
-    it: which links may fly, by their phase, and which would be chosen for an invocation, after the link of which index.
+    """A single situation as sets of values, and as conditions read it, by arguments and phase. It also caches results
+    for the situation: which links may fly, by phase, and the chosen link for an invocation, by the index of the
+    link before.
     """
 
     state: State
@@ -261,11 +263,11 @@ class SeenSituation(NamedTuple):
 
 @dataclass(slots=True, eq=False)
 class PreparedPolicy:
-    """A policy that was found well-formed, compiled. `limits` has one entry a slot; `bounds` is the same by column: the
-    ages at which slots are stale, the least and the most values. `monitors` are in order.
+    """A policy that was checked and compiled. `limits` has one entry for each slot; `bounds` is the same by column:
+    the stale ages, the least and the greatest values. `monitors` are in order.
 
-    `seen` is the last single situation that was asked about, remembered to be quick, as planners remember their last
-    start and zones the last box: no answer depends on it, and nothing else is ever changed.
+    `seen` caches the last single situation, as planners cache their last start and zones their last box. No answer
+    depends on it, and nothing else in a prepared policy ever changes.
     """
 
     policy: Policy
@@ -276,19 +278,19 @@ class PreparedPolicy:
     rules: RuleIndex
     airspace: PreparedAirspace | None
     contingency: tuple[PreparedLink, ...]
-    still: Planner  # plans to stay: the present place with its error
+    still: Planner  # plans without motion: the present place with its error
     monitors: tuple[PreparedMonitor, ...]
     seen: SeenSituation | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PreparedInvocation:
-    """An invocation that was found well-formed, compiled under `policy`.
+    """An invocation that was checked and compiled under `policy`.
 
-    `misfit` is the first parameter whose argument is out of range; `reads` are the slots that a decision may read, each
-    with the age in us at which it is stale. `phase` is the number of its mission phase among the policy's phase names,
-    -1 if it is none of them; `rests_us` how long the observation that a decision rests on stands for the moments after;
-    `lasts_us` the longest that it may fly (`lasting.longest`).
+    `misfit` is the first parameter whose argument is out of range. `reads` are the slots that a decision may read,
+    each with the age in us at which it becomes stale. `phase` is the index of its mission phase among the policy's
+    phase names, -1 if it is not among them. `rests_us` is how long the observation behind a decision stays valid;
+    `lasts_us` is the longest flight of the invocation (`lasting.longest`).
     """
 
     invocation: Invocation
@@ -309,7 +311,7 @@ class PreparedInvocation:
 
 
 def prepare(policy: Policy) -> PreparedPolicy | Refusal:
-    """The policy, compiled, or what is wrong with it."""
+    """The compiled policy, or the reason why it is refused."""
     problem = next(problems(policy), None)
     if problem is not None:
         return Refusal("malformed", problem)
@@ -333,7 +335,7 @@ def prepare(policy: Policy) -> PreparedPolicy | Refusal:
 
 
 def prepare_mission(mission: Mission, policy: PreparedPolicy) -> tuple[PreparedInvocation, ...] | Refusal:
-    """The mission's invocations in order, compiled, or what is wrong with them."""
+    """The compiled invocations of a mission in order, or the reason why it is refused."""
     problem = next(mission_checks.mission(mission, policy.policy), None)
     if problem is not None:
         return Refusal("malformed", problem)
@@ -352,7 +354,7 @@ def prepare_mission(mission: Mission, policy: PreparedPolicy) -> tuple[PreparedI
 
 
 def paths_fit(mission: Mission, policy: PreparedPolicy) -> Refusal | None:
-    """Whether deciding about the mission's paths takes no longer than a request may: what is wrong if it does."""
+    """The refusal of a mission whose paths take longer to decide than a request may; None if they do not."""
     error = policy.policy.vehicle.position_error
     box, compared = (-error, -error, error, error), 0
     for step, invocation in enumerate(mission.invocations):
@@ -360,14 +362,12 @@ def paths_fit(mission: Mission, policy: PreparedPolicy) -> Refusal | None:
             compared += sum(1 + zone.shape.compared(y0, y1, box) for zone in policy.tables.zones)
             if compared > MAX_COMPARED:
                 text = f"the legs of its paths would be compared with more than {MAX_COMPARED:,} edges of zones"
-                return Refusal(
-                    "malformed", f"{step_words(step)}: {text}", "fewer points of its paths, or of the zones there"
-                )
+                return Refusal("malformed", f"{step_words(step)}: {text}", "reduce the points of its paths or zones")
     return None
 
 
 def at_slowest(prepared: PreparedInvocation, slowest: int) -> PreparedInvocation:
-    """The invocation in a mission whose steps before it ask for a speed as slow as this, mm/s; 0 if none does."""
+    """The invocation, for a mission whose earlier steps request a speed as slow as this, mm/s; 0 if none does."""
     plan, contract = prepared.invocation.plan, prepared.invocation.contract
     asked = slower(slowest, plan.speed)
     if asked == plan.speed:
@@ -378,8 +378,8 @@ def at_slowest(prepared: PreparedInvocation, slowest: int) -> PreparedInvocation
 def prepare_invocation(
     invocation: Invocation, policy: PreparedPolicy, phases: tuple[str, ...]
 ) -> PreparedInvocation | Refusal:
-    """The invocation of a mission with these phases, compiled, or what is wrong with it. An argument out of range is
-    for `decide` to refuse.
+    """The compiled invocation of a mission with these phases, or the reason why it is refused. `decide` refuses
+    arguments that are out of range.
     """
     problem = next(mission_checks.invocation(invocation, policy.policy, policy.tables.zones), None)
     if problem is not None:
@@ -431,13 +431,13 @@ def _limits(policy: Policy) -> tuple[SlotLimit, ...]:
 
 
 def _reads(clauses: list[Clause], policy: Policy) -> tuple[int, ...]:
-    """The slots that a decision on these clauses may read: whatever it found there bounds how long it holds."""
+    """The slots that a decision on these clauses may read. Their ages limit how long the decision is valid."""
     vehicle = policy.vehicle
     battery = () if vehicle.battery == -1 else (vehicle.battery,)
     return tuple(sorted({*slots_read(clauses, vehicle, policy.monitors), *where(vehicle), *battery}))
 
 
 def _phase(invocation: Invocation, policy: Policy, phases: tuple[str, ...]) -> int:
-    """The number of the invocation's phase among the policy's names. One that no condition names is as good as none."""
+    """The index of the invocation's phase among the policy's names. A phase that no condition names has no effect."""
     name = phases[invocation.phase] if 0 <= invocation.phase < len(phases) else None
     return policy.phases.index(name) if name in policy.phases else NO_PHASE

@@ -1,9 +1,10 @@
-"""How often a vehicle has to report each message for a program to be decided in time.
+"""The message rates that a program needs so that its steps can be decided in time.
 
-One set of figures: the compiler proves with it that what a step waits for can come before its deadline, and the
-adapters ask the vehicle for it. A message is asked for several times within the time after which its signals are stale,
-and within the shortest deadline of a step that waits for one of them; no more often than any autopilot reports it, and
-often enough for what adapters see effects by. All times in us.
+The compiler and the adapters share these figures. The compiler proves with them that the values a step waits for
+can arrive before its deadline; the adapters request the rates from the vehicle. Each message is requested several
+times within the stale time of its signals and within the shortest deadline of a step that waits for one of them.
+The rate is no higher than any autopilot can report, and high enough for the effects that the adapters observe. All
+times in us.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -15,14 +16,16 @@ from rtshcua.model.flat.contract import Contract, TimingClass
 from rtshcua.model.flat.policy import Policy, RuleKind
 from rtshcua.model.flat.signal import Signal
 
-#: Between two reports that are asked for: no fewer, for links and autopilots carry no more, and no more.
+#: : Limits of the requested interval between two reports: links and autopilots support no shorter one, and a longer
+#: one is never requested.
 MOST_OFTEN: Final = 50_000
 LEAST_OFTEN: Final = 1_000_000
-#: How many reports are asked for within a time to stale, and within a deadline.
+#: : The number of reports requested within a stale time, and within a deadline.
 WITHIN_STALE: Final = 4
 WITHIN_DEADLINE: Final = 2
 
-#: By these the adapters see effects, takeovers and readiness: asked for at least so often, whatever reads them.
+#: : The adapters observe effects, takeovers and readiness in these messages, so they are requested at least this
+#: often.
 AT_LEAST: Final[Mapping[str, int]] = {
     "HEARTBEAT": 100_000,
     "GLOBAL_POSITION_INT": 100_000,
@@ -31,7 +34,7 @@ AT_LEAST: Final[Mapping[str, int]] = {
     "GPS_RAW_INT": 500_000,
     "SYS_STATUS": 500_000,
 }
-#: On a link that carries no more they may come as seldom as this: mode and landed state are asked for besides.
+#: : On a slow link they may be as rare as this, because mode and landed state are requested separately.
 SUFFICES: Final[Mapping[str, int]] = {
     "HEARTBEAT": 1_000_000,
     "GLOBAL_POSITION_INT": 250_000,
@@ -40,25 +43,25 @@ SUFFICES: Final[Mapping[str, int]] = {
     "GPS_RAW_INT": 1_000_000,
     "SYS_STATUS": 1_000_000,
 }
-#: What comes no more often than this, whatever is asked for: PX4's HEARTBEAT is constant and its CURRENT_MODE came 1.8
-#: times a second (docs/flying/link.md has the recordings); a radio reports once a second, and takes no requests.
+#: : These messages cannot be requested more often: PX4's HEARTBEAT is constant and its CURRENT_MODE came 1.8 times a
+#: second (docs/flying/link.md has the recordings); a radio reports once a second and accepts no requests.
 AT_BEST: Final[Mapping[str, int]] = {"HEARTBEAT": 1_000_000, "CURRENT_MODE": 560_000, "RADIO_STATUS": 1_000_000}
-#: How much older than its report a value may be: a receiver measures five times a second, as autopilots come, and what
-#: carries no stamp of its own counts as measured at the last position before it.
+#: : How much older than its report a value may be. A receiver measures five times a second by default, and a value
+#: without a time stamp counts as measured at the last position before it.
 FIX: Final = 200_000
 UNSTAMPED: Final = 100_000
 
 
 class Rate(NamedTuple):
-    """How long it is between two reports of a message: as it is asked for, and as long as will do."""
+    """The interval between two reports of a message: the requested one, and the longest that is sufficient."""
 
     asked: int
     suffices: int
 
 
 def rates(policy: Policy, contracts: Iterable[Contract] = ()) -> dict[str, Rate]:
-    """The rate of each message that a policy's signals are read from. `contracts` are those of a mission's steps, whose
-    own blocks may make deadlines shorter than the policy's skills have.
+    """The rate of each message that the policy's signals are read from. `contracts` are those of a mission's steps,
+    because their own blocks may shorten the deadlines of the policy's skills.
     """
     waits = _waits(policy, contracts)
     asked: dict[str, int] = {}
@@ -79,12 +82,14 @@ def rates(policy: Policy, contracts: Iterable[Contract] = ()) -> dict[str, Rate]
 
 
 def delivered(asked: Mapping[str, Rate]) -> dict[str, int]:
-    """How long it is between two reports of a message on a link that carries them, of any autopilot."""
+    """The interval between two reports of a message, on a link with enough capacity, from any autopilot."""
     return {name: max(rate.asked, AT_BEST.get(name, 0)) for name, rate in asked.items()}
 
 
 def awaited(policy: Policy, skill: int, contract: Contract) -> Iterator[Clause]:
-    """The clauses that a decision on a contract may wait for: its own, and those of what forbids it."""
+    """The clauses that a decision on a contract may wait for: its own, and those of the `forbid` rules that may
+    match.
+    """
     yield from (*contract.require, *contract.assume, *contract.maintain)
     for rule in policy.rules:
         if rule.kind == RuleKind.FORBID and rule.when is not None and skill in (rule.skills or (skill,)):
@@ -97,14 +102,14 @@ def signal_of(policy: Policy, slot: int) -> Signal:
 
 
 def _waits(policy: Policy, contracts: Iterable[Contract]) -> dict[int, int]:
-    """The shortest deadline within which a slot may be waited for. A reflex does not wait."""
+    """The shortest deadline of a step that may wait for a slot. A reflex does not wait."""
     numbers = {contract.name: number for number, contract in enumerate(policy.contracts)}
     waits: dict[int, int] = {}
     for contract in (*policy.contracts, *contracts):
         if contract.timing_class == TimingClass.REFLEX:
             continue
         clauses = awaited(policy, numbers[contract.name], contract)
-        vehicle = policy.vehicle  # where it is, and its charge, are asked of every step
+        vehicle = policy.vehicle  # every step reads position and charge
         for slot in (*slots_read(clauses, vehicle, policy.monitors), *where(vehicle), vehicle.battery):
             waits[slot] = min(contract.deadline_us, waits.get(slot, contract.deadline_us))
     return waits

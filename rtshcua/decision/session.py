@@ -1,11 +1,11 @@
-"""The rules of one session (design 4.3, 4.4): which step is current, which ids are used up, what may be asked for
-again, what is decided about links, and what is in force. The boundary follows them on board, and the audit when it
+"""The rules of one session (design 4.3, 4.4): which step is current, which ids are used, what may be requested again,
+what is decided about links, and what is in force. The boundary applies them on board, and the auditor when it
 derives a log again.
 
-What is in force is changed by signed documents. Whatever is wrong with a document, it changes nothing. An approval is
-what later decisions are told of; a recall or a cancellation ends the mission; a replacement puts its steps in the place
-of those that were not released. It brings no step back under an id that was there before, and none that was refused: a
-refusal is of what it refused, wherever that stands now.
+Signed documents change what is in force; an invalid document changes nothing. Later decisions read the approvals.
+A recall or a cancellation ends the mission. A replacement substitutes the steps that were not released. It cannot
+reuse the id of an earlier step, and it cannot bring back a refused step: a refusal applies to what it refused, at
+any position in any mission.
 """
 
 from typing import Final, NamedTuple
@@ -40,7 +40,7 @@ from rtshcua.wire.response import Status
 from rtshcua.wire.trust import TrustRoot
 from rtshcua.wire.untrusted import Untrusted
 
-#: how many documents may be considered ahead of being taken
+#: : how many documents may be verified ahead of their acceptance
 MOST_AHEAD: Final = 16
 
 _KINDS: Final = {
@@ -49,8 +49,8 @@ _KINDS: Final = {
 
 
 class _Ahead(NamedTuple):
-    """What was found ahead of a document: the replacement in it, prepared, or why it is not to be trusted; the digest
-    of the mission whose steps it was compared with, and what is in force if it is taken then; the ids of its new steps.
+    """The result of verifying a document ahead: the prepared replacement, or why it is not trusted; the digest of the
+    mission that its steps were compared with; the state after its acceptance; and the ids of its new steps.
     """
 
     found: VerifiedReplacement | Untrusted
@@ -61,11 +61,11 @@ class _Ahead(NamedTuple):
 
 
 class InForce:
-    """The verified bundle and its invocations; after a replacement, with those of the mission that flies now.
+    """The verified bundle and its invocations; after a replacement, those of the new mission.
 
-    `flight` is the id of this one flight: documents name it, so that none serves another flight of the same mission.
-    `received_us` is when the bundle was received on board, monotonic.
-    `recalled` and `cancelled` say by whose word no step may begin any more: a person's, or the proposer's own.
+    `flight` is the id of this flight. Documents name it, so that none is valid for another flight of the same
+    mission. `received_us` is when the bundle was received on board, monotonic. `recalled` and `cancelled` say that
+    no further step may begin, by order of a person or of the proposer.
     """
 
     def __init__(
@@ -89,39 +89,39 @@ class InForce:
         self._approvals = Approvals(policy.policy)
         #: by step
         self._received_us: tuple[int, ...] = (received_us,) * len(invocations)
-        #: the last replacements that were considered, by their bytes
+        #: : the last replacements that were verified ahead, by their bytes
         self._ahead: dict[bytes, _Ahead] = {}
-        #: of what flies first: who dates a mission later than its steps would be out of reach of a recall for a policy
+        #: : issue time of the first mission: a proposer who post-dates a later mission must not escape a recall of
+        #: the policy
         self._issued_at_us = min(
             [bundle.mission.issued_at_us, *(each.issued_at_us for each in bundle.mission.invocations)]
         )
-        #: of the mission that was opened, and of all that replaced it since
+        #: : the first mission and all its replacements
         self._digests: tuple[bytes, ...] = (bundle.mission_digest,)
-        #: the steps that were in force, and are not any more
+        #: : the steps that were in force and no longer are
         self._replaced: tuple[Invocation, ...] = ()
-        #: the ids of all steps that ever were in force
+        #: : the ids of all steps that were ever in force
         self._seen = frozenset(each.invocation_id for each in bundle.mission.invocations)
 
     @property
     def called_off(self) -> bool:
-        """Whether no step may begin any more."""
+        """Whether no further step may begin."""
         return self.recalled or self.cancelled
 
     def approvals(self, invocation: Invocation, now: Now) -> tuple[ConfirmAnswer, ...]:
-        """The verified answers that a decision on an invocation is told of."""
+        """The verified approvals that a decision on an invocation reads."""
         return self._approvals.about(invocation, now)
 
     def received_us(self, step: int) -> int:
-        """When a step was received on board, monotonic (paper symbol `t_r`): nothing is released before."""
+        """When a step was received on board, monotonic (paper symbol `t_r`): nothing is released before that."""
         return self._received_us[step]
 
     def consider(self, document: bytes, now: Now) -> Untrusted | None:
-        """Verify and prepare a replacement ahead, in whatever thread, so that `take` need not: that takes a while.
+        """Verify and prepare a replacement ahead, in any thread, so that `take` need not spend the time.
 
-        Gives why it is not to be trusted.
-
-        Nothing comes of it but time: it rests on the document, the policy and the root, which stay as they are, and
-        `take` asks again whether these have expired; and on the mission that it supersedes, if that is in force.
+        Returns why it is not trusted. This has no effect but speed. The result depends on the document, the policy
+        and the root, which do not change, and on the mission that it supersedes, if that is in force; `take`
+        checks expiry again.
         """
         try:
             if kind_of(document) is not names.REPLACEMENT:
@@ -140,13 +140,15 @@ class InForce:
         return ahead.found if isinstance(ahead.found, Untrusted) else None
 
     def considered(self, document: bytes) -> Bundle | None:
-        """What is in force if a replacement that was considered is taken; None where it may not be, or not yet."""
+        """The state after the acceptance of a replacement that was verified ahead; None where it cannot be accepted,
+        or not yet.
+        """
         ahead = self._ahead.get(document)
         return None if ahead is None else ahead.after
 
     def misfit(self, document: bytes, released: int) -> Untrusted | None:
-        """Why a replacement that was considered does not fit what is in force, of which `released` steps were released;
-        None where it does, or was not considered, or nothing comes of any document.
+        """Why a replacement that was verified ahead does not apply to the mission in force, of which `released` steps
+        were released; None where it applies or is unknown, or where no document has an effect any more.
         """
         ahead = self._ahead.get(document)
         if ahead is None or isinstance(ahead.found, Untrusted) or self.called_off:
@@ -158,8 +160,8 @@ class InForce:
         return None
 
     def take(self, document: bytes, now: Now, *, decided: int, released: int, current: int = 0) -> Receipt:
-        """Take a document in. The first `decided` steps are decided for good, the first `released` were released; those
-        from `current` on are not over.
+        """Accept a document. The first `decided` steps have a final decision, the first `released` were released, and
+        those from `current` on are not over.
         """
         kind = UNKNOWN
         try:
@@ -188,7 +190,7 @@ class InForce:
         )  # fmt: skip
         step = answered.about.step
         if step < decided:
-            raise DocumentError("already-decided", f"{step_words(step)} was decided before")
+            raise DocumentError("already-decided", f"{step_words(step)} was already decided")
         self._approvals.add(answered, now)
         what = "granted" if answered.granted else "refused"
         text = f"{step_words(step)} is {what} by `{policy.roles[answered.role]}`"
@@ -224,7 +226,7 @@ class InForce:
 
     def _replacement(self, document: bytes, now: Now, released: int) -> Receipt:
         if len(self._digests) > MAX_REPLACEMENTS:
-            raise DocumentError("too-many", f"one flight takes at most {MAX_REPLACEMENTS} replacements")
+            raise DocumentError("too-many", f"one flight accepts at most {MAX_REPLACEMENTS} replacements")
         ahead = self._ahead.pop(document, None)
         if ahead is None:
             found = self._opened(document, now)
@@ -238,7 +240,7 @@ class InForce:
         after = fit_replacement(found, self.bundle, released, compared=b"" if ahead is None else ahead.compared)
         new = found.new if ahead is None else ahead.new
         if not new.isdisjoint(self._seen):
-            raise DocumentError("id-seen", "a new step has the id of one that this flight knew before")
+            raise DocumentError("id-seen", "a new step has an id that this flight used before")
         prepared = self._prepared(found.mission) if ahead is None else ahead.prepared
         self._seen |= new
         self._replaced = (*self._replaced, *self.bundle.mission.invocations[found.kept :])
@@ -260,13 +262,13 @@ class InForce:
     def _prepared(self, mission: Mission) -> tuple[PreparedInvocation, ...]:
         prepared = prepare_mission(mission, self.policy)
         if isinstance(prepared, Refusal):
-            raise DocumentError("malformed", f"the mission does not make sense: {prepared.text}")
+            raise DocumentError("malformed", f"the new mission is malformed: {prepared.text}")
         return prepared
 
 
-#: the last step of section 4.1 that a request must pass for its id to be used up
+#: : the last step of section 4.1 that a request must pass for its id to be used
 _AUTHORITY: Final = 3
-#: a step that is not admitted is waited for, until its deadline
+#: : a step that is not admitted may be requested again until its deadline
 _WAITS: Final = (OnInadmissible.HOLD, OnInadmissible.REPLAN)
 _INTEGRITY: Final = 1
 _STATE: Final = 6
@@ -274,9 +276,9 @@ _PASSED: Final = 8
 
 
 class Session:
-    """Decides on the steps and links of what is in force, in the order in which they are asked for.
+    """Decides on the steps and links in force, in the order of the requests.
 
-    `enforced` false is mode `none`: a step that is denied flies all the same, and so becomes the current one.
+    `enforced` is false in mode `none`: a step that is denied flies nevertheless, and so becomes the current one.
     """
 
     def __init__(self, in_force: InForce, *, enforced: bool) -> None:
@@ -284,29 +286,29 @@ class Session:
         self._in_force = in_force
         self._enforced = enforced
         self._consumed: set[int] = set()
-        self._latest = -1  # the last step that was asked for and not denied,
+        self._latest = -1  # the last step that was requested and not denied,
         self._allowed = -1  # and the last that may have been sent
 
     @property
     def current(self) -> int:
-        """The step that may be asked for; the one after it may be too, once this one was."""
+        """The step that may be requested; after it was, the next one may be requested too."""
         return max(self._latest, 0)
 
     @property
     def _replaceable(self) -> bool:
-        """Whether the last step that was asked for may still be replaced: nothing of it was sent, nor is it used up."""
+        """Whether the last requested step may still be replaced: no frame of it was sent, and its id is not used."""
         invocations, latest = self._in_force.invocations, self._latest
         if not self._allowed < latest < len(invocations) or latest in self._consumed:
             return False
         return invocations[latest].invocation.on_inadmissible == OnInadmissible.REPLAN
 
     def consumed(self, step: int) -> int:
-        """1 if the step's id was used up, as `Context` has it."""
+        """1 if the step's id was used, as in `Context`."""
         return int(step in self._consumed)
 
     def refusal(self, ref: Ref) -> Status | None:
-        """Why nothing is decided about a step or a link: there is none, or its turn is not now. None where it may be
-        asked for. Once the mission is called off it is no step's turn; links may fly as before.
+        """Why no decision is made about a step or a link: it does not exist, or it is not its turn. None where it may
+        be requested. After a recall or a cancellation no step has a turn; links may fly as before.
         """
         kind, step, link = ref
         if kind == CONTINGENCY_LINK:
@@ -324,7 +326,7 @@ class Session:
         return Status.NOT_CURRENT if self._in_force.called_off or passed_over or step > self._latest + 1 else None
 
     def decide_step(self, step: int, state: State, context: Context, now: Now) -> Decision:
-        """Decide on a step that may be asked for (`refusal`), and remember it."""
+        """Decide on a step that may be requested (see `refusal`), and remember the decision."""
         invocation = self._in_force.invocations[step]
         decision = decide(invocation, state, self._policy, context, now)
         if decision.outcome is not Outcome.DENY or not self._enforced:
@@ -336,8 +338,8 @@ class Session:
         return decision
 
     def give_back(self, step: int) -> bool:
-        """Of a step that was admitted nothing was sent, and nothing will be: its id is unused again, so it may be asked
-        for once more, within its deadline. False where it is not the last that was asked for, or its id is not used up.
+        """Release the id of an admitted step of which nothing was sent and nothing will be, so that the step may be
+        requested once more before its deadline. False unless it is the last requested step and its id is used.
         """
         if step != self._latest or step not in self._consumed:
             return False
@@ -346,7 +348,7 @@ class Session:
         return True
 
     def decide_link(self, ref: Ref, binding: bytes, state: State, now: Now) -> Decision:
-        """Decide on a link that may be asked for (`refusal`), under the binding presented: its step's, or for the
+        """Decide on a link that may be requested (see `refusal`), under the given binding: its step's, or for the
         contingency the policy's digest. Steps 2 to 5 are skipped, and nothing is remembered.
         """
         kind, step, number = ref
@@ -367,10 +369,10 @@ class Session:
         return Decision(Outcome.ALLOW, Reason.ADMITTED, _PASSED, None, None, link, now.monotonic_us + LINK_VALID_US)
 
     def take(self, document: bytes, now: Now, released: int = 0) -> Receipt:
-        """Take in a signed document, if it is to be trusted; see `InForce.take`.
+        """Accept a signed document if it is trusted; see `InForce.take`.
 
-        `released` steps were released, as far as the caller knows; more were if they were asked for, but for one that
-        waits to be replaced (`on inadmissible replan`). The steps that a replacement brings were never used.
+        `released` is the caller's count of released steps. Requested steps were released too, except one that
+        waits for a replacement (`on inadmissible replan`). The new steps of a replacement are unused.
         """
         decided = self._latest + self.consumed(self._latest)
         released = max(released, self._latest + (not self._replaceable))
@@ -381,8 +383,8 @@ class Session:
 
 
 def may_ask_again(invocation: Invocation, outcome: Outcome, reason: Reason) -> bool:
-    """Whether an answer leaves the id unused: a deferred step is asked for again, and so is one that its mission holds
-    for, until its deadline.
+    """Whether an answer leaves the id unused. A deferred step may be requested again until its deadline, and so may a
+    step whose mission says to hold.
     """
     if outcome is Outcome.FALLBACK:
         return invocation.on_inadmissible in _WAITS and reason is not Reason.NO_SLACK

@@ -1,4 +1,4 @@
-"""What is decided in, as sets of values: a single situation is a set of one."""
+"""Situations as sets of values; a single situation is a set of one."""
 
 from collections.abc import Sequence
 from itertools import repeat
@@ -11,12 +11,14 @@ from rtshcua.decision.values import FALSE, MAYBE, MISSING, PRESENT, TRUE, UNKNOW
 from rtshcua.decision.volume import Volume
 from rtshcua.model.flat.situation import Now, State
 
-#: what a single situation may say of a temporal monitor
+#: : the allowed truths of a temporal monitor in a single situation
 SINGLE = frozenset({TRUE, FALSE, UNKNOWN})
 
 
 def environment(sets: Sets, policy: PreparedPolicy, arguments: Sequence[Value], phase: int) -> Environment:
-    """A set of situations, as conditions read it; `phase` is that of the invocation, -1 where there is none."""
+    """The environment in which conditions read a set of situations. `phase` is that of the invocation, -1 without
+    one.
+    """
     seen = policy.seen
     known = None if seen is None or seen.sets is not sets else seen.environments
     for at in known or ():
@@ -32,16 +34,16 @@ def environment(sets: Sets, policy: PreparedPolicy, arguments: Sequence[Value], 
 
 
 def situation(state: State, policy: PreparedPolicy, now: Now) -> Sets:
-    """The set whose only member is this situation: a slot that is missing, stale or beyond all sense is MISSING.
+    """The set that contains only this situation. A slot is MISSING if it is missing, stale or out of its range.
 
-    A state of the wrong size is a fault of whoever made it; nothing of it is believed. The same goes for the truths of
-    temporal monitors, where there are too few or too many, or one is no truth.
+    A state of the wrong size is a fault of its producer, and none of its values are used. The same applies to the
+    truths of temporal monitors if their number is wrong or one is not a truth.
     """
     return remembered(state, policy, now).sets
 
 
 def remembered(state: State, policy: PreparedPolicy, now: Now) -> SeenSituation:
-    """This situation, with what was answered about it so far."""
+    """The situation with its cached results."""
     seen = policy.seen
     if seen is None or seen.now != now or seen.state != state:
         seen = policy.seen = SeenSituation(state, now, _situation(state, policy, now), [], [], [])
@@ -53,7 +55,7 @@ def _situation(state: State, policy: PreparedPolicy, now: Now) -> Sets:
     values: list[Value]
     if not len(told) == len(ages) == len(limits):
         values = [MISSING] * len(limits)
-    elif _all_known(told, ages, policy):  # most often it is so, and the same is found sooner
+    elif _all_known(told, ages, policy):  # the common case, found sooner
         values = [*zip(told, told, repeat(PRESENT), repeat(None))]
     else:
         values = [
@@ -71,7 +73,7 @@ def _situation(state: State, policy: PreparedPolicy, now: Now) -> Sets:
 
 
 def _all_known(told: Sequence[int | None], ages: Sequence[int], policy: PreparedPolicy) -> TypeGuard[Sequence[int]]:
-    """Whether no slot is missing, stale or beyond all sense."""
+    """Whether every slot is present, fresh and within its range."""
     if None in told or min(ages, default=0) < 0:
         return False
     stale, least, most = policy.bounds
@@ -80,7 +82,7 @@ def _all_known(told: Sequence[int | None], ages: Sequence[int], policy: Prepared
 
 
 def is_situation(sets: Sets, policy: PreparedPolicy) -> bool:
-    """Whether a set of situations has one member only."""
+    """Whether a set of situations has exactly one member."""
     spans = (sets.monotonic_us, sets.utc_error_us, *sets.utc_us)
     points = all(low == high and gap != MAYBE for low, high, gap, _ in sets.values)
     if len(sets.monitors) != len(policy.monitors) or not SINGLE.issuperset(sets.monitors):
@@ -89,7 +91,7 @@ def is_situation(sets: Sets, policy: PreparedPolicy) -> bool:
 
 
 def ranging(at: Environment, volume: Volume, height: int, through: int) -> Environment:
-    """The same, with position and height anywhere in a volume, at any time until `through` us from now."""
+    """The same set, with position and height anywhere in a volume, at any time until `through` us from now."""
     slots = list(at.slots)
     slots[height] = volume.height
     return at.over(slots, volume.place, through)

@@ -37,8 +37,8 @@ _NEVER: Final = -(1 << 62)  # us: before any window
 
 
 class Remembered(NamedTuple):
-    """What is kept of one condition: its truth at the last observation, and the last us of its time line so far at
-    which it was true, false and unknown.
+    """The memory of one condition: its truth at the last observation, and the last us of its time line at which it
+    was true, false and unknown.
     """
 
     last: Truth
@@ -48,26 +48,27 @@ class Remembered(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What is kept between two observations; `at_us` is the moment of the last one, None before the first."""
+    """The memory between two observations. `at_us` is the moment of the last one, None before the first."""
 
     at_us: int | None
     conditions: tuple[Remembered, ...]
 
 
 def initial(policy: PreparedPolicy) -> Memory:
-    """Before the first observation."""
+    """The memory before the first observation."""
     return Memory(None, (Remembered(UNKNOWN, _NEVER, _NEVER, _NEVER),) * len(policy.monitors))
 
 
 def observe(memory: Memory, policy: PreparedPolicy, state: State, now: Now) -> tuple[Memory, tuple[Truth, ...]]:
-    """One observation: what to remember of it, and what each monitor of the policy says now (`State.monitors`).
+    """Process one observation. Return the new memory, and the present truth of each monitor of the policy
+    (`State.monitors`).
 
-    What `state` says of the monitors is not looked at.
+    The truths of the monitors in `state` are ignored.
     """
     at_us = now.monotonic_us if memory.at_us is None else max(now.monotonic_us, memory.at_us)
     truths: list[Truth] = []
     at = environment(situation(state, policy, now), policy, (), NO_PHASE)
-    at.monitors = truths  # it grows: a monitor reads those before it
+    at.monitors = truths  # grows in the loop: a monitor reads those before it
     conditions: list[Remembered] = []
     for monitor, before in zip(policy.monitors, memory.conditions, strict=True):
         after = _observed(before, monitor.condition(at), memory.at_us, at_us)
@@ -77,16 +78,18 @@ def observe(memory: Memory, policy: PreparedPolicy, state: State, now: Now) -> t
 
 
 def lasting(state: State, policy: PreparedPolicy, now: Now) -> State:
-    """The state with what conditions over time say when it has been so for longer than any of them looks back."""
+    """The state with the truths of the monitors after it has lasted longer than any of them looks back."""
     memory, monitors = initial(policy), state.monitors
-    looked_back = sum(monitor.window_us for monitor in policy.monitors)  # one may look at what another looks back at
+    looked_back = sum(
+        monitor.window_us for monitor in policy.monitors
+    )  # the windows add up, because a monitor may look at another one
     for at_us in range(0, looked_back + 3 * MAX_GAP, MAX_GAP) if policy.monitors else ():
         memory, monitors = observe(memory, policy, state, Now(at_us, now.utc_us, now.utc_error_us))
     return State(state.values, state.ages, monitors)
 
 
 def _observed(before: Remembered, truth: Truth, last_us: int | None, at_us: int) -> Remembered:
-    """The time line up to and with an observation: what lies since the last one, then what is so now."""
+    """The time line up to and including an observation: the interval since the last one, then the present truth."""
     _, true_us, false_us, unknown_us = before
     if last_us is None or at_us - last_us > MAX_GAP:
         unknown_us = at_us - 1
@@ -105,7 +108,7 @@ def _observed(before: Remembered, truth: Truth, last_us: int | None, at_us: int)
 
 
 def _says(monitor: PreparedMonitor, before: Remembered, after: Remembered, at_us: int) -> Truth:
-    """What a monitor says at an observation, given what was remembered before it and is now."""
+    """The truth of a monitor at an observation, from its memory and the present truth."""
     kind, start_us = monitor.kind, at_us - monitor.window_us
     if kind == MonitorKind.FOR_LAST:  # H[0, w] c: FALSE if some moment was FALSE, else UNKNOWN if one was, else TRUE
         return FALSE if after.false_us >= start_us else UNKNOWN if after.unknown_us >= start_us else TRUE

@@ -1,10 +1,10 @@
-"""The local time, windows of its day or week, and when a zone exists, on a clock whose error is bounded.
+"""Local time, windows of its day or week, and the existence of zones, on a clock with a bounded error.
 
-A moment `t` with error `e` is somewhere in `t - e`..`t + e`: a window or an interval holds when all of that is inside
-it, fails when all of it is outside, and is unknown otherwise. A zone exists in windows of the local day or week, an
-interval of UTC, or both (Kleene's `and`); outside of them nothing is inside it.
+A moment `t` with error `e` is somewhere in `t - e`..`t + e`. A window or an interval holds when all of that range
+is inside it, fails when all of it is outside, and is unknown otherwise. A zone exists in windows of the local day
+or week, in an interval of UTC, or in both (Kleene's `and`); outside of them the zone contains nothing.
 
-There are no time zones on board: a policy carries the moments at which the local time's distance from UTC changes.
+The vehicle needs no time zone database: a policy carries the moments at which the offset from UTC changes.
 """
 
 from bisect import bisect_right
@@ -22,11 +22,10 @@ _MONDAY = 3 * DAY
 
 
 class LocalTime:
-    """What a clock on the wall shows: UTC and an offset, which is the same at all times, or changes at some moments.
+    """Local time: UTC and an offset that is constant or changes at given moments.
 
-    With `offsets` (`VehicleLimits` says what they are) nothing is known before the first of their moments,
-    nor from the last
-    of them on.
+    With `offsets` (see `VehicleLimits`) local time is unknown before the first of the moments and from the last
+    one on.
     """
 
     __slots__ = ("_moments", "_offsets", "fixed")
@@ -37,16 +36,18 @@ class LocalTime:
         self._offsets = offsets[1::2] or (offset_us,)
 
     def offset(self, moment: int) -> int:
-        """How far it is from UTC at a moment; outside of what is known, as at the nearest moment that is."""
+        """The offset from UTC at a moment; outside the known range, that of the nearest known moment."""
         at = bisect_right(self._moments, moment) - 1
         return self._offsets[min(max(at, 0), len(self._offsets) - 1)]
 
     def known(self) -> Span | None:
-        """From when until before when it is known; None: always."""
+        """The range of moments at which local time is known; None if always."""
         return None if self.fixed else (self._moments[0], self._moments[-1])
 
     def stretches(self, low: int, high: int) -> Iterator[tuple[int, int, int]]:
-        """The parts of `low`..`high` with one offset: the first moment of each, the first after it, the offset."""
+        """The parts of `low`..`high` with one offset each: the first moment, the first moment after it, and the
+        offset.
+        """
         if self.fixed:
             yield low, high + 1, self._offsets[0]
             return
@@ -58,18 +59,20 @@ class LocalTime:
             yield start, end, self._offsets[at]
 
     def changes(self) -> tuple[tuple[int, int, int], ...]:
-        """The moments at which its offset changes, with the offset before and the one after."""
+        """The moments at which the offset changes, with the offset before and after."""
         return tuple(zip(self._moments[1:-1], self._offsets, self._offsets[1:], strict=False))
 
     def steady(self) -> int:
-        """The beginning of a week of UTC from which on its offset stays the same, for the longest time."""
+        """The beginning of a UTC week that starts the longest period of constant offset."""
         if self.fixed:
             return 0
         start, _ = max(pairwise(self._moments), key=lambda part: part[1] - part[0])
         return -(-start // WEEK) * WEEK
 
     def next(self, daytime: int, moment: int) -> int | None:
-        """The first moment from one on at which it shows a time of day; None where it never does as far as is known."""
+        """The first moment at or after a given one that has a given local time of day; None if there is no such
+        moment in the known range.
+        """
         for start, end, offset in self.stretches(moment, moment + 2 * DAY):
             found = start + (daytime - start - offset) % DAY
             if found < end:
@@ -78,7 +81,7 @@ class LocalTime:
 
 
 def time_of_week(local: int) -> int:
-    """How far a local time is into its week."""
+    """The position of a local time within its week."""
     return (local + _MONDAY) % WEEK
 
 
@@ -99,12 +102,12 @@ class Daytime:
         self._length = last - start + 1 if start <= last else DAY - start + last + 1
 
     def truth(self, utc: tuple[Span, ...], error: Span) -> Truth:
-        """Whether the moments of some intervals of UTC, each known to within an error in `error`, are in the window."""
+        """Whether all moments of some intervals of UTC, each known within an error in `error`, are in the window."""
         length, (least, most), truth = self._length, error, 0
         if length >= DAY:
             return TRUE
         for low, high in utc:
-            # how far after the start of the window the interval begins, and how long it is
+            # distance from the start of the window to the interval, and the interval's length
             at, width = (low + self._offset - self._start) % DAY, high - low
             if _meets(least, length - 2 * least, at, width):
                 truth |= TRUE
@@ -117,20 +120,20 @@ class Daytime:
         return truth
 
     def changes(self, low: int, high: int) -> Iterator[int]:
-        """The moments after `low` and up to `high` at which it begins, or has just ended."""
+        """The moments after `low` and up to `high` at which the window begins, or has just ended."""
         for edge in (self._start, self._start + self._length):
             yield from range(low + 1 + (edge - self._offset - low - 1) % DAY, high + 1, DAY)
 
 
 def _meets(start: int, length: int, at: int, width: int) -> bool:
-    """Whether the arc of `length` moments from `start` of the day shares one with `at`..`at + width`."""
+    """Whether an arc of `length` from `start` of the day overlaps `at`..`at + width`."""
     return length > 0 and ((at - start) % DAY < length or (start - at) % DAY <= width)
 
 
 class Windows:
-    """Windows of the local day (`period` is DAY) or week (WEEK): each from some us after it began until before another,
-    ascending. They hold whenever a clock on the wall shows a time in one of them: also in both
-    of two hours that it shows twice, and never at times that it skips. Where the local time is not known, nor are they.
+    """Windows of the local day (`period` is DAY) or week (WEEK), ascending; each from one offset within it to before
+    another. They hold whenever local time is in one of them, also in both occurrences of an hour that the clock
+    repeats, and never in an hour that it skips. They are unknown where local time is.
     """
 
     __slots__ = ("_everything", "_local", "_parts", "period")
@@ -141,7 +144,7 @@ class Windows:
         self._everything = windows == (0, period)
 
     def truth(self, utc: tuple[Span, ...], error: Span) -> Truth:
-        """Whether the moments of some intervals of UTC, each known to within an error in `error`, are in a window."""
+        """Whether all moments of some intervals of UTC, each known within an error in `error`, are in a window."""
         (least, most), truth = error, 0
         any_truth = TRUE | FALSE | (UNKNOWN if most else 0)
         for low, high in utc:
@@ -152,13 +155,15 @@ class Windows:
                 if start > first and max(low, start - most) <= min(high, start + most - 1):
                     truth |= UNKNOWN
                 if truth & any_truth == any_truth:
-                    break  # nothing else can come of it, but where the local time is not known
+                    break  # the result is settled, except where local time is unknown
             if not self._known(low - most, high + most):
                 truth |= UNKNOWN
         return truth
 
     def changes(self, low: int, high: int) -> Iterator[int]:
-        """The moments after `low` and up to `high` at which one begins, or has just ended, or ceases to be known."""
+        """The moments after `low` and up to `high` at which a window begins or has just ended, or local time becomes
+        unknown.
+        """
         return (start for start, _, _ in self._stretches(low, high) if start > low)
 
     def _known(self, low: int, high: int) -> bool:
@@ -166,14 +171,14 @@ class Windows:
         return known is None or (known[0] <= low and high < known[1])
 
     def _stretches(self, low: int, high: int) -> Iterator[tuple[int, int, Truth]]:
-        """`low`..`high` in parts that are as long as they can be: the first moment, the first after it, the truth."""
+        """`low`..`high` in maximal parts of one truth: the first moment, the first moment after it, and the truth."""
         at, last = low, high + 1
         known = self._local.known()
         if known is not None:
             if at < min(known[0], last):
                 yield at, min(known[0], last), UNKNOWN
             at, last = min(max(at, known[0]), last), min(last, known[1])
-        begun: Span | None = None  # a window that may go on
+        begun: Span | None = None  # a window that may continue in the next part
         for start, end in self._inside(at, last - 1):
             if begun is not None and begun[1] == start:
                 begun = begun[0], end
@@ -193,7 +198,7 @@ class Windows:
             yield max(low, last), high + 1, UNKNOWN
 
     def _inside(self, low: int, high: int) -> Iterator[Span]:
-        """The moments of windows, each part by the first and the first after it."""
+        """The moments inside windows, each part given by its first moment and the first moment after it."""
         for first, last, offset in self._local.stretches(low, high):
             if self._everything:
                 yield first, last
@@ -210,7 +215,9 @@ Window: TypeAlias = Daytime | Windows
 
 
 def daily(start: int, end: int, local: LocalTime) -> Window:
-    """The window from `start` to `end`, both included, in us since local midnight; over midnight when `start > end`."""
+    """The window from `start` to `end`, both included, in us since local midnight; across midnight when `start >
+    end`.
+    """
     if local.fixed:
         return Daytime(start, end, local.offset(0))
     after = min(end + 1, DAY)
@@ -219,7 +226,7 @@ def daily(start: int, end: int, local: LocalTime) -> Window:
 
 
 def weekly(windows: tuple[int, ...], local: LocalTime) -> Window:
-    """Windows of the local week, as `Zone.weekly` has them."""
+    """Windows of the local week, in the form of `Zone.weekly`."""
     return Windows(windows, WEEK, local)
 
 
@@ -232,7 +239,7 @@ class DateRange:
         self._start, self._end = start, end
 
     def truth(self, utc: tuple[Span, ...], error: Span) -> Truth:
-        """Whether the moments of some intervals, each known to within an error in `error`, are in the interval."""
+        """Whether all moments of some intervals, each known within an error in `error`, are in the interval."""
         start, end, (least, most), truth = self._start, self._end, error, 0
         for low, high in utc:
             if max(low, start + least) <= min(high, end - least):
@@ -247,7 +254,7 @@ class DateRange:
 
 
 class Times:
-    """All that says when a zone exists."""
+    """All conditions on when a zone exists."""
 
     __slots__ = ("_parts",)
 
@@ -255,7 +262,7 @@ class Times:
         self._parts = (*windows_of(zone, local), *(DateRange(*dates) for dates in (zone.dates,) if dates))
 
     def truth(self, utc: tuple[Span, ...], error: Span, through: int) -> Truth:
-        """What may be true of the zone's existing at some moment from one of `utc` to `through` us after it."""
+        """The possible truths of "the zone exists" at some moment from one of `utc` to `through` us after it."""
         if through:
             utc = tuple((low, high + through) for low, high in utc)
         truth = TRUE
@@ -270,7 +277,7 @@ def timed(zone: Zone) -> bool:
 
 
 def windows_of(zone: Zone, local: LocalTime) -> tuple[Window, ...]:
-    """The times of the day, or of the week, at which a zone exists."""
+    """The windows of the day or the week in which a zone exists."""
     if zone.daily:
         return (daily(zone.daily[0], zone.daily[1], local),)
     return (weekly(zone.weekly, local),) if zone.weekly else ()

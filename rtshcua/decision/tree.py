@@ -1,8 +1,9 @@
-"""Postfix code, read into a tree and type-checked on the way, and the slots that it reads. The bundle's code is never
-trusted to be well-formed.
+"""Parses postfix code into a tree, checks its types, and finds the slots that it reads. The bundle's code is
+untrusted.
 
-Every number is a sum of state slots and argument cells times constants, plus a constant, so each comparison becomes
-`sum <= bound` or `sum == bound`. A slot whose factor is 0 stays in the sum: the comparison is still unknown without it.
+Every number is a sum of state slots and argument cells times constants, plus a constant, so each comparison
+becomes `sum <= bound` or `sum == bound`. A slot with factor 0 stays in the sum, because the comparison is unknown
+without it.
 """
 
 from collections.abc import Iterable
@@ -18,13 +19,13 @@ from rtshcua.model.flat.signal import ENUMERATION, POSITION
 
 
 class CodeScope(NamedTuple):
-    """What code may name: the slots, cells, zones, tables, sets and monitors that exist, and of what kind they are.
+    """The slots, cells, zones, tables, sets and monitors that code may name, with their kinds.
 
-    Each method answers what is wrong with naming an index, or None.
+    Each method returns what is wrong with an index, or None.
 
-    `kinds` is the signal kind of each slot. `cells` is, for each skill that the code may speak of, the parameter kind
-    at each first cell: an argument must exist, of the same kind, in all of them, and in at least one. `members` are
-    the policy's sets; `phases` counts its phase names, None where code may not ask for the phase.
+    `kinds` is the signal kind of each slot. `cells` has, for each skill that the code may apply to, the parameter
+    kind at each first cell: an argument must exist, with the same kind, in all of these skills, and in at least
+    one. `members` are the policy's sets. `phases` counts its phase names, None where code may not read the phase.
     """
 
     kinds: tuple[int, ...]
@@ -36,11 +37,11 @@ class CodeScope(NamedTuple):
     phases: int | None
 
     def entry(self, what: str, index: int, count: int) -> str | None:
-        """One of so many zones, tables and the like."""
+        """Check an index into zones, tables and the like."""
         return None if 0 <= index < count else f"there is no {what} {index}"
 
     def number(self, slot: int) -> str | None:
-        """A slot that holds a number (an enumeration's ordinal is one)."""
+        """Check that a slot holds a number (such as an enumeration's ordinal)."""
         if not 0 <= slot < len(self.kinds):
             return f"there is no slot {slot}"
         return f"slot {slot} is a position, not a number" if self.kinds[slot] == POSITION else None
@@ -48,39 +49,43 @@ class CodeScope(NamedTuple):
     def enumeration(self, slot: int) -> str | None:
         """A slot that holds an enumeration."""
         found = 0 <= slot < len(self.kinds) and self.kinds[slot] == ENUMERATION
-        return None if found else f"slot {slot} is no enumeration"
+        return None if found else f"slot {slot} is not an enumeration"
 
     def argument(self, cell: int, kinds: tuple[int, ...], name: str) -> str | None:
         """The first cell of a parameter of one of these kinds, in every skill."""
         if not self.cells:
-            return "an argument is named, but no skill is"
+            return "an argument is named outside of a skill"
         found = all(kinds_of.get(cell) in kinds for kinds_of in self.cells)
-        return None if found else f"argument cell {cell} is no {name}"
+        return None if found else f"argument cell {cell} is not a {name}"
 
     def set_of_phases(self, index: int) -> str | None:
         """A membership set of phase names."""
         phases = self.phases
         if phases is None:
-            return "the phase is asked for where there is none"
+            return "the phase is not available here"
         if not 0 <= index < len(self.members):
             return f"there is no set {index}"
-        return None if all(0 <= member < phases for member in self.members[index]) else f"set {index} is none of phases"
+        return (
+            None
+            if all(0 <= member < phases for member in self.members[index])
+            else f"set {index} is not a set of phases"
+        )
 
     def week(self, index: int) -> str | None:
         """A set that is windows of a week."""
         return self.entry("set", index, len(self.members)) or windows_problem(self.members[index])
 
     def about(self, *contracts: Contract) -> "CodeScope":
-        """The same, for code that may name the arguments of these contracts' skills."""
+        """The scope of code that may name the arguments of these contracts' skills."""
         return self._replace(cells=tuple({each.cell: each.kind for each in one.parameters} for one in contracts))
 
     def inside_monitor(self, number: int) -> "CodeScope":
-        """The same, for the code of a temporal monitor: it may read those before it, no argument and no phase."""
+        """The scope of a temporal monitor's code: it may read earlier monitors, but no argument and no phase."""
         return self._replace(cells=(), monitors=number, phases=None)
 
 
 def scope_of(policy: Policy) -> CodeScope:
-    """What code may name anywhere in a policy; `policy.signals` own its slots."""
+    """The scope of all code in a policy whose signals are `policy.signals`."""
     kinds = [0] * policy.slots
     for signal in policy.signals:
         for slot in signal.slots:
@@ -165,7 +170,7 @@ class PhaseIn(NamedTuple):
 
 
 class MonitorSays(NamedTuple):
-    """What temporal monitor `monitor` says."""
+    """The truth of temporal monitor `monitor`."""
 
     monitor: int
 
@@ -223,14 +228,14 @@ class _Sum(NamedTuple):
         return _Sum(terms, self.constant + other.constant)
 
     def magnitude(self) -> int:
-        """What no value can exceed."""
+        """The greatest magnitude that the number can have."""
         return abs(self.constant) + sum(abs(term.factor) for term in self.terms) * MAX_VALUE
 
 
 def parse(code: tuple[int, ...], scope: CodeScope) -> Node | str:
-    """The condition that `code` spells, or what is wrong with it."""
+    """The condition in `code`, or what is wrong with it."""
     if not code or len(code) % 3 or len(code) > 3 * MAX_INSTRUCTIONS:
-        return f"{len(code)} integers are not 1 to {MAX_INSTRUCTIONS} instructions"
+        return f"{len(code)} integers; expected 3 for each of 1 to {MAX_INSTRUCTIONS} instructions"
     stack: list[_Sum | Node] = []
     for at in range(0, len(code), 3):
         problem = _step(stack, code[at], code[at + 1], code[at + 2], scope)
@@ -240,12 +245,12 @@ def parse(code: tuple[int, ...], scope: CodeScope) -> Node | str:
             return f"instruction {at // 3}: {problem}"
     last = stack.pop()
     if stack or isinstance(last, _Sum):
-        return "the code does not leave exactly one truth value"
+        return "the code does not leave exactly one truth value on the stack"
     return last
 
 
 def _step(stack: list[_Sum | Node], op: int, a: int, b: int, scope: CodeScope) -> str | None:
-    """Do one instruction on the stack; what is wrong with it, or None."""
+    """Execute one instruction on the stack. Return what is wrong with it, or None."""
     match op:
         case Op.CONST | Op.SIGNAL | Op.ARGUMENT:
             return _push_number(stack, op, a, b, scope)
@@ -270,7 +275,7 @@ def _push_number(stack: list[_Sum | Node], op: int, a: int, b: int, scope: CodeS
 
 
 def _numbers(stack: list[_Sum | Node], count: int) -> list[_Sum]:
-    """The last `count` values, taken off the stack if they are numbers; else none."""
+    """Pop the last `count` values if they are numbers; else return an empty list."""
     found = [each for each in stack[-count:] if isinstance(each, _Sum)]
     if len(found) < count:
         return []
@@ -279,7 +284,7 @@ def _numbers(stack: list[_Sum | Node], count: int) -> list[_Sum]:
 
 
 def _truths(stack: list[_Sum | Node], count: int) -> list[Node]:
-    """The last `count` values, taken off the stack if they are truth values; else none."""
+    """Pop the last `count` values if they are truth values; else return an empty list."""
     found = [each for each in stack[-count:] if not isinstance(each, _Sum)]
     if len(found) < count:
         return []
@@ -291,14 +296,14 @@ def _arithmetic(stack: list[_Sum | Node], op: int, a: int, b: int) -> str | None
     if op == Op.SCALE:
         operands = _numbers(stack, 1)
         if not operands:
-            return "one number is needed on the stack"
+            return "the instruction needs one number on the stack"
         if not -MAX_VALUE <= a <= MAX_VALUE:
             return f"factor {a} is out of range"
         result, problem = operands[0].scaled(a), _unused(b)
     else:
         operands = _numbers(stack, 2)
         if not operands:
-            return "two numbers are needed on the stack"
+            return "the instruction needs two numbers on the stack"
         result, problem = operands[0].plus(operands[1].scaled(1 if op == Op.ADD else -1)), _unused(a, b)
     stack.append(result)
     return problem or (None if result.magnitude() <= MAX_MAGNITUDE else "the number may exceed 64 bits")
@@ -307,7 +312,7 @@ def _arithmetic(stack: list[_Sum | Node], op: int, a: int, b: int) -> str | None
 def _compare(stack: list[_Sum | Node], op: int, a: int, b: int) -> str | None:
     operands = _numbers(stack, 2)
     if not operands:
-        return "two numbers are needed on the stack"
+        return "the instruction needs two numbers on the stack"
     left, right = reversed(operands) if op in (Op.GT, Op.GE) else operands  # l > r is r < l
     sum_ = left.plus(right.scaled(-1))  # l < r is l - r <= -1, for integers
     if sum_.magnitude() > MAX_MAGNITUDE:
@@ -323,7 +328,7 @@ def _compare(stack: list[_Sum | Node], op: int, a: int, b: int) -> str | None:
 def _connect(stack: list[_Sum | Node], op: int, a: int, b: int) -> str | None:
     operands = _truths(stack, 1 if op == Op.NOT else 2)
     if not operands:
-        return "one truth value is needed on the stack" if op == Op.NOT else "two truth values are needed on the stack"
+        return f"the instruction needs {'one truth value' if op == Op.NOT else 'two truth values'} on the stack"
     stack.append(Negation(*operands) if op == Op.NOT else Both(*operands) if op == Op.AND else Either(*operands))
     return _unused(a, b)
 
@@ -359,16 +364,16 @@ def _push_atom(stack: list[_Sum | Node], op: int, a: int, b: int, scope: CodeSco
             known = None if 0 <= a < scope.monitors else f"there is no monitor {a} here"
             problem, node = known or _unused(b), MonitorSays(a)
         case _:
-            return f"no instruction has the number {op}"
+            return f"unknown instruction {op}"
     stack.append(node)
     return problem
 
 
 def windows_problem(windows: tuple[int, ...]) -> str | None:
-    """What is wrong with windows of a week, or None: they begin and end within it, one after the other."""
+    """What is wrong with windows of a week, or None. They must lie within the week, one after the other."""
     good = windows and len(windows) % 2 == 0 and windows[0] >= 0 and windows[-1] <= WEEK
     good = good and all(one < other for one, other in pairwise(windows))
-    return None if good else "these are no windows of a week"
+    return None if good else "the windows of the week are out of order or out of range"
 
 
 def _unused(*operands: int) -> str | None:
@@ -378,8 +383,8 @@ def _unused(*operands: int) -> str | None:
 def slots_read(
     clauses: Iterable[Clause], vehicle: VehicleLimits, monitors: tuple[Monitor, ...] = ()
 ) -> tuple[int, ...]:
-    """The slots that well-formed clauses read, themselves or through the policy's temporal monitors, ascending; asking
-    where the vehicle is reads its position and height.
+    """The slots that well-formed clauses read, directly or through the policy's temporal monitors, ascending. A test
+    of the vehicle's place reads its position and height.
     """
     slots: set[int] = set()
     left, seen = list(clauses), set[int]()
@@ -394,14 +399,14 @@ def slots_read(
 
 
 class _Read(NamedTuple):
-    """What code reads: slots and monitors, and whether it asks where the vehicle is."""
+    """The slots and monitors that code reads, and whether it reads the vehicle's place."""
 
     slots: frozenset[int]
     monitors: frozenset[int]
     where: bool
 
 
-@lru_cache(maxsize=1024)  # checks and preparation ask it of the same code, for each step anew
+@lru_cache(maxsize=1024)  # cached, because checks and preparation read the same code for each step
 def _read(code: tuple[int, ...]) -> _Read:
     named = list(zip(code[::3], code[1::3], strict=False))
     return _Read(
@@ -412,11 +417,11 @@ def _read(code: tuple[int, ...]) -> _Read:
 
 
 def monitored(clauses: Iterable[Clause]) -> bool:
-    """Whether well-formed clauses ask a temporal monitor anything."""
+    """Whether well-formed clauses read a temporal monitor."""
     return any(Op.MONITOR in clause.code[::3] for clause in clauses)
 
 
 def where(vehicle: VehicleLimits) -> tuple[int, ...]:
-    """The slots that tell where the vehicle is, as far as it has them."""
+    """The slots of the vehicle's position and height, as far as it has them."""
     position = () if vehicle.position == -1 else (vehicle.position, vehicle.position + 1)
     return position if vehicle.height == -1 else (*position, vehicle.height)

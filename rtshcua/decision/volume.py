@@ -1,13 +1,13 @@
 """The planned volume: every place where a skill may take the vehicle from where it is now.
 
 It is the leg from the present position to the first point of the plan's path, and the path, at all heights between
-the present one and the plan's altitude; LAND is the descent here. HOME climbs where it is to the height that the
-vehicle returns at, if it is lower, flies home at that height or its own, and comes down there (`across`). All of it is
-widened by the vehicle's position error. Zones that a vehicle takes off from or lands in must therefore have no floor
-(`LOWEST`): a height of 0 lies *on* a floor of 0, hence outside.
+the present one and the plan's altitude. LAND is the descent at the present position. HOME climbs to the vehicle's
+return altitude if it is lower, flies home at that height or its own, and descends there (`across`). The volume is
+widened by the vehicle's position error. Zones that a vehicle takes off from or lands in must therefore have no
+floor (`LOWEST`): a height of 0 lies *on* a floor of 0, hence outside.
 
-So fly PX4 1.16 (rtl.cpp, rtl_direct.cpp) and ArduCopter 4.7 (mode_rtl.cpp). Both set off across a little before they
-have the height, and climb less where they are near home: docs/flying/returns.md.
+PX4 1.16 (rtl.cpp, rtl_direct.cpp) and ArduCopter 4.7 (mode_rtl.cpp) fly this way. Both start the way across
+shortly before they reach the height, and climb less near home: docs/flying/returns.md.
 """
 
 from collections.abc import Sequence
@@ -21,19 +21,20 @@ from rtshcua.model.flat.contract import Motion, MotionKind
 from rtshcua.model.flat.policy import VehicleLimits
 
 HOME = (0, 0)  # the origin of local coordinates
-#: so much below the height that it returns at, mm, a vehicle sets off for home: ArduCopter takes a corner within
-#: WPNAV_RADIUS, PX4 has reached a height within NAV_MC_ALT_RAD
+#: : a vehicle starts the way home this far below its return altitude, mm: ArduCopter accepts a corner within
+#: WPNAV_RADIUS, PX4 a height within NAV_MC_ALT_RAD
 SHORT = 2_000
-#: a return from no further away than this, mm, or than a third of the height, may be flown lower: PX4 within
+#: : a return that begins within this distance of home, mm, or within a third of the height, may be lower: PX4 within
 #: RTL_MIN_DIST, ArduCopter by RTL_CONE_SLOPE
 NEAR = 10_000
 STEEP = 3
 
 
 class Volume(NamedTuple):
-    """A planned volume: its `place`, the heights in it, and how far from home its farthest point is, mm rounded up.
+    """A planned volume: its `place`, the heights in it, and the distance of its farthest point from home, mm rounded
+    up.
 
-    Where the height at the start is missing the place has no heights, and where the position is, no `farthest`
+    Without a known start height the place has no heights, and without a known position there is no `farthest`
     (`place.located`).
     """
 
@@ -46,15 +47,15 @@ UNKNOWN_VOLUME = Volume(NOWHERE, MISSING, (0, 0))
 
 
 class Planner:
-    """The planned volumes of one plan. It remembers the last start, for which the answer is always the same."""
+    """The planned volumes of one plan. It caches the last start, because the result depends on nothing else."""
 
     __slots__ = ("_altitude", "_distance", "_error", "_kind", "_last", "_leg", "_near", "_path", "_sweep")
 
     def __init__(
         self, kind: int, path: tuple[int, ...], altitude: int | None, position_error: int, near: int = 0
     ) -> None:
-        """`altitude` is None where the height at the start counts; for HOME it is what the return climbs to, unless it
-        begins within `near` mm.
+        """`altitude` is None where the start height counts. For HOME it is the height to which the return climbs,
+        unless it begins within `near` mm.
         """
         self._kind, self._altitude, self._near = kind, altitude, near
         self._path = HOME if kind == MotionKind.HOME else path
@@ -65,7 +66,7 @@ class Planner:
         self._last: tuple[tuple[Value, Value, Value], Volume] | None = None
 
     def volume(self, slots: Sequence[Value], known: WellKnown) -> Volume:
-        """The volume from where the state says that the vehicle is."""
+        """The volume from the vehicle's present position in a state."""
         start = (slots[known.x], slots[known.y], slots[known.height])
         last = self._last
         if last is not None and last[0] == start:
@@ -96,8 +97,8 @@ class Planner:
         return Volume(PlaceSet(tuple(parts), located, gap), (low, high, gap, None), farthest)
 
     def _first_leg(self, x: Value, y: Value) -> tuple[Sweep, Sweep, Span]:
-        """The start, wherever in a box it is, the leg from there to the path, and the distance of the farthest point of
-        leg and path.
+        """The start, anywhere in a box; the leg from there to the path; and the distance from home of the farthest
+        point of both.
         """
         west, east, south, north = key = (x[0], x[1], y[0], y[1])
         if self._leg is not None and self._leg[0] == key:
@@ -115,32 +116,34 @@ class Planner:
 
 
 def across(low: int, returns: int, *, near: bool) -> int:
-    """The least height, mm above home, at which a return flies home that begins at `low`. `returns` is what it climbs
-    to, 0 if that is not known. Near home it may climb less, or not at all.
+    """The least height, mm above home, of a return that begins at `low`. `returns` is the height to which it climbs,
+    0 if unknown. Near home it may climb less, or not at all.
     """
     return low if near or not returns else max(low, returns - SHORT)
 
 
 def near_home(vehicle: VehicleLimits) -> int:
-    """From how far, mm, a return may be flown lower than the vehicle's return altitude: wherever home really is, and
-    as far as the position may be wrong.
+    """The distance, mm, within which a return may be lower than the return altitude, for any true home and position
+    error.
     """
     return cone(vehicle.return_altitude) + vehicle.home_within + vehicle.position_error
 
 
 def cone(returns: int) -> int:
-    """How far from the real home a return may be flown lower than the height that it climbs to; all in mm."""
+    """The distance from the true home within which a return may be lower than the height to which it climbs; all in
+    mm.
+    """
     return max(NEAR, -(-returns // STEEP))
 
 
 def flown_at(motion: Motion, altitude: int, vehicle: VehicleLimits) -> int | None:
-    """The `altitude` of a planner: what the step says, what a return climbs to, or None."""
+    """The `altitude` of a planner: the step's, the return altitude, or None."""
     if motion.kind == MotionKind.HOME:
         return vehicle.return_altitude
     return None if motion.altitude == -1 else altitude
 
 
 def distance(x: int, y: int) -> int:
-    """How far a place is from home, mm rounded up."""
+    """The distance of a place from home, mm rounded up."""
     square = x * x + y * y
     return isqrt(square - 1) + 1 if square else 0

@@ -1,12 +1,13 @@
-"""What must hold while a skill runs (paper symbols `sc`, `inv`), and while a vehicle waits in the air for its next step
-(design 4.4: holding is bounded by energy), there and on the predicted path.
+"""The conditions that must hold while a skill runs (paper symbols `sc`, `inv`), and while a vehicle waits in the air
+for its next step (design 4.4: energy bounds holding), at its place and on its predicted path.
 
-The predicted path is every place where a vehicle may be before it stands still, if it is told to stop now. Since its
-state was measured it flew on as it did (the older the state, the further); told to stop, it goes on so for its declared
-reaction, and then loses its declared braking of its speed. With v the velocity over ground, |v| its length, t the age
-of what was measured and the reaction together, and a the braking, it comes to stand v*t + v*|v|/(2a) from where it was
-measured, on the straight line there. All is rounded away from the vehicle and widened by its position error like a
-planned volume. A vehicle that declares no braking is taken to be where it was measured.
+The predicted path is every place where a vehicle may be before it stands still, if it is told to stop now. Since
+its state was measured it flew on unchanged (the older the state, the further). After the order to stop it
+continues for its declared reaction time, and then brakes at its declared rate. With v the velocity over ground,
+|v| its magnitude, t the sum of the state's age and the reaction time, and a the braking, it stops v*t + v*|v|/(2a)
+from the measured place, on the straight line there. All values are rounded away from the vehicle and widened by
+its position error like a planned volume. A vehicle that declares no braking is assumed to be where it was
+measured.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,7 +27,7 @@ from rtshcua.model.flat.situation import Now, State
 
 
 class PredictedPath(NamedTuple):
-    """A predicted path, as a volume, and how long it takes to stand still from now on, at most, in us."""
+    """A predicted path as a volume, and the greatest time until standstill from now, in us."""
 
     volume: Volume
     lasts_us: int
@@ -36,8 +37,8 @@ UNKNOWN_AHEAD = PredictedPath(UNKNOWN_VOLUME, 0)
 
 
 def ahead(slots: Sequence[Value], ages: Sequence[int], policy: PreparedPolicy) -> PredictedPath:
-    """The predicted path in one situation, and the ages of its slots. Where position or velocity is missing nothing is
-    known of it; where the height is, how high it leads.
+    """The predicted path in one situation, and the ages of its slots. It is unknown where position or velocity is
+    missing; where the height is missing, the path has no heights.
     """
     known, vehicle = policy.tables.known, policy.policy.vehicle
     x, _, x_gap, _ = slots[known.x]
@@ -62,7 +63,7 @@ def ahead(slots: Sequence[Value], ages: Sequence[int], policy: PreparedPolicy) -
     part, whole = 2 * braking * goes_us + speed * SECOND, 2 * braking * SECOND
     to_x, to_y = x + _away(east * part, whole), y + _away(north * part, whole)
     to_height = height + _away(-down * part, whole)
-    reach = vehicle.position_error + 1  # what the ends were rounded by bends the line by less than 1 mm
+    reach = vehicle.position_error + 1  # rounding the ends bends the line by less than 1 mm
     low, high = min(height, to_height), max(height, to_height)
     sweep = Sweep((x, y, to_x, to_y), (-reach, -reach, reach, reach))
     farthest = max(distance(x, y), distance(to_x, to_y))
@@ -85,16 +86,17 @@ WAY_HOME = "the reserve and the way home"
 
 
 class Unkept(NamedTuple):
-    """The text of something that should hold, and is FALSE or UNKNOWN."""
+    """The text of a condition that should hold and is FALSE or UNKNOWN."""
 
     text: str
     truth: Truth
 
 
 def holding(invocation: PreparedInvocation, state: State, policy: PreparedPolicy, now: Now) -> tuple[Unkept, ...]:
-    """What stands against waiting for `invocation` here: the airspace, its `degrade` rules, the charge to come home.
+    """The conditions that prevent waiting for `invocation` here: the airspace, its `degrade` rules, the charge to
+    return.
 
-    The place is every place that it may be at before it stands still, see `ahead`.
+    They are judged at every place where the vehicle may be before it stands still (see `ahead`).
     """
     sets = situation(state, policy, now)
     at = environment(sets, policy, invocation.arguments, invocation.phase)
@@ -108,9 +110,9 @@ def holding(invocation: PreparedInvocation, state: State, policy: PreparedPolicy
 
 
 def way_home(at: Environment, volume: Volume, invocation: PreparedInvocation) -> Truth:
-    """Whether the battery holds the reserve and the way home from anywhere in a volume, position error aside.
+    """Whether the battery holds the reserve and the way home from anywhere in a volume, without position error.
 
-    The way is counted as when a skill is admitted (`Energy`), rounded up.
+    The way is computed as for the admission of a skill (`Energy`), rounded up.
     """
     policy, vehicle = invocation.policy, invocation.policy.policy.vehicle
     charge, _, gap, _ = at.slots[policy.tables.known.battery]
@@ -122,13 +124,12 @@ def way_home(at: Environment, volume: Volume, invocation: PreparedInvocation) ->
 
 
 def watch(invocation: PreparedInvocation, state: State, policy: PreparedPolicy, now: Now) -> Iterator[Unkept]:
-    """Which of `assume`, the `degrade` rules (that none matches), `maintain`, the airspace and the charge to come home
-    from here does not hold now, found one after the other: what is quick to see comes first, and whoever has seen
-    enough need not ask for the rest.
+    """The conditions that do not hold now, out of `assume`, the `degrade` rules (none may match), `maintain`, the
+    airspace and the charge to return. They are found lazily, the fast ones first, so that a caller may stop early.
 
-    As when it was admitted, `assume` and `degrade` are about the present place, the rest about every place that the
-    vehicle may be at before it could stand still (`ahead`). UNKNOWN counts as FALSE when it lasts longer than the
-    contract's grace: the caller keeps that clock.
+    As at admission, `assume` and `degrade` are judged at the present place, the others at every place that the
+    vehicle may reach before standstill (`ahead`). UNKNOWN counts as FALSE when it lasts longer than the contract's
+    grace; the caller measures that time.
     """
     sets = situation(state, policy, now)
     at = environment(sets, policy, invocation.arguments, invocation.phase)
@@ -145,7 +146,7 @@ def watch(invocation: PreparedInvocation, state: State, policy: PreparedPolicy, 
         over = ranging(at, volume, policy.tables.known.height, lasts_us)
         for clause, condition in invocation.maintain:
             truth = EVERYWHERE[condition(over)]
-            if truth == UNKNOWN:  # what is wrong already where it is, is wrong wherever it goes
+            if truth == UNKNOWN:  # a condition that fails at the present place fails on every path
                 truth = EVERYWHERE[truth | condition(at) & FALSE]
             if truth != TRUE:
                 yield Unkept(clause.text, truth)

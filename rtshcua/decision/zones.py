@@ -1,12 +1,12 @@
-"""Is a place, or everything along a path, inside a zone? Exact, in integers, without division.
+"""Tests whether a place, or everything along a path, is inside a zone. Exact, in integers, without division.
 
-A zone is an open set: its boundary (that of a hole too), floor and ceiling are outside. A *sweep* is a path of straight
-legs, each widened by a box; a point is a path of one place and an empty box, a set of places one place and the box they
-may be in, and what a vehicle with a position error may cover is its path and the box of that error. A sweep that
-touches a boundary counts as being on both sides of it, so that it is refused whichever side was asked.
+A zone is an open set: its boundary (that of a hole too), floor and ceiling are outside. A *sweep* is a path of
+straight legs, each widened by a box. A point is a path of one place with an empty box, and a set of places is one
+place with a box; the path of a vehicle is widened by its position error. A sweep that touches a boundary counts as
+being on both sides of it, so that it is refused whichever side is required.
 
-Bounds for 64-bit arithmetic: coordinates and box sides within 2**29 mm (`MAX_COORDINATE`), hence differences within
-2**30, cross products within 2**61 and their sums with the box's within 2**62.
+Bounds for 64-bit arithmetic: coordinates and box sides are within 2**29 mm (`MAX_COORDINATE`), hence differences
+within 2**30, cross products within 2**61 and their sums with the box's within 2**62.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,8 @@ from rtshcua.decision.values import ABSENT, AND, FALSE, PRESENT, TRUE, UNKNOWN, 
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone
 
 NO_BOX: Box = (0, 0, 0, 0)
-#: how far around a place a zone is compared ahead, mm: what a vehicle flies in a second or two
+#: : the margin around a place within which a zone is compared in advance, mm: the distance of a second or two of
+#: flight
 AROUND = 10_000
 _UTC = LocalTime(0)
 
@@ -39,11 +40,11 @@ class Disc:
         return dx * dx + dy * dy < self._square
 
     def compared(self, y0: int, y1: int, box: Box) -> int:
-        """How many edges are compared with a leg: none."""
+        """The number of edges compared with a leg: none."""
         return 0
 
     def clear(self, x0: int, y0: int, x1: int, y1: int, box: Box) -> bool:
-        """Whether the widened leg is wholly inside, or wholly outside by a margin of at most 3 mm."""
+        """Whether the widened leg is completely inside, or completely outside by a margin of at most 3 mm."""
         west, south, east, north = box
         if self._holds(x0, y0, box) and self._holds(x1, y1, box):  # a disc is convex
             return True
@@ -52,10 +53,11 @@ class Disc:
         return self._outside(x0, y0, x1, y1, reach)
 
     def throughout(self, west: int, south: int, east: int, north: int) -> bool | None:
-        """Whether all of a box is inside; None where not all of it is on one side.
+        """Whether all of a box is inside; None where parts of it are on both sides.
 
-        Outside only where `clear` says so of every leg in it whose own box reaches no further than `AROUND`. Its reach
-        counts half as much again at most, where the leg passes the centre: the length of 2 mm is rounded up to 3.
+        True for outside only where `clear` is true of every leg in the box whose own box reaches no further than
+        `AROUND`. Its reach counts half as much again at most, where the leg passes the centre: the length of 2 mm
+        is rounded up to 3.
         """
         if self._holds(west, south, (0, 0, east - west, north - south)):
             return True
@@ -71,7 +73,7 @@ class Disc:
         return dx * dx + dy * dy < self._square
 
     def _outside(self, x0: int, y0: int, x1: int, y1: int, radius: int) -> bool:
-        """Whether the leg keeps further than `radius` from the centre; its length is rounded up, for safety."""
+        """Whether the leg stays farther than `radius` from the centre; its length is rounded up, for safety."""
         ux, uy, vx, vy = x1 - x0, y1 - y0, self._x - x0, self._y - y0
         along, square = ux * vx + uy * vy, ux * ux + uy * uy
         if along <= 0:
@@ -94,14 +96,14 @@ class RingArea:
         self.clear, self.compared = bands.clear, bands.compared
 
     def throughout(self, west: int, south: int, east: int, north: int) -> bool | None:
-        """Whether all of a box is inside; None where not all of it is on one side."""
+        """Whether all of a box is inside; None where parts of it are on both sides."""
         if not self.clear(west, south, west, south, (0, 0, east - west, north - south)):
             return None
         return bool(self.contains(west, south))
 
 
 class PreparedZone:
-    """A zone ready to be asked; `number` is its index in the policy, `times` is None where it exists at all times."""
+    """A zone prepared for queries. `number` is its index in the policy; `times` is None if it always exists."""
 
     __slots__ = ("banded", "ceiling", "floor", "number", "shape", "times", "vicinity")
 
@@ -126,7 +128,7 @@ class PreparedZone:
 
     def between(self, low: int, high: int, gap: int = PRESENT) -> Truth:
         """Whether the heights `low`..`high` (mm above home), which may be missing, lie between floor and ceiling. A
-        zone with neither does not ask for the height.
+        zone with neither does not read the height.
         """
         if not self.banded:
             return TRUE
@@ -144,8 +146,8 @@ Bounds: TypeAlias = tuple[int, int, int, int, int, int]
 
 
 class Vicinity:
-    """A box around the places that a zone was asked about last, and what it says of every place in there, if that is
-    one answer: a vehicle that flies about is not compared with the outline again and again. No answer depends on it.
+    """A box around the places of the last queries, and the zone's answer for every place in it, if there is a single
+    one. This avoids repeated comparisons with the outline for a vehicle in flight. No answer depends on it.
     """
 
     __slots__ = ("_answer", "_bounds", "_compared", "_zone")
@@ -157,9 +159,9 @@ class Vicinity:
         self._compared = False
 
     def answer(self, bounds: Bounds) -> Truth | None:
-        """What the zone says of every place within these bounds; None where the place itself must be compared.
+        """The zone's answer for every place within these bounds; None where the place itself must be compared.
 
-        The box is compared when a second place lies in it: places far apart are compared themselves, and only that.
+        The box is compared only once a second place lies in it, because places far apart gain nothing from it.
         """
         west, south, low, east, north, high = bounds
         near = self._bounds
@@ -181,8 +183,9 @@ class Vicinity:
 
 
 class Sweep:
-    """A path widened by a box (see `zones`). It remembers each zone's answer, which depends on nothing else: when
-    the zone exists is asked elsewhere (`evaluate.within`)."""
+    """A path widened by a box (see the module). It caches each zone's answer, which depends on nothing else:
+    `evaluate.within` handles the times of the zone.
+    """
 
     __slots__ = ("_answers", "box", "path")
 
@@ -203,10 +206,10 @@ Part: TypeAlias = tuple[Sweep, int, int]
 
 
 class PlaceSet:
-    """A set of places, the union of its parts; there is at least one. `located` and `high` say whether it may be
-    missing where they are, and how high: either may tell by itself that they are outside of a zone.
+    """A set of places: the union of its parts, of which there is at least one. `located` and `high` say whether
+    position and height may be missing; either may suffice to show that the places are outside a zone.
 
-    It too remembers each zone's answer, so that a planned volume that did not change is not looked at again.
+    It also caches each zone's answer, so that an unchanged planned volume is not compared again.
     """
 
     __slots__ = ("_answers", "_bounds", "high", "located", "parts")
@@ -217,7 +220,7 @@ class PlaceSet:
         self._bounds = None if located or high or len(parts) > 1 else _bounds(*parts[0])
 
     def inside(self, zone: PreparedZone) -> Truth:
-        """Whether the places are inside a zone, at a time at which it exists."""
+        """Whether the places are inside a zone, at a time when it exists."""
         answer = self._answers.get(zone.number)
         if answer is None:
             if self._bounds is not None:
@@ -241,7 +244,7 @@ class PlaceSet:
 
 
 def _bounds(sweep: Sweep, low: int, high: int) -> Bounds | None:
-    """What a part lies within; None where its box is too wide for `Disc.throughout`."""
+    """The bounds of a part; None where its box is too wide for `Disc.throughout`."""
     west, south, east, north = box = sweep.box
     if max(map(abs, box)) > AROUND:
         return None
@@ -253,8 +256,8 @@ NOWHERE = PlaceSet(((Sweep((0, 0), NO_BOX), 0, 0),), ABSENT, ABSENT)
 
 
 class WellKnown(NamedTuple):
-    """The state slots of position (x, y), height, battery, velocity, and what is measured to be taken of the battery.
-    One that no signal owns is the slot after the last, which is missing.
+    """The state slots of position (x, y), height, battery, velocity, and measured drain. A quantity without a signal
+    has the slot after the last, which is always missing.
     """
 
     x: int
@@ -268,7 +271,7 @@ class WellKnown(NamedTuple):
 
 
 def here(slots: Sequence[Value], known: WellKnown) -> PlaceSet:
-    """Where the vehicle is now, as far as the state tells."""
+    """The vehicle's present place, as far as the state has it."""
     west, east, x_gap, _ = slots[known.x]
     south, north, y_gap, _ = slots[known.y]
     low, high, height_gap, _ = slots[known.height]

@@ -151,7 +151,7 @@ class Approvals:
         if held is not None and _counts(held, now):
             raise DocumentError("already-answered", f"{step_words(answered.about.step)} has this answer already")
         if held is None and len(self._answers) == MAX_ANSWERS:
-            raise DocumentError("too-many", f"one flight takes at most {MAX_ANSWERS} answers")
+            raise DocumentError("too-many", f"one flight accepts at most {MAX_ANSWERS} answers")
         self._answers[key] = answered
 
     def keep(self, invocations: tuple[Invocation, ...]) -> None:

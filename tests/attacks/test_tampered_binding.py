@@ -71,7 +71,7 @@ def test_a_plan_says_nothing_that_no_argument_says(hidden: dict[str, int]) -> No
     steps = (*INVOCATIONS[:step], odd, *INVOCATIONS[step + 1 :])
     refusal = try_load(sealed(mission=replace(MISSION, invocations=steps)))
     assert isinstance(refusal, Refusal)
-    assert "is not the argument, 0" in refusal.text
+    assert "differs from the argument, 0" in refusal.text
 
 
 def test_a_tampered_request_in_the_air_flies_the_contingency() -> None:

@@ -1,5 +1,6 @@
-"""Is a flat policy or mission well-formed? A signature says who made a bundle, not that it makes sense.
+"""Checks that a flat policy or mission is well-formed. A signature proves who made a bundle, not that it is
+consistent.
 
-Each function yields what is wrong, worst first; `prepare` refuses on the first. Nothing yielded means that compiling
-and deciding cannot fail.
+Each function yields the problems that it finds, the most serious first; `prepare` refuses on the first. A policy
+or mission without problems can be compiled and decided without failure.
 """

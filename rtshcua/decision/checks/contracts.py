@@ -1,5 +1,5 @@
-"""Skill contracts, their clauses, the links of chains; and a mission may only tighten: its copy of a contract is the
-policy's, or stricter (design 5).
+"""Checks of skill contracts, their clauses and the links of chains. The contract in a mission must equal the policy's
+or be stricter (design 5).
 """
 
 from collections import Counter
@@ -29,14 +29,14 @@ from rtshcua.model.flat.zone import HIGHEST, LOWEST
 
 
 def clause(clause: Clause, scope: CodeScope) -> Iterator[str]:
-    """What is wrong with a clause's code."""
+    """Yield the problem of a clause's code, if it has one."""
     node = parse(clause.code, scope)
     if isinstance(node, str):
         yield node
 
 
 def contract(contract: Contract, policy: Policy, scope: CodeScope) -> Iterator[str]:
-    """What is wrong with a contract. Its links are `chain`'s: they speak of other contracts."""
+    """Yield the problems of a contract. `chain` checks its links, because they refer to other contracts."""
     yield from _parameters(contract, policy)
     yield from _motion(contract)
     yield from within("timing class", contract.timing_class, TimingClass.SEMANTIC, TimingClass.REFLEX)
@@ -60,16 +60,18 @@ def contract(contract: Contract, policy: Policy, scope: CodeScope) -> Iterator[s
             yield from at(f"{name} {number}", clause(one, about))
     clauses = (*contract.require, *contract.assume, *contract.maintain)
     if contract.reads != slots_read(clauses, policy.vehicle, policy.monitors):
-        yield "`reads` is not what the clauses read"
+        yield "`reads` differs from what the clauses read"
 
 
 def _record(contract: Contract) -> Iterator[str]:
-    """A record may be lost with the process only of what has no time to wait for it."""
+    """A record may be `buffered` (lost if the process crashes) only for reflex skills, which have no time to wait for
+    it.
+    """
     written = [word for word in contract.record if word in WORDS]
     if len(written) > 1:
-        yield f"recorded as `{written[0]}` and as `{written[1]}`"
+        yield f"recorded as both `{written[0]}` and `{written[1]}`"
     if WORDS[BUFFERED] in written and contract.timing_class != TimingClass.REFLEX:
-        yield f"recorded as `{WORDS[BUFFERED]}`, which is for reflexes alone"
+        yield f"`record {WORDS[BUFFERED]}` is only allowed for reflex skills"
 
 
 def _parameters(contract: Contract, policy: Policy) -> Iterator[str]:
@@ -77,7 +79,7 @@ def _parameters(contract: Contract, policy: Policy) -> Iterator[str]:
     cell = 0
     for parameter in contract.parameters:
         if parameter.cell != cell:
-            yield f"parameter `{parameter.name}`: cell {parameter.cell} is not the next, {cell}"
+            yield f"parameter `{parameter.name}`: cell {parameter.cell} is out of sequence; expected {cell}"
         yield from at(f"parameter `{parameter.name}`", _parameter(parameter, policy))
         cell += 2 if parameter.kind == PLACE else 1
     yield from within("number of cells", cell, 0, limits.MAX_CELLS)
@@ -101,37 +103,37 @@ def _motion(contract: Contract) -> Iterator[str]:
     yield from within("motion", motion.kind, MotionKind.HOLD, MotionKind.LAND)
     for name, cell in (("altitude", motion.altitude), ("speed", motion.speed), ("time", motion.time)):
         if cell != -1 and kinds.get(cell) != QUANTITY:
-            yield f"motion: argument cell {cell} is no {name}"
+            yield f"motion: argument cell {cell} is not a {name}"
     if motion.kind in (MotionKind.CLIMB, MotionKind.FLY, MotionKind.COVER) and motion.altitude == -1:
-        yield "motion: a skill that flies somewhere needs an altitude"
+        yield "motion: a skill that moves the vehicle needs an altitude"
     if motion.kind == MotionKind.FLY and PLACE not in kinds.values():
-        yield "motion: a skill that flies to a place needs one"
+        yield "motion: a skill that flies to a place needs a place argument"
     if motion.kind == MotionKind.COVER and list(kinds.values()).count(ZONE) != 1:
-        yield "motion: a skill that covers a zone needs one, and no other"
+        yield "motion: a skill that covers a zone needs exactly one zone argument"
 
 
 def arguments(values: tuple[int, ...], contract: Contract) -> Iterator[str]:
-    """What is wrong with the arguments of a call."""
+    """Yield the problems of a call's arguments."""
     if len(values) != cells(contract):
-        yield f"{len(values)} argument cells instead of {cells(contract)}"
+        yield f"{len(values)} argument cells; the contract has {cells(contract)}"
     found = misfit(values, contract)
     if found is not None:
         yield f"argument `{found.name}` is out of range"
 
 
 def chain(links: tuple[Link, ...], policy: Policy) -> Iterator[str]:
-    """What is wrong with the links of a chain; the contracts are well-formed."""
+    """Yield the problems of a chain's links. The contracts must be well-formed."""
     yield from within("number of links", len(links), 0, limits.MAX_LINKS)
     for number, one in enumerate(links):
         yield from at(f"link {number}", link(one, policy))
 
 
 def link(link: Link, policy: Policy) -> Iterator[str]:
-    """What is wrong with a link: it is a complete call of a skill that needs no survey path."""
+    """Yield the problems of a link, which must be a complete call of a skill that needs no survey path."""
     yield from index("skill", link.skill, len(policy.contracts))
     called = policy.contracts[link.skill]
     if called.motion.kind == MotionKind.COVER:
-        yield "a link has no path to cover a zone along"
+        yield "a link cannot call a skill that covers a zone, because links carry no path"
     yield from arguments(link.arguments, called)
     yield from within("limit", link.limit_us, 0, limits.MAX_DURATION)
     motion = called.motion
@@ -147,7 +149,7 @@ def link(link: Link, policy: Policy) -> Iterator[str]:
 
 
 def tightens(mine: Contract, policys: Contract) -> Iterator[str]:
-    """Where a mission's contract is looser than the policy's; no duration (0) is no limit, so looser than any."""
+    """Yield each field in which a mission's contract is looser than the policy's. A duration of 0 is unlimited."""
     for name, same in (
         ("name", mine.name == policys.name),
         ("motion", mine.motion == policys.motion),
@@ -177,21 +179,21 @@ def tightens(mine: Contract, policys: Contract) -> Iterator[str]:
 
 
 def one_line(text: str) -> str:
-    """A text as it is shown."""
+    """A text with its white space collapsed, as it is displayed."""
     return " ".join(text.split())
 
 
 def is_cut(text: str) -> bool:
-    """Whether a text is no more than the beginning of one, so that others may begin with it too."""
+    """Whether a text is an abbreviation, so that other texts may share its beginning."""
     return len(text) == limits.MAX_TEXT and text.endswith("...")
 
 
 def posing(one: Clause) -> str:
-    """What is wrong with a clause of a mission's own that would be taken for the policy's."""
-    return f"a clause says `{one_line(one.text)}` in the policy's words, and is another"
+    """Yield each clause of the mission's own that could be mistaken for a clause of the policy."""
+    return f"clause `{one_line(one.text)}` has the text of a policy clause but different code"
 
 
-# What is the policy's says so in the policy's words: a log and its readers are told by them.
+# logs and their readers identify a clause by its text, so a policy clause must have the policy's text
 def _calls(links: tuple[Link, ...]) -> list[tuple[int, tuple[int, ...], int, str]]:
     return [(link.skill, link.arguments, link.limit_us, link.text) for link in links]
 
@@ -201,7 +203,7 @@ def _codes(clauses: tuple[Clause, ...]) -> Counter[tuple[tuple[int, ...], str]]:
 
 
 def _same_parameters(mine: Contract, policys: Contract) -> bool:
-    """The same parameters, in ranges that are not wider."""
+    """Whether the parameters are the same and no range is wider."""
     return len(mine.parameters) == len(policys.parameters) and all(
         (a.name, a.kind, a.dimension, a.cell, a.labels) == (b.name, b.kind, b.dimension, b.cell, b.labels)
         and b.low <= a.low

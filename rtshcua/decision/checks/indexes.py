@@ -1,22 +1,22 @@
-"""The small questions that all checks ask."""
+"""Small checks of numbers and indexes that all other checks use."""
 
 from collections.abc import Iterable, Iterator
 
 
 def within(name: str, value: int, low: int, high: int) -> Iterator[str]:
-    """A number lies in `low`..`high`."""
+    """Yield a problem unless the number is in `low`..`high`."""
     if not low <= value <= high:
         yield f"{name} {value} is not in {low}..{high}"
 
 
 def index(name: str, value: int, count: int) -> Iterator[str]:
-    """A number is the index of one of `count` things."""
+    """Yield a problem unless the number is a valid index of `count` things."""
     if not 0 <= value < count:
         yield f"there is no {name} {value}"
 
 
 def ascending(name: str, values: Iterable[int], count: int) -> Iterator[str]:
-    """Numbers are distinct indexes of `count` things, in order."""
+    """Yield a problem unless the numbers are distinct, ascending indexes of `count` things."""
     before = -1
     for value in values:
         if value <= before:
@@ -26,6 +26,6 @@ def ascending(name: str, values: Iterable[int], count: int) -> Iterator[str]:
 
 
 def at(place: str, problems: Iterable[str]) -> Iterator[str]:
-    """The same problems, each told with where it is."""
+    """The same problems, each prefixed with its place."""
     for problem in problems:
         yield f"{place}: {problem}"

@@ -1,4 +1,4 @@
-"""A mission and its invocations, under a policy that is well-formed."""
+"""Checks of a mission and its invocations, under a policy that is well-formed."""
 
 from collections.abc import Iterator, Sequence
 
@@ -19,34 +19,35 @@ from rtshcua.model.step_number import step_words
 
 
 def mission(mission: Mission, policy: Policy) -> Iterator[str]:
-    """What is wrong with a mission apart from its invocations."""
+    """Yield the problems of a mission, except those of its invocations."""
     for name, mine, policys in (
         ("policy", mission.policy, policy.name),
         ("policy version", mission.policy_version, policy.version),
         ("vehicle", mission.vehicle, policy.vehicle.identity),
     ):
         if mine != policys:
-            yield f"{name} `{mine}` is not the policy's, `{policys}`"
+            yield f"mission {name} `{mine}` differs from the policy's `{policys}`"
     for what, name in (("mission", mission.name), *(("phase", phase) for phase in mission.phases)):
-        if not _is_name(name):  # people are shown it beside what they sign and what flies: it is no place for sentences
-            yield f"the name of the {what} is no name: letters of ASCII, digits, `_` and `.` make one"
+        # the name is displayed to people who sign and supervise, so it must not be able to imitate a sentence
+        if not _is_name(name):
+            yield f"the name of the {what} is invalid: use ASCII letters, digits, `_` and `.`"
     yield from within("number of invocations", len(mission.invocations), 0, MAX_INVOCATIONS)
     yield from within("number of phases", len(mission.phases), 0, MAX_PHASES)
     if len(set(mission.phases)) != len(mission.phases):
         yield "two phases have the same name"
     for step, one in enumerate(mission.invocations):
         if one.step != step:
-            yield f"{step_words(step)} says it is {step_words(one.step)}"
+            yield f"{step_words(step)} has the number of {step_words(one.step)}"
         yield from at(step_words(step), index("phase", one.phase, len(mission.phases)))
         if one.phases & ~_phases(one.contract, mission):
-            yield f"{step_words(step)}: it is valid in a phase that its contract does not name"
+            yield f"{step_words(step)} is valid in a phase that its contract does not name"
     yield from _rules_words(mission, policy)
     if len({one.invocation_id for one in mission.invocations}) != len(mission.invocations):
         yield "two steps have the same id"
 
 
 def _rules_words(mission: Mission, policy: Policy) -> Iterator[str]:
-    """A log says what decided by its text, and no condition is worded as a rule is."""
+    """Texts that no condition may have, because a log identifies a rule by this text."""
     contracts = (one.contract for one in mission.invocations)
     clauses = {each.text: each for of in contracts for each in (*of.require, *of.assume, *of.maintain)}
     worded = {one_line(text): each for text, each in clauses.items()}
@@ -58,7 +59,7 @@ def _rules_words(mission: Mission, policy: Policy) -> Iterator[str]:
 
 
 def _is_name(name: str) -> bool:
-    """Whether a text is a name as sources have it."""
+    """Whether a text has the form of a name in the language."""
     return name.isascii() and all(part.isidentifier() for part in name.split("."))
 
 
@@ -68,7 +69,9 @@ def _phases(contract: Contract, mission: Mission) -> int:
 
 
 def invocation(invocation: Invocation, policy: Policy, zones: Sequence[PreparedZone]) -> Iterator[str]:
-    """What is wrong with an invocation. Arguments out of range are for `decide` to refuse, so that it is recorded."""
+    """Yield the problems of an invocation. `decide` refuses arguments that are out of range, so that the refusal is
+    recorded.
+    """
     yield from index("skill", invocation.skill, len(policy.contracts))
     yield from index("role", invocation.role, len(policy.roles))
     yield from within("source", invocation.source, SourceKind.AGENT, SourceKind.REFLEX)
@@ -76,31 +79,35 @@ def invocation(invocation: Invocation, policy: Policy, zones: Sequence[PreparedZ
     yield from within("issued at", invocation.issued_at_us, 0, MAX_VALUE)
     yield from within("phases", invocation.phases, 0, (1 << MAX_PHASES) - 1)
     mine, policys = invocation.contract, policy.contracts[invocation.skill]
-    if mine != policys:  # the policy's own was looked at with the policy
+    if mine != policys:  # checks of the policy already cover the policy's own contract
         yield from tightens(mine, policys)
         yield from contract(mine, policy, scope_of(policy))
     if len(invocation.arguments) != cells(mine):
-        yield f"{len(invocation.arguments)} argument cells instead of {cells(mine)}"
+        yield f"{len(invocation.arguments)} argument cells; the contract has {cells(mine)}"
     for argument in invocation.arguments:
         yield from within("argument", argument, -MAX_VALUE, MAX_VALUE)
     yield from at("plan", _plan(invocation.plan, mine, invocation.arguments))
     if not _leads_right(invocation.plan, mine, invocation.arguments, zones[: policy.declared]):
-        yield "plan: the path does not fit the arguments"
+        yield "plan: the path does not match the arguments"
     for x, y in zip(invocation.plan.path[::2], invocation.plan.path[1::2], strict=True):
         yield from at("plan", place(policy.projection, x, y))
 
 
 def _plan(plan: Plan, contract: Contract, arguments: tuple[int, ...]) -> Iterator[str]:
-    """The plan is what the arguments say, so that what is checked is what will be flown."""
+    """Yield the differences between a plan and its arguments: the path that is checked must be the path that is
+    flown.
+    """
     motion = contract.motion
     if plan.kind != motion.kind:
-        yield f"kind {plan.kind} is not the skill's, {motion.kind}"
+        yield f"kind {plan.kind} differs from the skill's, {motion.kind}"
     yield from within("speed", plan.speed, 0, MAX_SPEED)
     yield from within("altitude", plan.altitude, LOWEST, HIGHEST)
     for name, cell, value in (("altitude", motion.altitude, plan.altitude), ("speed", motion.speed, plan.speed)):
-        said = 0 if cell == -1 else arguments[cell]  # who signs a mission adds nothing that no argument says
+        said = (
+            0 if cell == -1 else arguments[cell]
+        )  # the plan must not contain anything that the arguments do not specify
         if said != value:
-            yield f"{name} {value} is not the argument, {said}"
+            yield f"{name} {value} differs from the argument, {said}"
     if len(plan.path) % 2:
         yield "a coordinate is missing"
     yield from within("number of points", len(plan.path) // 2, 0, MAX_PATH)
@@ -109,12 +116,14 @@ def _plan(plan: Plan, contract: Contract, arguments: tuple[int, ...]) -> Iterato
 
 
 def _leads_right(plan: Plan, contract: Contract, arguments: tuple[int, ...], declared: Sequence[PreparedZone]) -> bool:
-    """The path is where the arguments say: what rules and clauses are told about must be what is flown."""
+    """Whether the path leads where the arguments say. Rules and clauses judge the arguments, so the path must follow
+    them.
+    """
     match plan.kind:
         case MotionKind.COVER:
             zone = arguments[first_cell(contract, ZONE)]
             if not 0 <= zone < len(declared):
-                return bool(plan.path)  # for `decide` to refuse
+                return bool(plan.path)  # `decide` refuses these
             return bool(plan.path) and declared[zone].along(plan.path, NO_BOX) == TRUE
         case MotionKind.FLY:
             cell = first_cell(contract, PLACE)

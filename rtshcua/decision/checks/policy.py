@@ -1,4 +1,4 @@
-"""A whole policy: its vehicle and signals, monitors, rules and airspace."""
+"""Checks of a whole policy: its vehicle and signals, monitors, rules and airspace."""
 
 from collections.abc import Iterator
 from itertools import pairwise
@@ -29,7 +29,7 @@ MAX_REACTION = 60_000_000  # us
 
 
 def signals(policy: Policy) -> Iterator[str]:
-    """What is wrong with a policy's signals: every slot has exactly one owner."""
+    """Yield the problems of a policy's signals: every slot must have exactly one owner."""
     yield from within("number of slots", policy.slots, 0, limits.MAX_SLOTS)
     owned: set[int] = set()
     for signal in policy.signals:
@@ -54,7 +54,7 @@ def _source(source: SignalSource, kind: int) -> Iterator[str]:
 
 
 def vehicle(policy: Policy) -> Iterator[str]:
-    """What is wrong with a policy's vehicle."""
+    """Yield the problems of a policy's vehicle."""
     yield from at("vehicle", _numbers(policy.vehicle))
     yield from at("vehicle", _without(policy))
     kinds = {signal.slot: signal.kind for signal in policy.signals}
@@ -67,24 +67,26 @@ def vehicle(policy: Policy) -> Iterator[str]:
         ("velocity down", policy.vehicle.down, NUMBER),
     ):
         if slot != -1 and kinds.get(slot) != kind:
-            yield f"vehicle: slot {slot} is no {name}"
+            yield f"vehicle: slot {slot} is not a {name}"
 
 
 def _without(policy: Policy) -> Iterator[str]:
-    """The sensors that it lacks are named in order, and nothing reads them; without any, no clause is left out."""
+    """Yield the problems of `without`: its signals are in order, nothing reads them, and clauses are left out only
+    because of them.
+    """
     names = policy.vehicle.without
     if any(one >= other for one, other in pairwise(names)):
-        yield "the signals that it is without are not ascending"
+        yield "the signals in `without` are not ascending"
     for signal in policy.signals:
         if signal.name in names:
-            yield f"it is without the signal `{signal.name}`, which the policy reads"
+            yield f"the policy reads `{signal.name}`, which the vehicle is without"
     for left_out in policy.left_out:
         if not names:
-            yield f"`{left_out.text}` is left out, and it is without no signal"
+            yield f"`{left_out.text}` is left out, but the vehicle is without no signal"
         if left_out.part in ("require", "assume", "maintain"):
             yield from index("skill", left_out.skill, len(policy.contracts))
         elif left_out.part not in ("forbid", "confirm", "degrade") or left_out.skill != -1:
-            yield f"`{left_out.text}` is left out of `{left_out.part}`, which no contract has"
+            yield f"`{left_out.text}` is left out of `{left_out.part}`, which is not a part of a contract"
 
 
 def _numbers(vehicle: VehicleLimits) -> Iterator[str]:
@@ -100,7 +102,7 @@ def _numbers(vehicle: VehicleLimits) -> Iterator[str]:
     yield from within("reaction", vehicle.reaction_us, 0, MAX_REACTION)
     yield from _offsets(vehicle)
     if vehicle.braking and -1 in (vehicle.north, vehicle.east, vehicle.down):
-        yield "brakes, and has no signal of its velocity"
+        yield "braking is declared without a velocity signal"
     if vehicle.speeds is not None:
         yield from _speeds(vehicle.speeds)
 
@@ -114,23 +116,25 @@ def _speeds(speeds: Speeds) -> Iterator[str]:
 
 
 def _offsets(vehicle: VehicleLimits) -> Iterator[str]:
-    """The local time of a time zone is known from its first moment to its last, by the data that is named."""
+    """Yield the problems of a time zone's offsets. Local time is known from the first transition to the last."""
     if len({bool(vehicle.time_zone), bool(vehicle.time_zone_data), bool(vehicle.offsets)}) > 1:
-        yield "a time zone has a name, a version of its data, and offsets"
+        yield "a time zone needs a name, a data version, and offsets"
     moments, offsets = vehicle.offsets[::2], vehicle.offsets[1::2]
     if vehicle.offsets and (vehicle.utc_offset_us or len(moments) != len(offsets) + 1 or not offsets):
-        yield "the offsets of its local time do not lie between moments"
+        yield "local-time offsets must alternate with the moments between them"
     yield from within("number of offsets", len(offsets), 0, limits.MAX_OFFSETS)
     for one in offsets:
         yield from within("offset from UTC", one, -limits.DAY, limits.DAY)
     for moment in moments:
         yield from within("moment", moment, 0, limits.MAX_VALUE)
     if any(one >= other for one, other in pairwise(moments)):
-        yield "the moments at which its local time changes are not ascending"
+        yield "the moments of the local-time changes are not ascending"
 
 
 def monitors(policy: Policy, scope: CodeScope) -> Iterator[str]:
-    """What is wrong with a policy's monitors: each reads only those before it, so that one pass observes them all."""
+    """Yield the problems of a policy's monitors. Each reads only earlier ones, so that one pass evaluates all of
+    them.
+    """
     yield from within("number of monitors", len(policy.monitors), 0, limits.MAX_MONITORS)
     for number, one in enumerate(policy.monitors):
         yield from at(f"monitor {number}", _monitor(one, scope.inside_monitor(number)))
@@ -144,14 +148,14 @@ def _monitor(monitor: Monitor, scope: CodeScope) -> Iterator[str]:
 
 
 def phases(policy: Policy) -> Iterator[str]:
-    """What is wrong with the names of mission phases."""
+    """Yield the problems of the names of mission phases."""
     yield from within("number of phase names", len(policy.phases), 0, limits.MAX_PHASE_NAMES)
     if len(set(policy.phases)) != len(policy.phases):
-        yield "two phase names are the same"
+        yield "two phases have the same name"
 
 
 def rules(policy: Policy, scope: CodeScope) -> Iterator[str]:
-    """What is wrong with a policy's rules; its contracts are well-formed."""
+    """Yield the problems of a policy's rules. The contracts must be well-formed."""
     yield from within("number of rules", len(policy.rules), 0, limits.MAX_RULES)
     keys = sum((len(rule.skills) or 1) * (len(rule.roles) or 1) for rule in policy.rules)
     yield from within("number of skills times roles in the rules", keys, 0, limits.MAX_RULE_KEYS)
@@ -160,7 +164,7 @@ def rules(policy: Policy, scope: CodeScope) -> Iterator[str]:
 
 
 def rule(rule: Rule, policy: Policy, scope: CodeScope) -> Iterator[str]:
-    """What is wrong with a rule."""
+    """Yield the problems of a rule."""
     yield from within("kind", rule.kind, RuleKind.FORBID, RuleKind.DEGRADE)
     yield from ascending("skill", rule.skills, len(policy.contracts))
     yield from ascending("role", rule.roles, len(policy.roles))
@@ -168,27 +172,29 @@ def rule(rule: Rule, policy: Policy, scope: CodeScope) -> Iterator[str]:
     if rule.when is not None:
         yield from at("when", clause(rule.when, scope.about(*(policy.contracts[skill] for skill in rule.skills))))
     if rule.second != -1 and rule.kind != RuleKind.CONFIRM:
-        yield "a rule that confirms nothing asks a second person"
+        yield "only a `confirm` rule can require a second person"
     if rule.kind == RuleKind.CONFIRM:
         yield from index("role", rule.approver, len(policy.roles))
         yield from within("role of the second person", rule.second, -1, len(policy.roles) - 1)
         yield from within("within", rule.within_us, 1, limits.MAX_DURATION)
     if rule.kind == RuleKind.DEGRADE:
         if rule.target is None:
-            yield "degrade has no target"
+            yield "a `degrade` rule needs a target"
         else:
             yield from at("target", link(rule.target, policy))
 
 
 def airspace(airspace: Airspace | None, policy: Policy) -> Iterator[str]:
-    """What is wrong with the airspace."""
+    """Yield the problems of the airspace."""
     if airspace is not None:
         for zone in (*airspace.inside, *airspace.outside):
             yield from index("zone", zone, len(policy.zones))
 
 
 def problems(policy: Policy) -> Iterator[str]:
-    """What is wrong with a policy. Later checks rely on earlier ones: stop at the first problem."""
+    """Yield the problems of a policy. Later checks rely on earlier ones, so the caller must stop at the first
+    problem.
+    """
     yield from signals(policy)
     yield from vehicle(policy)
     yield from zones(policy)

@@ -1,10 +1,10 @@
-"""Zones, tables of derived zones, and the projection; and the rings that bound an area: each simple, no two with a
-common point, outer ones counter-clockwise, holes clockwise.
+"""Checks of zones, derived zone tables, the projection, and the rings that bound an area. Each ring must be simple
+and no two may touch; outer rings run counter-clockwise, holes clockwise.
 
 A line sweeps the plane from south to north (along it from west to east), and the edges that it crosses are kept in
-order. Two edges can only meet after they have become neighbours, so comparing neighbours finds any that do (Shamos and
-Hoey 1976). Where a ring begins, the number of edges west of it tells whether its inside should be inside of the area.
-The effort grows as n log n with the number of corners, whatever the outline.
+order. Two edges can only meet after they have become neighbours, so comparing neighbours finds any intersection
+(Shamos and Hoey 1976). At the start of a ring, the number of edges west of it shows whether its interior must be
+inside the area. The cost grows as n log n with the number of corners, whatever the outline.
 """
 
 from collections.abc import Generator, Iterator, Sequence
@@ -22,7 +22,7 @@ FEW_CORNERS = 3
 
 
 def rings(given: Sequence[Sequence[Corner]]) -> Iterator[str]:
-    """The first thing that is wrong with the rings of an area."""
+    """The first problem of an area's rings, or None."""
     short = (f"ring {number} has {len(ring)} corners" for number, ring in enumerate(given) if len(ring) < FEW_CORNERS)
     problem = next(short, None) or _Sweep(given).problem()
     if problem is not None:
@@ -30,21 +30,21 @@ def rings(given: Sequence[Sequence[Corner]]) -> Iterator[str]:
 
 
 class _Sweep:
-    """Corners are numbered through all rings; an edge has the number of the corner at which it begins in its ring."""
+    """The sweep line. Corners are numbered through all rings; an edge has the number of the corner where it begins."""
 
     def __init__(self, given: Sequence[Sequence[Corner]]) -> None:
         self._corners = [corner for ring in given for corner in ring]
         self._rings = [number for number, ring in enumerate(given) for _ in ring]
         self._before: list[int] = []
-        self._edges: list[Leg] = []  # from the end that the sweep meets first
+        self._edges: list[Leg] = []  # from the end that the sweep reaches first
         for ring in given:
             at = len(self._before)
             self._before += (at + len(ring) - 1, *range(at, at + len(ring) - 1))
             self._edges += (_upward(*a, *b) for a, b in zip(ring, (*ring[1:], ring[0]), strict=True))
-        self._crossed: list[int] = []  # the edges that the line crosses, from west to east
+        self._crossed: list[int] = []  # the edges that the sweep line crosses, from west to east
 
     def problem(self) -> str | None:
-        """What is wrong, or None."""
+        """The first problem found, or None."""
         order = sorted(range(len(self._corners)), key=lambda corner: self._corners[corner][::-1])
         last: Corner | None = None
         for number in order:
@@ -70,9 +70,10 @@ class _Sweep:
         turn = _turn(self._edges[incoming], self._edges[outgoing])
         if turn == 0 or (at < len(self._crossed) and _side(self._edges[self._crossed[at]], corner) == 0):
             return MEET
-        # the area is between the two where an even number of edges lies west of them; it is to the left of each edge
+        # the area lies between these two edges if an even number of edges is west of them; it is to the left of each
+        # edge
         if (turn < 0) != (at % 2 == 0):
-            return "it goes round the wrong way, or is nested wrongly"
+            return "the ring has the wrong orientation or is nested wrongly"
         self._crossed[at:at] = (incoming, outgoing) if turn < 0 else (outgoing, incoming)
         return MEET if self._meets(at - 1) or self._meets(at + 1) else None
 
@@ -89,7 +90,7 @@ class _Sweep:
         return MEET if others or self._meets(at - 1) else None
 
     def _place(self, corner: Corner) -> int:
-        """How many of the crossed edges are west of a corner."""
+        """The number of crossed edges that lie west of a corner."""
         crossed, edges, (x, y) = self._crossed, self._edges, corner
         low, high = 0, len(crossed)
         while low < high:
@@ -102,31 +103,31 @@ class _Sweep:
         return low
 
     def _meets(self, at: int) -> bool:
-        """Whether a crossed edge and the next have a common point that is not the corner between them."""
+        """Whether a crossed edge and its neighbour share a point other than the corner between them."""
         if not 0 <= at < len(self._crossed) - 1:
             return False
         return _meet(self._edges[self._crossed[at]], self._edges[self._crossed[at + 1]])
 
 
 def _upward(x0: int, y0: int, x1: int, y1: int) -> Leg:
-    """An edge from the end that is further south, or further west at the same height."""
+    """An edge from its southern end; from its western end if both have the same height."""
     return (x0, y0, x1, y1) if (y0, x0) < (y1, x1) else (x1, y1, x0, y0)
 
 
 def _side(edge: Leg, corner: Corner) -> int:
-    """Above 0 where an upward edge passes east of a corner, below 0 where it passes west."""
+    """Positive where an upward edge passes east of a corner, negative where it passes west."""
     x0, y0, x1, y1 = edge
     return (x1 - x0) * (corner[1] - y0) - (y1 - y0) * (corner[0] - x0)
 
 
 def _turn(a: Leg, b: Leg) -> int:
-    """Below 0 where `a` leads further west than `b`."""
+    """Negative where `a` leads further west than `b`."""
     return (a[2] - a[0]) * (b[3] - b[1]) - (a[3] - a[1]) * (b[2] - b[0])
 
 
 def _meet(a: Leg, b: Leg) -> bool:
-    """Whether two upward edges that the line crosses at once (so that on one straight line they overlap) have a common
-    point, other than an end of both when they lead apart from there.
+    """Whether two upward edges that the sweep line crosses together share a point. A common end from which they lead
+    apart does not count. Edges on one straight line overlap.
     """
     start, end = _side(a, b[:2]), _side(a, b[2:])
     if a[:2] == b[:2] or a[2:] == b[2:]:
@@ -142,7 +143,7 @@ MAX_FACTOR = 32 << flat.SHIFT
 
 
 def zones(policy: Policy) -> Iterator[str]:
-    """What is wrong with a policy's geometry."""
+    """Yield the problems of a policy's geometry."""
     yield from at("projection", _projection(policy.projection))
     yield from within("number of zones", len(policy.zones), 0, MAX_ZONES)
     yield from within("number of declared zones", policy.declared, 0, len(policy.zones))
@@ -164,14 +165,14 @@ def _projection(projection: flat.Projection) -> Iterator[str]:
 
 
 def place(projection: flat.Projection, x: int, y: int) -> Iterator[str]:
-    """What is wrong with a local place that may be flown to: it must have a latitude and a longitude."""
+    """Yield a problem unless a local place that may be flown to has a latitude and a longitude."""
     yield from at(f"place {x}, {y}", _near(projection, x))
     yield from at(f"place {x}, {y}", _on_earth(*flat.unproject(projection, x, y)))
 
 
 def _near(projection: flat.Projection, x: int) -> Iterator[str]:
     if abs(x) << flat.SHIFT >= flat.HALF_TURN * projection.east:
-        yield "it is half around the earth"
+        yield "longitude is half around the earth"
 
 
 def _on_earth(latitude: int, longitude: int) -> Iterator[str]:
@@ -180,7 +181,7 @@ def _on_earth(latitude: int, longitude: int) -> Iterator[str]:
 
 
 def _vertices(zone: flat.Zone) -> int:
-    """How many vertices there are at least, before anything else is known of a zone."""
+    """A lower bound of the number of vertices, computed before anything else about a zone is known."""
     counts = 1 + min(max(zone.data[0], 0), flat.MAX_RINGS) if zone.shape == flat.AREA and zone.data else 0
     return max(len(zone.data) - counts, 0) // 2
 
@@ -197,7 +198,7 @@ def _zone(zone: flat.Zone) -> Iterator[str]:
         start = yield from _counts(zone)
         coordinates = zone.data[start:]
     else:
-        yield f"there is no shape {zone.shape}"
+        yield f"unknown shape {zone.shape}"
     for coordinate in coordinates:
         yield from within("coordinate", coordinate, -flat.MAX_COORDINATE, flat.MAX_COORDINATE)
     if zone.shape != flat.CIRCLE:
@@ -206,7 +207,7 @@ def _zone(zone: flat.Zone) -> Iterator[str]:
 
 
 def _counts(zone: flat.Zone) -> Generator[str, None, int]:
-    """What is wrong with the numbers of rings and corners; where the coordinates begin."""
+    """Check the numbers of rings and corners, and return where the coordinates begin."""
     data, start = zone.data, 0
     if zone.shape == flat.AREA:
         count = data[0] if data else 0
@@ -215,7 +216,7 @@ def _counts(zone: flat.Zone) -> Generator[str, None, int]:
         for corners in data[1:start]:
             yield from within("number of corners", corners, 3, MAX_TOTAL_VERTICES)
         if len(data) != start + 2 * sum(data[1:start]):
-            yield "the coordinates are not as many as the corners of the rings need"
+            yield "the number of coordinates does not match the corners of the rings"
     else:
         if len(data) % 2:
             yield "a coordinate is missing"
@@ -225,13 +226,13 @@ def _counts(zone: flat.Zone) -> Generator[str, None, int]:
 
 def _times(zone: flat.Zone) -> Iterator[str]:
     if len(zone.daily) not in (0, 2) or len(zone.dates) not in (0, 2):
-        yield "a time has a start and an end"
+        yield "a time needs a start and an end"
     if zone.daily and zone.weekly:
-        yield "it is there at times of the day, or of the week, not both"
+        yield "a zone has times of the day or of the week, not both"
     problem = windows_problem(zone.weekly) if zone.weekly else None
     if problem is not None:
         yield problem
     if zone.daily and not (0 <= zone.daily[0] < DAY and 0 <= zone.daily[1] <= DAY):
-        yield f"{zone.daily[0]}..{zone.daily[1]} us is no window of a day"
+        yield f"{zone.daily[0]}..{zone.daily[1]} us is not a window of a day"
     if zone.dates and not 0 <= zone.dates[0] <= zone.dates[1] <= MAX_VALUE:
-        yield f"{zone.dates[0]}..{zone.dates[1]} us is no interval of UTC"
+        yield f"{zone.dates[0]}..{zone.dates[1]} us is not an interval of UTC"

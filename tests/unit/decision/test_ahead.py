@@ -217,7 +217,7 @@ def test_without_braking_it_is_where_it_was_measured() -> None:
         ({"braking": -1}, "vehicle: braking"),
         ({"braking": MAX_SPEED + 1}, "vehicle: braking"),
         ({"reaction_us": -1}, "vehicle: reaction"),
-        ({"north": -1}, "vehicle: brakes, and has no signal of its velocity"),
+        ({"north": -1}, "vehicle: braking is declared without a velocity signal"),
         ({"down": POSITION_X}, "vehicle: slot"),
         ({"east": 99}, "vehicle: slot"),
     ],

@@ -21,28 +21,28 @@ SCOPE = scope_of(flat.POLICY)
 INSPECTING = SCOPE.about(flat.CONTRACTS[INSPECT])
 T, F, U = TRUE, FALSE, UNKNOWN
 YES = apply(Op.LE, const(0), const(0))
-BOTH_NUMBERS = "two numbers are needed on the stack"
+BOTH_NUMBERS = "the instruction needs two numbers on the stack"
 
 LARGEST = apply(Op.ADD, scaled(signal(BATTERY), 512), const(512))  # at most 2**62
 
 REFUSED = [
     (apply(Op.ADD, scaled(signal(BATTERY), 512), const(513)), "instruction 3: the number may exceed 64 bits"),
     (apply(Op.LE, scaled(signal(BATTERY), 512), const(513)), "instruction 3: the number may exceed 64 bits"),
-    ((), "0 integers are not 1 to 128 instructions"),
-    ((Op.CONST, 1), "2 integers are not 1 to 128 instructions"),
-    (YES * 50, "450 integers are not 1 to 128 instructions"),
-    ((99, 0, 0), "instruction 0: no instruction has the number 99"),
-    ((4, 0, 0), "instruction 0: no instruction has the number 4"),
-    ((-1, 0, 0), "instruction 0: no instruction has the number -1"),
-    (const(1), "the code does not leave exactly one truth value"),
-    (YES + YES, "the code does not leave exactly one truth value"),
-    (YES + const(1), "the code does not leave exactly one truth value"),
-    ((Op.AND, 0, 0), "instruction 0: two truth values are needed on the stack"),
-    ((*YES, Op.AND, 0, 0), "instruction 3: two truth values are needed on the stack"),
-    (apply(Op.OR, YES, const(1)), "instruction 4: two truth values are needed on the stack"),
-    (apply(Op.OR, const(1), YES), "instruction 4: two truth values are needed on the stack"),
-    ((Op.NOT, 0, 0), "instruction 0: one truth value is needed on the stack"),
-    (apply(Op.NOT, const(1)), "instruction 1: one truth value is needed on the stack"),
+    ((), "0 integers; expected 3 for each of 1 to 128 instructions"),
+    ((Op.CONST, 1), "2 integers; expected 3 for each of 1 to 128 instructions"),
+    (YES * 50, "450 integers; expected 3 for each of 1 to 128 instructions"),
+    ((99, 0, 0), "instruction 0: unknown instruction 99"),
+    ((4, 0, 0), "instruction 0: unknown instruction 4"),
+    ((-1, 0, 0), "instruction 0: unknown instruction -1"),
+    (const(1), "the code does not leave exactly one truth value on the stack"),
+    (YES + YES, "the code does not leave exactly one truth value on the stack"),
+    (YES + const(1), "the code does not leave exactly one truth value on the stack"),
+    ((Op.AND, 0, 0), "instruction 0: the instruction needs two truth values on the stack"),
+    ((*YES, Op.AND, 0, 0), "instruction 3: the instruction needs two truth values on the stack"),
+    (apply(Op.OR, YES, const(1)), "instruction 4: the instruction needs two truth values on the stack"),
+    (apply(Op.OR, const(1), YES), "instruction 4: the instruction needs two truth values on the stack"),
+    ((Op.NOT, 0, 0), "instruction 0: the instruction needs one truth value on the stack"),
+    (apply(Op.NOT, const(1)), "instruction 1: the instruction needs one truth value on the stack"),
     ((Op.LT, 0, 0), f"instruction 0: {BOTH_NUMBERS}"),
     (apply(Op.LT, const(1)), f"instruction 1: {BOTH_NUMBERS}"),
     (apply(Op.EQ, YES, const(1)), f"instruction 4: {BOTH_NUMBERS}"),
@@ -51,8 +51,8 @@ REFUSED = [
     (apply(Op.ADD, const(1)), f"instruction 1: {BOTH_NUMBERS}"),
     (apply(Op.SUB, YES, const(1)), f"instruction 4: {BOTH_NUMBERS}"),
     (apply(Op.SUB, const(1), YES), f"instruction 4: {BOTH_NUMBERS}"),
-    ((Op.SCALE, 2, 0), "instruction 0: one number is needed on the stack"),
-    (scaled(YES, 2), "instruction 3: one number is needed on the stack"),
+    ((Op.SCALE, 2, 0), "instruction 0: the instruction needs one number on the stack"),
+    (scaled(YES, 2), "instruction 3: the instruction needs one number on the stack"),
     (const(MAX_VALUE + 1), f"instruction 0: constant {MAX_VALUE + 1} is out of range"),
     (scaled(const(0), -MAX_VALUE - 1), f"instruction 1: factor {-MAX_VALUE - 1} is out of range"),
     (scaled(const(MAX_VALUE), MAX_VALUE), "instruction 1: the number may exceed 64 bits"),
@@ -66,23 +66,23 @@ REFUSED = [
     (signal(-1), "instruction 0: there is no slot -1"),
     (signal(POSITION_X), f"instruction 0: slot {POSITION_X} is a position, not a number"),
     (signal(POSITION_X + 1), f"instruction 0: slot {POSITION_X + 1} is a position, not a number"),
-    (argument(0), "instruction 0: argument cell 0 is no number"),
-    (argument(9), "instruction 0: argument cell 9 is no number"),
-    ((Op.SIGNAL_IN, BATTERY, 0), f"instruction 0: slot {BATTERY} is no enumeration"),
-    ((Op.SIGNAL_IN, -1, 0), "instruction 0: slot -1 is no enumeration"),
+    (argument(0), "instruction 0: argument cell 0 is not a number"),
+    (argument(9), "instruction 0: argument cell 9 is not a number"),
+    ((Op.SIGNAL_IN, BATTERY, 0), f"instruction 0: slot {BATTERY} is not an enumeration"),
+    ((Op.SIGNAL_IN, -1, 0), "instruction 0: slot -1 is not an enumeration"),
     ((Op.KNOWN, -1, 0), "instruction 0: there is no slot -1"),
     ((Op.KNOWN, 99, 0), "instruction 0: there is no slot 99"),
     ((Op.KNOWN, FIX, 1), "instruction 0: an unused operand is not 0"),
     ((Op.SIGNAL_IN, FIX, 2), "instruction 0: there is no set 2"),
     ((Op.SIGNAL_IN, FIX, -1), "instruction 0: there is no set -1"),
-    ((Op.ARGUMENT_IN, 1, 0), "instruction 0: argument cell 1 is no choice and no zone"),
+    ((Op.ARGUMENT_IN, 1, 0), "instruction 0: argument cell 1 is not a choice and no zone"),
     ((Op.ARGUMENT_IN, 0, 2), "instruction 0: there is no set 2"),
     ((Op.POSITION_IN, 6, 0), "instruction 0: there is no zone 6"),
     ((Op.POSITION_IN, -1, 0), "instruction 0: there is no zone -1"),
     ((Op.POSITION_IN, 0, 1), "instruction 0: an unused operand is not 0"),
-    ((Op.POSITION_IN_ARGUMENT, 1, 0), "instruction 0: argument cell 1 is no zone"),
+    ((Op.POSITION_IN_ARGUMENT, 1, 0), "instruction 0: argument cell 1 is not a zone"),
     ((Op.POSITION_IN_ARGUMENT, 0, 1), "instruction 0: there is no table 1"),
-    ((Op.ARGUMENT_POINT_IN, 0, 0), "instruction 0: argument cell 0 is no place"),
+    ((Op.ARGUMENT_POINT_IN, 0, 0), "instruction 0: argument cell 0 is not a place"),
     ((Op.TIME_IN, DAY, 0), f"instruction 0: {DAY}..0 us is not a time of day"),
     ((Op.TIME_IN, 0, DAY + 1), f"instruction 0: 0..{DAY + 1} us is not a time of day"),
     ((Op.TIME_IN, -1, 0), "instruction 0: -1..0 us is not a time of day"),
@@ -131,11 +131,11 @@ def test_a_stack_that_is_just_deep_enough() -> None:
 def test_arguments_need_a_skill_that_has_them() -> None:
     inspect, goto, hover = (flat.CONTRACTS[skill] for skill in (INSPECT, GOTO, HOVER))
     altitude, place = apply(Op.LE, argument(1), const(0)), (Op.ARGUMENT_POINT_IN, 0, 0)
-    assert parse(altitude, SCOPE) == "instruction 0: an argument is named, but no skill is"
+    assert parse(altitude, SCOPE) == "instruction 0: an argument is named outside of a skill"
     assert not isinstance(parse(place, SCOPE.about(goto)), str)
     assert isinstance(parse(place, SCOPE.about(inspect)), str)
     assert not isinstance(parse(altitude, SCOPE.about(inspect, inspect)), str)
-    assert parse(altitude, SCOPE.about(inspect, hover)) == "instruction 0: argument cell 1 is no number"
+    assert parse(altitude, SCOPE.about(inspect, hover)) == "instruction 0: argument cell 1 is not a number"
 
 
 @given(st.lists(st.integers(-2, 45) | st.integers(), max_size=24))

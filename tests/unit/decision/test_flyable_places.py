@@ -49,7 +49,7 @@ def test_a_link_flies_no_higher_than_an_altitude_can_be() -> None:
     ("projection", "place", "what"),
     [
         (Projection(473_977_400, 85_455_900, 7_900_000, 1), (0, 10 * M), "latitude"),
-        (Projection(-170_000_000, 1_799_990_000, 1 << 6, 11_600_000), (200 * M, 0), "it is half around"),
+        (Projection(-170_000_000, 1_799_990_000, 1 << 6, 11_600_000), (200 * M, 0), "longitude is half around"),
         (Projection(899_900_000, 0, 2_000, 11_712_000), (0, 2_000 * M), "latitude"),
     ],
 )
@@ -71,7 +71,7 @@ def test_a_skill_that_covers_has_one_zone() -> None:
     changed = replace(inspect, parameters=(*inspect.parameters, second))
     contracts = tuple(changed if one is inspect else one for one in P.contracts)
     assert wrong(replace(P, contracts=contracts)) == (
-        "skill `inspect_area`: motion: a skill that covers a zone needs one, and no other"
+        "skill `inspect_area`: motion: a skill that covers a zone needs exactly one zone argument"
     )
 
 

@@ -375,4 +375,4 @@ def test_one_flight_takes_so_many_replacements_and_no_more() -> None:
 def test_so_many_may_be_few(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rtshcua.decision.session.MAX_REPLACEMENTS", 0)
     receipt = take(flight(), sign_replacement(shorter(OF), over=OF.bundle, flight=FLIGHT, kept=2, key=MISSION_KEY))
-    assert (receipt.slug, receipt.text) == ("too-many", "one flight takes at most 0 replacements")
+    assert (receipt.slug, receipt.text) == ("too-many", "one flight accepts at most 0 replacements")

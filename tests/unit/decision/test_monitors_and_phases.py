@@ -64,12 +64,12 @@ INNER = SCOPE.about(flat.CONTRACTS[INSPECT]).inside_monitor(1)
         ((Op.PHASE_IN, 0, 2), SCOPE, PhaseIn(2)),
         ((Op.PHASE_IN, 0, 3), SCOPE, PhaseIn(3)),
         ((Op.PHASE_IN, 0, 4), SCOPE, PhaseIn(4)),
-        ((Op.PHASE_IN, 0, 1), SCOPE, "instruction 0: set 1 is none of phases"),
+        ((Op.PHASE_IN, 0, 1), SCOPE, "instruction 0: set 1 is not a set of phases"),
         ((Op.PHASE_IN, 0, 5), SCOPE, "instruction 0: there is no set 5"),
         ((Op.PHASE_IN, 0, -1), SCOPE, "instruction 0: there is no set -1"),
         ((Op.PHASE_IN, 1, 2), SCOPE, "instruction 0: an unused operand is not 0"),
-        ((Op.PHASE_IN, 0, 2), INNER, "instruction 0: the phase is asked for where there is none"),
-        (apply(Op.LE, argument(1), const(0)), INNER, "instruction 0: an argument is named, but no skill is"),
+        ((Op.PHASE_IN, 0, 2), INNER, "instruction 0: the phase is not available here"),
+        (apply(Op.LE, argument(1), const(0)), INNER, "instruction 0: an argument is named outside of a skill"),
         ((Op.MONITOR, 0, 0), scope_of(flat.POLICY), "instruction 0: there is no monitor 0 here"),
     ],
 )
@@ -95,17 +95,17 @@ def observing(*monitors: Monitor) -> Policy:
         (observing(Monitor(FOR, S, asks(1)), CALM_FOR_3_S), "monitor 0: instruction 0: there is no monitor 1 here"),
         (
             replace(observing(Monitor(FOR, S, in_phases(2))), phases=NAMES, sets=SETS),
-            "monitor 0: instruction 0: the phase is asked for where there is none",
+            "monitor 0: instruction 0: the phase is not available here",
         ),
         (
             observing(Monitor(FOR, S, clause("altitude", apply(Op.LE, argument(1), const(0))))),
-            "monitor 0: instruction 0: an argument is named, but no skill is",
+            "monitor 0: instruction 0: an argument is named outside of a skill",
         ),
         (
             replace(flat.POLICY, phases=tuple(map(str, range(MAX_PHASE_NAMES + 1)))),
             "number of phase names 65 is not in 0..64",
         ),
-        (replace(flat.POLICY, phases=("a", "b", "a")), "two phase names are the same"),
+        (replace(flat.POLICY, phases=("a", "b", "a")), "two phases have the same name"),
         (
             replace(flat.POLICY, rules=(flat.rule(RuleKind.PERMIT, when=asks(0)),)),
             "rule 0: when: instruction 0: there is no monitor 0 here",
@@ -146,7 +146,7 @@ def test_the_reads_of_a_contract_count_its_monitors() -> None:
         hover = replace(P.contracts[HOVER], assume=(asks(0),), reads=reads)
         return prepare(replace(P, contracts=(*P.contracts[:HOVER], hover, *P.contracts[HOVER + 1 :])))
 
-    assert hovering((flat.FIX,)) == Refusal("malformed", "skill `hover`: `reads` is not what the clauses read")
+    assert hovering((flat.FIX,)) == Refusal("malformed", "skill `hover`: `reads` differs from what the clauses read")
     assert isinstance(hovering((WIND, flat.FIX)), PreparedPolicy)
 
 

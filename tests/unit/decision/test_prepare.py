@@ -64,7 +64,7 @@ def lacking(*without: str, **fields: Any) -> Policy:
 
 
 BAD = flat.clause("bad", (0, 0, 0))
-DEEP = "instruction 0: no instruction has the number 0"
+DEEP = "instruction 0: unknown instruction 0"
 
 POLICIES: list[tuple[Policy, str]] = [
     (replace(P, slots=MAX_SLOTS + 1), f"number of slots {MAX_SLOTS + 1} is not in 0..{MAX_SLOTS}"),
@@ -87,11 +87,11 @@ POLICIES: list[tuple[Policy, str]] = [
     (vehicle(endurance_us=0), f"vehicle: endurance 0 is not in 1..{1 << 42}"),
     (vehicle(reserve=10_001), "vehicle: reserve 10001 is not in 0..10000"),
     (vehicle(utc_offset_us=1 << 40), f"vehicle: offset from UTC {1 << 40} is not in -86400000000..86400000000"),
-    (vehicle(position=flat.HEIGHT), "vehicle: slot 1 is no position"),
-    (vehicle(position=flat.POSITION_Y), "vehicle: slot 6 is no position"),
-    (vehicle(height=flat.FIX), "vehicle: slot 4 is no height"),
-    (vehicle(height=-2), "vehicle: slot -2 is no height"),
-    (vehicle(battery=99), "vehicle: slot 99 is no battery"),
+    (vehicle(position=flat.HEIGHT), "vehicle: slot 1 is not a position"),
+    (vehicle(position=flat.POSITION_Y), "vehicle: slot 6 is not a position"),
+    (vehicle(height=flat.FIX), "vehicle: slot 4 is not a height"),
+    (vehicle(height=-2), "vehicle: slot -2 is not a height"),
+    (vehicle(battery=99), "vehicle: slot 99 is not a battery"),
     (replace(P, projection=replace(P.projection, latitude=1 << 30)), "projection: latitude 1073741824 is not in"),
     (replace(P, projection=replace(P.projection, longitude=1 << 31)), "projection: longitude 2147483648 is not in"),
     (replace(P, projection=replace(P.projection, east=0)), "projection: east 0 is not in 1.."),
@@ -105,7 +105,7 @@ POLICIES: list[tuple[Policy, str]] = [
     (zone(data=(0, 0, 1, 1, 2, MAX_COORDINATE + 1)), f"zone 0: coordinate {MAX_COORDINATE + 1} is not in"),
     (zone(floor=1 << 31), "zone 0: floor 2147483648 is not in"),
     (zone(floor=10, ceiling=9), "zone 0: ceiling 9 is not in 10.."),
-    (zone(shape=3), "zone 0: there is no shape 3"),
+    (zone(shape=3), "zone 0: unknown shape 3"),
     (zone(shape=CIRCLE), "zone 0: a circle has a centre and a squared radius"),
     (zone(shape=CIRCLE, data=(0, 0, 0)), "zone 0: squared radius 0 is not in 1.."),
     (zone(shape=CIRCLE, data=(1 << 40, 0, 1)), f"zone 0: coordinate {1 << 40} is not in"),
@@ -116,7 +116,7 @@ POLICIES: list[tuple[Policy, str]] = [
     (replace(P, sets=((1,),) * 4097), "number of sets 4097 is not in 0..4096"),
     (replace(P, sets=((1,) * 4097, (2,))), "set 0: number of members 4097 is not in 0..4096"),
     (replace(P, contracts=P.contracts[1:2] * 257), "number of contracts 257 is not in 0..256"),
-    (parameter(1, cell=2), "skill `inspect_area`: parameter `altitude`: cell 2 is not the next, 1"),
+    (parameter(1, cell=2), "skill `inspect_area`: parameter `altitude`: cell 2 is out of sequence; expected 1"),
     (parameter(1, kind=4), "skill `inspect_area`: parameter `altitude`: kind 4 is not in 0..3"),
     (parameter(1, low=-(1 << 53)), "skill `inspect_area`: parameter `altitude`: low bound"),
     (parameter(1, low=5, high=4), "skill `inspect_area`: parameter `altitude`: high bound 4 is not in 5.."),
@@ -129,19 +129,19 @@ POLICIES: list[tuple[Policy, str]] = [
         "skill `hover`: number of parameters 33 is not in 0..32",
     ),
     (contract(HOVER, motion=Motion(6, -1, -1)), "skill `hover`: motion 6 is not in 0..5"),
-    (contract(INSPECT, motion=Motion(3, 0, 3)), "skill `inspect_area`: motion: argument cell 0 is no altitude"),
-    (contract(INSPECT, motion=Motion(3, 1, 9)), "skill `inspect_area`: motion: argument cell 9 is no speed"),
+    (contract(INSPECT, motion=Motion(3, 0, 3)), "skill `inspect_area`: motion: argument cell 0 is not a altitude"),
+    (contract(INSPECT, motion=Motion(3, 1, 9)), "skill `inspect_area`: motion: argument cell 9 is not a speed"),
     (
         contract(INSPECT, motion=Motion(3, -1, 3)),
-        "skill `inspect_area`: motion: a skill that flies somewhere needs an altitude",
+        "skill `inspect_area`: motion: a skill that moves the vehicle needs an altitude",
     ),
     (
         contract(INSPECT, motion=Motion(2, 1, 3)),
-        "skill `inspect_area`: motion: a skill that flies to a place needs one",
+        "skill `inspect_area`: motion: a skill that flies to a place needs a place argument",
     ),
     (
         contract(GOTO, motion=Motion(3, 2, -1)),
-        "skill `goto`: motion: a skill that covers a zone needs one",
+        "skill `goto`: motion: a skill that covers a zone needs exactly one",
     ),
     (contract(HOVER, timing_class=3), "skill `hover`: timing class 3 is not in 0..2"),
     (contract(HOVER, deadline_us=-1), "skill `hover`: deadline -1 is not in 0.."),
@@ -153,7 +153,7 @@ POLICIES: list[tuple[Policy, str]] = [
     (contract(HOVER, require=(BAD,)), f"skill `hover`: require 0: {DEEP}"),
     (contract(HOVER, assume=(BAD,)), f"skill `hover`: assume 0: {DEEP}"),
     (contract(HOVER, maintain=(BAD,)), f"skill `hover`: maintain 0: {DEEP}"),
-    (contract(HOVER, reads=()), "skill `hover`: `reads` is not what the clauses read"),
+    (contract(HOVER, reads=()), "skill `hover`: `reads` differs from what the clauses read"),
     (contract(HOVER, fallback=(flat.link(7),)), "skill `hover`: fallback: link 0: there is no skill 7"),
     (contract(HOVER, fallback=(flat.link(-1),)), "skill `hover`: fallback: link 0: there is no skill -1"),
     (contract(HOVER, fallback=(flat.link(HOVER),) * 9), "skill `hover`: fallback: number of links 9 is not in 0..8"),
@@ -163,9 +163,9 @@ POLICIES: list[tuple[Policy, str]] = [
     ),
     (
         replace(P, contingency=(flat.link(INSPECT, 1, 20 * M, 0, 4 * M),)),
-        "contingency: link 0: a link has no path to cover a zone along",
+        "contingency: link 0: a link cannot call a skill that covers a zone, because links carry no path",
     ),
-    (replace(P, contingency=(flat.link(GOTO, 0, 0),)), "contingency: link 0: 2 argument cells instead of 3"),
+    (replace(P, contingency=(flat.link(GOTO, 0, 0),)), "contingency: link 0: 2 argument cells; the contract has 3"),
     (
         replace(P, contingency=(flat.link(GOTO, 0, 0, 4 * M),)),
         "contingency: link 0: argument `altitude` is out of range",
@@ -182,32 +182,32 @@ POLICIES: list[tuple[Policy, str]] = [
     (rule(roles=(-1,)), "rule 0: role indexes are not ascending"),
     (rule(sources=(4,)), "rule 0: there is no source 4"),
     (rule(when=BAD), f"rule 0: when: {DEEP}"),
-    (rule(skills=()), "rule 0: when: instruction 0: an argument is named, but no skill is"),
+    (rule(skills=()), "rule 0: when: instruction 0: an argument is named outside of a skill"),
     (rule(kind=RuleKind.CONFIRM), "rule 0: there is no role -1"),
     (rule(kind=RuleKind.CONFIRM, approver=0), "rule 0: within 0 is not in 1.."),
     (
         rule(kind=RuleKind.CONFIRM, approver=0, second=2, within_us=1),
         "rule 0: role of the second person 2 is not in -1..1",
     ),
-    (rule(second=0), "rule 0: a rule that confirms nothing asks a second person"),
-    (rule(kind=RuleKind.DEGRADE), "rule 0: degrade has no target"),
+    (rule(second=0), "rule 0: only a `confirm` rule can require a second person"),
+    (rule(kind=RuleKind.DEGRADE), "rule 0: a `degrade` rule needs a target"),
     (rule(kind=RuleKind.DEGRADE, target=flat.link(9)), "rule 0: target: there is no skill 9"),
     (replace(P, airspace=Airspace((6,), (), "", 0, 0, 1)), "airspace: there is no zone 6"),
     (replace(P, airspace=Airspace((), (-1,), "", 0, 0, 1)), "airspace: there is no zone -1"),
-    (contract(HOVER, record=("written", "synced")), "skill `hover`: recorded as `written` and as `synced`"),
-    (contract(HOVER, record=("buffered",)), "skill `hover`: recorded as `buffered`, which is for reflexes alone"),
+    (contract(HOVER, record=("written", "synced")), "skill `hover`: recorded as both `written` and `synced`"),
+    (contract(HOVER, record=("buffered",)), "skill `hover`: `record buffered` is only allowed for reflex skills"),
     (replace(P, without_evidence=2), "without evidence 2 is not in 0..1"),
     (replace(P, without_evidence=-1), "without evidence -1 is not in 0..1"),
-    (lacking("b", "a"), "vehicle: the signals that it is without are not ascending"),
-    (lacking("a", "a"), "vehicle: the signals that it is without are not ascending"),
-    (lacking(P.signals[0].name), f"vehicle: it is without the signal `{P.signals[0].name}`, which the policy reads"),
+    (lacking("b", "a"), "vehicle: the signals in `without` are not ascending"),
+    (lacking("a", "a"), "vehicle: the signals in `without` are not ascending"),
+    (lacking(P.signals[0].name), f"vehicle: the policy reads `{P.signals[0].name}`, which the vehicle is without"),
     (
         replace(P, left_out=(LeftOut(0, "assume", "x", 0, 0, 1),)),
-        "vehicle: `x` is left out, and it is without no signal",
+        "vehicle: `x` is left out, but the vehicle is without no signal",
     ),
     (lacking("a", left_out=(LeftOut(99, "assume", "x", 0, 0, 1),)), "vehicle: there is no skill 99"),
-    (lacking("a", left_out=(LeftOut(0, "permit", "x", 0, 0, 1),)), "vehicle: `x` is left out of `permit`, which no"),
-    (lacking("a", left_out=(LeftOut(0, "degrade", "x", 0, 0, 1),)), "vehicle: `x` is left out of `degrade`, which no"),
+    (lacking("a", left_out=(LeftOut(0, "permit", "x", 0, 0, 1),)), "vehicle: `x` is left out of `permit`, which is not"),
+    (lacking("a", left_out=(LeftOut(0, "degrade", "x", 0, 0, 1),)), "vehicle: `x` is left out of `degrade`, which is not"),
     (replace(P, silence_us=0), f"silence 0 is not in 1..{MAX_SILENCE}"),
     (replace(P, silence_us=-1), f"silence -1 is not in 1..{MAX_SILENCE}"),
     (replace(P, silence_us=MAX_SILENCE + 1), f"silence {MAX_SILENCE + 1} is not in 1..{MAX_SILENCE}"),
@@ -264,7 +264,7 @@ INVOCATIONS: list[tuple[Invocation, str]] = [
     (step(on_inadmissible=4), "on inadmissible 4 is not in 0..3"),
     (step(issued_at_us=-1), "issued at -1 is not in 0.."),
     (step(phases=1 << 64), "phases 18446744073709551616 is not in 0.."),
-    (step(arguments=S.arguments[:3]), "3 argument cells instead of 4"),
+    (step(arguments=S.arguments[:3]), "3 argument cells; the contract has 4"),
     (step(arguments=(1, 20 * M, 0, 1 << 53)), "argument 9007199254740992 is not in"),
     (mine(name="other"), "`name` is looser than in the policy"),
     (mine(motion=Motion(3, 1, -1)), "`motion` is looser than in the policy"),
@@ -305,43 +305,43 @@ INVOCATIONS: list[tuple[Invocation, str]] = [
     (mine(maintain=(BAD, *S.contract.maintain[1:])), "`maintain` is looser than in the policy"),
     (mine(record=()), "`record` is looser than in the policy"),
     (mine(record=(*S.contract.record, "written")), "`durability` is looser than in the policy"),
-    (mine(record=(*S.contract.record, "written", "synced")), "recorded as `written` and as `synced`"),
+    (mine(record=(*S.contract.record, "written", "synced")), "recorded as both `written` and `synced`"),
     (mine(assume=(*S.contract.assume, BAD)), f"assume 3: {DEEP}"),
     (
         # a clause of the mission's own is stricter, and may not be taken for one of the policy's
         mine(assume=(*S.contract.assume, replace(S.contract.assume[1], text=S.contract.assume[0].text))),
-        f"a clause says `{S.contract.assume[0].text}` in the policy's words, and is another",
+        f"clause `{S.contract.assume[0].text}` has the text of a policy clause but different code",
     ),
-    (plan(kind=2), "plan: kind 2 is not the skill's, 3"),
-    (plan(speed=3 * M), "plan: speed 3000 is not the argument, 4000"),
+    (plan(kind=2), "plan: kind 2 differs from the skill's, 3"),
+    (plan(speed=3 * M), "plan: speed 3000 differs from the argument, 4000"),
     (plan(speed=-1), "plan: speed -1 is not in 0.."),
     (plan(altitude=1 << 31), "plan: altitude 2147483648 is not in"),
-    (plan(altitude=21 * M), "plan: altitude 21000 is not the argument, 20000"),
+    (plan(altitude=21 * M), "plan: altitude 21000 differs from the argument, 20000"),
     (plan(path=(1, 2, 3)), "plan: a coordinate is missing"),
     (plan(path=(0, 0) * 8193), "plan: number of points 8193 is not in 0..8192"),
     (plan(path=(0, MAX_COORDINATE + 1)), f"plan: coordinate {MAX_COORDINATE + 1} is not in"),
-    (plan(path=(0, 0)), "plan: the path does not fit the arguments"),  # not in the area
-    (plan(path=(*flat.PATH[:2], 100 * M, 0)), "plan: the path does not fit the arguments"),
-    (plan(path=()), "plan: the path does not fit the arguments"),
+    (plan(path=(0, 0)), "plan: the path does not match the arguments"),  # not in the area
+    (plan(path=(*flat.PATH[:2], 100 * M, 0)), "plan: the path does not match the arguments"),
+    (plan(path=()), "plan: the path does not match the arguments"),
     (
         replace(flat.INVOCATIONS[1], plan=replace(flat.INVOCATIONS[1].plan, path=(0, 0))),
-        "plan: the path does not fit the arguments",
+        "plan: the path does not match the arguments",
     ),
     (
         replace(flat.INVOCATIONS[0], plan=replace(flat.INVOCATIONS[0].plan, path=(0, 0))),
-        "plan: the path does not fit the arguments",
+        "plan: the path does not match the arguments",
     ),
     (
         replace(flat.INVOCATIONS[3], plan=replace(flat.INVOCATIONS[3].plan, path=(0, 1))),
-        "plan: the path does not fit the arguments",
+        "plan: the path does not match the arguments",
     ),
     (
         replace(flat.INVOCATIONS[3], plan=replace(flat.INVOCATIONS[3].plan, path=())),  # a return leads home
-        "plan: the path does not fit the arguments",
+        "plan: the path does not match the arguments",
     ),
     (
         replace(flat.INVOCATIONS[3], plan=replace(flat.INVOCATIONS[3].plan, path=(0, 0, 0, 0))),
-        "plan: the path does not fit the arguments",
+        "plan: the path does not match the arguments",
     ),
 ]
 
@@ -408,23 +408,23 @@ def test_the_phases_of_a_step_are_those_that_its_contract_names_or_fewer(step: i
     assert isinstance(prepare_mission(phases(step, bits), POLICY), tuple)
 
 
-NO_NAME = "no name: letters of ASCII, digits, `_` and `.` make one"
+INVALID = "invalid: use ASCII letters, digits, `_` and `.`"
 
 
 @rows(
     ("mission", "what"),
     [
-        (replace(MISSION, policy="other"), "policy `other` is not the policy's, `bridge_inspection`"),
-        (replace(MISSION, policy_version=8), "policy version `8` is not the policy's, `7`"),
+        (replace(MISSION, policy="other"), "mission policy `other` differs from the policy's `bridge_inspection`"),
+        (replace(MISSION, policy_version=8), "mission policy version `8` differs from the policy's `7`"),
         *(
-            (replace(MISSION, name=name), f"the name of the mission is {NO_NAME}")
+            (replace(MISSION, name=name), f"the name of the mission is {INVALID}")
             for name in ("", "low` on `quad-07`: `hover()", "a.", "1st", "caf\u00e9", "a b", "a\n")
         ),
-        (replace(MISSION, phases=("departure", "x y", "recovery")), f"the name of the phase is {NO_NAME}"),
-        (replace(MISSION, vehicle="quad-08"), "vehicle `quad-08` is not the policy's, `quad-07`"),
+        (replace(MISSION, phases=("departure", "x y", "recovery")), f"the name of the phase is {INVALID}"),
+        (replace(MISSION, vehicle="quad-08"), "mission vehicle `quad-08` differs from the policy's `quad-07`"),
         (replace(MISSION, invocations=MISSION.invocations * 4097), "number of invocations 16388 is not in 0..16384"),
         (replace(MISSION, phases=("p",) * 65), "number of phases 65 is not in 0..64"),
-        (replace(MISSION, invocations=MISSION.invocations[1:]), "step 1 says it is step 2"),
+        (replace(MISSION, invocations=MISSION.invocations[1:]), "step 1 has the number of step 2"),
         (replace(MISSION, phases=("departure",)), "step 2: there is no phase 1"),
         (
             replace(MISSION, invocations=(MISSION.invocations[0], replace(MISSION.invocations[0], step=1))),
@@ -432,11 +432,11 @@ NO_NAME = "no name: letters of ASCII, digits, `_` and `.` make one"
         ),
         (replace(MISSION, invocations=(replace(MISSION.invocations[0], role=9),)), "step 1: there is no role 9"),
         *(
-            (saying(f" {each.text}\n"), f"a clause says `{each.text}` in the policy's words, and is another")
+            (saying(f" {each.text}\n"), f"clause `{each.text}` has the text of a policy clause but different code")
             for each in (P.rules[0], P.airspace)
         ),
-        (phases(2, 0b011), "step 3: it is valid in a phase that its contract does not name"),
-        (phases(0, 0b1001), "step 1: it is valid in a phase that its contract does not name"),
+        (phases(2, 0b011), "step 3 is valid in a phase that its contract does not name"),
+        (phases(0, 0b1001), "step 1 is valid in a phase that its contract does not name"),
     ],
 )
 def test_a_malformed_mission(mission: Mission, what: str) -> None:

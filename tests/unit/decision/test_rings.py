@@ -76,12 +76,18 @@ def test_any_outlines(outlines: list[Ring]) -> None:
         ((ISLAND, HOLE, SQUARE), None),
         (((*SQUARE, (0, 5)),), None),  # a straight corner
         (((*SQUARE[:1], (5, 0), *SQUARE[1:]),), None),
-        ((SQUARE[::-1],), "ring 0: it goes round the wrong way, or is nested wrongly at 0, 0"),
-        ((SQUARE, HOLE[::-1]), "ring 1: it goes round the wrong way, or is nested wrongly at 2, 2"),
-        ((SQUARE, ISLAND[::-1], HOLE), "ring 1: it goes round the wrong way, or is nested wrongly at 4, 4"),
-        ((HOLE,), "ring 0: it goes round the wrong way, or is nested wrongly at 2, 2"),
-        ((SQUARE, ((20, 0), (20, 5), (25, 5))), "ring 1: it goes round the wrong way, or is nested wrongly at 20, 0"),
-        ((((0, 0), (10, 10), (10, 0), (0, 10)),), "ring 0: it goes round"),  # a bow: the sweep sees its turn first
+        ((SQUARE[::-1],), "ring 0: the ring has the wrong orientation or is nested wrongly at 0, 0"),
+        ((SQUARE, HOLE[::-1]), "ring 1: the ring has the wrong orientation or is nested wrongly at 2, 2"),
+        ((SQUARE, ISLAND[::-1], HOLE), "ring 1: the ring has the wrong orientation or is nested wrongly at 4, 4"),
+        ((HOLE,), "ring 0: the ring has the wrong orientation or is nested wrongly at 2, 2"),
+        (
+            (SQUARE, ((20, 0), (20, 5), (25, 5))),
+            "ring 1: the ring has the wrong orientation or is nested wrongly at 20, 0",
+        ),
+        (
+            (((0, 0), (10, 10), (10, 0), (0, 10)),),
+            "ring 0: the ring has the wrong orientation",
+        ),  # a bow: the sweep sees its turn first
         ((((0, 0), (10, 0), (0, 10), (10, 10)),), "ring 0: edges cross or touch at 10, 0"),
         ((((0, 0), (10, 0), (20, 0)),), "ring"),
         ((((0, 0), (10, 0), (10, 10), (10, 5)),), "ring"),  # folded back

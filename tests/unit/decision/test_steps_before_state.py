@@ -47,7 +47,7 @@ def test_a_place_out_of_all_coordinates() -> None:
     step = flat.INVOCATIONS[1]
     there = replace(step, arguments=(far + 1, 0, 20_000))
     found = prepare_invocation(there, POLICY, flat.MISSION.phases)
-    assert found == Refusal("malformed", "plan: the path does not fit the arguments")
+    assert found == Refusal("malformed", "plan: the path does not match the arguments")
     edge = replace(step, arguments=(far, 0, 20_000), plan=replace(step.plan, path=(far, 0)))
     assert ask(edge).reason is Reason.AIRSPACE
 

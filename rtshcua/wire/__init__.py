@@ -1,1 +1,3 @@
-"""What crosses a wire: canonical bytes, digests, keys by duty, signed envelopes, and the root that names the keys."""
+"""The wire formats: canonical bytes, digests, keys by duty, signed envelopes, and the trust root that names the
+keys.
+"""

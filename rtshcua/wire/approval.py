@@ -1,8 +1,8 @@
-"""Approvals: a person's signed answer to the `confirm` rules that ask for one, about one step of one mission.
+"""Approvals: a person's signed answer, for one step of one mission, to the `confirm` rules that require an approval.
 
-It names the flight by its id, the mission by its digest, and the step by its invocation's id and binding, so it means
-nothing for any other. The key must have duty `approval`, and the root must let it speak for the role in person on this
-vehicle.
+An approval names the flight by its id, the mission by its digest, and the step by its invocation's id and binding,
+so it is valid for no other. The key must have duty `approval`, and the root must allow it to act in person for the
+role on this vehicle.
 """
 
 from collections.abc import Collection, Sequence
@@ -44,8 +44,8 @@ class ApprovalDocument(Flat, frozen=True):
 
 
 class Answered(NamedTuple):
-    """A verified answer: about which invocation, by which role and person (numbers), `monotonic_us` when it came,
-    `expires_us` UTC.
+    """A verified answer: its invocation, its role and person (numbers), the moment of receipt `monotonic_us`, and
+    `expires_us` in UTC.
     """
 
     about: Invocation
@@ -72,48 +72,53 @@ def open_approval(
     missions: Collection[bytes] = (),
     replaced: Sequence[Invocation] = (),
 ) -> Answered:
-    """What a signed approval answers, if it is to be trusted here and now, about a step of the mission in force.
+    """The verified answer to a step of the mission in force, if the approval is trusted now.
 
-    A refusal may be about a step of any of the flight's `missions`, `replaced` or not: it is of what that asked for, so
-    nobody outruns it by replacing. It counts for a step in force that asks for the same.
+    A refusal may name a step of any of the flight's `missions`, replaced or not. It applies to every step in force
+    that requests the same, so that a replacement cannot evade it.
 
-    Raises `DocumentError`: its own slugs are `wrong-vehicle`, `other-flight`, `other-mission`, `unknown-invocation`,
-    `binding-mismatch`, `not-asked`; and `EnvelopeError`, `BundleError` and `ArtefactError`.
+    Raises `DocumentError`: its own slugs are `wrong-vehicle`, `other-flight`, `other-mission`,
+    `unknown-invocation`, `binding-mismatch`, `not-asked`; and `EnvelopeError`, `BundleError` and `ArtefactError`.
     """
     said, opened = open_document(document, names.APPROVAL, ApprovalDocument, Duty.APPROVAL, root, now)
     if said.granted not in (0, 1):
-        raise DocumentError("malformed", "it neither grants nor refuses")
+        raise DocumentError("malformed", "`granted` must be 0 or 1")
     check_vehicle(said.vehicle, vehicle)
     check_person(opened.key, said.role, vehicle, now)
     check_times(said.issued_at_us, said.expires_at_us, now)
     check_flight(said.flight, flight)
     if said.mission != bundle.mission_digest and (said.granted or said.mission not in missions):
-        raise DocumentError("other-mission", "it is about a step of another mission than the one in force")
+        raise DocumentError("other-mission", "the approval is for a step of a mission that is not in force")
     policy, steps = bundle.policy, bundle.mission.invocations
     meant = steps if said.granted else (*steps, *replaced)
     named = next((each for each in meant if each.invocation_id == said.invocation_id), None)
-    # the last one that asks for the same: those before it may be decided
+    # the last step that requests the same, because earlier ones may be decided already
     invocation = named if named in steps else next((each for each in reversed(steps) if _alike(each, named)), None)
     if named is None or invocation is None:
-        raise DocumentError("unknown-invocation", "it is about no step of the mission in force")
+        raise DocumentError("unknown-invocation", "the approval is for a step that is not in the mission in force")
     if named.binding != said.binding:
         raise DocumentError(
-            "binding-mismatch", f"it was made for another {step_words(named.step)} than the one in force"
+            "binding-mismatch", f"the approval is for a different {step_words(named.step)} than the one in force"
         )
     role = policy.roles.index(said.role) if said.role in policy.roles else -1
     if role < 0 or not confirms(policy, invocation, role):
-        text = f"no `confirm` of the policy asks role `{said.role[:80]}` about {step_words(invocation.step)}"
+        text = (
+            f"no `confirm` rule of the policy requires an approval by role `{said.role[:80]}` for "
+            f"{step_words(invocation.step)}"
+        )
         raise DocumentError("not-asked", text)
     return Answered(invocation, role, root.person(opened.key), said.granted, now.monotonic_us, said.expires_at_us)
 
 
 def _alike(a: Invocation, b: Invocation | None) -> bool:
-    """Whether two steps ask for the same: the skill with its arguments."""
+    """Whether two steps request the same: the same skill with the same arguments."""
     return b is not None and (a.skill, a.arguments) == (b.skill, b.arguments)
 
 
 def confirms(policy: Policy, invocation: Invocation, role: int) -> tuple[int, ...]:
-    """The numbers of the `confirm` rules that may ask this role about an invocation, whatever their conditions say."""
+    """The numbers of the `confirm` rules that may require this role's approval of an invocation, ignoring their
+    conditions.
+    """
     return tuple(
         number
         for number, rule in enumerate(policy.rules)
@@ -131,11 +136,11 @@ def _concerns(rule: Rule, invocation: Invocation) -> bool:
 
 
 class Approvals:
-    """The verified answers of one flight, and what a decision is told of them.
+    """The verified answers of one flight, for use in decisions.
 
-    A grant is for one invocation, by its id, until it expires. A refusal is for good, and for what it refused: the
-    skill with its arguments, in whatever step of whatever mission of this flight they stand. What is kept is bounded:
-    of each person in each role one grant for each step in force, and one refusal for each step that ever was.
+    A grant is for one invocation, by its id, until it expires. A refusal is permanent and applies to the skill
+    with its arguments, in any step of any mission of this flight. The size is bounded: for each person and role
+    one grant for each step in force, and one refusal for each step that ever was.
     """
 
     def __init__(self, policy: Policy) -> None:
@@ -143,19 +148,19 @@ class Approvals:
         self._answers: dict[_Subject, Answered] = {}
 
     def add(self, answered: Answered, now: Now) -> None:
-        """Take an answer in. Raises `DocumentError`, and changes nothing, for one that is there already
-        (`already-answered`), and where as many are kept as fit (`too-many`).
+        """Add an answer. Raises `DocumentError`, without a change, if it is present already (`already-answered`) or
+        the limit is reached (`too-many`).
         """
         key = _subject(answered.about, answered)
         held = self._answers.get(key)
         if held is not None and _counts(held, now):
-            raise DocumentError("already-answered", f"{step_words(answered.about.step)} has this answer already")
+            raise DocumentError("already-answered", f"{step_words(answered.about.step)} already has this answer")
         if held is None and len(self._answers) == MAX_ANSWERS:
             raise DocumentError("too-many", f"one flight accepts at most {MAX_ANSWERS} answers")
         self._answers[key] = answered
 
     def keep(self, invocations: tuple[Invocation, ...]) -> None:
-        """These are the steps now. Grants of others are dropped; refusals stay."""
+        """Set the steps in force. Grants for other steps are dropped; refusals stay."""
         if not self._answers:
             return
         ids = {each.invocation_id for each in invocations}
@@ -166,7 +171,7 @@ class Approvals:
         }
 
     def about(self, invocation: Invocation, now: Now) -> tuple[ConfirmAnswer, ...]:
-        """What `decide` reads of them: one entry for each answer that counts and each rule that it answers."""
+        """The approvals that `decide` reads: one entry for each valid answer and each rule that it answers."""
         if not self._answers:
             return ()
         return tuple(
@@ -177,12 +182,12 @@ class Approvals:
         )
 
 
-#: what an answer is about, by which role and person it is, and whether it grants
+#: : the subject of an answer, its role and person, and whether it grants
 _Subject = tuple[bytes | tuple[int, tuple[int, ...]], int, int, int]
 
 
 def _subject(invocation: Invocation, answered: Answered) -> _Subject:
-    """A grant is about one invocation, a refusal about what any invocation asks for."""
+    """The subject of an answer: of a grant one invocation, of a refusal what any invocation requests."""
     about = invocation.invocation_id if answered.granted else (invocation.skill, invocation.arguments)
     return about, answered.role, answered.person, answered.granted
 

@@ -1,6 +1,6 @@
-"""The frame of every CBOR artefact: the array of format name, integer version and body.
+"""The frame of every CBOR artefact: an array of format name, integer version and body.
 
-An array, not a map: the bytes then really begin with name and version, whatever the body's keys sort like.
+It is an array and not a map, so that the bytes begin with name and version, independent of the sort order of keys.
 """
 
 from typing import Final, TypeVar, cast
@@ -18,41 +18,43 @@ _INT64_MAX: Final = (1 << 63) - 1
 
 
 class ArtefactError(Untrusted):
-    """Bytes that are no such artefact: `malformed`, `unknown-format`, `unknown-version`."""
+    """Bytes that are not the expected artefact: `malformed`, `unknown-format`, `unknown-version`."""
 
 
 def wrap(artefact: Artefact, body: object) -> bytes:
-    """The canonical bytes of an artefact. Raises `CborError` for a body that has none."""
+    """The canonical bytes of an artefact. Raises `CborError` for a body that cannot be encoded."""
     return cbor.encode((artefact.name, artefact.version, body))
 
 
 def unwrap(artefact: Artefact, data: bytes, *, items: int = 0) -> Value:
-    """The body of `data`, which must be this very artefact in this very version. Raises `ArtefactError`.
+    """The body of `data`, which must be this artefact in this version. Raises `ArtefactError`.
 
-    `items` bounds what the artefact's format does not: for what nobody verified. Name and version are looked at before
-    anything below them is decoded.
+    `items` limits the CBOR items of unverified data whose format has no limit of its own. Name and version are
+    checked before the rest is decoded.
     """
     claimed = _claimed(data)
     if claimed is not None:
         name, version = claimed
         if name != artefact.name.encode():
             said = name[:80].decode("utf-8", "replace")
-            raise ArtefactError("unknown-format", f"this is `{said}`, not `{artefact.name}`")
+            raise ArtefactError("unknown-format", f"expected `{artefact.name}`, found `{said}`")
         if version != artefact.version:
-            text = f"`{artefact.name}` version {version} is unknown here; only version {artefact.version} is read"
-            older = f"; {names.COMPATIBILITY} says what reads earlier ones" if version < artefact.version else ""
+            text = (
+                f"`{artefact.name}` version {version} is not supported; this program reads version {artefact.version}"
+            )
+            older = f"; see {names.COMPATIBILITY} for earlier versions" if version < artefact.version else ""
             raise ArtefactError("unknown-version", text + older)
     try:
         value = cbor.decode(data, items=artefact.items or items or cbor.LIMIT)
     except CborError as error:
-        raise ArtefactError("malformed", f"this is no `{artefact.name}`: not canonical CBOR: {error}") from None
+        raise ArtefactError("malformed", f"not a `{artefact.name}`: not canonical CBOR: {error}") from None
     if claimed is None:
-        raise ArtefactError("malformed", f"this is no `{artefact.name}`: not an array of format name, version and body")
+        raise ArtefactError("malformed", f"not a `{artefact.name}`: expected an array of format name, version and body")
     return cast("tuple[Value, ...]", value)[2]
 
 
 def _claimed(data: bytes) -> tuple[bytes, int] | None:
-    """The name and the version that bytes begin with; None where they do not begin as an artefact."""
+    """The name and the version at the beginning of the bytes; None if they do not begin as an artefact."""
     try:
         array, count, at = cbor.head(data, 0)
         text, size, start = cbor.head(data, at)
@@ -74,8 +76,8 @@ def pack(artefact: Artefact, body: msgspec.Struct) -> bytes:
 def unpack(
     artefact: Artefact, data: bytes, shape: type[_S], error: type[Untrusted], what: str, *, items: int = 0
 ) -> _S:
-    """The body of `data`, a struct, provided that `pack` gives `data` of it. `items` is as for `unwrap`. Raises
-    `error`, slug `malformed`, with `what` it is not, and `ArtefactError`.
+    """The body of `data`, a struct, provided that `pack` encodes it to `data`. `items` is as for `unwrap`. Raises
+    `ArtefactError`, and `error` with slug `malformed` and `what` was expected.
     """
     try:
         body = msgspec.convert(unwrap(artefact, data, items=items), shape, builtin_types=(bytes,))

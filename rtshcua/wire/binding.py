@@ -1,8 +1,8 @@
-"""The binding (paper symbol `B`): one digest over everything that an invocation says and rests on.
+"""The binding (paper symbol `B`): one digest over an invocation and everything that it depends on.
 
-The published binding leaves out `pre`, `sc`, `f_b` and `ev`, so that they could be weakened unseen; this one covers
-every field of the invocation, its whole contract among them, and what it stands in: the policy by digest and version,
-the vehicle, and the mission.
+The published binding leaves out `pre`, `sc`, `f_b` and `ev`, so that these could be weakened unnoticed. This one
+covers every field of the invocation including its whole contract, and its context: the policy by digest and
+version, the vehicle, and the mission.
 """
 
 from typing import Final
@@ -23,9 +23,9 @@ _INVOCATION: Final = Domain(b"rtshcua/invocation")
 def bind(mission: Mission, policy_digest: bytes, *, after: bytes = b"") -> Mission:
     """The mission under the policy of that digest, every invocation with its id and its binding.
 
-    An id depends on all that the mission says, the time of its issue and the step, so the same inputs give the same id,
-    and no other mission or time of issue gives it again. `after` names what the mission replaces, if it does; a mission
-    that replaces another has other ids than the same one by itself.
+    An id depends on the whole mission, its time of issue and the step, so equal inputs give equal ids, and no
+    other mission or time of issue repeats them. `after` names the mission that this one replaces, if any; a
+    replacement has other ids than the same mission on its own.
     """
     mission = msgspec.structs.replace(mission, policy_digest=policy_digest)
     identified = [
@@ -37,7 +37,7 @@ def bind(mission: Mission, policy_digest: bytes, *, after: bytes = b"") -> Missi
 
 
 def binding_of(mission: Mission, invocation: Invocation) -> bytes:
-    """The binding that an invocation of this mission must carry: 32 bytes."""
+    """The binding of an invocation of this mission: 32 bytes."""
     around = [
         mission.policy_digest,
         mission.policy,
@@ -52,9 +52,9 @@ def binding_of(mission: Mission, invocation: Invocation) -> bytes:
 
 
 def first_misnamed(mission: Mission, *, after: bytes = b"") -> int | None:
-    """The index of the first invocation whose id is not the one that `bind` gives it, or None.
+    """The index of the first invocation whose id differs from the one that `bind` computes, or None.
 
-    Nobody chooses ids, so one that stood for something else before never comes again.
+    Because ids are computed, an id that was used for something else cannot be chosen again.
     """
     for index, (invocation, name) in enumerate(zip(mission.invocations, _ids(mission, after), strict=True)):
         if invocation.invocation_id != name:
@@ -63,7 +63,7 @@ def first_misnamed(mission: Mission, *, after: bytes = b"") -> int | None:
 
 
 def first_unbound(mission: Mission) -> int | None:
-    """The index of the first invocation whose binding is not the one it must carry, or None."""
+    """The index of the first invocation whose binding differs from the computed one, or None."""
     for index, invocation in enumerate(mission.invocations):
         if invocation.binding != binding_of(mission, invocation):
             return index
@@ -71,7 +71,7 @@ def first_unbound(mission: Mission) -> int | None:
 
 
 def _ids(mission: Mission, after: bytes) -> list[bytes]:
-    """The ids of a mission's steps, from all that it says without them and the bindings."""
+    """The ids of a mission's steps, computed from the mission without its ids and bindings."""
     blank = tuple(msgspec.structs.replace(each, invocation_id=b"", binding=b"") for each in mission.invocations)
     root = digest(_INVOCATION, _encoded(msgspec.structs.replace(mission, invocations=blank)) + after)
     return [digest(_INVOCATION, cbor.encode([root, each.step]))[:ID_BYTES] for each in blank]

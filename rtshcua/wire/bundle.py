@@ -1,7 +1,7 @@
 """A bundle: the policy's envelope and the mission's, nested as signed bytes.
 
 Each envelope is a COSE_Sign1 around an artefact whose body is the flat form. Payloads are verified before they are
-parsed, and their digests are those of the bytes that were signed.
+parsed, and their digests are those of the signed bytes.
 """
 
 from collections.abc import Iterable
@@ -20,9 +20,9 @@ from rtshcua.wire.names import Artefact
 from rtshcua.wire.trust import TrustRoot, key_refusal, proposer_refusal
 from rtshcua.wire.untrusted import Untrusted
 
-#: a bundle larger than this is refused unread, in bytes
+#: : a larger bundle is refused unread, in bytes
 MAX_BUNDLE: Final = 16 << 20
-#: and of a policy or a mission that nobody verified at most so many CBOR items are decoded
+#: : the most CBOR items that are decoded of an unverified policy or mission
 MAX_UNVERIFIED: Final = 1 << 17
 
 _F = TypeVar("_F", bound=Flat)
@@ -54,17 +54,17 @@ class Bundle:
 
 
 def policy_payload(policy: Policy) -> bytes:
-    """The bytes that a policy key signs."""
+    """The bytes of a policy that a policy key signs."""
     return artefact.pack(names.POLICY, policy)
 
 
 def mission_payload(mission: Mission) -> bytes:
-    """The bytes that a mission key signs."""
+    """The bytes of a mission that a mission key signs."""
     return artefact.pack(names.MISSION, mission)
 
 
 def policy_digest(payload: bytes) -> bytes:
-    """The name of a policy: what the mission and every binding refer to."""
+    """The digest by which the mission and every binding refer to the policy."""
     return digest.digest(digest.POLICY, payload)
 
 
@@ -75,7 +75,7 @@ def seal(policy: bytes, mission: bytes, *, policy_key: SigningKey, mission_key: 
 
 
 def seal_under(envelope: bytes, mission: bytes, *, mission_key: SigningKey) -> bytes:
-    """Sign a mission's payload, and nest it beside the envelope of a policy that was signed before.
+    """Sign a mission's payload, and nest it with the envelope of a policy that was signed before.
 
     Raises `WrongDuty` for a key of another duty.
     """
@@ -84,7 +84,7 @@ def seal_under(envelope: bytes, mission: bytes, *, mission_key: SigningKey) -> b
 
 
 def open_bundle(data: bytes, *, root: TrustRoot, vehicle: str | None, now_us: int) -> Bundle:
-    """Verify a bundle under a trust root, for `vehicle` (None: whichever it names), at a UTC time; then parse it.
+    """Verify a bundle under a trust root, for `vehicle` (None: the one that it names), at a UTC time; then parse it.
 
     Raises `BundleError`, `EnvelopeError` and `ArtefactError`.
     """
@@ -107,7 +107,7 @@ def open_bundle(data: bytes, *, root: TrustRoot, vehicle: str | None, now_us: in
 
 
 def claimed_vehicle(data: bytes) -> str:
-    """The identity of the vehicle that a bundle says it is for, whoever signed it: to find what is kept of that one.
+    """The identity of the vehicle that an unverified bundle names, to find that vehicle's stored state.
 
     Raises `BundleError`, `EnvelopeError` and `ArtefactError`.
     """
@@ -116,7 +116,8 @@ def claimed_vehicle(data: bytes) -> str:
 
 
 def check_bundle(bundle: Bundle, vehicle: str, now_us: int, *, after: bytes = b"") -> None:
-    """Whether the parts belong together, and their keys may speak for them on this vehicle; `after` is as for `bind`.
+    """Check that the parts belong together, and that their keys are authorised for them on this vehicle. `after` is
+    as for `bind`.
 
     Raises `BundleError`.
     """
@@ -127,32 +128,32 @@ def check_bundle(bundle: Bundle, vehicle: str, now_us: int, *, after: bytes = b"
 def envelopes(data: bytes) -> tuple[bytes, bytes]:
     """The policy's and the mission's envelope, unopened. Raises `BundleError` and `ArtefactError`."""
     if len(data) > MAX_BUNDLE:
-        raise BundleError("too-large", f"a bundle of {len(data)} bytes is not read; at most {MAX_BUNDLE} are")
+        raise BundleError("too-large", f"the bundle is {len(data)} bytes; the limit is {MAX_BUNDLE}")
     match artefact.unwrap(names.BUNDLE, data):
         case (bytes(policy), bytes(mission)):
             return policy, mission
-    raise BundleError("malformed", "a bundle holds two envelopes, the policy's and the mission's")
+    raise BundleError("malformed", "a bundle must contain two envelopes, the policy's and the mission's")
 
 
 def parse(kind: Artefact, payload: bytes, shape: type[_F]) -> _F:
-    """The flat form in a payload that was verified. Raises `BundleError` and `ArtefactError`."""
+    """The flat form in a verified payload. Raises `BundleError` and `ArtefactError`."""
     return artefact.unpack(kind, payload, shape, BundleError, f"`{kind.name}`")
 
 
 def parse_unverified(kind: Artefact, payload: bytes, shape: type[_F]) -> _F:
-    """The flat form in a payload of whoever: as `parse`, and it is refused where taking it apart would take long."""
+    """The flat form in an unverified payload: as `parse`, with a limit on the work of decoding it."""
     return artefact.unpack(kind, payload, shape, BundleError, f"`{kind.name}`", items=MAX_UNVERIFIED)
 
 
 def open_envelope(envelope: bytes, root: TrustRoot, duty: Duty, kind: Artefact, limit: int = MAX_BUNDLE) -> Opened:
     """The payload of an artefact that a key of the root signed for a duty. Raises `EnvelopeError`.
 
-    All keys of the root are offered, so that one of another duty is told apart from one that nobody knows; and one that
-    was revoked from both.
+    All keys of the root are candidates, so that a key of another duty, an unknown key and a revoked key are
+    distinguished.
     """
     signer = cose.unverified(envelope, limit=limit).kid
     if signer in root.revocations:
-        raise EnvelopeError("revoked-key", f"key {signer.hex()} was revoked by the trust root")
+        raise EnvelopeError("revoked-key", f"key {signer.hex()} is revoked by the trust root")
     keys = {key.kid: key for key in root.keys}
     return cose.open1(envelope, keys=keys, duty=duty, content_type=kind.content_type, limit=limit)
 
@@ -160,7 +161,7 @@ def open_envelope(envelope: bytes, root: TrustRoot, duty: Duty, kind: Artefact, 
 def _check_belonging(bundle: Bundle, after: bytes) -> None:
     policy, mission = bundle.policy, bundle.mission
     if mission.policy_digest != bundle.policy_digest:
-        raise BundleError("wrong-policy", "the mission was signed for another policy than the one beside it")
+        raise BundleError("wrong-policy", "the mission was signed for another policy than the one in this bundle")
     if (mission.policy, mission.policy_version) != (policy.name, policy.version):
         raise BundleError(
             "wrong-policy",
@@ -173,11 +174,11 @@ def _check_belonging(bundle: Bundle, after: bytes) -> None:
         )
     unbound = binding.first_unbound(mission)
     if unbound is not None:
-        raise BundleError("binding-mismatch", f"the binding of {step_words(unbound)} is not the one over its fields")
+        raise BundleError("binding-mismatch", f"the binding of {step_words(unbound)} does not match its fields")
     misnamed = binding.first_misnamed(mission, after=after)
     if misnamed is not None:
         raise BundleError(
-            "id-mismatch", f"the id of {step_words(misnamed)} is not the one that follows from the mission"
+            "id-mismatch", f"the id of {step_words(misnamed)} does not match the one computed from the mission"
         )
 
 
@@ -187,12 +188,16 @@ def _check_entitled(bundle: Bundle, vehicle: str, now_us: int) -> None:
         raise BundleError("wrong-vehicle", f"the bundle is for `{identity}`, this vehicle is `{vehicle}`")
     refusal = key_refusal(bundle.policy_key, vehicle=vehicle, now_us=now_us)
     if refusal:
-        raise BundleError(refusal, f"the policy's key {bundle.policy_key.kid.hex()} may not speak for `{vehicle}` now")
+        raise BundleError(
+            refusal, f"the policy's key {bundle.policy_key.kid.hex()} is not authorised for `{vehicle}` now"
+        )
     check_proposer(bundle.mission_key, bundle.policy, bundle.mission.invocations, now_us)
 
 
 def check_proposer(key: VerificationKey, policy: Policy, invocations: Iterable[Invocation], now_us: int) -> None:
-    """Whether a mission key may sign each of these steps under a policy, on its vehicle. Raises `BundleError`."""
+    """Check that a mission key is authorised to sign each of these steps under a policy, on its vehicle. Raises
+    `BundleError`.
+    """
     vehicle = policy.vehicle.identity
     for invocation in invocations:
         role, source = _speaker(policy, invocation)
@@ -200,7 +205,7 @@ def check_proposer(key: VerificationKey, policy: Policy, invocations: Iterable[I
         if refusal:
             raise BundleError(
                 refusal,
-                f"the mission's key {key.kid.hex()} may not speak for role `{role}` through `{source}` "
+                f"the mission's key {key.kid.hex()} is not authorised for role `{role}` through `{source}` "
                 f"under `{policy.name}` on `{vehicle}`",
             )
 
@@ -208,5 +213,7 @@ def check_proposer(key: VerificationKey, policy: Policy, invocations: Iterable[I
 def _speaker(policy: Policy, invocation: Invocation) -> tuple[str, str]:
     """The names of an invocation's role and source."""
     if not 0 <= invocation.role < len(policy.roles) or invocation.source not in SourceKind._value2member_map_:
-        raise BundleError("malformed", f"{step_words(invocation.step)} has no role or source that the policy knows")
+        raise BundleError(
+            "malformed", f"{step_words(invocation.step)} has a role or source that the policy does not declare"
+        )
     return policy.roles[invocation.role], SourceKind(invocation.source).name.lower()

@@ -1,7 +1,8 @@
-"""Cancellations: a proposer's signed word that its mission is not to go on, which brings the vehicle home.
+"""Cancellations: a proposer's signed order to stop its mission, after which the vehicle returns by the contingency.
 
-It names the flight by its id and one of its missions by its digest, and nothing of where the vehicle goes: that is the
-policy's contingency. The key must have duty `mission`, and the root must let it propose every step that is set aside.
+A cancellation names the flight by its id and one of its missions by its digest. It does not say where the vehicle
+goes: the policy's contingency does. The key must have duty `mission`, and the root must allow it to propose every
+step that is cancelled.
 """
 
 from collections.abc import Collection
@@ -17,7 +18,7 @@ from rtshcua.wire.trust import TrustRoot
 
 
 class CancellationDocument(Flat, frozen=True):
-    """What a mission key signs: the mission of that digest goes on no further in this flight. Times are UTC, us."""
+    """The content that a mission key signs: the mission of that digest ends in this flight. Times are UTC, us."""
 
     flight: bytes
     mission: bytes
@@ -41,17 +42,17 @@ def open_cancellation(
     current: int,
     now: Now,
 ) -> CancellationDocument:
-    """A cancellation that is to be trusted here and now, for a flight of `missions` (the one that was opened and those
-    that replaced it), of which `bundle` is in force. Its steps from `current` on are set aside.
+    """The cancellation in a document, if it is trusted now, for a flight of `missions` (the first one and its
+    replacements), of which `bundle` is in force. It cancels the steps from `current` on.
 
     Raises `DocumentError`: its own slugs are `wrong-vehicle`, `key-expired`, `other-flight`, `other-mission`;
-    `BundleError` for a key that may not propose what it would set aside; `EnvelopeError` and `ArtefactError`.
+    `BundleError` for a key that may not propose a cancelled step; `EnvelopeError` and `ArtefactError`.
     """
     said, opened = open_document(document, names.CANCELLATION, CancellationDocument, Duty.MISSION, root, now)
     check_key(opened.key, vehicle, now)
     check_times(said.issued_at_us, said.expires_at_us, now)
     check_flight(said.flight, flight)
     if said.mission not in missions:
-        raise DocumentError("other-mission", "it cancels another mission than the one that flies")
+        raise DocumentError("other-mission", "the cancellation is for a mission that does not fly")
     check_set_aside(opened.key, bundle, current)
     return said

@@ -1,30 +1,31 @@
-"""Deterministic CBOR (RFC 8949, section 4.2.1): one value, one encoding.
+"""Deterministic CBOR (RFC 8949, section 4.2.1): each value has exactly one encoding.
 
-Values are 64-bit integers, byte and text strings, booleans, null, arrays, and maps with text or integer keys; there are
-no floats, tags, indefinite lengths or other simple values. Map keys are in the bytewise order of their encodings (the
-canonical mode of cbor2 sorts by length first, the older rule of RFC 7049, and its encoder is slower than this one).
+Values are 64-bit integers, byte and text strings, booleans, null, arrays, and maps with text or integer keys.
+Floats, tags, indefinite lengths and other simple values are excluded. Map keys are in the bytewise order of their
+encodings (the canonical mode of cbor2 sorts by length first, the older rule of RFC 7049, and its encoder is slower
+than this one).
 
-The decoder accepts only the bytes that the encoder would have made. It is written to be read, and to say where and why
-bytes are refused; a second implementation must agree with it in every refusal: reason and place. It can be told how
-many items there may be: each array and map announces its own, so too many are refused before they are decoded.
+The decoder accepts only the bytes that the encoder produces. It reports the reason and the place of each refusal,
+and a second implementation must report the same. It can limit the number of items: each array and map announces
+its size, so an excess is refused before it is decoded.
 """
 
 from collections.abc import Mapping, Sequence
 from struct import Struct
 from typing import Final, TypeAlias, cast
 
-#: what a decoded item is; arrays come back as tuples
+#: : the type of a decoded item; arrays are decoded as tuples
 Value: TypeAlias = "bool | int | bytes | str | tuple[Value, ...] | dict[str | int, Value] | None"
 
 #: how deep arrays and maps may nest
 MAX_DEPTH: Final = 32
 
-#: the most bytes that `decode` takes unless told otherwise
+#: : the default limit of `decode`, in bytes
 LIMIT: Final = 16 << 20
 
 
 class CborError(ValueError):
-    """Bytes that are not canonical, or a value that has no canonical bytes (then `offset` is None)."""
+    """Bytes that are not canonical, or a value that cannot be encoded (then `offset` is None)."""
 
     def __init__(self, reason: str, offset: int | None = None) -> None:
         super().__init__(reason if offset is None else f"{reason} (byte {offset})")
@@ -40,9 +41,10 @@ _WITH_8 = Struct(">BQ").pack
 
 
 def encode(value: object) -> bytes:
-    """The canonical bytes of `value`; lists and tuples are the same array. Raises `CborError` for what has none.
+    """The canonical bytes of `value`; lists and tuples encode as the same array. Raises `CborError` for any other
+    type.
 
-    Types are taken exactly: an `IntEnum` or a `bytearray` is refused, so that equal bytes mean equal values.
+    Types are matched exactly: an `IntEnum` or a `bytearray` is refused, so that equal bytes mean equal values.
     """
     return _encoded(value, 0)
 
@@ -84,12 +86,12 @@ def _encoded(value: object, depth: int) -> bytes:
         return _encoded_array(cast("Sequence[object]", value), depth + 1)
     if kind is dict:
         return _encoded_map(cast("Mapping[object, object]", value), depth + 1)
-    raise CborError(f"`{kind.__name__}` has no encoding")
+    raise CborError(f"`{kind.__name__}` cannot be encoded")
 
 
 def _integer(n: int) -> bytes:
     if not -(1 << 63) <= n < 1 << 63:
-        raise CborError("integer outside 64 bits")
+        raise CborError("integer does not fit in 64 bits")
     return _head(0, n) if n >= 0 else _head(1, ~n)
 
 
@@ -98,7 +100,7 @@ def _encoded_array(items: Sequence[object], depth: int) -> bytes:
     parts = [_head(4, len(items))]
     add = parts.append
     for item in items:
-        # Lowered code is mostly integers: the common widths are written with one call at most.
+        # Lowered code is mostly integers: the common widths need one call at most.
         if type(item) is not int:
             add(_encoded(item, depth))
         elif -257 < item < 256:
@@ -114,7 +116,7 @@ def _encoded_array(items: Sequence[object], depth: int) -> bytes:
 
 def _encoded_map(pairs: Mapping[object, object], depth: int) -> bytes:
     _check_depth(depth)
-    # No two keys encode alike, so the order never comes down to the values.
+    # No two keys have the same encoding, so the sort never compares values.
     encoded = sorted((_key(key), _encoded(value, depth)) for key, value in pairs.items())
     return _head(5, len(encoded)) + b"".join([part for pair in encoded for part in pair])
 
@@ -134,7 +136,7 @@ def _utf8(text: str) -> bytes:
     try:
         return text.encode()
     except UnicodeEncodeError:
-        raise CborError("text is not Unicode scalar values") from None
+        raise CborError("text contains lone surrogates") from None
 
 
 # ---------------------------------------------------------------- decoding
@@ -142,38 +144,39 @@ def _utf8(text: str) -> bytes:
 #: the least argument that needs 1, 2, 4 or 8 bytes after the initial byte
 _LEAST: Final = (24, 1 << 8, 1 << 16, 1 << 32)
 _INT64_MAX: Final = (1 << 63) - 1
-#: the integers that are their own head: most of what a bundle holds
+#: : the integers that are encoded in the head itself, which are most of a bundle
 _SMALL: Final = {bytes([n]): n for n in range(24)} | {bytes([0x20 | n]): ~n for n in range(24)}
 _SIMPLE: Final[dict[int, bool | None]] = {0xF4: False, 0xF5: True, 0xF6: None}
 
 
 class _Room:
-    """How many items may still be announced, of `most`."""
+    """The number of items that may still be announced, out of `most`."""
 
     __slots__ = ("left", "most")
 
     def __init__(self, most: int) -> None:
         self.most = most
-        self.left = most - 1  # the outermost one is announced by nothing
+        self.left = most - 1  # the outermost item is not announced
 
 
 def decode(data: bytes, *, limit: int = LIMIT, items: int = LIMIT) -> Value:
     """The value of `data`, provided that `encode(value) == data`; else raises `CborError`. Arrays become tuples.
 
-    At most `limit` bytes, and at most `items` items: whatever stands in an array or a map, keys too, and itself.
+    The limits are `limit` bytes and `items` items. Every element of an array or a map counts as an item, as do map
+    keys and the outermost item.
     """
     if len(data) > limit:
         raise CborError(f"longer than the limit of {limit} bytes", limit)
     value, end = _item(data, 0, 0, _Room(items))
     if end != len(data):
-        raise CborError("bytes left over after the item", end)
+        raise CborError("unexpected bytes after the item", end)
     return value
 
 
 def head(data: bytes, at: int) -> tuple[int, int, int]:
     """Major type, argument, and where the head at `at` ends. Raises `CborError`."""
     if at >= len(data):
-        raise CborError("ends where an item should begin", at)
+        raise CborError("unexpected end before an item", at)
     major, info = data[at] >> 5, data[at] & 0x1F
     if info < 24:
         return major, info, at + 1
@@ -183,7 +186,7 @@ def head(data: bytes, at: int) -> tuple[int, int, int]:
         raise CborError("reserved initial byte", at)
     end = at + 1 + (1 << (info - 24))
     if end > len(data):
-        raise CborError("ends within the head of an item", at)
+        raise CborError("unexpected end in the head of an item", at)
     argument = int.from_bytes(data[at + 1 : end])
     if argument < _LEAST[info - 24]:
         raise CborError("not in the shortest form", at)
@@ -197,7 +200,7 @@ def _item(data: bytes, at: int, depth: int, room: _Room) -> tuple[Value, int]:
     match major:
         case 0 | 1:
             if argument > _INT64_MAX:
-                raise CborError("integer outside 64 bits", at)
+                raise CborError("integer does not fit in 64 bits", at)
             return argument if major == 0 else ~argument, end
         case 2:
             return _string(data, at, end, argument), end + argument
@@ -207,7 +210,7 @@ def _item(data: bytes, at: int, depth: int, room: _Room) -> tuple[Value, int]:
             return _array(data, at, end, argument, depth + 1, room)
         case 5:
             return _map(data, at, end, argument, depth + 1, room)
-    raise CborError(f"tag {argument} is not part of the format", at)
+    raise CborError(f"tag {argument} is not allowed", at)
 
 
 def _simple(data: bytes, at: int) -> bool | None:
@@ -215,13 +218,13 @@ def _simple(data: bytes, at: int) -> bool | None:
     if initial in _SIMPLE:
         return _SIMPLE[initial]
     if 0xF9 <= initial <= 0xFB:
-        raise CborError("floating-point number", at)
+        raise CborError("floating-point numbers are not allowed", at)
     raise CborError("simple value other than false, true and null", at)
 
 
 def _string(data: bytes, at: int, start: int, length: int) -> bytes:
     if length > len(data) - start:
-        raise CborError("string longer than the bytes that follow", at)
+        raise CborError("string is longer than the remaining bytes", at)
     return data[start : start + length]
 
 
@@ -264,11 +267,11 @@ def _map(data: bytes, at: int, start: int, count: int, depth: int, room: _Room) 
 
 
 def _take_room(data: bytes, at: int, start: int, items: int, depth: int, room: _Room) -> None:
-    """Refuse a container before anything is spent on it: nested too deep, or with more items than bytes or `room`."""
+    """Refuse a container before any work on it: nested too deep, or with more items than bytes or `room`."""
     if depth > MAX_DEPTH:
         raise CborError(f"nested deeper than {MAX_DEPTH}", at)
     if items > len(data) - start:
-        raise CborError("more items than bytes that follow", at)
+        raise CborError("more items than remaining bytes", at)
     room.left -= items
     if room.left < 0:
         raise CborError(f"more than {room.most} items", at)

@@ -1,8 +1,8 @@
-"""Signed envelopes: COSE_Sign1 (RFC 9052, sections 4.2 and 4.4) with Ed25519, and nothing optional.
+"""Signed envelopes: COSE_Sign1 (RFC 9052, sections 4.2 and 4.4) with Ed25519, without optional features.
 
-The algorithm is Ed25519 (-19, RFC 9864) and not EdDSA (-8), which that RFC deprecates for not saying which curve. The
-external data that is signed along is the duty's label: a signature made for one duty verifies for no other. Signed
-bytes stay opaque: they are verified before anyone parses them, and never made anew.
+The algorithm is Ed25519 (-19, RFC 9864) and not EdDSA (-8), which that RFC deprecates because it does not name the
+curve. The external data of the signature is the duty's label, so that a signature for one duty never verifies for
+another. Signed bytes stay opaque: they are verified before they are parsed, and never encoded again.
 """
 
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ ED25519: Final = -19
 _TAG_18: Final = b"\xd2"  # COSE_Sign1
 _ALGORITHM, _CONTENT_TYPE, _KID = 1, 3, 4  # header labels (RFC 9052, section 3.1)
 _SIGNATURE_BYTES: Final = 64
-#: a protected header is no longer than this, in bytes: ours have less than 80, whoever wants to keep a reader busy more
+#: : the longest protected header, in bytes: ours have less than 80, and a limit prevents needless work
 MAX_PROTECTED: Final = 200
 #: an envelope is an array, two strings, an empty map and a signature; a header has three pairs
 _ENVELOPE_ITEMS: Final = 5
@@ -35,7 +35,7 @@ class EnvelopeError(Untrusted):
 
 @dataclass(frozen=True, slots=True)
 class Opened:
-    """A verified payload, as it was signed, and the key that signed it."""
+    """A verified payload, exactly as it was signed, and the key that signed it."""
 
     payload: bytes
     key: VerificationKey
@@ -43,7 +43,7 @@ class Opened:
 
 @dataclass(frozen=True, slots=True)
 class Unverified:
-    """What an envelope claims. Nothing of it is to be trusted; it is for showing, and for finding the key."""
+    """The unverified claims of an envelope, for display and to find the key. Do not trust them."""
 
     protected: bytes
     content_type: str
@@ -62,9 +62,9 @@ def sign1(payload: bytes, *, key: SigningKey, duty: Duty, content_type: str) -> 
 def open1(
     envelope: bytes, *, keys: Mapping[bytes, VerificationKey], duty: Duty, content_type: str, limit: int = cbor.LIMIT
 ) -> Opened:
-    """The payload, if a key among `keys` (by `kid`) that has this duty signed it. Raises `EnvelopeError`.
+    """The payload, if a key among `keys` (by `kid`) with this duty signed it. Raises `EnvelopeError`.
 
-    Neither expiry nor what the key may speak for is looked at: see `trust.key_refusal` and `trust.speaker_refusal`.
+    Expiry and authorisation of the key are not checked: see `trust.key_refusal` and `trust.speaker_refusal`.
     """
     claimed = unverified(envelope, limit=limit)
     if claimed.content_type != content_type:
@@ -73,7 +73,7 @@ def open1(
         )
     key = keys.get(claimed.kid)
     if key is None or key.kid != claimed.kid:
-        raise EnvelopeError("unknown-key", f"key {claimed.kid.hex()} is not trusted here")
+        raise EnvelopeError("unknown-key", f"key {claimed.kid.hex()} is not in the trust root")
     if key.duty is not duty:
         raise EnvelopeError("wrong-duty", f"key {key.kid.hex()} is trusted for `{key.duty}`, not for `{duty}`")
     if not key.verify(claimed.signature, _signed(claimed.protected, duty, claimed.payload)):
@@ -82,7 +82,7 @@ def open1(
 
 
 def unverified(envelope: bytes, *, limit: int = cbor.LIMIT) -> Unverified:
-    """Take an envelope apart without trusting it. Raises `EnvelopeError` (`malformed`) unless it is canonical."""
+    """Parse an envelope without verifying it. Raises `EnvelopeError` (`malformed`) unless it is canonical."""
     if envelope[:1] != _TAG_18:
         raise EnvelopeError("malformed", "not a signed envelope: COSE_Sign1 begins with tag 18")
     match _decode(envelope[1:], limit, _ENVELOPE_ITEMS):
@@ -91,19 +91,21 @@ def unverified(envelope: bytes, *, limit: int = cbor.LIMIT) -> Unverified:
         ):
             content_type, kid = _headers(protected)
             return Unverified(protected, content_type, kid, payload, signature)
-    raise EnvelopeError("malformed", "not the four parts of a COSE_Sign1 with a 64-byte signature")
+    raise EnvelopeError("malformed", "not a COSE_Sign1 of four parts with a 64-byte signature")
 
 
 def _headers(protected: bytes) -> tuple[str, bytes]:
     if len(protected) > MAX_PROTECTED:
-        text = f"the protected header has {len(protected)} bytes, and at most {MAX_PROTECTED} are read"
+        text = f"the protected header is {len(protected)} bytes; the limit is {MAX_PROTECTED}"
         raise EnvelopeError("malformed", text)
     match _decode(protected, MAX_PROTECTED, _HEADER_ITEMS):
         case {1: int(algorithm), 3: str(content_type), 4: bytes(kid), **others} if not others and len(kid) == KID_BYTES:
             if algorithm != ED25519:
                 raise EnvelopeError("malformed", f"signature algorithm {algorithm} is not Ed25519 ({ED25519})")
             return content_type, kid
-    raise EnvelopeError("malformed", "the protected header is not algorithm, content type and key identifier")
+    raise EnvelopeError(
+        "malformed", "the protected header must contain exactly algorithm, content type and key identifier"
+    )
 
 
 def _signed(protected: bytes, duty: Duty, payload: bytes) -> bytes:

@@ -1,15 +1,15 @@
-"""SHA-256 with domain separation: a digest of one kind of thing is never a digest of another."""
+"""SHA-256 with domain separation, so that digests of different kinds of data never coincide."""
 
 from hashlib import sha256
 from typing import Any, Final, NewType
 
-#: what a digest is over; a label holds no NUL, so that label and data cannot run into each other
+#: : the kind of data in a digest; a label contains no NUL, so that label and data cannot be confused
 Domain = NewType("Domain", bytes)
 
 POLICY: Final = Domain(b"rtshcua/policy")  # the payload of a policy envelope
 MISSION: Final = Domain(b"rtshcua/mission")  # the payload of a mission envelope
 BUNDLE: Final = Domain(b"rtshcua/bundle")  # a whole bundle
-BINDING: Final = Domain(b"rtshcua/binding")  # paper symbol `B`: an invocation and all that it rests on
+BINDING: Final = Domain(b"rtshcua/binding")  # paper symbol `B`: an invocation and all that it depends on
 ROOT: Final = Domain(b"rtshcua/root")  # the payload of a trust root
 KEY: Final = Domain(b"rtshcua/key")  # a duty and a public key
 PARAMETERS: Final = Domain(b"rtshcua/parameters")  # names of a vehicle's parameters, and their values
@@ -26,9 +26,9 @@ def digest(domain: Domain, data: bytes) -> bytes:
 
 
 def hmac_halves(key: bytes) -> tuple[Any, Any]:
-    """The inner and the outer hash of HMAC-SHA256 (RFC 2104) under a key, as far as no message comes in.
+    """The inner and outer hash of HMAC-SHA256 (RFC 2104) under a key, before any message.
 
-    Who makes many under one key copies these: half the time of `hmac.digest`.
+    Copying these takes half the time of `hmac.digest` where one key is used for many messages.
     """
     padded = (sha256(key).digest() if len(key) > _BLOCK else key).ljust(_BLOCK, b"\0")
     return sha256(bytes(octet ^ 0x36 for octet in padded)), sha256(bytes(octet ^ 0x5C for octet in padded))

@@ -1,8 +1,7 @@
-"""Signed documents that are handed to a vehicle while it is under way: what approvals, recalls,
-replacements and cancellations share.
+"""Signed documents for a vehicle in flight: the common part of approvals, recalls, replacements and cancellations.
 
-Each is a COSE_Sign1 around an artefact of its own content type, so that none can be taken for another. A document
-speaks for a bounded time: it says when it was issued and when it ends, in UTC us.
+Each is a COSE_Sign1 around an artefact with a content type of its own, so that none can be mistaken for another. A
+document is valid for a bounded time: it contains the moments of issue and of expiry, in UTC us.
 """
 
 from typing import Final, TypeVar
@@ -18,12 +17,12 @@ from rtshcua.wire.names import Artefact
 from rtshcua.wire.trust import HUMAN, TrustRoot, key_refusal, speaker_refusal
 from rtshcua.wire.untrusted import Untrusted
 
-#: length of a flight's id in bytes: random, drawn for each, and `boot` in the genesis of its log
+#: : length of a flight's id in bytes: random for each flight, and `boot` in the genesis of its log
 FLIGHT_BYTES: Final = 16
-#: a document larger than this is refused unread, in bytes; one that holds no mission has no reason to be large
+#: : a larger document is refused unread, in bytes; only one that holds a mission is large
 MAX_DOCUMENT: Final = 1 << 18
 MAX_WITHOUT_MISSION: Final = 1 << 11
-#: how long an approval, a recall or a cancellation may speak at most, in us
+#: : the longest validity of an approval, a recall or a cancellation, in us
 MAX_LIFE_US: Final = 3_600_000_000
 
 _OUTSET: Final = b"\xd2\x84"  # tag 18, an array of four
@@ -46,9 +45,9 @@ class DocumentError(Untrusted):
 
 
 def kind_of(document: bytes) -> Artefact:
-    """What a document says that it is, not verified. Raises `DocumentError` and `EnvelopeError`.
+    """The kind of a document, unverified. Raises `DocumentError` and `EnvelopeError`.
 
-    It looks at the document's outline first: whoever floods a flight with garbage must not keep it busy decoding that.
+    The outline is checked first, so that a flood of garbage costs no decoding time in flight.
     """
     _check_size(document, MAX_DOCUMENT)
     if not _outlined(document):
@@ -56,7 +55,7 @@ def kind_of(document: bytes) -> Artefact:
     content_type = cose.unverified(document).content_type
     kind = _KINDS.get(content_type)
     if kind is None:
-        text = f"`{content_type[:80]}` is no document for a vehicle under way"
+        text = f"`{content_type[:80]}` is not a document for a vehicle in flight"
         raise DocumentError("unknown-document", text)
     if kind is not names.REPLACEMENT:
         _check_size(document, MAX_WITHOUT_MISSION)
@@ -65,11 +64,11 @@ def kind_of(document: bytes) -> Artefact:
 
 def _check_size(document: bytes, most: int) -> None:
     if len(document) > most:
-        raise DocumentError("too-large", f"a document of {len(document)} bytes is not read; at most {most} are")
+        raise DocumentError("too-large", f"the document is {len(document)} bytes; the limit is {most}")
 
 
 def _outlined(document: bytes) -> bool:
-    """Whether the bytes are laid out as a COSE_Sign1 of ours: tag, protected header, empty map, payload, signature."""
+    """Whether the bytes have the layout of our COSE_Sign1: tag, protected header, empty map, payload, signature."""
     if document[:2] != _OUTSET:
         return False
     at = len(_OUTSET)
@@ -96,8 +95,8 @@ def sign_document(kind: Artefact, body: Flat, key: SigningKey, duty: Duty) -> by
 def open_document(
     document: bytes, kind: Artefact, shape: type[_F], duty: Duty, root: TrustRoot, now: Now
 ) -> tuple[_F, Opened]:
-    """What a document says, if a key that the root trusts for the duty signed it, and the root is still good for
-    certain; and what was signed, by which key.
+    """The content of a document, if a key that the root trusts for the duty signed it and the root has certainly not
+    expired; and the signed payload with its key.
 
     Raises `DocumentError`, `EnvelopeError`, `BundleError` and `ArtefactError`.
     """
@@ -107,44 +106,46 @@ def open_document(
 
 
 def check_root(root: TrustRoot, now: Now) -> None:
-    """Whether the root is still good, for certain."""
+    """Check that the root has certainly not expired."""
     if now.utc_us + now.utc_error_us >= root.expires_at_us:
-        raise DocumentError("root-expired", f"trust root version {root.version} has expired, or may have")
+        raise DocumentError(
+            "root-expired", f"trust root version {root.version} has expired, or may have within the clock's error"
+        )
 
 
 def check_vehicle(named: str, vehicle: str) -> None:
-    """Whether a document is for this vehicle."""
+    """Check that a document is for this vehicle."""
     if named != vehicle:
-        raise DocumentError("wrong-vehicle", f"it is for `{named[:80]}`, this vehicle is `{vehicle}`")
+        raise DocumentError("wrong-vehicle", f"the document is for `{named[:80]}`; this vehicle is `{vehicle}`")
 
 
 def check_flight(named: bytes, flight: bytes) -> None:
-    """Whether a document is for this flight, and no other of the same mission."""
+    """Check that a document is for this flight, and not for another one of the same mission."""
     if named != flight:
-        raise DocumentError("other-flight", "it is for another flight than this one")
+        raise DocumentError("other-flight", "the document is for another flight")
 
 
 def check_key(key: VerificationKey, vehicle: str, now: Now) -> None:
-    """Whether a key may speak for a vehicle, for certain."""
+    """Check that a key is certainly authorised for a vehicle."""
     refusal = key_refusal(key, vehicle=vehicle, now_us=now.utc_us + now.utc_error_us)
     if refusal is not None:
-        raise DocumentError(refusal, f"key {key.kid.hex()} may not speak for `{vehicle}` now")
+        raise DocumentError(refusal, f"key {key.kid.hex()} is not authorised for `{vehicle}` now")
 
 
 def check_times(issued_at_us: int, expires_at_us: int, now: Now) -> None:
-    """Whether a document speaks now. In doubt it is issued, within the clock's error, and in doubt it has expired."""
+    """Check that a document is valid now. Within the clock's error, it counts as issued and as expired."""
     if issued_at_us > now.utc_us + now.utc_error_us:
-        raise DocumentError("issued-in-future", "it says that it will be issued later than now")
+        raise DocumentError("issued-in-future", "the document's time of issue is in the future")
     if now.utc_us + now.utc_error_us >= expires_at_us:
-        raise DocumentError("expired", "it has expired, or may have: the clock does not tell")
+        raise DocumentError("expired", "the document has expired, or may have within the clock's error")
     if not 0 < expires_at_us - issued_at_us <= MAX_LIFE_US:
         most = MAX_LIFE_US // 60_000_000
-        raise DocumentError("too-long-lived", f"it speaks for longer than the {most} min that a document may")
+        raise DocumentError("too-long-lived", f"the document is valid for longer than the limit of {most} min")
 
 
 def check_person(key: VerificationKey, role: str, vehicle: str, now: Now) -> None:
-    """Whether a key may answer in person for a role on a vehicle, for certain."""
+    """Check that a key is certainly authorised to answer in person for a role on a vehicle."""
     refusal = speaker_refusal(key, role=role, source=HUMAN, vehicle=vehicle, now_us=now.utc_us + now.utc_error_us)
     if refusal is not None:
-        text = f"key {key.kid.hex()} may not speak for role `{role}` in person on `{vehicle}` now"
+        text = f"key {key.kid.hex()} is not authorised for role `{role}` in person on `{vehicle}` now"
         raise DocumentError(refusal, text)

@@ -29,10 +29,10 @@ from cryptography.hazmat.primitives.kdf.scrypt import Scrypt
 from rtshcua.wire.keys import Duty, SigningKey, WrongDuty
 from rtshcua.wire.untrusted import Untrusted
 
-#: no key file is larger, in bytes
+#: : the largest key file, in bytes
 MAX_KEY_FILE: Final = 4096
 
-#: log2 of the N of scrypt, for keys that are written; those that are read may have from the first to the last of these
+#: : log2 of the N of scrypt for new keys, and its range for existing keys
 COST = 17
 COSTS: Final = range(14, 19)
 _BLOCK, _LANES = 8, 1  # r and p of scrypt
@@ -54,11 +54,13 @@ _FILE: Final = re.compile(
 
 
 class KeyFileError(Untrusted):
-    """A key file that does not serve: `malformed`, `unencrypted`, `passphrase-needed`, `wrong-passphrase`, `memory`."""
+    """A key file that cannot be used: `malformed`, `unencrypted`, `passphrase-needed`, `wrong-passphrase`, `memory`."""
 
 
 def dump_signing_key(key: SigningKey, *, passphrase: bytes | None) -> bytes:
-    """The file's bytes. Raises `KeyFileError` (`unencrypted`) for a key without passphrase, unless for development."""
+    """The file's bytes. Raises `KeyFileError` (`unencrypted`) for a key without passphrase that is not a development
+    key.
+    """
     head = f"duty: {key.duty}\ndevelopment: {'yes' if key.development else 'no'}\n".encode()
     if passphrase:
         salt = ChaCha20Poly1305.generate_key()
@@ -77,7 +79,7 @@ def _cipher(passphrase: bytes, salt: bytes, cost: int) -> ChaCha20Poly1305:
         made = Scrypt(salt=salt, length=32, n=1 << cost, r=_BLOCK, p=_LANES).derive(passphrase)
     except MemoryError:
         needed = (128 * _BLOCK << cost) >> 20
-        raise KeyFileError("memory", f"to work the key out of its passphrase takes {needed} MiB of memory") from None
+        raise KeyFileError("memory", f"deriving the key from its passphrase takes {needed} MiB of memory") from None
     return ChaCha20Poly1305(made)
 
 
@@ -87,7 +89,7 @@ def load_signing_key(data: bytes, *, duty: Duty, passphrase: bytes | None) -> Si
     sealed = _SEALED.fullmatch(short)
     found = sealed or _FILE.fullmatch(short)
     if found is None or (sealed is not None and int(sealed["cost"]) not in COSTS):
-        raise KeyFileError("malformed", "not a key file: header lines and one key are expected")
+        raise KeyFileError("malformed", "not a key file: expected header lines and one key")
     has, development = Duty(found["duty"].decode()), found["development"] == b"yes"
     if has is not duty:
         raise WrongDuty(has, duty)
@@ -106,7 +108,7 @@ def _unsealed(found: re.Match[bytes], passphrase: bytes) -> Ed25519PrivateKey:
     try:
         seed = cipher.decrypt(_NONCE, b64decode(found["sealed"]), found["head"])
     except InvalidTag:
-        raise KeyFileError("wrong-passphrase", "the passphrase does not open the key, or it is damaged") from None
+        raise KeyFileError("wrong-passphrase", "wrong passphrase, or the key is damaged") from None
     return Ed25519PrivateKey.from_private_bytes(seed)
 
 
@@ -116,7 +118,7 @@ def _private(block: bytes, passphrase: bytes | None) -> Ed25519PrivateKey:
     except (ValueError, TypeError, UnsupportedAlgorithm):
         if passphrase is None:
             raise KeyFileError("malformed", "the key's PKCS#8 block is damaged") from None
-        raise KeyFileError("wrong-passphrase", "the passphrase does not open the key, or it is damaged") from None
+        raise KeyFileError("wrong-passphrase", "wrong passphrase, or the key is damaged") from None
     if not isinstance(private, Ed25519PrivateKey):
         raise KeyFileError("malformed", "the key is not an Ed25519 key")
     return private

@@ -17,38 +17,40 @@ KID_BYTES: Final = 16
 PUBLIC_BYTES: Final = 32
 SEED_BYTES: Final = 32
 
-#: the field's prime, and the y of each point of small order: what such a key signs is signed for whoever likes it
+#: : the field's prime, and the y of each point of small order: anybody can make signatures for such a key
 _P: Final = 2**255 - 19
 _Y: Final = (
     0x05FC536D880238B13933C6D305ACDFD5F098EFF289F4C345B027B2C28F95E826  # of the points of order 8, and its negative
 )
 _SMALL_ORDER: Final = frozenset({0, 1, _P - 1, _Y, _P - _Y})
 
-#: stands for every role, policy or vehicle; a source is always named
+#: : means every role, policy or vehicle; a source is always named
 ANY: Final = "*"
 
 _SOURCES: Final = frozenset(kind.name.lower() for kind in SourceKind)
 
 
 class Duty(StrEnum):
-    """One key, one duty: a key trusted for one signs nothing else (The Update Framework, section 2.1, roles)."""
+    """The one duty of a key: a key trusted for one duty signs nothing else (The Update Framework, section 2.1,
+    roles).
+    """
 
-    ROOT = "root"  # names all other keys
+    ROOT = "root"  # signs trust roots, which name all other keys
     POLICY = "policy"  # signs policies
     MISSION = "mission"  # signs missions, for the roles and through the sources that the root lists
     APPROVAL = "approval"  # answers a `confirm`
     LOG = "log"  # signs evidence
     WITNESS = "witness"  # cosigns the checkpoints of logs, away from the vehicle
-    BOUNDARY = "boundary"  # signs what the enforcement boundary decided and let go ahead
+    BOUNDARY = "boundary"  # signs the enforcement boundary's statements of its own evidence
 
     @property
     def label(self) -> bytes:
-        """What is signed along with every payload, so that a signature made for one duty verifies for no other."""
+        """The label that is signed with every payload, so that a signature made for one duty verifies for no other."""
         return b"rtshcua/duty/" + self.value.encode()
 
 
 class WrongDuty(Untrusted):
-    """A key asked to do what another duty is for; `slug` is `wrong-duty`."""
+    """A key was used for another duty than its own; `slug` is `wrong-duty`."""
 
     def __init__(self, has: Duty, asked: Duty) -> None:
         super().__init__("wrong-duty", f"the key is for `{has}`, not for `{asked}`")
@@ -57,20 +59,23 @@ class WrongDuty(Untrusted):
 
 
 def key_id(duty: Duty, public: bytes) -> bytes:
-    """The name of a key, 16 bytes: it depends on the duty too, so a relabelled key is a key that nobody knows."""
+    """The name of a key, 16 bytes. It depends on the duty too, so a key with a changed duty is unknown."""
     return digest.digest(digest.KEY, duty.label + b"\0" + public)[:KID_BYTES]
 
 
 def is_strong(point: bytes) -> bool:
-    """Whether a point (32 bytes) is in canonical form and not of small order; not whether it is on the curve."""
-    y = int.from_bytes(point, "little") & ((1 << 255) - 1)  # above it is the sign of x
+    """Whether a point (32 bytes) is in canonical form and not of small order; membership of the curve is not
+    checked.
+    """
+    y = int.from_bytes(point, "little") & ((1 << 255) - 1)  # the top bit is the sign of x
     return y < _P and y not in _SMALL_ORDER
 
 
 def verified(public: bytes, signature: bytes, message: bytes) -> bool:
-    """Whether the key of `public` (32 bytes) signed `message`; one with s >= L is refused (RFC 8032, 5.1.7).
+    """Whether the key of `public` (32 bytes) signed `message`; a signature with s >= L is refused (RFC 8032, 5.1.7).
 
-    So is a key, or a first half of the signature, that is not strong: OpenSSL takes these, others do not.
+    A key, or the first half of a signature, that is not strong is refused too: OpenSSL accepts these, other
+    libraries do not.
     """
     if not is_strong(public) or not is_strong(signature[:PUBLIC_BYTES]):
         return False
@@ -84,10 +89,10 @@ def verified(public: bytes, signature: bytes, message: bytes) -> bool:
 class VerificationKey(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A public key as the trust root names it.
 
-    `roles`, `sources` (`agent`, `operator`, ...) and `vehicles` (identities) are those that it may speak for; a mission
-    key signs missions under `policies` (names) alone, and an approval key is of one `person` in one role. Empty is
-    none, and `*` is every role, policy or vehicle. `expires_us` is UTC in microseconds, None for as long as the root
-    lives.
+    `roles`, `sources` (`agent`, `operator`, ...) and `vehicles` (identities) are those that the key is authorised
+    for. A mission key signs missions under `policies` (names) only, and an approval key belongs to one `person` in
+    one role. An empty list authorises for nothing, and `*` means every role, policy or vehicle. `expires_us` is
+    UTC in microseconds, None if the key expires with the root.
     """
 
     duty: Duty
@@ -102,9 +107,9 @@ class VerificationKey(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     def __post_init__(self) -> None:
         if len(self.public) != PUBLIC_BYTES:
-            raise ValueError(f"a public key has {PUBLIC_BYTES} bytes, not {len(self.public)}")
+            raise ValueError(f"a public key is {PUBLIC_BYTES} bytes, not {len(self.public)}")
         if not is_strong(self.public):
-            raise ValueError("a public key is in canonical form and not of small order")
+            raise ValueError("a public key must be in canonical form and not of small order")
         if unknown := sorted(set(self.sources) - _SOURCES):
             raise ValueError(f"`{unknown[0]}` is not a source")
 
@@ -120,7 +125,7 @@ class VerificationKey(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class SigningKey:
-    """A private key and its one duty. It never shows its secret; Python cannot promise to erase it."""
+    """A private key and its one duty. It never displays its secret; Python cannot guarantee to erase it."""
 
     duty: Duty
     development: bool
@@ -132,7 +137,7 @@ class SigningKey:
 
     @classmethod
     def from_seed(cls, seed: bytes, *, duty: Duty, development: bool = False) -> Self:
-        """The key of a 32-byte secret seed, which the caller draws from the system's random source."""
+        """The key of a 32-byte secret seed, which the caller must draw from the system's random source."""
         return cls(duty, development, Ed25519PrivateKey.from_private_bytes(seed))
 
     @property

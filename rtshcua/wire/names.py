@@ -6,8 +6,8 @@ from typing import Final
 
 @dataclass(frozen=True, slots=True)
 class Artefact:
-    """A format. `version` is raised by any change that an older reader would misread. `items` is the most CBOR items
-    that one has, 0 where only its size is bounded: more are refused before they are decoded.
+    """A format. Any change that an older reader would misread raises `version`. `items` is the limit of CBOR items,
+    beyond which the data is refused; 0 if only the size is limited.
     """
 
     name: str
@@ -21,11 +21,11 @@ class Artefact:
         return f"application/vnd.{self.name.replace('/', '.')}{self.suffix}"
 
 
-#: how many items an artefact has at most: one of a fixed form, and one with lists
+#: : limits of CBOR items for an artefact of a fixed form, and for one with lists
 FEW: Final = 64
 MANY: Final = 1 << 16
 
-#: what says which revision reads earlier versions of these
+#: : the place that says which revision reads earlier versions
 COMPATIBILITY: Final = "docs/compatibility.md"
 
 ROOT: Final = Artefact("rtshcua/root", 2, items=MANY)  # 2: with policies of mission keys, persons of approval keys
@@ -40,7 +40,7 @@ QUALIFICATION: Final = Artefact("rtshcua/qualification", 1, items=MANY)
 RECEIPT: Final = Artefact("rtshcua/receipt", 2, items=FEW)  # 2: with the boundary's digest
 STATEMENT: Final = Artefact("rtshcua/statement", 2, items=FEW)
 LOG: Final = Artefact("rtshcua/log", 4, "")  # JSON lines (RFC 8785), without a registered suffix; 4: `received_us`
-PROOF: Final = Artefact("rtshcua/proof", 1, items=MANY)  # what a proof of a log carries
+PROOF: Final = Artefact("rtshcua/proof", 1, items=MANY)  # the material of a proof of a log
 REQUEST: Final = Artefact("rtshcua/request", 2)  # 2: with temporal monitors
 RESPONSE: Final = Artefact("rtshcua/response", 2)  # 2: with the boundary's digest
 PERMIT: Final = Artefact("rtshcua/permit", 1)

@@ -1,8 +1,8 @@
-"""The preparation permit: which parameters of the vehicle may be set on the ground, and to what.
+"""The preparation permit: the parameters of the vehicle that may be set on the ground, with their values.
 
-Its body is `_HEAD`, then `_WRITE` for each parameter, packed big-endian; an HMAC-SHA256 (RFC 2104) over it under the
-session key stands behind it. Values are the 32 bits of the float that they are. It is asked for by the same body
-without a MAC.
+Its body is `_HEAD`, then `_WRITE` for each parameter, packed big-endian, followed by an HMAC-SHA256 (RFC 2104)
+over it under the session key. Values are the 32 bits of the parameter's float. A request for the permit is the
+same body without a MAC.
 """
 
 from hmac import compare_digest, digest
@@ -21,7 +21,7 @@ MOST: Final = 32
 
 
 class ParameterWrite(NamedTuple):
-    """One parameter: its name (ASCII, 16 octets at most), the value that it was found to have, and the one it gets."""
+    """One parameter: its name (ASCII, 16 octets at most), its present value and its new value."""
 
     name: str
     before: int
@@ -29,9 +29,9 @@ class ParameterWrite(NamedTuple):
 
 
 class Preparation(msgspec.Struct, frozen=True):
-    """Permission to set just these parameters, once, up to a monotonic time. `restoring`: to what they were before.
+    """Permission to set exactly these parameters, once, up to a monotonic time. `restoring` sets the previous values.
 
-    `serial` is never reused in a session; it is 0 in what is asked for.
+    `serial` is unique within a session; it is 0 in a request.
     """
 
     serial: int
@@ -41,7 +41,7 @@ class Preparation(msgspec.Struct, frozen=True):
 
 
 def encode(preparation: Preparation) -> bytes:
-    """Its body. Raises ValueError for more writes than a permit may list."""
+    """The body. Raises ValueError for more writes than the limit."""
     if len(preparation.writes) > MOST:
         raise ValueError(f"a preparation lists at most {MOST} parameters")
     writes = preparation.writes
@@ -50,7 +50,7 @@ def encode(preparation: Preparation) -> bytes:
 
 
 def decode(body: bytes) -> Preparation | None:
-    """The preparation of a body; None for octets that are none. Never raises, whatever the octets."""
+    """The preparation in a body; None for malformed octets. Raises nothing."""
     if len(body) < _HEAD.size:
         return None
     version, restoring, serial, not_after_us, count = _HEAD.unpack_from(body)

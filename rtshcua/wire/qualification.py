@@ -1,7 +1,7 @@
-"""Qualification records: what was found when an autopilot was flown against what its adapter takes for granted.
+"""Qualification records: the results of flying an autopilot to test the assumptions of its adapter.
 
-A record is about one vehicle as it then was: its autopilot, the version, and the parameters that matter. The log key
-signs it, as it signs what else this vehicle's runtime saw (docs/adr/0043). It permits nothing.
+A record is about one vehicle in one state: its autopilot, the version, and the relevant parameters. The log key
+signs it, as it signs the other observations of this vehicle's runtime (docs/adr/0043). It permits nothing.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import TrustRoot, key_refusal
 from rtshcua.wire.untrusted import Untrusted
 
-#: a record larger than this is refused unread, in bytes
+#: : a larger record is refused unread, in bytes
 MAX_QUALIFICATION: Final = 1 << 18
 
 
@@ -24,17 +24,17 @@ class QualificationError(Untrusted):
 
 
 class CheckOutcome(IntEnum):
-    """What became of one check."""
+    """The outcome of one check."""
 
     HELD = 0
-    FAILED = 1  # what the adapter takes for granted is not so
-    TOLD = 2  # nothing rests on it, and somebody should know
-    UNCHECKED = 3  # it was not flown, or not seen
+    FAILED = 1  # the assumption of the adapter is wrong
+    TOLD = 2  # not as expected, but the adapter does not rely on it
+    UNCHECKED = 3  # not flown, or not observed
 
 
 class QualificationCheck(Flat, frozen=True):
-    """One check: a stable slug, its `CheckOutcome`, what was expected and what was measured in words, and both as
-    numbers of a `unit` (`us`, `mm`, `mm/s`) where there are any. `advice` says what to do about it.
+    """One check: a stable slug, its `CheckOutcome`, the expected and the measured value as text, and both as numbers
+    of a `unit` (`us`, `mm`, `mm/s`) if there are any. `advice` says what to do about it.
     """
 
     slug: str
@@ -48,7 +48,7 @@ class QualificationCheck(Flat, frozen=True):
 
 
 class Firmware(Flat, frozen=True):
-    """What an autopilot says that it is: its flavour, `flight_sw_version` and `flight_custom_version`."""
+    """The identification that an autopilot reports: its flavour, `flight_sw_version` and `flight_custom_version`."""
 
     flavour: str
     version: int
@@ -63,11 +63,11 @@ class Firmware(Flat, frozen=True):
 
 
 class Qualification(Flat, frozen=True):
-    """A record. `parameters` are those that matter, by name in ascending order, each the eight octets of its value as
-    a double (big-endian); `digest` is over them. `policy` is the digest of the policy that bounded the flights.
+    """A record. `parameters` are the relevant ones, by name in ascending order, each as the eight octets of its value
+    as a double (big-endian); `digest` is over them. `policy` is the digest of the policy that bounded the flights.
 
-    `pilot` is who consented, empty for a simulation. `logs` are the final hashes of the flights' logs. `flown_us` is
-    how long it was in the air; `issued_at_us` is UTC.
+    `pilot` is the person who consented, empty for a simulation. `logs` are the final hashes of the flights' logs.
+    `flown_us` is the time in the air; `issued_at_us` is UTC.
     """
 
     vehicle: str
@@ -84,16 +84,16 @@ class Qualification(Flat, frozen=True):
 
     @property
     def failed(self) -> tuple[QualificationCheck, ...]:
-        """What does not hold."""
+        """The checks that failed."""
         return tuple(each for each in self.checks if each.outcome == CheckOutcome.FAILED)
 
     @property
     def qualifies(self) -> bool:
-        """Whether something was checked, and all that was holds."""
+        """Whether at least one check was made and all made checks passed."""
         return not self.failed and any(each.outcome == CheckOutcome.HELD for each in self.checks)
 
     def changes(self, firmware: Firmware | None, parameters: Mapping[str, bytes]) -> tuple[str, ...]:
-        """What is otherwise now, in words; parameters that are not known now are not held against it."""
+        """The differences from the present vehicle, as text; unknown parameters do not count."""
         changes = []
         if firmware is not None and firmware != self.firmware:
             changes.append(f"its firmware is {firmware.text}, and was {self.firmware.text}")
@@ -104,7 +104,7 @@ class Qualification(Flat, frozen=True):
         return tuple(changes)
 
 
-#: no calendar has a name for a later time
+#: : the calendar ends here
 _YEAR_10000_US: Final = 253_402_300_800_000_000
 
 
@@ -120,19 +120,21 @@ def sign_qualification(record: Qualification, key: SigningKey) -> bytes:
 
 
 def open_qualification(document: bytes, *, root: TrustRoot, vehicle: str, now_us: int) -> Qualification:
-    """A record of this vehicle that a log key of the root signed, which could speak for it when it did and can now.
+    """A record of this vehicle, signed by a log key of the root that was authorised then and is authorised now.
 
-    `now_us` is UTC. Whoever has a key that expired may write any time of issue, so nothing that it signed counts now.
+    `now_us` is UTC. An expired key could have signed any time of issue, so nothing that it signed is accepted.
 
     Raises `QualificationError`, `EnvelopeError`, `BundleError` and `ArtefactError`.
     """
     if len(document) > MAX_QUALIFICATION:
-        raise QualificationError("too-large", f"a record of {len(document)} bytes is not read")
+        raise QualificationError("too-large", f"the record is {len(document)} bytes; the limit is {MAX_QUALIFICATION}")
     opened = open_envelope(document, root, Duty.LOG, names.QUALIFICATION, MAX_QUALIFICATION)
     record = read_qualification(opened.payload)
     if record.vehicle != vehicle:
-        raise QualificationError("wrong-vehicle", f"it is about `{record.vehicle[:80]}`, this vehicle is `{vehicle}`")
-    for when, at_us in (("could not speak", record.issued_at_us), ("may not speak any more", now_us)):
+        raise QualificationError(
+            "wrong-vehicle", f"the record is for `{record.vehicle[:80]}`; this vehicle is `{vehicle}`"
+        )
+    for when, at_us in (("was not authorised", record.issued_at_us), ("is no longer authorised", now_us)):
         refusal = key_refusal(opened.key, vehicle=vehicle, now_us=at_us)
         if refusal is not None:
             raise QualificationError(refusal, f"key {opened.key.kid.hex()} {when} for `{vehicle}`")
@@ -140,7 +142,7 @@ def open_qualification(document: bytes, *, root: TrustRoot, vehicle: str, now_us
 
 
 def read_qualification(payload: bytes) -> Qualification:
-    """The record in a payload, whoever signed it. Raises `QualificationError`, `BundleError` and `ArtefactError`."""
+    """The record in an unverified payload. Raises `QualificationError`, `BundleError` and `ArtefactError`."""
     record = parse(names.QUALIFICATION, payload, Qualification)
     outcomes = {int(each) for each in CheckOutcome}
     makes_sense = (
@@ -150,5 +152,5 @@ def read_qualification(payload: bytes) -> Qualification:
         and all(each.outcome in outcomes for each in record.checks)
     )
     if not makes_sense:
-        raise QualificationError("malformed", "it contradicts itself")
+        raise QualificationError("malformed", "the record contradicts itself")
     return record

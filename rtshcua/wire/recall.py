@@ -1,7 +1,7 @@
-"""Recalls: a person's signed order to bring a vehicle home, which ends a mission and starts none.
+"""Recalls: a person's signed order to bring a vehicle home. A recall ends a mission and starts none.
 
-It names one mission by its digest and the flight by its id, or all flights under one policy. The key must have duty
-`approval`, and the root must let it speak in person on this vehicle, for whatever role.
+It names one mission by its digest and the flight by its id, or all flights under one policy. The key must have
+duty `approval`, and the root must allow it to act in person on this vehicle, in any role.
 """
 
 from collections.abc import Collection
@@ -23,7 +23,8 @@ from rtshcua.wire.trust import HUMAN, TrustRoot
 
 
 class RecallDocument(Flat, frozen=True):
-    """What a person signs: `flight` and `mission`, or `policy` for all that fly under it; the others are empty.
+    """The content that a person signs: `flight` and `mission`, or `policy` for all flights under it; the others are
+    empty.
 
     Times are UTC, us.
     """
@@ -52,27 +53,27 @@ def open_recall(
     issued_at_us: int,
     now: Now,
 ) -> RecallDocument:
-    """A recall that is to be trusted here and now, for a flight of `missions` (the one that was opened and those that
-    replaced it) under the policy of that digest.
+    """The recall in a document, if it is trusted now, for a flight of `missions` (the first one and its replacements)
+    under the policy of that digest.
 
-    One for a whole policy does not reach a mission that was issued (`issued_at_us`) after it. Raises `DocumentError`:
-    its own slugs are `wrong-vehicle`, `wrong-source`, `key-expired`, `other-flight`, `other-mission`,
-    `other-policy`, `before-mission`; and `EnvelopeError`, `BundleError` and `ArtefactError`.
+    A recall of a whole policy does not apply to a mission that was issued (`issued_at_us`) after it. Raises
+    `DocumentError`: its own slugs are `wrong-vehicle`, `wrong-source`, `key-expired`, `other-flight`,
+    `other-mission`, `other-policy`, `before-mission`; and `EnvelopeError`, `BundleError` and `ArtefactError`.
     """
     said, opened = open_document(document, names.RECALL, RecallDocument, Duty.APPROVAL, root, now)
     if bool(said.mission) == bool(said.policy) or bool(said.mission) != bool(said.flight):
-        raise DocumentError("malformed", "a recall names either a mission and its flight or a policy")
+        raise DocumentError("malformed", "a recall must name either a mission with its flight, or a policy")
     check_vehicle(said.vehicle, vehicle)
     check_key(opened.key, vehicle, now)
     if HUMAN not in opened.key.sources:
-        raise DocumentError("wrong-source", f"key {opened.key.kid.hex()} may not speak in person")
+        raise DocumentError("wrong-source", f"key {opened.key.kid.hex()} is not authorised to act in person")
     check_times(said.issued_at_us, said.expires_at_us, now)
     if said.flight:
         check_flight(said.flight, flight)
     if said.mission and said.mission not in missions:
-        raise DocumentError("other-mission", "it recalls another mission than the one that flies")
+        raise DocumentError("other-mission", "the recall is for a mission that does not fly")
     if said.policy and said.policy != policy:
-        raise DocumentError("other-policy", "it recalls what flies under another policy")
+        raise DocumentError("other-policy", "the recall is for another policy than the one in force")
     if said.policy and said.issued_at_us < issued_at_us:
-        raise DocumentError("before-mission", "it recalls what flew under the policy before this mission was issued")
+        raise DocumentError("before-mission", "the recall of the policy is older than this mission")
     return said

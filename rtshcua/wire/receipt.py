@@ -1,4 +1,4 @@
-"""Receipts: what the boundary answers to a document that was presented to it."""
+"""Receipts: the boundary's answer to a document."""
 
 from typing import Final
 
@@ -8,18 +8,18 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.wire import artefact, names
 from rtshcua.wire.artefact import ArtefactError
 
-#: what a document was
+#: : the kind of a document
 UNKNOWN, APPROVAL, RECALL, REPLACEMENT, CANCELLATION = range(5)
-#: the slug of a document that took effect
+#: : the slug of an accepted document
 ACCEPTED: Final = "accepted"
 
 
 class Receipt(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """What became of a document: `slug` is `accepted` or why it was refused, `text` is for a person.
+    """The result of a document: `slug` is `accepted` or the reason of the refusal, `text` is for a person.
 
-    Of an accepted approval: `step`, `role` (its number), `granted`, and `expires_us` (UTC). Of an accepted replacement:
-    `step`, the first that changed. `evidence` is the boundary's digest (`boundary_chain`) after it; empty where no
-    boundary was asked.
+    For an accepted approval: `step`, `role` (its number), `granted`, and `expires_us` (UTC). For an accepted
+    replacement: `step`, the first that changed. `evidence` is the boundary's digest (`boundary_chain`) after it;
+    empty if no boundary was involved.
     """
 
     kind: int
@@ -33,7 +33,7 @@ class Receipt(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_field
 
     @property
     def accepted(self) -> bool:
-        """Whether it took effect."""
+        """Whether the document was accepted."""
         return self.slug == ACCEPTED
 
 
@@ -43,7 +43,7 @@ def encode(receipt: Receipt) -> bytes:
 
 
 def decode(data: bytes) -> Receipt | Refusal:
-    """Read a receipt. Raises nothing."""
+    """Decode a receipt, or return what is wrong. Raises nothing."""
     try:
         receipt = msgspec.convert(artefact.unwrap(names.RECEIPT, data), Receipt, builtin_types=(bytes,))
     except (ArtefactError, msgspec.ValidationError) as error:

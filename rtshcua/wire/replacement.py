@@ -1,8 +1,8 @@
-"""Replacements: a new mission for a flight that is under way, under the policy that it flies under.
+"""Replacements: a new mission for a flight in progress, under the policy in force.
 
-A mission key signs a whole mission, the digest of the one that it supersedes, and how many of that one's first steps
-stay. These must be the same steps, to the last argument and clause, though the sources may have moved; on board they
-stay as they were signed first. What follows them takes the place of what was not yet released.
+A mission key signs a whole mission, the digest of the mission that it supersedes, and how many of that mission's
+first steps are kept. These must be the same steps, to the last argument and clause; only source positions may
+differ. On board they stay as they were first signed. The steps after them replace those that were not released.
 """
 
 from dataclasses import replace as with_fields
@@ -24,13 +24,13 @@ from rtshcua.wire.document import DocumentError, check_flight, open_document, si
 from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
 from rtshcua.wire.trust import HUMAN, TrustRoot
 
-#: how many replacements one flight takes
+#: : the most replacements of one flight
 MAX_REPLACEMENTS: Final = 64
 
 
 class ReplacementDocument(Flat, frozen=True):
-    """What a mission key signs: in this flight the mission of digest `supersedes` keeps its first `kept` steps, and
-    `mission` is the whole that then flies.
+    """The content that a mission key signs: in this flight the mission of digest `supersedes` keeps its first `kept`
+    steps, and `mission` is the whole mission that then flies.
     """
 
     flight: bytes
@@ -40,7 +40,7 @@ class ReplacementDocument(Flat, frozen=True):
 
 
 class VerifiedReplacement(NamedTuple):
-    """A verified replacement of the mission of digest `supersedes`; `digest` names the mission from now on."""
+    """A verified replacement of the mission of digest `supersedes`; `digest` is the digest of the new mission."""
 
     supersedes: bytes
     kept: int
@@ -50,11 +50,11 @@ class VerifiedReplacement(NamedTuple):
 
     @property
     def new(self) -> frozenset[bytes]:
-        """The ids of the steps that are new."""
+        """The ids of the new steps."""
         return frozenset([each.invocation_id for each in self.mission.invocations[self.kept :]])
 
     def over(self, bundle: Bundle) -> Bundle:
-        """The bundle with what is in force now: the steps that stay as they were signed first, then the new ones."""
+        """The bundle with the mission now in force: the kept steps as they were first signed, then the new ones."""
         steps = (*bundle.mission.invocations[: self.kept], *self.mission.invocations[self.kept :])
         mission = replace(self.mission, invocations=steps)
         return with_fields(bundle, mission=mission, mission_digest=self.digest, mission_key=self.key)
@@ -63,8 +63,8 @@ class VerifiedReplacement(NamedTuple):
 def sign_replacement(mission: Mission, *, over: Bundle, flight: bytes, kept: int, key: SigningKey) -> bytes:
     """The signed document, with the mission bound to the policy of `over`.
 
-    Raises `WrongDuty` for a key of another duty, and `DocumentError` (`other-steps`) where the steps that are to stay
-    are not those of `over`.
+    Raises `WrongDuty` for a key of another duty, and `DocumentError` (`other-steps`) if the kept steps differ from
+    those of `over`.
     """
     _check_kept(over.mission, mission, kept)
     bound = bind(mission, over.policy_digest, after=_after(flight, over.mission_digest, kept))
@@ -75,12 +75,12 @@ def sign_replacement(mission: Mission, *, over: Bundle, flight: bytes, kept: int
 def open_replacement(
     document: bytes, *, root: TrustRoot, vehicle: str, flight: bytes | None, bundle: Bundle, now: Now
 ) -> VerifiedReplacement:
-    """A replacement that is to be trusted here and now, for a flight (None: whichever it names) under the policy of
-    `bundle`.
+    """The replacement in a document, if it is trusted now, for a flight (None: the one that it names) under the
+    policy of `bundle`.
 
-    Whether it fits what has flown is for `fit_replacement`. Raises `DocumentError` (`other-flight`, `issued-in-future`,
-    `no-step`),
-    `BundleError` as for a mission in a bundle, `EnvelopeError` and `ArtefactError`.
+    `fit_replacement` checks it against the flown steps. Raises `DocumentError` (`other-flight`,
+    `issued-in-future`, `no-step`), `BundleError` as for a mission in a bundle, `EnvelopeError` and
+    `ArtefactError`.
     """
     said, opened = open_document(document, names.REPLACEMENT, ReplacementDocument, Duty.MISSION, root, now)
     if flight is not None:
@@ -91,23 +91,23 @@ def open_replacement(
         candidate, vehicle, now.utc_us + now.utc_error_us, after=_after(said.flight, said.supersedes, said.kept)
     )
     if found.mission.issued_at_us > now.utc_us + now.utc_error_us:
-        raise DocumentError("issued-in-future", "it says that it will be issued later than now")
+        raise DocumentError("issued-in-future", "the document's time of issue is in the future")
     if not found.mission.invocations:
-        raise DocumentError("no-step", "it leaves no step to fly")
+        raise DocumentError("no-step", "the replacement contains no new step")
     return found
 
 
 def fit_replacement(found: VerifiedReplacement, bundle: Bundle, released: int, *, compared: bytes = b"") -> Bundle:
-    """What is in force after a replacement of the mission in `bundle`, of which `released` steps were released.
-    `compared` is the digest of the mission that `check_stays` was asked about before.
+    """The bundle in force after a replacement of the mission in `bundle`, of which `released` steps were released.
+    `compared` is the digest of the mission that `check_stays` compared before.
 
-    Raises `DocumentError`: `superseded` (it replaces what is not in force), `already-released`, `other-steps`; and
-    `BundleError` for a key that may not speak for what is replaced.
+    Raises `DocumentError`: `superseded` (it replaces a mission that is not in force), `already-released`,
+    `other-steps`; and `BundleError` for a key that is not authorised for the replaced steps.
     """
     if found.supersedes != bundle.mission_digest:
-        raise DocumentError("superseded", "it replaces another mission than the one in force")
+        raise DocumentError("superseded", "the replacement is for a mission that is not in force")
     if found.kept < released:
-        text = f"it changes {step_words(found.kept)}, and {released} steps were released already"
+        text = f"the replacement changes {step_words(found.kept)}, but {released} steps were released already"
         raise DocumentError("already-released", text)
     if compared != bundle.mission_digest:
         check_stays(found, bundle)
@@ -115,23 +115,21 @@ def fit_replacement(found: VerifiedReplacement, bundle: Bundle, released: int, *
 
 
 def check_stays(found: VerifiedReplacement, bundle: Bundle) -> None:
-    """Whether the steps of `bundle` that are to stay are the same, and the key may set the others aside. It takes as
-    long as there are steps. Raises `DocumentError` and `BundleError`.
+    """Check that the kept steps of `bundle` are the same, and that the key may set the others aside. The time grows
+    with the number of steps. Raises `DocumentError` and `BundleError`.
     """
     _check_kept(bundle.mission, found.mission, found.kept)
     check_set_aside(found.key, bundle, found.kept)
 
 
 def _after(flight: bytes, supersedes: bytes, kept: int) -> bytes:
-    """What the ids of a replacement follow from beside its mission: so they are those of no bundle
-    and no other flight.
-    """
+    """The additional input of a replacement's ids, so that they differ from those of every bundle and other flight."""
     return cbor.encode([flight, supersedes, kept])
 
 
 def check_set_aside(key: VerificationKey, bundle: Bundle, first: int) -> None:
-    """Whether a mission key may set aside the steps of a bundle from `first` on: who does may speak for those who
-    proposed them. An agent sets aside what agents proposed, no more. Whether the key expired is asked before.
+    """Check that a mission key may set aside the steps of a bundle from `first` on: it must be authorised for their
+    proposers. An agent may only set aside what agents proposed. Expiry of the key is checked before.
 
     Raises `BundleError`.
     """
@@ -142,22 +140,25 @@ def check_set_aside(key: VerificationKey, bundle: Bundle, first: int) -> None:
 
 
 def _check_kept(old: Mission, new: Mission, kept: int) -> None:
-    """The first `kept` steps are the same, in phases of the same names."""
+    """Check that the first `kept` steps are the same, in phases of the same names."""
     if not 0 <= kept <= min(len(old.invocations), len(new.invocations)):
-        text = f"{kept} steps cannot stay: there were {len(old.invocations)}, and there are {len(new.invocations)}"
+        text = (
+            f"{kept} steps cannot be kept: the old mission has {len(old.invocations)} and the new one "
+            f"{len(new.invocations)}"
+        )
         raise DocumentError("other-steps", text)
     phases = 1 + max((each.phase for each in old.invocations[:kept]), default=-1)
     if old.phases[:phases] != new.phases[:phases]:
-        raise DocumentError("other-steps", "the phases of the steps that stay have other names or another order")
+        raise DocumentError("other-steps", "the phases of the kept steps have other names or another order")
     for number in range(kept):
         if _essence(old.invocations[number], phases) != _essence(new.invocations[number], phases):
-            raise DocumentError("other-steps", f"{step_words(number)} is to stay, and is not the same step")
+            raise DocumentError("other-steps", f"{step_words(number)} should be kept but differs")
 
 
 def _essence(invocation: Invocation, phases: int) -> Invocation:
-    """All that an invocation says, without what names it, when it was issued, and where in its source it stood.
+    """The content of an invocation without its name, its time of issue and its source position.
 
-    Of the phases in which it means something, those count that both missions have.
+    Of its phases, those count that both missions have.
     """
     return replace(
         invocation,

@@ -22,27 +22,29 @@ from rtshcua.model.flat.situation import Now, State
 from rtshcua.wire import artefact, names
 from rtshcua.wire.digest import DIGEST_BYTES
 
-#: what may ask: a mission step, a link of a step's fallback chain, a link of the contingency
+#: : the kinds of requests: a mission step, a link of a step's fallback chain, a link of the contingency
 STEP, FALLBACK_LINK, CONTINGENCY_LINK = 0, 1, 2
-#: the `link` that stands for the target of a degrade rule
+#: : the `link` of the target of a degrade rule
 DEGRADE: Final = -1
 
 
 class Ref(NamedTuple):
-    """What a request, a permit, a command or a record is about: `link` is -1 for a step, `step` for the contingency."""
+    """The subject of a request, a permit, a command or a record: `link` is -1 for a step, `step` -1 for the
+    contingency.
+    """
 
     kind: int
     step: int
     link: int
 
 
-#: what belongs to no step and no link
+#: : belongs to no step and no link
 NOTHING: Final = Ref(-1, -1, -1)
 
 
 #: the largest request in octets
 MAX_SIZE: Final = 1023
-#: Ages saturate here; no signal may have a longer time to stale.
+#: : Ages saturate at this value; the stale time of each signal is below it.
 MAX_AGE_US: Final = MAX_STALE + 1
 UNKNOWN: Final = -(1 << 63)
 _TRUTHS: Final = frozenset({1, 2, 4})
@@ -52,11 +54,11 @@ _HEAD_FIELDS: Final = 10
 
 
 class Request(msgspec.Struct, frozen=True):
-    """What the runtime asks: may this step, or this link, be dispatched now?
+    """The runtime's request to dispatch a step or a link now.
 
-    `link` is -1 for a step, and `DEGRADE` for the target of a degrade rule (kind `FALLBACK_LINK`); `step` is -1 for a
-    link of the contingency. `binding` is the invocation's, or for the contingency the policy's digest. `released_us`,
-    `phase` and `remaining_us` are those of `Context`.
+    `link` is -1 for a step, and `DEGRADE` for the target of a degrade rule (kind `FALLBACK_LINK`); `step` is -1
+    for a link of the contingency. `binding` is the invocation's, or for the contingency the policy's digest.
+    `released_us`, `phase` and `remaining_us` are those of `Context`.
     """
 
     kind: int
@@ -71,12 +73,12 @@ class Request(msgspec.Struct, frozen=True):
 
     @property
     def ref(self) -> Ref:
-        """What it asks for."""
+        """The subject of the request."""
         return Ref(self.kind, self.step, self.link)
 
 
 def encode(request: Request) -> bytes:
-    """The request's octets. Raises `struct.error` for what no monitor and no clock makes."""
+    """The request's octets. Raises `struct.error` for values outside of the fields' ranges."""
     state, now = request.state, request.now
     values = state.values
     prefix, layout = _form(len(values), len(state.monitors))
@@ -98,8 +100,8 @@ def encode(request: Request) -> bytes:
 
 
 def decode(data: bytes, slots: int, monitors: int) -> Request | Refusal:
-    """Read a request for a state of so many slots and temporal monitors, or say which rule its octets break. Accepts
-    only the octets that `encode` makes; raises nothing.
+    """Decode a request for a state of so many slots and temporal monitors, or return which rule its octets break.
+    Accepts only octets that `encode` produces; raises nothing.
     """
     prefix, layout = _form(slots, monitors)
     if len(data) != len(prefix) + layout.size or not data.startswith(prefix):
@@ -109,9 +111,9 @@ def decode(data: bytes, slots: int, monitors: int) -> Request | Refusal:
     fields = layout.unpack_from(data, len(prefix))
     kind, step, link, binding, at_us, utc_us, utc_error_us, released_us, remaining_us, phase = fields[:_HEAD_FIELDS]
     if kind > CONTINGENCY_LINK or step < -1 or link < -1:
-        return Refusal("malformed", "a kind, step or link out of range")
+        return Refusal("malformed", "the kind, step or link is out of range")
     if max(at_us, utc_us, utc_error_us, released_us, remaining_us) > MAX_VALUE:
-        return Refusal("malformed", "a time out of range")
+        return Refusal("malformed", "a time is out of range")
     ages_at = _HEAD_FIELDS + slots
     said_at = ages_at + slots
     known = fields[_HEAD_FIELDS:ages_at]
@@ -120,17 +122,17 @@ def decode(data: bytes, slots: int, monitors: int) -> Request | Refusal:
         values = tuple([None if value == UNKNOWN else value for value in known])
         known = tuple([value for value in known if value != UNKNOWN])
     if known and not -MAX_VALUE <= min(known) <= max(known) <= MAX_VALUE:
-        return Refusal("malformed", "a state value out of range")
+        return Refusal("malformed", "a state value is out of range")
     ages, said = fields[ages_at:said_at], fields[said_at:]
     if not _TRUTHS.issuperset(said):
-        return Refusal("malformed", "what a monitor says is no truth")
+        return Refusal("malformed", "the value of a monitor is not a truth")
     now = Now(at_us, utc_us, utc_error_us)
     return Request(kind, step, link, binding, now, State(values, ages, said), released_us, phase, remaining_us)
 
 
 @cache
 def _form(slots: int, monitors: int) -> tuple[bytes, Struct]:
-    """What every request for a state of this size begins with, and the layout of what follows."""
+    """The beginning of every request for a state of this size, and the layout of the rest."""
     layout = Struct(f"{_HEAD}{slots}q{slots}I{monitors}B")
     body = bytes(layout.size)
     return artefact.wrap(names.REQUEST, body)[: -layout.size], layout

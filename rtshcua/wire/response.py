@@ -1,11 +1,12 @@
 """Responses of `enforce`: a decision, with a permit where it grants one, or a refusal to decide.
 
-The body is one string of octets in a fixed layout, big-endian: status, outcome, reason number, step of section 4.1,
-clause, target, `valid_until_us`, consumed, then the permit, if any, and last the digest of the boundary's own evidence
-after it (`boundary_chain`, paper symbol `d_ev`). In a refusal all but status and digest is 0.
+The body is one string of octets in a fixed layout, big-endian: status, outcome, reason number, step of section
+4.1, clause, target, `valid_until_us`, consumed, then the permit, if any, and last the new digest of the boundary's
+own evidence (`boundary_chain`, paper symbol `d_ev`). In a refusal all fields but status and digest are 0.
 
-A clause is a number, counted through `shared_clauses`, then `own_clauses`; so is a target, of a link of the fallback
-chain, or `-1 - rule` for that of a degrade rule. Where a link was asked for, no target is said: it is that link.
+A clause is a number, counted through `shared_clauses`, then `own_clauses`. A target is the number of a link of the
+fallback chain, or `-1 - rule` for that of a degrade rule. A response about a link has no target: the link is the
+target.
 """
 
 from enum import IntEnum
@@ -23,9 +24,9 @@ from rtshcua.wire.digest import DIGEST_BYTES
 from rtshcua.wire.permit import SIZE
 from rtshcua.wire.request import DEGRADE
 
-#: `target` where the decision names none: less than `-1 - rule` for any rule
+#: : `target` of a decision without a target: less than `-1 - rule` for any rule
 NO_TARGET: Final = -(1 << 15) - 1
-#: `clause` where the contract itself decided
+#: : `clause` when the contract itself decided
 NO_CLAUSE: Final = -1
 
 _OUTCOMES: Final = tuple(Outcome)
@@ -33,23 +34,23 @@ _HEAD: Final = Struct(">BBBBiiqB")
 
 
 class Status(IntEnum):
-    """Whether `enforce` decided, and if not, why."""
+    """Whether `enforce` decided, or why not."""
 
     DECIDED = 0
-    MALFORMED = 1  # the octets are no request
+    MALFORMED = 1  # the octets are not a request
     UNKNOWN_STEP = 2  # the bundle has no such step or link
     NOT_CURRENT = 3  # the bundle has it, but its turn has not come
-    CLOCK_APART = 4  # the time of day that it names is not the boundary's own
-    CLOCK_UNKNOWN = 5  # it names one, and the boundary knows of none
+    CLOCK_APART = 4  # the claimed time of day differs from the boundary's own
+    CLOCK_UNKNOWN = 5  # the request claims a time of day, but the boundary knows none
 
 
 def shared_clauses(policy: Policy) -> tuple[Rule | Airspace, ...]:
-    """What can decide any request, numbered by position: the rules, then the airspace if there is one."""
+    """The clauses that can decide any request, numbered by position: the rules, then the airspace if there is one."""
     return (*policy.rules, *(() if policy.airspace is None else (policy.airspace,)))
 
 
 def own_clauses(contract: Contract) -> tuple[Clause, ...]:
-    """What can decide a request for this contract; numbered on from the shared ones."""
+    """The clauses that can decide a request for this contract; their numbers continue those of the shared ones."""
     return (*contract.require, *contract.assume, *contract.maintain)
 
 
@@ -75,8 +76,8 @@ def encode_refusal(status: Status, evidence: bytes = bytes(DIGEST_BYTES)) -> byt
 
 
 def decode(data: bytes, policy: Policy, contract: Contract | None) -> Decision | Status | Refusal:
-    """Read a response about a step of this contract, or a link of it (None: of the contingency); a refusal to decide is
-    its status. Raises nothing.
+    """Decode a response about a step of this contract, or a link of it (None: of the contingency); a refusal to
+    decide is returned as its status. Raises nothing.
     """
     prefix, head, start, end = _PERMITTED if len(data) == _PERMITTED_BYTES else _BARE
     if not data.startswith(prefix) or len(data) != end + DIGEST_BYTES:
@@ -85,14 +86,14 @@ def decode(data: bytes, policy: Policy, contract: Contract | None) -> Decision |
     if status != Status.DECIDED:
         refused = Status(status) if status < len(Status) else None
         if refused is None or data != encode_refusal(refused, data[end:]):
-            return Refusal("malformed", "a refusal with more than its status")
+            return Refusal("malformed", "a refusal contains more than its status")
         return refused
     if outcome >= len(_OUTCOMES) or reason >= len(WIRE_REASONS):
-        return Refusal("malformed", "an outcome or a reason that there is not")
+        return Refusal("malformed", "the outcome or the reason is unknown")
     try:
         decisive, (link, flown) = _clause(clause, policy, contract), _target(target, policy, contract)
     except LookupError:
-        return Refusal("malformed", "a clause or a target that there is not")
+        return Refusal("malformed", "the clause or the target is unknown")
     said, why, permit = _OUTCOMES[outcome], WIRE_REASONS[reason], data[start:end]
     return Decision(said, why, step, decisive, link, flown, valid_until_us, consumed, permit)
 
@@ -127,7 +128,9 @@ _WITH_PERMIT: Final = _prefix(_HEAD.size + SIZE + DIGEST_BYTES)
 
 
 def _places(prefix: bytes, size: int) -> tuple[bytes, int, int, int]:
-    """What a response with a permit of this size begins with; where its head, its permit and its digest begin."""
+    """The beginning of a response with a permit of this size, and the offsets of its head, its permit and its
+    digest.
+    """
     start = len(prefix) + _HEAD.size
     return prefix, len(prefix), start, start + size
 

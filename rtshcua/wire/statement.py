@@ -1,4 +1,4 @@
-"""What the boundary signs of its own evidence (`boundary_chain`): so far it got, and whether it ends there.
+"""Statements: the boundary's signature over its own evidence (`boundary_chain`) so far, and whether it ends there.
 
 A COSE_Sign1 by a key of duty `boundary`, around an artefact whose body is the fields below in their order.
 """
@@ -26,15 +26,15 @@ class StatementError(Untrusted):
 
 
 class Statement(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """How far the boundary got in a flight (its id, 16 octets).
+    """The boundary's evidence at one moment of a flight (its id, 16 octets).
 
-    `session` counts the sessions of one boundary, 0 where it does not know; `before` is the digest that it kept of the
-    one before, 32 zero octets where there is none. `digest` is the one after `count` entries, and `marks` the first
-    octets of the digests after each entry since the statement before, of the first `MOST_MARKS` of them. `left` is the
-    digest of so many `frames` that carry out commands, `aside` that of what is only counted: `repeated` answers,
-    `declined` documents, `stopped` frames, and frames that were signed `ahead`. `source` (`wire.clock`) says where the
-    boundary has the time of day from, and the next three what it was at the statement: monotonic, UTC, and how far that
-    may be off, in us. After a `final` one there is no more.
+    `session` counts the sessions of one boundary, 0 if unknown; `before` is the last digest of the previous
+    session, 32 zero octets if there is none. `digest` is the digest after `count` entries, and `marks` the first
+    octets of the digests after each entry since the previous statement, of the first `MOST_MARKS` of them. `left`
+    is the digest of the `frames` that carry out commands, `aside` that of what is only counted: `repeated`
+    answers, `declined` documents, `stopped` frames, and frames signed `ahead`. `source` (`wire.clock`) is the
+    source of the boundary's time of day, and the next three are its reading at the statement: monotonic, UTC, and
+    the greatest error of the latter, in us. Nothing follows a `final` statement.
     """
 
     flight: bytes
@@ -63,7 +63,7 @@ class Statement(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fie
 
 
 def counted(said: Statement) -> tuple[int, int, int, int, int]:
-    """What of a statement only ever grows, besides its entries."""
+    """The counters of a statement, which only grow, besides its entries."""
     return said.frames, said.repeated, said.declined, said.stopped, said.ahead
 
 
@@ -74,12 +74,14 @@ def sign(statement: Statement, key: SigningKey) -> bytes:
 
 
 def claimed(data: bytes) -> Statement:
-    """What a statement says, whoever signed it. Raises as `open_statement`."""
+    """The content of an unverified statement. Raises as `open_statement`."""
     return _read(cose.unverified(data, limit=MAX_STATEMENT).payload)
 
 
 def open_statement(data: bytes, keys: Mapping[bytes, VerificationKey]) -> Statement:
-    """What one of the keys (by `kid`) signed. Raises `EnvelopeError`, `ArtefactError` and `StatementError`."""
+    """The statement that one of the keys (by `kid`) signed. Raises `EnvelopeError`, `ArtefactError` and
+    `StatementError`.
+    """
     opened = cose.open1(
         data, keys=keys, duty=Duty.BOUNDARY, content_type=names.STATEMENT.content_type, limit=MAX_STATEMENT
     )
@@ -92,7 +94,7 @@ def _read(payload: bytes) -> Statement:
     numbers = (said.session, said.count, *counted(said), said.at_us, said.utc_us, said.utc_error_us)
     fits = len(said.marks) % MARK_BYTES == 0 and len(said.marks) <= MARK_BYTES * MOST_MARKS
     if len(said.flight) != FLIGHT_BYTES or digests != {DIGEST_BYTES} or not fits:
-        raise StatementError("malformed", "a flight, a digest or a mark of it is not as long as they are")
+        raise StatementError("malformed", "a flight, digest or mark has the wrong length")
     if min(numbers) < 0 or not 0 <= said.source <= max(ClockSource):
-        raise StatementError("malformed", "a number of it is out of range")
+        raise StatementError("malformed", "a number is out of range")
     return said

@@ -39,7 +39,7 @@ def held_to(text: str, step: int = 0) -> Mission:
 def test_a_clause_that_borrows_the_policys_words_is_not_loaded(text: str) -> None:
     found = try_load(sealed(POLICY, held_to(text)))
     assert isinstance(found, Refusal)
-    assert "in the policy's words, and is another" in found.text
+    assert "has the text of a policy clause but different code" in found.text
 
 
 def test_what_refused_a_step_in_the_missions_own_words_is_told_so() -> None:

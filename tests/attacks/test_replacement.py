@@ -220,7 +220,7 @@ def test_what_stays_may_not_be_touched(changed: object) -> None:
     mission = replace(shorter(OF), invocations=(first, changed, last))
     of = fresh()
     assert presented(of, forged(of, mission)).slug == "other-steps"
-    with pytest.raises(DocumentError, match="is not the same step"):
+    with pytest.raises(DocumentError, match="should be kept but differs"):
         sign_replacement(mission, over=of.bundle, flight=FLIGHT, kept=2, key=MISSION_KEY)
 
 

@@ -103,7 +103,7 @@ def test_the_name_of_a_mission_says_nothing_of_what_is_signed(low: Path, capsys:
         return main(["approve", "low.bundle", "--step", "3", "-o", "yes", *FLIGHT])
 
     assert named(f"low` on `quad-07`: `hover(time = 5 s)`{' ' * 4000}`") == ExitCode.INPUT
-    assert "would be refused on board: the name of the mission is no name" in capsys.readouterr().err
+    assert "would be refused on board: the name of the mission is invalid" in capsys.readouterr().err
     assert not (low / "yes").exists()
     assert named("hover_5_s_above_home" * 400) == ExitCode.OK
     assert len(capsys.readouterr().err.split("`inspect_area(")[0]) < 160

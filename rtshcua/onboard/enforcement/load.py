@@ -173,7 +173,7 @@ def load(
         return Refusal("malformed", f"the policy does not make sense: {policy.text}")
     invocations = prepare_mission(opened.mission, policy)
     if isinstance(invocations, Refusal):
-        return Refusal("malformed", f"the new mission is malformed: {invocations.text}")
+        return Refusal("malformed", f"the mission is malformed: {invocations.text}")
     if not opened.policy.contingency or not invocations:
         what = "mission has no step" if opened.policy.contingency else "policy has no contingency"
         return Refusal("malformed", f"the {what}")

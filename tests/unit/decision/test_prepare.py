@@ -206,8 +206,14 @@ POLICIES: list[tuple[Policy, str]] = [
         "vehicle: `x` is left out, but the vehicle is without no signal",
     ),
     (lacking("a", left_out=(LeftOut(99, "assume", "x", 0, 0, 1),)), "vehicle: there is no skill 99"),
-    (lacking("a", left_out=(LeftOut(0, "permit", "x", 0, 0, 1),)), "vehicle: `x` is left out of `permit`, which is not"),
-    (lacking("a", left_out=(LeftOut(0, "degrade", "x", 0, 0, 1),)), "vehicle: `x` is left out of `degrade`, which is not"),
+    (
+        lacking("a", left_out=(LeftOut(0, "permit", "x", 0, 0, 1),)),
+        "vehicle: `x` is left out of `permit`, which is not",
+    ),
+    (
+        lacking("a", left_out=(LeftOut(0, "degrade", "x", 0, 0, 1),)),
+        "vehicle: `x` is left out of `degrade`, which is not",
+    ),
     (replace(P, silence_us=0), f"silence 0 is not in 1..{MAX_SILENCE}"),
     (replace(P, silence_us=-1), f"silence -1 is not in 1..{MAX_SILENCE}"),
     (replace(P, silence_us=MAX_SILENCE + 1), f"silence {MAX_SILENCE + 1} is not in 1..{MAX_SILENCE}"),

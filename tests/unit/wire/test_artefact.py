@@ -16,29 +16,29 @@ def test_bytes_begin_with_name_and_version():
 @rows(
     ("data", "slug", "text"),
     [
-        (b"", "malformed", "this is no `rtshcua/policy`: not canonical CBOR: ends where an item should begin (byte 0)"),
-        (cbor.encode(1), "malformed", "this is no `rtshcua/policy`: not an array of format name, version and body"),
+        (b"", "malformed", "not a `rtshcua/policy`: not canonical CBOR: unexpected end before an item (byte 0)"),
+        (cbor.encode(1), "malformed", "not a `rtshcua/policy`: expected an array of format name, version and body"),
         (
             cbor.encode(("rtshcua/policy", True, 1)),
             "malformed",
-            "this is no `rtshcua/policy`: not an array of format name, version and body",
+            "not a `rtshcua/policy`: expected an array of format name, version and body",
         ),
         (
             cbor.encode(("rtshcua/policy", 1)),
             "malformed",
-            "this is no `rtshcua/policy`: not an array of format name, version and body",
+            "not a `rtshcua/policy`: expected an array of format name, version and body",
         ),
-        (wrap(names.MISSION, 1), "unknown-format", "this is `rtshcua/mission`, not `rtshcua/policy`"),
+        (wrap(names.MISSION, 1), "unknown-format", "expected `rtshcua/policy`, found `rtshcua/mission`"),
         (
             cbor.encode(("rtshcua/policy", 8, 1)),
             "unknown-version",
-            "`rtshcua/policy` version 8 is unknown here; only version 7 is read",
+            "`rtshcua/policy` version 8 is not supported; this program reads version 7",
         ),
         (
             cbor.encode(("rtshcua/policy", 5, 1)),
             "unknown-version",
-            "`rtshcua/policy` version 5 is unknown here; only version 7 is read; "
-            "docs/compatibility.md says what reads earlier ones",
+            "`rtshcua/policy` version 5 is not supported; this program reads version 7; "
+            "see docs/compatibility.md for earlier versions",
         ),
     ],
 )
@@ -54,24 +54,24 @@ def test_anything_else_is_refused(data, slug, text):
         (
             wrap(names.MISSION, 0)[:-1] + b"\xff",
             "unknown-format",
-            "this is `rtshcua/mission`, not `rtshcua/policy`",
+            "expected `rtshcua/policy`, found `rtshcua/mission`",
         ),
-        (b"\x83\x62\xff\xfe\x01", "unknown-format", "this is `\ufffd\ufffd`, not `rtshcua/policy`"),
+        (b"\x83\x62\xff\xfe\x01", "unknown-format", "expected `rtshcua/policy`, found `\ufffd\ufffd`"),
         (
             b"\x83\x6ertshcua/policy\x20",
             "unknown-version",
-            "`rtshcua/policy` version -1 is unknown here; only version 7 is read; "
-            "docs/compatibility.md says what reads earlier ones",
+            "`rtshcua/policy` version -1 is not supported; this program reads version 7; "
+            "see docs/compatibility.md for earlier versions",
         ),
         (
             b"\x83\x6ertshcua/policy\x1b" + b"\xff" * 8 + b"\x00",
             "malformed",
-            "this is no `rtshcua/policy`: not canonical CBOR: integer outside 64 bits (byte 16)",
+            "not a `rtshcua/policy`: not canonical CBOR: integer does not fit in 64 bits (byte 16)",
         ),
         (
             b"\x83\x78\xff\x00\x00",
             "malformed",
-            "this is no `rtshcua/policy`: not canonical CBOR: string longer than the bytes that follow (byte 1)",
+            "not a `rtshcua/policy`: not canonical CBOR: string is longer than the remaining bytes (byte 1)",
         ),
     ],
 )

@@ -47,7 +47,7 @@ def test_the_present_version_is_read_and_earlier_ones_are_refused_by_name(name: 
         assert (slug, text) == ("", "")
         return
     assert slug == "unknown-version"
-    assert text.startswith(f"`rtshcua/{kind}` version {version} is unknown here")
+    assert text.startswith(f"`rtshcua/{kind}` version {version} is not supported")
     assert names.COMPATIBILITY in text
 
 

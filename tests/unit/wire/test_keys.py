@@ -99,7 +99,7 @@ def test_verification_carries_what_the_key_is():
 
 
 def test_a_verification_key_that_cannot_be():
-    with pytest.raises(ValueError, match="a public key has 32 bytes, not 31"):
+    with pytest.raises(ValueError, match="a public key is 32 bytes, not 31"):
         VerificationKey(Duty.POLICY, bytes(31))
     with pytest.raises(ValueError, match="`pilot` is not a source"):
         VerificationKey(Duty.MISSION, bytes([2] * 32), sources=("agent", "pilot"))

@@ -61,7 +61,7 @@ def test_the_target_of_a_degrade_rule_is_read_back() -> None:
 def test_a_clause_or_a_target_that_there_is_not_is_refused(clause: int, target: int, contract: Contract | None) -> None:
     refused = read(written(ANSWER, clause, target), contract)
     assert isinstance(refused, Refusal)
-    assert refused.text == "a clause or a target that there is not"
+    assert refused.text == "the clause or the target is unknown"
 
 
 def test_clauses_are_numbered_from_the_rules_over_the_airspace_to_the_contract() -> None:
@@ -116,10 +116,10 @@ def changed(data: bytes, at: int, octet: int) -> bytes:
         (written(ANSWER)[:-1], "not a response of version 2"),
         (cbor.encode(("rtshcua/response", 1, bytes(53))), "not a response of version 2"),
         (artefact.wrap(names.RESPONSE, 1), "not a response of version 2"),
-        (changed(PLAIN, 1, len(Outcome)), "an outcome or a reason that there is not"),
-        (changed(PLAIN, 2, len(Reason)), "an outcome or a reason that there is not"),
-        (changed(REFUSAL, 0, len(Status)), "a refusal with more than its status"),
-        (changed(REFUSAL, 20, 1), "a refusal with more than its status"),
+        (changed(PLAIN, 1, len(Outcome)), "the outcome or the reason is unknown"),
+        (changed(PLAIN, 2, len(Reason)), "the outcome or the reason is unknown"),
+        (changed(REFUSAL, 0, len(Status)), "a refusal contains more than its status"),
+        (changed(REFUSAL, 20, 1), "a refusal contains more than its status"),
     ],
 )
 def test_what_is_no_response_says_why(data: bytes, text: str) -> None:

@@ -88,7 +88,7 @@ def test_another_pin_is_refused():
     assert opening(SIGNED, pinned=NEXT.public) == "unknown-key"
     assert opening(SIGNED, pinned=NEXT.kid) == "unknown-key"
     assert opening(SIGNED, pinned=bytes(32)) == "unknown-key"  # a pin that anybody could sign for
-    with pytest.raises(ValueError, match="a root is pinned by 32 or 16 bytes, not 3"):
+    with pytest.raises(ValueError, match="a pin is 32 or 16 bytes, not 3"):
         open_root(SIGNED, pinned=b"pin", now_us=200)
 
 
@@ -212,7 +212,7 @@ def test_without_a_threshold_one_witness_is_enough():
 
 
 def test_a_threshold_above_one_says_so():
-    with pytest.raises(RootError, match="`policy` asks for 2 signatures; only 1 is supported so far"):
+    with pytest.raises(RootError, match="`policy` requires 2 signatures; only 1 is supported"):
         changed(thresholds=Thresholds(policy=2)).sign(ROOT)
 
 

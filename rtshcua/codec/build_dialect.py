@@ -1,6 +1,7 @@
-"""Derives `dialect.json` from pymavlink: `python -m rtshcua.codec.build_dialect` writes it anew.
+"""Generates `dialect.json` from pymavlink: `python -m rtshcua.codec.build_dialect`.
 
-A test compares the shipped table with a fresh one, so that a new pymavlink cannot change the dialect unseen.
+A test compares the shipped table with a newly generated one, so that a new pymavlink cannot change the dialect
+unnoticed.
 """
 
 import json
@@ -16,7 +17,8 @@ COMMAND = "python -m rtshcua.codec.build_dialect"
 def build_table() -> dict[str, dict[str, Any]]:
     """The table, by introspection of the generated module.
 
-    `messages`: name -> [number, {field: [type, array length, unit, enumeration]}]; `enums`: name -> {entry: value}.
+    `messages`: name -> [number, {field: [type, array length, unit, enumeration]}]; `enums`: name -> {entry:
+    value}.
     """
     messages = {kind.msgname: [number, _fields(kind)] for number, kind in sorted(ardupilotmega.mavlink_map.items())}
     enums = {
@@ -27,7 +29,7 @@ def build_table() -> dict[str, dict[str, Any]]:
 
 
 def _fields(kind: Any) -> dict[str, list[Any]]:
-    # Types are listed in the order of the XML, array lengths in the order of the wire.
+    # Types are in the order of the XML, array lengths in the order of the wire.
     lengths = dict(zip(kind.ordered_fieldnames, kind.array_lengths, strict=True))
     return {
         name: [type_, lengths[name], kind.fieldunits_by_name.get(name, ""), kind.fieldenums_by_name.get(name)]
@@ -41,7 +43,7 @@ def _is_end(enum: str, entry: str) -> bool:
 
 
 def render(table: dict[str, dict[str, Any]]) -> str:
-    """The table's text: JSON, one message or enumeration a line, so that a change shows as one."""
+    """The table as JSON with one message or enumeration on each line, for readable diffs."""
     sections = []
     for section, rows in table.items():
         lines = ",\n".join(f"{json.dumps(name)}:{json.dumps(row, separators=(',', ':'))}" for name, row in rows.items())

@@ -1,11 +1,11 @@
-"""MAVLink 2 messages to frames and back, over pymavlink's generated messages (never `mavutil`).
+"""Converts MAVLink 2 messages to frames and back, over pymavlink's generated messages (never `mavutil`).
 
-What pymavlink's `decode` and `pack` do, prepared once for each kind of message. The message is of a class derived from
-pymavlink's own, with every field; its header is not filled in, for who sent it stands in `ReceivedFrame`.
+It does the work of pymavlink's `decode` and `pack`, prepared once for each kind of message. The message is of a
+class derived from pymavlink's, with every field; its header is empty, because `ReceivedFrame` has the sender.
 
-Fast twin of pymavlink's codec. Goal: a flight in virtual time is at least 150 times as fast as life
-(bench/virtual_time.py); on a busy machine 52 times with it, 39 with pymavlink's two functions (docs/adr/0037).
-tests/unit/codec/test_decode.py holds that both give the same for every kind of message.
+A fast equivalent of pymavlink's codec. Goal: a flight in virtual time is at least 150 times as fast as real time
+(bench/virtual_time.py); on a busy machine 52 times with this codec, 39 with pymavlink's two functions
+(docs/adr/0037). tests/unit/codec/test_decode.py checks that both give the same for every kind of message.
 """
 
 from binascii import crc_hqx
@@ -29,46 +29,46 @@ from rtshcua.mavlink.framing import (
 )
 from rtshcua.mavlink.signing import FrameVerifier
 
-# pymavlink lets an environment variable switch the checksum off in its own decoder. Nobody here may use it so.
+# An environment variable can disable the checksum in pymavlink's own decoder, which must not be used here.
 ardupilotmega.MAVLINK_IGNORE_CRC = 0
 
 _HEAD = Struct("<BBBBBB3s").pack
 _head = Struct("<xBBxBBB3s").unpack_from
 
 Message = Any
-"""An instance of a generated `MAVLink_..._message` class; pymavlink ships no types."""
+"An instance of a generated `MAVLink_..._message` class; pymavlink ships no types."
 
 
 def is_addressed(message: Message, system: int, component: int) -> bool:
-    """Whether a message is for this component: it names it, or everybody (0), or nobody (its kind has no target)."""
+    """Whether a message is for this component: it names it, or all (0), or its kind has no target."""
     systems, components = (0, system), (0, component)
     return getattr(message, "target_system", 0) in systems and getattr(message, "target_component", 0) in components
 
 
 class MessageKind(NamedTuple):
-    """How messages of one number are decoded."""
+    """How to decode messages of one number."""
 
     name: str
     extra: bytes
-    """The octet that the checksum takes in behind the payload: a digest of the message's layout."""
+    "The octet that the checksum includes after the payload: a digest of the message's layout."
     fields: Struct
     build: Callable[..., Message]
-    """Makes a message of the numbers on the wire, in their order."""
+    "Makes a message of the values on the wire, in their order."
     number: bytes
-    """As it stands in a frame's header."""
+    "As it is in a frame's header."
     payload: Callable[[Message], bytes] | None
-    """The payload of a message, zeros at its end included; None where it holds texts."""
+    "Packs the payload of a message, with trailing zeros; None if it contains texts."
 
 
 _UNKNOWN = MessageKind("", b"", Struct(""), tuple, b"", None)
-"""Of messages that the dialect does not have."""
+"Of messages that are not in the dialect."
 
-_met: dict[bytes, MessageKind] = {}  # the kinds of messages that came, by number: at most as many as the dialect has
+_met: dict[bytes, MessageKind] = {}  # the kinds of received messages, by number: at most as many as the dialect has
 
 
-@lru_cache(maxsize=1024)  # more than the dialect has; a hostile link may name 2^24 numbers
+@lru_cache(maxsize=1024)  # more than the dialect has; a hostile link may send 2^24 numbers
 def kind_of(number: int) -> MessageKind | None:
-    """The kind of a message; None for one that the dialect does not have."""
+    """The kind of a message; None if it is not in the dialect."""
     of = ardupilotmega.mavlink_map.get(number)
     if of is None:
         return None
@@ -79,9 +79,9 @@ def kind_of(number: int) -> MessageKind | None:
 
 
 def _function(text: str, **known: Any) -> Callable[..., Any]:
-    """The function `made` of a text that is put together from pymavlink's own names of fields.
+    """The function `made` of source text that is composed of pymavlink's own field names.
 
-    Fields that are set and read by their names, one after the other, take a third of what they take as a dictionary.
+    Assigning and reading fields by name takes a third of the time of a dictionary.
     """
     exec(text, known)
     made: Callable[..., Any] = known["made"]
@@ -89,32 +89,34 @@ def _function(text: str, **known: Any) -> Callable[..., Any]:
 
 
 def _bare(of: Any) -> dict[str, Any]:
-    """What a message holds beside its fields."""
+    """The contents of a message besides its fields."""
     made = of(*[0] * len(of.fieldnames))
     return {name: value for name, value in vars(made).items() if name not in of.fieldnames}
 
 
 def _layout(of: Any) -> tuple[tuple[str, int, int], ...]:
-    """Each field in the order of the wire, where it starts among the values, and its length."""
+    """Each field in the order of the wire, its start among the values, and its length."""
     starts = [sum(of.lengths[:place]) for place in range(len(of.lengths))]
     return tuple(zip(of.ordered_fieldnames, starts, of.lengths, strict=True))
 
 
 @cache
 def _filled(of: Any) -> Any:
-    """The class of a message, with what is the same in each, which none then has to be given."""
+    """The class of a message with the values that are the same in all instances."""
     return type(of.__name__, (of,), _bare(of))
 
 
 def _making(of: Any, takes: str, fields: Mapping[str, str], **known: Any) -> Callable[..., Message]:
-    """What makes a message without the generated constructor: a function that `takes` so, and each field's value."""
+    """A function with the parameters `takes` that makes a message with each field's value, without the generated
+    constructor.
+    """
     set_all = "\n".join(f"    message.{name} = {value}" for name, value in fields.items())
     text = f"def made({takes}):\n    message = new(of)\n{set_all}\n    return message"
     return _function(text, new=object.__new__, of=_filled(of), **known)
 
 
 def _numbers(of: Any) -> Callable[..., Message]:
-    """A message of numbers, from those of the wire."""
+    """A constructor of a message without texts, from the values on the wire."""
     takes = [f"value{place}" for place in range(sum(of.lengths))]
     fields = {
         name: takes[start] if length == 1 else f"[{', '.join(takes[start : start + length])}]"
@@ -124,7 +126,7 @@ def _numbers(of: Any) -> Callable[..., Message]:
 
 
 def maker(of: Any) -> Callable[..., Message]:
-    """What makes a message of numbers as the generated constructor does, from the same arguments in their order."""
+    """A constructor of a message without texts, with the arguments of the generated one."""
     defaults = of.__init__.__defaults__ or ()
     given = len(of.fieldnames) - len(defaults)
     takes = [f"value{place}" + f"=defaults[{place - given}]" * (place >= given) for place in range(len(of.fieldnames))]
@@ -133,13 +135,13 @@ def maker(of: Any) -> Callable[..., Message]:
 
 
 def _payload(of: Any) -> Callable[[Message], bytes]:
-    """What packs the numbers of a message, in the order of the wire."""
+    """A function that packs the values of a message, in the order of the wire."""
     values = [f"message.{name}" if length == 1 else f"*message.{name}[:{length}]" for name, _, length in _layout(of)]
     return _function(f"def made(message): return pack({', '.join(values)})", pack=of.unpacker.pack)
 
 
 def _any(of: Any) -> Callable[..., Message]:
-    """A message with texts, by the generated constructor."""
+    """A message with texts, made by the generated constructor."""
     starts = [sum(of.lengths[:place]) for place in range(len(of.lengths))]
     pick = [(starts[place], of.lengths[place]) for place in of.orders]
 
@@ -158,7 +160,7 @@ def _any(of: Any) -> Callable[..., Message]:
 
 
 class ReceivedFrame(NamedTuple):
-    """A good frame: its checksum is right and its message is of the dialect."""
+    """A frame with a correct checksum and a message of the dialect."""
 
     message: Message
     name: str
@@ -166,20 +168,20 @@ class ReceivedFrame(NamedTuple):
     component: int
     sequence: int
     signed: bool
-    """Whether the frame carries a signature. Whether the signature is right is not checked here."""
+    "Whether the frame is signed. The signature is not verified here."
     frame: bytes
-    """The frame as it came, for the raw log."""
+    "The received octets, for the raw log."
 
 
 _LEAST, _BEHIND_SIGNED = HEADER + CHECKSUM, CHECKSUM + SIGNATURE
 
 
 class Codec:
-    """One end of a link: packs messages as (system, component), parses what the other end sent.
+    """One end of a link: packs messages as (system, component), and parses those of the other end.
 
-    `only`, if given, holds the system ids that are listened to; frames of others are dropped and counted in `foreign`.
-    `damaged` counts stretches of bytes that were no good frame, `unknown` counts frames of messages that the dialect
-    does not have and whose checksum therefore cannot be verified, `refused` those that `verifier` did not accept.
+    `only`, if given, holds the accepted system ids; frames of others are dropped and counted in `foreign`.
+    `damaged` counts sequences of bytes that were not a valid frame, `unknown` counts frames of messages that are
+    not in the dialect, so that their checksum cannot be verified, `refused` those that `verifier` did not accept.
     """
 
     def __init__(
@@ -196,12 +198,12 @@ class Codec:
     def pack(self, message: Message) -> bytes:
         """The message's frame, with the next sequence number."""
         sender = self._sender
-        kind = kind_of(type(message).id)  # of the class: some messages have a field of this name
+        kind = kind_of(type(message).id)  # read from the class, because some messages have a field of this name
         _, extra, _, _, number, payload_of = kind or _UNKNOWN
         if payload_of is None:
             frame: bytes = message.pack(sender)
         else:
-            # What pymavlink does, in a third of the time. Zeros at the end of a payload are not sent, but for the
+            # Equivalent to pymavlink in a third of the time. Trailing zeros of a payload are not sent, except its
             # first octet.
             payload = payload_of(message)
             if not payload[-1]:
@@ -213,11 +215,11 @@ class Codec:
         return frame
 
     def parse(self, datagram: bytes, now_us: int = 0) -> list[ReceivedFrame]:
-        """The good frames in a datagram, in order; never raises, whatever the bytes.
+        """The valid frames in a datagram, in order; raises nothing.
 
-        A frame does not span datagrams, so nothing is kept from one call to the next. The time is the verifier's.
+        A frame does not span datagrams, so nothing is kept between calls. The time is for the verifier.
         """
-        received, only = _decode(datagram), self._only  # what comes in a datagram is one frame, as a rule
+        received, only = _decode(datagram), self._only  # a datagram usually contains one frame
         if received is not None:
             heeded = self._verifier is None and (only is None or received[2] in only)
             return [received] if heeded or self._lets_in(received, now_us) else []
@@ -232,8 +234,8 @@ class Codec:
                     good.append(received)
                 start, in_garbage = end, False
             elif end and kind_of(message_id(datagram, start)) is None and _at_boundary(datagram, end):
-                # Its checksum cannot be verified, but it is framed like the rest: skip it whole, lest something
-                # that its payload holds be taken for a frame of its own.
+                # Its checksum cannot be verified, but it has the frame of a message: skip all of it, so that its
+                # payload is not parsed as a frame.
                 self.unknown += 1
                 start, in_garbage = end, False
             else:
@@ -243,7 +245,7 @@ class Codec:
         return good
 
     def _lets_in(self, received: ReceivedFrame, now_us: int) -> bool:
-        """Whether a good frame is of somebody who is listened to; counted if it is not."""
+        """Whether a valid frame is from an accepted system; counted if not."""
         if self._only is not None and received[2] not in self._only:
             self.foreign += 1
         elif self._verifier is not None and not self._verifier.accept(received[6], now_us):
@@ -254,7 +256,7 @@ class Codec:
 
 
 def _decode(frame: bytes) -> ReceivedFrame | None:
-    """The good frame that these octets are, signed or not; None if they are anything else."""
+    """The valid frame in these octets, signed or not; None for anything else."""
     octets = len(frame)
     if octets < _LEAST or frame[0] != MARKER:
         return None
@@ -272,15 +274,15 @@ def _decode(frame: bytes) -> ReceivedFrame | None:
     if crc_hqx((frame[1:end] + extra + frame[end : end + CHECKSUM]).translate(MIRROR), 0xFFFF):
         return None  # the CRC of octets that end in their own checksum is 0
     size = fields.size
-    if length >= size:  # what is longer than we know comes of a newer dialect
+    if length >= size:  # a longer payload is from a newer dialect
         message = build(*fields.unpack_from(frame, HEADER))
     else:
-        message = build(*fields.unpack(frame[HEADER:end].ljust(size, b"\0")))  # zeros at the end are not sent
+        message = build(*fields.unpack(frame[HEADER:end].ljust(size, b"\0")))  # trailing zeros are not sent
     return ReceivedFrame(message, name, system, component, sequence, flags != 0, frame)
 
 
 def _frame_end(datagram: bytes, start: int) -> int:
-    """Where the frame that begins at `start` ends; 0 if no whole frame that can be understood begins there."""
+    """The end of the frame that begins at `start`; 0 if there is no complete, known frame."""
     octets = len(datagram)
     if datagram[start] != MARKER or octets < start + HEADER:
         return 0

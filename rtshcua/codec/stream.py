@@ -1,6 +1,6 @@
-"""Frames out of a stream of octets, where they begin anywhere and other octets may stand between them: serial and TCP.
+"""Extracts frames from a stream of octets (serial and TCP) in which other octets may lie between them.
 
-Octets that belong to no frame are counted, by what they seem to be, so that a person can be told why nothing is heard.
+Octets outside of frames are counted by their apparent kind, to explain why no messages arrive.
 """
 
 from typing import Final, NamedTuple
@@ -24,7 +24,7 @@ _MARKERS: Final = (MARKER, _OLD_MARKER)
 
 
 class StreamCounts(NamedTuple):
-    """What came: octets in all, whole frames, octets that belong to no frame, and frames of MAVLink 1."""
+    """Statistics: octets in all, complete frames, octets outside of frames, and frames of MAVLink 1."""
 
     octets: int = 0
     frames: int = 0
@@ -33,10 +33,10 @@ class StreamCounts(NamedTuple):
 
 
 class FrameStream:
-    """Cuts what comes into frames. What is not whole yet is kept for the next call; at most one frame's octets are.
+    """Splits a stream into frames. An incomplete frame is kept for the next call.
 
-    A frame counts where its checksum is right. That of a message which the dialect does not have cannot be verified;
-    it is left out, whole, if another frame follows it at once.
+    A frame is valid if its checksum is right. The checksum of a message that is not in the dialect cannot be
+    verified; it is skipped as a whole if another frame follows immediately.
     """
 
     def __init__(self) -> None:
@@ -44,7 +44,7 @@ class FrameStream:
         self._kept = b""
 
     def feed(self, octets: bytes) -> list[bytes]:
-        """The frames that are whole now, in their order."""
+        """The frames that are now complete, in order."""
         data = self._kept + octets
         frames: list[bytes] = []
         old = garbage = start = 0
@@ -57,11 +57,11 @@ class FrameStream:
                 continue
             length = _length(data, start)
             if length is None or (length and start + length > len(data)):
-                break  # the rest of it is still to come
+                break  # the rest is still to come
             frame = data[start : start + length]
             if not length or not _is_good(frame, data[start + length : start + length + 1]):
                 if length and _is_unknown(frame) and start + length == len(data):
-                    break  # what follows it decides
+                    break  # the next octets decide
                 garbage += 1
                 start += 1
                 continue
@@ -78,7 +78,7 @@ class FrameStream:
 
 
 def _length(data: bytes, start: int) -> int | None:
-    """How long the frame is that begins here; 0 where none can, None where its header is not whole yet."""
+    """The length of the frame that begins here; 0 if there is none, None if its header is incomplete."""
     if data[start] == _OLD_MARKER:
         return _OLD_HEADER + data[start + 1] + CHECKSUM if start + 1 < len(data) else None
     if start + FLAGS < len(data) and data[start + FLAGS] & ~FLAG_SIGNED:

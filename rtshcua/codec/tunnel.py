@@ -1,8 +1,8 @@
 """Messages longer than a frame, over TUNNEL frames (https://mavlink.io/en/messages/common.html#TUNNEL).
 
-A message is cut into chunks; each carries the message's kind, its name, its own number and how many there are. Frames
-get lost, come twice and out of order; who sends a message again sends the same chunks, which fill what is missing.
-Nothing here is trusted: what comes out is bytes, as hostile as the link.
+A message is split into chunks; each carries the message's kind, its name, its own number and the number of chunks.
+Frames may be lost, duplicated or reordered; a sender repeats a message with the same chunks, which fill the gaps.
+Nothing here is trusted: the output is as hostile as the link.
 """
 
 from collections import OrderedDict
@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega
 
 from rtshcua.codec.frames import Message, ReceivedFrame
 
-#: Ours. Numbers from 32768 on are nobody's, for use among parties that agree (MAV_TUNNEL_PAYLOAD_TYPE).
+#: : Our type. Numbers from 32768 on are for private use (MAV_TUNNEL_PAYLOAD_TYPE).
 PAYLOAD_TYPE: Final = 0xC05E
 NAME_OCTETS: Final = 8
 _HEAD: Final = Struct(f"<B{NAME_OCTETS}sHH")
@@ -24,13 +24,13 @@ CHUNK: Final = _PAYLOAD - _HEAD.size
 #: the longest message, in octets
 LONGEST: Final = 1 << 16
 MOST_CHUNKS: Final = -(-LONGEST // CHUNK)
-#: how many unfinished messages are kept, of all senders together, and of one
+#: : the most unfinished messages that are kept, of all senders together, and of one sender
 MOST_OPEN: Final = 32
 MOST_OF_ONE: Final = 4
 
 
 class Whole(NamedTuple):
-    """A message that is complete."""
+    """A complete message."""
 
     kind: int
     name: bytes
@@ -48,14 +48,16 @@ def name_of(data: bytes) -> bytes:
 
 
 def answer_name(asked: bytes, data: bytes) -> bytes:
-    """The name of what answers the message of name `asked`: two answers are never mixed up, nor put together."""
+    """The name of the answer to the message of name `asked`, so that answers are never confused or combined."""
     return asked[: NAME_OCTETS // 2] + sha256(data).digest()[: NAME_OCTETS // 2]
 
 
 def messages(kind: int, name: bytes, data: bytes, target: tuple[int, int] = (0, 0)) -> Iterator[Message]:
-    """The TUNNEL messages that carry `data`, for a system and component (0: all). Raises ValueError for too much."""
+    """The TUNNEL messages that carry `data`, for a system and component (0: all). Raises ValueError for data that is
+    too long.
+    """
     if not 0 < len(data) <= LONGEST:
-        raise ValueError(f"a message has from 1 to {LONGEST} octets, not {len(data)}")
+        raise ValueError(f"a message must have 1 to {LONGEST} octets, not {len(data)}")
     count = -(-len(data) // CHUNK)
     for index in range(count):
         payload = _HEAD.pack(kind, name, index, count) + data[index * CHUNK : (index + 1) * CHUNK]
@@ -64,18 +66,18 @@ def messages(kind: int, name: bytes, data: bytes, target: tuple[int, int] = (0, 
 
 
 class Assembler:
-    """Puts messages together. What it holds is bounded; of too many unfinished messages the oldest is forgotten."""
+    """Assembles messages. Its memory is bounded; beyond that the oldest unfinished message is dropped."""
 
     def __init__(self) -> None:
         self._open: OrderedDict[tuple[Hashable, int, bytes], _Open] = OrderedDict()
 
     @property
     def unfinished(self) -> int:
-        """How many messages are unfinished."""
+        """The number of unfinished messages."""
         return len(self._open)
 
     def take(self, sender: Hashable, received: ReceivedFrame) -> Whole | None:
-        """Take in a frame of a sender; gives the message that it completes, if it does."""
+        """Process a frame of a sender; return the message that it completes, if any."""
         message = received.message
         if received.name != "TUNNEL" or message.payload_type != PAYLOAD_TYPE:
             return None
@@ -92,7 +94,7 @@ class Assembler:
             held = self._open[key] = _Open(count, {})
             self._forget(sender)
         if held.number != count or held.chunks.setdefault(index, chunk) != chunk:
-            del self._open[key]  # one of the two is not of this message, and which, nobody knows
+            del self._open[key]  # one of the two is not part of this message, and it is unknown which
             return None
         if len(held.chunks) < count:
             return None

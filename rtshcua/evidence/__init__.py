@@ -1,1 +1,3 @@
-"""Section 6 of the design: records, their chain and Merkle tree, the signed close, and how a log is verified. Pure."""
+"""Evidence (design section 6): records, their hash chain and Merkle tree, the signed close, and log verification.
+Pure.
+"""

@@ -1,9 +1,10 @@
-"""The boundary's own evidence, held against the records: each decision, document and dispatch that the log tells of,
-and no other, in this order (docs/log-format.md, section 7).
+"""Compares the boundary's own evidence with the records: each decision, document and dispatch in the log must be an
+entry of the boundary, in the same order, and no entry may be missing (docs/log-format.md, section 7).
 
-The digests of `wire.boundary_chain` are worked out again from the records. The boundary's statements, signed by a key
-that the runtime does not need to have, say how far it got, and mark each entry: so the first record that is not the
-boundary's is named, whoever holds the log key. Where the trust root names no boundary key, nothing is looked at.
+The digests of `wire.boundary_chain` are recomputed from the records. The boundary's statements, signed by a key
+that the runtime need not have, contain the number of entries and mark each entry. The first record that the
+boundary did not make is therefore found even if the log key is in the wrong hands. Without a boundary key in the
+trust root nothing is checked.
 """
 
 import re
@@ -47,23 +48,28 @@ _BINDING: Final = re.compile(rf"[0-9a-f]{{{2 * DIGEST_BYTES}}}")
 _WRITES: Final = re.compile(r"(set|restore) ([^,]++(?:, [^,]++){0,99})")
 _WRITE: Final = re.compile(r"([A-Z0-9_]{1,16}) from (\S+) to (\S+)", re.ASCII)
 _NONE: Final = Claim(
-    "boundary", "what the boundary itself saw: no key of duty `boundary` in the trust root speaks for this vehicle"
+    "boundary",
+    "what the boundary itself decided and sent: the trust root has no key of duty `boundary` for this vehicle",
 )
 
-_MOVED: Final = "the boundary made no such entry here: this was altered, invented or moved, or one before was left out"
+_MOVED: Final = (
+    "the boundary made no such entry here: this record was altered, invented or moved, or an earlier one was removed"
+)
 
 _DIFFERS: Final = Flaw("boundary/differs", _MOVED)
 _INVENTED: Final = Flaw(
-    "boundary/invented", "the boundary signed how far it got, and made no entry after that for this"
+    "boundary/invented", "the boundary signed the number of its entries, and made no later entry for this record"
 )
-_AFTER: Final = Flaw("boundary/after-loss", "the boundary was lost before this: it made no such thing")
+_AFTER: Final = Flaw(
+    "boundary/after-loss", "the boundary was lost before this record, and so cannot have made its entry"
+)
 
-#: tag and payload of what the boundary made of something
+#: : tag and payload of the boundary's entry for a record
 Entry = tuple[Tag, bytes]
 
 
 class _Pending(NamedTuple):
-    """An entry that no statement spoke of yet: the record that tells of it, where that begins, and the digest."""
+    """An entry that no statement covers yet: its record, the offset of that record, and the digest."""
 
     record: int
     offset: int
@@ -71,7 +77,7 @@ class _Pending(NamedTuple):
 
 
 class _Claimed(NamedTuple):
-    """What a record claims of the time of day: how far UTC is ahead of monotonic time, and the error of that."""
+    """A record's claim about the time of day: the difference of UTC and monotonic time, and the error of it."""
 
     record: int
     offset: int
@@ -80,49 +86,49 @@ class _Claimed(NamedTuple):
     error_us: int
 
     def at(self, own: Now, since_us: int) -> Now:
-        """The same at a moment of the boundary's, some time after the one before: errors grow alike in both clocks."""
+        """The claim at a later moment of the boundary's clock. The errors of both clocks grow alike."""
         grown_us = max(0, own.monotonic_us - max(self.at_us, since_us)) * DRIFT_US // 1_000_000
         return Now(own.monotonic_us, own.monotonic_us + self.ahead_us, self.error_us + grown_us)
 
 
 def _claimed(record: AnyRecord, offset: int) -> _Claimed | None:
-    """None where it says that nobody knows."""
+    """None where the record states that the time of day is unknown."""
     if record.utc_error_us >= UTC_UNKNOWN_US:
         return None
     return _Claimed(record.seq, offset, record.at_us, record.utc_us - record.at_us, record.utc_error_us)
 
 
 class BoundaryEvidence:
-    """Takes the records of one log after its genesis, in their order; what it keeps is bounded by an epoch."""
+    """Processes the records of one log after its genesis, in order. The memory is bounded by one epoch."""
 
     def __init__(self, root: TrustRoot, genesis: Genesis) -> None:
         keys = root.keys_for(Duty.BOUNDARY)
         refusal = {kid: key_refusal(key, vehicle=genesis.vehicle, now_us=genesis.utc_us) for kid, key in keys.items()}
         self._keys = {kid: key for kid, key in keys.items() if refusal[kid] is None}
-        #: whether the log must have it
+        #: : whether the boundary's evidence is required
         self.asked = bool(self._keys)
         self._flight = bytes.fromhex(genesis.boot)
         self._enforced = genesis.mode != UNENFORCED
         self._bundle = sha256(octets(genesis.bundle) or b"").digest()
-        #: the boundary's, as far as the records tell
+        #: : the boundary's chain, recomputed from the records
         self.digest = boundary_chain.START
         self._count = 0
         self._pending: list[_Pending] = []
-        self._ahead: list[bytes] = []  # marks of entries that the last statement speaks of, and no record yet
+        self._ahead: list[bytes] = []  # marks in the last statement of entries whose records are still to come
         #: the last statement
         self.last: Statement | None = None
         self._stated = False  # in this epoch
-        #: the first record since the last statement that claims to know the time of day
+        #: : the first record since the last statement that claims a known time of day
         self._claim: _Claimed | None = _claimed(genesis, 0)
         self._recovered = False
-        self._lost: tuple[int, int] | None = None  # the record that says so, and where it begins
-        #: by the number of a record of a gap, that of the statement which says that nothing is missing before
+        self._lost: tuple[int, int] | None = None  # the record that says so, and its offset
+        #: : by the number of a gap's record, the number of the statement that shows that nothing is missing before it
         self.gaps: dict[int, int] = {}
-        self._gap: tuple[int, int] | None = None  # the record of a gap, and when it ended
+        self._gap: tuple[int, int] | None = None  # the record of the gap, and its end
 
     def check(self, record: AnyRecord, offset: int) -> Finding | None:
-        """What the boundary's evidence says against the next record, which begins at an octet of the log, or against
-        one before it; None where nothing does.
+        """The flaw that the boundary's evidence shows in the next record, which begins at this octet of the log, or
+        in an earlier one; None if there is none.
         """
         if not self.asked:
             return None
@@ -146,12 +152,12 @@ class BoundaryEvidence:
         if isinstance(record, Seal | Close):
             flaw = self._sealed(record)
         if isinstance(record, Recover):
-            self._recovered, self._claim = True, None  # monotonic time begins anew
+            self._recovered, self._claim = True, None  # monotonic time restarts
         self._stated, self._gap = False, None
         return None if flaw is None else flaw.at(record.seq, offset)
 
     def _lose(self, record: Effect, offset: int) -> Finding | None:
-        """The runtime says that the boundary is gone: nothing is its own from here on."""
+        """The runtime reports the loss of the boundary: no later record is made by it."""
         self._lost = record.seq, offset
         last = self.last
         if last is None:
@@ -159,7 +165,7 @@ class BoundaryEvidence:
         flaw = _omitted(last.count - self._count) if self._count < last.count else None
         return None if flaw is None else flaw.at(record.seq, offset)
 
-    # -------------------------------------------------------- what the log tells of
+    # -------------------------------------------------------- the log's claims
 
     def _entered(self, record: DecisionRecord | Effect, offset: int) -> Finding | None:
         entry = entry_of(record)
@@ -182,18 +188,18 @@ class BoundaryEvidence:
             return None
         return _DIFFERS.at(record.seq, offset)
 
-    # -------------------------------------------------------- what the boundary signed
+    # -------------------------------------------------------- the boundary's signatures
 
     def _stated_by(self, record: Effect) -> Finding | Flaw | None:
         try:
             said = statement.open_statement(octets(record.detail) or b"", self._keys)
         except Untrusted as error:
-            return Flaw(f"boundary/{error.slug}", f"what the boundary should have signed is not to be trusted: {error}")
+            return Flaw(f"boundary/{error.slug}", f"the boundary's signed statement is not trusted: {error}")
         return self._out_of_place(said) or self._marked(said)
 
     def _out_of_place(self, said: Statement) -> Flaw | None:
         if said.flight != self._flight:
-            text = "the boundary signed this in another flight"
+            text = "the boundary signed this statement in another flight"
             return Flaw("boundary/other-flight", text, said.flight.hex(), self._flight.hex())
         last = self.last
         if last is None:
@@ -205,27 +211,28 @@ class BoundaryEvidence:
                 return None
             return Flaw("boundary/beginning", "the boundary's session did not begin with this flight, bundle and mode")
         if (said.session, said.before) != (last.session, last.before):
-            text = "the boundary signed this in another session"
+            text = "the boundary signed this statement in another session"
             return Flaw("boundary/other-session", text, str(said.session), str(last.session))
         if (
             last.final
             or said.count < last.count
             or any(now < then for now, then in zip(counted(said), counted(last), strict=True))
         ):
-            text = "it is older than what the boundary signed before, or follows the last that it signs"
+            text = "the statement is older than the previous one, or follows the final one"
             return Flaw("boundary/replayed", text, str(said.count), f"at least {last.count}")
         if self._count < last.count:
             return _omitted(last.count - self._count)
         return None
 
     def _marked(self, said: Statement) -> Finding | Flaw | None:
-        """Hold the entries since the last statement against this one."""
+        """Compare the entries since the last statement with this one."""
         before = 0 if self.last is None else self.last.count
         new = said.count - before
         marks = [said.marks[at : at + MARK_BYTES] for at in range(0, len(said.marks), MARK_BYTES)]
         if len(marks) != min(new, MOST_MARKS):
             text = (
-                "it does not mark each entry since the statement before: one between was left out, or this one is older"
+                "the statement does not mark each entry since the previous one: an entry was removed, or "
+                "the statement is older"
             )
             return Flaw("boundary/missing", text)
         if self.last is None:
@@ -239,40 +246,41 @@ class BoundaryEvidence:
                 return _DIFFERS.at(entry.record, entry.offset)
         self._ahead = marks[len(pending) :]
         if self._count == said.count and self.digest != said.digest:
-            text = "what the records before tell of is not what the boundary made"
+            text = "the preceding records do not match what the boundary signed"
             return Flaw("boundary/differs", text, self.digest.hex(), said.digest.hex())
         return None
 
     def _timed(self, record: Effect, offset: int, before_us: int | None) -> Finding | None:
-        """Hold the time of day that the records claim, since the last statement, made at a monotonic time, against the
-        boundary's own clock.
+        """Compare the time of day that the records claim since the last statement, which was made at a monotonic
+        time, with the boundary's own clock.
         """
         assert self.last is not None
         own, claims = self.last.now, (self._claim, _claimed(record, offset))
         self._claim = None
         since_us = own.monotonic_us if before_us is None else before_us
         for claim in claims:
-            # where the boundary knows of none, it decides nothing by one that is named
+            # a boundary that does not know the time of day refuses every request that claims one
             if claim is not None and not bears_out(own, claim.at(own, since_us)):
-                text = "it claims another time of day than the boundary has by its own clock"
+                text = "the claimed time of day differs from the boundary's own clock"
                 known = self.last.source != ClockSource.UNKNOWN
                 expected = (
-                    f"{own.utc_us} us, true to {seconds(own.utc_error_us)}" if known else "none: its clock is not known"
+                    f"{own.utc_us} us, error {seconds(own.utc_error_us)}" if known else "none: its clock is not known"
                 )
-                found = f"{own.monotonic_us + claim.ahead_us} us, true to {seconds(claim.error_us)}"
+                found = f"{own.monotonic_us + claim.ahead_us} us, error {seconds(claim.error_us)}"
                 return Flaw("boundary/clock", text, found, expected).at(claim.record, claim.offset)
         return None
 
     def _vouched_for(self, record: Effect) -> Flaw | None:
-        """Whoever holds the log's keys could put a gap before a statement that is older than its end, and so have the
-        boundary vouch for a time in which it went on.
+        """Check the order of gaps and statements. A holder of the log's keys could otherwise put a gap before a
+        statement that is older than its end, so that the boundary would confirm a gap in which it continued to
+        work.
         """
         if self._gap is None:
             return None
         assert self.last is not None
         number, ended_us = self._gap
         if self.last.at_us < ended_us - APART_US:
-            text = "the boundary signed this before the gap ended that stands before it"
+            text = "the boundary signed this statement before the end of the gap that precedes it"
             return Flaw("boundary/gap", text, f"at {self.last.at_us} us", f"at {ended_us} us or later")
         self.gaps[number] = record.seq
         return None
@@ -286,32 +294,35 @@ class BoundaryEvidence:
         if isinstance(record, Seal):
             return None
         if not last.final:
-            return Flaw(
-                "boundary/not-ended", "the boundary did not sign that it ends here: what came after was cut off"
-            )
+            return Flaw("boundary/not-ended", "the boundary did not sign an end here: later records were removed")
         return _omitted(last.count - self._count) if self._count < last.count else None
 
     # -------------------------------------------------------- what that proves
 
     def shortfall(self) -> Finding | None:
-        """Why the boundary's evidence is not whole, in a log in which nothing was found."""
+        """Why the boundary's evidence is incomplete, in a log without a flaw."""
         if self._lost is None:
             return None
-        text = "the runtime says that the boundary was lost in flight: what follows is its word alone"
+        text = (
+            "the runtime reports that the boundary was lost in flight; only the runtime vouches for the "
+            "following records"
+        )
         return Flaw("boundary/lost", text).at(*self._lost)
 
     def claims(self) -> tuple[tuple[Claim, ...], tuple[Claim, ...]]:
-        """What was proven of a log in which nothing was found, and what was not."""
+        """What is proven of a log without a flaw, and what is not."""
         last = self.last
         if not self.asked:
             return (), (_NONE,)
         if last is None:
-            return (), (Claim("boundary", "what the boundary itself saw: the log breaks off before it signed"),)
+            return (), (
+                Claim("boundary", "what the boundary itself decided and sent: the log ends before its statement"),
+            )
         text = (
-            f"session {last.session} of the boundary signed for {last.count - 1} decisions, documents and dispatches: "
-            f"they are those that stand here, in this order; besides, {last.frames} frames passed it and "
-            f"{last.stopped} were refused, {last.repeated} answers repeated one and {last.declined} documents were "
-            "refused"
+            f"session {last.session} of the boundary signed for {last.count - 1} decisions, documents "
+            f"and dispatches, which are the recorded ones in this order; also {last.frames} frames "
+            f"passed it and {last.stopped} were refused, {last.repeated} answers were repeated and "
+            f"{last.declined} documents were refused"
         )
         proven, unproven = _of_clock(ClockSource(last.source))
         proven = (Claim("boundary", text), *proven)
@@ -320,33 +331,35 @@ class BoundaryEvidence:
             return proven, ahead
         if self._lost is not None:
             text = (
-                f"what the boundary made after its last signature, and that it was lost at record {self._lost[0]}: "
-                "that links flew from there on as it had signed them ahead says the runtime alone"
+                f"what the boundary did after its last statement, and its loss at record {self._lost[0]}: "
+                "only the runtime vouches that later links flew as the boundary had signed them ahead"
             )
             return proven, (Claim("boundary", text), *ahead)
-        return proven, (Claim("boundary", "what the boundary made after its last signature: it broke off"), *ahead)
+        return proven, (Claim("boundary", "what the boundary did after its last statement: the log ends"), *ahead)
 
 
 def _of_clock(source: ClockSource) -> tuple[tuple[Claim, ...], tuple[Claim, ...]]:
     """What is proven of the time of day, and what is not."""
     if source is ClockSource.SHARED:
-        text = "the time of day by a clock of the boundary's own: it had that of the run"
+        text = "the time of day by the boundary's own clock: the boundary used the clock of the run"
         return (), (Claim("clock", text),)
     if source is ClockSource.UNKNOWN:
-        return (Claim("clock", "the boundary's own clock knew no time of day, and the records claim none"),), ()
-    text = f"the time of day of the records is that of the boundary's own clock, by the {source.name.lower()}"
+        return (
+            Claim("clock", "the boundary's own clock did not know the time of day, and the records claim none"),
+        ), ()
+    text = f"the time of day in the records agrees with the boundary's own clock, set by the {source.name.lower()}"
     return (Claim("clock", text),), ()
 
 
 def _ahead(count: int) -> tuple[Claim, ...]:
-    """What is not proven where frames were signed ahead."""
-    text = f"whether any of the {count} frames were sent that the boundary signed ahead: it does not see that"
+    """The claim that is not proven if frames were signed ahead."""
+    text = f"whether any of the {count} frames that the boundary signed ahead were sent: it cannot observe that"
     return (Claim("boundary", text),) if count else ()
 
 
 def _is_made(record: AnyRecord) -> bool:
-    """Whether a record tells of something that only a boundary makes. Of the others, links fly without it, and what it
-    did not answer counts as refused.
+    """Whether a record is about something that only a boundary makes. Other records may exist without it: links fly
+    without it, and a missing answer counts as a refusal.
     """
     if isinstance(record, DecisionRecord):
         return True
@@ -357,24 +370,24 @@ def _is_made(record: AnyRecord) -> bool:
 
 
 def _unsigned(when: str) -> Flaw:
-    return Flaw("boundary/missing", f"the boundary did not sign its own evidence {when}: its statement was left out")
+    return Flaw("boundary/missing", f"the boundary did not sign its own evidence {when}: its statement was removed")
 
 
 def _omitted(count: int) -> Flaw:
     entries = "entry" if count == 1 else "entries"
-    text = f"the boundary made {count} {entries} before this that no record tells of: they were left out"
+    text = f"the boundary made {count} {entries} before this that no record contains: the records were removed"
     return Flaw("boundary/omitted", text)
 
 
 def entry_of(record: DecisionRecord | Effect) -> Entry | Flaw | None:
-    """What the boundary made of what a record tells of; None where it had no part in that."""
+    """The boundary's entry for a record; None where it had no part in it."""
     if isinstance(record, DecisionRecord):
-        text = "no boundary makes such a decision: a field of it is none that there is"
+        text = "no boundary makes such a decision: a field has an unknown value"
         return _decided(record) or Flaw("boundary/record", text)
     make = _EFFECTS.get(record.event)
     if make is None:
         return None
-    text = f"a record `{record.event}` that does not say what the boundary made"
+    text = f"a record `{record.event}` does not contain the boundary's entry"
     return make(record) or Flaw("boundary/record", text, record.detail)
 
 
@@ -406,7 +419,7 @@ def _decided(record: DecisionRecord) -> Entry | None:
 
 
 def _packed(tag: Tag, payload: Callable[[], bytes]) -> Entry | None:
-    """The entry of a payload; None where a number of it does not fit."""
+    """The entry of a payload; None where a number is out of range."""
     try:
         return tag, payload()
     except struct_error:

@@ -1,10 +1,10 @@
-"""How a verification speaks: what fails, and what was proven."""
+"""The results of a verification: flaws, and claims that were proven."""
 
 from typing import NamedTuple
 
 
 class Flaw(NamedTuple):
-    """What is wrong with one thing: a stable slug, and words. `found` and `expected` are what was compared, as text."""
+    """A defect of one object: a stable slug and a text. `found` and `expected` are the compared values, as text."""
 
     slug: str
     text: str
@@ -12,14 +12,14 @@ class Flaw(NamedTuple):
     expected: str = ""
 
     def at(self, record: int, offset: int = -1) -> "Finding":
-        """This flaw, found in record number `record`, whose line begins at octet `offset`."""
+        """This flaw in record number `record`, whose line begins at octet `offset`."""
         return Finding(self.slug, record, self.text, self.found, self.expected, offset)
 
 
 class Finding(NamedTuple):
-    """The flaw that ended a verification; `record` counts from 0 (its line is one more).
+    """The flaw that ended a verification; `record` counts from 0 (its line number is one more).
 
-    `offset` is where that line begins, in octets from the beginning of the log; -1 where it is not known.
+    `offset` is where that line begins, in octets from the beginning of the log; -1 if unknown.
     """
 
     slug: str
@@ -31,7 +31,7 @@ class Finding(NamedTuple):
 
 
 class Claim(NamedTuple):
-    """Something that was proven, or that was not: a stable slug and a sentence for a person."""
+    """A statement that was proven, or not proven: a stable slug and a sentence for a person."""
 
     slug: str
     text: str

@@ -1,4 +1,4 @@
-"""Where a log stands: what the next line is linked to, the tree over all lines, and the segment that is under way."""
+"""The head of a log: the link of the next line, the tree over all lines, and the open segment."""
 
 from collections.abc import Callable
 from hashlib import sha256
@@ -15,11 +15,11 @@ _TOGETHER = 256  # lines
 
 
 class Head:
-    """The number of the next record, the hash of the last line, the tree over all lines.
+    """The number of the next record, the hash of the last line, and the tree over all lines.
 
-    Of the segment under way: its number `epoch`, its `first` record, its `records` and `octets`, and their digest. Its
-    lines are hashed together, some at a time: that is quicker, and who records something does not wait for it. `after`
-    is the digest of the last checkpoint, which the next one names.
+    For the open segment: its number `epoch`, its `first` record, its `records` and `octets`, and their digest. Its
+    lines are hashed in batches, which is faster, and recording does not wait for it. `after` is the digest of the
+    last checkpoint, which the next one names.
     """
 
     __slots__ = ("_hash", "_lines", "_octets", "_push", "after", "epoch", "first", "prev", "seq", "tree")
@@ -35,18 +35,18 @@ class Head:
 
     def _begin(self) -> None:
         self.first = self.seq
-        self._octets = 0  # that are in the hash,
+        self._octets = 0  # lines that are hashed already,
         self._hash = sha256()
-        self._lines: list[bytes] = []  # and lines that come after them
+        self._lines: list[bytes] = []  # and later lines that are not
 
     @property
     def records(self) -> int:
-        """How many lines the segment has."""
+        """The number of lines in the segment."""
         return self.seq - self.first
 
     @property
     def octets(self) -> int:
-        """How many bytes it has."""
+        """The number of octets in the segment."""
         self._settle()
         return self._octets
 
@@ -63,14 +63,14 @@ class Head:
             self._lines.clear()
 
     def add(self, record: Record) -> bytes:
-        """The line of a record that was made with this head's `prev` and `seq`; the head then stands after it."""
+        """Append the line of a record that was made with this head's `prev` and `seq`."""
         line = encode(record)
         self.take(line)
         return line
 
     def take(self, line: bytes) -> None:
-        """Stand after this line, an ordinary record."""
-        hasher = LEAF.copy()  # what `leaf_hash` does
+        """Advance past this line, an ordinary record."""
+        hasher = LEAF.copy()  # inlined `leaf_hash`
         hasher.update(line)
         leaf = hasher.digest()
         self._push(leaf)
@@ -82,14 +82,14 @@ class Head:
             self._settle()
 
     def begin(self, line: bytes, after: bytes) -> None:
-        """Stand after this line, a signed record with a checkpoint of this digest: a segment begins with it."""
+        """Advance past this line, a signed record with a checkpoint of this digest. A segment begins with it."""
         self.epoch += 1
         self.after = after
         self._begin()
         self.take(line)
 
     def seal(self, record: Signed, origin: str, public: bytes, signer: Callable[[bytes], bytes]) -> bytes:
-        """The line of a signed record, made with this head, with its checkpoint over the lines so far."""
+        """The line of a signed record that is made with this head, with its checkpoint over the lines so far."""
         checkpoint = checkpoint_of(record, origin, self)
         line = encode(replace(record, checkpoint=sign(checkpoint, public, signer)))
         self.begin(line, checkpoint.digest())
@@ -97,6 +97,6 @@ class Head:
 
 
 def checkpoint_of(record: Signed, origin: str, head: Head) -> Checkpoint:
-    """What the checkpoint of a signed record must say where the log stands at `head`."""
+    """The checkpoint that a signed record must contain when the log is at `head`."""
     own = leaf_hash(encode(unsigned(record)))
     return Checkpoint(origin, head.seq, head.tree.root(), own, next_key_of(record), head.after)

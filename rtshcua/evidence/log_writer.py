@@ -1,4 +1,4 @@
-"""The writer's side of a log: turns what happened into lines, chained, counted in the tree, sealed. Does no I/O.
+"""Writes logs: turns events into lines that are chained, counted in the tree, and sealed. Does no I/O.
 
 The format is specified in docs/log-format.md.
 """
@@ -30,39 +30,40 @@ from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.wire.keys import Duty, key_id
 from rtshcua.wire.request import NOTHING, Ref
 
-#: the effect that holds what the boundary signed of its own evidence (`wire.statement`), in base64
+#: : the effect with the boundary's signed statement of its own evidence (`wire.statement`), in base64
 BOUNDARY: Final = "boundary"
-#: the effect that says that the boundary is gone for good: from here on nothing in the log is its own
+#: : the effect that reports the permanent loss of the boundary: it makes nothing in the log after that
 BOUNDARY_LOST: Final = "boundary-lost"
 
-#: How much later than `EPOCH_US` and `EPOCH_RECORDS` an epoch is sealed before anything else is recorded; a fifth.
+#: : The delay after `EPOCH_US` and `EPOCH_RECORDS` at which an epoch is sealed before anything else is recorded; a
+#: fifth.
 _LATE = 5
 _LATE_US, _LATE_RECORDS = EPOCH_US + EPOCH_US // _LATE, EPOCH_RECORDS + EPOCH_RECORDS // _LATE
 
 
 class Attest(Protocol):
-    """What signs how far the boundary's own evidence got; None where there is nobody to sign."""
+    """Signs the state of the boundary's own evidence; None if there is no boundary."""
 
     def __call__(self, now: Now, *, final: bool = False) -> bytes | None:
-        """The signed statement at a moment; after a `final` one there is no more."""
+        """The signed statement at a moment; nothing follows a `final` one."""
         ...
 
 
 def origin_of(vehicle: str, boot: str) -> str:
-    """The origin of a log's checkpoints: no spaces and no plus, whatever the vehicle is called."""
+    """The origin of a log's checkpoints, without spaces and plus signs."""
     return f"rtshcua/log/{quote(vehicle, safe='')}/{boot}"
 
 
 class Recorder:
-    """Makes the lines of one log, in order; each method returns one whole line.
+    """Makes the lines of one log, in order; each method returns whole lines.
 
     `certify` signs bytes with the Ed25519 key of duty `log` whose public half is `public` (32 bytes). It is called
-    once, by `genesis` or `recover`, and then let go: the rest is signed by epoch keys, for each of which `draw` gives
-    32 secret random bytes. The caller's clock never goes back from call to call, its UTC and monotonic time go on
-    alike, and its integers stay within 2**53 - 1: a verifier refuses a log where they do not.
+    once, by `genesis` or `recover`, and then dropped. Epoch keys sign the rest; `draw` returns 32 secret random
+    bytes for each. The caller's clock must never go back, its UTC and monotonic time must advance alike, and its
+    integers must stay within 2**53 - 1: a verifier refuses a log where they do not.
 
-    `attest` signs for the boundary: its statement stands before each seal and before the close, or once that it is
-    `lost`, in words, where it is.
+    `attest` signs for the boundary: its statement is recorded before each seal and before the close. Once the
+    boundary is `lost`, a text records the loss instead.
     """
 
     __slots__ = (
@@ -77,18 +78,18 @@ class Recorder:
         self._head = Head()
         self._key: EpochKey | None = None
         self._origin = self._mode = ""
-        self._signed_us = self._last_us = 0  # monotonic time of the last signed record, and of the last of all
+        self._signed_us = self._last_us = 0  # monotonic time of the last signed record, and of the last record
         self._told_gap = False  # in this epoch
         self.attest: Attest = nobody
         self.lost: Callable[[], str | None] = lambda: None
-        #: whether it was recorded that the boundary is lost: nothing that it makes is recorded after that
+        #: : whether the loss of the boundary was recorded, after which none of its entries are
         self.told_loss = False
 
     @classmethod
     def resumed(
         cls, head: Head, origin: str, certify: Callable[[bytes], bytes], public: bytes, draw: Callable[[], bytes]
     ) -> "Recorder":
-        """A recorder that goes on after the records in `head`; the first that it makes must be a `recover`."""
+        """A recorder that continues after the records in `head`; its first record must be a `recover`."""
         recorder = cls(certify, public, draw)
         recorder._head, recorder._origin = head, origin
         return recorder
@@ -104,7 +105,7 @@ class Recorder:
         return self._head.seq
 
     def due(self, now: Now) -> bool:
-        """Whether the epoch is over: `seal` it when nothing else is to be done."""
+        """Whether the epoch is over: `seal` it when there is nothing else to do."""
         return self._head.records >= EPOCH_RECORDS or now.monotonic_us - self._signed_us >= EPOCH_US
 
     def overdue(self, now: Now) -> bool:
@@ -126,8 +127,8 @@ class Recorder:
         received_us: int | None = None,
         sync_us: int = SYNC_US,
     ) -> bytes:
-        """The first line. `boot` is 16 random bytes; `mode`, the enforcement mode, stands in each decision too.
-        `received_us` is when the bundle was received on board, monotonic; without it, now.
+        """The first line. `boot` is 16 random bytes; `mode`, the enforcement mode, is in each decision too.
+        `received_us` is the monotonic time of receipt of the bundle; by default, now.
         """
         self._mode = mode
         self._origin = origin_of(vehicle, boot.hex())
@@ -167,13 +168,13 @@ class Recorder:
         decided: Decided,
         durability: int = SYNCED,
     ) -> bytes:
-        """The line of one decision, its inputs included. `invocation` is its id, empty for the contingency."""
+        """The line of one decision, with its inputs. `invocation` is its id, empty for the contingency."""
         head = self._head
         kind, step, link = ref
         outcome, reason, rule_step, clause, clause_at, target, target_link, valid_until_us = in_words(decided)
         self._last_us = now.monotonic_us
         return head.add(
-            DecisionRecord(  # by position, as defined: by name an append takes 14 % longer (bench/evidence.py)
+            DecisionRecord(  # positional arguments: an append with keywords takes 14 % longer (bench/evidence.py)
                 head.prev,
                 now.monotonic_us,
                 context.binding.hex(),
@@ -218,7 +219,7 @@ class Recorder:
         detail: str = "",
         durability: int = WRITTEN,
     ) -> bytes:
-        """The line of something that happened; `detail` is the world's own text, kept as it came."""
+        """The line of an event; `detail` is text from outside, recorded unchanged."""
         head = self._head
         kind, step, link = ref
         self._last_us = now.monotonic_us
@@ -241,7 +242,7 @@ class Recorder:
         )
 
     def attested(self, now: Now, *, final: bool = False) -> tuple[bytes, ...]:
-        """The line of what the boundary signs now; none where it signs nothing."""
+        """The line of the boundary's present statement; empty if there is no boundary."""
         return self._stated(now, self.attest(now, final=final))
 
     def _stated(self, now: Now, statement: bytes | None) -> tuple[bytes, ...]:
@@ -250,7 +251,7 @@ class Recorder:
         return (self.effect(now, BOUNDARY, detail=b64encode(statement).decode()),)
 
     def loss(self, now: Now) -> tuple[bytes, ...]:
-        """The line that says that the boundary is lost, once it is; the first time alone."""
+        """The line that records the loss of the boundary, once."""
         lost = None if self.told_loss else self.lost()
         if lost is None:
             return ()
@@ -258,9 +259,9 @@ class Recorder:
         return (self.effect(now, BOUNDARY_LOST, detail=lost),)
 
     def sealing(self, now: Now, *, tells_loss: bool = True) -> tuple[bytes, ...]:
-        """The lines that end an epoch: that it ends late, what the boundary signs, and the seal. Without `tells_loss`
-        only the first of these where it is lost and that is not recorded yet: records of what it made before come
-        first.
+        """The lines that end an epoch: a late seal's gap, the boundary's statement, and the seal. Without
+        `tells_loss`, only the gap if the loss of the boundary is not recorded yet, because records of its earlier
+        entries must come first.
         """
         gap = self._gap(now)
         statement = self.attest(now, final=False)
@@ -269,22 +270,22 @@ class Recorder:
         return (*gap, *self._stated(now, statement), self.seal(now))
 
     def caught_up(self, now: Now) -> tuple[bytes, ...]:
-        """The lines that must stand before anything else that is recorded: those that end an epoch which is over."""
+        """The lines that must precede any other record: those that end an epoch which is over."""
         return self.sealing(now) if self.overdue(now) else ()
 
     def _gap(self, now: Now) -> tuple[bytes, ...]:
-        """The line that says for how long nothing was recorded, where the epoch is sealed too late for that."""
+        """The line with the length of the gap if the epoch is sealed too late; else empty."""
         if self._told_gap or now.monotonic_us - self._signed_us <= LONGEST_US:
             return ()
         self._told_gap = True
         return (self.effect(now, STALLED, detail=detail_of(now.monotonic_us - self._last_us)),)
 
     def closing(self, now: Now, *, ending: str, tlog: bytes | None) -> tuple[bytes, ...]:
-        """The lines that end the log: that it ends late, what the boundary signs at last, and the close."""
+        """The lines that end the log: a late seal's gap, the boundary's final statement, and the close."""
         return (*self._gap(now), *self.attested(now, final=True), self.close(now, ending=ending, tlog=tlog))
 
     def seal(self, now: Now) -> bytes:
-        """The end of an epoch: signed by its key, which is then dropped; it names the next one."""
+        """The end of an epoch: signed by its key, which is then dropped. It names the key of the next one."""
         key, last = EpochKey(self._draw()), self._epoch_key()
         seal = Seal(**self._segment(now), next_key=key.public.hex(), type="seal")
         self._key = key
@@ -292,7 +293,7 @@ class Recorder:
         return self._head.seal(seal, self._origin, last.public, last.sign)
 
     def recover(self, now: Now, *, discarded_bytes: int, discarded_digest: bytes) -> bytes:
-        """The first line after a crash, signed by the log key; monotonic time begins anew."""
+        """The first line after a crash, signed by the log key; monotonic time restarts."""
         key = EpochKey(self._draw())
         recover = Recover(
             **self._segment(now),
@@ -316,7 +317,7 @@ class Recorder:
         return self._head.seal(close, self._origin, last.public, last.sign)
 
     def _segment(self, now: Now) -> dict[str, Any]:
-        """What every record that ends a segment says of it, and of the moment."""
+        """The fields of every record that ends a segment."""
         head = self._head
         return {
             "prev": head.prev,
@@ -332,7 +333,7 @@ class Recorder:
         }
 
     def _begin(self, at_us: int) -> None:
-        """An epoch begins."""
+        """Begin an epoch."""
         self._signed_us = self._last_us = at_us
         self._told_gap = False
 
@@ -341,8 +342,8 @@ class Recorder:
         return self._key
 
     def _certified(self, record: Genesis | Recover, key: EpochKey) -> bytes:
-        """A record signed by the log key, which is then let go."""
-        assert self._certify is not None, "the log key signs once"
+        """A record signed by the log key, which is then dropped."""
+        assert self._certify is not None, "the log key signs only once"
         certify, self._certify = self._certify, None
         self._key = key
         self._begin(record.at_us)
@@ -350,7 +351,7 @@ class Recorder:
 
 
 def nobody(now: Now, *, final: bool = False) -> None:
-    """Signs nothing."""
+    """A signer that signs nothing."""
 
 
 def _approvals(context: Context) -> tuple[tuple[int, int, int, int, int], ...]:
@@ -358,5 +359,7 @@ def _approvals(context: Context) -> tuple[tuple[int, int, int, int, int], ...]:
 
 
 def _storable(text: str) -> str:
-    """The text, with what UTF-8 cannot carry (lone surrogates) replaced: the world's text must not stop a record."""
+    """The text with characters replaced that UTF-8 cannot represent (lone surrogates), so that any text can be
+    recorded.
+    """
     return text.encode("utf-8", "replace").decode()

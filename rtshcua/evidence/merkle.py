@@ -1,17 +1,17 @@
-"""The Merkle tree of RFC 9162 section 2.1.1 over SHA-256, grown leaf by leaf in logarithmic memory."""
+"""The Merkle tree of RFC 9162, section 2.1.1, over SHA-256, grown leaf by leaf in logarithmic memory."""
 
 from collections.abc import Iterable
 from hashlib import sha256
 from typing import ClassVar
 
-LEAF = sha256(b"\x00")  # a leaf's hash, as far as it is the same for all
+LEAF = sha256(b"\x00")  # the constant beginning of a leaf's hash
 _NODE = sha256(b"\x01")
 EMPTY = sha256(b"").digest()
 
 
 def leaf_hash(entry: bytes) -> bytes:
     """SHA-256(0x00 || entry)."""
-    hasher = LEAF.copy()  # cheaper than joining the prefix to the bytes
+    hasher = LEAF.copy()  # faster than joining the prefix to the bytes
     hasher.update(entry)
     return hasher.digest()
 
@@ -24,10 +24,10 @@ def node_hash(left: bytes, right: bytes) -> bytes:
 
 
 class MerkleTree:
-    """The tree of the leaves pushed so far; it holds one hash for each set bit of `size`.
+    """The tree of the leaves so far; it holds one hash for each set bit of `size`.
 
-    Leaves are folded in when the root is asked for, and `TILE` together at the latest: who pushes one, and waits, then
-    mostly waits for no hash at all.
+    Leaves are combined when the root is read, and after `TILE` leaves at the latest, so that most calls of `push`
+    compute no hash.
     """
 
     TILE: ClassVar = 256
@@ -37,10 +37,10 @@ class MerkleTree:
     def __init__(self) -> None:
         self.size = 0
         self._perfect: list[bytes] = []  # roots of perfect subtrees, the largest first,
-        self._leaves: list[bytes] = []  # and what comes after them
+        self._leaves: list[bytes] = []  # and the leaves after them
 
     def push(self, leaf: bytes) -> None:
-        """Adds a leaf by its hash."""
+        """Add a leaf by its hash."""
         leaves = self._leaves
         leaves.append(leaf)
         self.size += 1
@@ -48,7 +48,7 @@ class MerkleTree:
             self._fold()
 
     def graft(self, height: int, node: bytes) -> None:
-        """Adds a perfect subtree of 2**height leaves by its root; `size` is a multiple of that."""
+        """Add a perfect subtree of 2**height leaves by its root; `size` must be a multiple of that."""
         self._fold()
         self._join(self.size >> height, (node,))
         self.size += 1 << height
@@ -58,8 +58,8 @@ class MerkleTree:
         self._leaves.clear()
 
     def _join(self, number: int, nodes: Iterable[bytes]) -> None:
-        """Puts nodes of one size behind the perfect subtrees, of which `number` of that size come before: each is
-        joined to those of its size that stand before it, as many as its number ends in ones.
+        """Append nodes of one size, of which `number` precede them in the tree: each is joined to the preceding ones
+        of its size, as often as its number ends in ones.
         """
         perfect = self._perfect
         for node in nodes:

@@ -1,15 +1,15 @@
-"""Merkle proofs of RFC 9162: inclusion of a leaf (section 2.1.3), consistency of two trees (section 2.1.4).
+"""Merkle proofs of RFC 9162: inclusion of a leaf (section 2.1.3), and consistency of two trees (section 2.1.4).
 
-A proof is a list of hashes, each the root over one range of leaves; `inclusion_ranges` and `consistency_ranges` say
-which ranges, in the order of the proof. Whoever has the hashes makes the proof of them: `StoredTree`, which keeps
-the nodes, or `proof_of`, which reads all leaves once.
+A proof is a list of hashes, each the root over one range of leaves. `inclusion_ranges` and `consistency_ranges`
+return the ranges in the order of the proof. The hashes come from `StoredTree`, which keeps the nodes, or from
+`proof_of`, which reads all leaves once.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
 
 from rtshcua.evidence.merkle import EMPTY, MerkleTree, node_hash
 
-#: leaves from the first number up to, and without, the second
+#: : leaves from the first number to before the second
 Range = tuple[int, int]
 
 _HASH = 32
@@ -17,7 +17,7 @@ _MOST_EDGES = 1_024
 
 
 def inclusion_ranges(index: int, size: int) -> list[Range]:
-    """The ranges whose hashes show leaf `index` in the tree of `size` leaves (2.1.3.1): from its sibling upwards.
+    """The ranges whose hashes prove leaf `index` in the tree of `size` leaves (2.1.3.1), from its sibling upwards.
 
     Raises ValueError unless 0 <= index < size.
     """
@@ -37,9 +37,10 @@ def inclusion_ranges(index: int, size: int) -> list[Range]:
 
 
 def consistency_ranges(first: int, second: int) -> list[Range]:
-    """The ranges whose hashes show that the tree of `second` leaves begins with that of `first` (2.1.4.1).
+    """The ranges whose hashes prove that the tree of `second` leaves begins with that of `first` (2.1.4.1).
 
-    None are needed for the empty tree, nor for two of one size. Raises ValueError unless 0 <= first <= second.
+    The list is empty for the empty tree and for two trees of one size. Raises ValueError unless 0 <= first <=
+    second.
     """
     if not 0 <= first <= second:
         raise ValueError(f"a tree of {second} leaves does not begin with {first}")
@@ -62,9 +63,9 @@ def consistency_ranges(first: int, second: int) -> list[Range]:
 
 
 def proof_of(ranges: Sequence[Range], leaves: Iterable[bytes]) -> list[bytes]:
-    """The hashes over `ranges`, from one pass over all leaf hashes, which holds a few of them at a time.
+    """The hashes over `ranges`, from one pass over all leaf hashes with a few of them in memory.
 
-    Raises ValueError when the leaves end before the last range does.
+    Raises ValueError if the leaves end before the last range does.
     """
     pairs, found = _numbered(leaves), {}
     for start, end in sorted(ranges):
@@ -75,7 +76,7 @@ def proof_of(ranges: Sequence[Range], leaves: Iterable[bytes]) -> list[bytes]:
             if number == end - 1:
                 break
         if tree.size != end - start:
-            raise ValueError(f"there are not {end} leaves")
+            raise ValueError(f"fewer than {end} leaves")
         found[start] = tree.root()
     return [found[start] for start, _ in ranges]
 
@@ -85,7 +86,9 @@ def _numbered(leaves: Iterable[bytes]) -> Iterator[tuple[int, bytes]]:
 
 
 def root_from_inclusion(leaf: bytes, index: int, size: int, proof: Sequence[bytes]) -> bytes | None:
-    """The root of the tree of `size` leaves whose leaf `index` is `leaf`, by its proof (2.1.3.2); None without one."""
+    """The root of the tree of `size` leaves whose leaf `index` is `leaf`, from its proof (2.1.3.2); None for a wrong
+    proof.
+    """
     if not 0 <= index < size:
         return None
     node, last, root = index, size - 1, leaf
@@ -105,14 +108,15 @@ def root_from_inclusion(leaf: bytes, index: int, size: int, proof: Sequence[byte
 
 
 def verify_inclusion(leaf: bytes, index: int, size: int, proof: Sequence[bytes], root: bytes) -> bool:
-    """Whether `proof` shows the leaf hash `leaf` at `index` of the tree of `size` leaves with this root (2.1.3.2)."""
+    """Whether `proof` proves the leaf hash `leaf` at `index` of the tree of `size` leaves with this root (2.1.3.2)."""
     return root_from_inclusion(leaf, index, size, proof) == root
 
 
 def verify_consistency(first: int, first_root: bytes, second: int, second_root: bytes, proof: Sequence[bytes]) -> bool:
-    """Whether `proof` shows that the tree of `second` leaves begins with that of `first` (2.1.4.2).
+    """Whether `proof` proves that the tree of `second` leaves begins with that of `first` (2.1.4.2).
 
-    The empty tree has its own root, and every tree begins with it: that proof is empty, as is one of two equal trees.
+    Every tree begins with the empty one, whose root is fixed: that proof is empty, as is the proof of two equal
+    trees.
     """
     if not 0 <= first <= second:
         return False
@@ -146,13 +150,13 @@ def verify_consistency(first: int, first_root: bytes, second: int, second_root: 
 
 
 class StoredTree:
-    """A Merkle tree whose nodes are kept, so that a proof is looked up instead of computed.
+    """A Merkle tree that keeps its nodes, so that a proof is looked up and not computed.
 
-    `nodes` are those of an earlier tree; they are taken as they are. What is kept: the roots of all perfect subtrees,
-    32 octets each, in the order in which they become whole. Leaf n comes after 2n - popcount(n) others, and the perfect
-    trees that end with it come right after it, the smaller ones first; so each node has a fixed place, the store only
-    ever grows, and it may be a file mapped into memory. It costs at most 64 octets a leaf. Nobody needs to trust it: a
-    wrong hash in it gives a proof that does not verify.
+    `nodes` are those of an earlier tree, taken without a check. The store holds the roots of all perfect subtrees,
+    32 octets each, in the order in which they are completed. Leaf n comes after 2n - popcount(n) other nodes, and
+    is followed by the perfect trees that end with it, the smaller ones first. So each node has a fixed place, the
+    store only grows, and it may be a file mapped into memory. It takes at most 64 octets a leaf. It need not be
+    trusted: a wrong hash gives a proof that does not verify.
     """
 
     __slots__ = ("_edges", "nodes", "size")
@@ -160,12 +164,12 @@ class StoredTree:
     def __init__(self, nodes: bytearray | None = None, size: int = 0) -> None:
         self.nodes = bytearray() if nodes is None else nodes
         self.size = size
-        self._edges: dict[Range, bytes] = {}  # worked out before: ranges at the end of a tree, which are not kept
+        self._edges: dict[Range, bytes] = {}  # cached: ranges at the end of a tree, which are not stored
         if len(self.nodes) != _place(size, 0):
-            raise ValueError(f"a tree of {size} leaves is kept in {_place(size, 0)} octets, not {len(self.nodes)}")
+            raise ValueError(f"a tree of {size} leaves takes {_place(size, 0)} octets, not {len(self.nodes)}")
 
     def push(self, leaf: bytes) -> None:
-        """Adds a leaf by its hash, and the nodes that it makes whole."""
+        """Add a leaf by its hash, and the nodes that it completes."""
         nodes, number = self.nodes, self.size
         nodes += leaf
         node, level = leaf, 0
@@ -197,7 +201,7 @@ class StoredTree:
             raise ValueError(f"the tree has {self.size} leaves, not {size}")
 
     def _hash(self, start: int, end: int) -> bytes:
-        """The root over a range as `inclusion_ranges` gives it: it begins where a perfect tree of its size would."""
+        """The root over a range as `inclusion_ranges` returns it: it begins where a perfect tree of its size would."""
         width = end - start
         if not width & width - 1:
             place = _place(end - 1, width.bit_length() - 1)
@@ -212,5 +216,5 @@ class StoredTree:
 
 
 def _place(last: int, level: int) -> int:
-    """Where the node over 2**level leaves stands of which `last` is the last one."""
+    """The place of the node over 2**level leaves whose last leaf is `last`."""
     return (2 * last - last.bit_count() + level) * _HASH

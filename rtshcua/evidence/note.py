@@ -1,7 +1,7 @@
-"""C2SP signed notes (c2sp.org/signed-note), Ed25519, that carry checkpoints (c2sp.org/tlog-checkpoint).
+"""C2SP signed notes (c2sp.org/signed-note) with Ed25519, which carry checkpoints (c2sp.org/tlog-checkpoint).
 
-The checkpoint of a log has up to three extension lines: the record that carries it, the key that signs the next one,
-and the checkpoint before it (docs/log-format.md, section 2).
+The checkpoint of a log has up to three extension lines: the record that carries it, the key that signs the next
+one, and the previous checkpoint (docs/log-format.md, section 2).
 """
 
 from base64 import b64decode, b64encode
@@ -23,11 +23,12 @@ _PARTS: Final = {"note/unsigned": "note", "note/malformed": "note", "note/key": 
 
 
 class Checkpoint(NamedTuple):
-    """The head of a tree: whose it is, how many leaves it has, and its root hash.
+    """The head of a tree: its origin, the number of leaves, and its root hash.
 
-    `record` is the leaf hash of the record that carries it, as it is without it; `key` the Ed25519 public key of the
-    next epoch, None at the end of a log; `after` the `digest` of the checkpoint before it in the log, None at its
-    beginning. So whoever believes a checkpoint has all that came before it, and the records that carry them.
+    `record` is the leaf hash of the record that carries it, without the checkpoint; `key` the Ed25519 public key
+    of the next epoch, None at the end of a log; `after` the `digest` of the previous checkpoint in the log, None
+    in the first. A trusted checkpoint therefore covers everything before it, including the records that carry
+    checkpoints.
     """
 
     origin: str
@@ -44,7 +45,7 @@ class Checkpoint(NamedTuple):
         return f"{self.origin}\n{self.size}\n{base64(self.root)}\n{_RECORD}{base64(self.record)}\n{key}{after}"
 
     def digest(self) -> bytes:
-        """SHA-256 of the text: what the next checkpoint names."""
+        """SHA-256 of the text, which the next checkpoint names."""
         return sha256(self.text().encode()).digest()
 
 
@@ -54,18 +55,18 @@ def key_id(name: str, public: bytes, kind: bytes = ED25519) -> bytes:
 
 
 def signature_line(name: str, signature: bytes) -> str:
-    """The line of a signature, its key id in front."""
+    """The line of a signature, which begins with its key id."""
     return f"{MARK}{name} {base64(signature)}\n"
 
 
 def sign(checkpoint: Checkpoint, public: bytes, signer: Callable[[bytes], bytes]) -> str:
-    """The note of a checkpoint, signed in the name of its origin by `signer`, which holds the key of `public`."""
+    """The note of a checkpoint, signed in the name of its origin by `signer`, a signer with the key of `public`."""
     text, name = checkpoint.text(), checkpoint.origin
     return f"{text}\n{signature_line(name, key_id(name, public) + signer(text.encode()))}"
 
 
 def split(note: str) -> tuple[str, list[str]]:
-    """The signed text of a note and its signature lines, each with its newline; no lines when it is not a note."""
+    """The signed text of a note and its signature lines, each with its newline; no lines for anything but a note."""
     body, blank, rest = note.rpartition("\n\n")
     if not blank or not rest.endswith("\n"):
         return note, []
@@ -73,28 +74,28 @@ def split(note: str) -> tuple[str, list[str]]:
 
 
 def read_signature(line: str) -> tuple[str, bytes]:
-    """Name and signature (key id in front) of a signature line; empty when it is none, or not in canonical form."""
+    """Name and signature (key id first) of a signature line; empty if the line is malformed or not canonical."""
     name, _, encoded = line.removeprefix(MARK).removesuffix("\n").rpartition(" ")
     signature = strict_base64(encoded)
     return (name, signature) if line == signature_line(name, signature) and name and " " not in name else ("", b"")
 
 
 def open_note(note: str, origin: str, public: bytes) -> Checkpoint | Flaw:
-    """The checkpoint of a note that bears one signature, valid, by `public` in the name of `origin`; or what is wrong.
+    """The checkpoint of a note with one valid signature by `public` in the name of `origin`, or the flaw.
 
-    One signature exactly: the format allows others, which a reader ignores, but none belongs into a record, and what is
-    ignored could be changed unseen.
+    Exactly one signature: the format allows more, which a reader ignores, but a record must not contain parts that
+    can be changed unnoticed.
     """
     text, signatures = split(note)
     if not signatures:
-        return Flaw("note/unsigned", "the checkpoint bears no signature")
+        return Flaw("note/unsigned", "the checkpoint has no signature")
     name, signature = read_signature(signatures[0])
     if len(signatures) != 1 or len(signature) != ID_BYTES + _SIGNATURE_BYTES:
         return Flaw("note/malformed", "the checkpoint does not end with one Ed25519 signature line")
     if name != origin or signature[:ID_BYTES] != key_id(origin, public):
         return Flaw("note/key", "the checkpoint is signed by another key, or in another name", name, origin)
     if not verified(public, signature[ID_BYTES:], text.encode()):
-        return Flaw("note/signature", "the key that should have did not sign this checkpoint")
+        return Flaw("note/signature", "the signature of the checkpoint is wrong")
     return parse(text)
 
 
@@ -112,7 +113,7 @@ def parse(text: str) -> Checkpoint | Flaw:
 
 
 def renamed(flaw: Flaw, prefix: str) -> Flaw:
-    """A flaw of `open_note` or `parse` in the words of whoever read the note: `seal/...`, `proof/...`."""
+    """A flaw of `open_note` or `parse` with the slug prefix of the caller: `seal/...`, `proof/...`."""
     return flaw._replace(slug=f"{prefix}/{_PARTS[flaw.slug]}")
 
 
@@ -121,7 +122,7 @@ def _extension(lines: list[str], name: str) -> bytes | None:
 
 
 def octets(text: str) -> bytes | None:
-    """The bytes of canonical base64, None for what is not: what a lenient reader ignores could be changed unseen."""
+    """The bytes of canonical base64, None for anything else: a lenient reader would ignore changes."""
     try:
         data = b64decode(text, validate=True)
     except ValueError:
@@ -130,7 +131,7 @@ def octets(text: str) -> bytes | None:
 
 
 def strict_base64(text: str) -> bytes:
-    """As `octets`, but no bytes for what is not canonical base64."""
+    """As `octets`, but empty bytes where the text is not canonical base64."""
     return octets(text) or b""
 
 

@@ -1,12 +1,12 @@
-"""The quick verification of a closed log: what was signed, held against the octets, and nothing that was not signed.
+"""The fast verification of a closed log: it checks the signed octets, and nothing that is not signed.
 
-It finds the segments from the end, and hashes each apart from the others; so it can be done by many at a time. It reads
-the signed records, and no other. It says yes or nothing: whenever anything is out of place, `rtshcua.evidence.verify`
-reads the log line by line, and names what it is.
+It finds the segments from the end and hashes them independently, so that they can be processed in parallel. It
+parses the signed records only. The result is "verified" or nothing: if anything is wrong,
+`rtshcua.evidence.verify` reads the log line by line and names the flaw.
 
-Processor time, against `verify`: 0.32 in a log of 36 MB, 0.54 in one of 60 KB. Goal: at most 6.5 times SHA-256 of the
-file, and 1.3 by the octets alone (bench/verify.py). tests/unit/evidence/test_quick_verification.py holds that it says
-yes where the careful one does, and nothing where that one finds anything.
+Processor time, against `verify`: 0.32 in a log of 36 MB, 0.54 in one of 60 KB. Goal: at most 6.5 times SHA-256 of
+the file, and 1.3 by the octets alone (bench/verify.py). tests/unit/evidence/test_quick_verification.py checks that
+both verifications agree.
 """
 
 from array import array
@@ -27,10 +27,10 @@ from rtshcua.evidence.report import LogReport, claims, unsealed, with_anchors
 from rtshcua.evidence.seal_verification import Seals, Segment
 from rtshcua.evidence.witnessing.anchors import ANCHORED, Anchors
 
-#: gives so many octets of a log from an offset on, fewer where it ends
+#: : returns so many octets of a log from an offset, fewer at its end
 Octets = Callable[[int, int], bytes]
 
-#: a signed record that is longer than this, or a segment, is read by nobody who is in a hurry; in octets
+#: : a longer signed record, or a longer segment, is left to the full verification; in octets
 _LONGEST_LINE: Final = 1 << 20
 LONGEST_SEGMENT: Final = 1 << 27
 _GUESS: Final = 1 << 12  # octets that most signed records fit into
@@ -38,24 +38,24 @@ _GUESS: Final = 1 << 12  # octets that most signed records fit into
 _AT = b'","at_us":'
 _ANCHOR = b'"event":"' + ANCHORED.encode() + b'"'
 _STALLED = b'"event":"' + STALLED.encode() + b'"'
-_CHECKPOINT = b',"checkpoint":'  # no text holds it, for a quote inside a text stands behind a backslash
+_CHECKPOINT = b',"checkpoint":'  # cannot occur in a text, where a quote stands after a backslash
 
 _FORM = (
-    "the form and number of each record that is not signed itself, its clocks, that it stands where it may and its "
-    "epoch was sealed in time, that the boundary itself made what they tell of, and that decisions follow from what "
-    "they record: `--audit`"
+    "the format, number, clocks and place of each unsigned record, that its epoch was sealed in "
+    "time, that the boundary made the recorded entries, and that the decisions follow from the "
+    "recorded inputs: use `--audit`"
 )
-_UNTRUE: Final = Flaw("seal/gap", "a gap is recorded that the records do not have")
-_TREE = "that records are linked line by line and make up the signed tree: without `--fast`"
+_UNTRUE: Final = Flaw("seal/gap", "the recorded gap does not match the records")
+_TREE = "that records are linked line by line and make up the signed tree: verify without `--fast`"
 
 
 class SegmentLeaves(NamedTuple):
     """The lines of a segment as leaves of the tree.
 
-    `number` is that of the first line. `first` is what it names as the line before it and `last` what the line after
-    the segment must name, both hexadecimal; `last_us` is the monotonic time of the last line, `nodes` the largest
-    perfect subtrees, each with its height, that the lines make up where they stand in the tree. `anchors` are the notes
-    of anchors that were recorded, and `gap` the time without records that was.
+    `number` is that of the first line. `first` is the hash of the previous line that it names, and `last` the hash
+    that the line after the segment must name, both hexadecimal. `last_us` is the monotonic time of the last line,
+    and `nodes` the largest perfect subtrees, each with its height, that the lines make up at their place in the
+    tree. `anchors` are the notes of recorded anchors, and `gap` the time without records.
     """
 
     number: int
@@ -69,14 +69,16 @@ class SegmentLeaves(NamedTuple):
 
 
 class SegmentPart(NamedTuple):
-    """A segment's digest (SHA-256, hexadecimal), and its leaves where somebody looked."""
+    """A segment's digest (SHA-256, hexadecimal), and its leaves if they were read."""
 
     digest: str
     leaves: SegmentLeaves | None
 
 
 def find(octets: Octets, size: int) -> "array[int] | None":
-    """Where the signed records of a closed log begin, the genesis first and the close last; None if it is not so."""
+    """The offsets of the signed records of a closed log, the genesis first and the close last; None if the log is not
+    closed.
+    """
     offset = _last_line(octets, size)
     found = array("Q")
     while offset:
@@ -92,7 +94,7 @@ def find(octets: Octets, size: int) -> "array[int] | None":
 
 
 def _last_line(octets: Octets, size: int) -> int:
-    """Where the last line begins; 0 where that is not seen."""
+    """The offset of the last line; 0 if it is not found."""
     for length in (_GUESS, _LONGEST_LINE):
         start = max(size - length, 0)
         line = octets(start, size - start)
@@ -102,7 +104,7 @@ def _last_line(octets: Octets, size: int) -> int:
 
 
 def signed_line(octets: Octets, offset: int, longest: int = _LONGEST_LINE) -> bytes | None:
-    """The line at an offset, newline included; None where it is longer than a signed record."""
+    """The line at an offset, newline included; None if it is longer than a signed record."""
     length = _GUESS
     while True:
         data = octets(offset, length)
@@ -115,10 +117,10 @@ def signed_line(octets: Octets, offset: int, longest: int = _LONGEST_LINE) -> by
 
 
 def scan(data: bytes) -> SegmentPart | None:
-    """The part of a segment's octets; None where something is out of place."""
+    """The part made of a segment's octets; None if anything is wrong."""
     if b"\r" in data or data.count(b"\n") > MOST_RECORDS + 1 or data.count(_CHECKPOINT) != 1:
         return None
-    lines = data.splitlines(keepends=True)  # these end in newlines alone
+    lines = data.splitlines(keepends=True)  # only these end in newlines
     signed = read(lines[0])
     leaves = [leaf_hash(line) for line in lines]
     links = hexlify(b"".join(leaves))
@@ -139,7 +141,7 @@ def _at_us(line: bytes) -> int | None:
 
 
 def _gap(data: bytes, lines: list[bytes], first: int) -> RecordGap | Flaw | None:
-    """The gap that is recorded in a segment, if one is; a flaw where it is not what the lines say."""
+    """The gap recorded in a segment, if there is one; a flaw if it does not match the lines."""
     if data.find(_STALLED) < 0:
         return None
     (number, *more) = [number for number, line in enumerate(lines) if _STALLED in line]
@@ -162,7 +164,7 @@ def _anchors(data: bytes) -> tuple[str, ...]:
 
 
 def _nodes(level: list[bytes], first: int) -> list[tuple[int, bytes]]:
-    """The perfect subtrees, each with its height, that leaves from number `first` on make up, from left to right."""
+    """The perfect subtrees, each with its height, of the leaves from number `first` on, from left to right."""
     left: list[tuple[int, bytes]] = []
     right: list[tuple[int, bytes]] = []
     height = 0
@@ -180,7 +182,7 @@ def _nodes(level: list[bytes], first: int) -> list[tuple[int, bytes]]:
 
 
 class LogOutline(NamedTuple):
-    """Where the signed records of a log begin, the genesis first and the close last; and the genesis."""
+    """The offsets of the signed records of a log, the genesis first and the close last; and the genesis."""
 
     octets: Octets
     size: int
@@ -189,7 +191,7 @@ class LogOutline(NamedTuple):
 
 
 def outline(octets: Octets, size: int) -> LogOutline | None:
-    """The outline of a log of so many octets; None where it has none that is worth believing."""
+    """The outline of a log of this size; None if the log cannot be verified this way."""
     line = signed_line(octets, 0, LONGEST)
     genesis = None if line is None else read(line)
     offsets = find(octets, size) if isinstance(genesis, Genesis) else None
@@ -197,9 +199,9 @@ def outline(octets: Octets, size: int) -> LogOutline | None:
 
 
 def quick(log: LogOutline, parts: Iterable[SegmentPart | None], anchors: Anchors) -> LogReport | None:
-    """The report on a log that is whole and closed, or None where the careful verification must find out.
+    """The report on a verified, closed log, or None if the full verification must decide.
 
-    `parts` are those of its segments in their order. Where nobody looked at their leaves, the report says so.
+    `parts` are those of its segments in order. The report says so if their leaves were not read.
     """
     walk = _Walk(log.genesis, anchors)
     if not walk.begin():
@@ -217,7 +219,7 @@ def quick(log: LogOutline, parts: Iterable[SegmentPart | None], anchors: Anchors
 
 
 class _Walk:
-    """From one signed record to the next. Each step says whether all is well."""
+    """Steps from one signed record to the next. Each method returns whether everything is correct."""
 
     def __init__(self, genesis: Genesis, anchors: Anchors) -> None:
         self._genesis = genesis
@@ -235,12 +237,12 @@ class _Walk:
         return (genesis.seq, genesis.prev) == (0, START) and self._signed(genesis, Segment(0, 0, "", EMPTY))
 
     def segment(self, part: SegmentPart, octets: int, record: Seal | Recover | Close) -> bool:
-        """Take a segment, and the record that closes it."""
+        """Process a segment, and the record that closes it."""
         leaves, anew = part.leaves, isinstance(record, Recover)
         if leaves is None:
             self._fast = True
             segment = Segment(record.seq - self._seq, octets, part.digest, None)
-            in_time = anew or record.at_us - self._signed_us <= LONGEST_US  # else its records say why
+            in_time = anew or record.at_us - self._signed_us <= LONGEST_US  # else the records explain the late seal
             return in_time and segment.records > 0 and self._signed(record, segment)
         if leaves.number != self._tree.size:
             return False
@@ -283,11 +285,14 @@ class _Walk:
         form: tuple[Claim, ...] = (Claim("form", _FORM),)
         root = b""
         if self._fast:
-            text = f"the octets of records 0 to {records - 2} are those that were signed, segment by segment"
+            text = f"the octets of records 0 to {records - 2} are the signed ones, segment by segment"
             proven = (Claim("octets", text), *(claim for claim in proven if claim.slug != "chain"))
             form = (Claim("tree", _TREE), *form)
         else:
-            text = f"lines 1 to {records} follow one another, each names the one before it, and their tree is as signed"
+            text = (
+                f"lines 1 to {records} follow one another, each names the previous one, and their tree is "
+                "the signed one"
+            )
             proven = tuple(Claim("chain", text) if claim.slug == "chain" else claim for claim in proven)
             self._tree.push(leaf_hash(line))
             root = self._tree.root()

@@ -1,4 +1,4 @@
-"""From a line back to its record: only the one line that our encoder would have written for it is accepted."""
+"""Decodes a line into its record. Only the exact line that the encoder writes for the record is accepted."""
 
 import re
 
@@ -22,46 +22,46 @@ from rtshcua.wire import names
 
 #: the longest line in bytes; a genesis carries a whole bundle
 LONGEST = 1 << 26
-#: bytes of a line that a finding quotes
+#: : the most bytes of a line that a finding quotes
 SHOWN = 80
 
 
 def too_long(line: bytes) -> Flaw | None:
-    """Whether a line is longer than any record, which is said before it is read."""
+    """The flaw of a line that is longer than any record, checked before it is read."""
     if len(line) <= LONGEST:
         return None
     return Flaw("record/too-long", "the line is too long for a record", f"{len(line)} bytes", f"{LONGEST} bytes")
 
 
 def shown(line: bytes) -> str:
-    """The beginning of a line, as a finding quotes it."""
+    """The beginning of a line for a finding."""
     return line[:SHOWN].decode("utf-8", "backslashreplace")
 
 
 def may_be_torn(line: bytes, prev: str) -> bool:
-    """Whether a last line without its end may be what a crash left of the record after the line of hash `prev`: its
-    beginning, or nothing but zeros, as a file system leaves what was not on the disk yet.
+    """Whether a last line without its end may be what a crash left of the record after the line of hash `prev`: the
+    beginning of that record, or nothing but zeros, as a file system leaves data that was not written yet.
     """
     start = b'{"_prev":"' + prev.encode() + b'","at_us":'
     return line.startswith(start) or start.startswith(line) or not line.strip(b"\0")
 
 
 def behind_close(line: bytes) -> Flaw:
-    """What is wrong where a line, or part of one, stands behind the signed close: the log itself ends before it."""
+    """The flaw of a line, or part of one, that follows the signed close."""
     if not line.strip(b"\0"):
         what = f"{len(line)} zero octets, as a file system leaves them after a power cut"
     elif not line.strip():
         what = "empty lines or blanks"
     elif line.startswith(_BEGINNING) or _BEGINNING.startswith(line):
-        what = "a record" if line.endswith(b"\n") else "a part of a record"
+        what = "a record" if line.endswith(b"\n") else "part of a record"
     else:
-        what = "something that is no record"
-    text = f"the log is over: behind its signed close stands {what}, for which no key of this log signed"
+        what = "data other than a record"
+    text = f"the signed close is followed by {what}, which no key of this log signed"
     return Flaw("close/junk-after", text, shown(line), "nothing")
 
 
 _BEGINNING = b'{"_prev":"'
-_TYPE = b',"type":"'  # no text can hold it, for a quote inside a text stands behind a backslash
+_TYPE = b',"type":"'  # cannot occur in a text, where a quote stands after a backslash
 _VERSION = re.compile(rb',"version":(\d{1,15})[,}]')
 _DECODERS: dict[bytes, msgspec.json.Decoder[AnyRecord]] = {
     b"genesis": msgspec.json.Decoder(Genesis),
@@ -75,28 +75,28 @@ _OUTCOMES = frozenset(outcome.name.lower() for outcome in Outcome)
 _DIGITS = "0123456789abcdef"
 _WORDS = {
     "`int`": "an integer", "`float`": "a fraction", "`str`": "a text", "`bool`": "a truth value", "`null`": "null",
-    "`array`": "a list", "`object`": "an object", "JSON is malformed": "it is not JSON",
+    "`array`": "a list", "`object`": "not JSON", "JSON is malformed": "it is not JSON",
 }  # fmt: skip
 
 
 def read(line: bytes) -> AnyRecord | Flaw:
-    """The record of a line (newline included), or what is wrong with the line."""
+    """The record of a line (newline included), or the flaw of the line."""
     start = line.rfind(_TYPE) + len(_TYPE)
     name = line[start : line.find(b'"', start)] if start >= len(_TYPE) else b""
     decoder = _DECODERS.get(name)
     if decoder is None:
-        return Flaw("record/malformed", "it is not a record: genesis, decision, effect, seal, recover or close")
+        return Flaw("record/malformed", "not a record: expected genesis, decision, effect, seal, recover or close")
     try:
         record = decoder.decode(line)
     except UnicodeDecodeError:
-        return Flaw("record/malformed", "it is not UTF-8")
+        return Flaw("record/malformed", "the line is not UTF-8")
     except msgspec.DecodeError as error:
         version = _VERSION.search(line) if name == b"genesis" else None
         if version is not None and int(version[1]) != VERSION:
             return _unknown_format(FORMAT, int(version[1]))
-        return Flaw("record/malformed", f"it has not the form of a record of type {name.decode()}: {_words(error)}")
+        return Flaw("record/malformed", f"malformed record of type {name.decode()}: {_words(error)}")
     if encode(record) != line:
-        return Flaw("record/not-canonical", "it is not written in the one form that this record has (RFC 8785)")
+        return Flaw("record/not-canonical", "the record is not in its canonical form (RFC 8785)")
     if isinstance(record, DecisionRecord):
         return _decision(record)
     if isinstance(record, Genesis) and (record.format != FORMAT or record.version != VERSION):
@@ -106,11 +106,11 @@ def read(line: bytes) -> AnyRecord | Flaw:
 
 def _decision(record: DecisionRecord) -> DecisionRecord | Flaw:
     if record.outcome not in _OUTCOMES:
-        text = "it has not the form of a record of type decision: its outcome is none that there is"
+        text = "malformed record of type decision: unknown outcome"
         return Flaw("record/malformed", text, record.outcome, ", ".join(sorted(_OUTCOMES)))
     for octets in (record.binding, record.invocation):
         if octets.strip(_DIGITS) or len(octets) & 1:
-            text = "it has not the form of a record of type decision: its binding or invocation is not hexadecimal"
+            text = "malformed record of type decision: binding or invocation is not hexadecimal"
             return Flaw("record/malformed", text, octets)
     return record
 
@@ -123,7 +123,7 @@ def _words(error: msgspec.DecodeError) -> str:
 
 
 def _unknown_format(name: str, version: int) -> Flaw:
-    text = "its format is not one that this program reads"
+    text = "the format is not supported by this program"
     if name == FORMAT and version < VERSION:
-        text += f"; {names.COMPATIBILITY} says what verifies logs of earlier versions"
+        text += f"; see {names.COMPATIBILITY} for logs of earlier versions"
     return Flaw("genesis/format", text, f"{name} version {version}", f"{FORMAT} version {VERSION}")

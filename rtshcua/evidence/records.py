@@ -1,14 +1,14 @@
-"""The records of a log: what each line holds, byte for byte.
+"""The records of a log: the contents of each line, byte for byte.
 
-A line is RFC 8785 (JCS) JSON and a newline: keys sorted, integers, texts, null, arrays and objects only. msgspec writes
-the fields of a struct in the order of their definition, so every struct here defines them sorted; the bytes are then
-those of RFC 8785. `_prev` sorts first, for every other key begins with a lower-case letter: its value stands at
-bytes 10 to 73 of each line.
+A line is RFC 8785 (JCS) JSON and a newline: sorted keys, and only integers, texts, null, arrays and objects.
+msgspec writes the fields of a struct in the order of their definition, so every struct here defines them sorted,
+and the bytes are those of RFC 8785. `_prev` sorts first, because every other key begins with a lower-case letter:
+its value is at bytes 10 to 73 of each line.
 
-Every record has `_prev` (SHA-256 of 0x00 and the line before, newline included: chain link and RFC 9162 leaf at once),
-`seq` (counts from 0), `type`, and the moment it was written: `at_us` (monotonic), `utc_us` (since the Unix epoch) and
-`utc_error_us` (bound on the error of `utc_us`). Digests, keys and ids are lower-case hexadecimal. The format is
-specified in docs/log-format.md.
+Every record has `_prev` (SHA-256 of 0x00 and the previous line, newline included: chain link and RFC 9162 leaf at
+once), `seq` (counts from 0), `type`, and the moment of its writing: `at_us` (monotonic), `utc_us` (since the Unix
+epoch) and `utc_error_us` (bound on the error of `utc_us`). Digests, keys and ids are lower-case hexadecimal. The
+format is specified in docs/log-format.md.
 """
 
 from typing import Annotated, Final, Literal
@@ -28,23 +28,23 @@ LARGEST = (1 << 53) - 1
 Integer = Annotated[int, msgspec.Meta(ge=-LARGEST, le=LARGEST)]
 Count = Annotated[int, msgspec.Meta(ge=0, le=LARGEST)]
 Durability = Annotated[int, msgspec.Meta(ge=0, le=3)]
-# Looked at by a regular expression, and so only in the first and the last record; the verifier compares the others with
-# what they must be.
+# A regular expression checks it, and therefore only in the first and the last record; the verifier compares it with
+# the expected value in the others.
 Hash = Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]{64}\Z")]
 Name = Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]{32}\Z")]
 
 
 class Record(msgspec.Struct, frozen=True, forbid_unknown_fields=True, rename={"prev": "_prev"}, gc=False):
-    """The base of what a log holds; without fields, for those of a subclass would come after them, unsorted."""
+    """The base of all records. It has no fields, because those of a subclass would follow them unsorted."""
 
 
 class Genesis(Record, frozen=True):
-    """The first record: who flies what, under which trust, and what the log is checked with.
+    """The first record: the flight, its trust root, and the keys that the log is verified with.
 
     `bundle` and `root` are base64 of the bundle and of the trust root; `log_key` is the Ed25519 public key, called
-    `log_kid` in the root, that signs this record. `boot` is 16 random bytes; `before` the last line's hash of the log
-    that this vehicle wrote before, or null. `received_us` is the monotonic time at which the bundle was received on
-    board (paper symbol `t_r`); what a replacement brings is received when the effect says so. `mode` is the enforcement
+    `log_kid` in the root, that signs this record. `boot` is 16 random bytes; `before` the hash of the last line of
+    this vehicle's previous log, or null. `received_us` is the monotonic time at which the bundle was received on
+    board (paper symbol `t_r`); the steps of a replacement are received at its effect. `mode` is the enforcement
     mode. A record of durability class 2 is on the disk within `sync_us`.
     """
 
@@ -74,9 +74,9 @@ class Genesis(Record, frozen=True):
 class RecordedState(
     msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True, kw_only=True, gc=False
 ):
-    """Paper symbol `S_t` as it was read: one value and one age (us) a slot, null where nothing valid was received; and
-    what each temporal monitor of the policy said (1 true, 2 false, 4 unknown). Without monitors there is no such field,
-    as in logs that are older than it is.
+    """The state as it was read (paper symbol `S_t`): one value and one age (us) for each slot, null where nothing
+    valid was received, and the truth of each temporal monitor of the policy (1 true, 2 false, 4 unknown). Without
+    monitors the field is absent, as in older logs.
     """
 
     ages: tuple[Integer, ...]
@@ -85,7 +85,7 @@ class RecordedState(
 
 
 class RecordedContext(msgspec.Struct, frozen=True, forbid_unknown_fields=True, gc=False):
-    """`decide`'s context but for the binding; an approval is [rule, role, granted, monotonic us]."""
+    """The context of `decide` without the binding; an approval is [rule, role, granted, monotonic us]."""
 
     approvals: tuple[tuple[Integer, Integer, Integer, Integer, Integer], ...]
     consumed: Integer
@@ -96,7 +96,7 @@ class RecordedContext(msgspec.Struct, frozen=True, forbid_unknown_fields=True, g
     vehicle: str
 
 
-#: the fields of a decision record that say what was decided
+#: : the fields of a decision record with the result of the decision
 DECIDED: Final = (
     "outcome", "reason", "rule_step", "clause", "clause_at", "target", "target_link", "valid_until_us"
 )  # fmt: skip
@@ -106,7 +106,7 @@ _OUTCOMES: Final = tuple(outcome.name.lower() for outcome in Outcome)  # by numb
 def in_words(
     decided: Decided,
 ) -> tuple[str, str, int, str | None, tuple[int, int, int] | None, str | None, int, int]:
-    """What was decided, in the words of a record (`DECIDED`). Of a link that may fly it names no target."""
+    """The decision in the form of a record (`DECIDED`). A link that may fly has no target."""
     clause, target = decided.clause, decided.target if decided.outcome == Outcome.FALLBACK else None
     return (
         _OUTCOMES[decided.outcome],
@@ -121,12 +121,12 @@ def in_words(
 
 
 class DecisionRecord(Record, frozen=True):
-    """One answer of `enforce`, with every input that `decide` read, so that it can be derived again.
+    """One answer of `enforce`, with every input that `decide` read, so that the decision can be derived again.
 
     `kind`, `step` and `link` are those of the request (`wire.request`). `outcome` and `reason` are slugs.
-    `binding` is the one that the request presented. `clause` is the text of the deciding clause, `clause_at` its
-    [source, start, end]; `target` the text of the link to fly instead and `target_link` its index (-1: none).
-    `rule_step` is the number in section 4.1 of the step that decided, `valid_until_us` monotonic.
+    `binding` is the one in the request. `clause` is the text of the deciding clause, `clause_at` its [source,
+    start, end]; `target` the text of the link to fly instead and `target_link` its index (-1: none). `rule_step`
+    is the number in section 4.1 of the step that decided, `valid_until_us` monotonic.
     """
 
     prev: str
@@ -155,14 +155,14 @@ class DecisionRecord(Record, frozen=True):
 
     @property
     def ref(self) -> Ref:
-        """What it decides on."""
+        """The subject of the decision."""
         return Ref(self.kind, self.step, self.link)
 
 
 class Effect(Record, frozen=True):
-    """What then happened. `event` is a stable slug; `detail` is text of the world's own making, never to be trusted.
+    """An event. `event` is a stable slug; `detail` is text from outside, which must not be trusted.
 
-    `kind`, `step` and `link` name what it belongs to as in `DecisionRecord` (-1: nothing), `token` the command, or -1.
+    `kind`, `step` and `link` name the subject as in `DecisionRecord` (-1: none), `token` the command, or -1.
     """
 
     prev: str
@@ -181,13 +181,13 @@ class Effect(Record, frozen=True):
 
     @property
     def ref(self) -> Ref:
-        """What it belongs to."""
+        """The subject of the event."""
         return Ref(self.kind, self.step, self.link)
 
 
 class Seal(Record, frozen=True):
-    """The end of an epoch. `bytes` and `records` say how long its segment is, `digest` is the SHA-256 of its bytes:
-    those from the beginning of the signed record before this one up to this one. `next_key` signs what follows.
+    """The end of an epoch. `bytes` and `records` are the length of its segment, `digest` is the SHA-256 of its bytes:
+    from the beginning of the previous signed record up to this one. `next_key` signs the next epoch.
     """
 
     prev: Hash
@@ -205,8 +205,8 @@ class Seal(Record, frozen=True):
 
 
 class Recover(Record, frozen=True):
-    """A seal after a crash, signed by the log key: what stood after the last whole record was cut off, so many bytes
-    of that digest. Monotonic time begins anew here.
+    """A seal after a crash, signed by the log key. The octets after the last complete record were discarded: their
+    number and digest. Monotonic time restarts here.
     """
 
     prev: Hash
@@ -226,8 +226,8 @@ class Recover(Record, frozen=True):
 
 
 class Close(Record, frozen=True):
-    """The last record: a seal after which nothing follows. `tlog` is the SHA-256 of the telemetry log, null where
-    there is none.
+    """The last record: a seal that nothing follows. `tlog` is the SHA-256 of the telemetry log, null if there is
+    none.
     """
 
     prev: Hash
@@ -246,30 +246,30 @@ class Close(Record, frozen=True):
 
 
 AnyRecord = Genesis | DecisionRecord | Effect | Seal | Recover | Close
-#: Records with a `checkpoint`: a C2SP signed note over the tree of all lines before, and over the record itself.
+#: : Records with a `checkpoint`: a C2SP signed note over the tree of all previous lines, and over the record itself.
 Signed = Genesis | Seal | Recover | Close
-#: those that end an epoch
+#: : records that end an epoch
 Sealing = Seal | Recover | Close
 
-_encode = msgspec.json.Encoder().encode_lines  # cheaper than adding the newline
-_CHECKPOINT = b',"checkpoint":"'  # no text can hold it, for a quote inside a text stands behind a backslash
+_encode = msgspec.json.Encoder().encode_lines  # faster than appending the newline
+_CHECKPOINT = b',"checkpoint":"'  # cannot occur in a text, where a quote stands after a backslash
 
 
 def encode(record: Record) -> bytes:
     """The line of a record, newline included."""
-    return _encode([record])  # of a tuple msgspec 0.22 never lets go
+    return _encode([record])  # msgspec 0.22 leaks a tuple that it is given here
 
 
 def is_signed(line: bytes) -> bool:
-    """Whether this is the line of a signed record, if it is the line of a record."""
+    """Whether a line that is a record is a signed record."""
     return _CHECKPOINT in line
 
 
 def unsigned(record: Signed) -> Signed:
-    """A signed record as its checkpoint vouches for it: without that checkpoint."""
+    """A signed record as its checkpoint covers it: without that checkpoint."""
     return msgspec.structs.replace(record, checkpoint=None)
 
 
 def next_key_of(record: Signed) -> bytes | None:
-    """The key that signs what follows a signed record, 32 bytes; None behind a close."""
+    """The key that signs the records after a signed record, 32 bytes; None after a close."""
     return None if isinstance(record, Close) else bytes.fromhex(record.next_key)

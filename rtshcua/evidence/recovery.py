@@ -1,12 +1,12 @@
-"""What of a log is kept after a crash: the longest beginning that verifies. What the crash left behind it is cut off.
+"""Recovery of a log after a crash: the longest beginning that verifies is kept, and the rest is discarded.
 
-A crash tears the end: the last line has no end, or (after a power cut) something in the lines that were not on the disk
-yet is missing or zero. It neither writes whole records that do not follow the one before, nor does it damage what
-stands before a signed record, for that was on the disk before the signed record was written. Whatever looks like that
-was not a crash, and is not signed: `TAMPERED`.
+A crash damages the end: the last line is incomplete, or (after a power cut) part of the lines that were not on the
+disk yet is missing or zero. It neither writes complete records that do not follow the previous one, nor damages
+data before a signed record, which was on the disk before the signed record was written. Such damage is not the
+result of a crash: `TAMPERED`.
 
-What recovery cannot tell: whether the records after the last signed one are as they were written, for the key of their
-epoch died with the process. They are kept as found, and the `recover` record says where they end.
+Recovery cannot tell whether the records after the last signed one are unchanged, because the key of their epoch
+was lost with the process. They are kept as found, and the `recover` record says where they end.
 """
 
 from collections.abc import Callable
@@ -24,15 +24,15 @@ from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, G
 from rtshcua.evidence.seal_verification import Seals
 from rtshcua.model.flat.situation import Now
 
-#: the ending that the close of a recovered log names
+#: : the `ending` in the close of a recovered log
 RECOVERED = "recovered"
 
 
 class LogState(Enum):
-    """What a log is to recovery: `closed`: nothing to do. `whole`: ends between two records, without a close. `torn`:
-    there is something behind the last record, as a crash leaves it. `unbegun`: it has not even a first record.
+    """The state of a log for recovery. `closed`: nothing to do. `whole`: ends after a complete record, without a
+    close. `torn`: ends in the remains of a crash. `unbegun`: has no complete record.
 
-    The rest is not recovered: `tampered` was changed, and `foreign` was begun under another log key.
+    The others are not recovered: `tampered` was changed, and `foreign` was begun under another log key.
     """
 
     CLOSED = "closed"
@@ -47,11 +47,12 @@ RECOVERABLE = (LogState.WHOLE, LogState.TORN)
 
 
 class FoundLog(NamedTuple):
-    """A log as it was found. Its first `records`, `kept` octets, verify; `head` stands behind them, to be gone on from
-    once. `sealed` counts the records up to the last signed one, it included. `discarded` octets of that SHA-256 follow.
+    """A log as found. Its first `records`, `kept` octets, verify; `head` follows them and can be continued once.
+    `sealed` counts the records up to and including the last signed one. `discarded` octets with that SHA-256
+    follow.
 
-    `reason` is what is wrong where the kept part ends, None where nothing is. `latest_us` is the greatest UTC that the
-    kept records leave no doubt of, in us: it is later now.
+    `reason` is the flaw at the end of the kept part, None if there is none. `latest_us` is a lower bound of the
+    present UTC according to the kept records, in us.
     """
 
     state: LogState
@@ -67,9 +68,9 @@ class FoundLog(NamedTuple):
 
 
 class Examination:
-    """Takes the lines of a log in order, also after the first that is not kept; memory does not grow with the log.
+    """Processes the lines of a log in order, including those after the kept part; memory does not grow with the log.
 
-    `public` is the log key (Ed25519, 32 bytes) that would sign the recovery; without one no log is foreign.
+    `public` is the log key (Ed25519, 32 bytes) that would sign the recovery; without it no log is foreign.
     """
 
     def __init__(self, public: bytes | None) -> None:
@@ -82,13 +83,13 @@ class Examination:
         self._latest_us = 0
         self._sealed = 0
         self._closed = False
-        self._whole = False  # the first line that is not kept is a record, only in the wrong place
-        self._more = False  # behind what is kept stands what was written later than it was on the disk
+        self._whole = False  # the first line that is not kept is a record in the wrong place
+        self._more = False  # a later line follows that was written after the end of the kept part was on the disk
         self._discarded = 0
         self._digest = sha256()
 
     def take(self, line: bytes) -> bool:
-        """Whether the next line (newline included, if it has one) is kept."""
+        """Whether the next line (with its newline, if it has one) is kept."""
         if self.reason is None:
             record = behind_close(line) if self._closed else _read(line)
             flaw = record if isinstance(record, Flaw) else self._check(record, line)
@@ -104,7 +105,7 @@ class Examination:
         return False
 
     def _is_later(self, line: bytes) -> bool:
-        """Whether this is a record that was written after all that is kept, and more, was on the disk."""
+        """Whether this is a record that was written after the kept part, and more, was on the disk."""
         if self.genesis is None:
             return not isinstance(_read(line), Flaw)
         return is_signed(line) and isinstance(_read(line), Genesis | Seal | Recover | Close)
@@ -113,12 +114,12 @@ class Examination:
         head = self.head
         if isinstance(record, Genesis) != (head.seq == 0):
             slug = "genesis/repeated" if head.seq else "genesis/missing"
-            return Flaw(slug, "a log has one genesis, and begins with it", record.type)
+            return Flaw(slug, "a genesis is only allowed at the beginning of a log", record.type)
         if record.seq != head.seq:
-            text = f"record {record.seq} stands where record {head.seq} belongs"
+            text = f"found record {record.seq} where record {head.seq} is expected"
             return Flaw("chain/sequence", text, str(record.seq), str(head.seq))
         if record.prev != head.prev:
-            return Flaw("chain/broken", "it was not written after the record before it", head.prev, record.prev)
+            return Flaw("chain/broken", "the record does not follow the record before it", head.prev, record.prev)
         flaw = self._clocks.check(record) or self._check_epoch(record, line)
         if flaw is None:
             self._latest_us = max(self._latest_us, record.utc_us - record.utc_error_us)
@@ -142,7 +143,7 @@ class Examination:
         return None
 
     def examined(self) -> FoundLog:
-        """The whole, once the lines are over."""
+        """The result, after the last line."""
         return FoundLog(
             state=self._state(),
             genesis=self.genesis,
@@ -171,10 +172,10 @@ class Examination:
 def ending(
     examined: FoundLog, now: Now, certify: Callable[[bytes], bytes], public: bytes, draw: Callable[[], bytes]
 ) -> bytes:
-    """The two lines that end a log in state `WHOLE` or `TORN` after what is kept of it: `recover` and `close`.
+    """The two lines that end a log in state `WHOLE` or `TORN` after its kept part: `recover` and `close`.
 
-    `certify` signs with the log key `public`, `draw` gives 32 secret random bytes for the key of the close. Where the
-    clock says that it is earlier than the log does, the error of its UTC is stated as great as that makes it.
+    `certify` signs with the log key `public`, `draw` returns 32 secret random bytes for the key of the close. If
+    the clock is earlier than the log, the stated error of UTC is increased by the difference.
     """
     assert examined.genesis is not None
     assert examined.state in RECOVERABLE
@@ -191,5 +192,5 @@ def _read(line: bytes) -> AnyRecord | Flaw:
     if flaw is not None:
         return flaw
     if not line.endswith(b"\n"):
-        return Flaw("tail/torn", f"the log ends inside this record, {len(line)} bytes into it", shown(line))
+        return Flaw("tail/torn", f"the log ends inside this record, after {len(line)} of its bytes", shown(line))
     return read(line)

@@ -1,4 +1,4 @@
-"""What a verification says: what was proven, what was not, and the first record that fails."""
+"""The report of a verification: what was proven, what was not, and the first record with a flaw."""
 
 from collections.abc import Mapping
 from datetime import UTC, datetime, timedelta
@@ -16,7 +16,9 @@ _NONE = Recoveries()
 
 
 class LogVerdict(Enum):
-    """`VERIFIED`: whole up to a signed close. `INCOMPLETE`: sound as far as it goes. `FAILED`: not to be believed."""
+    """`VERIFIED`: complete up to a signed close. `INCOMPLETE`: correct as far as it goes. `FAILED`: not to be
+    trusted.
+    """
 
     VERIFIED = "verified"
     INCOMPLETE = "incomplete"
@@ -26,11 +28,11 @@ class LogVerdict(Enum):
 class LogReport(NamedTuple):
     """The verification of one log.
 
-    `records` is how many were sound, `counts` how many of each kind: record types, and outcomes of the decisions.
-    `failure` is the first record that fails; `shortfall` says why a log without failure is incomplete. `root` is the
-    RFC 9162 root over the sound records; `last_us` the last record's monotonic time. `sealed` of the records lie up to
-    the last signature, in `epochs` and the record that signs; `anchored` of them the threshold of witnesses has
-    cosigned. `outside` is what all witnesses saw, of a log without failure; `gaps` are the times in which it has none.
+    `records` is the number of correct records, `counts` the number of each kind: record types, and outcomes of the
+    decisions. `failure` is the first flaw; `shortfall` says why a log without a flaw is incomplete. `root` is the
+    RFC 9162 root over the correct records; `last_us` the last record's monotonic time. `sealed` counts the records
+    up to the last signature, in `epochs` epochs; `anchored` those that the threshold of witnesses has cosigned.
+    `outside` is what all witnesses saw, of a log without a flaw; `gaps` are the times without records.
     """
 
     records: int
@@ -51,7 +53,7 @@ class LogReport(NamedTuple):
 
     @property
     def verdict(self) -> LogVerdict:
-        """The whole in one word."""
+        """The verdict."""
         if self.failure is not None:
             return LogVerdict.FAILED
         return LogVerdict.VERIFIED if self.shortfall is None else LogVerdict.INCOMPLETE
@@ -61,50 +63,54 @@ def claims(
     records: int, sealed: int, epochs: int, genesis: Genesis | None, close: Close | None, failure: Finding | None,
     recoveries: Recoveries = _NONE,
 ) -> tuple[tuple[Claim, ...], tuple[Claim, ...]]:  # fmt: skip
-    """What the chain of `records` sound records proves, and what it does not; `sealed` of them are signed for."""
+    """What the chain of `records` correct records proves, and what it does not; `sealed` of them are signed for."""
     if failure is not None:
-        text = f"a log that fails proves nothing, neither about record {failure.record} nor about those around it"
+        text = (
+            f"a log that fails verification proves nothing, neither about record {failure.record} nor about the others"
+        )
         return (), (Claim("log", text),)
     assert genesis is not None
-    chain = Claim("chain", f"{_span(0, records)} whole, in order, and follow{_s(records)} one another without a gap")
+    chain = Claim("chain", f"{_span(0, records)} intact, in order, and follow{_s(records)} one another without a gap")
     seals = Claim("seals", f"{_span(0, sealed)} signed for, in {epochs} sealed epoch{'' if epochs == 1 else 's'}")
     if close is None:
-        text = "no signed close: whatever was cut off the end cannot be seen"
+        text = "no signed close: a removal of records from the end cannot be detected"
         unproven = [Claim("signed-close", text)]
         if records > sealed:
-            text = f"{_span(sealed, records)} chained but not yet signed for: anyone could have written them anew"
+            text = f"{_span(sealed, records)} chained but not yet signed for: anyone could have rewritten them"
             unproven.append(Claim("seals", text))
         return (chain, seals), (*unproven, unanchored(records, 0))
     text = (
-        f"closed and signed by log key {genesis.log_kid} and the keys of the epochs after it: nothing was changed, "
-        f"added or taken out by anyone who did not hold the log key, or the epoch keys of the time{_loose(recoveries)}"
+        f"closed and signed by log key {genesis.log_kid} and the keys of the epochs after it: nobody "
+        "without the log key, or the epoch keys of the time, changed, added or removed a "
+        f"record{_loose(recoveries)}"
     )
     return (chain, seals, Claim("signed-close", text)), (unanchored(records, 0),)
 
 
 def _loose(recoveries: Recoveries) -> str:
-    """What no key spoke for until a recovery did."""
+    """The records that no key covered before a recovery."""
     if not recoveries.crashes:
         return ""
     many = f"{recoveries.unsigned} record{'' if recoveries.unsigned == 1 else 's'}"
-    return f"; but for {many}, unsigned when the log broke off, and what stood after them"
+    return f"; except {many}, unsigned when the log broke off, and the data after them"
 
 
 def unsealed(recoveries: Recoveries) -> tuple[Claim, ...]:
-    """What is not proven of a log that was recovered."""
+    """What is not proven of a recovered log."""
     crashes = recoveries.crashes
     if not crashes:
         return ()
     after = "a crash" if crashes == 1 else f"{crashes} crashes"
     text = (
-        f"recovered after {after}: that the last records before (unsigned then: {recoveries.unsigned}) are as they "
-        f"were written, and that no others came after them (discarded: {recoveries.discarded} octets)"
+        f"recovered after {after}: that the last records before it (unsigned then: "
+        f"{recoveries.unsigned}) are unchanged, and that no others followed them (discarded: "
+        f"{recoveries.discarded} octets)"
     )
     return (Claim("recovered", text),)
 
 
 def with_anchors(report: LogReport, anchored: AnchoredExtent) -> LogReport:
-    """A report without failure, with what witnesses saw of its log."""
+    """A report without a flaw, with what witnesses saw of its log."""
     count = min(anchored.records, report.records)
     unproven = tuple(claim for claim in report.unproven if claim.slug != "anchor")
     if count < report.records:
@@ -114,31 +120,31 @@ def with_anchors(report: LogReport, anchored: AnchoredExtent) -> LogReport:
     proven = report.proven
     if count:
         saw = [seen for seen in anchored.witnessed if seen.size + 1 >= count]
-        text = f"{_span(0, count)} as {_list([f'`{seen.name}`' for seen in saw])} saw {'it' if count == 1 else 'them'}"
+        text = f"{_span(0, count)} as seen by {_list([f'`{seen.name}`' for seen in saw])}"
         when = max(seen.time_s for seen in saw)
         proven = (*proven, Claim("anchor", f"{text}, outside of the vehicle, {utc_of(when)}"))
     return report._replace(anchored=count, proven=proven, unproven=unproven, outside=anchored)
 
 
 def with_boundary(report: LogReport, signed: Mapping[int, int]) -> LogReport:
-    """A report without failure, with the gaps for which the boundary signed too, by the numbers of their records."""
+    """A report without a flaw, with the gaps for which the boundary signed too, by the numbers of their records."""
     gaps = tuple(gap._replace(boundary=signed.get(gap.record)) for gap in report.gaps)
     unproven = (*(claim for claim in report.unproven if claim.slug != "gap"), *map(told, gaps))
     return report._replace(gaps=gaps, unproven=unproven)
 
 
 def rejected(anchored: AnchoredExtent) -> Claim:
-    """What notes of witnesses do not say, for they are damaged or forged."""
+    """The claim that is not proven because notes of witnesses are damaged or forged."""
     many = "1 note" if anchored.rejected == 1 else f"{anchored.rejected} notes"
-    text = f"what {many} of witnesses would say, damaged or forged and passed over: {anchored.first}"
+    text = f"{many} of witnesses, damaged or forged and ignored: {anchored.first}"
     return Claim("anchor/signature", text)
 
 
 def cosigned(anchored: AnchoredExtent) -> str:
-    """By how many of how many witnesses more is cosigned than is anchored, in words; empty where by none."""
+    """How many of the witnesses cosigned more than what is anchored, as text; empty if none did."""
     if not anchored.ahead:
         return ""
-    return f"cosigned by {len(anchored.ahead)} of the {anchored.threshold} witnesses that are needed"
+    return f"cosigned by {len(anchored.ahead)} of {anchored.threshold} required witnesses"
 
 
 def utc_of(time_s: int) -> str:
@@ -149,16 +155,16 @@ def utc_of(time_s: int) -> str:
 
 
 def unanchored(records: int, anchored: int, outside: AnchoredExtent | None = None) -> Claim:
-    """What is not proven where the first `anchored` of `records` records are held by witnesses; `outside` says whether
-    some of the others were cosigned, by too few.
+    """What is not proven because only the first `anchored` of `records` records are held by witnesses. `outside` says
+    whether too few witnesses cosigned some of the others.
     """
     tail = f"unanchored tail: {records - anchored} record{'' if records - anchored == 1 else 's'}"
-    since = "the beginning on" if not anchored else f"record {anchored - 1} on"
-    few = "no witness outside holds them"
+    since = "the beginning" if not anchored else f"record {anchored - 1}"
+    few = "no witness holds them"
     if outside is not None and outside.ahead:
         end = min(outside.ahead[0].size + 1, records)
         few = f"{_span(anchored, end)} {cosigned(outside)}"
-    text = f"{tail}: {few}; who held the log key, or the keys from {since}, could have cut or rewritten them"
+    text = f"{tail}: {few}; a holder of the log key, or of the keys since {since}, could have removed or rewritten them"
     return Claim("anchor", text)
 
 

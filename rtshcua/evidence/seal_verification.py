@@ -1,4 +1,6 @@
-"""What signed records must say, one after another: who signs which, and what for (docs/log-format.md, section 2)."""
+"""Checks the signed records of a log, one after another: their signers and what they cover (docs/log-format.md,
+section 2).
+"""
 
 from typing import NamedTuple
 
@@ -12,8 +14,8 @@ from rtshcua.wire.keys import Duty, key_id
 
 
 class Segment(NamedTuple):
-    """What a signed record closes, as it was counted: lines and octets from the signed record before it, their digest
-    (SHA-256, hexadecimal), and the root of the tree over all lines before it; None where nobody worked it out.
+    """The segment that a signed record closes, as counted: lines and octets from the previous signed record, their
+    digest (SHA-256, hexadecimal), and the root of the tree over all lines before it; None if it was not computed.
     """
 
     records: int
@@ -23,7 +25,7 @@ class Segment(NamedTuple):
 
 
 class Recoveries(NamedTuple):
-    """How often a log was recovered, how many lines nobody had signed then, and how many octets were discarded."""
+    """How often a log was recovered, how many lines were unsigned at that time, and how many octets were discarded."""
 
     crashes: int = 0
     unsigned: int = 0
@@ -31,19 +33,19 @@ class Recoveries(NamedTuple):
 
 
 class Seals:
-    """Takes the signed records of one log in their order; each must be whole in itself and in its place."""
+    """Processes the signed records of one log in order; the caller has checked each record and its place."""
 
     __slots__ = ("_log_key", "_next_key", "checkpoint", "epochs", "origin", "recoveries")
 
     def __init__(self) -> None:
-        self.epochs = 0  # how many were sealed
+        self.epochs = 0  # the number of sealed epochs
         self.origin = ""
         self.checkpoint: Checkpoint | None = None  # of the last signed record
         self.recoveries = Recoveries()
         self._log_key = self._next_key = b""
 
     def check(self, record: Signed, segment: Segment) -> Flaw | None:
-        """What is wrong with the next signed record, whose `seq` was checked, or None."""
+        """The flaw of the next signed record, whose `seq` was checked, or None."""
         flaw = self._begin(record) if isinstance(record, Genesis) else self._check_segment(record, segment)
         opened = flaw or self._open(record, segment.root)
         if isinstance(opened, Flaw):
@@ -59,10 +61,10 @@ class Seals:
         return None
 
     def follow(self, record: Signed, line: bytes, head: Head) -> Flaw | None:
-        """As `check`, of a record that stands next to the lines of the head, which then stands after it."""
+        """As `check`, for a record that follows the lines of the head; advances the head."""
         flaw = self.check(record, Segment(head.records, head.octets, head.digest(), head.tree.root()))
         if flaw is None:
-            assert self.checkpoint is not None, "it was checked"
+            assert self.checkpoint is not None, "checked before"
             head.begin(line, self.checkpoint.digest())
         return flaw
 
@@ -72,20 +74,20 @@ class Seals:
         key = key_id(Duty.LOG, self._log_key).hex()
         if genesis.log_kid == key:
             return None
-        return Flaw("genesis/log-key", "the log key is not the one that is named", genesis.log_kid, key)
+        return Flaw("genesis/log-key", "the log key is not the named one", genesis.log_kid, key)
 
     def _check_segment(self, record: Sealing, segment: Segment) -> Flaw | None:
         if record.epoch != self.epochs:
-            text = "it ends another epoch than the one that ends here: one was taken out, put in or moved"
+            text = "the record ends another epoch than the present one: an epoch was removed, added or moved"
             return Flaw("seal/epoch", text, str(record.epoch), str(self.epochs))
         if record.records != segment.records:
-            text = "it miscounts the records of its epoch"
+            text = "wrong number of records in the epoch"
             return Flaw("seal/records", text, str(record.records), str(segment.records))
         if record.bytes != segment.octets:
-            text = "it miscounts the octets of its epoch"
+            text = "wrong number of octets in the epoch"
             return Flaw("seal/bytes", text, str(record.bytes), str(segment.octets))
         if record.digest != segment.digest:
-            text = "the octets of its epoch are not those of its digest: at least one record was changed"
+            text = "the digest of the epoch does not match: at least one record was changed"
             return Flaw("seal/digest", text, segment.digest, record.digest)
         return None
 
@@ -100,19 +102,19 @@ class Seals:
             text = "the signature is for another number of records"
             return Flaw("seal/size", text, str(record.seq), str(opened.size))
         if root is not None and opened.root != root:
-            text = "these are not the records that were signed: at least one was changed, and the chain written anew"
+            text = "the signature does not match these records: at least one was changed, and the chain was rewritten"
             return Flaw("seal/root", text, root.hex(), opened.root.hex())
         own = leaf_hash(encode(unsigned(record)))
         if opened.record != own:
-            text = "it is not the record that was signed: one of its fields was changed"
+            text = "the record is not the signed one: a field was changed"
             return Flaw("seal/self", text, own.hex(), opened.record.hex())
         key = next_key_of(record)
         if opened.key != key:
-            text = "the signature names another key for what follows than the record does"
+            text = "the signature names another key for the next epoch than the record does"
             return Flaw("seal/next-key", text, _hex(key), _hex(opened.key))
         after = None if self.checkpoint is None else self.checkpoint.digest()
         if opened.after != after:
-            text = "the signature follows another one than that of the signed record before"
+            text = "the signature does not follow that of the previous signed record"
             return Flaw("seal/after", text, _hex(after), _hex(opened.after))
         return opened
 

@@ -1,15 +1,15 @@
-"""The verification of a log, line by line in constant memory. The steps, in their order, as the comments number them:
+"""Verifies a log line by line in constant memory. The steps in order, as the comments number them:
 
 1. the line: ended by a newline, not too long, nothing after the close
-2. the record: known type, every field there and of its kind, written in the one canonical form
+2. the record: known type, every field present and of its type, written in canonical form
 3. the genesis: first, and only there; a known format and version
-4. the chain: numbered without gap, and each record names the hash of the line before it
-5. the clocks: monotonic time never goes back, nor does UTC by more than its stated error allows, and both go on alike
-6. the epochs: each sealed in time (`gaps`), by the key that the signed record before names (`seals`)
-7. the end: a close, or else what is missing
+4. the chain: numbered without a gap, and each record names the hash of the previous line
+5. the clocks: monotonic time never goes back, nor does UTC by more than its stated error, and both advance alike
+6. the epochs: each sealed in time (`gaps`), by the key that the previous signed record names (`seals`)
+7. the end: a close, or else the reason why it is missing
 
-That is section 5 of docs/log-format.md but for its steps 2 and 3. What the caller must do: trust the genesis' log key,
-bundle and trust root, and derive the decisions again (`rtshcua.ground.audit`).
+These are the steps of section 5 of docs/log-format.md except its steps 2 and 3. The caller must establish trust in
+the genesis' log key, bundle and trust root, and derive the decisions again (`rtshcua.ground.audit`).
 """
 
 from collections.abc import Iterable
@@ -24,33 +24,33 @@ from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, G
 from rtshcua.evidence.report import LogReport, claims, unsealed
 from rtshcua.evidence.seal_verification import Seals
 
-_LINK = slice(10, 74)  # where the value of `_prev` stands
+_LINK = slice(10, 74)  # the offset of the value of `_prev`
 
 
 class LogVerifier:
-    """Takes the lines of a log in order; after the first that fails it takes no more."""
+    """Processes the lines of a log in order and stops after the first flaw."""
 
     def __init__(self) -> None:
         self.genesis: Genesis | None = None
         self.close: Close | None = None
         self.failure: Finding | None = None
-        self.offset = 0  # where the next line begins
+        self.offset = 0  # offset of the next line
         self.seals = Seals()
         self._counts: dict[str, int] = {}
         self._head = Head()
         self._clocks = Clocks()
-        self._before = 0  # where the last line began
+        self._before = 0  # offset of the last line
         self._torn: bytes | None = None
-        self._doubt: tuple[bytes, Finding] | None = None  # hash of the line after a broken link, and what it then is
+        self._doubt: tuple[bytes, Finding] | None = None  # hash of the line after a broken link, and the flaw
         self._term = EpochTerm()
 
     @property
     def records(self) -> int:
-        """How many records were sound."""
+        """The number of correct records."""
         return self._head.seq
 
     def take(self, line: bytes) -> AnyRecord | None:
-        """The record of the next line (newline included), or None when the log ends or fails there."""
+        """The record of the next line (newline included), or None if the log ends or fails there."""
         if self.failure is not None:
             return None
         if self._doubt is not None:
@@ -78,7 +78,7 @@ class LogVerifier:
         return record
 
     def fail(self, finding: Finding) -> None:
-        """Ends the verification for a reason of the caller's own."""
+        """End the verification with a flaw found by the caller."""
         self.failure = finding
 
     def _read(self, line: bytes) -> AnyRecord | Flaw | None:
@@ -89,7 +89,7 @@ class LogVerifier:
         if flaw is not None:
             return flaw
         if self._torn is not None:
-            return Flaw("record/malformed", "a line without its end stands before others", shown(self._torn))
+            return Flaw("record/malformed", "a line without its newline precedes others", shown(self._torn))
         if not line.endswith(b"\n"):
             self._torn = line
             return None
@@ -102,25 +102,27 @@ class LogVerifier:
         # 3 the genesis
         if isinstance(record, Genesis):
             if number:
-                return Flaw("genesis/repeated", "a second log begins inside this one")
+                return Flaw("genesis/repeated", "the log contains the beginning of a second log")
         elif self.genesis is None:
-            text = "the log does not begin with its genesis: its head was cut off"
+            text = "the log does not begin with its genesis: its beginning was removed"
             return Flaw("genesis/missing", text, record.type, "genesis")
         # 4 the chain
         if record.seq != number:
-            text = f"record {record.seq} stands where record {number} belongs: records were taken out, added or moved"
+            text = f"found record {record.seq} where record {number} is expected: records were removed, added or moved"
             return Flaw("chain/sequence", text, str(record.seq), str(number))
         if not number and record.prev != START:
-            return Flaw("chain/broken", "the genesis names a record before it", record.prev, START)
+            return Flaw("chain/broken", "the genesis names a previous record", record.prev, START)
         return None
 
     def _broken_link(self, record: AnyRecord) -> Finding:
         before, after = self.records - 1, self.records
-        text = f"record {after} was not written after record {before} as it stands here: one of the two was changed"
+        text = f"record {after} does not follow record {before}: one of the two was changed"
         return Finding("chain/broken", before, text, self._head.prev, record.prev, self._before)
 
     def _settled(self, line: bytes) -> Finding:
-        """Which of the two records at a broken link was changed: the line after them was written after the second."""
+        """Decide which of the two records at a broken link was changed, because the line after them follows the
+        second.
+        """
         assert self._doubt is not None
         (leaf, finding), self._doubt = self._doubt, None
         if line[_LINK] == leaf.hex().encode():
@@ -146,7 +148,7 @@ class LogVerifier:
         return None
 
     def report(self) -> LogReport:
-        """The whole, once the lines are over."""
+        """The report, after the last line."""
         if self._doubt is not None:
             self.failure, self._doubt = self._doubt[1], None
         # 7 the end
@@ -183,21 +185,21 @@ class LogVerifier:
             text = f"the log ends after {number} records, without its signed close"
             return None, Finding("close/missing", number, text, offset=offset)
         if not torn:
-            text = "the log is empty: nothing was ever written, or all of it was cut off"
+            text = "the log is empty: nothing was written, or everything was removed"
             return Finding("log/empty", number, text, offset=offset), None
         if not may_be_torn(torn, self._head.prev):
             start = '{"_prev":"' + self._head.prev
-            text = "what stands after the last whole record is not the beginning of another"
+            text = "the data after the last complete record is not the beginning of another record"
             return Finding("record/malformed", number, text, shown(torn), start[:SHOWN], offset), None
         if not number:
             text = "the log ends inside its first record"
             return Finding("genesis/missing", number, text, shown(torn), offset=offset), None
-        text = f"the log ends inside record {number}, {len(torn)} bytes into it"
+        text = f"the log ends inside record {number}, after {len(torn)} of its bytes"
         return None, Finding("tail/torn", number, text, offset=offset)
 
 
 def verify(lines: Iterable[bytes]) -> LogReport:
-    """Verifies the lines of a log, each with its newline, as a file opened in binary mode yields them."""
+    """Verify the lines of a log, each with its newline, as iteration over a file opened in binary mode yields them."""
     verifier = LogVerifier()
     for line in lines:
         verifier.take(line)

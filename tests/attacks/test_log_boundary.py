@@ -67,7 +67,7 @@ def test_the_true_log_is_whole_and_says_what_the_boundary_signed_for() -> None:
     report = sound(LINES).report
     (claim,) = [claim for claim in report.proven if claim.slug == "boundary"]
     assert claim.text.startswith("session 1 of the boundary signed for 10 decisions, documents and dispatches")
-    assert "1 were refused, 30 answers repeated one and 1 documents were refused" in claim.text
+    assert "1 were refused, 30 answers were repeated and 1 documents were refused" in claim.text
     assert "boundary" not in {claim.slug for claim in report.unproven}
     assert signed(LINES) == list(LINES)  # the attacker's tool writes nothing else than the truth of the truth
 
@@ -273,7 +273,7 @@ def test_a_log_cut_off_and_called_a_crash_says_what_is_not_shown(seal: int) -> N
     head = edit(LINES[seal], type="recover", discarded_bytes=0, discarded_digest="00" * 32)
     report = prove(signed([*LINES[:seal], head, close])).report
     assert report.failure is None, report.failure
-    assert ("boundary", "what the boundary made after its last signature: it broke off") in report.unproven
+    assert ("boundary", "what the boundary did after its last statement: the log ends") in report.unproven
 
 
 # ---------------------------------------------------------------- a loss that is claimed
@@ -295,7 +295,7 @@ def test_a_loss_is_claimed_to_leave_out_what_follows(number: int) -> None:
     report = prove(signed(lost_at(number))).report
     assert report.failure is None
     assert report.verdict is LogVerdict.INCOMPLETE
-    assert any("says the runtime alone" in text for slug, text in report.unproven if slug == "boundary")
+    assert any("only the runtime vouches" in text for slug, text in report.unproven if slug == "boundary")
 
 
 def test_what_the_boundary_signed_is_not_left_out_by_a_loss() -> None:

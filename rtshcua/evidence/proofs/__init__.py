@@ -1,1 +1,3 @@
-"""Proofs of single records of a log, and of its growth, in files that verify alone (docs/proofs.md). Pure."""
+"""Proofs of single records of a log, and of its growth, as files that can be verified without the log
+(docs/proofs.md). Pure.
+"""

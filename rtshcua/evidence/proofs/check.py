@@ -1,11 +1,11 @@
-"""What a proof proves, from the file and one pinned root key alone (docs/proofs.md). Total: any octets give an answer.
+"""Checks a proof with its file and one pinned root key only (docs/proofs.md). Any octets give an answer.
 
 The steps, as the comments number them:
 
-1. the file, and what it carries, each in its one form
+1. the file and its contents, each in its canonical form
 2. the checkpoint: signed in the chain from the log key that the trust root names (`trust`)
-3. the record that carries the checkpoint: it is the one that the checkpoint vouches for
-4. what is proven: the path from the record, or between two checkpoints, gives the signed root
+3. the record that carries the checkpoint: it is the one that the checkpoint names
+4. the claim: the path from the record, or between two checkpoints, leads to the signed root
 """
 
 from typing import NamedTuple
@@ -21,8 +21,8 @@ from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, G
 
 
 class Proven(NamedTuple):
-    """What a proof proves. `checkpoint` is the head of the log that was signed, `signed` the record that carries it;
-    `older` the head that the log went on from (consistency), `record` the record that is in it (inclusion, record).
+    """The content of a valid proof. `checkpoint` is the signed head of the log, `signed` the record that carries it;
+    `older` the earlier head (consistency), `record` the record that is included (inclusion, record).
     """
 
     kind: ProofKind
@@ -35,7 +35,7 @@ class Proven(NamedTuple):
 
 
 def check_proof(data: bytes, pinned: bytes) -> Proven | Flaw:
-    """What the file proves under the pinned root key (32 bytes) or its name (16), or what is wrong with it."""
+    """What the file proves under the pinned root key (32 bytes) or its name (16), or the flaw."""
     # 1 the file
     file = read_proof(data)
     if isinstance(file, Flaw):
@@ -44,7 +44,7 @@ def check_proof(data: bytes, pinned: bytes) -> Proven | Flaw:
     if isinstance(extra, Flaw):
         return extra
     if bool(extra.record) != (file.kind is ProofKind.INCLUSION):
-        return Flaw("proof/extra", "it carries other parts than its kind has")
+        return Flaw("proof/extra", "the proof contains other parts than its kind requires")
     signed = _record(extra.signed)
     record = _record(extra.record) if extra.record else None
     if isinstance(signed, Flaw):
@@ -63,26 +63,30 @@ def check_proof(data: bytes, pinned: bytes) -> Proven | Flaw:
         return flaw
     assert not isinstance(signed, DecisionRecord | Effect)
     proven = Proven(file.kind, file.number, believed, checkpoint, signed, record=record)
-    # 4 what is proven
+    # 4 the claim
     return _CHECKS[file.kind](proven, file, extra)
 
 
 def _record(line: bytes) -> AnyRecord | Flaw:
-    record = read(line) if line.endswith(b"\n") else Flaw("", "it is not a line")
-    return Flaw("proof/record", f"a record in it is none: {record.text}") if isinstance(record, Flaw) else record
+    record = read(line) if line.endswith(b"\n") else Flaw("", "the record is not a line")
+    return (
+        Flaw("proof/record", f"the proof contains an invalid record: {record.text}")
+        if isinstance(record, Flaw)
+        else record
+    )
 
 
 def _check_signed(signed: AnyRecord, line: bytes, believed: Believed) -> Flaw | None:
     checkpoint = believed.checkpoints[-1]
     if isinstance(signed, DecisionRecord | Effect) or signed.checkpoint is not None:
-        return Flaw("proof/signed", "the record that should carry the checkpoint is of a kind that carries none")
+        return Flaw("proof/signed", "the record that should carry the checkpoint is of a kind without one")
     if leaf_hash(line) != checkpoint.record:
-        text = "the record that should carry the checkpoint is not the one that was signed with it"
+        text = "the record that carries the checkpoint is not the signed one"
         return Flaw("proof/signed", text, leaf_hash(line).hex(), checkpoint.record.hex())
     key = None if isinstance(signed, Close) else bytes.fromhex(signed.next_key)
     certified = isinstance(signed, Genesis | Recover)
     if signed.seq != checkpoint.size or key != checkpoint.key or certified != believed.certified:
-        return Flaw("proof/signed", "the record that carries the checkpoint and the checkpoint contradict each other")
+        return Flaw("proof/signed", "the checkpoint and the record that carries it contradict each other")
     return None
 
 
@@ -90,27 +94,27 @@ def _inclusion(proven: Proven, file: ProofFile, extra: ProofMaterial) -> Proven 
     record, checkpoint = proven.record, proven.checkpoint
     assert record is not None
     if record.seq != file.number:
-        text = "it shows another record than the one whose place it gives"
+        text = "the record is not the one at the given place"
         return Flaw("proof/record", text, str(record.seq), str(file.number))
     if not verify_inclusion(leaf_hash(extra.record), file.number, checkpoint.size, file.path, checkpoint.root):
-        return Flaw("proof/path", f"this is not record {file.number} of the log that was signed")
+        return Flaw("proof/path", f"this is not record {file.number} of the signed log")
     return proven
 
 
 def _consistency(proven: Proven, file: ProofFile, _: ProofMaterial) -> Proven | Flaw:
     older = next((head for head in proven.believed.checkpoints[:-1] if head.size == file.number), None)
     if older is None:
-        return Flaw("proof/chain", f"it carries no earlier checkpoint of {file.number} records")
+        return Flaw("proof/chain", f"the proof contains no earlier checkpoint of {file.number} records")
     newer = proven.checkpoint
     if not verify_consistency(older.size, older.root, newer.size, newer.root, file.path):
-        text = f"the log of {newer.size} records does not begin with the {older.size} that were signed before"
+        text = f"the log of {newer.size} records does not begin with the {older.size} records signed before"
         return Flaw("proof/consistency", text)
     return proven._replace(older=older)
 
 
 def _own(proven: Proven, file: ProofFile, _: ProofMaterial) -> Proven | Flaw:
     if file.path or file.number != proven.checkpoint.size:
-        return Flaw("proof/record", "it shows another record than the one whose place it gives")
+        return Flaw("proof/record", "the record is not the one at the given place")
     return proven._replace(record=proven.signed)
 
 

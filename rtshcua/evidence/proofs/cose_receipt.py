@@ -1,11 +1,12 @@
-"""COSE receipts (RFC 9942): that a record is in a log, signed by the log key when it is exported.
+"""COSE receipts (RFC 9942): proof that a record is in a log, signed by the log key at the time of export.
 
-COSE_Sign1, tag 18, whose payload is the root of the tree, detached: whoever verifies works it out from the record and
-the path, and then looks whether that was signed. Algorithm Ed25519 (-19), verifiable data structure RFC9162_SHA256
-(395: 1), its inclusion proof in the unprotected header (396: {-1: [[size, index, path]]}). The protected header also
-names the key (4) and, as claims (RFC 9597, 15), the log's origin as the issuer (1) and the size of the tree in decimal
-as the subject (2), for a path alone does not tell some sizes apart. So that it verifies alone the unprotected header
-also has the record's line and the signed trust root, under names of our own.
+COSE_Sign1, tag 18, whose detached payload is the root of the tree: a verifier computes it from the record and the
+path, and then checks the signature over it. Algorithm Ed25519 (-19), verifiable data structure RFC9162_SHA256
+(395: 1), its inclusion proof in the unprotected header (396: {-1: [[size, index, path]]}). The protected header
+also names the key (4) and, as claims (RFC 9597, 15), the log's origin as the issuer (1) and the size of the tree
+in decimal as the subject (2), because a path alone does not distinguish some sizes. The unprotected header also
+contains the record's line and the signed trust root, under names of our own, so that the receipt can be verified
+by itself.
 """
 
 from collections.abc import Callable, Sequence
@@ -33,12 +34,14 @@ _RFC9162_SHA256: Final = 1
 _INCLUSION: Final = -1
 _RECORD, _ROOT = "rtshcua/record", "rtshcua/root"
 _HASH: Final = 32
-#: CBOR items of a receipt, of its header, and of its proof, whose path has at most 64 nodes: that many each at most
+#: : the most CBOR items of a receipt, of its header, and of its proof, whose path has at most 64 nodes
 _ITEMS: Final = 128
 
 
 class ReceiptClaim(NamedTuple):
-    """What a receipt proves: record `number` is in the log of `name`, as the log key signed it at `size` records."""
+    """The content of a valid receipt: record `number` is in the log of `name`, as the log key signed it at `size`
+    records.
+    """
 
     name: LogName
     number: int
@@ -52,12 +55,12 @@ def make_receipt(
     line: bytes, number: int, size: int, path: Sequence[bytes], *, origin: str, root: bytes, kid: bytes,
     signer: Callable[[bytes], bytes],
 ) -> bytes:  # fmt: skip
-    """The receipt of a line. `signer` signs by the log key, whose name is `kid`. Raises ValueError where the path does
-    not fit, or is empty: RFC 9942 has no receipt for the only leaf of a tree.
+    """The receipt of a line. `signer` signs by the log key, whose name is `kid`. Raises ValueError where the path is
+    wrong or empty: RFC 9942 has no receipt for the only leaf of a tree.
     """
     head = root_from_inclusion(leaf_hash(line), number, size, path)
     if head is None or not path:
-        raise ValueError(f"this is no path from leaf {number} of {size}")
+        raise ValueError(f"the path does not lead from leaf {number} of {size}")
     claims = {_ISSUER: origin, _SUBJECT: str(size)}
     protected = cbor.encode({_ALGORITHM: ED25519, _KID: kid, _CLAIMS: claims, _VDS: _RFC9162_SHA256})
     proof = cbor.encode((size, number, tuple(path)))
@@ -66,7 +69,7 @@ def make_receipt(
 
 
 def check_receipt(data: bytes, pinned: bytes) -> ReceiptClaim | Flaw:
-    """What the receipt proves under the pinned root key (32 bytes) or its name (16), or what is wrong with it."""
+    """The content of a receipt under the pinned root key (32 bytes) or its name (16), or the flaw."""
     try:
         value = cbor.decode(data[1:], limit=MAX_PROOF, items=_ITEMS) if data.startswith(TAG_18) else None
         match value:
@@ -78,8 +81,10 @@ def check_receipt(data: bytes, pinned: bytes) -> ReceiptClaim | Flaw:
                     ):
                         return _check(protected, parts, line, root, signature, pinned)
     except CborError as error:
-        return Flaw("proof/malformed", f"it is not a receipt: not canonical CBOR: {error}")
-    return Flaw("proof/malformed", "it is not a receipt of inclusion: COSE_Sign1 with one proof, a record and a root")
+        return Flaw("proof/malformed", f"not a receipt: not canonical CBOR: {error}")
+    return Flaw(
+        "proof/malformed", "not a receipt of inclusion: expected a COSE_Sign1 with one proof, a record and a root"
+    )
 
 
 def _check(
@@ -99,7 +104,7 @@ def _check(
         ):
             hashes = [node for node in path if isinstance(node, bytes)]
             return _verify(protected, kid, origin, (size, number, hashes), line, root, signature, pinned)
-    return Flaw("proof/malformed", "the headers of the receipt, or its proof, are not those of RFC 9942")
+    return Flaw("proof/malformed", "the headers or the proof of the receipt do not conform to RFC 9942")
 
 
 def _verify(
@@ -107,9 +112,9 @@ def _verify(
     signature: bytes, pinned: bytes,
 ) -> ReceiptClaim | Flaw:  # fmt: skip
     size, number, path = proof
-    record = read(line) if line.endswith(b"\n") else Flaw("", "it is not a line")
+    record = read(line) if line.endswith(b"\n") else Flaw("", "the record is not a line")
     if isinstance(record, Flaw):
-        return Flaw("proof/record", f"the record in it is none: {record.text}")
+        return Flaw("proof/record", f"the receipt contains an invalid record: {record.text}")
     name = name_of(origin)
     if isinstance(name, Flaw):
         return name
@@ -124,7 +129,7 @@ def _verify(
         return flaw
     head = root_from_inclusion(leaf_hash(line), number, size, path)
     if head is None or record.seq != number:
-        return Flaw("proof/path", f"the path in it does not lead from record {record.seq} to a root")
+        return Flaw("proof/path", f"the path does not lead from record {record.seq} to a root")
     if not key.verify(signature, _signed(protected, head)):
         return Flaw("proof/signature", f"the log key did not sign a log in which this is record {number}")
     return ReceiptClaim(name, number, size, record, key, trusted)

@@ -1,4 +1,4 @@
-"""The file of a proof (docs/proofs.md): three kinds in the one layout of c2sp.org/tlog-proof.
+"""The file of a proof (docs/proofs.md): three kinds in the layout of c2sp.org/tlog-proof.
 
     <kind>
     extra <base64>
@@ -7,9 +7,9 @@
                                     (an empty line)
     <the signed note of a checkpoint>
 
-Only the one form of each file is read: what a reader ignores could be changed unseen. The `extra` is deterministic
-CBOR: what a proof carries beside the Merkle path, so that it verifies alone. The layout authenticates none of it; every
-part of it is verified (`check`).
+Only the canonical form of each file is read, because a reader must not ignore changes. `extra` is deterministic
+CBOR with the data that a proof needs besides the Merkle path. The layout authenticates nothing; `check` verifies
+every part.
 """
 
 from enum import StrEnum
@@ -23,30 +23,30 @@ from rtshcua.wire import artefact, names
 from rtshcua.wire.cbor import CborError
 from rtshcua.wire.untrusted import Untrusted
 
-#: a longer file is refused unread, in octets
+#: : a larger file is refused unread, in octets
 MAX_PROOF: Final = 8 << 20
 
 _EXTRA: Final = "extra "
 _HASH: Final = 32  # octets
-_MOST_HASHES: Final = 128  # no tree of 2**53 leaves needs more
+_MOST_HASHES: Final = 128  # enough for a tree of 2**53 leaves
 _MOST_DIGITS: Final = 16
 
 
 class ProofKind(StrEnum):
-    """What a file proves; the value is its first line."""
+    """The kind of a proof; the value is the first line of its file."""
 
     INCLUSION = "c2sp.org/tlog-proof@v1"  # a record is in the log
-    CONSISTENCY = "rtshcua/consistency-proof@v1"  # one checkpoint's log begins with another's
-    RECORD = "rtshcua/record-proof@v1"  # a signed record is of the log, by its own signature
+    CONSISTENCY = "rtshcua/consistency-proof@v1"  # the log at one checkpoint begins with the log at an earlier one
+    RECORD = "rtshcua/record-proof@v1"  # a signed record is in the log, by its own signature
 
     @property
     def word(self) -> str:
-        """What stands before the number."""
+        """The keyword before the number."""
         return "old" if self is ProofKind.CONSISTENCY else "index"
 
 
 class ProofFile(NamedTuple):
-    """A proof as it is written. `number` is a record's, or the size of the older tree; `extra` see `ProofMaterial`."""
+    """A proof as written. `number` is a record's number, or the size of the older tree; `extra` see `ProofMaterial`."""
 
     kind: ProofKind
     extra: bytes
@@ -61,34 +61,34 @@ class ProofFile(NamedTuple):
 
 
 def read_proof(data: bytes) -> ProofFile | Flaw:
-    """The proof in a file, or what is wrong with it. Nothing of it is to be trusted yet."""
+    """The proof in a file, or the flaw. The contents are not verified."""
     if len(data) > MAX_PROOF:
-        return Flaw("proof/too-long", "the file is too long for a proof", f"{len(data)} bytes", f"{MAX_PROOF} bytes")
+        return Flaw("proof/too-long", "the file is too large for a proof", f"{len(data)} bytes", f"{MAX_PROOF} bytes")
     try:
         head, blank, note = data.decode().partition("\n\n")
     except UnicodeDecodeError:
-        return Flaw("proof/malformed", "it is not UTF-8")
+        return Flaw("proof/malformed", "the file is not UTF-8")
     lines = head.split("\n", _MOST_HASHES + 3)
     try:
         kind = ProofKind(lines[0])
     except ValueError:
-        return Flaw("proof/malformed", "it is not a proof: its first line names no kind that there is", lines[0][:80])
+        return Flaw("proof/malformed", "not a proof: the first line is not a known kind", lines[0][:80])
     if not blank or not 3 <= len(lines) <= _MOST_HASHES + 3:
-        return Flaw("proof/malformed", "it has not the lines of a proof: extra, number, hashes, and a checkpoint")
+        return Flaw("proof/malformed", "a proof needs the lines extra, number, hashes, and a checkpoint")
     number = lines[2].removeprefix(kind.word + " ")
     if not (number.isascii() and number.isdigit() and len(number) <= _MOST_DIGITS):
-        return Flaw("proof/malformed", f"its third line is not `{kind.word}` and a number", lines[2][:80])
+        return Flaw("proof/malformed", f"the third line is not `{kind.word}` and a number", lines[2][:80])
     path = tuple(map(strict_base64, lines[3:]))
     file = ProofFile(kind, strict_base64(lines[1].removeprefix(_EXTRA)), int(number), path, note)
     if any(len(node) != _HASH for node in path) or file.encode() != data:
-        return Flaw("proof/malformed", "it is not written in the one form that this proof has")
+        return Flaw("proof/malformed", "the proof is not in its canonical form")
     return file
 
 
 class ProofMaterial(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """`root` is the signed trust root. `chain` has the notes from one that the log key signed up to, and without, that
-    of the proof: each names the key that signs the next. `signed` is the line of the record that carries the proof's
-    checkpoint, with the checkpoint as null. `record` is the line that is shown.
+    """`root` is the signed trust root. `chain` has the notes from one that the log key signed up to the one before
+    the proof's: each names the key that signs the next. `signed` is the line of the record that carries the
+    proof's checkpoint, with the checkpoint as null. `record` is the line of the proven record.
     """
 
     chain: tuple[str, ...]
@@ -97,16 +97,16 @@ class ProofMaterial(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omi
     record: bytes = b""
 
     def encode(self) -> bytes:
-        """The canonical octets. Raises `CborError` when they would be too many for a reader."""
+        """The canonical octets. Raises `CborError` if they exceed the reader's limit."""
         return artefact.pack(names.PROOF, self)
 
 
 def read_extra(data: bytes) -> ProofMaterial | Flaw:
-    """The extra of a proof, or what is wrong with it."""
+    """The extra data of a proof, or the flaw."""
     try:
         extra = msgspec.convert(artefact.unwrap(names.PROOF, data), ProofMaterial, builtin_types=(bytes,))
         if extra.encode() == data:
             return extra
     except (Untrusted, CborError, msgspec.ValidationError) as error:
-        return Flaw("proof/extra", f"what the proof carries cannot be read: {error}")
-    return Flaw("proof/extra", "what the proof carries is not written in its one form")
+        return Flaw("proof/extra", f"the extra data cannot be decoded: {error}")
+    return Flaw("proof/extra", "the extra data is not in its canonical form")

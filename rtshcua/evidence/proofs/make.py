@@ -1,7 +1,7 @@
-"""Proofs made of a log: read once for its signed records, and once more for the hashes, in bounded memory.
+"""Makes proofs from a log, in bounded memory: one pass for the signed records, and one for the hashes.
 
-What comes out was verified as its reader will, but for the pin; so no proof is made of a log that does not hold. Below
-the checkpoint of a proof that was made, cosignatures of witnesses are put.
+The result is verified like a reader's, except for the pin, so that no proof is made of an invalid log.
+Cosignatures of witnesses can be appended below the checkpoint of a proof.
 """
 
 from base64 import b64decode
@@ -33,7 +33,7 @@ from rtshcua.wire import cose
 from rtshcua.wire.cbor import CborError
 from rtshcua.wire.untrusted import Untrusted
 
-#: gives the lines of the log from its beginning, each time that it is called
+#: : returns the lines of the log from its beginning, on each call
 Lines = Callable[[], Iterable[bytes]]
 
 _EVENT = b',"event":"%s"' % ANCHORED.encode()
@@ -41,8 +41,8 @@ _MOST = 64  # lines that are tried as cosignatures
 
 
 class ProofParts(NamedTuple):
-    """What a proof is made of: the trust root, the notes that the log key and then epoch keys signed, up to that of
-    `signed`, and the line that was asked for, if it is before it.
+    """The parts of a proof: the trust root, the notes signed by the log key and then by epoch keys, up to the note of
+    `signed`, and the requested line if it is before that record.
     """
 
     root: bytes
@@ -54,9 +54,9 @@ class ProofParts(NamedTuple):
 def find(
     lines: Iterable[bytes], number: int | None, at: int | None, *, since: int | None = None, closed: bool = False
 ) -> ProofParts | Flaw:
-    """What a proof of record `number`, or of what follows the signed record `since`, is made of.
+    """The parts of a proof of record `number`, or of growth since the signed record `since`.
 
-    The signed record is `at`; without it the first one after `number`, or the last one there is (`closed`, `since`).
+    The signed record is `at`; by default the first one after `number`, or the last one (`closed`, `since`).
     """
     if at is not None and number is not None and at < number:
         return Flaw("proof/number", f"record {at} was signed before record {number} was written", str(at), f"{number}")
@@ -90,21 +90,21 @@ class _Finder:
         if isinstance(record, Flaw):
             if record.slug == "genesis/format":
                 return record
-            text = f"record {seq} of the log is none: {record.text}"
+            text = f"record {seq} of the log is invalid: {record.text}"
             return Flaw("proof/log" if seq else "proof/no-log", text, record.found, record.expected)
         if (
             isinstance(record, DecisionRecord | Effect)
             or isinstance(record, Genesis) != (seq == 0)
             or record.seq != seq
         ):
-            return Flaw("proof/log", f"record {seq} of the log stands where it does not belong", record.type)
+            return Flaw("proof/log", f"record {seq} of the log is in the wrong place", record.type)
         if isinstance(record, Genesis):
             try:
                 self._root = b64decode(record.root, validate=True)
             except ValueError:
                 return Flaw("proof/log", "the trust root in the genesis is not base64")
         if isinstance(record, Genesis | Recover) and (self._since is None or self._since >= seq):
-            self._notes.clear()  # signed by the log key itself: nothing before it is needed
+            self._notes.clear()  # signed by the log key itself: no earlier notes are needed
         self._notes.append(record.checkpoint or "")
         self._sizes.add(seq)
         self._signed = record
@@ -119,22 +119,24 @@ class _Finder:
     def found(self, count: int) -> ProofParts | Flaw:
         number, signed = self._number, self._signed
         if signed is None:
-            return Flaw("proof/no-log", "there is no whole record in it")
+            return Flaw("proof/no-log", "the log contains no complete record")
         if number is not None and not self._line:
             text = f"the log has no record {number}"
             return Flaw("proof/number", text, str(number), f"0 to {count - 1}")
         for asked in (self._at, self._since):
             if asked is not None and asked not in self._sizes:
-                return Flaw("proof/number", f"record {asked} is no signed record: a genesis, a seal or a close")
+                return Flaw(
+                    "proof/number", f"record {asked} is not a signed record: expected a genesis, a seal or a close"
+                )
         least = number if number is not None else self._since
         assert least is not None
         if signed.seq < least:
-            return Flaw("proof/unsealed", f"nothing after record {least} is signed yet, and so nothing vouches for it")
+            return Flaw("proof/unsealed", f"no signed record follows record {least} yet, so nothing vouches for it")
         return ProofParts(self._root, tuple(self._notes), signed, self._line)
 
 
 def _whole(lines: Iterable[bytes]) -> Iterator[bytes]:
-    """The lines but for what a crash left of the last one."""
+    """The lines without the incomplete last one that a crash may have left."""
     for line in lines:
         if not line.endswith(b"\n"):
             return
@@ -142,10 +144,10 @@ def _whole(lines: Iterable[bytes]) -> Iterator[bytes]:
 
 
 def prove_inclusion(lines: Lines, number: int, at: int | None = None) -> bytes | Flaw:
-    """The proof that record `number` is in the log: under the signed record `at`, or else the first one after it.
+    """The proof that record `number` is in the log, under the signed record `at`, by default the first one after it.
 
-    The close, after which there is none, is proven by its own signature; so is any signed record for which `at` is its
-    own number.
+    The close has no signed record after it and is proven by its own signature, as is any signed record whose
+    number is `at`.
     """
     found = find(lines(), number, at)
     if isinstance(found, Flaw):
@@ -160,8 +162,8 @@ def prove_inclusion(lines: Lines, number: int, at: int | None = None) -> bytes |
 def receipt_of(
     lines: Lines, number: int, at: int | None, *, kid: bytes, signer: Callable[[bytes], bytes]
 ) -> bytes | Flaw:
-    """The COSE receipt (`cose_receipt`) of record `number`, under the same signed record as its inclusion proof, which
-    is verified first. `signer` signs by the log key, whose name in the trust root is `kid`.
+    """The COSE receipt (`cose_receipt`) of record `number`, under the same signed record as its inclusion proof,
+    which is verified first. `signer` signs by the log key, whose name in the trust root is `kid`.
     """
     found = find(lines(), number, at)
     if isinstance(found, Flaw):
@@ -169,7 +171,7 @@ def receipt_of(
     size = found.signed.seq
     if size < 2 or size == number:
         text = f"a tree of {size} records has no receipt for record {number}"
-        return Flaw("proof/number", text, str(number), "an earlier record, or `--at` a later signed one")
+        return Flaw("proof/number", text, str(number), "use an earlier record, or a later signed one with `--at`")
     path = _path(inclusion_ranges(number, size), leaves(lines))
     if isinstance(path, Flaw):
         return path
@@ -183,8 +185,8 @@ def receipt_of(
 
 
 def prove_consistency(lines: Lines, old: int, at: int | None = None) -> bytes | Flaw:
-    """The proof that the log, as the signed record `at` or else the last one vouches for it, begins with what the
-    signed record `old` vouched for.
+    """The proof that the log at the signed record `at`, by default the last one, begins with the log at the signed
+    record `old`.
     """
     found = find(lines(), None, at, since=old)
     if isinstance(found, Flaw):
@@ -213,7 +215,7 @@ def _path(ranges: Sequence[Range], hashes: Iterable[bytes]) -> list[bytes] | Fla
     try:
         return proof_of(ranges, hashes)
     except (ValueError, RecursionError):
-        return Flaw("proof/log", "a line of the log is none, or the log was cut while it was read")
+        return Flaw("proof/log", "the log contains an invalid line, or was truncated while it was read")
 
 
 def leaves(lines: Lines) -> Iterator[bytes]:
@@ -222,7 +224,9 @@ def leaves(lines: Lines) -> Iterator[bytes]:
 
 
 def with_cosignatures(data: bytes, anchors: Iterable[str]) -> bytes:
-    """A proof that was made here, with the lines by which witnesses cosigned its checkpoint; others are left out."""
+    """A proof made by this module, with the lines in which witnesses cosigned its checkpoint; other lines are
+    dropped.
+    """
     file = read_proof(data)
     assert isinstance(file, ProofFile)
     text, own = split(file.note)
@@ -235,7 +239,7 @@ def with_cosignatures(data: bytes, anchors: Iterable[str]) -> bytes:
 
 
 def is_anchored(data: bytes) -> bool:
-    """Whether enough witnesses cosigned the checkpoint of a proof that was made here."""
+    """Whether enough witnesses cosigned the checkpoint of a proof made by this module."""
     file = read_proof(data)
     assert isinstance(file, ProofFile)
     found = check_proof(data, _own_pin(file))
@@ -243,7 +247,7 @@ def is_anchored(data: bytes) -> bool:
 
 
 def cosigned_sizes(anchors: Iterable[str]) -> set[int]:
-    """The sizes of the checkpoints that the anchors are of, whoever made them."""
+    """The sizes of the checkpoints in these anchors, unverified."""
     found = (parse(split(anchor)[0]) for anchor in anchors)
     return {checkpoint.size for checkpoint in found if not isinstance(checkpoint, Flaw)}
 

@@ -1,7 +1,7 @@
-"""Why a checkpoint in a proof may be believed: the notes from one that the log key signed up to it.
+"""Establishes the trust in a proof's checkpoint: the notes from one that the log key signed up to it.
 
-The log key is one that the trust root names for duty `log` and the log's vehicle, and the trust root is signed by the
-pinned key. What has expired since the time that is given was good then.
+The trust root names the log key for duty `log` and the log's vehicle, and the pinned key signed the trust root.
+Keys are judged at the given time, even if they have expired since.
 """
 
 from typing import NamedTuple
@@ -17,7 +17,7 @@ from rtshcua.wire.trust import TrustRoot
 
 
 class LogName(NamedTuple):
-    """Whose log it is."""
+    """The vehicle and the flight of a log."""
 
     origin: str
     vehicle: str
@@ -25,8 +25,8 @@ class LogName(NamedTuple):
 
 
 class Believed(NamedTuple):
-    """Checkpoints that rest on the pinned key, in order, and what they rest on. `certified`: the log key itself signed
-    the last one, not the key of an epoch. `cosigned`: which witnesses that the root trusts cosigned the last one.
+    """Checkpoints that rest on the pinned key, in order, and their evidence. `certified`: the log key itself signed
+    the last one, not the key of an epoch. `cosigned`: the trusted witnesses that cosigned the last one.
     """
 
     name: LogName
@@ -38,13 +38,13 @@ class Believed(NamedTuple):
 
     @property
     def anchored(self) -> bool:
-        """Whether as many witnesses cosigned the last checkpoint as the trust root asks for."""
+        """Whether as many witnesses cosigned the last checkpoint as the trust root requires."""
         return len(self.cosigned) >= self.root.witness_threshold
 
 
 def believe(notes: tuple[str, ...], root: bytes, pinned: bytes, now_us: int) -> Believed | Flaw:
-    """The checkpoints of the notes, of which the log key signed the first, or what is wrong with them. Witnesses may
-    have cosigned the last one.
+    """The checkpoints of the notes, the first of which the log key signed, or the flaw. Witnesses may have cosigned
+    the last one.
 
     `pinned` is the root's public key (32 bytes) or its `kid` (16 bytes); `now_us` is UTC.
     """
@@ -77,7 +77,8 @@ def _cosigned(text: str, lines: list[str], witnesses: frozenset[bytes]) -> tuple
             return cosignature._replace(slug="proof/cosignature")
         if cosignature is None or cosignature.public in found:
             return Flaw(
-                "proof/note", "a line below the checkpoint is by no witness that the trust root names, or again"
+                "proof/note",
+                "a line below the checkpoint is a duplicate, or by a witness that the trust root does not name",
             )
         found[cosignature.public] = cosignature
     return tuple(found.values())
@@ -90,7 +91,7 @@ def _follow(notes: tuple[str, ...], name: LogName, log_key: VerificationKey, roo
         if checkpoints:
             last = checkpoints[-1]
             if last.key is None:
-                return Flaw("proof/chain", "a checkpoint stands after one that ends its log")
+                return Flaw("proof/chain", "a checkpoint follows the one that ends its log")
             certified = _signer_id(note) != key_id(name.origin, last.key)
             public = log_key.public if certified else last.key
         opened = open_note(note, name.origin, public)
@@ -99,7 +100,7 @@ def _follow(notes: tuple[str, ...], name: LogName, log_key: VerificationKey, roo
         if opened.origin != name.origin:
             return Flaw("proof/chain", "the checkpoints are of different logs", opened.origin, name.origin)
         if checkpoints and opened.size <= checkpoints[-1].size:
-            text = "the checkpoints are not in their order"
+            text = "the checkpoints are out of order"
             return Flaw("proof/chain", text, str(opened.size), f"more than {checkpoints[-1].size}")
         checkpoints.append(opened)
     return Believed(name, tuple(checkpoints), certified, log_key, root)
@@ -112,15 +113,15 @@ def name_of(origin: str) -> LogName | Flaw:
         name = LogName(origin, unquote(parts[2]), parts[3])
         if origin == origin_of(name.vehicle, name.boot):
             return name
-    return Flaw("proof/origin", "it is not of a log of this program", origin[:160], "rtshcua/log/<vehicle>/<boot>")
+    return Flaw("proof/origin", "not a log of this program", origin[:160], "rtshcua/log/<vehicle>/<boot>")
 
 
 def signer(root: TrustRoot, short: bytes, name: LogName, now_us: int) -> VerificationKey | Flaw:
-    """The key for duty `log` that a note names by its four octets, and that may sign for the vehicle."""
+    """The key for duty `log` that a note names by four octets and that may sign for the vehicle."""
     for key in root.keys_for(Duty.LOG).values():
         if key_id(name.origin, key.public) == short:
             return may_not_sign(key, name.vehicle, now_us) or key
-    text = "no key that the trust root names for duty `log` signed this: whoever did was not entitled to"
+    text = "not signed by a key of duty `log` in the trust root: the signer was not authorised"
     return Flaw("trust/log-key", text, short.hex())
 
 

@@ -1,7 +1,7 @@
-"""What witnesses saw of a log, held against the log: how far it is anchored, or that it was rewritten or cut.
+"""Compares the cosignatures of witnesses with the log: how far it is anchored, or that it was rewritten or truncated.
 
-A witness cosigns no two trees that contradict each other. So what it cosigned at one size stands for all smaller ones,
-and with a threshold of k the log is anchored as far as the k-th of its witnesses went.
+A witness never cosigns two trees that contradict each other. A cosignature at one size therefore covers all
+smaller sizes, and with a threshold of k the log is anchored up to the size that k witnesses reached.
 """
 
 from collections.abc import Iterable, Iterator
@@ -13,9 +13,9 @@ from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.note import MARK, parse
 from rtshcua.evidence.witnessing.cosign import Cosignature, cosignatures
 
-#: the event of an effect that holds an anchor in its `detail`
+#: : the event of an effect with an anchor in its `detail`
 ANCHORED: Final = "anchored"
-#: the longest note that is looked at, in characters: the checkpoint and some dozens of cosignatures
+#: : the longest note that is read, in characters: the checkpoint and some dozens of cosignatures
 LONGEST_NOTE: Final = 1 << 14
 
 
@@ -31,10 +31,11 @@ class Witnessed(NamedTuple):
 class AnchoredExtent(NamedTuple):
     """How far the threshold of witnesses saw the log.
 
-    `records` counts the lines from the first on that are anchored: the tree that was cosigned, and the signed record
-    that carries its checkpoint, which is named in it. `tail` is how many lines come after. `witnessed` is what each
-    witness saw, the largest first; it may go further than what is anchored, when too few went there. `rejected` notes
-    say nothing, for they have a signature in the name of a witness that it did not make; `first` says of which.
+    `records` counts the anchored lines from the first on: the tree that was cosigned, and the signed record that
+    carries its checkpoint, which the checkpoint names. `tail` is the number of later lines. `witnessed` is what
+    each witness saw, the largest first; it may go further than what is anchored, if too few went there. `rejected`
+    counts the ignored notes, which have a wrong signature in the name of a witness; `first` names the first of
+    these.
     """
 
     records: int
@@ -46,15 +47,15 @@ class AnchoredExtent(NamedTuple):
 
     @property
     def ahead(self) -> tuple[Witnessed, ...]:
-        """What went further than what is anchored: by fewer witnesses than the threshold."""
+        """What fewer witnesses than the threshold saw beyond what is anchored."""
         return tuple(seen for seen in self.witnessed if seen.size >= self.records)
 
 
 class Anchors:
-    """Takes the checkpoints of one log and the anchors for it, in any order, and compares each pair once.
+    """Processes the checkpoints of one log and its anchors, in any order, and compares each pair once.
 
-    `witnesses` are the public keys that the trust root names for duty `witness` (`TrustRoot.witnesses`). Of a
-    checkpoint only a digest is kept: some hundred bytes for each epoch.
+    `witnesses` are the public keys that the trust root names for duty `witness` (`TrustRoot.witnesses`). Only a
+    digest of each checkpoint is kept: some hundred bytes for each epoch.
     """
 
     def __init__(self, origin: str, witnesses: Iterable[bytes], threshold: int) -> None:
@@ -67,7 +68,7 @@ class Anchors:
         self._rejected, self._first = 0, ""
 
     def checkpoint(self, note: str) -> Flaw | None:
-        """A checkpoint of the log, as a signed record carries it, whose own signature was verified."""
+        """Add a checkpoint of the log from a signed record, whose own signature was verified."""
         text = note.rpartition("\n\n")[0] + "\n"
         size = int(text.split("\n", 2)[1])
         digest = sha256(text.encode()).digest()
@@ -76,8 +77,9 @@ class Anchors:
         return None if waiting is None else _compare(size, digest, *waiting)
 
     def anchor(self, note: str) -> Flaw | None:
-        """An anchor, wherever it comes from. What no trusted witness cosigned, or of another log, says nothing. A note
-        with a wrong signature of one of them is rejected as a whole: anyone can write such notes, in a file of anchors.
+        """Add an anchor from any source. An anchor of another log, or without a trusted witness, is ignored. A note
+        with a wrong signature of a witness is rejected as a whole, because anyone can write such notes into a file
+        of anchors.
         """
         if len(note) > LONGEST_NOTE:
             return None
@@ -106,14 +108,14 @@ class Anchors:
             self._rejected, self._first = self._rejected + 1, self._first or flaw.text
 
     def finish(self, records: int) -> AnchoredExtent | Flaw:
-        """The outcome for a log of so many lines, once all its checkpoints and anchors were given."""
+        """The result for a log of so many lines, after all its checkpoints and anchors."""
         if self._ahead:
             size = max(self._ahead)
             witness = self._ahead[size][1]
             if size >= records:
-                text = f"witness `{witness.name}` saw a longer log: its end was cut off"
+                text = f"witness `{witness.name}` saw a longer log: the end of this one was removed"
                 return Flaw("anchor/beyond", text, f"{records} records", f"{size + 1} records or more")
-            text = f"witness `{witness.name}` saw a checkpoint of {size} records, which the log does not have"
+            text = f"witness `{witness.name}` saw a checkpoint of {size} records, which is not in the log"
             return Flaw("anchor/root", text, "none", f"a signed record {size}")
         witnessed = tuple(sorted(self._seen.values(), key=lambda seen: (-seen.size, seen.public)))
         count = witnessed[self._threshold - 1].size + 1 if len(witnessed) >= self._threshold else 0
@@ -123,13 +125,13 @@ class Anchors:
 def _compare(size: int, own: bytes, seen: bytes, witness: Cosignature) -> Flaw | None:
     if own == seen:
         return None
-    text = f"witness `{witness.name}` saw another log at {size} records: this one was written anew"
+    text = f"witness `{witness.name}` saw another log at {size} records: this one was rewritten"
     return Flaw("anchor/root", text, own.hex(), seen.hex())
 
 
 def notes(text: str) -> Iterator[str]:
-    """The notes in the text of an anchor file: the parts of each, text and signatures, end with an empty line. What was
-    half written is passed over.
+    """The notes in an anchor file: each has two parts, text and signatures, which end with an empty line. Incomplete
+    notes are skipped.
     """
     for body, signatures in pairwise(text.split("\n\n")):
         if signatures.startswith(MARK) and not body.startswith(MARK):

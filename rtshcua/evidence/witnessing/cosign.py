@@ -1,6 +1,6 @@
 """Cosignatures of witnesses (c2sp.org/tlog-cosignature, Ed25519): further signature lines below a checkpoint.
 
-A witness signs the moment and the text of the checkpoint. Its name is not signed: who it is, its key alone says.
+A witness signs the time and the text of the checkpoint. Its name is not signed: only its key identifies it.
 """
 
 from collections.abc import Callable, Iterable
@@ -19,7 +19,9 @@ _LAST_S: Final = (1 << 63) - 1
 
 
 class Cosignature(NamedTuple):
-    """Who cosigned, by public key (32 bytes) and the name given, and when, in seconds since the Unix epoch."""
+    """A cosignature: public key (32 bytes) and given name of the witness, and the time in seconds since the Unix
+    epoch.
+    """
 
     public: bytes
     name: str
@@ -27,7 +29,7 @@ class Cosignature(NamedTuple):
 
 
 def name_of(public: bytes) -> str:
-    """The name that a witness of ours goes by: that of its key in the trust root."""
+    """The name of one of our witnesses: the name of its key in the trust root."""
     return f"rtshcua/witness/{kid_of(Duty.WITNESS, public).hex()}"
 
 
@@ -39,9 +41,9 @@ def cosign(text: str, time_s: int, public: bytes, signer: Callable[[bytes], byte
 
 
 def read_cosignature(line: str, text: str, witnesses: Iterable[bytes]) -> Cosignature | Flaw | None:
-    """Which of the witnesses, by public key, cosigned the text with this line; None for a line of anybody else.
+    """The witness, by public key, who cosigned the text with this line; None for a line of anybody else.
 
-    A line in the name of a witness that it did not make is a flaw.
+    A line in the name of a witness with a wrong signature is a flaw.
     """
     name, octets = read_signature(line)
     if len(octets) != ID_BYTES + _TIME_BYTES + _SIGNATURE_BYTES:
@@ -57,7 +59,7 @@ def read_cosignature(line: str, text: str, witnesses: Iterable[bytes]) -> Cosign
 
 
 def cosignatures(note: str, witnesses: Iterable[bytes]) -> tuple[str, list[Cosignature]] | Flaw:
-    """The text of an anchor, and who of the witnesses cosigned it; lines of others are passed over."""
+    """The text of an anchor, and the witnesses who cosigned it; lines of others are skipped."""
     text, lines = split(note)
     known = list(witnesses)
     found = []

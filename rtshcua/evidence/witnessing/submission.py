@@ -1,7 +1,7 @@
-"""A log as its witnesses are shown it: the signed notes, and the tree that proves one to begin with another.
+"""The parts of a log that are submitted to witnesses: the signed notes, and the tree for consistency proofs.
 
-Line by line while it is written (`Submission`), or whole, from a file that is handed to a witness (`survey`): in two
-passes at most, and what is kept is a note for each epoch, however long the log is.
+Line by line while the log is written (`Submission`), or from a complete file (`survey`): at most two passes,
+keeping one note for each epoch.
 """
 
 from bisect import bisect_left
@@ -19,12 +19,12 @@ from rtshcua.evidence.records import Close, DecisionRecord, Effect, encode, is_s
 from rtshcua.evidence.witnessing.cosign import Cosignature, read_cosignature
 from rtshcua.evidence.witnessing.witness import CosignRequest
 
-#: the most notes that go behind a checkpoint in one request; a witness that missed more is led on in several
+#: : the most notes of a chain in one request; a witness that missed more is updated in several requests
 MOST_NOTES: Final = 32
 
 
 class _Bearer(msgspec.Struct):
-    """A signed record, as far as a witness is shown it."""
+    """The parts of a signed record that a witness receives."""
 
     checkpoint: str
 
@@ -33,7 +33,7 @@ _read = msgspec.json.Decoder(_Bearer).decode
 
 
 def note_of(line: bytes) -> str | None:
-    """The checkpoint that a line carries; None for a line that is not signed."""
+    """The checkpoint in a line; None for a line that is not signed."""
     if not is_signed(line):
         return None
     try:
@@ -43,7 +43,7 @@ def note_of(line: bytes) -> str | None:
 
 
 class Submission:
-    """Takes the lines of one log in order. It keeps at most 64 octets a line, and a note for each epoch."""
+    """Processes the lines of one log in order. It keeps at most 64 octets a line, and a note for each epoch."""
 
     def __init__(self) -> None:
         self._tree = StoredTree()
@@ -52,11 +52,11 @@ class Submission:
 
     @property
     def records(self) -> int:
-        """How many lines were taken."""
+        """The number of lines so far."""
         return self._tree.size
 
     def take(self, line: bytes) -> str | None:
-        """Take the next line; gives its note, if it is signed."""
+        """Add the next line; return its note if it is signed."""
         note = note_of(line)
         if note is not None:
             self._sizes.append(self._tree.size)
@@ -75,14 +75,14 @@ class Submission:
         return self._sizes[index : index + 1] == [size]
 
     def again(self, size: int) -> CosignRequest:
-        """To have the checkpoint of this size cosigned once more, by a witness whose answer was lost."""
+        """Have the checkpoint of this size cosigned again, by a witness whose answer was lost."""
         return CosignRequest(size, (), self._notes[bisect_left(self._sizes, size)])
 
     def request(self, known: int | None, records: int) -> CosignRequest | None:
-        """What to send a witness that cosigned the tree of `known` leaves last, or is thought to know nothing, so that
-        it cosigns the last checkpoint among the first `records` lines, or one on the way there.
+        """The request to a witness that last cosigned the tree of `known` leaves (0: none, as far as known), so that
+        it cosigns the last checkpoint among the first `records` lines, or an intermediate one.
 
-        None when there is nothing to cosign, or when what the witness knows is no checkpoint of this log.
+        None if there is nothing to cosign, or if the witness's size is not a checkpoint of this log.
         """
         index = -1
         if known is not None:
@@ -98,7 +98,7 @@ class Submission:
 
 
 def anchor(note: str, answer: str, witnesses: Iterable[bytes]) -> str | None:
-    """The anchor of a note: with those lines of a witness's answer that one of the witnesses made; None without any."""
+    """The anchor made of a note and those lines of an answer that trusted witnesses signed; None without any."""
     text, keys = split(note)[0], tuple(witnesses)
     made = [
         line for line in answer.splitlines(keepends=True) if isinstance(read_cosignature(line, text, keys), Cosignature)
@@ -114,27 +114,27 @@ class Survey(NamedTuple):
 
     @property
     def origin(self) -> str:
-        """Whose log it is."""
+        """The origin of the log."""
         return next(iter(self.notes.values())).partition("\n")[0]
 
     @property
     def size(self) -> int:
-        """That of the last checkpoint."""
+        """The size at the last checkpoint."""
         return max(self.notes)
 
 
 def survey(lines: Iterable[bytes]) -> Survey | Finding:
-    """The notes of a log, each with the root that these lines give, of the record that carries it, and after the one
-    before it; a last line that is not whole is passed over.
+    """The notes of a log. Each is checked against the root computed from these lines, the record that carries it, and
+    the note before it; an incomplete last line is skipped.
 
-    A checkpoint that is not so is not worth anybody's signature, whatever proof comes with it: the leaves are computed
-    here, and not believed.
+    A checkpoint that fails the check must not be cosigned, whatever proof it comes with: the leaves are computed
+    here, not trusted.
     """
     tree, after, closed = MerkleTree(), None, False
     notes: dict[int, str] = {}
     for line in lines:
         if closed:
-            return Flaw("close/junk-after", "there is something after the signed close").at(tree.size)
+            return Flaw("close/junk-after", "the signed close is followed by more data").at(tree.size)
         if not line.endswith(b"\n"):
             break
         note = note_of(line)
@@ -151,36 +151,37 @@ def survey(lines: Iterable[bytes]) -> Survey | Finding:
 
 
 def _checked(line: bytes, note: str, tree: MerkleTree, after: bytes | None) -> Checkpoint | Flaw:
-    """The checkpoint of a signed record that stands after the lines of the tree; its signature is looked at later."""
+    """The checkpoint of a signed record that follows the lines of the tree; its signature is checked later."""
     checkpoint = parse(split(note)[0])
     if isinstance(checkpoint, Flaw):
         return checkpoint
     if (checkpoint.size, checkpoint.root) != (tree.size, tree.root()):
-        text = "the checkpoint is not that of the records before it"
+        text = "the checkpoint does not match the records before it"
         return Flaw("seal/root", text, checkpoint.root.hex(), tree.root().hex())
     if checkpoint.after != after:
-        return Flaw("seal/after", "the checkpoint follows another one than that of the signed record before")
+        return Flaw("seal/after", "the checkpoint does not follow that of the previous signed record")
     record = read(line)
     if isinstance(record, Flaw):
         return record
-    assert not isinstance(record, DecisionRecord | Effect), "these bear no checkpoint"
+    assert not isinstance(record, DecisionRecord | Effect), "these records have no checkpoint"
     own = leaf_hash(encode(unsigned(record)))
     if checkpoint.record != own:
-        text = "the checkpoint is not that of the record that carries it: one of its fields was changed"
+        text = "the checkpoint does not match the record that carries it: a field was changed"
         return Flaw("seal/self", text, own.hex(), checkpoint.record.hex())
     return checkpoint
 
 
 def request_of(log: Survey, known: int | None, lines: Callable[[], Iterable[bytes]]) -> CosignRequest | Flaw:
-    """What to ask a witness that cosigned the tree of `known` leaves last (None: nothing) about the end of the log.
+    """The request about the end of the log, to a witness that last cosigned the tree of `known` leaves (None:
+    nothing).
 
-    `lines` gives the lines once more.
+    `lines` iterates over the lines again.
     """
     if known is not None and known not in log.notes:
         if known >= log.records:
-            text = "the witness saw a longer log: the end of this one was cut off"
+            text = "the witness saw a longer log: the end of this one was removed"
             return Flaw("anchor/beyond", text, f"{log.records} records", f"{known + 1} records or more")
-        return Flaw("anchor/root", "the witness saw a checkpoint that this log does not have", "none", str(known))
+        return Flaw("anchor/root", "the witness saw a checkpoint that is not in this log", "none", str(known))
     size, old = log.size, known or 0
     proof = proof_of(consistency_ranges(old, size), map(leaf_hash, lines())) if 0 < old < size else []
     after = -1 if known is None else known

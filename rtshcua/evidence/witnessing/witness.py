@@ -1,12 +1,13 @@
-"""A witness: it cosigns a checkpoint only if the log that it saw before is still the beginning of this one.
+"""A witness: it cosigns a checkpoint only if the log that it saw before is still the beginning of the present one.
 
-After c2sp.org/tlog-witness, with two things of our own. A log changes its key with every epoch, so behind the
-checkpoint a request may carry the notes in between, each of which names the key of the next; the first is the genesis'
-note, which the log key of the trust root signs. And with a size the witness holds on to the whole text that it cosigned
-there, with the record that carried it and the next key, and to the key that signed it: an epoch's key signs once.
+It follows c2sp.org/tlog-witness, with two additions. A log changes its key with every epoch, so a request may
+carry the intermediate notes after the checkpoint, each of which names the key of the next; the first is the
+genesis' note, signed by the log key of the trust root. And with each size the witness stores the whole text that
+it cosigned, including the record that carried it and the next key, and the key that signed it: an epoch's key
+signs once.
 
-Everything here is pure. Whoever keeps the state must have it on the disk before the cosignature leaves, or a crash lets
-the witness contradict itself.
+Everything here is pure. The caller must store the state on the disk before the cosignature is sent; otherwise a
+crash could make the witness contradict itself.
 """
 
 from collections.abc import Callable, Iterable
@@ -26,17 +27,17 @@ OK, MALFORMED, FORBIDDEN, UNKNOWN, CONFLICT, INCONSISTENT = 200, 400, 403, 404, 
 _ORIGIN: Final = "rtshcua/log/"
 _HASH_BYTES: Final = 32
 _LONGEST_SIZE: Final = 16  # digits
-_STRANGER: Final = "it is not signed by the key that the record before names, nor by the log's"
+_STRANGER: Final = "not signed by the key that the previous record names, nor by the log's key"
 
-#: the public log keys that the trust root names for a vehicle
+#: : returns the public log keys that the trust root names for a vehicle
 LogKeys = Callable[[str], Iterable[bytes]]
 
 
 class CosignRequest(NamedTuple):
-    """A checkpoint to be cosigned. `proof` shows that the tree of `old` leaves is its beginning.
+    """A checkpoint to be cosigned. `proof` proves that the tree of `old` leaves is its beginning.
 
-    `chain` holds the notes of the signed records between the checkpoint of `old` leaves and this one, oldest first;
-    when the witness is thought to know nothing, from the genesis' on.
+    `chain` holds the notes of the signed records between the checkpoint of `old` leaves and this one, oldest
+    first; from the genesis on if the witness is assumed to know nothing.
     """
 
     old: int
@@ -45,24 +46,24 @@ class CosignRequest(NamedTuple):
     chain: tuple[str, ...] = ()
 
     def encode(self) -> bytes:
-        """The body of c2sp.org/tlog-witness, and behind it each note of the chain after an empty line."""
+        """The body of c2sp.org/tlog-witness, followed by each note of the chain after an empty line."""
         proof = "".join(f"{base64(each)}\n" for each in self.proof)
         chain = "".join(f"\n{note}" for note in self.chain)
         return f"old {self.old}\n{proof}\n{self.note}{chain}".encode()
 
 
 class LastCosigned(NamedTuple):
-    """What was cosigned last of a log: the text of its checkpoint, and the public key that the log signed it with."""
+    """The last cosigned checkpoint of a log: its text, and the public key that the log signed it with."""
 
     text: str
     signer: bytes
 
 
 class Declined(NamedTuple):
-    """Why nothing is cosigned. `status` is one of HTTP's, as c2sp.org/tlog-witness uses them.
+    """Why nothing is cosigned. `status` is an HTTP status, as c2sp.org/tlog-witness uses them.
 
-    `size` is that of the tree that the witness saw, with a conflict. `contradiction`: the log's own key signed what
-    contradicts what was cosigned before; the note is worth keeping.
+    `size` is that of the tree that the witness saw, with a conflict. `contradiction`: the log's own key signed a
+    contradiction to what was cosigned before; the note is kept as evidence.
     """
 
     status: int
@@ -71,29 +72,29 @@ class Declined(NamedTuple):
     contradiction: bool = False
 
     def answer(self) -> "WitnessResponse":
-        """What the sender is told: for a conflict the size, else why."""
+        """The body of the answer: for a conflict the size, else the reason."""
         return WitnessResponse(self.status, f"{self.size}\n" if self.status == CONFLICT else f"{self.text}\n")
 
 
 class WitnessResponse(NamedTuple):
-    """What a witness answers: one of HTTP's numbers, and the body of c2sp.org/tlog-witness."""
+    """A witness's answer: an HTTP status, and the body of c2sp.org/tlog-witness."""
 
     status: int
     body: str
 
     def encode(self) -> bytes:
-        """The number in a line of its own, and the body."""
+        """The status in a line of its own, then the body."""
         return f"{self.status}\n{self.body}".encode()
 
     @property
     def size(self) -> int | None:
-        """With a conflict: how large the tree is that the witness cosigned last; None for nonsense."""
+        """With a conflict, the size of the tree that the witness cosigned last; None if the body is malformed."""
         digits = self.body.removesuffix("\n")
         return int(digits) if digits.isascii() and digits.isdigit() and len(digits) <= _LONGEST_SIZE else None
 
 
 def decode_answer(data: bytes) -> WitnessResponse | None:
-    """The answer in these bytes; None when they are none."""
+    """The answer in these bytes; None if they are malformed."""
     status, newline, body = data.partition(b"\n")
     if not newline or len(status) != 3 or not status.isdigit():
         return None
@@ -101,7 +102,7 @@ def decode_answer(data: bytes) -> WitnessResponse | None:
 
 
 def decode(data: bytes) -> CosignRequest | Declined:
-    """The request in a body; never raises, whatever the bytes."""
+    """The request in a body, or why it is declined. Raises nothing."""
     try:
         head, *parts = data.decode().split("\n\n")
     except UnicodeDecodeError:
@@ -112,45 +113,47 @@ def decode(data: bytes) -> CosignRequest | Declined:
     # a part is the text of a note, the next one its signatures; the last ends with one newline
     texts = [f"{body}\n\n{lines}\n" for body, lines in zip(parts[::2], parts[1::2], strict=False)]
     if not texts or len(parts) % 2 or not data.endswith(b"\n") or len(proof) > MOST_PROOF:
-        return Declined(MALFORMED, "the request has not the form of one")
+        return Declined(MALFORMED, "malformed request")
     texts[-1] = texts[-1][:-1]
     request = CosignRequest(number, tuple(strict_base64(each) for each in proof), texts[0], tuple(texts[1:]))
     if {len(each) for each in request.proof} - {_HASH_BYTES} or request.encode() != data:
-        return Declined(MALFORMED, "the request has not the form of one")
+        return Declined(MALFORMED, "malformed request")
     return request
 
 
 def judge(request: CosignRequest, seen: LastCosigned | None, log_keys: LogKeys) -> LastCosigned | Declined:
-    """What may be cosigned, or why it may not. `seen` is what was cosigned last for this origin, if anything was."""
+    """The checkpoint that may be cosigned, or why it is declined. `seen` is what was cosigned last for this origin,
+    if anything.
+    """
     text, lines = split(request.note)
     checkpoint = parse(text)
     if not lines or isinstance(checkpoint, Flaw):
-        return Declined(MALFORMED, "what is to be cosigned is not the checkpoint of a log")
+        return Declined(MALFORMED, "the note is not the checkpoint of a log")
     known = None if seen is None else parse(seen.text)
-    assert not isinstance(known, Flaw), "what was cosigned is a checkpoint"
+    assert not isinstance(known, Flaw), "the stored note is a checkpoint"
     vehicle = vehicle_of(checkpoint.origin)
     keys = tuple(log_keys(vehicle)) if vehicle else ()
     if not keys:
-        return Declined(UNKNOWN, f"nothing is known of `{checkpoint.origin}`")
+        return Declined(UNKNOWN, f"unknown log `{checkpoint.origin}`")
     size = 0 if known is None else known.size
     if request.old > checkpoint.size:
         return Declined(MALFORMED, f"a tree of {checkpoint.size} records does not begin with one of {request.old}")
     if request.old != size:
-        return Declined(CONFLICT, f"the tree of {size} records was cosigned last, not that of {request.old}", size)
+        return Declined(CONFLICT, f"the last cosigned tree has {size} records, not {request.old}", size)
     if seen is not None and text == seen.text:
-        return seen  # again, for the answer may have been lost
+        return seen  # cosign it again, because the answer may have been lost
     signer = _follow(request, known, seen, keys)
     if isinstance(signer, Declined):
         return signer
     root = EMPTY if known is None else known.root
     if not verify_consistency(size, root, checkpoint.size, checkpoint.root, request.proof):
-        # Anyone can put a wrong proof to a right note: that alone is no contradiction.
-        return Declined(INCONSISTENT, f"it is not shown that the tree begins with that of {size} records")
+        # Anyone can combine a wrong proof with a correct note, so this alone is not a contradiction.
+        return Declined(INCONSISTENT, f"the proof does not show that the tree begins with the one of {size} records")
     return LastCosigned(text, signer)
 
 
 def vehicle_of(origin: str) -> str:
-    """The vehicle whose log has this origin; empty for an origin that no log has."""
+    """The vehicle whose log has this origin; empty for an invalid origin."""
     quoted, _, boot = origin.removeprefix(_ORIGIN).rpartition("/")
     vehicle = unquote(quoted, errors="replace")
     return vehicle if origin == origin_of(vehicle, boot) else ""
@@ -159,12 +162,12 @@ def vehicle_of(origin: str) -> str:
 def _follow(
     request: CosignRequest, known: Checkpoint | None, seen: LastCosigned | None, log_keys: tuple[bytes, ...]
 ) -> bytes | Declined:
-    """The key that signed the last note, if each is signed by the key that the one before it names, or by the log key,
-    and goes on from there.
+    """The key that signed the last note, if each note is signed by the key that the previous one names, or by the log
+    key, and continues it.
     """
     chain = [*request.chain, request.note]
     if seen is not None and split(chain[0])[0] == seen.text:
-        del chain[0]  # who did not know that the witness knows the genesis tells it again
+        del chain[0]  # a sender that is unsure of the witness's state sends the genesis again
     before, signer, origin = known, b"", request.note.partition("\n")[0]
     for note in chain:
         named = () if before is None or before.key is None else (before.key,)
@@ -173,20 +176,21 @@ def _follow(
             twice = seen is not None and _opened(note, origin, (seen.signer,))[1] is not None
             return _conflict(known, contradiction=True) if twice else Declined(FORBIDDEN, _STRANGER)
         if before is None and (checkpoint.size or checkpoint.root != EMPTY or checkpoint.after is not None):
-            return Declined(FORBIDDEN, "the first that is seen of a log is the checkpoint of its genesis")
+            return Declined(FORBIDDEN, "the first note of a log must be the checkpoint of its genesis")
         if before is not None and (before.key is None or checkpoint.size <= before.size):
             return _conflict(known, contradiction=before is known and checkpoint.size >= before.size)
         if before is not None and checkpoint.after != before.digest():
-            # The log key may sign more than once, and there may be others in between: that alone is no contradiction.
+            # The log key may sign several times, and other notes may lie between, so this alone is not a
+            # contradiction.
             if before is known and signer == before.key:
                 return _conflict(known, contradiction=True)
-            return Declined(INCONSISTENT, "it does not follow the checkpoint that is to come before it")
+            return Declined(INCONSISTENT, "the note does not follow the checkpoint that should precede it")
         before = checkpoint
     return signer
 
 
 def _opened(note: str, origin: str, keys: Iterable[bytes]) -> tuple[bytes, Checkpoint | None]:
-    """Which of the keys signed the note of a log, and its checkpoint."""
+    """The key that signed the note of a log, and its checkpoint."""
     for key in keys:
         checkpoint = open_note(note, origin, key)
         if not isinstance(checkpoint, Flaw) and checkpoint.origin == origin:
@@ -196,5 +200,5 @@ def _opened(note: str, origin: str, keys: Iterable[bytes]) -> tuple[bytes, Check
 
 def _conflict(known: Checkpoint | None, *, contradiction: bool) -> Declined:
     size = 0 if known is None else known.size
-    text = "it contradicts what was cosigned before, or the order of a log"
+    text = "the note contradicts what was cosigned before, or the order of a log"
     return Declined(CONFLICT, text, size, contradiction)

@@ -358,7 +358,7 @@ def test_a_replacement_that_brings_back_an_id_seen_before_is_refused() -> None:
 def test_a_replacement_whose_kept_steps_differ_is_not_signed() -> None:
     first, second, last = shorter(OF).invocations
     mission = replace(shorter(OF), invocations=(first, replace(second, skill=GOTO + 1), last))
-    with pytest.raises(DocumentError, match="is not the same step"):
+    with pytest.raises(DocumentError, match="should be kept but differs"):
         sign_replacement(mission, over=OF.bundle, flight=FLIGHT, kept=2, key=MISSION_KEY)
 
 

@@ -116,7 +116,7 @@ def test_entries_of_a_true_log(log: Log) -> None:
     assert [log.refuse(), log.refuse("permit/used"), log.state(), log.take(SEAL), log.state(), log.take(SEAL)] == [
         None
     ] * 6
-    assert log.evidence.claims()[1][0].text.endswith("it broke off")
+    assert log.evidence.claims()[1][0].text.endswith("the log ends")
     assert [log.refuse(), log.state(final=True), log.take(CLOSE)] == [None] * 3
     assert [claim.slug for claim in log.evidence.claims()[1]] == ["clock"]
 
@@ -228,7 +228,7 @@ def test_a_log_that_was_recovered(log: Log) -> None:
     log.refuse()
     assert log.take(RECOVER) is None
     assert log.take(replace(CLOSE, ending="recovered")) is None
-    assert log.evidence.claims()[1][0].text.endswith("it broke off")
+    assert log.evidence.claims()[1][0].text.endswith("the log ends")
     other = Log()
     assert other.take(RECOVER) is None
     assert other.take(CLOSE) == ("boundary/missing", 2)  # only recovery ends one so
@@ -270,7 +270,7 @@ def test_that_frames_were_signed_ahead_is_told_and_not_that_they_were_sent() -> 
     assert log.state(final=True) is None
     proven, unproven = log.evidence.claims()
     assert "0 frames passed it" in proven[0].text
-    text = "whether any of the 3 frames were sent that the boundary signed ahead: it does not see that"
+    text = "whether any of the 3 frames that the boundary signed ahead were sent: it cannot observe that"
     assert unproven[0] == Claim("boundary", text)
 
 
@@ -398,13 +398,15 @@ def test_none_may_be_claimed_where_the_boundary_knows_none() -> None:
     quiet = Log(replace(GENESIS, utc_error_us=UTC_UNKNOWN_US))
     assert quiet.take(replace(stated(said), utc_error_us=UTC_UNKNOWN_US)) is None
     (_, clock), _ = quiet.evidence.claims()
-    assert "knew no time of day" in clock.text
+    assert "did not know the time of day" in clock.text
 
 
 def test_a_clock_of_its_own_is_told_of(log: Log) -> None:
     assert told(log) is None
     (_, clock), unproven = log.evidence.claims()
-    assert clock == Claim("clock", "the time of day of the records is that of the boundary's own clock, by the kernel")
+    assert clock == Claim(
+        "clock", "the time of day in the records agrees with the boundary's own clock, set by the kernel"
+    )
     assert [claim.slug for claim in unproven] == ["boundary"]
 
 

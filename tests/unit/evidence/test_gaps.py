@@ -9,7 +9,7 @@ from virtual.rows import rows
     [
         (RecordGap(7, 127_560_000, 9, 8), "the key that signed record 9 and by the boundary, which signed in record 8"),
         (RecordGap(7, 127_560_000, 9), "vouched for by the key that signed record 9"),
-        (RecordGap(7, 127_560_000), "nobody has signed for that yet"),
+        (RecordGap(7, 127_560_000), "not signed for yet"),
     ],
 )  # fmt: skip
 def test_it_says_how_long_it_was_and_who_vouches_for_it(gap: RecordGap, words: str) -> None:

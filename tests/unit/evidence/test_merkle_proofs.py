@@ -167,7 +167,7 @@ def test_a_tree_does_not_begin_with_a_larger_one(first: int, second: int) -> Non
 
 
 def test_leaves_that_end_too_early_give_no_proof() -> None:
-    with pytest.raises(ValueError, match="there are not 9 leaves"):
+    with pytest.raises(ValueError, match="fewer than 9 leaves"):
         proof_of(inclusion_ranges(3, 9), LEAVES[:8])
 
 
@@ -195,7 +195,7 @@ def test_a_store_is_taken_up_again_as_it_was_left(stored: StoredTree) -> None:
     for leaf in LEAVES[33:]:
         again.push(leaf)
     assert again.nodes == stored.nodes
-    with pytest.raises(ValueError, match="is kept in"):
+    with pytest.raises(ValueError, match="takes"):
         StoredTree(bytearray(32), 2)
     with pytest.raises(ValueError, match="has 70 leaves"):
         stored.root(71)

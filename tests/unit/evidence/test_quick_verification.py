@@ -85,7 +85,9 @@ def test_it_agrees_on_every_whole_log(epochs: list[int]) -> None:
     for field in ("records", "root", "close", "genesis", "last_us", "sealed", "epochs", "failure", "shortfall"):
         assert getattr(found, field) == getattr(careful, field)
     assert found.proven[1:] == careful.proven[1:]
-    text = f"lines 1 to {found.records} follow one another, each names the one before it, and their tree is as signed"
+    text = (
+        f"lines 1 to {found.records} follow one another, each names the previous one, and their tree is the signed one"
+    )
     assert found.proven[0].text == text
     assert [claim.slug for claim in found.unproven] == ["anchor", "form"]
 
@@ -327,7 +329,7 @@ def test_a_log_that_is_anchored_to_its_end(log: Log) -> None:
     assert (found.anchored, found.records) == (12, 12)
     assert [claim.slug for claim in found.unproven] == ["form"]
     assert found.proven[-1].slug == "anchor"
-    assert found.proven[-1].text.startswith("records 0 to 11 are as `")
+    assert found.proven[-1].text.startswith("records 0 to 11 are as seen by `")
 
 
 def test_a_part_of_another_place(log: Log) -> None:
@@ -366,7 +368,7 @@ def test_what_the_epochs_own_key_can_have_unseen_is_said_to_be_unseen(
     assert found is not None
     assert "whole" not in found.proven[0].text
     form = found.unproven[-1].text
-    for word in ("form", "number", "clocks", "sealed in time", "stands where it may"):
+    for word in ("form", "number", "clocks", "sealed in time", "place of each unsigned record"):
         assert word in form
 
 

@@ -167,11 +167,11 @@ GOOD = encode(Effect("0" * 64, 1, "d", 1, "e", 0, 0, 0, 0, 0, "effect", 3, 2))
 @rows(
     ("line", "slug", "words"),
     [
-        (b"", "record/malformed", "it is not a record"),
-        (b"\xff\xfe\n", "record/malformed", "it is not a record"),
-        (b'{"type":"effect"}\n', "record/malformed", "it is not a record"),
-        (GOOD.replace(b"effect", b"effort"), "record/malformed", "it is not a record"),
-        (GOOD.replace(b'"d"', b'"\xff"'), "record/malformed", "it is not UTF-8"),
+        (b"", "record/malformed", "not a record"),
+        (b"\xff\xfe\n", "record/malformed", "not a record"),
+        (b'{"type":"effect"}\n', "record/malformed", "not a record"),
+        (GOOD.replace(b"effect", b"effort"), "record/malformed", "not a record"),
+        (GOOD.replace(b'"d"', b'"\xff"'), "record/malformed", "the line is not UTF-8"),
         (GOOD.replace(b'"at_us":1,', b""), "record/malformed", "object missing required field `at_us`"),
         (GOOD.replace(b"}", b',"z":1}'), "record/malformed", "object contains unknown field `z`"),
         (GOOD.replace(b'"kind":0', b'"kind":0.0'), "record/malformed", "expected an integer, got a fraction"),

@@ -16,16 +16,16 @@ def outside(threshold: int, *sizes: int) -> AnchoredExtent:
 def test_too_few_witnesses() -> None:
     assert cosigned(outside(1, 9)) == ""
     assert cosigned(outside(2)) == ""
-    assert cosigned(outside(2, 9)) == "cosigned by 1 of the 2 witnesses that are needed"
-    assert cosigned(outside(3, 9, 9)) == "cosigned by 2 of the 3 witnesses that are needed"
+    assert cosigned(outside(2, 9)) == "cosigned by 1 of 2 required witnesses"
+    assert cosigned(outside(3, 9, 9)) == "cosigned by 2 of 3 required witnesses"
     text = unanchored(10, 0, outside(2, 7)).text
     assert text.startswith(
-        "unanchored tail: 10 records: records 0 to 7 are cosigned by 1 of the 2 witnesses that are needed; who held"
+        "unanchored tail: 10 records: records 0 to 7 are cosigned by 1 of 2 required witnesses; a holder"
     )
     text = unanchored(10, 5, outside(2, 9, 4)).text
-    assert text.startswith("unanchored tail: 5 records: records 5 to 9 are cosigned by 1 of the 2")
-    assert "no witness outside holds them" in unanchored(10, 0, outside(2)).text
-    assert "no witness outside holds them" in unanchored(10, 5, outside(1, 4)).text
+    assert text.startswith("unanchored tail: 5 records: records 5 to 9 are cosigned by 1 of 2")
+    assert "no witness holds them" in unanchored(10, 0, outside(2)).text
+    assert "no witness holds them" in unanchored(10, 5, outside(1, 4)).text
 
 
 def test_moments() -> None:
@@ -40,7 +40,7 @@ def test_notes_that_say_nothing() -> None:
     for count, many in ((1, "1 note"), (2, "2 notes")):
         found = with_anchors(report, outside(1, 9)._replace(rejected=count, first="why"))
         assert found.unproven == (rejected(outside(1, 9)._replace(rejected=count, first="why")),)
-        text = f"what {many} of witnesses would say, damaged or forged and passed over: why"
+        text = f"{many} of witnesses, damaged or forged and ignored: why"
         assert (found.unproven[0].slug, found.unproven[0].text) == ("anchor/signature", text)
 
 

@@ -129,8 +129,8 @@ def test_nothing_may_follow_the_close(log: list[bytes]) -> None:
     assert failure([*log, b"x"]) == ("close/junk-after", 9)
     for junk, what in (
         (bytes(4096), "4096 zero octets, as a file system leaves them"), (b"\n", "empty lines or blanks"),
-        (b"  \n", "empty lines or blanks"), (log[-1], "stands a record,"), (log[-1][:50], "a part of a record"),
-        (log[-1][:3], "a part of a record"), (b"junk\n", "something that is no record"),
+        (b"  \n", "empty lines or blanks"), (log[-1], "by a record,"), (log[-1][:50], "part of a record"),
+        (log[-1][:3], "part of a record"), (b"junk\n", "data other than a record"),
     ):  # fmt: skip
         found = verify([*log, junk]).failure
         assert found is not None

@@ -163,7 +163,7 @@ def test_split_view_that_grew(split_view: tuple[Log, Log, Judge]) -> None:
     for proof in ((), asked(log, 6).proof[:-1], request.proof):
         found = refused(witness, asked(log, 6)._replace(proof=proof))
         assert (found.status, found.contradiction) == (INCONSISTENT, False)
-        assert "the tree begins with that of 6 records" in found.text
+        assert "the tree begins with the one of 6 records" in found.text
     cosigned(witness, asked(log, 6))
 
 
@@ -179,7 +179,7 @@ def test_other_lines_below_the_checkpoint_that_was_cosigned(split_view: tuple[Lo
     for proof in (request.proof, ()):
         found = refused(witness, request._replace(proof=proof))
         assert (found.status, found.contradiction) == (INCONSISTENT, False)
-        assert "the tree begins with that of 6 records" in found.text
+        assert "the tree begins with the one of 6 records" in found.text
 
 
 def test_another_genesis_under_the_key_of_the_one_that_was_cosigned_is_a_contradiction() -> None:
@@ -280,7 +280,7 @@ def test_logs_of_others() -> None:
     assert isinstance(found := judge(CosignRequest(0, (), theirs), None, lambda vehicle: ()), Declined)
     assert found.status == UNKNOWN
     assert judge(CosignRequest(0, (), theirs), None, lambda vehicle: (bytes(32),)) == Declined(
-        FORBIDDEN, "it is not signed by the key that the record before names, nor by the log's"
+        FORBIDDEN, "not signed by the key that the previous record names, nor by the log's key"
     )
 
 

@@ -140,7 +140,7 @@ def test_a_replacement_that_drops_a_phase_is_followed_in_a_log(here: Path) -> No
     wrong = replace(before.mission, name="")
     refused = prepared(before.policy.policy, wrong)
     assert isinstance(refused, Refusal)
-    assert "refused on board: the name of the mission is no name" in refused.text
+    assert "refused on board: the name of the mission is invalid" in refused.text
 
 
 def test_what_cannot_be_signed(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -167,7 +167,7 @@ def test_what_cannot_be_signed(here: Path, capsys: pytest.CaptureFixture[str]) -
     says(ExitCode.USAGE, "go together", "compile", "shorter.rts", "--from", "3")
     says(
         ExitCode.REFUSED,
-        "step 3 is to stay",
+        "step 3 should be kept",
         "compile",
         "shorter.rts",
         "--replaces",
@@ -222,7 +222,7 @@ def test_a_bundle_that_no_root_ever_trusted_is_not_recalled(
     (here / "low.bundle").write_bytes(forged)
     capsys.readouterr()
     assert main(["recall", "low.bundle", "-o", "home", *FLIGHT, *named]) == ExitCode.UNTRUSTED
-    assert "was revoked" in capsys.readouterr().err
+    assert "is revoked by the trust root" in capsys.readouterr().err
     assert not (here / "home").exists()
 
 

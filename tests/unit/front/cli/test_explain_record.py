@@ -92,7 +92,7 @@ def test_there_must_be_such_a_record(log: Path, capsys: pytest.CaptureFixture[st
     assert "has no record 999" in capsys.readouterr().err
     log.write_bytes(b"".join([*LINES[:3], b"{}\n"]))
     assert explain(log, 7) == ExitCode.EVIDENCE
-    assert "fails before record 7, at record 3: record/malformed, it is not" in capsys.readouterr().err
+    assert "fails before record 7, at record 3: record/malformed, not a record" in capsys.readouterr().err
     assert app.main(["verify-log", str(log), str(log), "--root", ROOT_KEY.hex(), "--explain", "1"]) == ExitCode.USAGE
     log.write_bytes(b"hello\n")
     assert explain(log, 0) == ExitCode.INPUT

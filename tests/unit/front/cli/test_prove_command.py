@@ -150,7 +150,7 @@ def test_several_proofs(capsys: pytest.CaptureFixture[str]) -> None:
         ([3, "--since", 0], ExitCode.USAGE, "record 3 and `--since 0` are two things to prove"),
         (["--since", 0, "--cose"], ExitCode.USAGE, "do not go together"),
         ([99], ExitCode.INPUT, "the log has no record 99"),
-        ([3, "--at", 4], ExitCode.INPUT, "record 4 is no signed record"),
+        ([3, "--at", 4], ExitCode.INPUT, "record 4 is not a signed record"),
         ([7, "--at", 6], ExitCode.INPUT, "was signed before record 7"),
         ([3, "--cose"], ExitCode.UNTRUSTED, "holds no keys"),
     ],

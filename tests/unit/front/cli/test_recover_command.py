@@ -177,7 +177,7 @@ def test_what_a_witness_saw_more_of_is_not_ended(
     before = sorted((path.name, path.read_bytes()) for path in run.iterdir())
     assert recover(run, *words) == ExitCode.ANCHOR
     said = capsys.readouterr()
-    assert "saw a longer log: its end was cut off" in " ".join(said.err.split())
+    assert "saw a longer log: the end of this one was removed" in " ".join(said.err.split())
     assert sorted((path.name, path.read_bytes()) for path in run.iterdir()) == before, "nothing was written"
 
 

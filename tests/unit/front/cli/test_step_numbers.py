@@ -87,7 +87,7 @@ def test_a_replacement_is_new_from_the_step_that_was_typed(here: Path, capsys: p
     assert "new from step 3" in told(capsys, *command, "--from", "3")
     assert "new from step 3" in told(capsys, "show", "shorter.replacement")
     assert json.loads(told(capsys, *command, "--from", "3", "--json"))["replacement"]["from_step_number"] == 3
-    assert "step 3 is to stay" in told(capsys, *command, "--from", "4", code=ExitCode.REFUSED)
+    assert "step 3 should be kept" in told(capsys, *command, "--from", "4", code=ExitCode.REFUSED)
     assert "accepted: 1 to 5" in told(capsys, *command, "--from", "6", code=ExitCode.USAGE)
 
 

@@ -288,7 +288,7 @@ def test_a_decision_that_its_own_signers_forged(run: Path, capsys: pytest.Captur
     forged[number] = edit(forged[number], outcome="deny")
     rewrite(run, signed(forged))
     assert verify(run) == ExitCode.OK
-    assert "- the form and number of each record that is not signed itself, its clocks" in capsys.readouterr().out
+    assert "- the format, number, clocks and place of each unsigned record" in capsys.readouterr().out
     assert verify(run, "--audit") == ExitCode.DECISION
     assert f"FAILED  at record {number}, line {number + 1}: decision/outcome" in capsys.readouterr().out
     assert verify(run, "--audit", "--no-derive") == ExitCode.OK
@@ -297,7 +297,7 @@ def test_a_decision_that_its_own_signers_forged(run: Path, capsys: pytest.Captur
 def test_fast_says_no_more_than_it_saw(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert verify(run, "--fast") == ExitCode.OK
     out = capsys.readouterr().out
-    assert f"+ the octets of records 0 to {len(flight()) - 2} are those that were signed" in out
+    assert f"+ the octets of records 0 to {len(flight()) - 2} are the signed ones" in out
     assert "- that records are linked line by line" in out
     lines = list(flight())
     lines[4] = edit(lines[4], event="failed")

@@ -50,12 +50,12 @@ def test_a_damaged_note_says_nothing(how: list[str], log: Path, capsys: pytest.C
     assert verify(log, *how) == ExitCode.OK
     out = " ".join(capsys.readouterr().out.split())
     assert "closed and signed; unanchored" in out
-    assert "- what 2 notes of witnesses would say, damaged or forged and passed over: witness `rtshcua/witness/" in out
+    assert "- 2 notes of witnesses, damaged or forged and ignored: witness `rtshcua/witness/" in out
     log.with_suffix(".anchors").write_text(spoilt(note) + "\n" + note + "\n")
     assert verify(log, *how) == ExitCode.OK
     out = " ".join(capsys.readouterr().out.split())
     assert "closed and signed; anchored to its end" in out
-    assert "- what 1 note of witnesses would say" in out
+    assert "- 1 note of witnesses, damaged or forged" in out
 
 
 @pytest.mark.parametrize("how", HOWS)
@@ -105,7 +105,7 @@ def test_a_log_that_must_be_anchored_and_too_few_cosigned() -> None:
     )
     missing = verify_log._required(report).shortfall
     assert missing is not None
-    assert missing.found == "0 records, the rest cosigned by 1 of the 2 witnesses that are needed"
+    assert missing.found == "0 records, the rest cosigned by 1 of 2 required witnesses"
 
 
 def test_how_fast_a_flight_was() -> None:

@@ -174,7 +174,7 @@ def test_a_log_that_was_written_anew(
 def test_a_log_that_is_not_what_was_signed(flown: Flown, capsys: pytest.CaptureFixture[str]) -> None:
     flown.path.write_bytes(flown.path.read_bytes().replace(b'"said"', b'"sand"'))
     assert app.main(["witness", str(flown.path)]) == ExitCode.EVIDENCE
-    assert "not cosigned: record 4: the checkpoint is not that of the records before it" in capsys.readouterr().out
+    assert "not cosigned: record 4: the checkpoint does not match the records before it" in capsys.readouterr().out
 
 
 def test_a_log_of_a_key_that_the_root_does_not_name(tmp_path: Path, store: KeyStore) -> None:

@@ -215,7 +215,7 @@ def _outside(number: int, report: LogReport) -> str:
     saw = 0 if outside is None else sum(seen.size >= number for seen in outside.witnessed)
     if outside is None or not saw:
         return "no: no witness outside saw it"
-    return f"no: cosigned by {saw} of the {outside.threshold} witnesses that are needed"
+    return f"no: cosigned by {saw} of {outside.threshold} required witnesses"
 
 
 def _key(told: Told, genesis: Genesis, sealed: Sealing) -> str:

@@ -84,18 +84,18 @@ def _is_mode(node: ast.expr) -> bool:
         "def f():\n    with path.open('wb') as file:\n        pass",
     ],
 )  # fmt: skip
-def test_every_way_is_found(way: str) -> None:
+def test_scan_finds_every_way_to_open_files(way: str) -> None:
     assert list(opened(way))
 
 
 @pytest.mark.parametrize(
     "other", ["os.open(os.devnull, 0)", "text.replace('a', 'b')", "session.open(uri, 1)", "replace(path, data)"]
 )
-def test_what_opens_no_file_is_not(other: str) -> None:
+def test_scan_ignores_other_calls(other: str) -> None:
     assert not list(opened(other))
 
 
-def test_files_are_opened_and_written_by_the_store_alone() -> None:
+def test_only_the_store_opens_and_writes_files() -> None:
     found = {
         str(file.relative_to(PACKAGE)): sorted(set(opened(file.read_text(encoding="utf-8"))))
         for file in sorted(PACKAGE.rglob("*.py"))
@@ -106,7 +106,7 @@ def test_files_are_opened_and_written_by_the_store_alone() -> None:
     assert sorted(ALLOWED.keys() - ways.keys()) == [], "these may go from the list"
 
 
-def test_folders_are_made_with_a_mode_of_their_own() -> None:
+def test_folders_are_created_with_a_mode() -> None:
     """Without one a folder has what the umask leaves, all to everybody where it takes nothing."""
     without = []
     for file in sorted(PACKAGE.rglob("*.py")):
@@ -121,7 +121,7 @@ def test_folders_are_made_with_a_mode_of_their_own() -> None:
     assert [each for each in without if not each.startswith("app/lint/findings.py")] == []
 
 
-def test_no_mode_lets_others_write() -> None:
+def test_no_mode_allows_others_to_write() -> None:
     modes = {name: mode for name, mode in vars(writing).items() if name.endswith(("_FILE", "_FOLDER"))}
     assert len(modes) == 4
     assert {name: oct(mode) for name, mode in modes.items() if mode & 0o022} == {}

@@ -30,7 +30,7 @@ def imports(source: str) -> Iterator[str]:
                 yield module
 
 
-def test_the_scan_finds_every_way_to_import() -> None:
+def test_scan_finds_every_way_to_import() -> None:
     source = (
         "import a.b, c\nfrom d.e import f\ndef g():\n    import h\n    import_module('i')\n    x.import_module('j.k')\n"
     )
@@ -38,7 +38,7 @@ def test_the_scan_finds_every_way_to_import() -> None:
 
 
 @pytest.mark.parametrize("layer", CORE)
-def test_core_touches_no_world(layer: str) -> None:
+def test_core_imports_no_input_or_output(layer: str) -> None:
     files = sorted((PACKAGE / layer).rglob("*.py"))
     assert files
     found = {
@@ -56,7 +56,7 @@ def test_import_contracts_hold(checkout: Path) -> None:
     assert run.returncode == 0, run.stdout + run.stderr
 
 
-def test_loading_all_of_onboard_loads_nothing_of_the_ground(checkout: Path) -> None:
+def test_onboard_imports_no_ground_module(checkout: Path) -> None:
     modules = [
         ".".join(file.relative_to(checkout).with_suffix("").parts).removesuffix(".__init__")
         for file in sorted((PACKAGE / "onboard").rglob("*.py"))

@@ -33,17 +33,17 @@ def test_every_field_is_on_the_map(cls: type) -> None:
 
 
 @rows("file", FILES)
-def test_every_file_is_there(file: str) -> None:
+def test_every_named_file_exists(file: str) -> None:
     assert (ROOT / file).is_file()
 
 
-def test_every_theorem_has_its_row() -> None:
+def test_every_theorem_has_a_row() -> None:
     found = {str(path.relative_to(ROOT)) for path in (ROOT / "tests" / "theorems").glob("test_*.py")}
     assert len(found) == 4
     assert found <= set(FILES)
 
 
-def test_every_predicate_names_the_test_that_carries_it() -> None:
+def test_every_predicate_names_its_test() -> None:
     part = PAGE.partition("## Predicates and functions")[2].partition("\n## ")[0]
     lines = [line for line in part.splitlines() if line.startswith("| ")][1:]
     assert len(lines) >= 13
@@ -55,5 +55,5 @@ def test_every_predicate_names_the_test_that_carries_it() -> None:
     "what",
     ["valid_T", "valid_S", "admissible", "Q_onboard", "enforce", "h_intent", "h_agent", "r_eta", "r_time", "act"],
 )
-def test_what_the_paper_proves_things_with_is_on_the_map(what: str) -> None:
+def test_every_proof_notion_is_on_the_map(what: str) -> None:
     assert re.search(rf"^\|[^|]*\b{what}\b[^|]*\| `[A-Za-z][\w.]*` \| `rtshcua/", PAGE, re.MULTILINE), what

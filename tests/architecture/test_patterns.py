@@ -45,7 +45,7 @@ def _repeated(parsed: Any) -> Iterator[bool]:
             yield from _repeated(each)
 
 
-def test_the_scan_sees_repeated_groups_and_nothing_else() -> None:
+def test_scan_finds_exactly_repeated_groups() -> None:
     seen = (r"(?:ab)*+", r"(a|b)++", r"x(?:_[0-9]++)?+", r"(?:ab){1,3}+", r"(?>(?:ab)*+)", r"[(](?:ab)*+")
     unseen = (r"(?:ab)*", r"(?>(?:ab)*)", r"[ab]*+", r"a++", r"\)*+", r".?+", r"(?:a++b)*", r"\d{2}+")
     assert [each for each in seen if not WRITTEN.search(each)] == []

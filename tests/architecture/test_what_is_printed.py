@@ -75,16 +75,16 @@ def printing(source: str) -> Iterator[str]:
         "sys.stderr.writelines(names)",
     ],
 )  # fmt: skip
-def test_every_way_to_print_is_known(way: str) -> None:
+def test_scan_finds_every_way_to_print(way: str) -> None:
     assert [*printing(f"def f():\n    {way}\n")]
 
 
 @rows("way", ["sys.stdout.isatty()", "out(name)", "sys.stdout.flush()", "isinstance(sys.stdout, TextIOWrapper)"])
-def test_what_prints_nothing_is_let_be(way: str) -> None:
+def test_scan_ignores_other_calls(way: str) -> None:
     assert not [*printing(way)]
 
 
-def test_what_is_printed_passes_one_door() -> None:
+def test_all_output_passes_the_stdout_module() -> None:
     found = {
         path.relative_to(PACKAGE).as_posix(): sorted({*printing(path.read_text(encoding="utf-8"))})
         for path in PACKAGE.rglob("*.py")

@@ -16,7 +16,7 @@ from rtshcua.virtual.judge import judge
 S = 1_000_000
 
 
-def test_a_target_that_arducopter_is_given_while_it_takes_off_is_a_takeover() -> None:
+def test_target_during_a_copter_takeoff_is_a_takeover() -> None:
     """Nothing of ours was expected to show as a target there, so a go-to was flown over when it went too high."""
     was = flown(of("ardupilot", at(7, faults.PilotGoto(0, -32_000, 17_000, 21_000))))
     assert next(each for each in was.samples if each.at_us >= 7 * S).climb_mm_s > 1_000, "it no longer climbs then"
@@ -24,7 +24,7 @@ def test_a_target_that_arducopter_is_given_while_it_takes_off_is_a_takeover() ->
 
 
 @pytest.mark.slow
-def test_a_frame_that_the_gate_held_back_as_late_is_not_taken_for_the_next_one() -> None:
+def test_frame_refused_as_late_is_not_taken_for_the_next() -> None:
     """The judge took the stop that followed for the late frame itself. The step of it is tried again."""
     was = flown(of("px4", at(26.5, faults.MessageSilence(0, "HEARTBEAT", 3 * S))))
     assert any("frame/late" in str(record(line).get("detail")) for life in was.lives for line in life.lines)
@@ -32,7 +32,7 @@ def test_a_frame_that_the_gate_held_back_as_late_is_not_taken_for_the_next_one()
 
 
 @pytest.mark.slow
-def test_what_stays_unknown_after_a_silence_is_waited_for_and_supervision_ends_as_much_later() -> None:
+def test_supervision_waits_for_fresh_state_after_a_silence() -> None:
     """The judge let a grace run on as soon as all but what was frozen at the source was fresh."""
     for_good = flown(of("px4", at(9.5, faults.Freeze(0)), at(13.2, faults.Stall(0, 5_300_000, 638))))
     assert {"fresh", "violated"} <= events(for_good)
@@ -52,14 +52,14 @@ def record(line: bytes) -> dict[str, object]:
     return found
 
 
-def test_motors_that_stop_low_in_a_takeoff_are_no_landing_before_it_lies_there() -> None:
+def test_motor_stop_low_in_a_takeoff_is_no_landing() -> None:
     """Below 3 m it counted as landed as soon as it was slow, which what rises is before it falls."""
     for kills_s in (6.3, 6.68, 7.3):
         assert slugs(flown(of("ardupilot", at(kills_s, faults.Kill(0))))) == set()
 
 
 @pytest.mark.slow
-def test_a_failsafe_of_px4_in_the_mode_that_we_fly_in_is_a_takeover() -> None:
+def test_px4_failsafe_in_the_current_mode_is_a_takeover() -> None:
     """Its fence holds it where it breaks it: in Hold, which our stop had chosen. That was noted, and flown over."""
     for lost, jump_s in (
         (at(22, faults.MessageSilence(0, "GPS_RAW_INT", 8 * S)), 27), (at(30, faults.GpsLoss(0, 4 * S)), 31),
@@ -70,7 +70,7 @@ def test_a_failsafe_of_px4_in_the_mode_that_we_fly_in_is_a_takeover() -> None:
 
 
 @pytest.mark.slow
-def test_who_stands_down_on_a_stuck_mode_is_excused() -> None:
+def test_standing_down_on_a_stuck_mode_is_excused() -> None:
     """Nothing tells it from somebody who chose the mode of before again."""
     was = flown(of("ardupilot", at(41.2, faults.MessageStuck(0, "HEARTBEAT", 4 * S))))
     assert (was.ending, slugs(was)) == ("stood-down", set())
@@ -115,7 +115,7 @@ _OFTEN = {
         if not (does is TAKEOFF and (flavour == "ardupilot" or kind == "climb"))
     ],
 )  # fmt: skip
-def test_who_takes_it_over_while_the_runtime_is_dead_is_not_flown_over(flavour: str, kind: str, does: Fault) -> None:
+def test_takeover_while_the_runtime_is_dead_is_respected(flavour: str, kind: str, does: Fault) -> None:
     """Its mode was one of ours, so the run that was begun again took it for its own."""
     at_s = FLIES[flavour, kind]
     was = flown(of(flavour, at(at_s, faults.RuntimeKilled(0, 3 * S)), at(at_s + 1, does)))
@@ -125,9 +125,7 @@ def test_who_takes_it_over_while_the_runtime_is_dead_is_not_flown_over(flavour: 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("killed_s", "taken_s", "dead_s"), [(9, 11, 6), (43, 44, 10)], ids=["climb", "hold"])
-def test_a_takeoff_that_a_pilot_chose_in_the_air_shows_once_it_is_over(
-    killed_s: int, taken_s: int, dead_s: int
-) -> None:
+def test_pilot_takeoff_in_the_air_is_detected_at_its_end(killed_s: int, taken_s: int, dead_s: int) -> None:
     """It is in Hold again, 2.5 m above where ours had been."""
     was = flown(of("px4", at(killed_s, faults.RuntimeKilled(0, dead_s * S)), at(taken_s, TAKEOFF)))
     assert next(each.mode for each in was.samples if each.at_us >= (killed_s + dead_s) * S) is FlightMode.LOITER
@@ -135,7 +133,7 @@ def test_a_takeoff_that_a_pilot_chose_in_the_air_shows_once_it_is_over(
 
 
 @pytest.mark.slow
-def test_a_pause_in_a_takeoff_shows_as_little_where_a_pilot_also_chose_the_mode_that_it_was_in() -> None:
+def test_takeoff_pause_is_excused_after_a_mode_change_without_effect() -> None:
     """ArduCopter stays in its mode then, and pauses: the judge took the mode for the takeover."""
     was = flown(of("ardupilot", at(7, faults.PilotMode(0, FlightMode.GUIDED)), at(7, PAUSE)))
     assert (was.samples[-1].taken_over_by, slugs(was)) == ("pilot", set())
@@ -143,7 +141,7 @@ def test_a_pause_in_a_takeoff_shows_as_little_where_a_pilot_also_chose_the_mode_
 
 
 @pytest.mark.slow
-def test_a_return_that_is_paused_as_it_begins_is_not_taken_for_the_hold_before_it() -> None:
+def test_paused_return_is_not_taken_for_the_previous_hold() -> None:
     """Nothing says yet that it was obeyed; the place is the hold's, but for centimetres."""
     was = flown(of("px4", at(44.58, faults.RuntimeKilled(0, 200_000)), at(44.8, PAUSE)))
     assert was.samples[-1].taken_over_by == "pilot"
@@ -158,13 +156,13 @@ def test_a_return_that_is_paused_as_it_begins_is_not_taken_for_the_hold_before_i
         for each in FLIES
     ],
 )
-def test_a_run_that_is_begun_again_brings_down_what_nobody_else_flies(flavour: str, kind: str) -> None:
+def test_restarted_run_brings_down_an_untouched_vehicle(flavour: str, kind: str) -> None:
     was = flown(of(flavour, at(FLIES[flavour, kind], faults.RuntimeKilled(0, 3 * S))))
     assert (was.ending, slugs(was), was.samples[-1].in_air) == ("aborted", set(), False)
 
 
 @pytest.mark.slow
-def test_what_gets_there_only_after_the_restart_is_not_a_takeover() -> None:
+def test_frame_that_arrives_after_the_restart_is_no_takeover() -> None:
     """The hold of the recall was still on its way when the process died: its mode showed later, as if somebody chose
     it, and it was left there.
     """
@@ -175,13 +173,13 @@ def test_what_gets_there_only_after_the_restart_is_not_a_takeover() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("flavour", "at_s"), [("px4", 38.283), ("ardupilot", 35.447)])
-def test_a_leg_that_gets_there_after_the_stop_left_is_not_a_takeover(flavour: str, at_s: float) -> None:
+def test_leg_that_arrives_after_the_stop_is_no_takeover(flavour: str, at_s: float) -> None:
     """A slow link, as radios are: the run stood down in the air, and nobody else was there."""
     was = flown(of(flavour, at(1.5, faults.LinkDelay(0, 400_000)), at(at_s, faults.Recall(0))))
     assert (was.ending, slugs(was), was.samples[-1].in_air) == ("recalled", set(), False)
 
 
-def test_a_pause_while_the_runtime_is_dead_is_seen_where_a_leg_had_ended() -> None:
+def test_pause_at_the_end_of_a_leg_without_a_runtime_is_detected() -> None:
     """Its target is decimetres from where the leg had ended."""
     was = flown(of("px4", at(11.3, faults.RuntimeKilled(0, 11 * S)), at(22.27, PAUSE)))
     assert was.samples[-1].taken_over_by == "pilot"
@@ -189,7 +187,7 @@ def test_a_pause_while_the_runtime_is_dead_is_seen_where_a_leg_had_ended() -> No
 
 
 @pytest.mark.parametrize("at_s", [17.8, 18.35])
-def test_a_pause_that_stops_it_near_the_target_of_its_leg_is_seen(at_s: float) -> None:
+def test_pause_near_the_target_of_a_leg_is_detected(at_s: float) -> None:
     """The place at which it says that it will stop is decimetres from the one that it flew to: that passed for it, also
     just after the next leg was sent.
     """
@@ -199,7 +197,7 @@ def test_a_pause_that_stops_it_near_the_target_of_its_leg_is_seen(at_s: float) -
 
 
 @pytest.mark.slow
-def test_a_pause_at_the_target_of_its_leg_is_seen_until_it_crosses_ours_for_the_next() -> None:
+def test_pause_at_the_target_of_a_leg_is_detected_until_the_next() -> None:
     """Centimetres from it: two reports before the next leg tell. After those it crosses our frame, and is excused."""
     seen = flown(of("px4", at(26.9, PAUSE)))
     assert (seen.ending, slugs(seen), judge(seen).exceptions) == ("stood-down", set(), ())
@@ -208,7 +206,7 @@ def test_a_pause_at_the_target_of_its_leg_is_seen_until_it_crosses_ours_for_the_
     assert {each.cause for each in judge(crossed).exceptions} == {"crossed"}
 
 
-def test_a_target_that_is_told_late_is_waited_for_before_a_restart_takes_the_flight_for_its_own() -> None:
+def test_restart_waits_for_a_late_target_report() -> None:
     mute = at(15.5, faults.MessageSilence(0, "POSITION_TARGET_GLOBAL_INT", 2_300_000))
     was = flown(of("px4", at(13, faults.RuntimeKilled(0, 3 * S)), at(14, GOTO), mute))
     assert (was.ending, slugs(was)) == ("stood-down", set())
@@ -220,7 +218,7 @@ def test_a_target_that_is_told_late_is_waited_for_before_a_restart_takes_the_fli
     ids=["failsafe", "pilot"],
 )
 @pytest.mark.soak  # each flies for nine minutes
-def test_a_landing_is_not_sent_again_to_a_vehicle_that_was_landed_by_others(taken: Incident) -> None:
+def test_landing_is_not_repeated_after_others_landed_the_vehicle(taken: Incident) -> None:
     """The link to it was dead, so ours had not arrived; its mode was the one that ours asks for."""
     was = flown(of("ardupilot", at(35, faults.LinkSilence(0, None, Direction.UP)), taken))
     assert (was.ending, slugs(was), was.samples[-1].in_air) == ("aborted", set(), False)
@@ -236,7 +234,7 @@ def test_a_landing_is_not_sent_again_to_a_vehicle_that_was_landed_by_others(take
         (faults.MessageStuck(0, "GPS_RAW_INT"), None),
     ],
 )
-def test_a_pause_of_px4_shows_nowhere_while_its_target_is_an_old_one(hides: Fault, cause: str | None) -> None:
+def test_px4_pause_during_a_stuck_target_is_excused(hides: Fault, cause: str | None) -> None:
     """Its mode is Hold as before. What hides the target excuses what flies over the pause, and nothing else does."""
     was = flown(of("px4", at(23, hides), at(24, PAUSE), at(24.7, faults.Recall(0))))
     motion = [each for each in judge(was).exceptions if each.slug == "motion-after-takeover"]

@@ -68,7 +68,7 @@ SHOWN: dict[str, tuple[Scenario, str]] = {
 }  # fmt: skip
 
 
-def test_a_wrong_runtime_leaves_nothing_behind() -> None:
+def test_wrong_runtime_is_undone_afterwards() -> None:
     """What a process makes once and keeps was the wrong runtime's in the flights of the right one that came after."""
     scenario, slug = SHOWN["landing-by-word"]
     before = logs(flown(scenario))
@@ -88,7 +88,7 @@ SOME = ("recall-ignored", "dispatch-unwritten", "first-link-skipped", "hover-by-
 @pytest.mark.parametrize(
     "name", [pytest.param(each, marks=[] if each in SOME else [pytest.mark.soak]) for each in BY_NAME]
 )
-def test_what_is_wrong_is_seen(name: str) -> None:
+def test_judge_detects_each_wrong_runtime(name: str) -> None:
     scenario, slug = SHOWN[name]
     assert slug in slugs(wrongly(name, scenario))
 
@@ -97,7 +97,7 @@ def test_what_is_wrong_is_seen(name: str) -> None:
 @pytest.mark.parametrize(
     "name", [pytest.param(each, marks=[] if each == "assume-not-watched" else [pytest.mark.soak]) for each in SHOWN]
 )
-def test_the_judge_is_not_mistaken_where_the_runtime_is(name: str) -> None:
+def test_judge_does_not_share_the_runtimes_defects(name: str) -> None:
     """It shares no code with it: what is wrong there while the flight is judged changes no verdict."""
     scenario, slug = SHOWN[name]
     was = wrongly(name, scenario)
@@ -107,13 +107,13 @@ def test_the_judge_is_not_mistaken_where_the_runtime_is(name: str) -> None:
 
 @pytest.mark.soak
 @pytest.mark.parametrize("name", BY_NAME)
-def test_the_right_runtime_does_not_fail_there(name: str) -> None:
+def test_correct_runtime_does_not_fail_in_these_flights(name: str) -> None:
     assert slugs(flown(SHOWN[name][0])) == set()
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize(("name", "number"), [("restart-over-pilot", 4), ("mode-not-asked", 214)])
-def test_a_campaign_that_is_aimed_at_it_finds_it(name: str, number: int) -> None:
+def test_aimed_campaign_finds_the_defect(name: str, number: int) -> None:
     flight = flight_of(
         1, number - 1, space(BY_NAME[name].aimed), CampaignTally()
     )  # of the first round, which knows nothing
@@ -131,6 +131,6 @@ def test_a_campaign_that_is_aimed_at_it_finds_it(name: str, number: int) -> None
         if each.flavour in (None, flavour)
     ],
 )
-def test_nothing_is_wrong_while_nothing_goes_wrong(name: str, flavour: str) -> None:
+def test_wrong_runtimes_complete_a_calm_flight(name: str, flavour: str) -> None:
     was = wrongly(name, calm(flavour))
     assert (was.ending, slugs(was)) == ("completed", set())

@@ -44,14 +44,16 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return script
 
 
-def test_both_answer_the_same(program: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_aarch64_boundary_answers_as_the_native_one(
+    program: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(boundary_process, "program", lambda: program)
     counts = ask_both(7, 5_000, tmp_path)
     assert decided(counts) >= 5_000
     assert min(counts[each] for each in ("dispatches", "frames", "documents accepted", "statements")) > 0, counts
 
 
-def test_the_measures_that_it_lacks_are_named(program: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_hardening_measures_are_named(program: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(boundary_process, "program", lambda: program)
     user = (65_534, 65_534) if os.geteuid() == 0 else None
     here = measures_here(user)
@@ -61,7 +63,7 @@ def test_the_measures_that_it_lacks_are_named(program: Path, monkeypatch: pytest
         assert not here & (Measure.NO_FILES | Measure.FEW_CALLS | Measure.SECRET_MEMORY)
 
 
-def test_a_flight(program: Path, ground: Any) -> None:
+def test_flight_with_the_aarch64_boundary(program: Path, ground: Any) -> None:
     start = (
         "from pathlib import Path\n"
         "from rtshcua.adapters import boundary_process\n"

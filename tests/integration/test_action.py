@@ -27,7 +27,7 @@ def workspace(tmp_path: Path) -> Path:
 
 
 @pytest.mark.slow
-def test_a_sound_project_passes_and_leaves_its_reports(run: Run, workspace: Path, tmp_path: Path) -> None:
+def test_valid_project_passes_and_writes_reports(run: Run, workspace: Path, tmp_path: Path) -> None:
     ended = run(workspace, working_directory="drones")
     assert {*ended.outcomes.values()} == {"success"}, ended.printed
     assert (tmp_path / "installed").read_text().splitlines()[-1] == str(ROOT)
@@ -41,7 +41,7 @@ def test_a_sound_project_passes_and_leaves_its_reports(run: Run, workspace: Path
 
 
 @pytest.mark.slow
-def test_what_is_wrong_is_annotated_and_each_part_runs_all_the_same(run: Run, workspace: Path) -> None:
+def test_errors_are_annotated_and_every_step_runs(run: Run, workspace: Path) -> None:
     rules = workspace / "drones/policies/rules.rts"
     text = rules.read_text(encoding="utf-8").replace("altitude <= 25 m", "altitude<=15 m")
     rules.write_text(text, encoding="utf-8")
@@ -53,7 +53,7 @@ def test_what_is_wrong_is_annotated_and_each_part_runs_all_the_same(run: Run, wo
 
 
 @pytest.mark.slow
-def test_inputs_of_the_action_are_not_run_by_the_shell(run: Run, workspace: Path) -> None:
+def test_action_inputs_are_not_executed_by_the_shell(run: Run, workspace: Path) -> None:
     hostile = "$(touch owned) `touch owned` ; touch owned #"
     ended = run(workspace, paths=hostile, fail_on=hostile, sarif=f"{hostile}.sarif", tests="false")
     assert ended.outcomes["Lint"] == "failure"

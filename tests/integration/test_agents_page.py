@@ -48,7 +48,7 @@ def of(example: str) -> Any:
 
 @pytest.mark.parametrize("altitude", ["25 m", "41 m"])
 @pytest.mark.parametrize("api", ["anthropic", "openai"])
-def test_a_call_and_its_answer(here: Path, api: str, altitude: str) -> None:
+def test_examples_of_the_page_handle_a_tool_call(here: Path, api: str, altitude: str) -> None:
     given: dict[str, Any] = {}
     spec = proposal(altitude)
     call = SimpleNamespace(type="tool_use", id="7", input=spec)

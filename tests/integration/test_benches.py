@@ -100,7 +100,7 @@ def processes(session: int) -> list[int]:
     return found
 
 
-def test_who_floods_ends_when_the_benchmark_is_killed(tmp_path: Path) -> None:
+def test_flooding_process_ends_with_its_benchmark(tmp_path: Path) -> None:
     with TemporaryFile() as out:
         bench = begun("flood", {"BLOCK_S": 60.0}, tmp_path, out, out)
         patience = monotonic() + 60

@@ -31,7 +31,7 @@ def audited(ground: Any, folder: Path) -> dict[str, Any]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-def test_over_a_link_with_a_key_it_is_the_vehicles(ground: Any, port: int, flavour: str) -> None:
+def test_signed_link_gives_the_vehicles_time(ground: Any, port: int, flavour: str) -> None:
     """The boundary verifies the vehicle's SYSTEM_TIME itself, in answer to a number that it drew."""
     key = ground.folder / "link.key"
     key.write_text("5a" * 32 + "\n")
@@ -52,7 +52,7 @@ def test_over_a_link_with_a_key_it_is_the_vehicles(ground: Any, port: int, flavo
 
 
 @pytest.mark.slow
-def test_over_a_link_without_one_nothing_flies_until_somebody_states_a_bound(ground: Any, port: int) -> None:
+def test_unsigned_link_needs_a_stated_clock_bound(ground: Any, port: int) -> None:
     bundle = ground.bundle()
     ground.vehicle(port, 1)
     where = ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07", "--mode", "process")

@@ -186,7 +186,7 @@ def arm(console: Console) -> None:
     console.see_armed(True)
 
 
-def test_it_is_flown_from_the_console(console: Console, flavour: str) -> None:
+def test_mavproxy_console_flies_the_vehicle(console: Console, flavour: str) -> None:
     px4 = flavour == "px4"
     modes = MODES[flavour]
 

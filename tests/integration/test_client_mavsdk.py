@@ -78,7 +78,7 @@ def server(options: Sequence[str], port: int) -> Iterator[str]:
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-def test_a_program_on_mavsdk_flies_it(flavour: str, port: int) -> None:
+def test_mavsdk_program_flies_the_vehicle(flavour: str, port: int) -> None:
     with server(["--flavour", flavour], port) as there, process(sys.executable, str(FLIGHT), flavour, there) as flight:
         out, _ = flight.communicate(timeout=PATIENCE_S)
     assert flight.returncode == 0, out

@@ -47,7 +47,7 @@ def until(found: Callable[[], bool], process: subprocess.Popen[str]) -> None:
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="the moment is read from /proc")
-def test_a_command_that_starts_or_works_is_ended_by_the_signal_and_says_nothing() -> None:
+def test_sigint_ends_a_command_without_output() -> None:
     words = [sys.executable, "-m", "rtshcua", "check", str(library.root() / "missions/short.rts")]
     found: dict[float, tuple[int, str, str]] = {}
     for moment_s in MOMENTS_S:
@@ -68,7 +68,7 @@ def test_a_command_that_starts_or_works_is_ended_by_the_signal_and_says_nothing(
 
 
 @pytest.mark.parametrize(("before", "after"), [("SIG_IGN", "SIG_IGN"), ("default_int_handler", "SIG_DFL")])
-def test_the_door_leaves_alone_what_whoever_starts_it_wants(
+def test_entry_point_keeps_the_callers_signal_handling(
     monkeypatch: pytest.MonkeyPatch, before: str, after: str
 ) -> None:
     """A shell starts what runs in the background with SIGINT ignored."""
@@ -85,7 +85,7 @@ def test_the_door_leaves_alone_what_whoever_starts_it_wants(
         signal.signal(signal.SIGINT, was)
 
 
-def test_what_puts_something_in_order_is_told_of_ctrl_c() -> None:
+def test_commands_with_cleanup_handle_ctrl_c() -> None:
     """Terminals whose echo is off, children, temporary folders, tables that are half written."""
     orderly = {row.name for row in COMMANDS if row.ends_in_order}
     assert orderly >= {"sim", "qualify", "archive", "verify-log", "keys", "init"}
@@ -95,7 +95,7 @@ def test_what_puts_something_in_order_is_told_of_ctrl_c() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("words", ["campaign MISSION --flights 500 --jobs 2", "witness LOGS --watch 3600"])
-def test_a_command_that_goes_on_and_on_ends_in_order_and_without_a_traceback(words: str, tmp_path: Path) -> None:
+def test_long_running_command_ends_cleanly_on_ctrl_c(words: str, tmp_path: Path) -> None:
     """While flights are flown by others, and amid an hour's wait."""
     (tmp_path / "logs").mkdir()
     environment = {
@@ -125,7 +125,7 @@ def test_a_command_that_goes_on_and_on_ends_in_order_and_without_a_traceback(wor
         assert "of 500 flights are kept in `runs/campaign-short-1`" in err
 
 
-def test_the_door_imports_nothing_of_ours_before_it_is_open() -> None:
+def test_entry_point_imports_no_own_module_first() -> None:
     code = (
         "import sys, signal; from rtshcua.front.cli.entry_point import main\n"
         "print([name for name in sys.modules if name.startswith('rtshcua.')])"

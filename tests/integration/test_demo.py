@@ -13,7 +13,7 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 
 @pytest.mark.slow
-def test_the_demo_fits_a_screen_and_ends_with_what_to_try_next(tmp_path: Path) -> None:
+def test_demo_fits_a_screen_and_ends_with_next_steps(tmp_path: Path) -> None:
     for name in ("missions", "policies", "skills", "rtshcua"):
         (tmp_path / name).symlink_to(CHECKOUT / name)
     (tmp_path / ".make").mkdir()

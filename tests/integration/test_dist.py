@@ -57,7 +57,7 @@ COMPILED = HOLDERS.keys()
 
 @pytest.mark.clients
 @pytest.mark.parametrize("anew", [False, pytest.param(True, marks=pytest.mark.soak)])
-def test_make_dist_gives_the_same_bytes_whoever_runs_it_where_and_when(tmp_path: Path, anew: bool) -> None:
+def test_make_dist_is_reproducible(tmp_path: Path, anew: bool) -> None:
     """`anew`: the other compiles the C library too."""
     one = copied(tmp_path / "one", stray=False)
     other = copied(tmp_path / "two of them", stray=True)
@@ -108,7 +108,7 @@ def packages(bill: Any) -> list[Any]:
 
 
 @pytest.mark.slow
-def test_the_bill_of_materials_has_what_the_program_is_compiled_from(bill: Any) -> None:
+def test_bill_of_materials_lists_the_compiled_sources(bill: Any) -> None:
     inside = {each["name"]: each for each in bill["components"] if each["name"] in COMPILED}
     assert inside.keys() == COMPILED
     pins = "".join((CHECKOUT / "requirements" / f"{each}.txt").read_text("utf-8") for each in ("boundary", "zig"))
@@ -126,7 +126,7 @@ def test_the_bill_of_materials_has_what_the_program_is_compiled_from(bill: Any) 
     assert head == f"// Monocypher version {inside['monocypher']['version']}"
 
 
-def test_the_bill_of_materials_has_the_versions_that_are_pinned_and_installed(bill: Any) -> None:
+def test_bill_of_materials_has_the_pinned_versions(bill: Any) -> None:
     text = (CHECKOUT / "requirements/dev.txt").read_text(encoding="utf-8").replace("\\\n", "")
     pins = [Requirement(line.split("--hash")[0]) for line in text.splitlines() if "==" in line]
     pinned = {canonicalize_name(each.name): str(each.specifier)[2:] for each in pins if applies(each)}
@@ -136,7 +136,7 @@ def test_the_bill_of_materials_has_the_versions_that_are_pinned_and_installed(bi
     assert {each["purl"] for each in packages(bill)} == {f"pkg:pypi/{name}@{it}" for name, it in listed.items()}
 
 
-def test_the_bill_of_materials_lists_what_is_needed_and_nothing_else(bill: Any) -> None:
+def test_bill_of_materials_lists_exactly_the_dependencies(bill: Any) -> None:
     names = {each["bom-ref"]: each["name"] for each in (*bill["components"], bill["metadata"]["component"])}
     edges = {names[each["ref"]]: {names[below] for below in each["dependsOn"]} for each in bill["dependencies"]}
     assert edges.keys() == {*names.values()}

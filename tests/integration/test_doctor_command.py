@@ -33,7 +33,7 @@ def doctor(*words: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.slow
-def test_a_vehicle_over_real_udp() -> None:
+def test_doctor_examines_a_vehicle_over_udp() -> None:
     port = free_port()
     with Simulator(["--port", str(port), "--flavour", "ardupilot"]):
         done = doctor("--connect", f"udpin:127.0.0.1:{port}", "--seconds", "5", "--json")
@@ -57,14 +57,14 @@ def test_a_vehicle_over_real_udp() -> None:
         (["--connect", "udpin:127.0.0.1:14550", "--agent-user", "no-such-user"], 2, "no user `no-such-user`"),
     ],
 )
-def test_wrong_words(commands: Forked, words: list[str], code: int, says: str, tmp_path: Path) -> None:
+def test_wrong_options_are_refused(commands: Forked, words: list[str], code: int, says: str, tmp_path: Path) -> None:
     done = commands.run(["doctor", *words], tmp_path, 120)
     assert done.code == code
     assert says in done.err
     assert "Traceback" not in done.err
 
 
-def test_each_measure_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_missing_hardening_measures_are_named(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """By a program that lacks it, which is a script here; and that it breaks off."""
     script = tmp_path / "boundary"
 
@@ -87,7 +87,7 @@ def test_each_measure_that_is_missing_is_named(monkeypatch: pytest.MonkeyPatch, 
         assert "did not start" in text
 
 
-def test_a_run_that_decides_in_its_own_process_is_judged_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_in_process_run_is_judged_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its boundary's process is not asked, also where its program was built."""
     for built in (Path("rtshcua-boundary"), None):
         monkeypatch.setattr(doctor_command, "program", lambda built=built: built)

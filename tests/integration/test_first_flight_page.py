@@ -29,7 +29,7 @@ def typed() -> list[str]:
     return sorted({part.strip() for line in lines for part in line.split("&&") if part.strip().startswith("rtshcua ")})
 
 
-def test_the_tethers_policy_and_mission_compile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tether_policy_and_mission_compile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     policy, mission = blocks("rts")
     (tmp_path / "policies").mkdir()
     (tmp_path / "missions").mkdir()
@@ -42,7 +42,7 @@ def test_the_tethers_policy_and_mission_compile(tmp_path: Path, monkeypatch: pyt
 
 
 @pytest.mark.slow
-def test_what_it_types_is_for_the_project_that_it_makes(commands: Forked, own_world: None, tmp_path: Path) -> None:
+def test_commands_of_the_page_fit_its_project(commands: Forked, own_world: None, tmp_path: Path) -> None:
     def typed_here(line: str, where: Path) -> str:
         done = commands.run(shlex.split(line)[1:], where, 60)
         assert done.code == 0, (line, done.out, done.err)
@@ -72,7 +72,7 @@ def test_what_it_types_is_for_the_project_that_it_makes(commands: Forked, own_wo
 
 
 @pytest.mark.parametrize("line", typed())
-def test_each_command_is_typed_as_it_is(line: str) -> None:
+def test_commands_of_the_page_run_as_written(line: str) -> None:
     _, name, *words = shlex.split(line)
     row = find(name)
     assert row is not None, name
@@ -84,7 +84,7 @@ def test_each_command_is_typed_as_it_is(line: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-def test_without_propellers_it_is_told_to_land_and_disarms(flavour: str) -> None:
+def test_bench_flight_without_propellers_lands_and_disarms(flavour: str) -> None:
     def without_propellers(vehicle: VirtualVehicle) -> None:
         body = vehicle.simulation._autopilot.vehicle
         body._lift_off = lambda: setattr(body, "_lifting_s", float("inf"))  # type: ignore[method-assign]

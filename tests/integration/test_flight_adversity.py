@@ -24,7 +24,7 @@ def closed(run: Any, ending: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [pytest.param(signal.SIGINT, marks=pytest.mark.soak), signal.SIGTERM])
-def test_a_stop_falls_back_first(ground: Any, number: signal.Signals) -> None:
+def test_interrupt_flies_the_fallback_first(ground: Any, number: signal.Signals) -> None:
     run = ground.run(ground.bundle())
     run.until("dispatched", step=1)
     run.signal(number)
@@ -34,7 +34,7 @@ def test_a_stop_falls_back_first(ground: Any, number: signal.Signals) -> None:
     assert run.dispatched()[-1] in ("return_home", "emergency_land")
 
 
-def test_a_stop_on_the_ground_sends_nothing(ground: Any) -> None:
+def test_interrupt_on_the_ground_sends_nothing(ground: Any) -> None:
     run = ground.run(ground.bundle(), "--fault", "gps-loss,at=0s")
     run.until("plan")
     run.signal(signal.SIGINT)
@@ -44,7 +44,7 @@ def test_a_stop_on_the_ground_sends_nothing(ground: Any) -> None:
 
 
 @pytest.mark.slow
-def test_three_stops_leave_the_vehicle_and_keep_the_log(ground: Any) -> None:
+def test_three_interrupts_leave_the_vehicle_and_keep_the_log(ground: Any) -> None:
     run = ground.run(ground.bundle(), speed=2)
     run.until("dispatched", step=1)
     for count in range(3):
@@ -59,7 +59,7 @@ def test_three_stops_leave_the_vehicle_and_keep_the_log(ground: Any) -> None:
 
 
 @pytest.mark.slow
-def test_a_pilot_takes_over(ground: Any) -> None:
+def test_pilot_takeover_ends_the_run(ground: Any) -> None:
     run = ground.run(ground.bundle(), "--fault", "pilot,at=15s,mode=position").end()
     assert run.code == 7
     closed(run, "stood-down")
@@ -67,7 +67,7 @@ def test_a_pilot_takes_over(ground: Any) -> None:
 
 
 @pytest.mark.soak
-def test_a_low_battery_turns_it_home(ground: Any) -> None:
+def test_low_battery_in_flight_returns_home(ground: Any) -> None:
     run = ground.run(ground.bundle(), "--fault", "battery,at=12s,level=20%").end()
     assert run.code == 6
     closed(run, "aborted")
@@ -76,7 +76,7 @@ def test_a_low_battery_turns_it_home(ground: Any) -> None:
 
 
 @pytest.mark.slow
-def test_a_low_battery_on_the_ground_is_refused_and_the_bundle_is_not_used_up(ground: Any) -> None:
+def test_low_battery_on_the_ground_keeps_the_bundle_unused(ground: Any) -> None:
     bundle = ground.bundle()
     run = ground.run(bundle, "--battery", "20").end()
     assert run.code == 5
@@ -91,7 +91,7 @@ def test_a_low_battery_on_the_ground_is_refused_and_the_bundle_is_not_used_up(gr
 
 
 @pytest.mark.soak
-def test_a_vehicle_that_goes_silent(ground: Any) -> None:
+def test_silent_vehicle_ends_the_run(ground: Any) -> None:
     """It may come back as long as it can fly; who asks for the end waits for half a minute."""
     run = ground.run(ground.bundle(), "--fault", "link-silence,at=12s")
     run.until("link-lost")
@@ -102,7 +102,7 @@ def test_a_vehicle_that_goes_silent(ground: Any) -> None:
 
 
 @pytest.mark.slow
-def test_a_simulated_vehicle_that_dies(ground: Any) -> None:
+def test_dead_simulated_vehicle_ends_the_run(ground: Any) -> None:
     run = ground.run(ground.bundle())
     run.until("dispatched", step=1)
     os.kill(run.child("rtshcua.simulation"), signal.SIGKILL)
@@ -113,7 +113,7 @@ def test_a_simulated_vehicle_that_dies(ground: Any) -> None:
 
 
 @pytest.mark.slow
-def test_a_view_that_dies_stops_nothing(ground: Any) -> None:
+def test_killed_view_does_not_stop_the_flight(ground: Any) -> None:
     run = ground.run(ground.bundle(case.low_steps(leg=False)))
     run.until("dispatched", step=1)
     os.kill(run.child("rtshcua.front.cli.render.live"), signal.SIGKILL)
@@ -122,7 +122,7 @@ def test_a_view_that_dies_stops_nothing(ground: Any) -> None:
 
 
 @pytest.mark.slow
-def test_a_view_that_is_stopped_stops_nothing(ground: Any) -> None:
+def test_stopped_view_does_not_stop_the_flight(ground: Any) -> None:
     run = ground.run(ground.bundle(case.low_steps(leg=False)))
     run.until("dispatched", step=1)
     view = run.child("rtshcua.front.cli.render.live")
@@ -177,7 +177,7 @@ class Relay(threading.Thread):
 
 
 @pytest.mark.slow
-def test_garbage_on_the_link_changes_nothing(ground: Any, port: int) -> None:
+def test_garbage_on_the_link_has_no_effect(ground: Any, port: int) -> None:
     relay = Relay(port)
     relay.start()
     ground.vehicle(relay.port, speed=3)  # slower: all the garbage is read, and what is permitted for 1.5 s must leave

@@ -36,7 +36,7 @@ mission short under training_field@2 on quad {{
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("deadline", "flavour"), each_once(DEADLINES, ("px4", "ardupilot")))
-def test_a_mission_of_each_published_deadline_compiles_and_flies(tmp_path: Path, deadline: int, flavour: str) -> None:
+def test_mission_of_each_published_deadline_flies(tmp_path: Path, deadline: int, flavour: str) -> None:
     source = tmp_path / "short.rts"
     source.write_text(MISSION.format(deadline=deadline))
     compiled, _ = compile_sources([source], mission=None, issued_at_us=case.flat.ISSUED)

@@ -102,7 +102,7 @@ def faults(tried: str) -> list[Any]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", faults("full within a line"))
-def test_a_disk_that_refuses_ends_the_mission_where_the_policy_lands(fault: Fault, tmp_path: Path) -> None:
+def test_full_disk_lands_if_the_policy_says_land(fault: Fault, tmp_path: Path) -> None:
     run = Watched(tmp_path, LAND)
     flown = run.fly(fault, 18, 40)
     assert flown.ending is Ending.EVIDENCE_LOST
@@ -115,9 +115,7 @@ def test_a_disk_that_refuses_ends_the_mission_where_the_policy_lands(fault: Faul
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", faults("defect"))
-def test_what_runs_may_finish_where_the_policy_refuses_and_then_the_contingency_flies(
-    fault: Fault, tmp_path: Path
-) -> None:
+def test_full_disk_finishes_the_step_if_the_policy_says_refuse(fault: Fault, tmp_path: Path) -> None:
     run = Watched(tmp_path, REFUSE)
     flown = run.fly(fault, 18, 40)
     assert flown.ending is Ending.EVIDENCE_LOST
@@ -131,7 +129,7 @@ def test_what_runs_may_finish_where_the_policy_refuses_and_then_the_contingency_
 
 @pytest.mark.slow
 @pytest.mark.parametrize("fault", faults("read-only"))
-def test_a_mission_goes_on_once_everything_is_recorded_again(fault: Fault, tmp_path: Path) -> None:
+def test_mission_continues_once_records_are_written(fault: Fault, tmp_path: Path) -> None:
     run = Watched(tmp_path, REFUSE)
     flown = run.fly(fault, 18, 28)
     assert flown.ending is Ending.COMPLETED
@@ -143,7 +141,7 @@ def test_a_mission_goes_on_once_everything_is_recorded_again(fault: Fault, tmp_p
 
 
 @pytest.mark.parametrize("without", [LAND, REFUSE])
-def test_on_the_ground_nothing_begins_without_its_record(without: WithoutEvidence, tmp_path: Path) -> None:
+def test_no_step_begins_on_the_ground_without_its_record(without: WithoutEvidence, tmp_path: Path) -> None:
     run = Watched(tmp_path, without)
     flown = run.fly(refuses(errno.EROFS), 0.1, 100)
     assert (flown.ending, run.skills) in (
@@ -152,9 +150,7 @@ def test_on_the_ground_nothing_begins_without_its_record(without: WithoutEvidenc
 
 
 @pytest.mark.parametrize("without", [LAND, REFUSE])
-def test_a_climb_waits_for_the_disk_and_a_sync_that_fails_withholds_it(
-    without: WithoutEvidence, tmp_path: Path
-) -> None:
+def test_climb_waits_for_a_successful_sync(without: WithoutEvidence, tmp_path: Path) -> None:
     run = Watched(tmp_path, without)
     flown = run.fly(fails_to_sync, 0.1, 100)
     assert flown.ending is Ending.EVIDENCE_LOST
@@ -164,7 +160,7 @@ def test_a_climb_waits_for_the_disk_and_a_sync_that_fails_withholds_it(
 
 
 @pytest.mark.slow
-def test_a_sync_that_fails_in_the_air_is_a_failure_for_good(tmp_path: Path) -> None:
+def test_failed_sync_in_the_air_is_permanent(tmp_path: Path) -> None:
     run = Watched(tmp_path, REFUSE)
     flown = run.fly(fails_to_sync, 18, 21)
     assert flown.ending is Ending.EVIDENCE_LOST
@@ -173,7 +169,7 @@ def test_a_sync_that_fails_in_the_air_is_a_failure_for_good(tmp_path: Path) -> N
 
 
 @pytest.mark.slow
-def test_a_disk_that_takes_a_few_bytes_at_a_time_changes_nothing(tmp_path: Path) -> None:
+def test_short_writes_have_no_effect(tmp_path: Path) -> None:
     def takes_seven(sink: DiskSink) -> None:
         sink.disk.step = 7
 
@@ -185,7 +181,7 @@ def test_a_disk_that_takes_a_few_bytes_at_a_time_changes_nothing(tmp_path: Path)
 
 
 @pytest.mark.slow
-def test_a_disk_that_hangs_for_a_while_is_noted_and_a_longer_one_is_a_failure(tmp_path: Path) -> None:
+def test_short_disk_stall_is_noted_and_a_long_one_is_a_failure(tmp_path: Path) -> None:
     flown = Watched(tmp_path, LAND).fly(hangs, 18, 23)
     assert flown.ending is Ending.COMPLETED
     (noted,) = [each for each in flown.effects("noted") if "reach the disk" in each["detail"]]
@@ -200,7 +196,7 @@ def test_a_disk_that_hangs_for_a_while_is_noted_and_a_longer_one_is_a_failure(tm
 
 
 @pytest.mark.slow
-def test_a_step_is_not_sent_while_its_record_hangs(tmp_path: Path) -> None:
+def test_step_is_not_sent_before_its_record_is_written(tmp_path: Path) -> None:
     run = Watched(tmp_path, LAND)
     flown = run.fly(hangs, 15, 60)
     assert "goto" not in run.skills
@@ -220,7 +216,7 @@ class Machine:
 
 
 @pytest.mark.slow
-def test_a_time_of_day_that_is_set_is_recorded_and_moves_no_record(tmp_path: Path) -> None:
+def test_clock_step_is_recorded_and_moves_no_record(tmp_path: Path) -> None:
     run, machine = Watched(tmp_path, LAND), Machine()
     steps = StepWatch(machine)
 
@@ -243,7 +239,7 @@ def test_a_time_of_day_that_is_set_is_recorded_and_moves_no_record(tmp_path: Pat
     verified(flown)
 
 
-def test_a_slight_difference_is_no_step() -> None:
+def test_small_clock_difference_is_no_step() -> None:
     machine = Machine()
     steps, now = StepWatch(machine), Now(0, case.flat.ISSUED, 0)
     for second in range(1, 50):

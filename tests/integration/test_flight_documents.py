@@ -75,7 +75,7 @@ def approval(flight: Flight, granted: int = 1) -> bytes:
 
 
 @pytest.mark.slow
-def test_it_waits_in_the_air_for_an_approval(low: bytes) -> None:
+def test_step_waits_in_the_air_for_an_approval(low: bytes) -> None:
     flown = fly(low, "px4", "approval/awaited", approval)
     assert flown.ending is Ending.COMPLETED
     assert flown.dispatched() == ["takeoff", "goto", "hover", "inspect_area", "return_home"]
@@ -83,7 +83,7 @@ def test_it_waits_in_the_air_for_an_approval(low: bytes) -> None:
 
 
 @pytest.mark.slow
-def test_a_refusal_brings_it_home(low: bytes) -> None:
+def test_refused_approval_returns_home(low: bytes) -> None:
     flown = fly(low, "ardupilot", "approval/awaited", lambda flight: approval(flight, 0))
     assert flown.ending is Ending.ABORTED
     assert "inspect_area" not in flown.dispatched()
@@ -91,7 +91,7 @@ def test_a_refusal_brings_it_home(low: bytes) -> None:
 
 
 @pytest.mark.slow
-def test_an_agent_replans_under_way(low: bytes, shorter: Mission) -> None:
+def test_agent_replaces_the_mission_in_flight(low: bytes, shorter: Mission) -> None:
     expected: list[Sequence[Invocation]] = []
 
     def document(flight: Flight) -> bytes:
@@ -106,7 +106,7 @@ def test_an_agent_replans_under_way(low: bytes, shorter: Mission) -> None:
     assert [[step.contract.name for step in steps] for steps in expected] == [flown.dispatched()]
 
 
-def test_what_a_new_step_waits_for_comes_within_its_deadline(low: bytes, shorter: Mission) -> None:
+def test_replacement_requests_reports_for_its_deadlines(low: bytes, shorter: Mission) -> None:
     def quick(step: Invocation) -> Invocation:
         return replace(step, contract=replace(step.contract, deadline_us=200_000))
 
@@ -119,7 +119,7 @@ def test_what_a_new_step_waits_for_comes_within_its_deadline(low: bytes, shorter
 
 
 @pytest.mark.slow
-def test_a_recall_brings_it_home_by_the_contingency(low: bytes) -> None:
+def test_recall_flies_the_contingency(low: bytes) -> None:
     def document(flight: Flight) -> bytes:
         utc_us = flight.clock.now().utc_us
         flying = flight.loaded.in_force

@@ -71,7 +71,7 @@ def flown(folder: Path, flavour: str, without: str, hover_us: int, *, battery: i
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", ["px4", pytest.param("ardupilot", marks=pytest.mark.soak)])
-def test_a_battery_that_drains_faster_than_declared_is_home_with_its_reserve(tmp_path: Path, flavour: str) -> None:
+def test_fast_draining_battery_lands_with_its_reserve(tmp_path: Path, flavour: str) -> None:
     found = flown(tmp_path, flavour, "", FAST_US)
     assert found.vehicle.simulation.truth().battery >= RESERVE
     told = [str(each) for each in found.records if "the way home is computed with the measured value" in str(each)]
@@ -80,20 +80,20 @@ def test_a_battery_that_drains_faster_than_declared_is_home_with_its_reserve(tmp
 
 
 @pytest.mark.soak
-def test_so_is_one_whose_gauge_rises_now_and_then(tmp_path: Path) -> None:
+def test_rising_gauge_lands_with_its_reserve(tmp_path: Path) -> None:
     """Its drain was never known, and it landed with half of its reserve."""
     found = flown(tmp_path, "ardupilot", "", FAST_US, gauge_rise=2)
     assert found.vehicle.simulation.truth().battery >= RESERVE
 
 
 @pytest.mark.soak
-def test_without_the_measurement_it_is_not(tmp_path: Path) -> None:
+def test_fast_draining_battery_without_measurement_loses_its_reserve(tmp_path: Path) -> None:
     """The same flight by what is declared alone: the vehicle without the signal, as a policy may say."""
     assert flown(tmp_path, "ardupilot", ", battery.drain", FAST_US).vehicle.simulation.truth().battery < RESERVE
 
 
 @pytest.mark.slow
-def test_a_battery_that_is_as_declared_finishes_its_mission(tmp_path: Path) -> None:
+def test_battery_as_declared_completes_the_mission(tmp_path: Path) -> None:
     found = flown(tmp_path, "ardupilot", "", 18 * 60 * case.S)
     assert found.ending.name == "COMPLETED"
     assert not any("computed with the measured value" in str(each) for each in found.records)
@@ -105,7 +105,7 @@ def refused(of: Flown) -> Any:
 
 
 @pytest.mark.slow
-def test_more_wind_than_declared_is_measured_by_distance_and_brings_it_home(tmp_path: Path) -> None:
+def test_strong_wind_is_measured_by_distance_and_returns_home(tmp_path: Path) -> None:
     """In 15 m/s it gets on at a third of its speed: a minute takes half as much again, a metre three times as much."""
     found = flown(tmp_path, "ardupilot", "", 18 * 60 * case.S, battery=6_000, wind=Wind(15_000, 0, 0))
     assert found.ending.name == "ABORTED"
@@ -116,7 +116,7 @@ def test_more_wind_than_declared_is_measured_by_distance_and_brings_it_home(tmp_
     assert ("a minute declared" in minute, "a km declared" in km) == (True, True)
 
 
-def test_nothing_begins_on_a_second_battery_that_is_nearly_empty_and_seldom_reported(tmp_path: Path) -> None:
+def test_empty_second_battery_prevents_the_start(tmp_path: Path) -> None:
     second = OtherBattery(Purpose.FLIGHT, 500, every_us=7 * case.S)
     found = flown(tmp_path, "px4", "", 18 * 60 * case.S, other_batteries=(second,))
     assert (found.ending.name, found.dispatched()) == ("REFUSED", [])
@@ -124,7 +124,7 @@ def test_nothing_begins_on_a_second_battery_that_is_nearly_empty_and_seldom_repo
 
 
 @pytest.mark.slow
-def test_a_second_battery_that_runs_low_brings_it_home_while_the_first_is_full(tmp_path: Path) -> None:
+def test_low_second_battery_returns_home(tmp_path: Path) -> None:
     """Of two that feed the motors the one with less counts; it is not the one with the lower number."""
     second = OtherBattery(Purpose.FLIGHT, 4_200)
     found = flown(tmp_path, "ardupilot", "", 18 * 60 * case.S, other_batteries=(second,))

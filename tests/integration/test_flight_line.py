@@ -46,7 +46,7 @@ def flies_over_serial(bundle: bytes, folder: Path, flavour: str, baud: int) -> L
 @pytest.mark.slow
 @pytest.mark.parametrize("baud", BAUDS)
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-def test_a_mission_flies_over_a_serial_line(tmp_path: Path, flavour: str, baud: int) -> None:
+def test_mission_flies_over_a_serial_line(tmp_path: Path, flavour: str, baud: int) -> None:
     flies_over_serial(BUNDLE, tmp_path, flavour, baud)
 
 
@@ -60,7 +60,7 @@ def test_every_shipped_mission_flies_over_a_serial_line(tmp_path: Path, name: st
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("flavour", "baud"), [("px4", 57_600), ("ardupilot", 57_600), ("px4", 921_600)])
-def test_deadlines_of_a_tenth_of_a_second_fly_over_a_serial_line(tmp_path: Path, flavour: str, baud: int) -> None:
+def test_short_deadlines_hold_over_a_serial_line(tmp_path: Path, flavour: str, baud: int) -> None:
     source = tmp_path / "short.rts"
     source.write_text(MISSION.format(deadline=100))
     vehicle = flies_over_serial(sealed(source), tmp_path, flavour, baud)
@@ -69,7 +69,7 @@ def test_deadlines_of_a_tenth_of_a_second_fly_over_a_serial_line(tmp_path: Path,
 
 
 @pytest.mark.slow
-def test_a_mission_flies_over_tcp() -> None:
+def test_mission_flies_over_tcp() -> None:
     with socket.socket() as server:
         server.bind(("127.0.0.1", 0))
         server.listen()

@@ -36,7 +36,7 @@ def says_why(flight: Flight, case: str) -> None:
 
 
 @pytest.mark.parametrize("case", NARROW)
-def test_a_mission_beyond_the_autopilots_own_fence_is_refused_on_the_ground_and_why_is_said(case: str) -> None:
+def test_mission_beyond_the_own_fence_is_refused_with_a_reason(case: str) -> None:
     """No waiting changes a parameter: it is not waited for until the mission is too old."""
     flight = narrow(case)
     while (ended := flight.turn()) is None:
@@ -46,7 +46,7 @@ def test_a_mission_beyond_the_autopilots_own_fence_is_refused_on_the_ground_and_
     assert not flight.vehicle.simulation.truth().armed
 
 
-def test_one_that_fits_has_taken_off_by_then() -> None:
+def test_mission_inside_the_own_fence_takes_off() -> None:
     flight = Flight(shipped("one_bridge"), simulated("ardupilot"))
     while flight.clock.elapsed_us < SETTLED_US:
         assert flight.turn() is None
@@ -60,7 +60,7 @@ WHOLE = ("a circle", "a ceiling of PX4's")
 @pytest.mark.parametrize(
     "case", [pytest.param(case, marks=() if case in WHOLE else pytest.mark.soak) for case in NARROW]
 )
-def test_a_mission_that_waits_in_vain_is_refused_and_no_fence_is_uploaded(case: str) -> None:
+def test_refused_mission_uploads_no_fence(case: str) -> None:
     flight = narrow(case)
     flown = flight.fly()
     assert flown.ending is Ending.REFUSED
@@ -76,12 +76,12 @@ def test_a_mission_that_waits_in_vain_is_refused_and_no_fence_is_uploaded(case: 
         ("ardupilot", {"FENCE_RADIUS": 20.0}, False),  # no fence is
     ],
 )
-def test_what_is_not_armed_bounds_nothing(flavour: str, parameters: dict[str, float], fence: bool) -> None:
+def test_disabled_own_fence_is_ignored(flavour: str, parameters: dict[str, float], fence: bool) -> None:
     config = simulated(flavour, parameters=tuple(parameters.items()))
     assert Flight(shipped("short"), config, fence=fence).fly().ending is Ending.COMPLETED
 
 
-def test_a_fence_that_leaves_the_mission_room_and_not_the_airspace_is_noted() -> None:
+def test_own_fence_narrower_than_the_airspace_is_noted() -> None:
     config = simulated("ardupilot", parameters=(("FENCE_RADIUS", 60.0),))
     flown = Flight(shipped("short"), config).fly()
     assert flown.ending is Ending.COMPLETED

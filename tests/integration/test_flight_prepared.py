@@ -39,7 +39,7 @@ def has(flight: Flight, names: Sequence[str]) -> dict[str, float]:
 
 
 @FLAVOURS
-def test_what_is_configured_makes_it_fly_and_is_put_back(flavour: str) -> None:
+def test_configured_parameters_are_set_and_restored(flavour: str) -> None:
     had, settings = NARROW[flavour]
     owed: dict[str, Owed] = {}
     flight = prepared(flavour, owed)
@@ -68,7 +68,7 @@ def test_what_is_configured_makes_it_fly_and_is_put_back(flavour: str) -> None:
 
 
 @FLAVOURS
-def test_without_it_the_same_mission_is_refused(flavour: str) -> None:
+def test_mission_without_prepared_parameters_is_refused(flavour: str) -> None:
     had, _ = NARROW[flavour]
     flight = Flight(shipped("short"), simulated(flavour, parameters=tuple(had.items())))
     assert flight.fly().ending is Ending.REFUSED
@@ -80,7 +80,7 @@ def test_without_it_the_same_mission_is_refused(flavour: str) -> None:
 @pytest.mark.parametrize("fault", [
     MessageSilence(at_us=S, message="PARAM_VALUE", for_us=6 * S), LinkLoss(at_us=0, loss=2_000, for_us=20 * S),
 ], ids=["no PARAM_VALUE for a while", "a fifth of all is lost"])  # fmt: skip
-def test_lost_answers_delay_it_and_spoil_nothing(flavour: str, fault: Any) -> None:
+def test_lost_parameter_answers_only_delay_the_flight(flavour: str, fault: Any) -> None:
     had, _ = NARROW[flavour]
     flight = prepared(flavour, faults=(fault,))
     assert flight.fly().ending is Ending.COMPLETED
@@ -88,7 +88,7 @@ def test_lost_answers_delay_it_and_spoil_nothing(flavour: str, fault: Any) -> No
 
 
 @FLAVOURS
-def test_what_is_never_answered_refuses_the_mission(flavour: str) -> None:
+def test_unanswered_parameter_refuses_the_mission(flavour: str) -> None:
     flight = prepared(flavour, faults=(MessageSilence(at_us=0, message="PARAM_VALUE"),))
     flown = flight.fly()
     assert flown.ending is Ending.REFUSED
@@ -97,7 +97,7 @@ def test_what_is_never_answered_refuses_the_mission(flavour: str) -> None:
 
 
 @FLAVOURS
-def test_what_is_interrupted_on_the_ground_is_put_back(flavour: str) -> None:
+def test_interrupt_on_the_ground_restores_parameters(flavour: str) -> None:
     had, _ = NARROW[flavour]
     flight = prepared(flavour)
     asked = [False]
@@ -116,7 +116,7 @@ def test_what_is_interrupted_on_the_ground_is_put_back(flavour: str) -> None:
 
 
 @FLAVOURS
-def test_what_a_run_that_died_left_is_put_back_by_the_next(flavour: str) -> None:
+def test_next_run_restores_parameters_of_a_dead_run(flavour: str) -> None:
     had, settings = NARROW[flavour]
     owed: dict[str, Owed] = {}
     first = prepared(flavour, owed)
@@ -145,7 +145,7 @@ def test_what_a_run_that_died_left_is_put_back_by_the_next(flavour: str) -> None
 
 
 @pytest.mark.parametrize("settings", [{}, {"FENCE_ALT_MAX": 90.0}], ids=["nothing is set", "something is to be set"])
-def test_what_broke_off_in_the_air_is_brought_down_by_a_run_that_cannot_record(settings: dict[str, float]) -> None:
+def test_run_that_cannot_record_still_lands_a_broken_off_flight(settings: dict[str, float]) -> None:
     owed: dict[str, Owed] = {}
     first = prepared("ardupilot", owed)
     assert first.prepare() is None
@@ -177,9 +177,7 @@ def test_what_broke_off_in_the_air_is_brought_down_by_a_run_that_cannot_record(s
     ("px4", PilotMode(at_us=20 * S), Ending.STOOD_DOWN, 1),
     ("ardupilot", Kill(at_us=20 * S), Ending.CRASHED, 0),
 ], ids=["taken over", "crashed"])  # fmt: skip
-def test_what_is_not_known_to_stand_is_left_as_it_is_and_stays_owed(
-    flavour: str, fault: Any, ending: Ending, says: int
-) -> None:
+def test_unconfirmed_parameters_stay_owed(flavour: str, fault: Any, ending: Ending, says: int) -> None:
     had, settings = NARROW[flavour]
     owed: dict[str, Owed] = {}
     flight = prepared(flavour, owed, faults=(fault,))

@@ -26,7 +26,7 @@ def records(folder: Path) -> list[dict[str, Any]]:
 
 
 @pytest.mark.slow
-def test_a_run_that_was_killed_in_the_air_comes_down_and_its_log_is_ended_by_the_next(ground: Any, port: int) -> None:
+def test_next_run_lands_a_killed_flight_and_ends_its_log(ground: Any, port: int) -> None:
     def runs() -> set[Path]:
         return set((ground.folder / "runs").iterdir())
 
@@ -69,7 +69,7 @@ def test_a_run_that_was_killed_in_the_air_comes_down_and_its_log_is_ended_by_the
 
 
 @pytest.mark.slow
-def test_a_run_whose_root_expired_while_it_was_in_the_air_comes_down_too(ground: Any, port: int) -> None:
+def test_killed_flight_with_an_expired_root_lands(ground: Any, port: int) -> None:
     """Nothing else of an expired root flies, and nobody is asked to trust the log of it."""
     ground.vehicle(port, SPEED)
     bundle, words = ground.bundle(), ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07")

@@ -101,7 +101,7 @@ WHY: dict[str, Fault] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("why", "flavour"), each_once(WHY, ["px4", "ardupilot"]))
-def test_a_return_from_behind_a_tower_leads_over_it(bundle: bytes, flavour: str, why: str) -> None:
+def test_return_from_behind_a_tower_flies_over_it(bundle: bytes, flavour: str, why: str) -> None:
     found = flown(scenario(when(AfterStep(2, 29 * case.S, 29 * case.S), WHY[why])), flavour, bundle=bundle)
     homeward = [each for each in found.samples if each.mode is FlightMode.RETURN and each.in_air]
     far = away(found)
@@ -116,7 +116,7 @@ def test_a_return_from_behind_a_tower_leads_over_it(bundle: bytes, flavour: str,
     assert hypot(*local_mm(found.policy, last.latitude, last.longitude)) < 3 * M, "it came home"
 
 
-def test_a_px4_with_a_rally_point_is_not_flown() -> None:
+def test_px4_with_a_rally_point_is_refused() -> None:
     """Its return leads to the nearest of home and rally points, and no parameter tells that there are some."""
     flight = Flight(shipped("short"), simulated("px4"))
     ground, point = Codec(255, 190), (473_980_000, 85_460_000, 20)

@@ -121,7 +121,7 @@ def lands_at_home(flavour: str, stage: str, seconds: float, way: Direction) -> N
         ("px4", "hover link", 5.0, Direction.BOTH),
     ],
 )
-def test_a_silence_lands_nothing_on_the_spot(flavour: str, stage: str, seconds: float, way: Direction) -> None:
+def test_silence_does_not_land_on_the_spot(flavour: str, stage: str, seconds: float, way: Direction) -> None:
     lands_at_home(flavour, stage, seconds, way)
 
 
@@ -163,7 +163,7 @@ def resumed(flavour: str, seconds: float) -> Flown:
         )
     ],
 )  # fmt: skip
-def test_begun_again_in_the_air_it_comes_home_and_lands_nothing_on_the_spot(flavour: str, seconds: float) -> None:
+def test_restart_in_the_air_returns_home(flavour: str, seconds: float) -> None:
     """PX4 streams all at once: what it said was judged before any of it had an age, and landed it there."""
     flown = resumed(flavour, seconds)
     truth = flown.vehicle.simulation.truth()
@@ -180,7 +180,7 @@ def test_begun_again_in_the_air_it_comes_home_and_lands_nothing_on_the_spot(flav
         for flavour, stage in product(FLAVOURS, STAGES)
     ],
 )
-def test_a_vehicle_that_never_hears_us_again_is_not_waited_for_without_an_end(flavour: str, stage: str) -> None:
+def test_deaf_vehicle_is_not_awaited_forever(flavour: str, stage: str) -> None:
     """It has no failsafe of its own for that: it does what it was told last, until its battery brings it down."""
     flown = fly(flavour, stage, 1e5, Direction.UP)
     assert flown.audit().report.verdict is LogVerdict.VERIFIED
@@ -196,7 +196,9 @@ def test_a_vehicle_that_never_hears_us_again_is_not_waited_for_without_an_end(fl
 @pytest.mark.parametrize("flavour", FLAVOURS)
 @pytest.mark.parametrize("stage", STAGES)
 @pytest.mark.parametrize(("seconds", "way"), [*product(SECONDS, Direction)])
-def test_no_silence_in_any_stage_lands_on_the_spot(flavour: str, stage: str, seconds: float, way: Direction) -> None:
+def test_silence_in_any_stage_does_not_land_on_the_spot(
+    flavour: str, stage: str, seconds: float, way: Direction
+) -> None:
     lands_at_home(flavour, stage, seconds, way)
 
 
@@ -222,7 +224,7 @@ def hovers() -> bytes:
         pytest.param("ardupilot", (20.0,), Direction.UP, marks=pytest.mark.soak),
     ],
 )
-def test_a_hover_goes_on_after_silences_that_are_longer_than_what_its_limit_leaves(
+def test_hover_continues_after_silences_beyond_its_limit(
     flavour: str, silences: tuple[float, ...], way: Direction
 ) -> None:
     flight = Flight(hovers(), simulated(flavour))

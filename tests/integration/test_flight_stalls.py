@@ -38,7 +38,7 @@ def bundle() -> bytes:
     attested=some.booleans(),
     lost=some.none() | some.integers(0, LOOKS),
 )
-def test_wherever_it_stands_still_the_log_proves_itself_and_tells_each_gap(
+def test_log_verifies_and_records_every_stall(
     stalls: dict[int, int], mode: EnforcementMode, flavour: str, attested: bool, lost: int | None
 ) -> None:
     """Two verifiers, written apart, agree (`audit`); no decision is derived otherwise, nothing is called forged. That
@@ -64,7 +64,7 @@ def test_wherever_it_stands_still_the_log_proves_itself_and_tells_each_gap(
 @pytest.mark.parametrize(
     ("for_s", "height", "flavour"), each_once((28, 44, 60), (16 * case.M, 4 * case.M), ("px4", "ardupilot"))
 )
-def test_a_vehicle_that_lands_while_nobody_reads_has_landed(for_s: int, height: int, flavour: str) -> None:
+def test_landing_during_a_stall_is_detected(for_s: int, height: int, flavour: str) -> None:
     """What waited says that it flies, what comes then that its motors are off, and maybe, as of PX4, in another mode:
     that is neither a crash nor a takeover.
     """
@@ -88,9 +88,7 @@ def test_a_vehicle_that_lands_while_nobody_reads_has_landed(for_s: int, height: 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("flavour", "at", "for_us"), [("px4", 464, 14_297_001), ("ardupilot", 427, 20_466_187)])
-def test_what_was_lost_while_nobody_read_is_waited_for_and_the_flight_goes_on(
-    flavour: str, at: int, for_us: int
-) -> None:
+def test_fresh_state_is_awaited_after_a_stall(flavour: str, at: int, for_us: int) -> None:
     """The socket keeps what was said first: the newest of it is old when the computer goes on."""
     flown = StallingFlight(bundle(), flavour, {at: for_us}).fly()
     (stood,) = flown.effects("stood-still")
@@ -102,7 +100,7 @@ def test_what_was_lost_while_nobody_read_is_waited_for_and_the_flight_goes_on(
     assert flown.audit().report.failure is None
 
 
-def test_a_gap_is_recorded_before_anything_else_and_sealed_at_once() -> None:
+def test_stall_is_recorded_first_and_sealed_at_once() -> None:
     flight = StallingFlight(bundle(), "px4", {600: 30 * case.S})
     flown = flight.fly()
     (gap,) = flown.effects("stalled")
@@ -119,7 +117,7 @@ def test_a_gap_is_recorded_before_anything_else_and_sealed_at_once() -> None:
 
 
 @pytest.mark.slow
-def test_a_flight_that_never_stands_still_tells_of_no_gap() -> None:
+def test_flight_without_stalls_records_no_gap() -> None:
     flown = StallingFlight(bundle(), "px4", {}).fly()
     assert not flown.effects("stalled")
     assert not flown.audit().report.gaps
@@ -127,7 +125,7 @@ def test_a_flight_that_never_stands_still_tells_of_no_gap() -> None:
     assert max(after - before for before, after in pairwise(times)) < TOLD_US
 
 
-def test_a_wait_for_parameters_is_sealed_as_a_flight_is() -> None:
+def test_wait_for_parameters_is_sealed() -> None:
     """What is set before a flight is waited for outside of the loop, and longer than an epoch lasts."""
     silent = MessageSilence(at_us=0, message="EXTENDED_SYS_STATE", for_us=120 * case.S)
     flown = Flight(bundle(), case.simulated("px4", faults=(silent,)), settings={"GF_ACTION": 3}).fly()
@@ -139,7 +137,7 @@ def test_a_wait_for_parameters_is_sealed_as_a_flight_is() -> None:
 
 @pytest.mark.soak
 @pytest.mark.parametrize("seed", range(1_000, 1_060))
-def test_a_mission_on_a_computer_that_stalls_is_nobody_elses(seed: int) -> None:
+def test_stall_is_no_takeover(seed: int) -> None:
     """The standard mission, with stalls of 1 to 20 s, in each third flight one soon after the other."""
     chance, flavour = Random(seed), ("px4", "ardupilot")[seed % 2]
     at, apart = chance.randrange(4_800), 60 if seed % 3 == 0 else 4_800

@@ -56,7 +56,7 @@ def flown(name: str, flavour: str) -> tuple[Flown, set[str]]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "flavour"), SOME)
-def test_what_ships_flies_on_a_stock_copter(name: str, flavour: str) -> None:
+def test_shipped_missions_fly_on_a_stock_copter(name: str, flavour: str) -> None:
     flight, said = flown(name, flavour)
     assert flight.ending is Ending.COMPLETED, flight.decisions()
     assert {outcome for _, outcome, _ in flight.decisions()} == {"allow"}

@@ -25,7 +25,7 @@ def others_in_soak(tried: tuple[str, str], *others: str) -> list[Any]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("flavour", "way"), others_in_soak(("px4", "both"), "down", "up"))
-def test_a_silence_of_some_seconds_ends_no_flight(ground: Any, flavour: str, way: str) -> None:
+def test_short_silence_does_not_end_the_flight(ground: Any, flavour: str, way: str) -> None:
     """What is only not heard of us is noted, and what is flown goes on; what is not heard is waited for."""
     direction = "" if way == "both" else f",way={way}"
     words = ("--flavour", flavour, "--fault", f"link-silence,at=14s,for=5s{direction}")
@@ -45,7 +45,7 @@ GOTO = "pilot-goto,at=14s,north=-30m,east=-30m,up=20m"
 @pytest.mark.parametrize(
     ("flavour", "fault"), others_in_soak(("ardupilot", GOTO), "pilot,at=14s,mode=position", "pilot-pause,at=14s")
 )
-def test_nothing_is_sent_after_a_takeover(ground: Any, flavour: str, fault: str) -> None:
+def test_no_frame_is_sent_after_a_takeover(ground: Any, flavour: str, fault: str) -> None:
     if flavour == "ardupilot":
         fault = fault.replace("mode=position", "mode=loiter")
         if "pause" in fault:

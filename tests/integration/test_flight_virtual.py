@@ -120,7 +120,7 @@ def test_ground_stations_hear_each_decision_and_the_log_what_the_vehicle_said(fl
 
 
 @pytest.mark.slow
-def test_equal_flights_leave_equal_logs_and_so_does_one_that_goes_on_from_a_copy() -> None:
+def test_equal_flights_leave_equal_logs() -> None:
     fault = parse_fault("battery,at=12s,level=24%")
     flight = Flight(shipped("short"), simulated("px4"))
     while flight.clock.elapsed_us < 10 * case.S:
@@ -143,7 +143,7 @@ FALLBACKS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("fault", "flavour"), each_once(FALLBACKS, FLAVOURS))
-def test_a_breach_in_flight_flies_the_chain_down(fault: str, flavour: str) -> None:
+def test_breach_in_flight_flies_the_fallback_chain(fault: str, flavour: str) -> None:
     flown = fly_on(flavour, fault)
     assert flown.ending is Ending.ABORTED
     assert flown.effects("violated")
@@ -152,7 +152,7 @@ def test_a_breach_in_flight_flies_the_chain_down(fault: str, flavour: str) -> No
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", PX4_OR_SOAK)
-def test_a_dropout_lands_nothing_and_ends_nothing(flavour: str) -> None:
+def test_link_dropout_does_not_end_the_flight(flavour: str) -> None:
     """With charge and position good after it, a silence of 5 s landed the vehicle where it was (recorded, 3 of 3)."""
     config = case.simulated(flavour, faults=(parse_fault("link-silence,at=18s,for=5s"),))
     flown = verified(Flight(case.seal(case.mission(case.short_steps())), config).fly())
@@ -166,7 +166,7 @@ PILLAR = "pillar,at=0s,north=118.5m,east=140m,radius=2m,height=28m"
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", ARDUPILOT_OR_SOAK)
-def test_a_survey_stops_before_what_stands_in_its_way(flavour: str) -> None:
+def test_survey_stops_before_an_obstacle(flavour: str) -> None:
     flown = fly_on(flavour, PILLAR)
     assert flown.dispatched() == ["takeoff", "goto", "inspect_area", "hover", "return_home"]
     (violated,) = flown.effects("violated")
@@ -182,7 +182,7 @@ JUMPED = ["takeoff", "goto", "inspect_area", "hover", "return_home", "emergency_
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", PX4_OR_SOAK)
-def test_a_jump_out_of_the_airspace_flies_the_chain_down(flavour: str) -> None:
+def test_position_jump_out_of_the_airspace_flies_the_fallback_chain(flavour: str) -> None:
     flown = fly_on(flavour, FAR_JUMP, fence=False)
     assert flown.ending is Ending.ABORTED
     assert flown.dispatched() == JUMPED
@@ -193,7 +193,7 @@ FAILSAFE = "by its own failsafe: "
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_the_autopilots_own_fence_is_a_second_line_of_defence_and_wins(flavour: str) -> None:
+def test_own_fence_of_the_autopilot_takes_over(flavour: str) -> None:
     """ArduCopter returns. PX4 holds, in the mode that it is in already: the vehicle's state is critical."""
     flown = fly_on(flavour, JUMP)
     assert flown.ending is Ending.STOOD_DOWN
@@ -214,7 +214,7 @@ TAKEN = {
 
 
 @pytest.mark.parametrize(("fault", "flavour"), each_once(TAKEN, FLAVOURS))
-def test_whoever_takes_over_wins(fault: str, flavour: str) -> None:
+def test_takeover_ends_the_run(fault: str, flavour: str) -> None:
     flown = fly_on(flavour, fault)
     assert flown.ending is Ending.STOOD_DOWN
     (taken,) = flown.effects("taken-over")
@@ -226,7 +226,7 @@ def test_whoever_takes_over_wins(fault: str, flavour: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", PX4_OR_SOAK)
-def test_vehicle_that_stays_silent_is_lost_once_it_can_fly_no_more(flavour: str) -> None:
+def test_silent_vehicle_is_lost_after_its_endurance(flavour: str) -> None:
     """This one flies for 3 minutes; what ships says 18, of which all but the beginning is silence."""
     policy, fault = case.policy(), parse_fault("link-silence,at=20s")
     policy = replace(policy, vehicle=replace(policy.vehicle, endurance_us=ENDURANCE_US))
@@ -242,7 +242,7 @@ ENDURANCE_US = 3 * case.MIN
 
 @pytest.mark.soak
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_vehicle_of_the_shipped_mission_that_stays_silent_is_lost(flavour: str) -> None:
+def test_silent_vehicle_of_the_shipped_mission_is_lost(flavour: str) -> None:
     flown = fly_on(flavour, "link-silence,at=50s")
     assert flown.ending is Ending.LINK_LOST
     assert flown.effects("link-lost")
@@ -253,7 +253,7 @@ POOR_LINKS = ("link-loss,at=5s,loss=20%", "link-delay,at=0s,delay=400ms", "gps-l
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("fault", "flavour"), each_once(POOR_LINKS, FLAVOURS))
-def test_a_poor_and_slow_link_is_survived(fault: str, flavour: str) -> None:
+def test_poor_link_is_survived(fault: str, flavour: str) -> None:
     """Up, one leg, home: each kind of command is lost, late, or lacks its fix."""
     config = case.simulated(flavour, faults=(parse_fault(fault),))
     flight = Flight(case.seal(case.mission(case.short_steps())), config)
@@ -262,13 +262,13 @@ def test_a_poor_and_slow_link_is_survived(fault: str, flavour: str) -> None:
 
 @pytest.mark.soak
 @pytest.mark.parametrize(("fault", "flavour"), [*product(POOR_LINKS, FLAVOURS)])
-def test_the_standard_mission_survives_a_poor_and_slow_link(fault: str, flavour: str) -> None:
+def test_standard_mission_survives_a_poor_link(fault: str, flavour: str) -> None:
     assert fly("standard", flavour, fault).ending is Ending.COMPLETED
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", ARDUPILOT_OR_SOAK)
-def test_a_lost_fix_stops_it_and_one_that_is_back_brings_it_home(flavour: str) -> None:
+def test_lost_fix_stops_and_recovered_fix_returns_home(flavour: str) -> None:
     """While the autopilot still vouches for the position nothing lands it on the spot."""
     flown = fly_on(flavour, "gps-loss,at=50s,for=3s")
     assert flown.ending is Ending.ABORTED
@@ -278,7 +278,7 @@ def test_a_lost_fix_stops_it_and_one_that_is_back_brings_it_home(flavour: str) -
 
 @pytest.mark.slow
 @pytest.mark.parametrize("level", ["20%", "6%"])
-def test_a_low_battery_on_the_ground_flies_nothing(level: str) -> None:
+def test_low_battery_on_the_ground_prevents_the_start(level: str) -> None:
     flown = fly("short", "px4", f"battery,at=0s,level={level}")
     assert flown.ending is Ending.REFUSED
     assert flown.dispatched() == []
@@ -286,7 +286,7 @@ def test_a_low_battery_on_the_ground_flies_nothing(level: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("at_s", [0, 1, 3, 10, 60, pytest.param(200, marks=pytest.mark.soak)])
-def test_a_stop_at_any_time_brings_it_down(at_s: int) -> None:
+def test_interrupt_at_any_time_lands(at_s: int) -> None:
     pressed = []
 
     def press(flight: Flight) -> list[Event]:
@@ -301,7 +301,7 @@ def test_a_stop_at_any_time_brings_it_down(at_s: int) -> None:
 
 
 @pytest.mark.slow
-def test_a_full_disk_brings_it_down_and_loses_no_record() -> None:
+def test_full_disk_lands_and_loses_no_record() -> None:
     def fill(flight: Flight) -> list[Event]:
         flight.sink.full = 50 * case.S < flight.clock.elapsed_us < 80 * case.S
         return []
@@ -311,7 +311,7 @@ def test_a_full_disk_brings_it_down_and_loses_no_record() -> None:
     assert flown.effects("gap")
 
 
-def test_mode_none_flies_what_would_be_refused() -> None:
+def test_mode_none_flies_refused_steps() -> None:
     flown = fly("short", "px4", "battery,at=0s,level=20%", mode=EnforcementMode.NONE)
     assert flown.decisions()[0][1] == "fallback"
     assert flown.dispatched()[0] == "takeoff"

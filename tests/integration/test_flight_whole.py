@@ -130,7 +130,7 @@ def kept(flown: Flown, folder: Path) -> Path:
 # -------------------------------------------------------------------------------------------- the flight
 
 
-def test_a_short_mission_is_flown_and_recorded(flown: Flown) -> None:
+def test_short_mission_is_flown_and_recorded(flown: Flown) -> None:
     run = flown.run
     assert run.dispatched() == ["takeoff", "goto", "return_home"]
     assert run.effects().count("succeeded") == 3
@@ -150,17 +150,17 @@ def test_summary_names_the_autopilot(watched: Flown, signed: Flown) -> None:
     assert (watched.run.summary["flavour"], signed.run.summary["flavour"]) == ("px4", "ardupilot")
 
 
-def test_each_decision_is_written_before_it_is_acted_on(flown: Flown) -> None:
+def test_decision_is_written_before_it_takes_effect(flown: Flown) -> None:
     kinds = [(r["type"], r.get("event") or r.get("outcome")) for r in flown.run.log() if r.get("step") == 1]
     assert kinds == [("decision", "allow"), *[("effect", each) for each in ("dispatched", "obeyed", "succeeded")]]
 
 
-def test_sim_ends_cleanly_after_it_served_a_run(signed: Flown) -> None:
+def test_sim_ends_cleanly_after_a_run(signed: Flown) -> None:
     (vehicle,) = signed.others
     assert vehicle.end().code == ExitCode.OK
 
 
-def test_dry_run_decides_the_mission_and_leaves_nothing_behind(watched: Flown) -> None:
+def test_dry_run_decides_the_mission_without_side_effects(watched: Flown) -> None:
     """The bundle flew after it, in the only folder of a run that there is."""
     (rehearsal,) = watched.others
     assert rehearsal.code == ExitCode.OK, rehearsal.stderr
@@ -172,7 +172,7 @@ def test_dry_run_decides_the_mission_and_leaves_nothing_behind(watched: Flown) -
     assert len(list((watched.ground.folder / "runs").iterdir())) == 1
 
 
-def test_dry_run_names_what_refuses_a_step(watched: Flown) -> None:
+def test_dry_run_names_the_reason_of_a_refusal(watched: Flown) -> None:
     poor = watched.ground.run(watched.ground.bundle(name="poor"), "--dry-run", "--battery", "30").end()
     assert poor.code == ExitCode.REFUSED
     first = poor.events[0]["steps"][0]
@@ -211,7 +211,7 @@ def test_bundle_flies_again_with_fresh_state_and_a_pipe_gets_plain_lines(watched
 # ----------------------------------------------------------------------------------------- a signed link
 
 
-def test_whoever_has_the_links_key_can_verify_each_raw_frame_and_what_signatures_promise_is_kept(
+def test_raw_frames_verify_with_the_link_key(
     signed: Flown,
 ) -> None:
     frames = [entry.frame for entry in tlog.read((signed.run.folder / "telemetry.tlog").read_bytes())]
@@ -229,9 +229,7 @@ def test_whoever_has_the_links_key_can_verify_each_raw_frame_and_what_signatures
 # ------------------------------------------------------------------------------------------- witnesses
 
 
-def test_flight_that_two_witnesses_watch_is_anchored_to_its_end(
-    commands: Forked, watched: Flown, tmp_path: Path
-) -> None:
+def test_witnessed_flight_is_anchored_to_its_end(commands: Forked, watched: Flown, tmp_path: Path) -> None:
     count = len(watched.run.log())
     assert watched.run.effects().count("anchored") >= 4
     assert audited(commands, watched.ground, watched.run.folder)["anchored"] == count
@@ -241,7 +239,7 @@ def test_flight_that_two_witnesses_watch_is_anchored_to_its_end(
     assert 0 < audited(commands, watched.ground, folder)["anchored"] < count
 
 
-def test_witness_notices_a_log_that_was_cut(watched: Flown, tmp_path: Path) -> None:
+def test_witness_detects_a_truncated_log(watched: Flown, tmp_path: Path) -> None:
     """Who holds the log's keys still cannot cut it: the witness remembers."""
     log = kept(watched, tmp_path) / "log.jsonl"
     lines = log.read_bytes().splitlines(keepends=True)
@@ -249,7 +247,7 @@ def test_witness_notices_a_log_that_was_cut(watched: Flown, tmp_path: Path) -> N
     assert watched.ground.start("witness", str(log), "--json").end().code == ExitCode.ANCHOR
 
 
-def test_flight_whose_witness_is_not_there_says_so(commands: Forked, signed: Flown) -> None:
+def test_absent_witness_is_reported(commands: Forked, signed: Flown) -> None:
     assert any("did not cosign the end of the log" in str(event) for event in signed.run.events)
     assert "anchored" not in signed.run.effects()
     assert audited(commands, signed.ground, signed.run.folder)["anchored"] == 0
@@ -260,7 +258,7 @@ def test_flight_whose_witness_is_not_there_says_so(commands: Forked, signed: Flo
 PROOFS = ("whole", "receipt", "since")
 
 
-def test_records_of_a_flight_are_proven_without_its_log(commands: Forked, watched: Flown, tmp_path: Path) -> None:
+def test_records_are_proved_without_the_log(commands: Forked, watched: Flown, tmp_path: Path) -> None:
     folder = kept(watched, tmp_path)
     records = watched.run.log()
     number = next(record["seq"] for record in records if record["type"] == "decision")
@@ -277,7 +275,7 @@ def test_records_of_a_flight_are_proven_without_its_log(commands: Forked, watche
 # ---------------------------------------------------------------------------------------- what it is made of
 
 
-def test_nothing_of_the_ground_is_loaded_on_board(watched: Flown) -> None:
+def test_run_loads_no_ground_module(watched: Flown) -> None:
     loaded = watched.modules
     ours = [name for name in loaded if name.startswith("rtshcua.")]
     assert "rtshcua.onboard.runtime.runtime" in ours

@@ -184,7 +184,7 @@ REFUSED: tuple[tuple[str, Callable[[Hostile], bytes], str], ...] = (
 
 
 @pytest.mark.slow
-def test_whatever_is_refused_changes_nothing(missions: dict[str, tuple[Mission, Policy]]) -> None:
+def test_refused_documents_have_no_effect(missions: dict[str, tuple[Mission, Policy]]) -> None:
     of = Hostile(missions, HOVERS)
 
     def play() -> Play:
@@ -201,7 +201,7 @@ def test_whatever_is_refused_changes_nothing(missions: dict[str, tuple[Mission, 
 
 
 @pytest.mark.slow
-def test_a_flood_changes_nothing_and_fills_no_disk(missions: dict[str, tuple[Mission, Policy]]) -> None:
+def test_document_flood_has_no_effect_and_fills_no_disk(missions: dict[str, tuple[Mission, Policy]]) -> None:
     of = Hostile(missions, HOVERS)
     turns: list[int] = []
 
@@ -219,7 +219,7 @@ def test_a_flood_changes_nothing_and_fills_no_disk(missions: dict[str, tuple[Mis
     assert len(flown.effects("document-refused")) <= 7
 
 
-def test_an_agent_that_stops_answering_leaves_a_flight_that_ends_by_itself(
+def test_flight_ends_without_a_silent_agent(
     missions: dict[str, tuple[Mission, Policy]],
 ) -> None:
     """What it proposed asks a person, and nobody tells anybody: the wait is bounded, then the fallback flies."""
@@ -232,9 +232,7 @@ def test_an_agent_that_stops_answering_leaves_a_flight_that_ends_by_itself(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("late_us", [0, 3 * S])
-def test_an_agent_that_answers_3_s_late_changes_what_was_not_released_and_no_more(
-    missions: dict[str, tuple[Mission, Policy]], late_us: int
-) -> None:
+def test_late_replan_changes_only_unreleased_steps(missions: dict[str, tuple[Mission, Policy]], late_us: int) -> None:
     """It meant to change the step that waits for a person; the step was approved and flies meanwhile."""
     of = Hostile(missions, INSPECTION)
 
@@ -255,7 +253,7 @@ def test_an_agent_that_answers_3_s_late_changes_what_was_not_released_and_no_mor
 
 @pytest.mark.slow
 @pytest.mark.parametrize("first", ["approval", "replan"])
-def test_a_replan_that_races_an_approval_never_flies_what_was_approved_for_other_steps(
+def test_racing_replan_cannot_use_approvals_of_other_steps(
     missions: dict[str, tuple[Mission, Policy]], first: str
 ) -> None:
     """Both in one turn, before the step's release: the person agreed to the step that is gone."""
@@ -273,9 +271,7 @@ def test_a_replan_that_races_an_approval_never_flies_what_was_approved_for_other
 
 
 @pytest.mark.parametrize("first", ["cancellation", "replan"])
-def test_a_cancellation_that_races_a_replan_ends_it_either_way(
-    missions: dict[str, tuple[Mission, Policy]], first: str
-) -> None:
+def test_cancellation_racing_a_replan_ends_the_mission(missions: dict[str, tuple[Mission, Policy]], first: str) -> None:
     of = Hostile(missions, HOVERS)
 
     def play() -> Play:
@@ -289,7 +285,7 @@ def test_a_cancellation_that_races_a_replan_ends_it_either_way(
     assert set(kinds(flown)[2:]) == {2}, "the contingency, and nothing of any mission"
 
 
-def test_nothing_that_is_played_again_after_a_cancellation_revives_the_mission(
+def test_replayed_documents_cannot_revive_a_cancelled_mission(
     missions: dict[str, tuple[Mission, Policy]],
 ) -> None:
     of = Hostile(missions, HOVERS)
@@ -309,7 +305,7 @@ def test_nothing_that_is_played_again_after_a_cancellation_revives_the_mission(
 
 
 @pytest.mark.slow
-def test_a_replan_that_is_played_again_is_refused(missions: dict[str, tuple[Mission, Policy]]) -> None:
+def test_replayed_replan_is_refused(missions: dict[str, tuple[Mission, Policy]]) -> None:
     """Also its forerunner: there is no way back to a mission that was replaced."""
     of = Hostile(missions, HOVERS)
 
@@ -327,7 +323,7 @@ def test_a_replan_that_is_played_again_is_refused(missions: dict[str, tuple[Miss
 
 
 @pytest.mark.slow
-def test_a_cancellation_on_the_way_home_disturbs_nothing(missions: dict[str, tuple[Mission, Policy]]) -> None:
+def test_cancellation_on_the_way_home_has_no_effect(missions: dict[str, tuple[Mission, Policy]]) -> None:
     of = Hostile(missions, HOVERS)
 
     def play() -> Play:
@@ -339,7 +335,7 @@ def test_a_cancellation_on_the_way_home_disturbs_nothing(missions: dict[str, tup
     assert kinds(flown) == [0] * 4, "the mission's own return goes on"
 
 
-def test_a_person_recalls_whatever_the_agent_does(missions: dict[str, tuple[Mission, Policy]]) -> None:
+def test_person_can_recall_against_the_agent(missions: dict[str, tuple[Mission, Policy]]) -> None:
     of = Hostile(missions, HOVERS)
 
     def play() -> Play:

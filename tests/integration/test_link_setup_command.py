@@ -18,7 +18,7 @@ AT = "udpin:127.0.0.1:{}"
 
 
 @pytest.mark.slow
-def test_over_real_udp(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_link_key_is_set_over_udp(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     port, path = free_port(), tmp_path / "link.key"
     with Simulator(["--port", str(port), "--flavour", "ardupilot"]):
         assert app.main(["keys", "link", str(path), "--connect", AT.format(port), "--trusted-link"]) == ExitCode.OK
@@ -46,7 +46,7 @@ SEEN = SetUp("ardupilot", 1, (4, 7, 0), False, True, True, False, ("\x1b[2Jhello
         (Refusal("no-answer", "it answers nothing"), ExitCode.LINK, "it answers nothing"),
     ],
 )
-def test_what_was_seen_is_told(
+def test_observed_result_is_reported(
     seen: SetUp | Refusal, code: ExitCode, slug: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:  # fmt: skip
@@ -60,7 +60,7 @@ def test_what_was_seen_is_told(
     assert bytes(range(32)).hex() not in told.out + told.err
 
 
-def test_what_is_refused_before_anything_is_sent(
+def test_invalid_options_are_refused_before_sending(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(link_setup.LinkSetup, "__init__", lambda *_, **__: pytest.fail("nothing is to be sent"))

@@ -22,7 +22,7 @@ def held(public: bytes) -> list[SigningKey]:
 
 
 @pytest.mark.slow
-def test_the_log_key_is_let_go_before_the_flight(ground: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_log_key_is_released_before_the_flight(ground: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     bundle = ground.bundle()
     public = ground.store.signing_key(Duty.LOG).public
     here = ground.store.signing_key(Duty.LOG)

@@ -164,7 +164,7 @@ def served(grounds: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[S
     ["", "Bearer", "Bearer {upper}", "Bearer {short}", "Basic {token}", "{token}", "Bearer {token}, Bearer {token}",
      'Bearer "{token}"', "Bearer token={token}", "Bearer {token}\x0b"],
 )  # fmt: skip
-def test_anything_but_the_token_is_refused(served: Served, value: str) -> None:
+def test_wrong_token_is_refused(served: Served, value: str) -> None:
     token = served.token
     said = value.format(token=token, upper=token.swapcase(), short=token[:-1])
     status, headers, body = served.ask(Authorization=said)
@@ -175,19 +175,19 @@ def test_anything_but_the_token_is_refused(served: Served, value: str) -> None:
 @pytest.mark.parametrize(
     "path", ["/mcp?token={}", "/mcp?access_token={}", "/mcp#{}", "/mcp/{}", "/mcp;token={}", "//x:{}@127.0.0.1/mcp"]
 )
-def test_a_token_in_the_address_is_none(served: Served, path: str) -> None:
+def test_token_in_the_address_is_refused(served: Served, path: str) -> None:
     """An address stands in histories and logs."""
     assert served.raw(served.head(f"POST {path.format(served.token)} HTTP/1.1")).startswith(b"HTTP/1.1 401")
 
 
-def test_a_token_elsewhere_or_twice_is_none(served: Served) -> None:
+def test_misplaced_or_repeated_token_is_refused(served: Served) -> None:
     assert code(served.raw(served.head("POST /mcp HTTP/1.1", f"Cookie: token={served.token}"))) == 401
     assert code(served.raw(served.head("POST /mcp HTTP/1.1", f"Proxy-{served.bearer()}"))) == 401
     assert code(served.raw(served.head("POST /mcp HTTP/1.1", served.bearer(), served.bearer()))) == 401
     assert code(served.raw(served.head("POST /mcp HTTP/1.1", served.bearer(), "Authorization: Bearer x"))) == 401
 
 
-def test_names_of_headers_and_the_scheme_have_no_case(served: Served) -> None:
+def test_header_names_and_scheme_are_case_insensitive(served: Served) -> None:
     """As RFC 9110 has it: so none that is spelled otherwise is overlooked either."""
     session = served.greeted()
     named = ("Content-Type: application/json", "Accept: application/json, text/event-stream", f"{SESSION}: {session}")
@@ -201,7 +201,7 @@ def test_names_of_headers_and_the_scheme_have_no_case(served: Served) -> None:
 
 
 @pytest.mark.parametrize("method", ["GET", "HEAD", "PUT", "DELETE", "OPTIONS", "PATCH", "TRACE", "PROPFIND", "X"])
-def test_no_method_goes_round_the_token(served: Served, method: str) -> None:
+def test_every_method_needs_the_token(served: Served, method: str) -> None:
     assert code(served.raw(served.head(f"{method} /mcp HTTP/1.1"))) == 401
 
 
@@ -209,7 +209,7 @@ def test_no_method_goes_round_the_token(served: Served, method: str) -> None:
     "path", ["/", "/mcp/", "//mcp", "/mcp/../mcp", "/MCP", "/..%2f..%2fetc/passwd", "/../../etc/passwd", "/mcp%00", "*",
              "http://evil.example/mcp", "/sse", "/messages/", "/.well-known/oauth-protected-resource"],
 )  # fmt: skip
-def test_there_is_one_place_and_who_has_no_token_is_not_told_which(served: Served, path: str) -> None:
+def test_other_paths_do_not_reveal_the_endpoint(served: Served, path: str) -> None:
     assert code(served.raw(served.head(f"GET {path} HTTP/1.1"))) == 401
     assert code(served.raw(served.head(f"GET {path} HTTP/1.1", served.bearer()))) == 404
 
@@ -222,7 +222,7 @@ def test_there_is_one_place_and_who_has_no_token_is_not_told_which(served: Serve
     ["evil.example:{}", "127.0.0.1", "127.0.0.1:1", "127.0.0.1.evil.example:{}", "localhost.:{}", "[::1]:{}",
      "0.0.0.0:{}", "2130706433:{}", "127.1:{}", "user@127.0.0.1:{}", "127.0.0.1:{}, evil.example", ""],
 )  # fmt: skip
-def test_a_name_that_was_made_to_mean_this_machine_is_refused(served: Served, host: str) -> None:
+def test_dns_rebinding_host_is_refused(served: Served, host: str) -> None:
     """DNS rebinding: the page's own name comes in Host, and with it its origin counts as the same one."""
     name = host.format(served.port)
     assert served.status(Host=name) in (400, 421)
@@ -234,11 +234,11 @@ def test_a_name_that_was_made_to_mean_this_machine_is_refused(served: Served, ho
     ["null", "https://evil.example", "http://evil.example:{}", "https://127.0.0.1:{}", "http://127.0.0.1", "file://",
      "http://127.0.0.1:{} https://evil.example", "http://127.0.0.1:{}.evil.example", "chrome-extension://abc", ""],
 )  # fmt: skip
-def test_a_page_of_elsewhere_is_refused_even_with_the_token(served: Served, origin: str) -> None:
+def test_foreign_origin_is_refused_even_with_the_token(served: Served, origin: str) -> None:
     assert served.status(Origin=origin.format(served.port)) == 403
 
 
-def test_a_preflight_allows_nothing(served: Served) -> None:
+def test_cors_preflight_allows_nothing(served: Served) -> None:
     """A browser asks first where a page wants to send a token or JSON: no answer lets it."""
     for origin in ("https://evil.example", "null", f"http://127.0.0.1:{served.port}"):
         wanted = ("Access-Control-Request-Method: POST", "Access-Control-Request-Headers: authorization, content-type")
@@ -253,7 +253,7 @@ def test_a_preflight_allows_nothing(served: Served) -> None:
 
 
 @pytest.mark.parametrize("kind", ["text/plain", "application/x-www-form-urlencoded", "multipart/form-data", ""])
-def test_what_a_page_may_send_unasked_is_not_taken(served: Served, kind: str) -> None:
+def test_simple_cors_requests_are_refused(served: Served, kind: str) -> None:
     """The kinds of body that a browser sends without a preflight."""
     assert served.status(GREETING, Content_Type=kind) in (400, 415)
 
@@ -261,7 +261,7 @@ def test_what_a_page_may_send_unasked_is_not_taken(served: Served, kind: str) ->
 # ------------------------------------------------------------------------------------------ HTTP itself
 
 
-def test_what_is_no_request_is_answered_and_hung_up_on(served: Served) -> None:
+def test_malformed_request_closes_the_connection(served: Served) -> None:
     for data in (
         b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03" + bytes(500),  # TLS
         b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n",
@@ -277,13 +277,13 @@ def test_what_is_no_request_is_answered_and_hung_up_on(served: Served) -> None:
         assert code(served.raw(data)) in (400, 401, 421, 501), data
 
 
-def test_the_old_protocol_has_to_say_who_it_asks_too(served: Served) -> None:
+def test_http_1_0_needs_a_host_header(served: Served) -> None:
     assert code(served.raw(f"POST /mcp HTTP/1.0\r\n{served.bearer()}\r\n\r\n".encode())) == 421
     answer = served.raw(served.head("POST /mcp HTTP/1.0", "Content-Length: 0"))
     assert code(answer) == 401
 
 
-def test_each_of_several_requests_at_once_needs_the_token(served: Served) -> None:
+def test_each_pipelined_request_needs_the_token(served: Served) -> None:
     """The first one has it, those behind it in the same packet do not."""
     with served.dial() as link:
         with_it = served.head("GET /other HTTP/1.1", served.bearer())
@@ -296,7 +296,7 @@ def test_each_of_several_requests_at_once_needs_the_token(served: Served) -> Non
     assert re.findall(rb"HTTP/1\.1 (\d+)", found) == [b"404", b"401", b"401"]
 
 
-def test_a_request_in_a_body_is_none(served: Served) -> None:
+def test_request_inside_a_body_is_not_executed(served: Served) -> None:
     """The body of a request that is refused is read over, whatever it looks like."""
     inner = served.head("GET /mcp HTTP/1.1", served.bearer())
     asked = served.head("POST /mcp HTTP/1.1", f"Content-Length: {len(inner)}")
@@ -309,7 +309,7 @@ def test_a_request_in_a_body_is_none(served: Served) -> None:
     assert re.findall(rb"HTTP/1\.1 (\d+)", found) == [b"401"]
 
 
-def test_a_host_that_wants_another_protocol_is_answered_as_any(served: Served) -> None:
+def test_protocol_upgrade_needs_the_token(served: Served) -> None:
     for wanted in ("websocket", "h2c"):
         asked = served.head(
             "GET /mcp HTTP/1.1", f"Upgrade: {wanted}", "Connection: Upgrade", "Sec-WebSocket-Version: 13"
@@ -318,7 +318,7 @@ def test_a_host_that_wants_another_protocol_is_answered_as_any(served: Served) -
     assert served.complaints() == b"", "whoever runs it is not written to by strangers"
 
 
-def test_headers_without_end_are_cut_off(served: Served) -> None:
+def test_endless_headers_are_cut_off(served: Served) -> None:
     with served.dial() as link:
         link.sendall(served.head()[:-2])
         sent = 0
@@ -347,7 +347,7 @@ def open_files(served: Served) -> int:
     return len(list(Path(f"/proc/{served.run.process.pid}/fd").iterdir()))
 
 
-def test_a_body_that_is_too_large_is_refused_by_what_it_says_or_is(served: Served) -> None:
+def test_oversized_body_is_refused(served: Served) -> None:
     assert served.status(b"[" * ((4 << 20) + 1)) == 413
     before = memory(served)
     for headers in ((), (served.bearer(),)):
@@ -363,7 +363,7 @@ def test_a_body_that_is_too_large_is_refused_by_what_it_says_or_is(served: Serve
     assert memory(served) - before < 24 << 20
 
 
-def test_a_length_that_is_never_sent_opens_nothing(served: Served) -> None:
+def test_unsent_body_opens_no_session(served: Served) -> None:
     for size in (5 << 20, 10**18, 10**30):
         asked = served.head("POST /mcp HTTP/1.1", served.bearer(), f"Content-Length: {size}")
         assert code(served.raw(asked)) in (400, 413)
@@ -377,7 +377,7 @@ def test_a_length_that_is_never_sent_opens_nothing(served: Served) -> None:
        for each in (b"1.5", b"null", b"true", b'"\\ud800"', b"9" * 5_000))],
     ids=range(16),
 )  # fmt: skip
-def test_what_is_no_message_opens_no_session(served: Served, body: bytes) -> None:
+def test_malformed_message_opens_no_session(served: Served, body: bytes) -> None:
     before = memory(served)
     status, headers, said = served.ask(body)
     assert status == 400
@@ -392,13 +392,13 @@ def test_what_is_no_message_opens_no_session(served: Served, body: bytes) -> Non
     assert served.complaints() == b""
 
 
-def test_several_messages_at_once_are_none(served: Served) -> None:
+def test_batched_messages_are_refused(served: Served) -> None:
     """The protocol has no batches since 2025-06-18."""
     assert served.status([GREETING, LISTED]) == 400
 
 
 @pytest.mark.slow
-def test_who_connects_and_says_nothing_does_not_keep_others_out(served: Served) -> None:
+def test_idle_connections_do_not_block_others(served: Served) -> None:
     """Twice as many as there is room for; some say a part of a request, some are refused and then go on, bit by bit."""
     session = served.greeted()
     begun, open_before = time.monotonic(), open_files(served)
@@ -437,7 +437,7 @@ def test_who_connects_and_says_nothing_does_not_keep_others_out(served: Served) 
 # ------------------------------------------------------------------------------------------ sessions
 
 
-def test_a_session_is_its_hosts_and_ends_when_it_says_so(served: Served) -> None:
+def test_session_belongs_to_its_host_and_ends_on_delete(served: Served) -> None:
     session, other = served.greeted(), served.greeted()
     assert re.fullmatch(r"[0-9a-f]{32}", session), "122 random bits: nothing to guess"
     assert session != other
@@ -454,7 +454,7 @@ def test_a_session_is_its_hosts_and_ends_when_it_says_so(served: Served) -> None
     assert served.left(other) == 200
 
 
-def test_nobody_takes_over_the_stream_of_a_session(served: Served) -> None:
+def test_session_stream_cannot_be_taken_over(served: Served) -> None:
     session = served.greeted()
     with served.dial() as link:
         link.sendall(
@@ -475,7 +475,7 @@ def test_nobody_takes_over_the_stream_of_a_session(served: Served) -> None:
             pass
 
 
-def test_sessions_are_counted_and_room_comes_back(served: Served) -> None:
+def test_number_of_sessions_is_limited(served: Served) -> None:
     opened = [served.greeted() for _ in range(8)]
     assert served.status(GREETING) == 503
     assert served.status(Mcp_Session_Id=opened[0]) == 200, "those that there are go on"

@@ -227,7 +227,7 @@ REFUSED: tuple[dict[str, Any], ...] = (
 
 
 @pytest.mark.slow
-def test_what_a_hostile_agent_calls_is_answered_and_signs_nothing(ground: Any, base: str, place: Path) -> None:
+def test_hostile_tool_calls_are_answered_and_sign_nothing(ground: Any, base: str, place: Path) -> None:
     assert len(HOSTILE) + len(REFUSED) >= 60
 
     async def work(session: ClientSession) -> None:
@@ -250,7 +250,7 @@ def test_what_a_hostile_agent_calls_is_answered_and_signs_nothing(ground: Any, b
 
 
 @pytest.mark.slow
-def test_who_subscribed_is_told_when_the_flight_changes_and_not_after(ground: Any, base: str, place: Path) -> None:
+def test_subscriber_is_notified_until_it_unsubscribes(ground: Any, base: str, place: Path) -> None:
     """A vehicle that is played by a socket: it waits, then flies, then ends."""
     updated: list[str] = []
 
@@ -294,7 +294,7 @@ def test_who_subscribed_is_told_when_the_flight_changes_and_not_after(ground: An
 
 
 @pytest.mark.slow
-def test_what_the_first_call_needs_is_loaded_before_the_host_is_greeted(ground: Any, base: str, place: Path) -> None:
+def test_modules_are_loaded_before_the_greeting(ground: Any, base: str, place: Path) -> None:
     """A call that comes with the greeting finds the compiler there, and waits for the policy alone."""
     words = ["mcp", base, "--to", str(place), "--with", str(POLICY)]
     command = [sys.executable, "-X", "importtime", "-m", "rtshcua", *words]
@@ -306,7 +306,7 @@ def test_what_the_first_call_needs_is_loaded_before_the_host_is_greeted(ground: 
     assert "rtshcua.onboard.runtime.controller" not in loaded, "nor anything that only flies"
 
 
-def test_a_key_that_may_speak_for_others_is_refused(ground: Any, base: str, place: Path) -> None:
+def test_key_with_other_roles_is_refused(ground: Any, base: str, place: Path) -> None:
     (key,) = Path(ground.environment["RTSHCUA_DATA_DIR"]).rglob("mission-operator.key")
     run = ground.start("mcp", base, "--to", str(place), "--with", str(POLICY), "--mission-key", str(key))
     out, err = run.process.communicate()
@@ -314,7 +314,7 @@ def test_a_key_that_may_speak_for_others_is_refused(ground: Any, base: str, plac
     assert b"an agent's key alone" in err
 
 
-def test_a_key_of_which_nobody_can_tell_whose_it_is_is_refused(ground: Any, base: str, place: Path) -> None:
+def test_key_without_a_trust_root_is_refused(ground: Any, base: str, place: Path) -> None:
     """Without a trust root it was taken for an agent's."""
     (key,) = Path(ground.environment["RTSHCUA_DATA_DIR"]).rglob("mission-operator.key")
     lone = ground.folder / "lone.key"
@@ -328,7 +328,7 @@ def test_a_key_of_which_nobody_can_tell_whose_it_is_is_refused(ground: Any, base
 
 
 @pytest.mark.clients
-def test_an_agent_has_a_gated_flight(ground: Any, base: str, place: Path) -> None:
+def test_agent_flies_through_the_gate(ground: Any, base: str, place: Path) -> None:
     run = ground.run(base, "--wait", "--agent-socket", str(place), speed=SPEED)
     run.until("waiting")
     progress: list[float] = []
@@ -389,7 +389,7 @@ def test_an_agent_has_a_gated_flight(ground: Any, base: str, place: Path) -> Non
 
 
 @pytest.mark.clients
-def test_an_agent_cancels_its_flight_and_the_contingency_brings_it_home(ground: Any, base: str, place: Path) -> None:
+def test_agents_cancellation_flies_the_contingency(ground: Any, base: str, place: Path) -> None:
     run = ground.run(base, "--wait", "--agent-socket", str(place), speed=SPEED)
     run.until("waiting")
 
@@ -457,7 +457,7 @@ def status_of(port: int, **headers: str) -> int:
         link.close()
 
 
-def test_over_http_who_has_the_token_is_served_and_nobody_else(ground: Any, base: str, place: Path) -> None:
+def test_http_serves_only_the_token_holder(ground: Any, base: str, place: Path) -> None:
     updated: list[str] = []
 
     async def message(what: Any) -> None:
@@ -503,7 +503,7 @@ def test_over_http_who_has_the_token_is_served_and_nobody_else(ground: Any, base
         assert status_of(port, **right, **{"Mcp-Session-Id": "0" * 32}) == 404, "a session of nobody"
 
 
-def test_a_token_that_others_may_read_serves_nobody(ground: Any, base: str, place: Path) -> None:
+def test_token_readable_by_others_is_refused(ground: Any, base: str, place: Path) -> None:
     token = ground.folder / "token"
     token.write_text("a" * 40)
     token.chmod(0o644)
@@ -518,7 +518,7 @@ def test_a_token_that_others_may_read_serves_nobody(ground: Any, base: str, plac
 
 
 @pytest.mark.clients
-def test_a_host_that_dies_in_flight_leaves_a_flight_that_ends_by_itself(ground: Any, base: str, place: Path) -> None:
+def test_flight_ends_without_a_dead_host(ground: Any, base: str, place: Path) -> None:
     """It calls a hundred tools at once, breaks off in the middle, and nobody follows the flight any more."""
     run = ground.run(base, "--wait", "--agent-socket", str(place), speed=SPEED)
     run.until("waiting")
@@ -549,7 +549,7 @@ def test_a_host_that_dies_in_flight_leaves_a_flight_that_ends_by_itself(ground: 
 
 
 @pytest.mark.clients
-def test_the_scripted_host_flies_by_the_plug_in_that_was_made(ground: Any, base: str, place: Path) -> None:
+def test_scripted_host_flies_with_the_plug_in(ground: Any, base: str, place: Path) -> None:
     """As the README has it, without a model."""
     made = ground.start("agent-bundle", "plug", "--bundle", base, "--to", str(place), "--with", str(POLICY)).process
     out, err = made.communicate()
@@ -625,7 +625,7 @@ def _called(number: int, name: str = "check_mission", **arguments: Any) -> dict[
 
 
 @pytest.mark.slow
-def test_a_host_that_cancels_a_burst_of_calls_is_served_on(ground: Any, base: str, place: Path) -> None:
+def test_host_is_served_after_cancelling_many_calls(ground: Any, base: str, place: Path) -> None:
     server = _Bare(ground, base, place)
     server.say(_called(1, mission=PROPOSAL))
     server.until(1)
@@ -638,7 +638,7 @@ def test_a_host_that_cancels_a_burst_of_calls_is_served_on(ground: Any, base: st
     assert server.end() == 0
 
 
-def test_a_line_that_is_no_message_is_answered_and_ends_nothing(ground: Any, base: str, place: Path) -> None:
+def test_malformed_line_is_answered_and_the_session_continues(ground: Any, base: str, place: Path) -> None:
     server = _Bare(ground, base, place)
     server.say(_called(2, "describe_vehicle"))
     server.until(2)

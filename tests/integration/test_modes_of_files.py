@@ -30,7 +30,7 @@ def made(folder: Path) -> dict[str, int]:
 
 
 @pytest.mark.slow
-def test_what_all_commands_make_is_written_by_its_owner_alone(
+def test_created_files_are_writable_by_the_owner_only(
     umask: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     place = tmp_path / "here"

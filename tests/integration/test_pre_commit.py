@@ -97,7 +97,7 @@ def verdicts(done: subprocess.CompletedProcess[str]) -> dict[str, str]:
     return {line[0]: line[-1].strip(".") for line in lines}
 
 
-def test_a_sound_project_passes_and_an_unsound_one_fails(place: Path, run: Commit) -> None:
+def test_hooks_pass_a_valid_project_and_fail_an_invalid_one(place: Path, run: Commit) -> None:
     done = run()
     names = [each["name"] for each in HOOKS]
     assert verdicts(done) == dict.fromkeys(names, "Passed"), done.stdout + done.stderr

@@ -29,7 +29,7 @@ def right(flavour: str) -> tuple[Qualifying, dict[str, QualificationCheck]]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_a_right_vehicle_holds_every_check(flavour: str) -> None:
+def test_correct_vehicle_passes_every_check(flavour: str) -> None:
     _, checks = right(flavour)
     failed = {
         slug: each for slug, each in checks.items() if each.outcome in (CheckOutcome.FAILED, CheckOutcome.UNCHECKED)
@@ -39,7 +39,7 @@ def test_a_right_vehicle_holds_every_check(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_it_takes_less_than_five_minutes_of_flight(flavour: str) -> None:
+def test_qualification_takes_less_than_five_minutes_of_flight(flavour: str) -> None:
     flown, _ = right(flavour)
     assert sum(each.airborne_us for each in flown.observed.sorties) < MOST_S * SECOND
     # nor does it stand about: from the first heartbeat to the last landing
@@ -56,7 +56,7 @@ def test_each_sortie_is_a_flight_with_a_log_that_verifies(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_it_measures_what_flew(flavour: str) -> None:
+def test_qualification_measures_the_flight(flavour: str) -> None:
     """The figures are the simulated vehicle's own: it flies at 5 m/s, returns at 30 m, and is silenced thrice."""
     flown, checks = right(flavour)
     assert checks["return/height"].found == pytest.approx(30_000, abs=500)
@@ -103,7 +103,7 @@ AGAIN = (
     [*WRONG, *(pytest.param(*each, marks=pytest.mark.soak) for each in AGAIN)],
     ids=lambda each: getattr(each, "__name__", each),
 )
-def test_a_wrong_vehicle_is_noticed(
+def test_wrong_vehicle_fails_its_check(
     habit: Callable[[VirtualVehicle], None], flavour: str, sortie: str, slug: str
 ) -> None:
     flown = Qualifying(flavour, habit)
@@ -113,13 +113,13 @@ def test_a_wrong_vehicle_is_noticed(
     assert flown.observed.sorties[0].down, "whatever is wrong with it, it was brought down"
 
 
-def test_a_fence_that_does_nothing_is_noticed() -> None:
+def test_ineffective_fence_fails_its_check() -> None:
     checks = {each.slug: each for each in Qualifying("px4", parameters=(("GF_ACTION", 0),)).fly([NAMED["climb"]])}
     assert checks["fence/on"].outcome == CheckOutcome.FAILED
     assert "set `GF_ACTION` to 2" in checks["fence/on"].advice
 
 
-def test_nothing_is_flown_after_a_sortie_that_did_not_go_as_planned() -> None:
+def test_failed_sortie_ends_the_qualification() -> None:
     flown = Qualifying("px4", wrong.landing_that_does_not_descend)
     checks = {each.slug: each for each in flown.fly(SORTIES)}
     assert [each.name for each in flown.observed.sorties] == ["climb"]
@@ -134,7 +134,7 @@ def lands(vehicle: VirtualVehicle, text: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_the_pilot_of_a_real_vehicle_is_asked_and_waited_for(flavour: str) -> None:
+def test_pilot_of_a_real_vehicle_is_asked_to_take_over(flavour: str) -> None:
     flown = Qualifying(flavour, pilot=lands)
     checks = {each.slug: each for each in flown.fly([BY_PILOT])}
     assert checks["takeover/mode"].outcome == CheckOutcome.HELD
@@ -144,7 +144,7 @@ def test_the_pilot_of_a_real_vehicle_is_asked_and_waited_for(flavour: str) -> No
 
 
 @pytest.mark.slow
-def test_a_pilot_who_does_not_take_over_is_told_so_and_it_comes_home() -> None:
+def test_missing_takeover_is_reported_and_returns_home() -> None:
     flown = Qualifying("px4", pilot=lambda vehicle, text: None)
     checks = {each.slug: each for each in flown.fly([BY_PILOT])}
     assert checks["takeover/mode"].outcome == CheckOutcome.FAILED
@@ -152,7 +152,7 @@ def test_a_pilot_who_does_not_take_over_is_told_so_and_it_comes_home() -> None:
     assert flown.observed.sorties[0].ending == "completed"
 
 
-def test_a_takeover_that_nobody_asked_for_ends_it() -> None:
+def test_unrequested_takeover_ends_the_qualification() -> None:
     """A pilot's abort, at whatever stage: it stands down, and no other sortie is flown."""
 
     def taken(vehicle: VirtualVehicle) -> None:
@@ -164,7 +164,7 @@ def test_a_takeover_that_nobody_asked_for_ends_it() -> None:
 
 
 @pytest.mark.slow
-def test_what_is_commanded_in_a_silence_ends_it() -> None:
+def test_fallback_ends_a_test_silence() -> None:
     """A silence is a test; a fallback is not to wait for it."""
     begun: list[int] = []
 

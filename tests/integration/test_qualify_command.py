@@ -36,7 +36,7 @@ def doctor(ground: Any, link: list[str]) -> dict[str, Any]:
 
 
 @pytest.mark.slow
-def test_a_sortie_its_record_and_who_asks_for_it(ground: Any, port: int, tmp_path: Path) -> None:
+def test_qualify_flies_a_sortie_and_writes_a_record(ground: Any, port: int, tmp_path: Path) -> None:
     link = ["--connect", f"udpin:127.0.0.1:{port}"]
     as_quad = [*link, "--vehicle", "quad-07", "--speed", str(SPEED), "--json"]
     words = [*ground.afresh, "compile", SHORT, "-o", "short.bundle"]

@@ -62,7 +62,7 @@ def made() -> Iterator[Listening]:
 
 
 @pytest.mark.slow
-def test_a_flight_of_which_the_run_has_no_key(ground: Any, made: Listening, port: int) -> None:
+def test_run_without_keys_flies_by_a_listening_boundary(ground: Any, made: Listening, port: int) -> None:
     aboard = Aboard(ground, made, port, signed=True)
     run = aboard.run()
     run.until("dispatched", step=0)
@@ -81,7 +81,7 @@ def test_a_flight_of_which_the_run_has_no_key(ground: Any, made: Listening, port
 
 
 @pytest.mark.slow
-def test_a_runtime_that_is_killed(ground: Any, made: Listening, port: int) -> None:
+def test_vehicle_of_a_killed_runtime_is_brought_down(ground: Any, made: Listening, port: int) -> None:
     """The boundary is gone at once, and the next run brings the vehicle down. The log that broke off stays open: its
     key is not here.
     """
@@ -110,7 +110,7 @@ def test_a_runtime_that_is_killed(ground: Any, made: Listening, port: int) -> No
 
 
 @pytest.mark.slow
-def test_what_is_in_the_air_comes_down_without_the_boundary(ground: Any, made: Listening, port: int) -> None:
+def test_broken_off_flight_lands_without_the_boundary(ground: Any, made: Listening, port: int) -> None:
     """Nobody can verify that log, for the log's key is drawn; nothing new flies."""
     aboard = Aboard(ground, made, port, signed=False)
     first = aboard.run()
@@ -130,9 +130,7 @@ def test_what_is_in_the_air_comes_down_without_the_boundary(ground: Any, made: L
 
 
 @pytest.mark.slow
-def test_a_vehicle_that_enforces_signing_is_not_waited_for_without_the_boundary(
-    ground: Any, made: Listening, port: int
-) -> None:
+def test_signing_vehicle_is_not_awaited_without_the_boundary(ground: Any, made: Listening, port: int) -> None:
     """Nothing that this run could send is obeyed: it ends, and one that is begun once the boundary is there does it."""
     aboard = Aboard(ground, made, port, signed=True, speed=1)  # who cannot ask it does not know that it is simulated
     first = aboard.run()
@@ -150,7 +148,7 @@ def test_a_vehicle_that_enforces_signing_is_not_waited_for_without_the_boundary(
 
 
 @pytest.mark.slow
-def test_a_boundary_that_is_killed_in_flight(ground: Any, made: Listening, port: int) -> None:
+def test_boundary_killed_in_flight_is_survived(ground: Any, made: Listening, port: int) -> None:
     """What it signed ahead brings the vehicle down, which enforces signing."""
     aboard = Aboard(ground, made, port, signed=True)
     run = aboard.run()
@@ -177,7 +175,7 @@ def away(folder: Path) -> Iterator[None]:
 
 
 @pytest.mark.slow
-def test_a_run_that_waits(ground: Any, made: Listening, port: int) -> None:
+def test_waiting_run_flies_and_recovers(ground: Any, made: Listening, port: int) -> None:
     """As the unit has it, with no key store at all: what is handed in flies; one that is killed is begun again, and
     brings the vehicle down.
     """
@@ -203,7 +201,7 @@ def test_a_run_that_waits(ground: Any, made: Listening, port: int) -> None:
 
 
 @pytest.mark.slow
-def test_what_an_earlier_run_owes_is_left_to_one_that_may_put_it_back(ground: Any, made: Listening, port: int) -> None:
+def test_owed_parameters_are_left_to_a_permitted_run(ground: Any, made: Listening, port: int) -> None:
     """This one may set nothing, and its log says so."""
     aboard = Aboard(ground, made, port, signed=False)
     owed = Path(ground.environment["RTSHCUA_DATA_DIR"]) / "state" / "parameters" / "vehicle-quad-07"
@@ -219,7 +217,7 @@ def test_what_an_earlier_run_owes_is_left_to_one_that_may_put_it_back(ground: An
     assert "prepared" not in run.effects()
 
 
-def test_keys_that_the_trust_root_does_not_name(ground: Any, made: Listening, port: int) -> None:
+def test_keys_missing_in_the_trust_root_are_refused(ground: Any, made: Listening, port: int) -> None:
     """A log that nobody could verify does not begin; neither does one without what the boundary signs."""
     assert ground.start("keys", "provision", str(made.folder), "--vehicle", "quad-07").process.wait() == 0
     made.give()
@@ -238,7 +236,7 @@ def test_keys_that_the_trust_root_does_not_name(ground: Any, made: Listening, po
 
 
 @pytest.mark.slow
-def test_the_doctor_looks_at_it_and_uses_nothing_up(ground: Any, made: Listening, port: int) -> None:
+def test_doctor_examines_the_boundary_without_side_effects(ground: Any, made: Listening, port: int) -> None:
     aboard = Aboard(ground, made, port, signed=False)
     words = ("doctor", "--connect", f"udpin:127.0.0.1:{port}", "--seconds", "3", "--json", "--boundary-socket")
     for place, verdict in ((made.socket, "ok"), (made.socket.with_name("none"), "stop")):
@@ -264,13 +262,13 @@ WRONG = [
 ]  # fmt: skip
 
 
-def test_what_does_not_go_with_it(capsys: pytest.CaptureFixture[str]) -> None:
+def test_conflicting_options_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
     for words, said in WRONG:
         assert main(["run", "b.bundle", *words]) == 2, words
         assert said in capsys.readouterr().err
 
 
-def test_provisioning_is_whole_or_nothing(ground: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_provisioning_is_atomic(ground: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "boundaries"
     words = ["keys", "provision", str(folder), "--vehicle"]
     for name in ("", ".", "..", "a/b", "/a", "a\n", "a b", "é", "a@b", ".a", "a" * 81):

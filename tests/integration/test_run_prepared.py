@@ -34,7 +34,7 @@ def owed(ground: Any) -> dict[str, list[str]]:
 
 
 @pytest.mark.slow
-def test_a_killed_run_leaves_what_the_next_puts_back(ground: Any, port: int) -> None:
+def test_next_run_restores_parameters_of_a_killed_run(ground: Any, port: int) -> None:
     def runs() -> set[Path]:
         return set((ground.folder / "runs").iterdir())
 
@@ -62,7 +62,7 @@ def test_a_killed_run_leaves_what_the_next_puts_back(ground: Any, port: int) -> 
 
 
 @pytest.mark.slow
-def test_what_a_run_that_died_on_the_ground_left_is_put_back_though_the_next_is_refused(ground: Any, port: int) -> None:
+def test_refused_run_restores_parameters_of_a_dead_run(ground: Any, port: int) -> None:
     ground.vehicle(port, SPEED, *OWNERS)
     ground.command = ground.afresh  # its view is as slow to start as it is: else it tells too late to be killed in time
     bundle, words = ground.bundle(), ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07")
@@ -80,7 +80,7 @@ def test_what_a_run_that_died_on_the_ground_left_is_put_back_though_the_next_is_
 
 
 @pytest.mark.slow
-def test_ctrl_c_on_the_ground_puts_back_what_was_set(ground: Any, port: int) -> None:
+def test_ctrl_c_on_the_ground_restores_parameters(ground: Any, port: int) -> None:
     ground.vehicle(port, SPEED, *OWNERS)
     ground.command = ground.afresh  # as above: else it flies already
     words = ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07")
@@ -94,7 +94,7 @@ def test_ctrl_c_on_the_ground_puts_back_what_was_set(ground: Any, port: int) -> 
 
 
 @pytest.mark.slow
-def test_an_agent_is_heard_and_told_while_parameters_are_set(ground: Any, port: int) -> None:
+def test_agent_is_served_while_parameters_are_set(ground: Any, port: int) -> None:
     ground.vehicle(port, SPEED, *OWNERS)
     with tempfile.TemporaryDirectory(dir="/tmp") as folder, socket.socket(socket.AF_UNIX) as link:
         path = Path(folder) / "s"

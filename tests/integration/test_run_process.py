@@ -41,7 +41,7 @@ def let_go(kept: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_flight_by_a_boundary_of_its_own(ground: Any) -> None:
+def test_flight_with_a_boundary_process(ground: Any) -> None:
     """It has the link's key: a vehicle that enforces signing obeys, and the log is what the boundary signed for. What
     a run remembers is its own, and in reach of who takes it over; the boundary remembers that the bundle flew, too.
     """
@@ -64,7 +64,7 @@ def test_a_flight_by_a_boundary_of_its_own(ground: Any) -> None:
 
 
 @pytest.mark.slow
-def test_what_is_in_the_air_comes_down_where_the_boundary_does_not_begin(ground: Any, port: int) -> None:
+def test_broken_off_flight_lands_if_the_boundary_does_not_start(ground: Any, port: int) -> None:
     """What it kept was damaged while nobody flew: nothing new flies, and what does comes down without it."""
     ground.vehicle(port, SPEED)
     words = ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07", "--mode", "process")
@@ -115,7 +115,7 @@ def modes(ground: Any) -> list[str]:
     return sorted(json.loads((run / "log.jsonl").read_bytes().splitlines()[0])["mode"] for run in folders)
 
 
-def test_a_boundary_that_hangs_ends_with_its_runtime(ground: Any, port: int) -> None:
+def test_hanging_boundary_ends_with_its_runtime(ground: Any, port: int) -> None:
     """It would keep the restart from its file, and the vehicle in the air."""
     bundle, words, boundary = halted_in_flight(ground, port, *AS)
     try:
@@ -128,7 +128,7 @@ def test_a_boundary_that_hangs_ends_with_its_runtime(ground: Any, port: int) -> 
 
 
 @pytest.mark.slow
-def test_what_is_in_the_air_comes_down_where_another_holds_the_boundarys_file(ground: Any, port: int) -> None:
+def test_broken_off_flight_lands_if_the_boundary_file_is_locked(ground: Any, port: int) -> None:
     """Whoever holds it is no run: the one before broke off, and nobody holds its log."""
     ground.vehicle(port, SPEED)
     words = ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07", "--mode", "process")
@@ -171,7 +171,7 @@ def heights(folder: Path, after_us: int) -> tuple[list[int], list[int]]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("flavour", "signed"), each_once(("px4", "ardupilot"), (False, True)))
-def test_a_boundary_that_is_killed_in_flight(flavour: str, signed: bool, ground: Any) -> None:
+def test_boundary_killed_in_flight_is_survived(flavour: str, signed: bool, ground: Any) -> None:
     """What it had signed ahead brings the vehicle down, which obeys nothing else; the log says so, and proves no more
     than it can.
     """
@@ -210,9 +210,7 @@ RESTARTS = [pytest.param(False, SPEED, id="keyless"), pytest.param(True, 1, id="
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("signed", "speed"), RESTARTS)
-def test_a_run_whose_boundary_died_with_it_comes_down_by_the_contingency(
-    signed: bool, speed: int, ground: Any, port: int
-) -> None:
+def test_run_killed_with_its_boundary_flies_the_contingency(signed: bool, speed: int, ground: Any, port: int) -> None:
     """As one in software mode does: the boundary knows the bundle, and begins no step of it."""
     key = link_key(ground) if signed else []
     ground.vehicle(port, speed, *key[:2])

@@ -36,7 +36,7 @@ def refused(capfd: Any, *words: str) -> tuple[int, str]:
 
 
 @pytest.mark.parametrize("words", [(), ("--dry-run",), ("--connect", "PORT", *IDENTITY), ("--wait",)])
-def test_a_bundle_that_expired_begins_nothing_where_the_time_is_known(
+def test_expired_bundle_is_refused(
     ground: Any, capfd: Any, port: int, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...]
 ) -> None:
     """Before a vehicle is looked for; one that is waited with says the policy alone, and may be of any age."""
@@ -51,7 +51,7 @@ def test_a_bundle_that_expired_begins_nothing_where_the_time_is_known(
     assert ("compile the mission again" in err) == (code == 5)
 
 
-def test_no_vehicle(ground: Any, capfd: Any, port: int) -> None:
+def test_missing_vehicle_is_refused(ground: Any, capfd: Any, port: int) -> None:
     code, err = refused(capfd, ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}", *IDENTITY)
     assert code == 8
     assert "no heartbeat of a vehicle" in err
@@ -59,13 +59,13 @@ def test_no_vehicle(ground: Any, capfd: Any, port: int) -> None:
     assert not (ground.folder / "runs").exists()
 
 
-def test_no_vehicle_leaves_the_bundle_unopened(ground: Any, capfd: Any, port: int) -> None:
+def test_missing_vehicle_leaves_the_bundle_unused(ground: Any, capfd: Any, port: int) -> None:
     bundle = ground.bundle()
     refused(capfd, bundle, "--connect", f"udpin:127.0.0.1:{port}", *IDENTITY)
     assert not (ground.store.folder.parent / "state" / "replay").exists()
 
 
-def test_a_busy_port(ground: Any, capfd: Any) -> None:
+def test_busy_port_is_refused(ground: Any, capfd: Any) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 0))
         busy = other.getsockname()[1]
@@ -74,7 +74,7 @@ def test_a_busy_port(ground: Any, capfd: Any) -> None:
     assert f"cannot listen at `udpin:127.0.0.1:{busy}`: address already in use" in err
 
 
-def test_a_line_that_carries_too_little(ground: Any, capfd: Any) -> None:
+def test_line_with_too_little_capacity_is_refused(ground: Any, capfd: Any) -> None:
     far, near = pty.openpty()
     code, err = refused(capfd, ground.bundle(), "--connect", f"serial:{os.ttyname(near)}:9600", *IDENTITY)
     os.close(far)
@@ -84,17 +84,17 @@ def test_a_line_that_carries_too_little(ground: Any, capfd: Any) -> None:
     assert "19200 baud would" in err
 
 
-def test_an_address_that_is_not_ours(ground: Any, capfd: Any) -> None:
+def test_foreign_address_is_refused(ground: Any, capfd: Any) -> None:
     assert refused(capfd, ground.bundle(), "--connect", "udpin:203.0.113.7:14550", *IDENTITY)[0] == 8
 
 
 @pytest.mark.parametrize("text", ["udpin:127.0.0.1", "14550", "udpin:host:99999", "tcp:a:b", "serial:ttyS0:57600"])
-def test_an_address_that_is_none(ground: Any, capfd: Any, text: str) -> None:
+def test_malformed_address_is_refused(ground: Any, capfd: Any, text: str) -> None:
     assert refused(capfd, ground.bundle(), "--connect", text, *IDENTITY)[0] == 2
 
 
 @pytest.mark.slow
-def test_a_bundle_with_any_changed_byte_is_refused(ground: Any, capfd: Any) -> None:
+def test_changed_bundle_is_refused(ground: Any, capfd: Any) -> None:
     bundle = ground.bundle()
     good = Path(bundle).read_bytes()
     chance = Random(11)
@@ -108,19 +108,19 @@ def test_a_bundle_with_any_changed_byte_is_refused(ground: Any, capfd: Any) -> N
 
 
 @pytest.mark.parametrize("data", [b"", b"\0" * 5_000, b"mission m {}\n", bytes(range(256)) * 9], ids=len)
-def test_what_is_no_bundle_is_malformed(ground: Any, capfd: Any, data: bytes) -> None:
+def test_other_file_is_malformed(ground: Any, capfd: Any, data: bytes) -> None:
     Path("no.bundle").write_bytes(data)
     assert refused(capfd, "no.bundle")[0] == 3
 
 
-def test_a_truncated_bundle_is_malformed(ground: Any, capfd: Any) -> None:
+def test_truncated_bundle_is_malformed(ground: Any, capfd: Any) -> None:
     good = Path(ground.bundle()).read_bytes()
     for length in range(1, len(good), len(good) // 17):
         Path("cut.bundle").write_bytes(good[:length])
         assert refused(capfd, "cut.bundle")[0] == 3
 
 
-def test_a_source_is_not_flown_but_compiled(ground: Any, capfd: Any) -> None:
+def test_source_is_refused_with_the_compile_command(ground: Any, capfd: Any) -> None:
     Path("m.rts").write_text("mission m {}\n")
     code, err = refused(capfd, "m.rts")
     assert code == 3
@@ -128,24 +128,24 @@ def test_a_source_is_not_flown_but_compiled(ground: Any, capfd: Any) -> None:
     assert "`rtshcua compile m.rts -o m.bundle`" in err
 
 
-def test_a_missing_bundle(ground: Any, capfd: Any) -> None:
+def test_missing_bundle_is_refused(ground: Any, capfd: Any) -> None:
     code, err = refused(capfd, "none.bundle")
     assert (code, err) == (3, "error[input]: no such file or directory: `none.bundle`\n")
 
 
-def test_another_vehicle(ground: Any, capfd: Any) -> None:
+def test_bundle_for_another_vehicle_is_refused(ground: Any, capfd: Any) -> None:
     code, err = refused(capfd, ground.bundle(), "--vehicle", "quad-08")
     assert code == 5
     assert "`quad-08`" in err
 
 
-def test_mode_none_with_another_vehicle(ground: Any, capfd: Any, port: int) -> None:
+def test_mode_none_refuses_a_connected_vehicle(ground: Any, capfd: Any, port: int) -> None:
     code, err = refused(capfd, ground.bundle(), "--mode", "none", "--connect", f"udpin:127.0.0.1:{port}", *IDENTITY)
     assert code == 5
     assert "mode `none`" in err
 
 
-def test_options_that_do_not_go_together(ground: Any, capfd: Any) -> None:
+def test_conflicting_options_are_refused(ground: Any, capfd: Any) -> None:
     for words in (
         ["--connect", "udpin:127.0.0.1:14550", *IDENTITY, "--battery", "50"],
         ["--connect", "udpin:127.0.0.1:14550", *IDENTITY, "--fresh-state"],
@@ -161,7 +161,7 @@ def test_options_that_do_not_go_together(ground: Any, capfd: Any) -> None:
         assert refused(capfd, ground.bundle(), *words)[0] == 2, words
 
 
-def test_no_keys(ground: Any, capfd: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_keys_are_refused(ground: Any, capfd: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     bundle = ground.bundle()
     monkeypatch.setenv("RTSHCUA_DATA_DIR", str(ground.folder / "nobody"))
     code, err = refused(capfd, bundle)
@@ -169,19 +169,21 @@ def test_no_keys(ground: Any, capfd: Any, monkeypatch: pytest.MonkeyPatch) -> No
     assert "rtshcua keys init" in err
 
 
-def test_a_simulated_vehicle_that_cannot_start(ground: Any, capfd: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_simulated_vehicle_that_cannot_start_is_reported(
+    ground: Any, capfd: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("rtshcua.adapters.simulator._MODULE", "rtshcua.no_such_module")
     code, err = refused(capfd, ground.bundle())
     assert code == 8
     assert "the simulated vehicle did not start: " in err
 
 
-def test_another_vehicle_is_to_be_named(ground: Any, capfd: Any, port: int) -> None:
+def test_connected_vehicle_must_be_named(ground: Any, capfd: Any, port: int) -> None:
     code, err = refused(capfd, ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}")
     assert code == 2
     assert "`--connect` needs `--vehicle`" in err
 
 
-def test_a_bundle_for_another_vehicle_than_the_one_connected(ground: Any, capfd: Any, port: int) -> None:
+def test_bundle_for_another_connected_vehicle_is_refused(ground: Any, capfd: Any, port: int) -> None:
     code, _ = refused(capfd, ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-08")
     assert code == 5

@@ -22,9 +22,7 @@ scenario "somebody else flies" {
 """
 
 
-def test_a_scenario_happens_in_a_run_and_what_it_expects_is_told(
-    ground: Any, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_run_applies_a_scenario_and_reports_its_expectations(ground: Any, capsys: pytest.CaptureFixture[str]) -> None:
     (ground.folder / "field.rts").write_text(FIELD.read_text())
     (ground.folder / "flights.rts").write_text(SOURCE)
     made = ground.folder / "field.bundle"

@@ -15,7 +15,7 @@ STOPPED_S = 60
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("flavour", "mode"), each_once(("px4", "ardupilot"), ("software", "process")))
-def test_a_run_that_was_stopped_tells_of_a_gap_and_its_log_verifies(ground: Any, flavour: str, mode: str) -> None:
+def test_stopped_run_records_a_gap_in_a_valid_log(ground: Any, flavour: str, mode: str) -> None:
     """The case: stopped in flight; the seal comes late, and nobody is accused. What `run` calls whole verifies."""
     run = ground.run(ground.bundle(), "--mode", mode, "--flavour", flavour, speed=SPEED)
     run.until("dispatched", step=1)
@@ -41,7 +41,7 @@ def test_a_run_that_was_stopped_tells_of_a_gap_and_its_log_verifies(ground: Any,
 
 
 @pytest.mark.slow
-def test_a_log_that_does_not_verify_is_not_called_whole(ground: Any) -> None:
+def test_altered_log_is_reported(ground: Any) -> None:
     """Something altered the log while it flew: a defect card does. The run reads it back before it vouches for it."""
     run = ground.run(ground.bundle(), speed=SPEED)
     run.until("dispatched", step=1)

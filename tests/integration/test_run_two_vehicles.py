@@ -22,7 +22,7 @@ def both(port: int) -> Iterator[list[str]]:
 
 
 @pytest.mark.slow
-def test_neither_is_flown(ground: Any, both: list[str]) -> None:
+def test_two_vehicles_on_a_link_are_refused(ground: Any, both: list[str]) -> None:
     run = ground.run(ground.bundle(), *both, "--vehicle", case.policy().vehicle.identity, speed=10).end()
     assert run.code == 5, run.stderr
     assert run.events[-1]["slug"] == "two-vehicles"
@@ -34,7 +34,7 @@ def test_neither_is_flown(ground: Any, both: list[str]) -> None:
 
 
 @pytest.mark.slow
-def test_the_one_that_is_named_is_met(ground: Any, both: list[str]) -> None:
+def test_vehicle_named_by_system_id_is_chosen(ground: Any, both: list[str]) -> None:
     words = [*both, "--vehicle", case.policy().vehicle.identity, "--system", "2", "--dry-run"]
     run = ground.run(ground.bundle(), *words, speed=10).end()
     assert run.code == 0, run.stderr

@@ -29,7 +29,7 @@ def place() -> Iterator[Path]:
 
 
 @pytest.mark.slow
-def test_what_is_handed_in_flies_once(ground: Any, place: Path) -> None:
+def test_submitted_bundle_flies_once(ground: Any, place: Path) -> None:
     words = ("--wait", "--agent-socket", str(place), *APART)
     key = ground.folder / "link.key"
     key.write_text("5a" * 32 + "\n")
@@ -71,9 +71,7 @@ def test_ctrl_c_ends_the_wait(ground: Any, place: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_flight_that_broke_off_is_brought_down_by_the_wait_that_is_begun_again(
-    ground: Any, place: Path, port: int
-) -> None:
+def test_restarted_wait_lands_a_broken_off_flight(ground: Any, place: Path, port: int) -> None:
     """It waited, and the vehicle hung in the air. It comes down whatever has expired since."""
     ground.vehicle(port, SPEED)
     words = ("--wait", "--agent-socket", str(place), "--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07")

@@ -72,7 +72,7 @@ def module(folder: Path) -> Path:
     return found
 
 
-def test_it_shows_how_far_it_is_and_is_quiet_when_all_is_there(project: Path) -> None:
+def test_setup_shows_progress_and_is_quiet_when_complete(project: Path) -> None:
     (project / ".venv" / "ready").unlink()
     said = setup(project)
     assert ".venv is half-made" in said
@@ -81,7 +81,7 @@ def test_it_shows_how_far_it_is_and_is_quiet_when_all_is_there(project: Path) ->
     assert setup(project) == ""
 
 
-def test_what_somebody_added_is_no_damage(project: Path) -> None:
+def test_added_file_is_no_damage(project: Path) -> None:
     added = module(project).parent / "mine.py"
     added.write_text("")
     (module(project).parent / "__pycache__").mkdir(exist_ok=True)
@@ -89,7 +89,7 @@ def test_what_somebody_added_is_no_damage(project: Path) -> None:
     assert added.exists()
 
 
-def test_a_file_that_was_cut_short_is_noticed_and_so_is_a_list_that_is_gone(project: Path) -> None:
+def test_truncated_file_and_missing_list_are_detected(project: Path) -> None:
     check = [sys.executable, "-I", "-S", ".make/whole", "check"]
     before = module(project).read_text()
     module(project).write_text("")
@@ -105,7 +105,7 @@ def test_a_file_that_was_cut_short_is_noticed_and_so_is_a_list_that_is_gone(proj
 
 
 @pytest.mark.parametrize("how", ["gone", "python"])
-def test_what_broke_is_named_and_mended(project: Path, how: str) -> None:
+def test_damage_is_named_and_repaired(project: Path, how: str) -> None:
     match how:
         case "gone":
             module(project).unlink()

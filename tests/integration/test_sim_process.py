@@ -82,7 +82,7 @@ def close_to(value: float, target: float, by: float) -> bool:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-def test_it_flies_out_and_home(flavour: str) -> None:
+def test_simulated_vehicle_flies_out_and_home(flavour: str) -> None:
     with Station("--flavour", flavour, "--speed", "40", "--wind", "4,270,1", "--cruise", "8") as s:
         px4 = flavour == "px4"
         s.until(lambda _: True, "HEARTBEAT")
@@ -123,13 +123,13 @@ def test_it_flies_out_and_home(flavour: str) -> None:
         assert close_to(where.relative_alt, 0, 300)
 
 
-def test_first_heartbeat_comes_soon() -> None:
+def test_first_heartbeat_is_sent_at_once() -> None:
     with Station() as s:
         s.until(lambda _: True, "HEARTBEAT")
         assert time.monotonic() - s.started < 5
 
 
-def test_ready_line() -> None:
+def test_ready_line_is_json() -> None:
     with Station("--flavour", "ardupilot", "--system", "7", "--speed", "2") as s:
         assert s.ready["event"] == "ready"
         assert (s.ready["flavour"], s.ready["system"], s.ready["speed"]) == ("ardupilot", 7, 2.0)
@@ -140,7 +140,7 @@ def test_ready_line() -> None:
         )  # the radio is a system of its own
 
 
-def test_its_parent_lets_something_go_wrong() -> None:
+def test_parent_can_inject_faults() -> None:
     with Station("--speed", "20") as s:
         assert s.process.stdin is not None
         s.process.stdin.write(b"rain,at=0s\nbattery,at=0s,lev")
@@ -155,7 +155,7 @@ def test_its_parent_lets_something_go_wrong() -> None:
         assert b"no such fault: `rain`" in s.process.stderr.read()
 
 
-def test_it_ends_when_its_parent_is_gone() -> None:
+def test_process_ends_with_its_parent() -> None:
     with Station() as s:
         assert s.process.stdin is not None
         s.process.stdin.close()
@@ -163,7 +163,7 @@ def test_it_ends_when_its_parent_is_gone() -> None:
         assert s.process.wait(PATIENCE_S) == EXIT_OK
 
 
-def test_it_ends_on_sigterm_and_not_on_the_terminals_ctrl_c() -> None:
+def test_process_ends_on_sigterm_but_not_on_ctrl_c() -> None:
     with Station("--speed", "20") as s:
         s.process.send_signal(signal.SIGINT)
         s.until(lambda m: m.time_boot_ms > 3_000, "GLOBAL_POSITION_INT")
@@ -171,7 +171,7 @@ def test_it_ends_on_sigterm_and_not_on_the_terminals_ctrl_c() -> None:
         assert s.process.wait(PATIENCE_S) == EXIT_OK
 
 
-def test_it_hears_only_its_peer_and_survives_garbage() -> None:
+def test_only_the_peer_is_heard_and_garbage_is_survived() -> None:
     chance = Random(9)
     with Station("--speed", "20") as s, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
         s.until(lambda m: m.fix_type >= 3, "GPS_RAW_INT")
@@ -190,7 +190,7 @@ def test_faults_reach_the_vehicle() -> None:
         assert s.until(lambda m: m.battery_remaining < 50, "BATTERY_STATUS").battery_remaining in (21, 22)
 
 
-def test_busy_port_is_said_plainly() -> None:
+def test_busy_port_is_reported() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 0))
         port = other.getsockname()[1]
@@ -217,7 +217,7 @@ def test_busy_port_is_said_plainly() -> None:
         (["--port", "14550", "--signing-key", "/dev/null"], "`/dev/null` does not hold a key"),
     ],
 )
-def test_bad_options(options: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_options_are_refused(options: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
     try:
         code = main(options)
     except SystemExit as end:  # of argparse
@@ -226,7 +226,7 @@ def test_bad_options(options: list[str], message: str, capsys: pytest.CaptureFix
     assert message in capsys.readouterr().err
 
 
-def test_bad_options_of_a_process_leave_no_traceback() -> None:
+def test_invalid_options_print_no_traceback() -> None:
     done = subprocess.run([*MODULE, "--port", "0"], capture_output=True, text=True, check=False, timeout=PATIENCE_S)
     assert done.returncode == EXIT_USAGE
     assert "Traceback" not in done.stderr

@@ -33,7 +33,7 @@ def commands_of(workflow: dict[str, Any]) -> list[list[str]]:
 
 
 @pytest.mark.slow
-def test_its_own_workflow_passes(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_workflow_of_a_new_project_passes(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     commands = commands_of(yaml.safe_load((place / ".github/workflows/policy.yml").read_text(encoding="utf-8")))
     assert [words[0] for words in commands] == ["fmt", "lint", "test", "keys", "compile"]
     for words in commands:
@@ -42,7 +42,7 @@ def test_its_own_workflow_passes(place: Path, capsys: pytest.CaptureFixture[str]
     assert (place / "missions/first_look.bundle").is_file()
 
 
-def test_its_own_hooks_pass(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_hooks_of_a_new_project_pass(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (ours,) = yaml.safe_load((place / ".pre-commit-config.yaml").read_text(encoding="utf-8"))["repos"]
     sources = sorted(str(path.relative_to(place)) for path in place.rglob("*.rts"))
     for hook in ours["hooks"]:
@@ -52,7 +52,7 @@ def test_its_own_hooks_pass(place: Path, capsys: pytest.CaptureFixture[str]) -> 
 
 
 @pytest.mark.slow
-def test_it_is_judged_by_its_settings(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_project_settings_apply(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     settings = place / "rtshcua.toml"
     text, changed = re.subn(r"(?m)^fail-under = \d+", "fail-under = 100", settings.read_text(encoding="utf-8"))
     assert changed == 1
@@ -62,7 +62,7 @@ def test_it_is_judged_by_its_settings(place: Path, capsys: pytest.CaptureFixture
 
 
 @pytest.mark.slow
-def test_a_test_notices_a_rule_that_changed(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_changed_rule_fails_a_test(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rules = place / "policies/rules.rts"
     rules.write_text(rules.read_text("utf-8").replace("altitude <= 25 m", "altitude <= 26 m"), encoding="utf-8")
     assert app.main(["test", "."]) == 13
@@ -70,7 +70,7 @@ def test_a_test_notices_a_rule_that_changed(place: Path, capsys: pytest.CaptureF
 
 
 @pytest.mark.slow
-def test_the_page_works_as_it_is_written(
+def test_page_runs_as_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -84,7 +84,7 @@ def test_the_page_works_as_it_is_written(
             assert app.main(words[1:]) == 0, "\n".join([*words, *capsys.readouterr()])
 
 
-def test_the_page_names_every_input_of_the_action_and_every_hook() -> None:
+def test_page_names_every_action_input_and_hook() -> None:
     root = Path(__file__).resolve().parents[2]
     action = yaml.safe_load((root / "action.yml").read_text(encoding="utf-8"))
     hooks = yaml.safe_load((root / ".pre-commit-hooks.yaml").read_text(encoding="utf-8"))
@@ -102,7 +102,7 @@ def test_the_page_names_every_input_of_the_action_and_every_hook() -> None:
         ("./wheels/rtshcua-0.1.0-py3-none-any.whl", True),
     ],
 )
-def test_a_bare_name_is_never_installed(place: Path, source: str, installs: bool) -> None:
+def test_workflow_never_installs_the_bare_name(place: Path, source: str, installs: bool) -> None:
     """Whoever takes the name at a package index would run in the CI of everybody who trusted it."""
     workflow = yaml.safe_load((place / ".github/workflows/policy.yml").read_text(encoding="utf-8"))
     (job,) = workflow["jobs"].values()
@@ -120,5 +120,5 @@ def test_a_bare_name_is_never_installed(place: Path, source: str, installs: bool
         assert (place / "installed").read_text().splitlines()[-1] == source
 
 
-def test_no_page_installs_the_bare_name_in_ci() -> None:
+def test_pages_never_install_the_bare_name_in_ci() -> None:
     assert not re.search(r"pip install [\"']?rtshcua", PAGE)

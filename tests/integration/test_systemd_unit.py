@@ -35,7 +35,7 @@ def instances(tmp_path: Path) -> Path:
 
 
 @ANALYZE
-def test_systemd_takes_them(instances: Path) -> None:
+def test_systemd_accepts_the_units(instances: Path) -> None:
     made = [instances / name for name in (*SERVICES, "rtshcua-boundary@quad-07.socket")]
     checked = analyzed("verify", "--man=no", *made)
     assert (checked.returncode, checked.stderr) == (0, "")
@@ -48,7 +48,7 @@ def test_systemd_takes_them(instances: Path) -> None:
 
 @ANALYZE
 @pytest.mark.parametrize("name", SERVICES)
-def test_it_is_shut_in(name: str, instances: Path, tmp_path: Path) -> None:
+def test_unit_is_sandboxed(name: str, instances: Path, tmp_path: Path) -> None:
     own = tmp_path / "own" / name
     own.parent.mkdir()
     own.write_text((instances / name).read_text().replace("=root", "=daemon"))
@@ -56,7 +56,7 @@ def test_it_is_shut_in(name: str, instances: Path, tmp_path: Path) -> None:
     assert checked.returncode == 0, checked.stdout
 
 
-def test_who_may_connect_is_the_user_of_the_run() -> None:
+def test_socket_belongs_to_the_user_of_the_run() -> None:
     """And the boundary has another user, whose folder is the one that its program is given."""
     run, boundary, socket = (
         dict(re.findall("(?m)^([A-Za-z]+)=(.*)$", (UNITS / name).read_text(encoding="utf-8")))
@@ -69,7 +69,7 @@ def test_who_may_connect_is_the_user_of_the_run() -> None:
     assert run["Requires"] == "rtshcua-boundary@%i.socket"
 
 
-def test_its_command_is_one_that_run_takes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_of_the_unit_is_valid(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """It gets as far as the bundle, which is not there."""
     (line,) = re.findall("(?m)^ExecStart=(.*)$", UNIT.read_text(encoding="utf-8"))
     words = line.replace("%i", "quad-07").replace("${LINK}", "udpin:127.0.0.1:14599").split()[1:]
@@ -79,7 +79,7 @@ def test_its_command_is_one_that_run_takes(tmp_path: Path, capsys: pytest.Captur
 
 
 @pytest.mark.slow
-def test_a_flight_with_no_memory_that_is_written_and_run(ground: Any) -> None:
+def test_flight_without_writable_executable_memory(ground: Any) -> None:
     """MemoryDenyWriteExecute= of systemd, by the kernel's own means (PR_SET_MDWE), where it has them."""
     start = (
         "import ctypes, os, sys\n"

@@ -24,7 +24,7 @@ def pattern(expected: str) -> str:
     return "".join(lines)
 
 
-def test_the_tutorial_works_as_it_is_written(
+def test_tutorial_runs_as_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -38,7 +38,7 @@ def unsynchronised(ground: Any, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow
-def test_the_vehicles_time_bounds_ours(ground: Any, capfd: Any, port: int) -> None:
+def test_vehicle_time_bounds_the_clock_error(ground: Any, capfd: Any, port: int) -> None:
     """ArduCopter tells it when it is asked."""
     ground.vehicle(port, 1, "--flavour", "ardupilot")
     step = rehearsed(ground, capfd, port)
@@ -46,7 +46,7 @@ def test_the_vehicles_time_bounds_ours(ground: Any, capfd: Any, port: int) -> No
 
 
 @pytest.mark.slow
-def test_without_it_freshness_is_unknown_until_somebody_states_a_bound(
+def test_freshness_is_unknown_without_a_clock_bound(
     ground: Any, capfd: Any, port: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(connect, "UTC_S", 0.5)
@@ -57,9 +57,7 @@ def test_without_it_freshness_is_unknown_until_somebody_states_a_bound(
 
 
 @pytest.mark.slow
-def test_a_rehearsal_takes_no_time_that_the_boundary_of_the_flight_would_not_take(
-    ground: Any, capfd: Any, port: int
-) -> None:
+def test_rehearsal_uses_the_clock_of_the_flights_boundary(ground: Any, capfd: Any, port: int) -> None:
     """Apart from the run, the boundary believes the vehicle's time over a link with a key alone."""
     ground.vehicle(port, 1, "--flavour", "ardupilot")
     told = rehearsal(ground, capfd, port, "--mode", "process")
@@ -79,6 +77,6 @@ def test_a_rehearsal_takes_no_time_that_the_boundary_of_the_flight_would_not_tak
         (["--utc-error", "1s"], "goes with `--connect`"),
     ],
 )
-def test_what_no_operator_means(ground: Any, capfd: Any, words: list[str], said: str) -> None:
+def test_invalid_clock_bound_is_refused(ground: Any, capfd: Any, words: list[str], said: str) -> None:
     assert main(["run", ground.bundle(), *words]) == ExitCode.USAGE
     assert said in capfd.readouterr().err

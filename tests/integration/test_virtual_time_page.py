@@ -14,7 +14,7 @@ PAGE = (CHECKOUT / "docs/flying/virtual-time.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow
-def test_tests_of_the_page_pass_in_a_new_project(
+def test_page_tests_pass_in_a_new_project(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("RTSHCUA_DATA_DIR", str(tmp_path / "keys"))

@@ -88,7 +88,7 @@ def library(run: Run) -> Path:
     return Path(run("python", "-c", "from rtshcua import library; print(library.root())").stdout.strip())
 
 
-def test_library_is_inside_the_wheel_and_whole(library: Path, place: Path, checkout: Path) -> None:
+def test_wheel_contains_the_whole_library(library: Path, place: Path, checkout: Path) -> None:
     assert library.is_relative_to(place / "venv")
     for folder in ("grammar", "skills", "policies", "missions", "examples"):
         ours, shipped = (
@@ -116,12 +116,12 @@ def test_compile_and_show_a_shipped_mission(run: Run, library: Path, tmp_path: P
     assert run("rtshcua", "show", bundle).stdout
 
 
-def test_a_project_of_ones_own_is_sound(run: Run, tmp_path: Path) -> None:
+def test_new_project_passes_its_checks(run: Run, tmp_path: Path) -> None:
     run("rtshcua", "init", tmp_path / "riverside")
     run("rtshcua", "lint", tmp_path / "riverside")
 
 
-def test_a_flight_by_the_boundary_that_the_wheel_brings(run: Run, library: Path, place: Path, tmp_path: Path) -> None:
+def test_flight_with_the_boundary_of_the_wheel(run: Run, library: Path, place: Path, tmp_path: Path) -> None:
     asked = "from rtshcua.adapters.boundary_process import program; print(program())"
     program = Path(run("python", "-c", asked).stdout.strip())
     assert program.is_relative_to(place / "venv")

@@ -37,14 +37,12 @@ def flight(name: str) -> ScenarioFlight:
 
 
 @pytest.mark.slow
-def test_it_passes_check_and_its_tests_reach_nine_in_ten(farm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_example_passes_check_with_high_coverage(farm: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert app.main(["check", "missions"]) == 0, capsys.readouterr().err
     assert app.main(["test", "--coverage", "--fail-under", "90", "tests/farm.rts"]) == 0, capsys.readouterr().out
 
 
-def test_the_day_decides_whether_the_substation_may_be_flown_over(
-    farm: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_substation_flight_depends_on_the_day(farm: Path, capsys: pytest.CaptureFixture[str]) -> None:
     def codes(when: str) -> set[str]:
         app.main(["check", "--at", when, "missions/substation.rts"])
         return set(re.findall(r"error\[(E\d+)\]", capsys.readouterr().err))
@@ -54,7 +52,7 @@ def test_the_day_decides_whether_the_substation_may_be_flown_over(
     assert codes("2026-11-29T09:00:00Z") == {"E0718"}  # nobody is on shift
 
 
-def test_every_tower_is_kept_out_of(farm: Path) -> None:
+def test_every_tower_is_an_exclusion_zone(farm: Path) -> None:
     policy = (farm / "policies" / "farm.rts").read_text(encoding="utf-8")
     (airspace,) = re.findall(r"(?m)^  airspace .*$", policy)
     assert re.findall(r"tower_\d", airspace) == [f"tower_{number}" for number in range(1, 7)]
@@ -63,7 +61,7 @@ def test_every_tower_is_kept_out_of(farm: Path) -> None:
 @pytest.mark.soak  # each takes as long as ten tests
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 @pytest.mark.parametrize("name", FLIGHTS)
-def test_it_flies_as_its_scenarios_say(farm: Path, name: str, flavour: str) -> None:
+def test_scenarios_fly_as_expected(farm: Path, name: str, flavour: str) -> None:
     chosen = flight(name)
     assert flavour in chosen.scenario.flavours
     policy, start = chosen.policy.lowered.policy, chosen.scenario.start
@@ -75,7 +73,7 @@ def test_it_flies_as_its_scenarios_say(farm: Path, name: str, flavour: str) -> N
     assert [each.found for each in expectations(was, verdict) if not each.met] == []
 
 
-def test_the_page_names_commands_and_sources_that_there_are() -> None:
+def test_page_names_existing_commands_and_sources() -> None:
     page = (FARM / "README.md").read_text(encoding="utf-8")
     lines = [shlex.split(line, comments=True) for line in page.splitlines() if line.startswith("rtshcua ")]
     assert len(lines) > 12

@@ -10,7 +10,7 @@ from virtual import case
 from virtual.forked import Forked
 
 
-def test_a_root_without_witnesses(commands: Forked, ground: Any) -> None:
+def test_root_without_witnesses_is_refused(commands: Forked, ground: Any) -> None:
     shutil.rmtree(ground.store.folder)
     now_us = time.time_ns() // 1_000
     ground.store.create(
@@ -22,7 +22,7 @@ def test_a_root_without_witnesses(commands: Forked, ground: Any) -> None:
     assert "names no witness of this vehicle" in done.err
 
 
-def test_addresses_that_are_none(commands: Forked, ground: Any) -> None:
+def test_malformed_addresses_are_refused(commands: Forked, ground: Any) -> None:
     for address in ("nowhere", "udpin:127.0.0.1:15000"):
         done = commands.run(["run", ground.bundle(), "--witness", address], ground.folder, 60)
         assert done.code == ExitCode.USAGE

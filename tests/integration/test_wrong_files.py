@@ -42,7 +42,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_file_of_another_kind_is_named(
+def test_file_of_another_kind_is_named(
     command: str, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(place)
@@ -69,9 +69,7 @@ def test_a_file_of_another_kind_is_named(
         ("sim --fault quantum,at=3s", "no such fault: `quantum`; expected one of battery, "),
     ],
 )
-def test_an_unknown_word_is_answered_with_the_nearest(
-    line: str, words: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_unknown_word_suggests_the_nearest(line: str, words: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert app.main(line.split()) == 2
     told = "".join(capsys.readouterr())
     assert [each for each in words.split("|") if each not in told] == []

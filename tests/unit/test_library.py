@@ -36,14 +36,14 @@ def test_checkout_or_editable_install(installed: Installed, tmp_path: Path) -> N
     assert installed() == tmp_path.resolve()
 
 
-def test_wheel_comes_before_what_happens_to_lie_beside_it(installed: Installed, tmp_path: Path) -> None:
+def test_wheel_takes_precedence_over_adjacent_files(installed: Installed, tmp_path: Path) -> None:
     lay_out(tmp_path, *library.FOLDERS)
     lay_out(tmp_path / "rtshcua/_library", *library.FOLDERS)
     assert installed() == (tmp_path / "rtshcua/_library").resolve()
 
 
 @pytest.mark.parametrize("place", [".", "rtshcua/_library"])
-def test_broken_installation_says_what_is_missing_and_where(installed: Installed, tmp_path: Path, place: str) -> None:
+def test_broken_installation_names_the_missing_files(installed: Installed, tmp_path: Path, place: str) -> None:
     lay_out(tmp_path / place, "grammar", "missions")
     with pytest.raises(FileNotFoundError) as caught:
         installed()
@@ -51,5 +51,5 @@ def test_broken_installation_says_what_is_missing_and_where(installed: Installed
     assert caught.value.filename == str((tmp_path / place).resolve())
 
 
-def test_this_installation_is_whole() -> None:
+def test_this_installation_is_complete() -> None:
     assert all((library.root() / name).is_dir() for name in library.FOLDERS)

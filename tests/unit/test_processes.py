@@ -124,7 +124,7 @@ def run(folder: Path, *words: str, **files: str) -> tuple[int, str]:
 
 
 @pytest.mark.slow
-def test_none_is_lost_and_what_fails_is_told(tmp_path: Path) -> None:
+def test_no_test_is_lost_and_failures_are_reported(tmp_path: Path) -> None:
     code, said = run(tmp_path, test_a=PASSES, test_b=FAILS, test_c=DIES, test_d=PASSES)
     assert code == 1, said
     assert "2 failed, 8 passed" in said, said
@@ -136,7 +136,7 @@ def test_none_is_lost_and_what_fails_is_told(tmp_path: Path) -> None:
     assert (tmp_path / "ended").read_text(encoding="utf-8").split() == ["over"] * 2
 
 
-def test_two_of_three_processes_begin_with_the_last_files() -> None:
+def test_last_files_start_first_in_other_processes() -> None:
     files = [[0, 1], [2], [3, 4], [5], [6]]
     own, other = Pipe()
     with own, other:
@@ -153,7 +153,7 @@ def test_two_of_three_processes_begin_with_the_last_files() -> None:
         ((), {"test_wrong": "import nothing_of_that_name"}, "1 error"),
     ],
 )
-def test_it_ends_early_or_at_the_end(tmp_path: Path, words: tuple[str, ...], files: dict[str, str], told: str) -> None:
+def test_run_that_ends_early_says_why(tmp_path: Path, words: tuple[str, ...], files: dict[str, str], told: str) -> None:
     code, said = run(tmp_path, *words, **files)
     assert code != 0
     assert told in said
@@ -171,7 +171,7 @@ def test_it_ends_early_or_at_the_end(tmp_path: Path, words: tuple[str, ...], fil
     ],
     ids=("ends", "ends-before-others", "ends-after", "says-nothing", "hangs"),
 )
-def test_a_process_that_does_not_do_all_it_was_given_is_a_failure(
+def test_process_that_leaves_tests_is_a_failure(
     tmp_path: Path, text: str, told: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also where it ends as one does that did."""

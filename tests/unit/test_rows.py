@@ -5,7 +5,7 @@ import pytest
 from virtual.rows import rows
 
 
-def test_each_row_is_tried_and_those_that_fail_are_named() -> None:
+def test_every_row_runs_and_failing_rows_are_named() -> None:
     tried = []
 
     @rows(("number", "text"), [(1, "a"), pytest.param(2, "b", id="the second"), (3, "c")])
@@ -23,7 +23,7 @@ def test_each_row_is_tried_and_those_that_fail_are_named() -> None:
 
 
 @pytest.mark.parametrize("ids", [["one", "two"], {"one": 1, "two": 2}, {1: "one", 2: "two"}.get])
-def test_names_of_rows_are_those_of_parameters(ids: object) -> None:
+def test_rows_are_named_like_parameters(ids: object) -> None:
     @rows("number", [1, 2], ids=ids)
     def none(number: int) -> None:
         raise ValueError(number)
@@ -41,11 +41,11 @@ def ten() -> int:
 
 @rows("more", [1, 2])
 @rows("factor", [2, 3])
-def test_fixtures_are_given_and_tables_multiply(ten: int, factor: int, more: int) -> None:
+def test_rows_take_fixtures_and_tables_multiply(ten: int, factor: int, more: int) -> None:
     assert ten * factor + more in (21, 22, 31, 32)
 
 
-def test_what_cannot_be_rows_is_refused() -> None:
+def test_invalid_rows_are_refused() -> None:
     for table in ([], [(1,)], [pytest.param(1, 2, marks=pytest.mark.soak)]):
         with pytest.raises(AssertionError):
             rows(("one", "other"), table)

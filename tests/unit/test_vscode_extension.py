@@ -95,7 +95,7 @@ def captured(rule: dict[str, Any], match: re.Match[str]) -> Iterator[tuple[str, 
     yield match.string[at : match.end()], rule.get("name", "")
 
 
-def test_the_grammar_has_the_words_of_the_language_and_no_others() -> None:
+def test_grammar_has_exactly_the_keywords() -> None:
     text = (CHECKOUT / "grammar" / "rtshcua.lark").read_text(encoding="utf-8")
     quoted = set(re.findall(r'^[A-Z_.0-9]+: "([a-z_]+)"', text, re.MULTILINE))
     # words that are regular expressions, as they stand only before a bracket, or as part of a phrase
@@ -111,7 +111,7 @@ def test_the_grammar_has_the_words_of_the_language_and_no_others() -> None:
 
 
 @rows("path", [*SOURCES, SAMPLE], ids=lambda path: path.stem)
-def test_everything_in_a_source_has_a_scope(path: Path) -> None:
+def test_every_token_has_a_scope(path: Path) -> None:
     text = path.read_text(encoding="utf-8")
     found = list(tokens(text))
     assert "".join(part for part, _ in found) == text.replace("\n", "")
@@ -149,7 +149,7 @@ def test_everything_in_a_source_has_a_scope(path: Path) -> None:
         ("speed / 2 // half", "/", "keyword.operator.arithmetic"),
     ],
 )
-def test_scopes(text: str, part: str, scope: str) -> None:
+def test_tokens_have_their_scopes(text: str, part: str, scope: str) -> None:
     assert any(each == part and found.startswith(scope) for each, found in tokens(text)), list(tokens(text))
 
 
@@ -174,7 +174,7 @@ SNIPPETS = read("snippets/rtshcua.json")
 
 
 @rows("name", SNIPPETS)
-def test_a_snippet_parses_as_it_is(name: str) -> None:
+def test_snippets_parse(name: str) -> None:
     body = SNIPPETS[name]["body"]
     text = expanded("\n".join(body) if isinstance(body, list) else body)
     if re.match(r"permit|forbid|confirm|degrade|delegate|use", text):
@@ -193,7 +193,7 @@ def test_every_declaration_has_a_snippet() -> None:
     assert names <= first
 
 
-def test_the_parts_of_the_extension_are_there_and_pinned() -> None:
+def test_extension_files_exist_and_are_pinned() -> None:
     contributed = PACKAGE["contributes"]
     parts = [PACKAGE["main"], contributed["languages"][0]["configuration"], contributed["grammars"][0]["path"]]
     for part in (*parts, contributed["snippets"][0]["path"], "README.md"):
@@ -205,7 +205,7 @@ def test_the_parts_of_the_extension_are_there_and_pinned() -> None:
     assert GRAMMAR["scopeName"] == contributed["grammars"][0]["scopeName"]
 
 
-def test_nothing_is_run_in_a_workspace_that_is_not_trusted() -> None:
+def test_untrusted_workspace_runs_nothing() -> None:
     trust = PACKAGE["capabilities"]["untrustedWorkspaces"]
     settings = PACKAGE["contributes"]["configuration"]["properties"]
     assert trust["supported"] == "limited"
@@ -214,7 +214,7 @@ def test_nothing_is_run_in_a_workspace_that_is_not_trusted() -> None:
     assert "workspace.isTrusted" in script
 
 
-def test_the_problem_matcher_reads_what_lint_prints() -> None:
+def test_problem_matcher_reads_lint_output() -> None:
     source = Source("policies/a b.rts", "\nzone x = circle(1 N, 2 E, 3 m)\n")
     for code in (codes.SYNTAX, codes.UNUSED):
         found = Diagnostic(code, "the message", Span(source.file, 6, 7), "help")

@@ -38,7 +38,7 @@ def results(folder: Path) -> dict[int, object]:
 
 
 @pytest.mark.clients
-def test_a_worker_that_is_killed_takes_no_flight_with_it(tmp_path: Path, checkout: Path) -> None:
+def test_killed_worker_loses_no_flight(tmp_path: Path, checkout: Path) -> None:
     script = tmp_path / "on_cluster.py"
     script.write_text(SCRIPT)
     there = subprocess.run(

@@ -16,7 +16,7 @@ def drawn(count: int, tally: CampaignTally = SEEN, space: FaultSpace = SPACE) ->
     return [draw(1, number, space, tally) for number in range(count)]
 
 
-def test_the_same_flight_is_drawn_again_and_another_seed_draws_another() -> None:
+def test_drawing_is_determined_by_the_seed() -> None:
     assert drawn(50) == drawn(50)
     assert drawn(50) != [draw(2, number, SPACE, SEEN) for number in range(50)]
 
@@ -30,12 +30,12 @@ def test_every_parameter_of_every_kind_has_a_range() -> None:
     assert [each for each in parameters if each not in RANGES and (None, each[1]) not in RANGES] == []
 
 
-def test_every_kind_but_another_name_of_one_is_in_exactly_one_group() -> None:
+def test_every_fault_kind_is_in_exactly_one_group() -> None:
     grouped = [kind for _, kinds in GROUPS for kind in dict.fromkeys(kinds)]
     assert sorted(kind.__name__ for kind in grouped) == sorted({kind.__name__ for kind in faults.KINDS.values()})
 
 
-def test_all_kinds_flavours_and_ways_of_telling_the_time_are_drawn() -> None:
+def test_all_kinds_flavours_and_triggers_are_drawn() -> None:
     flights = drawn(1_500)
     incidents = [each for one in flights for each in one.scenario.incidents]
     assert {type(each.fault) for each in incidents} == set(faults.KINDS.values())
@@ -43,13 +43,13 @@ def test_all_kinds_flavours_and_ways_of_telling_the_time_are_drawn() -> None:
     assert Counter(one.scenario.flavours for one in flights) == {("px4",): 750, ("ardupilot",): 750}
 
 
-def test_the_number_of_faults_follows_the_stated_distribution() -> None:
+def test_number_of_faults_follows_its_distribution() -> None:
     many = Counter(len(one.scenario.incidents) for one in drawn(2_000))
     for number, part in enumerate(HOW_MANY, 1):
         assert abs(many[number] / 20 - part) < 4, (number, many[number])
 
 
-def test_faults_gather_near_state_changes_that_were_seen() -> None:
+def test_faults_cluster_near_observed_state_changes() -> None:
     times = [
         each.when.from_us
         for one in drawn(1_000)
@@ -62,7 +62,7 @@ def test_faults_gather_near_state_changes_that_were_seen() -> None:
     assert all(time >= 0 for time in times)
 
 
-def test_half_of_the_flights_go_where_little_was_tried() -> None:
+def test_half_of_the_flights_prefer_untried_pairs() -> None:
     worn = CampaignTally(SEEN.moments, {(kind.__name__, "landed"): 1_000 for kind in faults.KINDS.values()})
     tried = Counter(label for one in drawn(1_000, worn)[::2] for _, label in one.tries)
     even = Counter(label for one in drawn(1_000)[::2] for _, label in one.tries)
@@ -70,6 +70,6 @@ def test_half_of_the_flights_go_where_little_was_tried() -> None:
     assert set(even) == {"landed", "takeoff sent", ANYWHERE}
 
 
-def test_kinds_that_are_left_out_are_not_drawn() -> None:
+def test_excluded_kinds_are_not_drawn() -> None:
     wind = FaultSpace(SPACE.skills, SPACE.lasts_us, kinds=frozenset({faults.WindStep}))
     assert {type(each.fault) for one in drawn(50, space=wind) for each in one.scenario.incidents} == {faults.WindStep}

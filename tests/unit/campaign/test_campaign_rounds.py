@@ -71,18 +71,18 @@ def all_of(workers: Shuffled, past: dict[int, CampaignResult] | None = None) -> 
     return flown
 
 
-def test_rounds_have_every_number_once() -> None:
+def test_rounds_contain_every_number_once() -> None:
     assert [number for each in rounds(333) for number in each] == list(range(333))
     assert [len(each) for each in rounds(333)] == [FIRST, ROUND, ROUND, ROUND, 13]
 
 
-def test_the_order_in_which_flights_come_back_changes_nothing() -> None:
+def test_results_do_not_depend_on_the_order_of_completion() -> None:
     assert all_of(Shuffled(1)) == all_of(Shuffled(2))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("most", [0, 1, FIRST - 1, FIRST, FIRST + 1, FIRST + ROUND + 50])
-def test_an_interrupted_campaign_goes_on_as_if_nothing_had_been(most: int) -> None:
+def test_interrupted_campaign_continues_with_equal_results(most: int) -> None:
     first = Shuffled(3, most)
     past: dict[int, CampaignResult] = {}
     with pytest.raises(KeyboardInterrupt):
@@ -94,13 +94,13 @@ def test_an_interrupted_campaign_goes_on_as_if_nothing_had_been(most: int) -> No
     assert sorted(first.flown + second.flown) == list(range(ORDER.flights))
 
 
-def test_more_flights_can_be_asked_for_later() -> None:
+def test_campaign_can_be_extended() -> None:
     few: dict[int, CampaignResult] = {}
     fly_rounds(CampaignOrder(5, 40, SPACE), FIELD, Shuffled(), few, lambda _: None)
     assert few == {number: each for number, each in all_of(Shuffled()).items() if number < 40}
 
 
-def test_a_flight_can_be_drawn_again_by_its_number() -> None:
+def test_flight_can_be_drawn_again_by_number() -> None:
     flown = all_of(Shuffled())
     for number in (0, FIRST, FIRST + ROUND + 7):
         made = drawn(ORDER, number, flown)
@@ -108,14 +108,14 @@ def test_a_flight_can_be_drawn_again_by_its_number() -> None:
         assert made.tries == flown[number].tries
 
 
-def test_a_torn_line_counts_as_not_flown() -> None:
+def test_truncated_line_counts_as_not_flown() -> None:
     lines = [result_line(each) for each in all_of(Shuffled()).values()]
     torn = [*lines[:-1], lines[-1][: len(lines[-1]) // 2]]
     assert len(read_results(torn)) == ORDER.flights - 1
     assert len(read_results([b"\xff\n", b"{}\n", b"\n", *lines])) == ORDER.flights
 
 
-def test_what_was_seen_is_counted_by_kind_and_moment() -> None:
+def test_pairs_of_kind_and_moment_are_counted() -> None:
     flown = all_of(Shuffled())
     seen = tally(flown[number] for number in sorted(flown))
     assert {each.label for each in seen.moments["px4"]} == {"airborne", "down"}
@@ -170,7 +170,7 @@ def few() -> list[CampaignFlight]:
 
 
 @pytest.mark.slow
-def test_a_flight_whose_process_died_is_flown_again(tmp_path: Path) -> None:
+def test_flight_of_a_dead_worker_is_flown_again(tmp_path: Path) -> None:
     processes = WorkerProcesses(1)
     flown = list(processes.fly(DiesOnce(b"", str(tmp_path / "died").encode(), ()), few()))
     processes.close()
@@ -178,7 +178,7 @@ def test_a_flight_whose_process_died_is_flown_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_flight_that_kills_every_process_is_a_failure_and_the_others_are_flown() -> None:
+def test_flight_that_kills_every_worker_is_a_failure() -> None:
     processes = WorkerProcesses(1)
     flown = sorted(processes.fly(DiesAlways(b"", b"", ()), few()), key=lambda each: each.number)
     processes.close()
@@ -186,7 +186,7 @@ def test_a_flight_that_kills_every_process_is_a_failure_and_the_others_are_flown
     assert flown[3].failures[0].slug == LOST
 
 
-def test_one_process_is_enough() -> None:
+def test_campaign_runs_in_one_process() -> None:
     assert list(Here().fly(Nothing(b"", b"", ()), few())) == [result(flight) for flight in few()]
     assert FIRST < ROUND
 
@@ -206,7 +206,7 @@ class NeverEnds(Nothing):
 
 
 @pytest.mark.slow
-def test_a_flight_that_is_under_way_is_not_waited_for_once_somebody_asks_for_the_end() -> None:
+def test_stop_does_not_wait_for_flights_in_progress() -> None:
     looks = iter([None, None])
 
     def look() -> None:

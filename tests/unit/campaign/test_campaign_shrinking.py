@@ -25,7 +25,7 @@ def kinds(scenario: Scenario) -> list[type[Fault]]:
     return [type(each.fault) for each in scenario.incidents]
 
 
-def test_what_is_not_needed_goes() -> None:
+def test_unneeded_faults_are_removed() -> None:
     full = of(at(3 * S, WindStep(0, 9_000)), at(5 * S, GpsLoss(0, S)), at(6 * S, LinkSilence(0, S)))
     small, flown = shrink(full, SKILLS, lambda scenario: GpsLoss in kinds(scenario))
     assert kinds(small) == [GpsLoss]
@@ -33,13 +33,13 @@ def test_what_is_not_needed_goes() -> None:
     assert 0 < flown < 60
 
 
-def test_two_that_fail_only_together_stay_together() -> None:
+def test_faults_that_fail_only_together_are_kept() -> None:
     full = of(at(3 * S, WindStep(0, 9_000)), at(5 * S, GpsLoss(0, S)), at(6 * S, LinkSilence(0, S)))
     small, _ = shrink(full, SKILLS, lambda scenario: {GpsLoss, LinkSilence} <= set(kinds(scenario)))
     assert kinds(small) == [GpsLoss, LinkSilence]
 
 
-def test_it_becomes_as_weak_and_as_round_as_it_may() -> None:
+def test_parameters_become_weaker_and_rounder() -> None:
     full = of(at(34_560_000, LinkSilence(0, 17_300_000)))
 
     def fails(scenario: Scenario) -> bool:
@@ -51,7 +51,7 @@ def test_it_becomes_as_weak_and_as_round_as_it_may() -> None:
 
 
 @rows("number", range(40))
-def test_it_comes_to_an_end_whatever_was_drawn(number: int) -> None:
+def test_shrinking_terminates(number: int) -> None:
     scenario = draw(3, number, SPACE, CampaignTally({"px4": [Moment("landed", 9 * S)]})).scenario
     small, flown = shrink(scenario, SKILLS, lambda _: True, most=2_000)
     assert small.incidents == ()
@@ -59,7 +59,7 @@ def test_it_comes_to_an_end_whatever_was_drawn(number: int) -> None:
 
 
 @rows("number", range(40))
-def test_the_smallest_of_one_fault_is_not_smaller_than_itself(number: int) -> None:
+def test_minimal_scenario_has_no_smaller_candidate(number: int) -> None:
     scenario = draw(3, number, SPACE, CampaignTally()).scenario
     many = len(scenario.incidents)
 
@@ -71,12 +71,12 @@ def test_the_smallest_of_one_fault_is_not_smaller_than_itself(number: int) -> No
     assert shrink(small, SKILLS, keeps)[0] == small
 
 
-def test_nothing_is_flown_beyond_what_is_allowed() -> None:
+def test_shrinking_respects_the_flight_limit() -> None:
     full = of(*(at(n * S, GpsLoss(0, S)) for n in range(20)))
     assert shrink(full, SKILLS, lambda scenario: len(scenario.incidents) >= 10, most=5)[1] == 5
 
 
-def test_a_scenario_is_written_as_a_source_has_it() -> None:
+def test_scenario_text_parses_to_the_scenario() -> None:
     scenario = of(at(0, LinkSilence(0, 5 * S, held=True)), at(2 * S, WindStep(0, 12_000, 270)))
     assert scenario_text(scenario, "short", "lib:missions/short.rts", "found\nby flight 7") == (
         "// found\n"

@@ -60,7 +60,7 @@ def measured(kind: AutopilotKind) -> dict[int, list[int]]:
 
 
 @pytest.mark.parametrize("kind", list(AutopilotKind))
-def test_the_delays_are_those_that_were_recorded(kind: AutopilotKind) -> None:
+def test_delays_match_the_recordings(kind: AutopilotKind) -> None:
     chance, taken = Random(5), measured(kind)
     assert sum(map(len, taken.values())) == {AutopilotKind.PX4: 107, AutopilotKind.ARDUPILOT: 110}[kind]
     for lane, delays in enumerate(FLAVOURS[kind].lanes.delays):
@@ -72,7 +72,7 @@ def test_the_delays_are_those_that_were_recorded(kind: AutopilotKind) -> None:
                 assert own == pytest.approx(recorded, rel=0.1, abs=400), part
 
 
-def test_an_inbox_keeps_the_order_within_a_lane_and_not_between_them() -> None:
+def test_inbox_keeps_the_order_within_each_lane() -> None:
     codec = Codec(255, 190)
     beat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
     frames = [codec.parse(codec.pack(beat))[0] for _ in range(40)]
@@ -106,7 +106,7 @@ def acks(received: list[Any], command: int) -> list[int]:
     return [f.message.result for f in received if f.name == "COMMAND_ACK" and f.message.command == command]
 
 
-def test_a_command_takes_milliseconds(pilot: Callable[..., Any], flavour: str) -> None:
+def test_command_is_answered_within_milliseconds(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour, answers=Answers.RECORDED)
     p.wait(2)
     took = []
@@ -120,14 +120,14 @@ def test_a_command_takes_milliseconds(pilot: Callable[..., Any], flavour: str) -
     assert len(set(took)) > 5
 
 
-def test_at_once_is_at_once(pilot: Callable[..., Any], flavour: str) -> None:
+def test_at_once_answers_without_delay(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour)
     p.wait(2)
     assert acknowledged(p, mavlink.MAV_CMD_DO_CHANGE_SPEED, 1, 5, -1) == 0
     assert p.simulation.next_us is None
 
 
-def test_a_request_may_overtake_a_command_on_px4_and_never_on_copter(pilot: Callable[..., Any], flavour: str) -> None:
+def test_requests_overtake_commands_on_px4_only(pilot: Callable[..., Any], flavour: str) -> None:
     """Asked right behind a command for another mode, PX4 may tell the old one, as measured on the real one."""
     p = pilot(flavour, answers=Answers.RECORDED, noise=False)
     p.wait(2)
@@ -147,7 +147,7 @@ def test_a_request_may_overtake_a_command_on_px4_and_never_on_copter(pilot: Call
     assert old > 5 if p.px4 else old == 0
 
 
-def test_what_waits_while_it_stands_still_is_answered_after(pilot: Callable[..., Any], flavour: str) -> None:
+def test_messages_during_a_halt_are_answered_afterwards(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour, answers=Answers.RECORDED)
     p.wait(2.019)
     p.simulation.inject(faults.Stall(p.simulation.now_us, S))
@@ -158,7 +158,7 @@ def test_what_waits_while_it_stands_still_is_answered_after(pilot: Callable[...,
     assert acks(p.seen, 512) == [0]
 
 
-def test_streams_begin_at_any_time(pilot: Callable[..., Any], flavour: str) -> None:
+def test_streams_start_at_random_phases(pilot: Callable[..., Any], flavour: str) -> None:
     def first(seed: int, answers: Answers) -> int:
         simulation, codec = (
             Simulation(SimulationConfig(AutopilotKind(flavour), seed=seed, answers=answers)),

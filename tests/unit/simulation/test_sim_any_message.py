@@ -58,7 +58,7 @@ def bombard(seed: int) -> Simulation:
 
 
 @rows("seed", range(8))
-def test_a_bombardment(seed: int) -> None:
+def test_random_messages_do_not_crash_the_vehicle(seed: int) -> None:
     assert len(HEARD) == len(_HANDLERS)
     simulation = bombard(seed)
     assert simulation.damaged == 0
@@ -66,6 +66,6 @@ def test_a_bombardment(seed: int) -> None:
 
 
 @pytest.mark.soak
-def test_many_bombardments() -> None:
+def test_many_random_messages_do_not_crash_the_vehicle() -> None:
     for seed in range(1_000):
         bombard(seed)

@@ -48,7 +48,9 @@ def flying(copter: Any) -> Any:
         (512, (nan,), [4]),
     ],
 )
-def test_results_on_the_ground(copter: Any, command: int, params: tuple[float, ...], expected: list[int]) -> None:
+def test_command_results_on_the_ground(
+    copter: Any, command: int, params: tuple[float, ...], expected: list[int]
+) -> None:
     assert copter.long(command, *params) == expected
 
 
@@ -63,7 +65,7 @@ def test_results_on_the_ground(copter: Any, command: int, params: tuple[float, .
         (FlightMode.MANUAL, 0),
     ],
 )
-def test_custom_modes(copter: Any, mode: FlightMode, number: int) -> None:
+def test_custom_modes_are_entered(copter: Any, mode: FlightMode, number: int) -> None:
     assert copter.mode(mode) == [0]
     copter.wait(1)
     assert copter.last("HEARTBEAT").custom_mode == number
@@ -76,13 +78,13 @@ def test_arming_before_ready_fails_with_a_text(pilot: Callable[..., Any]) -> Non
 
 
 @pytest.mark.parametrize("mode", [FlightMode.LAND, FlightMode.RETURN, FlightMode.BRAKE])
-def test_modes_that_cannot_be_armed_in(copter: Any, mode: FlightMode) -> None:
+def test_arming_is_refused_in_modes_that_do_not_allow_it(copter: Any, mode: FlightMode) -> None:
     copter.mode(mode)
     assert copter.arm() == [4]
     assert copter.texts()[-1].endswith("mode not armable")
 
 
-def test_takeoff_in_loiter_is_accepted_and_does_nothing(copter: Any) -> None:
+def test_takeoff_in_loiter_is_accepted_without_effect(copter: Any) -> None:
     copter.mode(FlightMode.LOITER)
     assert copter.arm() == [0]
     assert copter.long(22, 0, 0, 0, 0, 0, 0, 10) == [0]
@@ -91,7 +93,7 @@ def test_takeoff_in_loiter_is_accepted_and_does_nothing(copter: Any) -> None:
 
 
 @pytest.mark.parametrize(("frame", "result"), [(0, 2), (5, 2), (10, 2), (3, 0), (6, 0)])
-def test_takeoff_wants_a_relative_frame(copter: Any, frame: int, result: int) -> None:
+def test_takeoff_requires_a_relative_frame(copter: Any, frame: int, result: int) -> None:
     copter.mode(FlightMode.GUIDED)
     copter.arm()
     assert copter.int(22, frame, [0, 0, 0, 0], 0, 0, 10) == [result]
@@ -101,7 +103,7 @@ def test_takeoff_wants_a_relative_frame(copter: Any, frame: int, result: int) ->
     assert copter.truth.in_air is (result == 0)
 
 
-def test_in_the_air(flying: Any) -> None:
+def test_command_results_in_the_air(flying: Any) -> None:
     assert flying.truth.mode is FlightMode.GUIDED
     assert flying.arm() == [0]
     assert flying.long(400, 0) == [4]
@@ -149,7 +151,7 @@ def test_position_target_is_ignored_on_the_ground_and_outside_guided(copter: Any
     assert abs(copter.truth.north_mm) < 300
 
 
-def test_pause_stops_and_brake_stops(flying: Any) -> None:
+def test_pause_and_brake_stop_the_vehicle(flying: Any) -> None:
     for stop in (lambda: flying.long(193, 0), lambda: flying.mode(FlightMode.BRAKE)):
         flying.mode(FlightMode.GUIDED)
         flying.go_to(flying.truth.north_mm / 1000 + 100, 0, 10)
@@ -161,7 +163,7 @@ def test_pause_stops_and_brake_stops(flying: Any) -> None:
         assert flying.long(193, 1) == [0 if flying.truth.mode is FlightMode.GUIDED else 4]
 
 
-def test_a_pause_keeps_mode_and_target_and_what_comes_meanwhile(flying: Any) -> None:
+def test_pause_keeps_mode_and_later_targets(flying: Any) -> None:
     flying.long(511, 87, 100_000)
     flying.go_to(200, 0, 10)
     flying.wait(5)
@@ -205,7 +207,7 @@ def leg_at_5_6_m_s(flying: Any) -> None:
 
 
 @pytest.mark.parametrize("name", ["arducopter-velocity-takeover", "arducopter-pause-takeover"])
-def test_a_velocity_or_a_pause_in_a_leg_does_what_was_recorded(flying: Any, name: str) -> None:
+def test_velocity_or_pause_in_a_leg_matches_the_recording(flying: Any, name: str) -> None:
     """From 5.6 m/s. The mode stays; on a velocity no target is told any more, on a pause the same one is."""
     leg_at_5_6_m_s(flying)
     real, told, velocity = speeds(name), [], "velocity" in name
@@ -222,7 +224,7 @@ def test_a_velocity_or_a_pause_in_a_leg_does_what_was_recorded(flying: Any, name
     assert len(told) == (0 if velocity else 70)
 
 
-def test_a_velocity_that_is_not_commanded_again_ends_in_standing(flying: Any) -> None:
+def test_velocity_expires_without_renewal(flying: Any) -> None:
     """GUID_TIMEOUT: 3 s after the last. In another mode than GUIDED nobody minds it."""
     flying.mode(FlightMode.BRAKE)
     steer(flying, 3)
@@ -236,13 +238,13 @@ def test_a_velocity_that_is_not_commanded_again_ends_in_standing(flying: Any) ->
     assert flying.truth.speed_mm_s < 150
 
 
-def test_a_place_from_home_is_flown_to(flying: Any) -> None:
+def test_local_target_is_flown_to(flying: Any) -> None:
     flying.send(mavlink.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, 0x0DF8, 20, 5, -12, *[0.0] * 8))
     flying.wait(15)
     assert (flying.truth.north_mm, flying.truth.east_mm) == pytest.approx((20_000, 5_000), abs=500)
 
 
-def test_targets_are_told_where_the_mode_has_one(copter: Any) -> None:
+def test_target_is_reported_in_modes_that_have_one(copter: Any) -> None:
     def told() -> list[Any]:
         return [f.message for f in copter.wait(1) if f.name == "POSITION_TARGET_GLOBAL_INT"]
 
@@ -265,7 +267,7 @@ def test_targets_are_told_where_the_mode_has_one(copter: Any) -> None:
     assert not told()
 
 
-def test_the_same_mode_again_changes_nothing(flying: Any) -> None:
+def test_selecting_the_current_mode_has_no_effect(flying: Any) -> None:
     flying.go_to(100, 0, 10)
     flying.wait(5)
     assert flying.mode(FlightMode.GUIDED) == [0]
@@ -281,7 +283,7 @@ def test_set_mode_message_is_acknowledged_with_its_own_number(flying: Any) -> No
     assert flying.truth.mode is FlightMode.LAND
 
 
-def test_nothing_but_the_heartbeat_its_time_and_the_radio_unasked(copter: Any) -> None:
+def test_default_streams_are_heartbeat_timesync_and_radio(copter: Any) -> None:
     copter.wait(20)
     assert {frame.name for frame in copter.seen} == {"HEARTBEAT", "RADIO_STATUS", "TIMESYNC"}
     asked = [frame.message for frame in copter.seen if frame.name == "TIMESYNC"]
@@ -301,7 +303,7 @@ def test_data_stream_request_overrides_an_interval(copter: Any) -> None:
     assert count("GLOBAL_POSITION_INT") == 0
 
 
-def test_a_speed_that_is_set_before_the_first_target_is_forgotten(flying: Any) -> None:
+def test_speed_set_before_the_first_target_is_lost(flying: Any) -> None:
     assert flying.long(178, 1, 2, -1) == [0]
     flying.go_to(100, 0, 10)
     flying.wait(6)

@@ -58,7 +58,7 @@ def test_estimator_and_sensors_come_up_step_by_step(pilot: Callable[..., Any], f
         assert [p.last("HEARTBEAT").system_status, p.last("GPS_RAW_INT").fix_type, flags, prearm] == expected, seconds
 
 
-def test_arducopter_tells_positions_long_before_they_are_worth_anything(pilot: Callable[..., Any]) -> None:
+def test_arducopter_sends_positions_before_they_are_valid(pilot: Callable[..., Any]) -> None:
     p = watched(pilot, "ardupilot")
     told = []
     for seconds in (2, 4, 12, 21):
@@ -69,7 +69,7 @@ def test_arducopter_tells_positions_long_before_they_are_worth_anything(pilot: C
     assert told == [[False], [True, False, False], [True, True, False], [True, True, True]]
 
 
-def test_arming_while_it_comes_up(pilot: Callable[..., Any], flavour: str) -> None:
+def test_arming_during_boot_is_refused(pilot: Callable[..., Any], flavour: str) -> None:
     p = watched(pilot, flavour)
     refused = [1 if p.px4 else 4]
     p.wait(1.9)
@@ -98,7 +98,9 @@ def test_arming_while_it_comes_up(pilot: Callable[..., Any], flavour: str) -> No
         (faults.BatteryLevel(2 * S, 700), "battery too low", "Battery 1 below minimum arming capacity"),
     ],
 )
-def test_refusals_to_arm_say_why(pilot: Callable[..., Any], flavour: str, fault: Any, px4: str, copter: str) -> None:
+def test_arming_refusals_name_the_reason(
+    pilot: Callable[..., Any], flavour: str, fault: Any, px4: str, copter: str
+) -> None:
     p = pilot(flavour, faults=(fault,)).ready()
     p.long(511, 1, 100_000)
     p.mode(FlightMode.LOITER)
@@ -108,7 +110,7 @@ def test_refusals_to_arm_say_why(pilot: Callable[..., Any], flavour: str, fault:
     assert not p.last("SYS_STATUS").onboard_control_sensors_health & PREARM
 
 
-def test_standing_armed_it_disarms_by_itself(pilot: Callable[..., Any], flavour: str) -> None:
+def test_armed_vehicle_on_the_ground_disarms(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour).ready()
     p.arm()
     p.wait(9.5)
@@ -117,7 +119,7 @@ def test_standing_armed_it_disarms_by_itself(pilot: Callable[..., Any], flavour:
     assert not p.truth.armed
 
 
-def test_running_up_it_does_not(pilot: Callable[..., Any], flavour: str) -> None:
+def test_vehicle_spooling_up_does_not_disarm(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour).ready()
     p.mode(FlightMode.GUIDED)
     p.arm()

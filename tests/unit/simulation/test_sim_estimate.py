@@ -26,7 +26,7 @@ def behind(p: Any, name: str) -> float:
     return float(p.truth.north_mm / 1_000 - north)
 
 
-def test_a_real_estimate_is_late(pilot: Callable[..., Any], flavour: str) -> None:
+def test_real_position_estimate_lags(pilot: Callable[..., Any], flavour: str) -> None:
     p = flying(pilot, flavour, noise=False, estimate=Estimate.REAL)
     p.go_to(300, 0, 20)
     p.wait(8)
@@ -37,7 +37,7 @@ def test_a_real_estimate_is_late(pilot: Callable[..., Any], flavour: str) -> Non
     assert behind(p, "GPS_RAW_INT") == pytest.approx(speed * FIX_LATE_S, abs=0.05)
 
 
-def test_a_real_speed_comes_down_late(pilot: Callable[..., Any], flavour: str) -> None:
+def test_real_velocity_estimate_lags(pilot: Callable[..., Any], flavour: str) -> None:
     def told(estimate: Estimate) -> tuple[float, float]:
         p = flying(pilot, flavour, noise=False, estimate=estimate)
         p.go_to(300, 0, 20)
@@ -52,7 +52,7 @@ def test_a_real_speed_comes_down_late(pilot: Callable[..., Any], flavour: str) -
     assert 0.1 < real[1] - close[1] < 0.5
 
 
-def test_a_real_receiver_strays_slowly_by_about_a_metre() -> None:
+def test_real_receiver_error_wanders_by_about_a_metre() -> None:
     found, steps = [], []
     for seed in range(12):
         simulation = Simulation(SimulationConfig(AutopilotKind.PX4, seed=seed, estimate=Estimate.REAL))
@@ -71,7 +71,7 @@ def test_a_real_receiver_strays_slowly_by_about_a_metre() -> None:
     assert 0.05 < fmean(steps) < 0.3
 
 
-def test_it_steers_by_what_it_believes(pilot: Callable[..., Any], flavour: str) -> None:
+def test_vehicle_steers_by_its_estimate(pilot: Callable[..., Any], flavour: str) -> None:
     p = flying(pilot, flavour, estimate=Estimate.REAL)
     off = []
     for _ in range(60):
@@ -83,7 +83,7 @@ def test_it_steers_by_what_it_believes(pilot: Callable[..., Any], flavour: str) 
     assert 0.3 < max(off) < 4
 
 
-def test_without_noise_it_does_not_stray(pilot: Callable[..., Any], flavour: str) -> None:
+def test_estimate_does_not_wander_without_noise(pilot: Callable[..., Any], flavour: str) -> None:
     p = flying(pilot, flavour, noise=False, estimate=Estimate.REAL)
     p.wait(30)
     assert hypot(p.truth.north_mm, p.truth.east_mm) < 50

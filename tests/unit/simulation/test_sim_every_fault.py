@@ -74,14 +74,14 @@ def flying(pilot: Callable[..., Any], flavour: str) -> Any:
     return p
 
 
-def test_there_is_an_example_of_each() -> None:
+def test_every_fault_kind_has_an_example() -> None:
     assert set(EXAMPLES) == set(OF_VEHICLE)
     assert all(type(EXAMPLES[name](0)) is kind for name, kind in OF_VEHICLE.items())
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(EXAMPLES))
-def test_it_changes_what_is_seen(
+def test_every_fault_changes_the_output(
     name: str, pilot: Callable[..., Any], flavour: str, on_its_way: dict[str, Any]
 ) -> None:
     if flavour not in on_its_way:
@@ -104,7 +104,7 @@ def test_it_changes_what_is_seen(
     assert name in NEVER[flavour], "nothing changed"
 
 
-def test_what_is_not_of_the_vehicle_has_no_effect_on_it_and_an_unknown_kind_is_refused() -> None:
+def test_host_faults_have_no_effect_and_unknown_kinds_are_refused() -> None:
     on = Affected(Autopilot(FLAVOURS[AutopilotKind.PX4], SimulationConfig()), None, None, None, None)  # type: ignore[arg-type]
     assert not list(effects(faults.DiskFull(0), on))
     assert not list(effects(faults.Recall(0), on))

@@ -25,7 +25,7 @@ def names(p: Any) -> set[str]:
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-def test_a_stock_vehicle_tells_none_of_it_in_a_flight_either(pilot: Callable[..., Any], flavour: str) -> None:
+def test_stock_vehicle_sends_no_messages_of_extras(pilot: Callable[..., Any], flavour: str) -> None:
     """But the voltage of the whole battery, which every vehicle measures."""
     p = pilot(flavour, extras=STOCK, wind=Wind(5_000, 270))
     p.take_off(5)
@@ -39,7 +39,7 @@ def test_a_stock_vehicle_tells_none_of_it_in_a_flight_either(pilot: Callable[...
 
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-def test_the_wind_is_known_in_the_air_and_what_is_told_after_it_is_old(pilot: Callable[..., Any], flavour: str) -> None:
+def test_wind_is_estimated_in_the_air_only(pilot: Callable[..., Any], flavour: str) -> None:
     """Seen on the real ones: PX4 sends no WIND_COV on the ground, ArduCopter goes on sending the last of the flight."""
     p = pilot(flavour, wind=Wind(5_000, 270))
     ask(p.ready()).wait(1)
@@ -62,7 +62,7 @@ def test_the_wind_is_known_in_the_air_and_what_is_told_after_it_is_old(pilot: Ca
     assert len(after) == (0 if p.px4 else 1)
 
 
-def test_two_range_finders_tell_in_turn_where_they_look(pilot: Callable[..., Any]) -> None:
+def test_two_range_finders_report_in_turn(pilot: Callable[..., Any]) -> None:
     p = pilot("px4", extras=EQUIPPED | {Equipment.ALTIMETER})
     p.take_off(5)
     p.seen.clear()
@@ -73,6 +73,6 @@ def test_two_range_finders_tell_in_turn_where_they_look(pilot: Callable[..., Any
     assert all(3 <= distance <= 6 for orientation, distance in told if orientation == 25)
 
 
-def test_one_that_looks_down_is_all_that_there_may_be(pilot: Callable[..., Any]) -> None:
+def test_downward_range_finder_works_alone(pilot: Callable[..., Any]) -> None:
     p = pilot("px4", extras=frozenset({Equipment.ALTIMETER})).ready()
     assert {f.message.orientation for f in p.seen if f.name == "DISTANCE_SENSOR"} == {25}

@@ -30,7 +30,7 @@ def inject(p: Any, kind: Callable[..., faults.Fault], *args: Any) -> None:
     p.simulation.inject(kind(p.simulation.now_us, *args))
 
 
-def test_battery_level(flying: Any) -> None:
+def test_battery_level_fault_lowers_the_charge(flying: Any) -> None:
     inject(flying, faults.BatteryLevel, 2_000)
     flying.wait(1)
     assert flying.last("BATTERY_STATUS").battery_remaining in (19, 20)
@@ -59,7 +59,7 @@ def test_low_battery_refuses_to_arm(pilot: Callable[..., Any], flavour: str) -> 
     )
 
 
-def test_gps_loss_shows_at_once_and_the_autopilot_lands_later(flying: Any) -> None:
+def test_gps_loss_is_reported_at_once_and_lands_later(flying: Any) -> None:
     flying.mode(FlightMode.LOITER)
     inject(flying, faults.GpsLoss)
     flying.wait(1)
@@ -93,7 +93,7 @@ def test_gps_jump_moves_the_report_and_then_the_vehicle(flying: Any) -> None:
     assert abs(flying.truth.north_mm + 20_000) < 500
 
 
-def test_wind_step_is_told_in_the_flavours_own_message(flying: Any) -> None:
+def test_wind_step_is_reported_in_the_flavours_message(flying: Any) -> None:
     inject(flying, faults.WindStep, 12_000, 270)
     flying.wait(1)
     if flying.px4:
@@ -104,13 +104,13 @@ def test_wind_step_is_told_in_the_flavours_own_message(flying: Any) -> None:
         assert flying.last("WIND").direction == pytest.approx(-90, abs=0.1)
 
 
-def test_a_storm_carries_it_away(flying: Any) -> None:
+def test_storm_carries_the_vehicle_away(flying: Any) -> None:
     inject(flying, faults.WindStep, 25_000, 270)
     flying.wait(10)
     assert flying.truth.east_mm > 30_000
 
 
-def test_link_delay(flying: Any) -> None:
+def test_link_delay_delays_both_directions(flying: Any) -> None:
     inject(flying, faults.LinkDelay, 300_000)
     flying.wait(1)
     assert flying.mode(FlightMode.LAND) == []
@@ -122,7 +122,7 @@ def test_link_delay(flying: Any) -> None:
     assert flying.last("COMMAND_ACK").result == 0
 
 
-def test_link_loss(flying: Any) -> None:
+def test_link_loss_drops_frames(flying: Any) -> None:
     inject(flying, faults.LinkLoss, 4_000)
     flying.wait(0.1)
     received = len(flying.wait(20))
@@ -131,7 +131,7 @@ def test_link_loss(flying: Any) -> None:
     assert 0.5 < received / len(flying.wait(20)) < 0.7
 
 
-def test_link_silence(flying: Any) -> None:
+def test_link_silence_drops_all_frames(flying: Any) -> None:
     inject(flying, faults.LinkSilence, 5 * S)
     flying.wait(0.1)
     assert flying.wait(4.8) == []
@@ -140,7 +140,7 @@ def test_link_silence(flying: Any) -> None:
     assert flying.truth.mode is not FlightMode.LAND
 
 
-def test_link_quality_is_told_by_the_radio(flying: Any) -> None:
+def test_radio_reports_link_quality(flying: Any) -> None:
     assert flying.last("RADIO_STATUS").txbuf == 100
     inject(flying, faults.LinkQuality, 2_500)
     flying.wait(1.1)
@@ -149,7 +149,7 @@ def test_link_quality_is_told_by_the_radio(flying: Any) -> None:
     assert (radio.system, radio.component) == (51, 68)
 
 
-def test_obstacle(flying: Any) -> None:
+def test_obstacle_is_reported_by_the_range_finder(flying: Any) -> None:
     assert flying.last("DISTANCE_SENSOR").current_distance == 4_000
     inject(flying, faults.Obstacle, 3_000, 2 * S)
     flying.wait(1)
@@ -158,7 +158,7 @@ def test_obstacle(flying: Any) -> None:
     assert flying.last("DISTANCE_SENSOR").current_distance == 4_000
 
 
-def test_pilot_takes_over(flying: Any) -> None:
+def test_pilot_mode_switch_takes_over(flying: Any) -> None:
     flying.go_to(100, 0, 20)
     flying.wait(4)
     inject(flying, faults.PilotMode)
@@ -167,7 +167,7 @@ def test_pilot_takes_over(flying: Any) -> None:
     assert flying.truth.speed_mm_s < 100
 
 
-def test_faults_from_the_configuration_happen_when_they_should(pilot: Callable[..., Any], flavour: str) -> None:
+def test_configured_faults_happen_on_time(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour, faults=(faults.BatteryLevel(3 * S, 5_000), faults.BatteryLevel(2 * S, 7_000)))
     p.wait(1.9)
     assert p.truth.battery > 9_900
@@ -217,7 +217,7 @@ def test_faults_from_the_configuration_happen_when_they_should(pilot: Callable[.
         ("pilot,at=1s", faults.PilotMode(S, FlightMode.POSITION)),
     ],
 )
-def test_fault_texts(text: str, expected: faults.Fault) -> None:
+def test_fault_texts_are_parsed(text: str, expected: faults.Fault) -> None:
     assert parse_fault(text) == expected
 
 
@@ -240,12 +240,12 @@ def test_fault_texts(text: str, expected: faults.Fault) -> None:
         ("stall,at=1s,for=1s,shuffle=yes", "the seed of the shuffled order"),
     ],
 )
-def test_bad_fault_texts(text: str, message: str) -> None:
+def test_malformed_fault_texts_are_refused(text: str, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         parse_fault(text)
 
 
-def test_a_glitch_is_not_believed_and_then_nothing_is(flying: Any) -> None:
+def test_gps_glitch_is_rejected_until_the_estimate_expires(flying: Any) -> None:
     flying.mode(FlightMode.LOITER)
     estimator = "ESTIMATOR_STATUS" if flying.px4 else "EKF_STATUS_REPORT"
     before = flying.last("GLOBAL_POSITION_INT").lat
@@ -263,7 +263,7 @@ def test_a_glitch_is_not_believed_and_then_nothing_is(flying: Any) -> None:
     assert flying.truth.mode is FlightMode.LAND
 
 
-def test_without_a_position_it_lands_where_the_wind_carries_it(pilot: Callable[..., Any], flavour: str) -> None:
+def test_vehicle_without_position_drifts_while_landing(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour, wind=Wind(5_000, 270))
     p.take_off(20)
     p.mode(FlightMode.LOITER)
@@ -277,7 +277,7 @@ def test_without_a_position_it_lands_where_the_wind_carries_it(pilot: Callable[.
     assert ("EKF Failsafe Cleared" in p.texts()) is not p.px4
 
 
-def test_low_voltage_is_told_after_a_while_and_changes_nothing_by_default(pilot: Callable[..., Any]) -> None:
+def test_low_voltage_is_reported_and_ignored_by_default(pilot: Callable[..., Any]) -> None:
     p = pilot("ardupilot")
     p.long(511, 1, 100_000)
     p.take_off(15)
@@ -296,7 +296,7 @@ def test_low_voltage_is_told_after_a_while_and_changes_nothing_by_default(pilot:
     assert p.texts()[-2:] == ["Arm: Battery 1 low voltage failsafe", "Arm: Battery failsafe"]
 
 
-def test_the_voltage_that_is_low_is_a_parameter(pilot: Callable[..., Any]) -> None:
+def test_low_voltage_threshold_is_a_parameter(pilot: Callable[..., Any]) -> None:
     p = pilot("ardupilot", battery=3_000)
     p.send(mavlink.MAVLink_param_set_message(1, 1, b"BATT_LOW_VOLT", 14.7, 9))
     p.take_off(15)
@@ -304,7 +304,7 @@ def test_the_voltage_that_is_low_is_a_parameter(pilot: Callable[..., Any]) -> No
 
 
 @pytest.mark.parametrize(("action", "mode"), [(1, FlightMode.LAND), (2, FlightMode.RETURN)])
-def test_low_voltage_may_be_told_to_act(pilot: Callable[..., Any], action: int, mode: FlightMode) -> None:
+def test_low_voltage_action_is_a_parameter(pilot: Callable[..., Any], action: int, mode: FlightMode) -> None:
     p = pilot("ardupilot")
     p.send(mavlink.MAVLink_param_set_message(1, 1, b"BATT_FS_LOW_ACT", action, 9))
     p.take_off(15)
@@ -313,7 +313,7 @@ def test_low_voltage_may_be_told_to_act(pilot: Callable[..., Any], action: int, 
     assert p.truth.mode is mode
 
 
-def test_a_fault_is_written_as_it_is_read() -> None:
+def test_formatted_fault_parses_to_itself() -> None:
     space = FaultSpace(
         ("takeoff", "return_home"), {"px4": 60 * S, "ardupilot": 60 * S}, kinds=frozenset(OF_VEHICLE.values())
     )

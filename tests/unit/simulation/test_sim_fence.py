@@ -50,7 +50,7 @@ def bytewise(value: int) -> float:
 
 
 @given(st.floats(-20, 20), st.floats(-20, 20))
-def test_a_square_holds_what_its_bounds_hold(north: float, east: float) -> None:
+def test_square_contains_the_points_within_its_bounds(north: float, east: float) -> None:
     if min(abs(abs(north) - 10), abs(abs(east) - 10)) > 1e-6:
         assert SQUARE.holds(north, east) == (abs(north) < 10 and abs(east) < 10)
     inside = max(abs(north), abs(east)) < 10
@@ -59,7 +59,7 @@ def test_a_square_holds_what_its_bounds_hold(north: float, east: float) -> None:
     assert SQUARE.edge(north, east) == pytest.approx(expected if inside else away, abs=1e-9)
 
 
-def test_a_polygon_may_be_concave() -> None:
+def test_polygon_can_be_concave() -> None:
     assert NOTCHED.holds(-5, 0)
     assert not NOTCHED.holds(1, 9)
     assert not NOTCHED.holds(0, 5)
@@ -77,7 +77,9 @@ def test_a_polygon_may_be_concave() -> None:
         (FenceArea((SQUARE,), (FenceCircle((0, 0), 2),)), (5, 5), (1, 0)),
     ],
 )
-def test_areas(area: FenceArea, inside: tuple[float, float], outside: tuple[float, float] | None) -> None:
+def test_area_combines_included_and_excluded_shapes(
+    area: FenceArea, inside: tuple[float, float], outside: tuple[float, float] | None
+) -> None:
     assert area.holds(*inside)
     assert area.outside_by(*inside) == 0
     if outside is not None:
@@ -85,13 +87,13 @@ def test_areas(area: FenceArea, inside: tuple[float, float], outside: tuple[floa
         assert area.outside_by(*outside) == pytest.approx(1) or area.outside_by(*outside) > 1
 
 
-def test_the_ceiling() -> None:
+def test_ceiling_limits_the_allowed_height() -> None:
     limits = FenceLimits(FenceArea(), 50)
     assert limits.holds(Point(0, 0, 50))
     assert not limits.holds(Point(0, 0, 50.1))
 
 
-def test_what_is_uploaded_becomes_an_area(pilot: Pilots) -> None:
+def test_uploaded_items_become_an_area(pilot: Pilots) -> None:
     a = pilot("px4")
     rows = [
         *p.square(50),
@@ -118,7 +120,7 @@ def ordered_out(a: Any) -> list[int]:
     return result
 
 
-def test_a_target_outside_is_refused_or_dropped(pilot: Pilots, flavour: str) -> None:
+def test_target_outside_the_fence_is_refused_or_dropped(pilot: Pilots, flavour: str) -> None:
     a = pilot(flavour)
     a.take_off(10)
     fenced(a, p.square(60))
@@ -130,7 +132,7 @@ def test_a_target_outside_is_refused_or_dropped(pilot: Pilots, flavour: str) -> 
         assert any("outside geofence" in text for text in a.texts())
 
 
-def test_right_behind_an_upload_a_target_outside_is_accepted(pilot: Pilots, flavour: str) -> None:
+def test_target_outside_is_accepted_right_after_an_upload(pilot: Pilots, flavour: str) -> None:
     a = pilot(flavour)
     a.take_off(10)
     if not a.px4:
@@ -174,7 +176,7 @@ def on_the_way_out(a: Any) -> Any:
         ("ardupilot", 4, FlightMode.BRAKE),
     ],
 )
-def test_actions(pilot: Pilots, flavour: str, action: int, mode: FlightMode) -> None:
+def test_breach_triggers_the_configured_action(pilot: Pilots, flavour: str, action: int, mode: FlightMode) -> None:
     a = pilot(flavour)
     a.take_off(10)
     if a.px4:
@@ -192,7 +194,7 @@ def test_actions(pilot: Pilots, flavour: str, action: int, mode: FlightMode) -> 
     assert (a.truth.north_mm > 50_000) == goes_on
 
 
-def test_px4_does_not_return_after_somebody_took_over_while_it_held(pilot: Pilots) -> None:
+def test_px4_takeover_during_hold_cancels_the_return(pilot: Pilots) -> None:
     a = pilot("px4")
     a.take_off(10)
     a.send(mavlink.MAVLink_param_set_message(1, 1, b"GF_ACTION", bytewise(3), 6))
@@ -204,7 +206,7 @@ def test_px4_does_not_return_after_somebody_took_over_while_it_held(pilot: Pilot
     assert a.truth.mode is FlightMode.POSITION
 
 
-def test_px4_can_be_told_to_terminate(pilot: Pilots) -> None:
+def test_px4_breach_can_terminate_the_flight(pilot: Pilots) -> None:
     a = pilot("px4")
     a.take_off(10)
     a.send(mavlink.MAVLink_param_set_message(1, 1, b"GF_ACTION", bytewise(4), 6))
@@ -213,7 +215,7 @@ def test_px4_can_be_told_to_terminate(pilot: Pilots) -> None:
     a.until(lambda: not a.truth.in_air)
 
 
-def test_whoever_commands_in_a_breach_is_obeyed(pilot: Pilots, flavour: str) -> None:
+def test_commands_during_a_breach_are_obeyed(pilot: Pilots, flavour: str) -> None:
     a = pilot(flavour)
     a.take_off(10)
     on_the_way_out(a)
@@ -228,7 +230,7 @@ def test_whoever_commands_in_a_breach_is_obeyed(pilot: Pilots, flavour: str) -> 
     assert a.truth.mode is FlightMode.LOITER
 
 
-def test_far_outside_arducopter_lands(pilot: Pilots) -> None:
+def test_arducopter_lands_far_outside_the_fence(pilot: Pilots) -> None:
     a = pilot("ardupilot")
     a.take_off(10)
     a.go_to(140, 0, 10)
@@ -238,7 +240,7 @@ def test_far_outside_arducopter_lands(pilot: Pilots) -> None:
     assert a.truth.mode is FlightMode.LAND
 
 
-def test_the_height_and_the_circle(pilot: Pilots) -> None:
+def test_arducopter_checks_height_and_circle(pilot: Pilots) -> None:
     a = pilot("ardupilot")
     a.take_off(10)
     set_param(a, "FENCE_ENABLE", 1)
@@ -264,7 +266,7 @@ def test_the_height_and_the_circle(pilot: Pilots) -> None:
     assert "Circle fence breached" in b.texts()
 
 
-def test_px4_has_a_circle_and_a_height_too(pilot: Pilots) -> None:
+def test_px4_checks_circle_and_height(pilot: Pilots) -> None:
     a = pilot("px4")
     a.take_off(10)
     set_param(a, "GF_MAX_HOR_DIST", 40)
@@ -278,7 +280,7 @@ def test_px4_has_a_circle_and_a_height_too(pilot: Pilots) -> None:
     assert "Failsafe activated: switching to Hold\t" in a.texts()
 
 
-def test_a_fence_off_or_left_out_does_nothing(pilot: Pilots) -> None:
+def test_disabled_or_absent_fence_has_no_effect(pilot: Pilots) -> None:
     a = pilot("ardupilot")
     a.take_off(10)
     p.upload(a, p.square(5), p.FENCE)
@@ -288,7 +290,7 @@ def test_a_fence_off_or_left_out_does_nothing(pilot: Pilots) -> None:
     assert a.truth.mode is FlightMode.GUIDED
 
 
-def test_outside_the_fence_it_does_not_arm(pilot: Pilots, flavour: str) -> None:
+def test_arming_outside_the_fence_is_refused(pilot: Pilots, flavour: str) -> None:
     a = fenced(pilot(flavour).ready(), p.square(20, 100, 0))
     if not a.px4:
         a.mode(FlightMode.GUIDED)
@@ -297,12 +299,12 @@ def test_outside_the_fence_it_does_not_arm(pilot: Pilots, flavour: str) -> None:
     assert not a.last("SYS_STATUS").onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK if a.px4 else 1
 
 
-def test_px4_does_not_show_its_fence_in_its_status(pilot: Pilots) -> None:
+def test_px4_status_does_not_report_the_fence(pilot: Pilots) -> None:
     a = fenced(pilot("px4").ready(), p.square(20))
     assert not a.last("SYS_STATUS").onboard_control_sensors_present & mavlink.MAV_SYS_STATUS_GEOFENCE
 
 
-def test_the_fence_shows_in_the_vehicles_status(pilot: Pilots) -> None:
+def test_arducopter_status_reports_the_fence(pilot: Pilots) -> None:
     a = pilot("ardupilot")
     a.take_off(10)
     a.long(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAVLINK_MSG_ID_SYS_STATUS, 200_000)
@@ -325,11 +327,11 @@ def test_the_fence_shows_in_the_vehicles_status(pilot: Pilots) -> None:
     assert a.long(mavlink.MAV_CMD_DO_FENCE_ENABLE, 7) == [4]
 
 
-def test_no_ceiling_is_infinite() -> None:
+def test_absent_ceiling_is_infinite() -> None:
     assert FenceLimits().ceiling == inf
 
 
-def test_px4s_own_circle_counts_beside_the_areas(pilot: Pilots) -> None:
+def test_px4_circle_applies_in_addition_to_areas(pilot: Pilots) -> None:
     """`Geofence::checkPointAgainstAllGeofences`."""
     a = fenced(pilot("px4"), p.square(500), GF_MAX_HOR_DIST=40)
     a.take_off(10)

@@ -27,7 +27,7 @@ OVERSHOOT_S = {"px4": (0.15, 0.19), "ardupilot": (0.07, 0.1)}
         pytest.param("ardupilot", (0, -300, 12), 8_000, marks=pytest.mark.soak),
     ],
 )
-def test_out_and_home(
+def test_flight_to_a_target_and_home(
     pilot: Callable[..., Any], flavour: str, there: tuple[float, float, float], cruise_mm_s: int
 ) -> None:
     north_m, east_m, up_m = there
@@ -60,7 +60,7 @@ def test_out_and_home(
     assert p.last("HEARTBEAT").base_mode & 128 == 0
 
 
-def test_it_lands_as_fast_as_its_owner_says(pilot: Callable[..., Any], flavour: str) -> None:
+def test_landing_speed_follows_the_configuration(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour, land_mm_s=1_200)
     p.take_off(8)
     p.mode(FlightMode.LAND)
@@ -73,7 +73,7 @@ def test_it_lands_as_fast_as_its_owner_says(pilot: Callable[..., Any], flavour: 
             SimulationConfig(land_mm_s=wrong)
 
 
-def test_return_climbs_first(pilot: Callable[..., Any], flavour: str) -> None:
+def test_return_begins_with_a_climb(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour)
     p.take_off(10)
     p.go_to(60, 0, 8)
@@ -86,7 +86,7 @@ def test_return_climbs_first(pilot: Callable[..., Any], flavour: str) -> None:
     assert highest > (29_000 if p.px4 else 14_000)
 
 
-def test_landed_state_tells_the_parts_of_the_flight(pilot: Callable[..., Any], flavour: str) -> None:
+def test_landed_state_follows_the_phases_of_the_flight(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour)
     p.long(511, 245, 100_000)
     p.take_off(12)
@@ -99,7 +99,7 @@ def test_landed_state_tells_the_parts_of_the_flight(pilot: Callable[..., Any], f
     assert [states[0]] + [b for a, b in pairwise(states) if a != b] == [1, 3, 2, 4, 1]
 
 
-def test_hold_keeps_the_place_in_wind(pilot: Callable[..., Any], flavour: str) -> None:
+def test_hold_keeps_its_place_in_wind(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour, wind=Wind(9_000, 45, 1_500))
     p.take_off(20)
     p.mode(FlightMode.LOITER)
@@ -120,7 +120,7 @@ STOPS = [
 
 
 @pytest.mark.parametrize(("flavour", "how", "speed_m_s", "away_m", "after_s"), STOPS)
-def test_told_to_stop_it_stops_as_the_real_one_did(
+def test_stop_matches_the_recording(
     pilot: Callable[..., Any], flavour: str, how: Any, speed_m_s: float, away_m: float, after_s: float
 ) -> None:
     p = pilot(flavour, cruise_mm_s=round(speed_m_s * 1000), noise=False)
@@ -138,9 +138,7 @@ def test_told_to_stop_it_stops_as_the_real_one_did(
 
 
 @pytest.mark.parametrize(("speed_m_s", "flavour"), each_once([1, 2, 6, 8, 12], ["px4", "ardupilot"]))
-def test_told_to_stop_it_stops_and_stays_from_any_speed(
-    pilot: Callable[..., Any], flavour: str, speed_m_s: int
-) -> None:
+def test_stop_holds_from_any_speed(pilot: Callable[..., Any], flavour: str, speed_m_s: int) -> None:
     p = pilot(flavour, cruise_mm_s=speed_m_s * 1000, noise=False)
     p.take_off(20)
     p.go_to(400, 0, 20)
@@ -172,7 +170,7 @@ def test_telemetry_agrees_with_the_truth(pilot: Callable[..., Any], flavour: str
     assert position.time_boot_ms * 1000 <= p.simulation.now_us < position.time_boot_ms * 1000 + 200_000
 
 
-def test_forced_disarm_in_the_air_is_a_fall(pilot: Callable[..., Any], flavour: str) -> None:
+def test_forced_disarm_in_the_air_lets_the_vehicle_fall(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour)
     p.take_off(20)
     assert p.long(400, 0, 21196) == [0]

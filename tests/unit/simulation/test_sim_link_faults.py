@@ -43,7 +43,7 @@ def lag_us(p: Any) -> list[int]:
     ]
 
 
-def test_a_delay_of_one_direction(flying: Any) -> None:
+def test_delay_affects_one_direction(flying: Any) -> None:
     inject(flying, faults.LinkDelay, 300_000, 8 * S, Direction.DOWN)
     flying.wait(1)
     assert set(lag_us(flying)) == {300_000}
@@ -71,7 +71,7 @@ def test_jitter_varies_the_delay_and_keeps_the_order(flying: Any) -> None:
     assert 0 <= min(lags) < 100_000 < max(lags) <= 220_000
 
 
-def test_what_is_overtaken_comes_out_of_order(flying: Any) -> None:
+def test_reordered_datagrams_arrive_out_of_order(flying: Any) -> None:
     inject(flying, faults.LinkReorder, 2_000)
     flying.wait(0.1)
     numbers = [frame.sequence for frame in of_autopilot(flying.wait(10))]
@@ -80,7 +80,7 @@ def test_what_is_overtaken_comes_out_of_order(flying: Any) -> None:
 
 
 @pytest.mark.parametrize("way", list(Direction))
-def test_silence_of_each_direction(flying: Any, way: Direction) -> None:
+def test_silence_affects_the_named_direction(flying: Any, way: Direction) -> None:
     inject(flying, faults.LinkSilence, 5 * S, way)
     flying.wait(0.1)
     flying.mode(FlightMode.LAND)
@@ -90,7 +90,7 @@ def test_silence_of_each_direction(flying: Any, way: Direction) -> None:
     assert (flying.truth.mode is FlightMode.LAND) is (way is Direction.DOWN), "what was lost stays lost"
 
 
-def test_what_was_held_comes_in_a_burst(flying: Any) -> None:
+def test_held_datagrams_arrive_in_a_burst(flying: Any) -> None:
     inject(flying, faults.LinkSilence, 5 * S, Direction.BOTH, True)
     flying.wait(0.1)
     flying.mode(FlightMode.LAND)
@@ -102,7 +102,7 @@ def test_what_was_held_comes_in_a_burst(flying: Any) -> None:
     assert flying.truth.mode is FlightMode.LAND
 
 
-def test_loss_of_one_direction_ends(flying: Any) -> None:
+def test_loss_in_one_direction_ends(flying: Any) -> None:
     inject(flying, faults.LinkLoss, 10_000, 2 * S, Direction.UP)
     flying.wait(0.1)
     assert of_autopilot(flying.wait(1))
@@ -114,7 +114,7 @@ def test_loss_of_one_direction_ends(flying: Any) -> None:
     assert flying.truth.mode is FlightMode.LAND
 
 
-def test_a_stall_stops_its_time_and_its_flight_and_answers_all_at_once(flying: Any) -> None:
+def test_stall_halts_the_autopilot_and_then_answers_in_a_burst(flying: Any) -> None:
     flying.go_to(200, 0, 20)
     flying.wait(5)
     before, told = flying.truth, flying.last("GLOBAL_POSITION_INT").time_boot_ms
@@ -132,7 +132,7 @@ def test_a_stall_stops_its_time_and_its_flight_and_answers_all_at_once(flying: A
     assert flying.truth.speed_mm_s > 4_000, "it flies on as it flew"
 
 
-def test_after_a_stall_the_order_of_the_first_messages_may_be_any(pilot: Callable[..., Any], flavour: str) -> None:
+def test_stall_can_shuffle_the_first_messages(pilot: Callable[..., Any], flavour: str) -> None:
     def first(shuffle: int) -> list[str]:
         p = pilot(flavour, faults=(faults.Stall(20 * S, 3 * S, shuffle),))
         for number in (33, 24, 30, 245, 147, 1):
@@ -146,7 +146,7 @@ def test_after_a_stall_the_order_of_the_first_messages_may_be_any(pilot: Callabl
     assert any(first(seed)[0] not in ("HEARTBEAT", "COMMAND_ACK") for seed in range(1, 6))
 
 
-def test_frozen_measurements_go_on_with_old_stamps(flying: Any) -> None:
+def test_frozen_measurements_keep_old_time_stamps(flying: Any) -> None:
     flying.go_to(200, 0, 20)
     flying.wait(5)
     inject(flying, faults.Freeze, 4 * S)
@@ -162,7 +162,7 @@ def test_frozen_measurements_go_on_with_old_stamps(flying: Any) -> None:
     assert flying.simulation.now_us / 1000 - flying.last("GLOBAL_POSITION_INT").time_boot_ms < 200
 
 
-def test_one_message_alone_goes_silent(flying: Any) -> None:
+def test_single_message_can_be_silenced(flying: Any) -> None:
     inject(flying, faults.MessageSilence, "GLOBAL_POSITION_INT", 3 * S)
     flying.wait(0.1)
     names = {frame.name for frame in flying.wait(2.8)}
@@ -179,7 +179,7 @@ def test_one_message_alone_goes_silent(flying: Any) -> None:
     st.integers(0, 10_000),
     st.lists(st.integers(0, 100_000), max_size=60),
 )
-def test_a_link_delivers_all_in_time_and_the_same_for_the_same_seed(
+def test_link_delivers_in_time_and_deterministically(
     seed: int, delay_us: int, jitter_us: int, reordered: int, gaps: list[int]
 ) -> None:
     def run() -> list[tuple[int, bytes]]:

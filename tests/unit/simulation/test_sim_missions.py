@@ -39,7 +39,7 @@ def place(a: Any) -> tuple[float, float, float]:
     return a.truth.north_mm / 1000, a.truth.east_mm / 1000, a.truth.up_mm / 1000
 
 
-def test_it_flies_a_survey_and_comes_home(pilot: Pilots, flavour: str) -> None:
+def test_survey_is_flown_and_ends_at_home(pilot: Pilots, flavour: str) -> None:
     a = armed(loaded(pilot(flavour, cruise_mm_s=8_000).ready(), SURVEY))
     first = 0 if a.px4 else 1
     assert start(a) == [0]
@@ -67,7 +67,7 @@ def test_it_flies_a_survey_and_comes_home(pilot: Pilots, flavour: str) -> None:
         assert texts == ["Mission: 1 Takeoff", "Mission: 1 Takeoff", "Mission: 2 WP", "Mission: 3 WP", "Mission: 4 RTL"]
 
 
-def test_current_item_and_state_are_told(pilot: Pilots, flavour: str) -> None:
+def test_current_item_and_state_are_reported(pilot: Pilots, flavour: str) -> None:
     a = pilot(flavour).ready()
     a.long(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, 200_000)
     a.wait(1)
@@ -84,7 +84,7 @@ def test_current_item_and_state_are_told(pilot: Pilots, flavour: str) -> None:
     assert a.last("MISSION_CURRENT").mission_state == 4
 
 
-def test_it_pauses_where_it_is_and_goes_on(pilot: Pilots, flavour: str) -> None:
+def test_mission_pauses_and_resumes(pilot: Pilots, flavour: str) -> None:
     a = armed(loaded(pilot(flavour).ready(), [p.takeoff(10), p.waypoint(60, 0, 10), p.waypoint(60, 40, 10)]))
     start(a)
     a.until(lambda: place(a)[0] > 20)
@@ -104,7 +104,7 @@ def test_it_pauses_where_it_is_and_goes_on(pilot: Pilots, flavour: str) -> None:
     assert reached(a).count(last) == 1
 
 
-def test_a_second_start_flies_it_again(pilot: Pilots, flavour: str) -> None:
+def test_second_start_repeats_the_mission(pilot: Pilots, flavour: str) -> None:
     a = armed(loaded(pilot(flavour).ready(), [p.takeoff(5), p.waypoint(8, 0, 5)]))
     last = 1 if a.px4 else 2
     start(a)
@@ -115,7 +115,7 @@ def test_a_second_start_flies_it_again(pilot: Pilots, flavour: str) -> None:
     a.until(lambda: reached(a).count(last) == 2)
 
 
-def test_a_start_that_is_sent_again_disturbs_nothing(pilot: Pilots) -> None:
+def test_repeated_start_has_no_effect(pilot: Pilots) -> None:
     a = armed(loaded(pilot("ardupilot").ready(), [p.takeoff(5), p.waypoint(8, 0, 5), p.RETURN]))
     start(a)
     a.until(lambda: 2 in reached(a))
@@ -125,7 +125,7 @@ def test_a_start_that_is_sent_again_disturbs_nothing(pilot: Pilots) -> None:
     a.until(lambda: not a.truth.armed, seconds=120)
 
 
-def test_landing_as_an_item(pilot: Pilots, flavour: str) -> None:
+def test_land_item_lands(pilot: Pilots, flavour: str) -> None:
     land = (21, p.RELATIVE, (0, 0, 0, 0), 15, 5, 0)
     a = armed(loaded(pilot(flavour).ready(), [p.takeoff(6), land]))
     start(a)
@@ -140,7 +140,7 @@ def test_landing_as_an_item(pilot: Pilots, flavour: str) -> None:
     assert place(here) == pytest.approx((12, 0, 0), abs=2.5)
 
 
-def test_speed_jumps_and_items_for_cameras(pilot: Pilots, flavour: str) -> None:
+def test_speed_jump_and_camera_items(pilot: Pilots, flavour: str) -> None:
     offset = 0 if flavour == "px4" else 1
     rows = [
         p.takeoff(5),
@@ -165,7 +165,7 @@ def test_speed_jumps_and_items_for_cameras(pilot: Pilots, flavour: str) -> None:
     assert place(a) == pytest.approx((5, 5, 5), abs=1)
 
 
-def test_altitudes_above_sea(pilot: Pilots, flavour: str) -> None:
+def test_altitudes_above_sea_are_converted(pilot: Pilots, flavour: str) -> None:
     a = pilot(flavour)
     amsl = a.config.home.amsl_mm / 1000
     armed(loaded(a.ready(), [p.takeoff(5), p.waypoint(10, 0, amsl + 9, frame=p.AMSL), p.waypoint(20, 0, 9)]))
@@ -174,7 +174,7 @@ def test_altitudes_above_sea(pilot: Pilots, flavour: str) -> None:
     assert place(a)[2] == pytest.approx(9, abs=1.1)
 
 
-def test_set_current(pilot: Pilots, flavour: str) -> None:
+def test_set_current_selects_an_item(pilot: Pilots, flavour: str) -> None:
     a = armed(loaded(pilot(flavour).ready(), SURVEY))
     start(a)
     a.until(lambda: a.truth.up_mm > 9_500)
@@ -191,14 +191,14 @@ def test_set_current(pilot: Pilots, flavour: str) -> None:
         assert a.long(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT, 99) == [4]
 
 
-def test_without_a_mission_there_is_nothing_to_start(pilot: Pilots, flavour: str) -> None:
+def test_start_without_a_mission_is_refused(pilot: Pilots, flavour: str) -> None:
     a = pilot(flavour).ready()
     assert start(a) == [2 if a.px4 else 4]
     assert a.mode(FlightMode.MISSION)[-1] == (1 if a.px4 else 4)
     assert not a.truth.armed
 
 
-def test_px4_starts_nothing_before_it_has_judged_the_mission(pilot: Pilots) -> None:
+def test_px4_start_is_denied_until_the_mission_is_checked(pilot: Pilots) -> None:
     a = pilot("px4").ready()
     p.upload(a, SURVEY)
     assert start(a) == [2]
@@ -206,7 +206,7 @@ def test_px4_starts_nothing_before_it_has_judged_the_mission(pilot: Pilots) -> N
     assert start(a) == [0]
 
 
-def test_px4_accepts_a_mission_outside_the_fence_and_does_not_fly_it(pilot: Pilots) -> None:
+def test_px4_accepts_but_does_not_fly_a_mission_outside_the_fence(pilot: Pilots) -> None:
     a = pilot("px4").ready()
     p.upload(a, p.square(60), p.FENCE)
     a.wait(0.5)
@@ -222,21 +222,21 @@ def test_px4_accepts_a_mission_outside_the_fence_and_does_not_fly_it(pilot: Pilo
     assert start(a) == [2]
 
 
-def test_px4_denies_the_mission_mode_when_it_cannot_arm(pilot: Pilots) -> None:
+def test_px4_denies_start_when_it_cannot_arm(pilot: Pilots) -> None:
     a = pilot("px4", battery=500).ready()
     loaded(a, SURVEY)
     assert start(a) == [1]
     assert not a.truth.armed
 
 
-def test_px4_takes_off_by_itself_for_a_mission_of_waypoints(pilot: Pilots) -> None:
+def test_px4_takes_off_for_a_mission_of_waypoints(pilot: Pilots) -> None:
     a = loaded(pilot("px4").ready(), [p.waypoint(20, 0, 8), p.waypoint(20, 10, 8)])
     assert start(a) == [0]
     a.until(lambda: reached(a) == [0, 1])
     assert place(a) == pytest.approx((20, 10, 8), abs=2.5)
 
 
-def test_px4_starts_from_the_item_that_is_named(pilot: Pilots) -> None:
+def test_px4_starts_from_the_named_item(pilot: Pilots) -> None:
     a = loaded(pilot("px4").ready(), SURVEY)
     assert a.long(mavlink.MAV_CMD_MISSION_START, 9) == [2]
     assert a.long(mavlink.MAV_CMD_MISSION_START, 2) == [0]
@@ -244,7 +244,7 @@ def test_px4_starts_from_the_item_that_is_named(pilot: Pilots) -> None:
     assert reached(a) == [2, 3]
 
 
-def test_px4_leaves_a_mission_that_is_taken_away(pilot: Pilots) -> None:
+def test_px4_leaves_mission_mode_when_the_mission_is_cleared(pilot: Pilots) -> None:
     a = loaded(pilot("px4").ready(), [p.takeoff(10), p.waypoint(500, 0, 10)])
     start(a)
     a.until(lambda: a.truth.north_mm > 20_000)
@@ -263,7 +263,7 @@ def test_arducopter_waits_on_the_ground_for_mission_start(pilot: Pilots) -> None
     assert a.send(mavlink.MAVLink_mission_clear_all_message(1, 1, p.MISSION))[-1].message.type == 1
 
 
-def test_arducopter_arms_not_in_auto_and_wants_a_takeoff_first(pilot: Pilots) -> None:
+def test_arducopter_auto_cannot_arm_and_requires_a_takeoff_item(pilot: Pilots) -> None:
     a = loaded(pilot("ardupilot").ready(), SURVEY)
     assert start(a) == [0]
     assert a.arm() == [4]
@@ -272,7 +272,7 @@ def test_arducopter_arms_not_in_auto_and_wants_a_takeoff_first(pilot: Pilots) ->
     assert start(b) == [4]
 
 
-def test_a_takeoff_below_where_it_is_is_over_at_once(pilot: Pilots, flavour: str) -> None:
+def test_takeoff_below_the_current_height_ends_at_once(pilot: Pilots, flavour: str) -> None:
     a = pilot(flavour)
     a.take_off(15)
     loaded(a, [p.takeoff(10), p.waypoint(20, 0, 15)])
@@ -282,7 +282,7 @@ def test_a_takeoff_below_where_it_is_is_over_at_once(pilot: Pilots, flavour: str
     assert a.truth.up_mm > 14_000
 
 
-def test_the_takeoff_mode_of_px4_climbs_by_its_parameter(pilot: Pilots) -> None:
+def test_px4_takeoff_mode_climbs_to_its_parameter(pilot: Pilots) -> None:
     a = pilot("px4").ready()
     a.send(mavlink.MAVLink_param_set_message(1, 1, b"MIS_TAKEOFF_ALT", 7.0, 9))
     assert a.arm() == [0]

@@ -13,7 +13,7 @@ def position(boot_ms: int) -> bytes:
     return CODEC.pack(mavlink.MAVLink_global_position_int_message(boot_ms, 0, 0, 0, 0, 0, 0, 0, 0))
 
 
-def test_waits_while_it_is_ahead_of_what_was_heard() -> None:
+def test_pace_waits_while_ahead_of_received_positions() -> None:
     pace = Pace()
     pace.says(position(70_000))
     pace.hears(69_000_000, 5.0)
@@ -24,7 +24,7 @@ def test_waits_while_it_is_ahead_of_what_was_heard() -> None:
     assert not pace.waits(5.2)
 
 
-def test_waits_for_nobody_who_tells_nothing() -> None:
+def test_pace_does_not_wait_without_reports() -> None:
     """A link that is cut, or a computer that stands still: the vehicle flies on."""
     pace = Pace()
     pace.says(position(70_000))
@@ -37,14 +37,14 @@ def test_waits_for_nobody_who_tells_nothing() -> None:
     "message",
     [mavlink.MAVLink_attitude_message(90_000, 0, 0, 0, 0, 0, 0), mavlink.MAVLink_heartbeat_message(2, 3, 81, 4, 4, 3)],
 )
-def test_only_a_position_says_how_far_it_is(message: object) -> None:
+def test_pace_counts_only_positions(message: object) -> None:
     pace = Pace()
     pace.hears(1_000_000, 5.0)
     pace.says(CODEC.pack(message))
     assert not pace.waits(5.1)
 
 
-def test_what_begins_anew_is_not_waited_for() -> None:
+def test_pace_does_not_wait_after_a_restart() -> None:
     pace = Pace()
     pace.hears(90_000_000, 5.0)
     pace.says(position(100))

@@ -22,9 +22,7 @@ DT = 0.02
 
 
 @given(st.floats(0, 1000), st.floats(0.1, 5), st.floats(0.2, 3))
-def test_the_distance_to_stop_is_the_inverse_of_the_speed_to_stop_from(
-    distance: float, braking: float, gain: float
-) -> None:
+def test_stopping_distance_is_the_inverse_of_stopping_speed(distance: float, braking: float, gain: float) -> None:
     approach = Approach(braking, gain)
     assert abs(approach.distance(approach.speed(distance)) - distance) < 1e-6
 
@@ -36,7 +34,7 @@ def test_the_distance_to_stop_is_the_inverse_of_the_speed_to_stop_from(
     st.floats(1, 12),
     *[st.floats(-4, 4)] * 2,
 )
-def test_it_arrives_and_stops_without_much_overshoot(
+def test_body_stops_at_its_target(
     flavour: AutopilotKind, north: float, east: float, speed: float, wind_north: float, wind_east: float
 ) -> None:
     agility = FLAVOURS[flavour].handling.agility
@@ -56,7 +54,7 @@ def test_it_arrives_and_stops_without_much_overshoot(
     assert hypot(body.v_north, body.v_east) < 0.05
 
 
-def test_in_too_much_wind_it_leans_as_far_as_it_may_and_is_carried_away() -> None:
+def test_body_drifts_in_too_strong_wind() -> None:
     body = Body()
     for _ in range(round(60 / DT)):
         body.track(DT, towards(body, 0.0, 0.0, 10.0, Approach(2.0, 1.0)), 3.0, 0.0, 1.0, (0.0, MAX_AIRSPEED + 3))
@@ -64,7 +62,7 @@ def test_in_too_much_wind_it_leans_as_far_as_it_may_and_is_carried_away() -> Non
     assert 2 < body.v_east < 4
 
 
-def test_without_a_position_it_goes_where_the_air_goes() -> None:
+def test_body_without_position_drifts_with_the_air() -> None:
     body = Body(v_north=5.0)
     for _ in range(round(60 / DT)):
         body.drift(DT, -0.5, 1.0, (-4.0, 3.0))
@@ -82,7 +80,7 @@ def test_without_a_position_it_goes_where_the_air_goes() -> None:
         ((0, 0, 1), (6, 0, 1)),
     ],
 )
-def test_what_flight_costs(dear: tuple[float, ...], cheap: tuple[float, ...]) -> None:
+def test_flight_load_depends_on_speed_climb_and_thrust(dear: tuple[float, ...], cheap: tuple[float, ...]) -> None:
     assert flight_load(*dear) > flight_load(*cheap) >= 0.3
 
 
@@ -101,7 +99,7 @@ def test_voltage_falls_with_the_level_and_sags_under_load() -> None:
     assert battery.millivolts == 10_200
 
 
-def test_a_full_battery_hovers_as_long_as_it_says() -> None:
+def test_full_battery_hovers_for_its_hover_time() -> None:
     battery = Battery(1.0, 18 * 60)
     seconds = 0.0
     while battery.level > 0:
@@ -131,7 +129,7 @@ def test_link_keeps_the_order_when_the_delay_shrinks() -> None:
     assert link.due(1_000) == [b"first", b"second"]
 
 
-def test_integer_parameters_travel_as_bytes_or_as_floats() -> None:
+def test_integer_parameters_are_encoded_by_flavour() -> None:
     for bytewise in (True, False):
         parameters = Parameters(PARAMETERS, replace(HANDLING), bytewise)
         message = parameters.read("MAV_SYS_ID", -1)
@@ -141,7 +139,7 @@ def test_integer_parameters_travel_as_bytes_or_as_floats() -> None:
         assert again.param_value == message.param_value
 
 
-def test_parameters_set_how_it_flies_and_echo() -> None:
+def test_parameters_change_handling_and_are_echoed() -> None:
     flown = replace(HANDLING)
     parameters = Parameters(PARAMETERS, flown, bytewise=True)
     assert parameters.write("RTL_RETURN_ALT", 45.0, mavlink.MAV_PARAM_TYPE_REAL32).param_value == 45.0

@@ -26,7 +26,7 @@ def inject(p: Any, kind: Callable[..., faults.Fault], *args: Any) -> None:
     p.simulation.inject(kind(p.simulation.now_us, *args))
 
 
-def test_a_pause_stops_it_and_the_mode_stays(flying: Any) -> None:
+def test_pilot_pause_stops_without_a_mode_change(flying: Any) -> None:
     mode, target = flying.truth.mode, flying.last("POSITION_TARGET_GLOBAL_INT").lat_int
     inject(flying, faults.PilotPause)
     flying.wait(7)
@@ -35,7 +35,7 @@ def test_a_pause_stops_it_and_the_mode_stays(flying: Any) -> None:
     assert not any(frame.name == "COMMAND_ACK" for frame in flying.wait(1)), "nobody here asked"
 
 
-def test_a_target_of_the_pilots_shows_in_the_report_alone(flying: Any) -> None:
+def test_pilot_target_shows_only_in_the_target_report(flying: Any) -> None:
     mode = flying.truth.mode
     inject(flying, faults.PilotGoto, 0, 200_000, 40_000)
     flying.wait(6)
@@ -48,7 +48,7 @@ def test_a_target_of_the_pilots_shows_in_the_report_alone(flying: Any) -> None:
     assert flying.last("GLOBAL_POSITION_INT").vy > 200
 
 
-def test_sticks_take_px4_out_of_an_automatic_mode_and_copter_only_aside_while_it_lands(flying: Any) -> None:
+def test_sticks_take_over_px4_and_only_shift_a_landing_copter(flying: Any) -> None:
     inject(flying, faults.PilotSticks, 2 * S)
     flying.wait(6)
     if flying.px4:
@@ -84,7 +84,7 @@ def test_sticks_do_not_end_offboard(pilot: Callable[..., Any]) -> None:
     assert p.truth.mode is FlightMode.GUIDED
 
 
-def test_killed_in_the_air_it_falls_and_breaks(flying: Any) -> None:
+def test_vehicle_killed_in_the_air_crashes(flying: Any) -> None:
     inject(flying, faults.Kill)
     flying.wait(1)
     assert not flying.truth.armed

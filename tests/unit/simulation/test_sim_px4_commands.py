@@ -61,11 +61,11 @@ def flying(px4: Any) -> Any:
         (512, (nan,), [2]),
     ],
 )
-def test_results_on_the_ground(px4: Any, command: int, params: tuple[float, ...], expected: list[int]) -> None:
+def test_command_results_on_the_ground(px4: Any, command: int, params: tuple[float, ...], expected: list[int]) -> None:
     assert px4.long(command, *params) == expected
 
 
-def test_custom_modes(px4: Any) -> None:
+def test_custom_modes_are_entered(px4: Any) -> None:
     for mode, number in [
         (FlightMode.LOITER, LOITER),
         (FlightMode.TAKEOFF, TAKEOFF),
@@ -77,7 +77,7 @@ def test_custom_modes(px4: Any) -> None:
         assert px4.last("HEARTBEAT").custom_mode == number
 
 
-def test_bogus_modes_change_nothing(px4: Any) -> None:
+def test_unknown_modes_have_no_effect(px4: Any) -> None:
     px4.long(176, 1, 99)
     px4.long(176, 1, 4, 99)
     px4.wait(1)
@@ -91,7 +91,7 @@ def test_arming_before_ready_is_temporarily_rejected(pilot: Callable[..., Any]) 
     assert early.ready().arm() == [0]
 
 
-def test_takeoff_while_disarmed_only_changes_the_mode_and_arming_starts_it(px4: Any) -> None:
+def test_takeoff_while_disarmed_begins_when_armed(px4: Any) -> None:
     assert px4.long(22, -1, 0, 0, nan, nan, nan, AMSL + 10) == [0]
     px4.wait(5)
     assert (px4.truth.mode, px4.truth.in_air) == (FlightMode.TAKEOFF, False)
@@ -107,7 +107,7 @@ def test_takeoff_altitude_is_above_sea(px4: Any) -> None:
     assert not px4.truth.in_air
 
 
-def test_takeoff_without_altitude_takes_the_parameter(px4: Any) -> None:
+def test_takeoff_without_altitude_uses_the_parameter(px4: Any) -> None:
     assert px4.arm() == [0]
     assert px4.long(22, -1, 0, 0, nan, nan, nan, nan) == [0]
     px4.until(lambda: px4.truth.mode is FlightMode.LOITER)
@@ -115,7 +115,7 @@ def test_takeoff_without_altitude_takes_the_parameter(px4: Any) -> None:
     assert abs(px4.truth.up_mm - 2_500) < 200
 
 
-def test_a_takeoff_that_is_chosen_in_the_air_climbs_from_there(flying: Any) -> None:
+def test_takeoff_in_the_air_climbs_from_the_current_height(flying: Any) -> None:
     """`Takeoff::set_takeoff_position`: what NAV_TAKEOFF named counts once, also where it was interrupted."""
     before_mm = flying.truth.up_mm
     assert flying.long(22, -1, 0, 0, nan, nan, nan, AMSL + before_mm // 1_000 + 20) == [0]
@@ -129,7 +129,7 @@ def test_a_takeoff_that_is_chosen_in_the_air_climbs_from_there(flying: Any) -> N
     assert abs(flying.truth.up_mm - held_mm - 2_500) < 200
 
 
-def test_armed_on_the_ground_disarms_by_itself(px4: Any) -> None:
+def test_armed_vehicle_on_the_ground_disarms(px4: Any) -> None:
     px4.arm()
     px4.wait(9)
     assert px4.truth.armed
@@ -137,7 +137,7 @@ def test_armed_on_the_ground_disarms_by_itself(px4: Any) -> None:
     assert not px4.truth.armed
 
 
-def test_in_the_air(flying: Any) -> None:
+def test_command_results_in_the_air(flying: Any) -> None:
     assert flying.arm() == [0]
     assert flying.long(400, 0) == [1]
     assert flying.truth.armed
@@ -150,7 +150,7 @@ def unflagged(flying: Any) -> list[int]:
     return answers
 
 
-def test_reposition_without_its_flag_is_not_known_and_flown_in_hold(flying: Any) -> None:
+def test_reposition_without_flag_is_unsupported_but_flown_in_hold(flying: Any) -> None:
     """Recorded: answered 3, the target follows at once, and then the vehicle does."""
     assert unflagged(flying) == [3]
     flying.wait(0.3)
@@ -174,7 +174,7 @@ def test_reposition_without_its_flag_changes_no_mode(flying: Any, mode: FlightMo
     assert abs(flying.truth.north_mm) < 1_000
 
 
-def test_hold_within_half_a_second_flies_to_what_was_named_before(flying: Any) -> None:
+def test_entering_hold_flies_to_a_recent_reposition_target(flying: Any) -> None:
     flying.mode(FlightMode.LAND)
     unflagged(flying)
     flying.wait(0.3)
@@ -183,7 +183,7 @@ def test_hold_within_half_a_second_flies_to_what_was_named_before(flying: Any) -
     assert flying.truth.north_mm == pytest.approx(20_000, abs=1_000)
 
 
-def test_a_later_release_answers_a_reposition_without_its_flag_for_what_it_does(pilot: Callable[..., Any]) -> None:
+def test_later_release_answers_reposition_by_its_effect(pilot: Callable[..., Any]) -> None:
     flying = pilot("px4", release=(1, 18)).ready()
     flying.take_off(10)
     assert unflagged(flying) == [0]
@@ -202,7 +202,7 @@ def test_reposition_reads_every_frame_as_above_sea(flying: Any, frame: int) -> N
     assert abs(flying.truth.up_mm - 15_000) < 300
 
 
-def test_reposition_without_altitude_or_place_keeps_them(flying: Any) -> None:
+def test_reposition_keeps_a_missing_altitude_or_place(flying: Any) -> None:
     flying.go_to(40, 0, 10)
     flying.wait(4)
     assert flying.int(192, 5, [-1, 1, 0, nan], 2**31 - 1, 2**31 - 1, nan) == [0]
@@ -213,7 +213,7 @@ def test_reposition_without_altitude_or_place_keeps_them(flying: Any) -> None:
     assert abs(where.up_mm - 10_000) < 300
 
 
-def test_reposition_on_the_ground_is_acknowledged_and_dropped(px4: Any) -> None:
+def test_reposition_on_the_ground_is_acknowledged_without_effect(px4: Any) -> None:
     latitude, longitude = px4.config.home.globe(20, 0)
     assert px4.int(192, 5, [-1, 1, 0, nan], latitude, longitude, AMSL + 10) == [0]
     px4.wait(5)
@@ -242,7 +242,7 @@ def test_set_mode_message_is_obeyed_and_never_acknowledged(flying: Any) -> None:
     assert flying.truth.mode is FlightMode.LAND
 
 
-def test_no_texts_until_a_ground_station_was_seen(pilot: Callable[..., Any]) -> None:
+def test_no_texts_before_a_ground_station_heartbeat(pilot: Callable[..., Any]) -> None:
     alone = pilot("px4", station=False)
     assert alone.arm() == [1]
     alone.ready().arm()
@@ -250,13 +250,13 @@ def test_no_texts_until_a_ground_station_was_seen(pilot: Callable[..., Any]) -> 
     assert alone.texts() == []
 
 
-def test_streams_run_unasked(px4: Any) -> None:
+def test_streams_run_by_default(px4: Any) -> None:
     names = {frame.name for frame in px4.seen}
     assert {"GLOBAL_POSITION_INT", "ESTIMATOR_STATUS", "EXTENDED_SYS_STATE", "DISTANCE_SENSOR"} <= names
     assert not {"EKF_STATUS_REPORT", "WIND", "WIND_COV"} & names
 
 
-def test_the_heartbeat_keeps_its_second_whatever_happens(flying: Any) -> None:
+def test_heartbeat_interval_is_constant(flying: Any) -> None:
     flying.wait(0.98)
     times = []
     for turn in range(500):
@@ -268,7 +268,7 @@ def test_the_heartbeat_keeps_its_second_whatever_happens(flying: Any) -> None:
     assert {after - before for before, after in pairwise(times)} == {1_000_000}
 
 
-def test_asked_for_the_heartbeat_tells_the_new_mode_15_ms_late(flying: Any) -> None:
+def test_requested_heartbeat_shows_a_new_mode_15_ms_late(flying: Any) -> None:
     """Recorded: Land was acknowledged at 2 ms, and a heartbeat that was asked for told of Hold at 7 ms."""
     asked = mavlink.MAVLink_command_long_message(1, 1, 512, 0, 0, 0, 0, 0, 0, 0, 0)
     flying.mode(FlightMode.LAND)
@@ -279,7 +279,7 @@ def test_asked_for_the_heartbeat_tells_the_new_mode_15_ms_late(flying: Any) -> N
         assert answers[0].message.custom_mode == mode
 
 
-def test_a_land_that_is_taken_back_within_the_lag_hardly_shows(flying: Any) -> None:
+def test_land_cancelled_within_the_lag_hardly_shows(flying: Any) -> None:
     """Recorded: by no heartbeat, no landed state and no target."""
     latitude, longitude = flying.config.home.globe(20, 0)
     flying.wait(0.001)
@@ -291,7 +291,7 @@ def test_a_land_that_is_taken_back_within_the_lag_hardly_shows(flying: Any) -> N
     assert {f.message.custom_mode for f in told if f.name == "HEARTBEAT"} == {LOITER}
 
 
-def test_the_current_mode_comes_slower_than_asked(px4: Any) -> None:
+def test_current_mode_has_a_minimum_interval(px4: Any) -> None:
     assert px4.long(511, 436, 100_000) == [0]
     number = (436).to_bytes(3, "little")
     datagrams = px4.simulation.advance(px4.simulation.now_us + 20_000_000)
@@ -300,14 +300,14 @@ def test_the_current_mode_comes_slower_than_asked(px4: Any) -> None:
     assert int.from_bytes(told[-1][10:14], "little") == LOITER
 
 
-def test_the_landed_state_tells_at_once_that_it_lands(flying: Any) -> None:
+def test_landed_state_reports_landing_at_once(flying: Any) -> None:
     assert flying.long(511, 245, 100_000) == [0]
     flying.mode(FlightMode.LAND)
     states = [f.message.landed_state for f in flying.wait(1) if f.name == "EXTENDED_SYS_STATE"]
     assert (len(states), set(states)) == (10, {4})
 
 
-def test_the_same_mode_again_does_not_stop_a_reposition(flying: Any) -> None:
+def test_selecting_hold_again_does_not_stop_a_reposition(flying: Any) -> None:
     flying.go_to(150, 0, 10)
     flying.wait(5)
     north = flying.truth.north_mm
@@ -332,7 +332,7 @@ NOWHERE = (2**31 - 1, 2**31 - 1, nan)
         [FlightMode.LOITER, FlightMode.TAKEOFF, FlightMode.RETURN, FlightMode.LAND, FlightMode.MISSION], [False, True]
     ),
 )
-def test_a_reposition_without_a_place_stops(flying: Any, mode: FlightMode, as_int: bool) -> None:
+def test_reposition_without_a_place_stops(flying: Any, mode: FlightMode, as_int: bool) -> None:
     def pause() -> list[int]:
         return flying.int(192, 0, [-1, 1, 0, nan], *NOWHERE) if as_int else flying.pause()
 
@@ -360,7 +360,7 @@ def test_a_reposition_without_a_place_stops(flying: Any, mode: FlightMode, as_in
     assert abs(flying.truth.up_mm - before.up_mm) < 300
 
 
-def test_a_reposition_of_height_or_heading_alone_keeps_the_target(flying: Any) -> None:
+def test_reposition_of_height_or_heading_keeps_the_target(flying: Any) -> None:
     place = flying.config.home.globe(150, 20)
     flying.go_to(150, 20, 10)
     flying.wait(4)
@@ -376,7 +376,7 @@ def test_a_reposition_of_height_or_heading_alone_keeps_the_target(flying: Any) -
     assert flying.truth.speed_mm_s > 4_500
 
 
-def test_a_pause_outside_the_fence_is_refused_and_it_flies_on(flying: Any) -> None:
+def test_pause_outside_the_fence_is_refused(flying: Any) -> None:
     flying.send(mavlink.MAVLink_param_set_message(1, 1, b"GF_MAX_HOR_DIST", 30, 9))
     flying.send(mavlink.MAVLink_param_set_message(1, 1, b"GF_ACTION", struct.unpack("<f", struct.pack("<i", 1))[0], 6))
     flying.go_to(25, 0, 10)
@@ -391,7 +391,7 @@ def test_a_pause_outside_the_fence_is_refused_and_it_flies_on(flying: Any) -> No
     assert flying.truth.north_mm > 24_000
 
 
-def test_the_target_is_told_in_every_mode_that_has_one(px4: Any) -> None:
+def test_target_is_reported_in_every_mode_that_has_one(px4: Any) -> None:
     assert not targets(px4.wait(2)), "none on the ground"
     px4.take_off(10)
     home, amsl = px4.config.home, px4.config.home.amsl_mm / 1000

@@ -26,7 +26,7 @@ def modes_asked(a: Any, number: int) -> tuple[list[int], list[Any]]:
     return acks, [m for m in read if m.get_type() == "AVAILABLE_MODES"]
 
 
-def test_all_modes_and_one_by_one(pilot: Pilots, flavour: str) -> None:
+def test_modes_are_listed_together_and_singly(pilot: Pilots, flavour: str) -> None:
     a = pilot(flavour).ready()
     acks, modes = modes_asked(a, 0)
     table = a.simulation._autopilot.flavour.modes
@@ -44,17 +44,17 @@ def test_all_modes_and_one_by_one(pilot: Pilots, flavour: str) -> None:
 
 
 @pytest.mark.parametrize("number", [397, 395, 300, 259, 280, 411])
-def test_messages_that_it_does_not_have(pilot: Pilots, flavour: str, number: int) -> None:
+def test_unknown_messages_are_refused(pilot: Pilots, flavour: str, number: int) -> None:
     a = pilot(flavour).ready()
     assert a.long(512, number) == [2 if a.px4 else 4]
 
 
 @pytest.mark.parametrize("command", [519, 521, 2504, 31010, 9])
-def test_commands_that_it_does_not_have(pilot: Pilots, flavour: str, command: int) -> None:
+def test_unknown_commands_are_unsupported(pilot: Pilots, flavour: str, command: int) -> None:
     assert pilot(flavour).ready().long(command) == [3]
 
 
-def test_there_are_no_files_and_no_logs(pilot: Pilots, flavour: str) -> None:
+def test_file_and_log_requests_are_answered(pilot: Pilots, flavour: str) -> None:
     a = pilot(flavour).ready()
     ask = struct.pack("<HBBBBBBI", 65_535, 3, 4, 0, 0, 0, 0, 0).ljust(251, b"\0")
     a.send(mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, list(ask)))
@@ -66,7 +66,7 @@ def test_there_are_no_files_and_no_logs(pilot: Pilots, flavour: str) -> None:
     assert a.last("LOG_ENTRY").num_logs == 0
 
 
-def test_what_it_says_of_itself(pilot: Pilots, flavour: str) -> None:
+def test_autopilot_version_reports_capabilities(pilot: Pilots, flavour: str) -> None:
     a = pilot(flavour).ready()
     assert a.long(512, 148) == [0]
     has = a.last("AUTOPILOT_VERSION").capabilities
@@ -89,7 +89,7 @@ def test_what_it_says_of_itself(pilot: Pilots, flavour: str) -> None:
         ("ardupilot", "WPNAV_SPEED", 9, 800.0),
     ],
 )
-def test_parameters_by_type(pilot: Pilots, flavour: str, name: str, type_: int, value: float) -> None:
+def test_parameters_have_their_types(pilot: Pilots, flavour: str, name: str, type_: int, value: float) -> None:
     a = pilot(flavour).ready()
 
     def encoded(value: float) -> float:
@@ -109,14 +109,14 @@ def test_parameters_by_type(pilot: Pilots, flavour: str, name: str, type_: int, 
 
 
 @pytest.mark.parametrize("name", ["MAV_SYS_ID", "SYSID_THISMAV"])
-def test_its_own_id_is_a_parameter(pilot: Pilots, name: str) -> None:
+def test_system_id_is_a_parameter(pilot: Pilots, name: str) -> None:
     a = pilot("px4" if name == "MAV_SYS_ID" else "ardupilot", system=7).ready()
     a.send(mavlink.MAVLink_param_request_read_message(7, 1, name.encode(), -1))
     value = a.last("PARAM_VALUE").param_value
     assert (struct.unpack("<i", struct.pack("<f", value))[0] if a.px4 else value) == 7
 
 
-def test_how_many_items_there_are_is_a_parameter(pilot: Pilots) -> None:
+def test_item_counts_are_parameters(pilot: Pilots) -> None:
     a = pilot("ardupilot").ready()
     p.upload(a, p.square(60), p.FENCE)
     assert (a.last("PARAM_VALUE").param_id, a.last("PARAM_VALUE").param_value) == ("FENCE_TOTAL", 4)
@@ -124,7 +124,7 @@ def test_how_many_items_there_are_is_a_parameter(pilot: Pilots) -> None:
     assert (a.last("PARAM_VALUE").param_id, a.last("PARAM_VALUE").param_value) == ("MIS_TOTAL", 2)
 
 
-def test_the_target_is_told_when_it_is_asked_for_if_there_is_one(pilot: Pilots, flavour: str) -> None:
+def test_target_is_sent_on_request_if_there_is_one(pilot: Pilots, flavour: str) -> None:
     """PX4 denies what it has nothing to tell of; ArduCopter acknowledges it, and sends nothing."""
     a = pilot(flavour).ready()
     asked = mavlink.MAVLink_command_long_message(1, 1, 512, 0, 87, 0, 0, 0, 0, 0, 0)
@@ -138,7 +138,7 @@ def test_the_target_is_told_when_it_is_asked_for_if_there_is_one(pilot: Pilots, 
     assert [frame.message.result for frame in told if frame.name == "COMMAND_ACK"] == [0]
 
 
-def test_a_write_that_the_real_one_passes_over_is_not_answered(pilot: Pilots, flavour: str) -> None:
+def test_ignored_parameter_writes_are_not_answered(pilot: Pilots, flavour: str) -> None:
     """PX4: another type than the parameter's; ArduPilot: no number. Both: a name that they do not have."""
     a = pilot(flavour).ready()
     name, was = ("GF_ACTION", 2.0) if a.px4 else ("FENCE_RADIUS", 300.0)
@@ -150,7 +150,7 @@ def test_a_write_that_the_real_one_passes_over_is_not_answered(pilot: Pilots, fl
     assert (struct.unpack("<i", struct.pack("<f", value))[0] if a.px4 else value) == was
 
 
-def test_answers_can_be_lost_as_reports_can(pilot: Pilots, flavour: str) -> None:
+def test_silenced_message_is_not_sent_as_an_answer(pilot: Pilots, flavour: str) -> None:
     fault = MessageSilence(at_us=2_000_000, message="PARAM_VALUE", for_us=2_000_000)
     a = pilot(flavour, faults=(fault,))
     ask = mavlink.MAVLink_param_request_read_message(1, 1, b"RTL_RETURN_ALT" if a.px4 else b"RTL_ALT", -1)

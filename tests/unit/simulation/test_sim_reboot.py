@@ -31,7 +31,7 @@ def of_autopilot(p: Any) -> list[Any]:
     return [f for f in p.seen if f.component == 1]
 
 
-def test_in_the_air_it_falls_silently(pilot: Callable[..., Any], flavour: str) -> None:
+def test_reboot_in_the_air_falls_silently(pilot: Callable[..., Any], flavour: str) -> None:
     p = made(pilot, flavour)
     p.take_off(40)
     reboot(p)
@@ -46,7 +46,7 @@ def test_in_the_air_it_falls_silently(pilot: Callable[..., Any], flavour: str) -
     assert of_autopilot(p)
 
 
-def test_it_begins_anew(pilot: Callable[..., Any], flavour: str) -> None:
+def test_reboot_resets_clock_modes_and_streams(pilot: Callable[..., Any], flavour: str) -> None:
     p = made(pilot, flavour)
     p.ready().mode(FlightMode.LAND)
     p.wait(2)
@@ -68,7 +68,7 @@ def test_it_begins_anew(pilot: Callable[..., Any], flavour: str) -> None:
         assert p.last("GLOBAL_POSITION_INT").time_boot_ms < 4_000
 
 
-def test_it_comes_up_as_at_first_and_flies_again(pilot: Callable[..., Any], flavour: str) -> None:
+def test_vehicle_flies_again_after_a_reboot(pilot: Callable[..., Any], flavour: str) -> None:
     p = made(pilot, flavour)
     p.ready()
     reboot(p)
@@ -82,7 +82,7 @@ def test_it_comes_up_as_at_first_and_flies_again(pilot: Callable[..., Any], flav
     assert p.truth.up_mm > 9_000
 
 
-def test_what_is_stored_stays(pilot: Callable[..., Any], flavour: str) -> None:
+def test_stored_state_survives_a_reboot(pilot: Callable[..., Any], flavour: str) -> None:
     p = made(pilot, flavour).ready()
     name = b"RTL_RETURN_ALT" if p.px4 else b"RTL_ALT"
     p.send(mavlink.MAVLink_param_set_message(1, 1, name, 44 if p.px4 else 4_400, 9))
@@ -92,7 +92,7 @@ def test_what_is_stored_stays(pilot: Callable[..., Any], flavour: str) -> None:
     assert p.last("PARAM_VALUE").param_value == (44 if p.px4 else 4_400)
 
 
-def test_its_signatures_go_on(pilot: Callable[..., Any], flavour: str) -> None:
+def test_signing_continues_after_a_reboot(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour, signing_key=bytes(range(32)), usb=True)
     p.wait(3)
 
@@ -106,7 +106,7 @@ def test_its_signatures_go_on(pilot: Callable[..., Any], flavour: str) -> None:
     assert (after - before) * 10 > (1_400_000 if p.px4 else 0)  # ArduCopter counts its frames
 
 
-def test_it_takes_as_long_as_its_boot(pilot: Callable[..., Any]) -> None:
+def test_reboot_takes_the_boot_time(pilot: Callable[..., Any]) -> None:
     p = pilot("px4", noise=False, boot=Boot.RECORDED)
     p.wait(8)
     reboot(p)
@@ -116,7 +116,7 @@ def test_it_takes_as_long_as_its_boot(pilot: Callable[..., Any]) -> None:
     assert p.arm() == [0]
 
 
-def test_what_waited_for_an_answer_is_forgotten(pilot: Callable[..., Any], flavour: str) -> None:
+def test_reboot_drops_waiting_messages(pilot: Callable[..., Any], flavour: str) -> None:
     p = made(pilot, flavour, answers=Answers.RECORDED)
     p.wait(2.019)
     p.simulation.inject(faults.Reboot(p.simulation.now_us))
@@ -128,7 +128,7 @@ def test_what_waited_for_an_answer_is_forgotten(pilot: Callable[..., Any], flavo
     assert p.simulation.next_us is None
 
 
-def test_what_was_wrong_with_the_receiver_stays(pilot: Callable[..., Any], flavour: str) -> None:
+def test_receiver_faults_survive_a_reboot(pilot: Callable[..., Any], flavour: str) -> None:
     p = made(pilot, flavour)
     p.ready()
     p.simulation.inject(faults.GpsLoss(p.simulation.now_us))
@@ -141,7 +141,7 @@ def test_what_was_wrong_with_the_receiver_stays(pilot: Callable[..., Any], flavo
 
 
 @pytest.mark.parametrize("times", [1, 2])
-def test_twice_is_once_more(times: int, pilot: Callable[..., Any], flavour: str) -> None:
+def test_second_reboot_repeats_the_first(times: int, pilot: Callable[..., Any], flavour: str) -> None:
     p = made(pilot, flavour)
     p.ready()
     for _ in range(times):

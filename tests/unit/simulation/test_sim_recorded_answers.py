@@ -78,7 +78,7 @@ CONFIGS = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(KEPT))
-def test_it_does_what_the_real_one_did(name: str) -> None:
+def test_answers_match_the_recording(name: str) -> None:
     trace, config = Trace(name), CONFIGS[name]
     real, own = trace.of_vehicle, Replay(trace, config).heard
     differences = [
@@ -93,7 +93,7 @@ def test_it_does_what_the_real_one_did(name: str) -> None:
     assert set(kept) == {d.key for d in differences}, "these differ no more"
 
 
-def test_differences_are_seen() -> None:
+def test_comparison_detects_differences() -> None:
     """The comparison by itself: a session compared with one that is a little otherwise."""
     trace = Trace("arducopter-signing")
     real = trace.of_vehicle

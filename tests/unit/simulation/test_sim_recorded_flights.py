@@ -146,7 +146,7 @@ def prearm(heard: Heard) -> object:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(KEPT))
-def test_it_flies_as_the_real_one_flew(name: str) -> None:
+def test_flight_matches_the_recording(name: str) -> None:
     real = Trace(name).of_vehicle
     own = flown(name, real[-1].at_us)
     differences = [
@@ -160,6 +160,6 @@ def test_it_flies_as_the_real_one_flew(name: str) -> None:
     assert set(kept) == {d.key for d in differences}, "these differ no more"
 
 
-def test_the_script_is_that_of_the_page() -> None:
+def test_script_is_that_of_the_page() -> None:
     """One config says nothing of the other; both are as recorded."""
     assert replace(COPTER, faults=()).boot is PX4.boot is Boot.RECORDED

@@ -101,7 +101,7 @@ def again(name: str) -> Flight:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(KEPT))
-def test_it_does_what_the_real_one_did(name: str) -> None:
+def test_takeover_matches_the_recording(name: str) -> None:
     flight = again(name)
     real, own, home = flight.real, flight.own, flight.home
     differences = [
@@ -128,7 +128,7 @@ def moved_m(home: HomePosition, heard: list[Heard], from_s: float, to_s: float) 
     return float(((last_north - north) ** 2 + (last_east - east) ** 2) ** 0.5)
 
 
-def test_each_shows_what_went_wrong() -> None:
+def test_each_recording_shows_its_takeover() -> None:
     """The defects by themselves, so that no tolerance above can hide them."""
     flight = again("px4-hover-does-not-stop")
     for side in (flight.real, flight.own):
@@ -149,7 +149,7 @@ def test_each_shows_what_went_wrong() -> None:
         assert len(burst) >= 5
 
 
-def test_differences_are_seen() -> None:
+def test_comparison_detects_differences() -> None:
     """The comparison by itself: a flight compared with one that is a little otherwise."""
     flight = again("px4-pilot-pause")
     real = flight.real

@@ -32,7 +32,7 @@ from virtual.rows import rows
         ("ardupilot", (), 8, 28, 28),
     ],
 )
-def test_the_height_of_the_way_home(
+def test_return_height_follows_the_autopilots_rules(
     pilot: Callable[..., Any],
     flavour: str,
     parameters: tuple[tuple[str, float], ...],

@@ -54,7 +54,7 @@ def keyed(a: Any) -> Signer:
     return Signer(a)
 
 
-def test_as_recorded_on_the_second_channel(pilot: Pilots) -> None:
+def test_second_channel_matches_the_recording(pilot: Pilots) -> None:
     a = pilot("ardupilot").ready()
     s = keyed(a)
     assert a.long(512, 148) == []
@@ -71,7 +71,7 @@ def test_as_recorded_on_the_second_channel(pilot: Pilots) -> None:
     assert a.long(512, 148) == [0]
 
 
-def test_its_time_stamps_begin_as_recorded(pilot: Pilots) -> None:
+def test_time_stamps_begin_as_recorded(pilot: Pilots) -> None:
     trace = Trace("arducopter-signing")
     given = next(h.message.initial_timestamp for h in trace.heard if h.name == "SETUP_SIGNING")
     real = next(h.received for h in trace.of_vehicle if h.received.signed and h.received.component == 1)
@@ -87,7 +87,7 @@ def stamp(received: Any) -> int:
     return int.from_bytes(received.frame[-12:-6], "little")
 
 
-def test_as_recorded_on_the_first_channel(pilot: Pilots) -> None:
+def test_first_channel_matches_the_recording(pilot: Pilots) -> None:
     a = pilot("ardupilot", usb=True).ready()
     keyed(a)
     assert a.long(512, 148) == [0]
@@ -100,7 +100,7 @@ def signing(pilot: Pilots, flavour: str, **config: Any) -> Any:
     return pilot(flavour, release=(1, 18) if flavour == "px4" else None, **config).ready()
 
 
-def test_what_it_sends_is_signed_and_rises(pilot: Pilots, flavour: str) -> None:
+def test_sent_frames_are_signed_with_rising_time_stamps(pilot: Pilots, flavour: str) -> None:
     a = signing(pilot, flavour)
     keyed(a)
     seen = [f for f in a.wait(5) if f.component == 1]
@@ -129,7 +129,7 @@ def test_replayed_forged_and_old_frames_have_no_effect(pilot: Pilots, flavour: s
     assert Signer(a, timestamp=START - 61 * 100_000).long(512, 148) == []
 
 
-def test_a_radio_need_not_sign(pilot: Pilots, flavour: str) -> None:
+def test_radio_frames_need_no_signature(pilot: Pilots, flavour: str) -> None:
     a = signing(pilot, flavour)
     keyed(a)
     autopilot = a.simulation._autopilot
@@ -144,7 +144,7 @@ def version(a: Any) -> tuple[int, ...]:
     return tuple(told.to_bytes(4)[:2])
 
 
-def test_px4_1_16_knows_no_key(pilot: Pilots) -> None:
+def test_px4_1_16_ignores_keys(pilot: Pilots) -> None:
     a = pilot("px4", usb=True).ready()
     assert version(a) == (1, 16)
     s = keyed(a)
@@ -153,7 +153,7 @@ def test_px4_1_16_knows_no_key(pilot: Pilots) -> None:
     assert not any(f.signed for f in a.wait(1))
 
 
-def test_px4_1_17_takes_a_key_over_usb_and_insists_as_its_parameter_says(pilot: Pilots) -> None:
+def test_px4_1_17_takes_a_key_over_usb_and_obeys_its_parameter(pilot: Pilots) -> None:
     a = pilot("px4", release=(1, 17)).ready()
     a.send(setup(KEY))
     assert not any(f.signed for f in a.wait(1))
@@ -167,7 +167,7 @@ def test_px4_1_17_takes_a_key_over_usb_and_insists_as_its_parameter_says(pilot: 
     assert s.long(512, 148) == [0]
 
 
-def test_px4_1_18_takes_a_key_over_any_link_disarmed_and_insists_over_usb_too(pilot: Pilots) -> None:
+def test_px4_1_18_takes_a_key_over_any_link_while_disarmed(pilot: Pilots) -> None:
     a = signing(pilot, "px4", usb=True)
     assert version(a) == (1, 18)
     s = keyed(a)
@@ -182,7 +182,7 @@ def test_px4_1_18_takes_a_key_over_any_link_disarmed_and_insists_over_usb_too(pi
     assert a.long(512, 148) == [0]
 
 
-def test_a_key_from_the_start(pilot: Pilots, flavour: str) -> None:
+def test_configured_key_signs_from_the_start(pilot: Pilots, flavour: str) -> None:
     a = pilot(flavour, signing_key=KEY, utc_us=EPOCH_US + START * 10, speed=400).ready()
     assert a.long(512, 148) == []
     assert Signer(a).long(512, 148) == [0]
@@ -199,7 +199,7 @@ def test_a_key_from_the_start(pilot: Pilots, flavour: str) -> None:
             SimulationConfig(**wrong)
 
 
-def test_a_time_stamp_beyond_48_bits_stops_nothing(pilot: Pilots) -> None:
+def test_time_stamp_beyond_48_bits_does_not_stop_signing(pilot: Pilots) -> None:
     a = pilot("ardupilot").ready()
     a.send(setup(KEY, 2**64 - 1))
     assert all(f.signed for f in a.wait(2) if f.component == 1)

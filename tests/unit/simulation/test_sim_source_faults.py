@@ -35,7 +35,7 @@ def estimator(p: Any) -> Any:
 # --------------------------------------------------------------------------------------------- gps-drift
 
 
-def test_a_receiver_that_strays_takes_the_vehicle_with_it(flying: Any) -> None:
+def test_drifting_receiver_displaces_the_vehicle(flying: Any) -> None:
     before = flying.last("GLOBAL_POSITION_INT").lon
     inject(flying, faults.GpsDrift, 0, 500, 20 * S)
     flying.wait(30)
@@ -46,7 +46,7 @@ def test_a_receiver_that_strays_takes_the_vehicle_with_it(flying: Any) -> None:
     assert flying.truth.east_mm == pytest.approx(-10_000, abs=300), "what it strayed by stays"
 
 
-def test_a_receiver_without_a_fix_does_not_stray(flying: Any) -> None:
+def test_receiver_without_fix_does_not_drift(flying: Any) -> None:
     inject(flying, faults.GpsLoss, 2 * S)
     flying.wait(0.1)
     flying.simulation.inject(faults.GpsDrift(flying.simulation.now_us, 0, 2_000, S))
@@ -57,7 +57,7 @@ def test_a_receiver_without_a_fix_does_not_stray(flying: Any) -> None:
 # --------------------------------------------------------------------------------------------- estimator
 
 
-def test_an_estimator_that_is_not_healthy_says_so_and_goes_on(flying: Any) -> None:
+def test_unhealthy_estimator_reports_it_and_continues(flying: Any) -> None:
     if not flying.px4:
         flying.mode(FlightMode.LOITER)
     inject(flying, faults.EstimatorUnhealthy)
@@ -78,7 +78,7 @@ def test_an_estimator_that_is_not_healthy_says_so_and_goes_on(flying: Any) -> No
     assert flying.mode(FlightMode.LOITER)[-1] != 0
 
 
-def test_an_estimator_that_recovers_in_time_is_trusted_again(pilot: Callable[..., Any]) -> None:
+def test_estimator_that_recovers_in_time_is_trusted_again(pilot: Callable[..., Any]) -> None:
     p = pilot("ardupilot", noise=False)
     for number in (1, 33, 193):
         p.long(511, number, 100_000)
@@ -95,7 +95,7 @@ def test_an_estimator_that_recovers_in_time_is_trusted_again(pilot: Callable[...
 # ------------------------------------------------------------------------------------------ battery-cell
 
 
-def test_a_cell_that_fails_takes_voltage_and_more_of_it_under_load(flying: Any) -> None:
+def test_failed_cell_lowers_the_voltage_more_under_load(flying: Any) -> None:
     def volts() -> Any:
         return flying.last("BATTERY_STATUS").voltages[0]
 
@@ -111,7 +111,7 @@ def test_a_cell_that_fails_takes_voltage_and_more_of_it_under_load(flying: Any) 
     assert volts() - hovering > 350, "without load it comes back, more than a sound one does"
 
 
-def test_copters_voltage_failsafe_sees_a_failed_cell_and_px4_does_not(pilot: Callable[..., Any], flavour: str) -> None:
+def test_failed_cell_triggers_the_failsafe_of_copter_only(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour, noise=False)
     if not p.px4:
         p.send(mavlink.MAVLink_param_set_message(1, 1, b"BATT_FS_LOW_ACT", 2, 2))
@@ -127,7 +127,7 @@ def test_copters_voltage_failsafe_sees_a_failed_cell_and_px4_does_not(pilot: Cal
 # ------------------------------------------------------------------------------------------------ pillar
 
 
-def test_a_pillar_that_moves_comes_nearer_and_hits(flying: Any) -> None:
+def test_moving_pillar_hits_the_vehicle(flying: Any) -> None:
     inject(flying, faults.Pillar, 0, 30_000, 2_000, 60_000, None, 4_000, 270)
     flying.wait(1)
     first = flying.truth.distance_to_obstacle_mm
@@ -138,7 +138,7 @@ def test_a_pillar_that_moves_comes_nearer_and_hits(flying: Any) -> None:
     assert flying.truth.distance_to_obstacle_mm == 0
 
 
-def test_a_pillar_that_is_gone_is_no_obstacle(flying: Any) -> None:
+def test_removed_pillar_is_no_obstacle(flying: Any) -> None:
     assert flying.truth.distance_to_obstacle_mm is None
     inject(flying, faults.Pillar, 0, 30_000, 2_000, 10_000, 2 * S, 1_000, 0)
     flying.wait(1)
@@ -148,7 +148,7 @@ def test_a_pillar_that_is_gone_is_no_obstacle(flying: Any) -> None:
     assert flying.truth.distance_to_obstacle_mm is None
 
 
-def test_a_pillar_moves_on_while_the_autopilot_stands_still(flying: Any) -> None:
+def test_pillar_moves_during_a_stall(flying: Any) -> None:
     inject(flying, faults.Pillar, 0, 60_000, 2_000, 60_000, None, 5_000, 270)
     inject(flying, faults.Stall, 4 * S)
     flying.wait(0.1)
@@ -160,7 +160,7 @@ def test_a_pillar_moves_on_while_the_autopilot_stands_still(flying: Any) -> None
 # ------------------------------------------------------------------------------------------------- stuck
 
 
-def test_a_message_that_sticks_keeps_its_values_with_new_stamps(flying: Any) -> None:
+def test_stuck_message_keeps_values_with_new_time_stamps(flying: Any) -> None:
     flying.go_to(100, 0, 20)
     flying.wait(4)
     inject(flying, faults.MessageStuck, "GLOBAL_POSITION_INT", 3 * S)
@@ -179,7 +179,7 @@ def test_a_message_that_sticks_keeps_its_values_with_new_stamps(flying: Any) -> 
     assert flying.last("GLOBAL_POSITION_INT").lat != stuck[0].lat
 
 
-def test_a_mode_may_stick(flying: Any) -> None:
+def test_heartbeat_can_be_stuck(flying: Any) -> None:
     inject(flying, faults.MessageStuck, "HEARTBEAT")
     flying.wait(0.1)
     told = flying.last("HEARTBEAT").custom_mode
@@ -189,7 +189,7 @@ def test_a_mode_may_stick(flying: Any) -> None:
     assert flying.last("HEARTBEAT").custom_mode == told
 
 
-def test_a_message_that_it_does_not_have_cannot_stick(flying: Any) -> None:
+def test_unknown_message_cannot_be_stuck(flying: Any) -> None:
     inject(flying, faults.MessageStuck, "ADSB_VEHICLE", S)
     assert flying.wait(2)
 
@@ -197,7 +197,7 @@ def test_a_message_that_it_does_not_have_cannot_stick(flying: Any) -> None:
 # ------------------------------------------------------------------------------------------------- stale
 
 
-def test_measurements_that_are_old_at_their_source_say_so(flying: Any) -> None:
+def test_stale_measurements_have_old_time_stamps(flying: Any) -> None:
     flying.go_to(200, 0, 20)
     flying.wait(4)
     inject(flying, faults.StaleSource, 800_000, 6 * S)
@@ -217,7 +217,7 @@ def test_measurements_that_are_old_at_their_source_say_so(flying: Any) -> None:
     assert flying.simulation.now_us // 1_000 - flying.last("GLOBAL_POSITION_INT").time_boot_ms <= 100
 
 
-def test_the_age_of_stale_measurements_grows_from_none(flying: Any) -> None:
+def test_age_of_stale_measurements_grows_from_zero(flying: Any) -> None:
     inject(flying, faults.StaleSource, 2 * S)
     ages = []
     for _ in range(30):

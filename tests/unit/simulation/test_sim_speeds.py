@@ -59,7 +59,7 @@ def landing(made: Any) -> float:
         ("ardupilot", ("LAND_ALT_LOW", 500.0), landing, 1_200, 1_600),
     ],
 )
-def test_a_parameter_counts(
+def test_speed_parameters_take_effect(
     pilot: Callable[..., Any],
     flavour: str,
     parameter: tuple[str, float],

@@ -27,7 +27,7 @@ def naive(pillar: Cylinder, body: Body, bearing: float) -> float | None:
 
 
 @given(st.floats(-30, 30), st.floats(-30, 30), st.floats(0.5, 5), st.floats(-pi, pi))
-def test_the_distance_is_that_of_a_walk_along_the_beam(north: float, east: float, radius: float, yaw: float) -> None:
+def test_distance_matches_a_walk_along_the_beam(north: float, east: float, radius: float, yaw: float) -> None:
     pillar, body = Cylinder(north, east, radius, 20.0), Body(yaw=yaw)
     surroundings = Surroundings()
     surroundings.pillars.append(pillar)
@@ -40,7 +40,7 @@ def test_the_distance_is_that_of_a_walk_along_the_beam(north: float, east: float
         assert abs(max(walked, RANGE_MIN_M) - seen) < 0.3
 
 
-def test_all_around_and_from_above() -> None:
+def test_sectors_and_distance_from_above() -> None:
     surroundings = Surroundings()
     surroundings.pillars += [Cylinder(10.0, 0.0, 1.0, 5.0), Cylinder(0.0, 20.0, 1.0, 30.0)]
     around = surroundings.around(Body(yaw=pi / 2))
@@ -52,7 +52,7 @@ def test_all_around_and_from_above() -> None:
     assert surroundings.around(Body())[0] == 3.0
 
 
-def test_the_nearer_one_hides_the_other_and_the_range_ends() -> None:
+def test_nearest_obstacle_in_range_is_reported() -> None:
     surroundings = Surroundings()
     surroundings.pillars += [Cylinder(30.0, 0.0, 1.0, 9.0), Cylinder(15.0, 0.0, 1.0, 9.0)]
     assert surroundings.ahead(Body()) == pytest.approx(14.0)
@@ -60,7 +60,7 @@ def test_the_nearer_one_hides_the_other_and_the_range_ends() -> None:
     assert surroundings.ahead(Body(north=14.5)) == RANGE_MIN_M
 
 
-def test_the_vehicle_sees_what_it_flies_towards(pilot: Callable[..., Any], flavour: str) -> None:
+def test_forward_range_finder_sees_the_obstacle_ahead(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour, faults=(Standing(0, 60_000, 0, 2_000, 30_000),))
     for number in (132, 330):
         p.long(511, number, 100_000)
@@ -78,7 +78,7 @@ def test_the_vehicle_sees_what_it_flies_towards(pilot: Callable[..., Any], flavo
     assert p.last("DISTANCE_SENSOR").current_distance == 4_000, "it points home now"
 
 
-def test_who_flies_into_it_falls_and_lies_there_tilted(pilot: Callable[..., Any], flavour: str) -> None:
+def test_collision_leaves_the_vehicle_tilted_on_the_ground(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour, faults=(Standing(0, 30_000, 0, 2_000, 30_000),))
     for number in (30, 33, 245):
         p.long(511, number, 50_000)
@@ -109,7 +109,7 @@ def test_who_flies_into_it_falls_and_lies_there_tilted(pilot: Callable[..., Any]
     assert p.arm() == [1 if p.px4 else 4]
 
 
-def test_over_it_is_free_and_it_may_go_away(pilot: Callable[..., Any]) -> None:
+def test_flight_above_an_obstacle_is_free(pilot: Callable[..., Any]) -> None:
     p = pilot("px4", faults=(Standing(0, 20_000, 0, 2_000, 10_000), Standing(0, 40_000, 0, 2_000, 50_000, 20_000_000)))
     p.take_off(15)
     p.wait(5)

@@ -20,7 +20,7 @@ Pilots = Callable[..., Any]
 
 
 @pytest.mark.parametrize("kind", [p.MISSION, p.FENCE, p.RALLY])
-def test_what_goes_up_comes_down(pilot: Pilots, flavour: str, kind: int) -> None:
+def test_uploaded_items_are_downloaded_unchanged(pilot: Pilots, flavour: str, kind: int) -> None:
     a = pilot(flavour).ready()
     rows = {
         p.MISSION: p.mission(a, MISSION),
@@ -42,13 +42,13 @@ def test_what_goes_up_comes_down(pilot: Pilots, flavour: str, kind: int) -> None
             assert got.param1 == expected.param1
 
 
-def test_px4_asks_the_legacy_way_until_it_has_seen_an_int_item(pilot: Pilots) -> None:
+def test_px4_requests_int_items_after_the_first_one(pilot: Pilots) -> None:
     a = pilot("px4").ready()
     assert p.upload(a, p.square(60), p.FENCE) == (["MISSION_REQUEST", "MISSION_REQUEST_INT"], 0)
     assert p.upload(a, p.square(60), p.FENCE) == (["MISSION_REQUEST_INT"], 0)
 
 
-def test_px4_asks_in_the_other_form_when_one_is_turned_down(pilot: Pilots) -> None:
+def test_px4_switches_the_request_form_when_refused(pilot: Pilots) -> None:
     """MAVSDK answers a legacy request with an ACK of UNSUPPORTED, and waits to be asked again."""
     a = pilot("px4").ready()
     asked = a.send(mavlink.MAVLink_mission_count_message(1, 1, 1, p.RALLY))
@@ -59,7 +59,7 @@ def test_px4_asks_in_the_other_form_when_one_is_turned_down(pilot: Pilots) -> No
     assert "MISSION_REQUEST" not in p.names(a.wait(1))
 
 
-def test_arducopter_always_asks_the_legacy_way(pilot: Pilots) -> None:
+def test_arducopter_always_uses_the_legacy_request(pilot: Pilots) -> None:
     a = pilot("ardupilot").ready()
     for _ in range(2):
         assert p.upload(a, p.square(60), p.FENCE) == (["MISSION_REQUEST"], 0)
@@ -78,7 +78,7 @@ def test_slot_0_of_arducopter_is_home(pilot: Pilots) -> None:
     assert (first.x, first.y, first.z) == (home.latitude, home.longitude, home.amsl_mm / 1000)
 
 
-def test_float_items_are_taken_too(pilot: Pilots, flavour: str) -> None:
+def test_float_items_are_accepted(pilot: Pilots, flavour: str) -> None:
     a = pilot(flavour).ready()
     a.send(mavlink.MAVLink_mission_count_message(1, 1, 3, p.FENCE))
     for number, (x, y) in enumerate([(47.3976, 8.5454), (47.3979, 8.5454), (47.3979, 8.5458)]):
@@ -88,7 +88,7 @@ def test_float_items_are_taken_too(pilot: Pilots, flavour: str) -> None:
     assert [m.x for m in p.download(a, p.FENCE)] == pytest.approx([473_976_000, 473_979_000, 473_979_000], abs=40)
 
 
-def test_lost_items_are_asked_for_again_and_then_given_up(pilot: Pilots, flavour: str) -> None:
+def test_lost_items_are_requested_again_and_then_abandoned(pilot: Pilots, flavour: str) -> None:
     a = pilot(flavour).ready()
     replies = a.send(mavlink.MAVLink_mission_count_message(1, 1, 4, p.FENCE))
     assert p.names(replies) == ["MISSION_REQUEST"]
@@ -103,7 +103,7 @@ def test_lost_items_are_asked_for_again_and_then_given_up(pilot: Pilots, flavour
     assert p.upload(a, p.square(60), p.FENCE)[1] == 0
 
 
-def test_an_item_out_of_order_is_not_taken(pilot: Pilots, flavour: str) -> None:
+def test_item_out_of_order_is_refused(pilot: Pilots, flavour: str) -> None:
     a = pilot(flavour).ready()
     rows = p.square(60)
     stray = a.send(p.item(a, rows[0], 0, p.FENCE))
@@ -129,7 +129,7 @@ def test_an_item_out_of_order_is_not_taken(pilot: Pilots, flavour: str) -> None:
         (p.RALLY, [(16, 0, (0, 0, 0, 0), 0, 0, 0)], 3),
     ],
 )
-def test_what_it_does_not_understand_it_refuses_and_keeps_what_it_had(
+def test_refused_upload_keeps_the_stored_plan(
     pilot: Pilots, flavour: str, kind: int, rows: list[Any], result: int
 ) -> None:
     a = pilot(flavour).ready()
@@ -138,7 +138,7 @@ def test_what_it_does_not_understand_it_refuses_and_keeps_what_it_had(
     assert len(p.download(a, p.FENCE)) == 4
 
 
-def test_places_that_are_no_places(flavour: str, pilot: Pilots) -> None:
+def test_invalid_places_are_refused(flavour: str, pilot: Pilots) -> None:
     a = pilot(flavour).ready()
     for x, y in ((nan, 8.5), (95.0, 8.5), (47.0, 181.0)):
         a.send(mavlink.MAVLink_mission_count_message(1, 1, 1, p.RALLY))
@@ -148,7 +148,7 @@ def test_places_that_are_no_places(flavour: str, pilot: Pilots) -> None:
     assert from_message(huge) is None
 
 
-def test_too_many_items_and_kinds_that_there_are_not(pilot: Pilots, flavour: str) -> None:
+def test_too_many_items_and_unknown_kinds_are_refused(pilot: Pilots, flavour: str) -> None:
     a = pilot(flavour).ready()
 
     def result(message: Any) -> list[int]:
@@ -163,7 +163,7 @@ def test_too_many_items_and_kinds_that_there_are_not(pilot: Pilots, flavour: str
     assert result(mavlink.MAVLink_mission_write_partial_list_message(1, 1, 0, 1, p.MISSION)) == [3]
 
 
-def test_clearing(pilot: Pilots, flavour: str) -> None:
+def test_clear_all_empties_plans(pilot: Pilots, flavour: str) -> None:
     a = pilot(flavour).ready()
     p.upload(a, p.mission(a, MISSION))
     p.upload(a, p.square(60), p.FENCE)
@@ -176,7 +176,7 @@ def test_clearing(pilot: Pilots, flavour: str) -> None:
     assert p.download(a, p.FENCE) == []
 
 
-def test_a_second_sender_has_to_wait(pilot: Pilots, flavour: str) -> None:
+def test_second_sender_is_refused_during_an_upload(pilot: Pilots, flavour: str) -> None:
     a = pilot(flavour).ready()
     other = Codec(254, 190)
     a.send(mavlink.MAVLink_mission_count_message(1, 1, 4, p.FENCE))
@@ -193,7 +193,7 @@ def test_a_second_sender_has_to_wait(pilot: Pilots, flavour: str) -> None:
     assert ask(mavlink.MAVLink_mission_clear_all_message(1, 1, p.FENCE)) == [0]
 
 
-def test_px4_opens_a_download_and_sends_again_what_was_lost(pilot: Pilots) -> None:
+def test_px4_repeats_lost_items_of_a_download(pilot: Pilots) -> None:
     a = pilot("px4").ready()
     p.upload(a, p.square(60), p.FENCE)
     ask = mavlink.MAVLink_mission_request_int_message(1, 1, 0, p.FENCE)
@@ -207,7 +207,7 @@ def test_px4_opens_a_download_and_sends_again_what_was_lost(pilot: Pilots) -> No
     assert p.names(a.wait(1)) == []
 
 
-def test_single_items_can_be_asked_for_from_arducopter(pilot: Pilots) -> None:
+def test_arducopter_sends_single_items_on_request(pilot: Pilots) -> None:
     a = pilot("ardupilot").ready()
     p.upload(a, p.square(60), p.FENCE)
     assert p.names(a.send(mavlink.MAVLink_mission_request_int_message(1, 1, 2, p.FENCE))) == ["MISSION_ITEM_INT"]
@@ -237,7 +237,7 @@ _MESSAGES = st.one_of(
     st.sampled_from(list(AutopilotKind)),
     st.lists(st.tuples(_MESSAGES, st.sampled_from([0, 20_000, 400_000])), max_size=20),
 )
-def test_no_order_of_messages_stops_it(kind: AutopilotKind, script: list[tuple[Any, int]]) -> None:
+def test_any_order_of_messages_is_survived(kind: AutopilotKind, script: list[tuple[Any, int]]) -> None:
     simulation, codec = Simulation(SimulationConfig(flavour=kind)), Codec(255, 190)
     simulation.advance(1_500_000)
     for message, pause in script:

@@ -38,7 +38,7 @@ def taken(p: Any, kind: Callable[..., faults.Fault], *args: Any) -> tuple[int | 
         (faults.Kill, ()),
     ],
 )
-def test_a_pilot_takes_it_over(
+def test_pilot_takeover_is_recorded(
     kind: Callable[..., faults.Fault], args: tuple[Any, ...], pilot: Callable[..., Any], flavour: str
 ) -> None:
     p = on_its_way(pilot, flavour)
@@ -47,20 +47,20 @@ def test_a_pilot_takes_it_over(
     assert taken(p, kind, *args) == (before_us + 20_000, Taker.PILOT)
 
 
-def test_a_pilot_without_effect_does_not(pilot: Callable[..., Any], flavour: str) -> None:
+def test_pilot_action_without_effect_is_no_takeover(pilot: Callable[..., Any], flavour: str) -> None:
     p = on_its_way(pilot, flavour)
     kind, args = (faults.PilotMode, (FlightMode.LOITER,)) if p.px4 else (faults.PilotSticks, (S,))
     assert taken(p, kind, *args) == (None, None)
 
 
-def test_a_switch_to_a_mode_that_cannot_fly_now_is_refused(pilot: Callable[..., Any]) -> None:
+def test_switch_to_an_unavailable_mode_is_refused(pilot: Callable[..., Any]) -> None:
     """PX4's `UserModeIntention::change`: Offboard without targets was entered for a moment, and Hold anew."""
     p = on_its_way(pilot, "px4")
     assert taken(p, faults.PilotMode, FlightMode.GUIDED) == (None, None)
     assert p.truth.mode is FlightMode.LOITER
 
 
-def test_a_switch_to_position_without_one_gets_altitude_from_px4_alone(pilot: Callable[..., Any], flavour: str) -> None:
+def test_px4_falls_back_to_altitude_without_a_position(pilot: Callable[..., Any], flavour: str) -> None:
     p = on_its_way(pilot, flavour)
     p.simulation.inject(faults.EstimatorUnhealthy(p.simulation.now_us))
     p.wait(2)
@@ -70,30 +70,30 @@ def test_a_switch_to_position_without_one_gets_altitude_from_px4_alone(pilot: Ca
     assert p.truth.mode is (FlightMode.ALTITUDE if p.px4 else before)
 
 
-def test_sticks_take_px4_over(pilot: Callable[..., Any]) -> None:
+def test_sticks_take_over_px4(pilot: Callable[..., Any]) -> None:
     assert taken(on_its_way(pilot, "px4"), faults.PilotSticks)[1] is Taker.PILOT
 
 
-def test_on_the_ground_there_is_nothing_to_take_over(pilot: Callable[..., Any], flavour: str) -> None:
+def test_no_takeover_on_the_ground(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour).ready()
     assert taken(p, faults.PilotMode, FlightMode.ALTITUDE) == (None, None)
 
 
-def test_our_own_commands_take_nothing_over(pilot: Callable[..., Any], flavour: str) -> None:
+def test_own_commands_are_no_takeover(pilot: Callable[..., Any], flavour: str) -> None:
     p = on_its_way(pilot, flavour)
     p.mode(FlightMode.LAND)
     p.until(lambda: not p.truth.armed)
     assert p.truth.taken_over_us is None
 
 
-def test_failsafes_take_it_over_and_the_first_counts(pilot: Callable[..., Any], flavour: str) -> None:
+def test_first_failsafe_takeover_counts(pilot: Callable[..., Any], flavour: str) -> None:
     p = on_its_way(pilot, flavour)
     first = taken(p, faults.BatteryLevel, 300)
     assert first[1] is Taker.FAILSAFE
     assert taken(p, faults.PilotMode, FlightMode.ALTITUDE) == first
 
 
-def test_a_breached_fence_takes_it_over(pilot: Callable[..., Any]) -> None:
+def test_fence_breach_is_a_takeover(pilot: Callable[..., Any]) -> None:
     p = on_its_way(pilot, "ardupilot")
     for name, value in ((b"FENCE_RADIUS", 30), (b"FENCE_ENABLE", 1)):
         p.send(mavlink.MAVLink_param_set_message(1, 1, name, value, 9))
@@ -101,7 +101,7 @@ def test_a_breached_fence_takes_it_over(pilot: Callable[..., Any]) -> None:
     assert p.truth.taken_over_by is Taker.FAILSAFE
 
 
-def test_the_air_is_told_as_it_moves(pilot: Callable[..., Any], flavour: str) -> None:
+def test_truth_has_the_current_wind(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour, wind=Wind(8_000, 270, 0))
     p.wait(1)
     assert (p.truth.wind_north_mm_s, p.truth.wind_east_mm_s) == (0, 8_000)
@@ -110,7 +110,7 @@ def test_the_air_is_told_as_it_moves(pilot: Callable[..., Any], flavour: str) ->
     assert hypot(gusty.truth.wind_north_mm_s, gusty.truth.wind_east_mm_s - 8_000) > 100
 
 
-def test_whoever_wants_to_know_hears_each_frame_that_comes(pilot: Callable[..., Any], flavour: str) -> None:
+def test_callback_receives_each_frame(pilot: Callable[..., Any], flavour: str) -> None:
     p, heard = pilot(flavour), list[tuple[int, bytes]]()
     p.wait(1)
     p.simulation.heard = lambda at_us, frame: heard.append((at_us, frame))
@@ -133,7 +133,7 @@ def test_whoever_wants_to_know_hears_each_frame_that_comes(pilot: Callable[..., 
     assert len(heard) == 3, "what is lost did not come"
 
 
-def test_it_flies_past_a_target_and_comes_back(pilot: Callable[..., Any], flavour: str) -> None:
+def test_vehicle_overshoots_a_target_and_comes_back(pilot: Callable[..., Any], flavour: str) -> None:
     """Recorded: PX4 0.6 to 1.4 m, from 4 to 6 m/s; ArduCopter 0.1 to 1 m, from 4 to 9 m/s."""
     p = pilot(flavour, noise=False, cruise_mm_s=5_000 if flavour == "px4" else 7_700)
     p.take_off(20)

@@ -100,11 +100,11 @@ def fly(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_some_lives(seed: int) -> None:
+def test_invariants_hold_under_random_events(seed: int) -> None:
     fly(seed)
 
 
 @pytest.mark.soak
-def test_many_lives() -> None:
+def test_invariants_hold_under_many_random_events() -> None:
     for seed in range(4, 600):
         fly(seed)

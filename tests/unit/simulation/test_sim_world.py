@@ -50,7 +50,7 @@ def flight(kind: AutopilotKind, seed: int, steps_us: list[int]) -> tuple[list[by
 
 
 @pytest.mark.parametrize("kind", list(AutopilotKind))
-def test_same_seed_same_bytes_however_time_is_cut(kind: AutopilotKind) -> None:
+def test_same_seed_gives_the_same_bytes_for_any_steps_of_time(kind: AutopilotKind) -> None:
     reference = flight(kind, 1, [S])
     assert flight(kind, 1, [S]) == reference
     assert flight(kind, 1, [20_000]) == reference
@@ -99,7 +99,7 @@ def test_stream_rates_of_px4(pilot: Callable[..., Any]) -> None:
     }
 
 
-def test_stream_intervals(pilot: Callable[..., Any], flavour: str) -> None:
+def test_stream_intervals_can_be_set(pilot: Callable[..., Any], flavour: str) -> None:
     p = pilot(flavour).ready()
 
     def count() -> int:
@@ -118,14 +118,14 @@ def test_stream_intervals(pilot: Callable[..., Any], flavour: str) -> None:
 @pytest.mark.parametrize(
     ("system", "component", "heard"), [(1, 1, True), (1, 0, True), (0, 0, True), (2, 1, False), (1, 191, False)]
 )
-def test_only_what_is_addressed_to_it(
+def test_messages_for_other_systems_are_ignored(
     pilot: Callable[..., Any], flavour: str, system: int, component: int, heard: bool
 ) -> None:
     p = pilot(flavour).ready()
     assert p.long(512, 148, system=system, component=component) == ([0] if heard else [])
 
 
-def test_it_runs_a_hundred_times_faster_than_real_time(pilot: Callable[..., Any]) -> None:
+def test_simulation_is_a_hundred_times_faster_than_real_time(pilot: Callable[..., Any]) -> None:
     p = pilot("px4")
     p.take_off(20)
     start = process_time()
@@ -147,7 +147,7 @@ def test_no_position_before_it_is_ready(pilot: Callable[..., Any]) -> None:
     assert p.last("SYS_STATUS").onboard_control_sensors_health & prearm
 
 
-def test_garbage_stops_nothing(pilot: Callable[..., Any], flavour: str) -> None:
+def test_garbage_is_survived(pilot: Callable[..., Any], flavour: str) -> None:
     """Random bytes, and frames with a right checksum but random content: it answers the next command all the same."""
     chance = random.Random(5)
     p = pilot(flavour)
@@ -211,7 +211,7 @@ def frame_of(number: int, kind: Any, payload: bytes) -> bytes:
     ),
     st.integers(0, 15_000),
 )
-def test_whatever_it_is_told_it_stays_within_bounds_and_uses_energy(
+def test_random_commands_keep_the_state_within_bounds(
     kind: AutopilotKind, orders: list[tuple[int, int, int, int]], wind: int
 ) -> None:
     simulation = Simulation(SimulationConfig(flavour=kind, wind=Wind(wind, 77, wind // 10)))
@@ -255,7 +255,7 @@ def test_whatever_it_is_told_it_stays_within_bounds_and_uses_energy(
         {"home": HomePosition(900_000_000, 0, 0)},
     ],
 )
-def test_impossible_configurations(bad: dict[str, Any]) -> None:
+def test_impossible_configurations_are_refused(bad: dict[str, Any]) -> None:
     with pytest.raises(ValueError):
         SimulationConfig(**bad)
 
@@ -266,7 +266,7 @@ def test_impossible_configurations(bad: dict[str, Any]) -> None:
     st.floats(-3000, 3000),
     st.floats(-3000, 3000),
 )
-def test_places_go_there_and_back(latitude: int, longitude: int, north: float, east: float) -> None:
+def test_places_convert_back_and_forth(latitude: int, longitude: int, north: float, east: float) -> None:
     home = HomePosition(latitude, longitude, 0)
     back = home.local(*home.globe(north, east))
     assert abs(back[0] - north) < 0.02

@@ -17,7 +17,7 @@ FLAVOURS = ("px4", "ardupilot")
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_a_flight_by_calls_is_the_one_without(flavour: str) -> None:
+def test_flight_in_mode_process_equals_mode_software(flavour: str) -> None:
     one, other = (
         Flight(shipped("short"), simulated(flavour), attested=True, mode=mode).fly()
         for mode in (EnforcementMode.SOFTWARE, EnforcementMode.PROCESS)
@@ -35,7 +35,7 @@ def test_a_flight_by_calls_is_the_one_without(flavour: str) -> None:
     assert other.audit().report.failure is None
 
 
-def test_nonsense_is_answered() -> None:
+def test_malformed_calls_are_answered() -> None:
     served, of = Served(ROOT, VEHICLE), Random(7)
     assert served(b"") == b"\1malformed"
     for _ in range(2_000):
@@ -46,7 +46,7 @@ def test_nonsense_is_answered() -> None:
         assert served(bytes([kind]) + bytes(80)) == b"\1not-loaded"
 
 
-def test_nobody_answers_once_it_is_dead() -> None:
+def test_dead_boundary_does_not_answer() -> None:
     served = Served(ROOT, VEHICLE)
     served.dead = True
     with pytest.raises(ConnectionResetError):

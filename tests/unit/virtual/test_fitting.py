@@ -20,7 +20,7 @@ def standard() -> tuple[Policy, Mission]:
     return compiled.policy, compiled.mission
 
 
-def test_a_fence_of_its_own_is_as_wide_and_high_as_the_mission_goes() -> None:
+def test_own_fence_is_widened_to_hold_the_mission() -> None:
     policy, mission = standard()
     copter = fitting(policy, flavour=AutopilotKind.ARDUPILOT)
     assert with_room(copter, policy, mission.invocations) == copter

@@ -80,7 +80,7 @@ def causes(judgement: Judgement) -> list[tuple[str, str | None]]:
 
 
 @pytest.mark.slow
-def test_nothing_is_wrong_with_a_good_flight(good: ScenarioFlown) -> None:
+def test_good_flight_has_no_failures(good: ScenarioFlown) -> None:
     found = judge(good)
     assert (found.failures, found.exceptions) == ((), ())
     assert found.margins.fence_mm is not None
@@ -108,11 +108,11 @@ SQUARE = (0, 0, 10, 0, 10, 10, 0, 10)
         (Zone("ring", AREA, -100, 100, (2, 4, 4, *SQUARE, 4, 4, 4, 6, 6, 6, 6, 4)), (2, 5, 0), 2),
     ],
 )
-def test_how_far_inside_a_zone(zone: Zone, place: tuple[int, int, int], inside: float) -> None:
+def test_distance_inside_a_zone(zone: Zone, place: tuple[int, int, int], inside: float) -> None:
     assert inside_mm(zone, *place) == pytest.approx(inside)
 
 
-def test_outside_the_airspace(good: ScenarioFlown) -> None:
+def test_leaving_the_airspace_is_a_failure(good: ScenarioFlown) -> None:
     found = judged(good, [sample(10, 490), sample(11, 503), sample(12, 507), sample(13, 480)])
     first, worst = found.failures
     assert (first.slug, first.at_us, worst.at_us) == ("outside-fence", 11 * S, 12 * S)
@@ -154,14 +154,14 @@ def _with_times(good: ScenarioFlown, number: int, **times: tuple[int, int]) -> A
         ({"dates": (NOON, NOON + HOUR), "daily": (11 * HOUR, 13 * HOUR)}, False),
     ],
 )
-def test_a_zone_is_kept_out_of_while_it_is_there(good: ScenarioFlown, times: Any, there: bool) -> None:
+def test_exclusion_zone_counts_while_it_exists(good: ScenarioFlown, times: Any, there: bool) -> None:
     policy = _with_times(good, case.flat.SCHOOL, **times)
     found = slugs(judged(good, [sample(10, north_m=250)], policy=policy, utc_us=NOON))
     assert found == ["outside-fence"] * there
 
 
 @pytest.mark.parametrize(("hours", "there"), [((13, 15), True), ((15, 16), False), ((12, 13), False)])
-def test_a_zone_is_there_by_the_clock_on_the_wall(good: ScenarioFlown, hours: tuple[int, int], there: bool) -> None:
+def test_zone_times_are_local_times(good: ScenarioFlown, hours: tuple[int, int], there: bool) -> None:
     policy = _with_times(good, case.flat.SCHOOL, daily=(hours[0] * HOUR, hours[1] * HOUR))
     offsets = (0, HOUR, NOON - HOUR, 2 * HOUR, NOON + HOUR, HOUR, NOON + 2 * HOUR)
     zoned = with_fields(policy.vehicle, utc_offset_us=0, time_zone="A/B", time_zone_data="1", offsets=offsets)
@@ -169,14 +169,14 @@ def test_a_zone_is_there_by_the_clock_on_the_wall(good: ScenarioFlown, hours: tu
     assert found == ["outside-fence"] * there
 
 
-def test_it_counts_when_a_zone_comes_while_it_flies(good: ScenarioFlown) -> None:
+def test_zone_that_begins_during_the_flight_counts(good: ScenarioFlown) -> None:
     policy = _with_times(good, case.flat.SCHOOL, dates=(NOON + 20 * S, NOON + HOUR))
     samples = [sample(at_s, north_m=250) for at_s in (10, 15, 22, 25)]
     found = judged(good, samples, policy=policy, utc_us=NOON).failures
     assert [(each.slug, each.at_us) for each in found] == [("outside-fence", 22 * S)]
 
 
-def test_whoever_flies_while_a_zone_that_must_be_kept_is_not_there_is_outside(good: ScenarioFlown) -> None:
+def test_flight_without_its_inclusion_zone_is_outside(good: ScenarioFlown) -> None:
     (inside,) = good.policy.airspace.inside  # type: ignore[union-attr]
     policy = _with_times(good, inside, dates=(NOON, NOON + 15 * S))
     found = judged(good, [sample(10), sample(20)], policy=policy, utc_us=NOON).failures
@@ -201,7 +201,7 @@ def test_whoever_flies_while_a_zone_that_must_be_kept_is_not_there_is_outside(go
         (faults.Kill(5 * S), "motors"),
     ],
 )  # fmt: skip
-def test_what_excuses_being_outside(good: ScenarioFlown, fault: Fault, cause: str | None) -> None:
+def test_faults_that_excuse_leaving_the_airspace(good: ScenarioFlown, fault: Fault, cause: str | None) -> None:
     found = judged(good, [sample(5), sample(11, 508), sample(12, 480)], fault)
     assert slugs(found) == ([] if cause else ["outside-fence"])
     assert causes(found) == ([("outside-fence", cause)] if cause else [])
@@ -219,7 +219,7 @@ def test_what_excuses_being_outside(good: ScenarioFlown, fault: Fault, cause: st
         (faults.GpsGlitch(5 * S, 0, M, 23 * S), "ardupilot", 30, None),
     ],
 )
-def test_a_landing_of_arducopter_that_began_without_a_position_stays_without(
+def test_copter_landing_begun_without_position_is_excused(
     good: ScenarioFlown, fault: Fault, flavour: str, from_s: int, cause: str | None
 ) -> None:
     """It is carried off by the wind long after the receiver is right again (`ModeLand::init`)."""
@@ -233,7 +233,7 @@ def test_a_landing_of_arducopter_that_began_without_a_position_stays_without(
     assert (slugs(found), causes(found)) == (([], [("outside-fence", cause)]) if cause else (["outside-fence"], []))
 
 
-def test_who_took_over_flies_where_he_wants(good: ScenarioFlown) -> None:
+def test_takeover_excuses_leaving_the_airspace(good: ScenarioFlown) -> None:
     taken: dict[str, Any] = {"taken_over_us": 10 * S, "taken_over_by": "pilot"}
     samples = [sample(9), sample(12, 508, **taken), sample(13, 480, **taken)]
     assert causes(judged(good, samples)) == [("outside-fence", "pilot")]
@@ -241,7 +241,7 @@ def test_who_took_over_flies_where_he_wants(good: ScenarioFlown) -> None:
     assert slugs(judged(good, before)) == ["outside-fence"]
 
 
-def test_a_wind_at_the_start_excuses_too(good: ScenarioFlown) -> None:
+def test_initial_wind_is_an_excuse(good: ScenarioFlown) -> None:
     windy = replace(good.scenario, start=Start(wind_mm_s=9 * M, gust_mm_s=2 * M))
     assert causes(judged(good, [sample(12, 508)], scenario=windy)) == [("outside-fence", "wind")]
 
@@ -261,7 +261,7 @@ def pillar(at_us: int, speed_mm_s: int = 0) -> faults.Pillar:
     return faults.Pillar(at_us, 0, 20 * M, 3 * M, 30 * M, speed_mm_s=speed_mm_s)
 
 
-def test_a_collision(good: ScenarioFlown) -> None:
+def test_collision_is_a_failure(good: ScenarioFlown) -> None:
     assert slugs(judged(good, crash())) == ["collision"]
     assert "hit an obstacle" in judged(good, crash()).failures[0].text
     assert "too hard" in judged(good, crash(near_mm=None)).failures[0].text
@@ -281,13 +281,13 @@ def test_a_collision(good: ScenarioFlown) -> None:
         (faults.Obstacle(5 * S, 3 * M), None),
     ],
 )
-def test_what_excuses_a_collision(good: ScenarioFlown, fault: Fault, cause: str | None) -> None:
+def test_faults_that_excuse_a_collision(good: ScenarioFlown, fault: Fault, cause: str | None) -> None:
     found = judged(good, crash(), fault)
     assert causes(found) == ([("collision", cause)] if cause else [])
     assert slugs(found) == ([] if cause else ["collision"])
 
 
-def test_a_pillar_that_could_be_seen_in_time_is_no_excuse(good: ScenarioFlown) -> None:
+def test_visible_pillar_is_no_excuse(good: ScenarioFlown) -> None:
     contracts = tuple(with_fields(each, reads=(case.flat.OBSTACLE,)) for each in good.policy.contracts)
     looks_out = with_fields(good.policy, contracts=contracts)
     far = [sample(5, obstacle_mm=60 * M), *crash()[1:]]
@@ -305,7 +305,7 @@ def test_a_pillar_that_could_be_seen_in_time_is_no_excuse(good: ScenarioFlown) -
     assert causes(judged(good, far, pillar(5 * S))) == excused  # nothing looks out for it
 
 
-def test_an_empty_battery_excuses_only_who_was_given_one(good: ScenarioFlown) -> None:
+def test_empty_battery_is_an_excuse_only_after_a_fault(good: ScenarioFlown) -> None:
     empty = [each._replace(battery=0) for each in crash(near_mm=None)]
     assert slugs(judged(good, empty)) == ["collision"]
     assert causes(judged(good, empty, faults.BatteryLevel(5 * S, 0))) == [("collision", "battery")]
@@ -319,7 +319,7 @@ def after(good: ScenarioFlown, **fields: Any) -> list[TruthSample]:
     return [sample(end_s + tenths / 10, **fields) for tenths in range(1, 60)]
 
 
-def test_it_rests_or_holds_at_the_end(good: ScenarioFlown) -> None:
+def test_vehicle_must_rest_or_hover_at_the_end(good: ScenarioFlown) -> None:
     lives = (replace(good.lives[0], ending="aborted"),)
     assert slugs(judged(good, after(good, speed_mm_s=300), lives=lives)) == []
     assert slugs(judged(good, after(good, speed_mm_s=3 * M), lives=lives)) == ["not-ended"]
@@ -330,7 +330,7 @@ def test_it_rests_or_holds_at_the_end(good: ScenarioFlown) -> None:
     ]  # it says that it completed the mission, and flies
 
 
-def test_what_excuses_flying_on(good: ScenarioFlown) -> None:
+def test_faults_that_excuse_flying_on(good: ScenarioFlown) -> None:
     lives = (replace(good.lives[0], ending="stood-down"),)
     taken = after(good, speed_mm_s=3 * M, taken_over_us=S, taken_over_by="pilot")
     assert causes(judged(good, taken, lives=lives)) == [("not-ended", "pilot")]
@@ -381,7 +381,7 @@ def reposition(x: int, y: int) -> bytes:
         (b"\xfd\x00garbage is nothing", "px4", None),
     ],
 )
-def test_what_a_frame_moves(frame: bytes, flavour: str, kinds: set[MotionKind] | None) -> None:
+def test_frames_are_mapped_to_kinds_of_motion(frame: bytes, flavour: str, kinds: set[MotionKind] | None) -> None:
     assert moves(frame, flavour) == kinds
 
 
@@ -389,7 +389,7 @@ def motion(good: ScenarioFlown) -> list[SentFrame]:
     return [frame for frame in good.frames if moves(frame.octets, good.flavour) is not None]
 
 
-def test_a_frame_after_a_takeover(good: ScenarioFlown) -> None:
+def test_motion_frame_after_a_takeover_is_a_failure(good: ScenarioFlown) -> None:
     frame = motion(good)[-1]
 
     def taken(before_us: int, *happened: Fault, more: Sequence[SentFrame] = (), **fields: Any) -> Judgement:
@@ -420,7 +420,7 @@ def test_a_frame_after_a_takeover(good: ScenarioFlown) -> None:
     assert causes(taken(2 * S, more=[at_once])) == [("motion-after-takeover", "crossed")]
 
 
-def test_a_takeover_by_the_mode_that_a_lost_frame_asked_for(good: ScenarioFlown) -> None:
+def test_takeover_by_the_mode_of_a_lost_frame_is_excused(good: ScenarioFlown) -> None:
     """It looks as if that frame had arrived. Another mode, or a frame that did arrive, excuses nothing."""
     land, hold = long(176, 1, 9), long(176, 1, 17)
     since_us, again_us = 30 * S, 33 * S
@@ -445,7 +445,7 @@ def test_a_takeover_by_the_mode_that_a_lost_frame_asked_for(good: ScenarioFlown)
     assert "motion-after-takeover" in slugs(sent_again(lost, (31, FlightMode.LAND), (60, FlightMode.POSITION)))
 
 
-def test_a_pause_that_nothing_shows(good: ScenarioFlown) -> None:
+def test_invisible_pause_is_excused(good: ScenarioFlown) -> None:
     frame = motion(good)[-1]
 
     def paused(flavour: str, up_m: float, *others: Fault, frames: tuple[SentFrame, ...] = (frame,)) -> Judgement:
@@ -476,7 +476,7 @@ def test_a_pause_that_nothing_shows(good: ScenarioFlown) -> None:
         (faults.PilotVelocity(0, -2_000, 0, 40 * S), 14, True),
     ],
 )
-def test_what_does_not_show_in_arducopters_takeoff(
+def test_invisible_takeovers_in_a_copter_takeoff_are_excused(
     good: ScenarioFlown, fault: Fault, after_s: int, *, seen: bool
 ) -> None:
     """A go-to to its end looks like the end itself; a velocity shows once it rises no further."""
@@ -493,7 +493,7 @@ def test_what_does_not_show_in_arducopters_takeoff(
 
 
 @pytest.mark.parametrize(("climb_mm_s", "cause"), [(600, "unseen"), (700, None), (800, None)])
-def test_a_pause_of_what_stops_already(good: ScenarioFlown, climb_mm_s: int, cause: str | None) -> None:
+def test_pause_of_a_stopping_vehicle_is_excused(good: ScenarioFlown, climb_mm_s: int, cause: str | None) -> None:
     """Told to stop, it still climbs when a pilot tells it the same: nothing shows that, while it slows down."""
     frame = motion(good)[-1]
     since_us = frame.sent_us - 5 * S
@@ -509,7 +509,7 @@ def test_a_pause_of_what_stops_already(good: ScenarioFlown, climb_mm_s: int, cau
 
 
 @pytest.mark.parametrize("left", ["replayed", "no-vehicle"])
-def test_a_flight_that_no_run_began_to_watch(good: ScenarioFlown, left: str) -> None:
+def test_airborne_vehicle_without_a_run_is_a_failure(good: ScenarioFlown, left: str) -> None:
     """A run that refused to begin, for the vehicle was on the ground, excuses nothing: it was about to take off."""
     hovers = [sample(at_us / S, up_m=5.0) for at_us in range(90 * S, 96 * S, S // 2)]
     found = judge(replace(good, samples=(*good.samples, *hovers), left=left, lives=()))
@@ -517,7 +517,7 @@ def test_a_flight_that_no_run_began_to_watch(good: ScenarioFlown, left: str) -> 
     assert ended == ([None] if left == "replayed" else [])
 
 
-def test_a_frame_that_the_log_does_not_have(good: ScenarioFlown) -> None:
+def test_unlogged_frame_is_a_failure(good: ScenarioFlown) -> None:
     frame = motion(good)[0]
     early = SentFrame(S // 10, S // 10, frame.octets)
     assert slugs(judge(replace(good, frames=(early,)))) == ["unlogged-effect"]
@@ -532,13 +532,13 @@ def test_a_frame_that_the_log_does_not_have(good: ScenarioFlown) -> None:
     assert causes(judge(replace(good, frames=(early,), happened=full))) == [("unlogged-effect", "disk")]
 
 
-def test_two_commands_at_one_moment() -> None:
+def test_frame_may_belong_to_either_of_two_simultaneous_commands() -> None:
     """ArduCopter refuses to brake without a position: the landing goes out in the same turn, and both are logged."""
     found = judge(flown(scenario(incident(13.4, faults.EstimatorUnhealthy(0, 5 * S))), "ardupilot", seed=5))
     assert found.failures == ()
 
 
-def test_a_late_fallback(good: ScenarioFlown) -> None:
+def test_late_fallback_is_a_failure(good: ScenarioFlown) -> None:
     frame = motion(good)[-1]
 
     def reacts(in_us: int, *happened: Fault, questions: tuple[SentFrame, ...] = ()) -> Judgement:
@@ -561,7 +561,7 @@ def test_a_late_fallback(good: ScenarioFlown) -> None:
     assert causes(reacts(S, faults.LinkSilence(2 * S))) == [] == slugs(reacts(S, faults.LinkDelay(2 * S, S)))
 
 
-def test_a_frame_after_its_permit_and_a_step_after_its_deadline(good: ScenarioFlown) -> None:
+def test_frame_after_permit_or_deadline_is_a_failure(good: ScenarioFlown) -> None:
     takes_off = next(each for each in motion(good) if moves(each.octets, "px4") == {MotionKind.CLIMB})
     late = [
         each._replace(sent_us=each.sent_us + 20 * S) if each is takes_off else each
@@ -576,7 +576,7 @@ def test_a_frame_after_its_permit_and_a_step_after_its_deadline(good: ScenarioFl
 # ---------------------------------------------------------------- logs
 
 
-def test_a_log_that_does_not_verify(good: ScenarioFlown) -> None:
+def test_log_that_does_not_verify_is_a_failure(good: ScenarioFlown) -> None:
     lines = list(good.lives[0].lines)
 
     def logged(changed: Sequence[bytes], *happened: Fault) -> Judgement:
@@ -589,7 +589,7 @@ def test_a_log_that_does_not_verify(good: ScenarioFlown) -> None:
     assert "log" in slugs(logged(lines[:3] + lines[4:], faults.DiskFull(S)))
 
 
-def test_a_decision_that_is_not_derived(good: ScenarioFlown, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_underived_decision_is_a_failure(good: ScenarioFlown, monkeypatch: pytest.MonkeyPatch) -> None:
     from rtshcua.evidence.finding import Flaw
     from rtshcua.ground.audit.record_audit import RecordAudit
 
@@ -598,7 +598,7 @@ def test_a_decision_that_is_not_derived(good: ScenarioFlown, monkeypatch: pytest
     assert slugs(judge(good)) == ["derive"]
 
 
-def test_a_fault_of_the_runtime(good: ScenarioFlown) -> None:
+def test_exception_of_the_runtime_is_a_failure(good: ScenarioFlown) -> None:
     assert slugs(judge(replace(good, fault="ZeroDivisionError"))) == ["fault"]
 
 
@@ -606,7 +606,7 @@ def test_a_fault_of_the_runtime(good: ScenarioFlown) -> None:
     ("signal", "by", "words"),
     [("position", 5_000, "place"), ("height", 2_000, "height"), ("battery", 300, "charge")],
 )
-def test_what_the_loop_is_given_is_compared_with_what_was(signal: str, by: int, words: str) -> None:
+def test_readings_are_compared_with_the_truth(signal: str, by: int, words: str) -> None:
     was = once("judged-flight", lambda: flown(scenario()))
     slot = getattr(was.policy.vehicle, signal)
 

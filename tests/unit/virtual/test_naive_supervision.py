@@ -75,7 +75,7 @@ def compare(policy: Policy, invocation: Invocation, state: State, now: Now) -> t
 
 @MANY
 @given(worlds.CHANCES)
-def test_it_agrees_with_the_product_in_random_worlds(of: Random) -> None:
+def test_agrees_with_the_runtime_in_random_worlds(of: Random) -> None:
     policy = named(worlds.policy(of))
     compare(
         policy, worlds.invocation(of, policy), heard(policy, worlds.state(of, len(policy.monitors))), worlds.now(of)
@@ -84,7 +84,7 @@ def test_it_agrees_with_the_product_in_random_worlds(of: Random) -> None:
 
 @MANY
 @given(worlds.CHANCES)
-def test_it_agrees_with_the_product_about_a_vehicle_that_brakes(of: Random) -> None:
+def test_agrees_with_the_runtime_about_a_braking_vehicle(of: Random) -> None:
     policy = named(rich_worlds.policy(of))
     first = policy.slots
     signals = tuple(
@@ -129,7 +129,7 @@ def heard(policy: Policy, state: State) -> State:
 
 @MANY
 @given(worlds.CHANCES)
-def test_temporal_monitors_say_what_the_product_makes_of_the_same_past(of: Random) -> None:
+def test_temporal_monitors_agree_with_the_runtime(of: Random) -> None:
     policy = replace(named(worlds.policy(of)), monitors=worlds.monitors(of, 3))
     made = prepare(policy)
     assume(isinstance(made, PreparedPolicy))
@@ -172,11 +172,11 @@ def texts(policy: Policy, state: State, now: Now = flat.NOW) -> list[tuple[str, 
         (flat.state({flat.BATTERY: 1_080}), [("the reserve and the way home", False, True)]),
     ],
 )
-def test_what_a_step_rests_on(state: State, broken: list[tuple[str, bool | None, bool]]) -> None:
+def test_violated_conditions_of_a_step_are_found(state: State, broken: list[tuple[str, bool | None, bool]]) -> None:
     assert texts(QUIET, state) == broken
 
 
-def test_a_zone_to_keep_out_of_counts_while_it_is_there() -> None:
+def test_exclusion_zone_counts_while_it_exists() -> None:
     utc_us = flat.NOW.utc_us
     for dates, there in (((utc_us, utc_us + S), True), ((utc_us + S, utc_us + 2 * S), False)):
         zones = [*flat.ZONES]
@@ -198,7 +198,7 @@ def turns(unknown: tuple[int, int], until_us: int) -> list[Turn]:
     ("silences", "broken_us"),
     [((), 2 * S + 600_000), (((2 * S + 200_000, 5 * S),), 5 * S + 400_000), (((2 * S, 4 * S),), 4 * S + 600_000)],
 )
-def test_a_silence_counts_for_no_grace(silences: tuple[tuple[int, int], ...], broken_us: int) -> None:
+def test_silence_does_not_count_for_the_grace(silences: tuple[tuple[int, int], ...], broken_us: int) -> None:
     """It is unknown from 2 s on; the grace is 500 ms, and a turn notices."""
     contract = replace(STEP.contract, grace_us=500_000)
     mission = replace(flat.MISSION, invocations=(replace(STEP, contract=contract),))
@@ -210,7 +210,7 @@ def test_a_silence_counts_for_no_grace(silences: tuple[tuple[int, int], ...], br
     assert text == "link.quality >= 40 %: unknown for longer than its grace of 500 ms"
 
 
-def test_each_of_the_frames_that_come_at_once_is_looked_at() -> None:
+def test_each_of_several_frames_in_a_turn_is_judged() -> None:
     values = tuple(enumerate(flat.state().values))
     gust = tuple((slot, 11 * M if slot == flat.WIND else value) for slot, value in values)
     at_once = [
@@ -222,7 +222,7 @@ def test_each_of_the_frames_that_come_at_once_is_looked_at() -> None:
     assert step.sure == (S, "wind.speed < 10 m/s")
 
 
-def test_what_lasts_longer_than_it_may_is_told_without_the_silences() -> None:
+def test_maximum_duration_excludes_silences() -> None:
     contract = replace(STEP.contract, duration_us=3 * S)
     mission = replace(flat.MISSION, invocations=(replace(STEP, contract=contract),))
     step = RunningStep(QUIET, mission, 0, (0, None), ((S, 2 * S),))

@@ -69,7 +69,7 @@ def test_the_same_arguments_give_the_same_flight() -> None:
 
 
 @pytest.mark.slow
-def test_incidents_come_after_a_step_and_on_a_condition() -> None:
+def test_incidents_follow_steps_and_conditions() -> None:
     high = flat.clause("height > 3 m", flat.apply(flat.Op.GT, flat.signal(flat.HEIGHT), flat.const(3 * M)))
     never = flat.clause("height > 3 km", flat.apply(flat.Op.GT, flat.signal(flat.HEIGHT), flat.const(3_000 * M)))
     found = flown(
@@ -89,14 +89,14 @@ def test_incidents_come_after_a_step_and_on_a_condition() -> None:
     assert 0 <= times[1] - rises - S < S
 
 
-def test_what_is_at_the_start() -> None:
+def test_start_conditions_are_applied() -> None:
     found = flown(scenario(start=Start(battery=2_000, wind_mm_s=3 * M)))
     assert found.ending == "refused"
     assert found.samples[0].battery == 2_000
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_a_mission_that_ships_is_flown(flavour: str) -> None:
+def test_shipped_mission_is_flown(flavour: str) -> None:
     fault = faults.WindStep(0, 5 * M)
     found = once(f"short-{flavour}", lambda: flown(scenario(incident(12, fault)), flavour, bundle=shipped("short")))
     assert found.ending == "completed"
@@ -108,7 +108,7 @@ def test_a_mission_that_ships_is_flown(flavour: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_a_runtime_that_is_killed_goes_on_in_another_process(flavour: str) -> None:
+def test_killed_runtime_continues_in_another_process(flavour: str) -> None:
     """PX4 streams from the start: judged before anything of it had an age, it was once landed on the spot."""
     found = flown(scenario(incident(15, faults.RuntimeKilled(0, 3 * S))), flavour)
     killed, after = found.lives
@@ -125,7 +125,7 @@ def test_a_runtime_that_is_killed_goes_on_in_another_process(flavour: str) -> No
 @pytest.mark.parametrize(
     ("after_ms", "dead_ms", "flavour"), each_once((50, 150, 700, 1_500, 2_500), (500, 1_000, 2_000, 3_000), FLAVOURS)
 )
-def test_a_takeoff_that_was_sent_is_not_left_alone(after_ms: int, dead_ms: int, flavour: str) -> None:
+def test_runtime_killed_during_takeoff_brings_the_vehicle_down(after_ms: int, dead_ms: int, flavour: str) -> None:
     """Killed between the takeoff and the lift-off: the next process finds the vehicle on the ground, and armed."""
     killed = when(AfterStep(0, after_ms * 1_000, after_ms * 1_000), faults.RuntimeKilled(0, dead_ms * 1_000))
     found = flown(scenario(killed), flavour, seed=after_ms + dead_ms)
@@ -141,7 +141,7 @@ def test_a_takeoff_that_was_sent_is_not_left_alone(after_ms: int, dead_ms: int, 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_a_flight_whose_boundary_is_killed_comes_down_by_what_that_signed_ahead(flavour: str) -> None:
+def test_killed_boundary_flight_lands_by_frames_signed_ahead(flavour: str) -> None:
     found = flown(scenario(incident(15, faults.BoundaryKilled(0))), flavour)
     assert found.ending == "aborted"
     after = events(found)[events(found).index("boundary-lost") :]
@@ -153,7 +153,7 @@ def test_a_flight_whose_boundary_is_killed_comes_down_by_what_that_signed_ahead(
 
 
 @pytest.mark.slow
-def test_the_process_after_that_has_a_boundary_of_its_own() -> None:
+def test_next_process_has_its_own_boundary() -> None:
     found = flown(scenario(incident(15, faults.BoundaryKilled(0)), incident(16, faults.RuntimeKilled(0, 2 * S))))
     first, after = found.lives
     assert (first.ending, after.ending) == (None, "aborted")
@@ -162,7 +162,7 @@ def test_the_process_after_that_has_a_boundary_of_its_own() -> None:
     assert judge(found).failures == ()
 
 
-def test_some_killed_processes_leave_a_torn_line() -> None:
+def test_killed_process_may_leave_a_truncated_line() -> None:
     torn = set()
     for seed in range(1, 8):
         found = flown(scenario(incident(1, faults.RuntimeKilled(0, S))), seed=seed)  # on the ground: soon over
@@ -171,7 +171,7 @@ def test_some_killed_processes_leave_a_torn_line() -> None:
     assert torn == {True, False}
 
 
-def test_no_process_begins_where_the_vehicle_is_on_the_ground() -> None:
+def test_no_process_starts_with_the_vehicle_on_the_ground() -> None:
     found = flown(scenario(incident(0.2, faults.RuntimeKilled(0, S))))
     assert len(found.lives) == 1
     assert found.left == "replayed"
@@ -180,7 +180,7 @@ def test_no_process_begins_where_the_vehicle_is_on_the_ground() -> None:
 
 
 @pytest.mark.slow
-def test_a_process_begins_when_the_disk_takes_records_again() -> None:
+def test_process_starts_when_the_disk_accepts_records_again() -> None:
     found = flown(
         scenario(incident(14, faults.DiskFull(0, 6 * S)), incident(15, faults.RuntimeKilled(0, S))), "ardupilot"
     )
@@ -204,20 +204,20 @@ def bothered() -> ScenarioFlown:
 
 
 @pytest.mark.slow
-def test_a_host_that_stalls_reads_later_what_was_said(bothered: ScenarioFlown) -> None:
+def test_stalled_host_reads_frames_later(bothered: ScenarioFlown) -> None:
     assert [frame for frame in bothered.frames if 14 * S < frame.sent_us < 15 * S]
     assert not [frame for frame in bothered.frames if 15_050_000 < frame.sent_us < 17 * S]
     assert [frame for frame in bothered.frames if 17 * S <= frame.sent_us < 18 * S]
 
 
-def test_what_bothers_a_flight_ends_it_no_earlier(bothered: ScenarioFlown) -> None:
+def test_harmless_faults_do_not_end_the_flight(bothered: ScenarioFlown) -> None:
     assert [each.number for each in bothered.happened] == [0, 1, 2, 3, 4]
     assert bothered.ending == "completed"
     nothing_wrong(bothered)
 
 
 @pytest.mark.slow
-def test_a_full_disk() -> None:
+def test_full_disk_ends_the_flight() -> None:
     for_good = flown(scenario(incident(15, faults.DiskFull(0))))
     assert for_good.ending == "evidence-lost"
     judgement = judge(for_good)
@@ -229,7 +229,7 @@ def test_a_full_disk() -> None:
 
 
 @pytest.mark.slow
-def test_a_step_waits_for_a_disk_that_takes_its_time() -> None:
+def test_step_waits_for_a_slow_disk() -> None:
     slow = flown(scenario(incident(17, faults.DiskStall(0, 2 * S))))
     (life,) = slow.lives
     assert slow.ending == "completed"
@@ -241,7 +241,7 @@ def test_a_step_waits_for_a_disk_that_takes_its_time() -> None:
     nothing_wrong(slow)
 
 
-def test_a_clock_that_is_set_moves_nothing_and_is_told(bothered: ScenarioFlown) -> None:
+def test_clock_step_is_recorded(bothered: ScenarioFlown) -> None:
     assert "clock-stepped" in events(bothered)
 
 
@@ -260,7 +260,7 @@ def low(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @pytest.mark.slow
-def test_an_approval_is_given(low: bytes) -> None:
+def test_approval_is_given(low: bytes) -> None:
     awaited = when(AfterStep(1, 2 * S, 2 * S), faults.Approval(0, "supervisor", 2))
     found = flown(scenario(awaited), bundle=low)
     assert "approval" in events(found)
@@ -269,21 +269,21 @@ def test_an_approval_is_given(low: bytes) -> None:
 
 
 @pytest.mark.slow
-def test_an_approval_is_refused(low: bytes) -> None:
+def test_approval_is_refused(low: bytes) -> None:
     found = flown(scenario(when(AfterStep(1, S, S), faults.Disapproval(0, "supervisor"))), "ardupilot", bundle=low)
     assert "inspect_area" not in dispatched(found)
     assert found.ending == "aborted"
     nothing_wrong(found)
 
 
-def test_nobody_answers_what_is_not_asked(bothered: ScenarioFlown) -> None:
+def test_approval_that_no_step_requires_is_noted(bothered: ScenarioFlown) -> None:
     notes = [each.note for each in bothered.happened]
     assert notes[1] == "no step of the mission requires it"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_a_recall_that_comes_twice(flavour: str) -> None:
+def test_repeated_recall_ends_the_flight_once(flavour: str) -> None:
     found = flown(scenario(incident(15, faults.Recall(0, 2))), flavour)
     assert found.ending == "recalled"
     assert events(found).count("recall") == 1
@@ -291,7 +291,7 @@ def test_a_recall_that_comes_twice(flavour: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_replacement_that_comes_twice() -> None:
+def test_repeated_replacement_is_accepted_once() -> None:
     found = flown(scenario(incident(12, faults.Replacement(0, 2))))
     assert events(found).count("replacement") == 1
     assert "document-refused" in events(found)
@@ -299,7 +299,7 @@ def test_a_replacement_that_comes_twice() -> None:
     nothing_wrong(found)
 
 
-def test_babble_is_refused_and_changes_nothing(bothered: ScenarioFlown) -> None:
+def test_babble_is_refused_without_effect(bothered: ScenarioFlown) -> None:
     refused = [r["detail"] for r in records(bothered) if r.get("event") == "document-refused"]
     assert refused
 
@@ -314,7 +314,7 @@ def test_documents_for_a_dead_process_are_lost() -> None:
 # ---------------------------------------------------------------- found by flights with random faults, and shrunken
 
 
-def test_a_go_to_in_a_takeoff_of_arducopter_is_seen() -> None:
+def test_go_to_in_a_copter_takeoff_is_detected() -> None:
     """It has no target in a takeoff, so nothing was compared: it followed the pilot, and then flew home."""
     pilot = incident(7.7, faults.PilotGoto(0, -20_000, 0, 10_000))
     found = flown(scenario(pilot), "ardupilot", bundle=shipped("short"), seed=0)
@@ -323,7 +323,7 @@ def test_a_go_to_in_a_takeoff_of_arducopter_is_seen() -> None:
 
 
 @pytest.mark.parametrize(("at_s", "seed"), [(8.8, 6), (9.2, 3)])
-def test_a_pause_in_the_last_metres_of_a_climb_of_px4_is_seen(at_s: float, seed: int) -> None:
+def test_pause_near_the_end_of_a_px4_climb_is_detected(at_s: float, seed: int) -> None:
     """It stops where it is, 1.4 and 1 m below the end of the climb, which was taken for that end."""
     found = flown(scenario(incident(at_s, faults.PilotPause(0))), seed=seed)
     assert found.ending == "stood-down"
@@ -331,7 +331,7 @@ def test_a_pause_in_the_last_metres_of_a_climb_of_px4_is_seen(at_s: float, seed:
 
 
 @pytest.mark.slow
-def test_a_pause_that_our_next_step_undoes_before_it_shows() -> None:
+def test_pause_undone_by_the_next_step_is_excused() -> None:
     """Both reach PX4 in the same moment, as the climb ends."""
     found = flown(scenario(incident(10.34, faults.PilotPause(0))), seed=1)
     judgement = judge(found)
@@ -365,7 +365,7 @@ def test_a_pause_that_our_next_step_undoes_before_it_shows() -> None:
         (EndsInside(flat.BRIDGE), False),
     ],
 )
-def test_expectations(expected: Expected, met: bool) -> None:
+def test_expectations_are_checked(expected: Expected, met: bool) -> None:
     found = once("recalled", lambda: flown(scenario(incident(15, faults.Recall(0)))))
     (answer,) = expectations(*_with(found, expected))
     assert answer.met is met, answer
@@ -384,7 +384,7 @@ def test_expectations(expected: Expected, met: bool) -> None:
         (Decides("fallback", "hover", "state/violated", "wind.speed"), False),
     ],
 )
-def test_what_broke_a_running_step_off_can_be_expected(expected: Decides, met: bool) -> None:
+def test_reason_of_an_aborted_step_can_be_expected(expected: Decides, met: bool) -> None:
     gale = when(AfterStep(1, S, S), faults.WindStep(0, 14_000))
     found = once("broken off by a gale", lambda: flown(scenario(gale)))
     (answer,) = expectations(*_with(found, expected))
@@ -398,7 +398,7 @@ def _with(found: ScenarioFlown, expected: Expected) -> tuple[ScenarioFlown, Any]
 
 
 @pytest.mark.soak
-def test_a_vehicle_that_flies_long_is_waited_for_as_long() -> None:
+def test_silent_vehicle_is_awaited_for_its_endurance() -> None:
     """A link that is lost for good is waited out for as long as the vehicle can fly: an hour, and no fault."""
     from msgspec.structs import replace
 
@@ -423,20 +423,20 @@ SECOND_LONG: dict[type[Fault], Fault] = {
 }  # fmt: skip
 
 
-def test_each_kind_of_host_and_agent_is_tried() -> None:
+def test_every_host_and_agent_fault_is_tried() -> None:
     assert set(SECOND_LONG) == {kind for kind in faults.KINDS.values() if issubclass(kind, HostFault | AgentFault)}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "at_s", "flavour"), each_once(SECOND_LONG, (1, 7, 14, 25, 33), FLAVOURS))
-def test_nothing_goes_wrong_whenever_it_happens(kind: type[Fault], at_s: int, flavour: str) -> None:
+def test_host_and_agent_faults_cause_no_failure_at_any_time(kind: type[Fault], at_s: int, flavour: str) -> None:
     found = flown(scenario(incident(at_s, SECOND_LONG[kind])), flavour)
     assert judge(found).failures == ()
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("flavour", "at_s"), [("ardupilot", 25.3), ("px4", 21.75), ("px4", 20.15)])
-def test_motors_that_stop_on_the_way_down_are_no_landing(flavour: str, at_s: float) -> None:
+def test_motor_stop_during_descent_is_no_landing(flavour: str, at_s: float) -> None:
     """Disarmed in the air a vehicle says at once that it is on the ground, also while it lands."""
     found = flown(scenario(incident(at_s, faults.Kill(0))), flavour, bundle=shipped("short"))
     before = next(each for each in found.samples if each.at_us >= round(at_s * S) - 50_000)
@@ -446,7 +446,7 @@ def test_motors_that_stop_on_the_way_down_are_no_landing(flavour: str, at_s: flo
     assert judge(found).failures == ()
 
 
-def test_a_run_that_dies_in_its_first_record_has_no_log_to_be_judged() -> None:
+def test_run_killed_in_its_first_record_has_no_log() -> None:
     killed = scenario(incident(0, faults.RuntimeKilled(0, 3 * S)))
     lives = [flown(killed, seed=seed, attested=False) for seed in range(1, 7)]  # else a statement is the last line
     torn = [of for of in lives if not of.lives[0].lines[-1].endswith(b"\n")]

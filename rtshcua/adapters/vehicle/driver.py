@@ -83,20 +83,49 @@ class GroundQuestions(Protocol):
 
 
 class Driver:
-    """One vehicle, chosen by the first heartbeat of one whose autopilot we know; frames of other systems do not count.
-    From then on a heartbeat under its ids that names another kind of vehicle or autopilot says nothing of it.
+    """One vehicle: the sender of the first heartbeat of a known autopilot. Frames of other systems are ignored, and so
+    are heartbeats under its ids that name another type of vehicle or another autopilot.
 
-    `slack` stretches every wait for an answer or an effect. It is 1, but for a simulated vehicle that lives so much
-    faster than life that the machine's own hold-ups would count as silence. `fence` False: the vehicle's own fence is
-    left as it is. Whatever is sent goes out through `frames`; with a `verifier` only what it accepts comes in.
-    `manoeuvres` are ways to fly by flavour (`px4`) and by flavour and skill (`px4.spray_area`): see `adapters.packs`.
-    With a `system` only the autopilot of this MAVLink system id is chosen; without, it is not ready beside another one.
-    `steps` are the mission's: how soon each has to be decided says how often reports are needed. `meant` are parameters
-    that a flight would set: the vehicle is judged as if they were, though nothing is.
+    All frames are sent through `frames`; with a `verifier` only frames that it accepts are received. With `system`,
+    only the autopilot of this MAVLink system id is chosen; without, the vehicle is not ready while another one sends.
+    `slack` multiplies each timeout. It is 1, except for a simulated vehicle that runs faster than real time, where
+    delays of this machine would otherwise count as silence. `fence` False leaves the vehicle's own fence unchanged.
+    `manoeuvres` holds the stages of packs, by flavour (`px4`) or by flavour and skill (`px4.spray_area`): see
+    `adapters.packs`. `steps` are the steps of the mission; their deadlines determine the telemetry rates. `meant` holds
+    parameters that a flight would set: the vehicle is judged with these values, but nothing is set.
     """
 
-    #: what a flight would be kept from is told, though nothing is set: for an examination
+    #: report what would prevent a flight although nothing is set: for an examination
     judges = False
+    #: the parameters of a preparation are being set (`adapters.preparation`): not ready, and no fence is uploaded
+    prepares = False
+    #: request the vehicle's time of day until it is known
+    asks_utc = False
+    #: how long to wait for it before anything begins, once nothing else is missing
+    utc_patience_us = 0
+    #: before this time the mission might have been issued in the future, so nothing begins
+    issued_from_us = 0
+    #: further questions to a vehicle on the ground; it gets each of the vehicle's messages
+    asks: GroundQuestions | None = None
+    #: the same in the air too, to identify a vehicle that an earlier run left flying
+    asks_first: GroundQuestions | None = None
+    #: an earlier run broke off: an armed vehicle may have been commanded to take off, so it counts as flying
+    resumes = False
+    #: what that run may have left the vehicle doing; None: unknown
+    left: Left | None = None
+    #: ask any autopilot for its identity at once, without waiting up to a second for its next heartbeat
+    hurries = False
+    #: the autopilot's flavour; None before its first heartbeat, which also sets the next six
+    flavour: AutopilotFlavour | None = None
+    stream_requests: StreamRequests  # the requested streams and their measured rates
+    preflight: Preflight  # compares the vehicle with the policy
+    settings: VehicleParameters  # reads and sets the parameters of a preparation
+    _aids: Aids
+    _heeded: set[str]  # messages that are used for more than readings
+    _kind = (0, 0)  # MAV_TYPE and MAV_AUTOPILOT of the vehicle
+    system = 0
+    #: that it is not a multirotor, in words
+    other_kind: str | None = None
 
     def __init__(
         self, policy: Policy, frames: Gate, slack: int = 1, *, fence: bool = True,
@@ -108,7 +137,7 @@ class Driver:
         self._mute = "the vehicle answers no request"
         self._capacity: int | None = None
         self._steps = steps
-        #: what parameters are judged to be, though they are not set
+        #: values that the vehicle is judged with, by parameter, although they are not set
         self.meant = {name: value_of(bits) for name, bits in (meant or {}).items()}
         self._fence = fence
         self._manoeuvres = manoeuvres or {}
@@ -118,59 +147,31 @@ class Driver:
         self.link = VehicleLink(frames, verifier, system)
         self._gate_may_be_lost = frames.may_be_lost
         self.source = SourceTime()
-        #: what it was last seen to do
+        #: the last observed state of the vehicle
         self.seen = ObservedVehicle()
-        #: which autopilot it is; None before its first heartbeat, at which the next five are set
-        self.flavour: AutopilotFlavour | None = None
-        self._aids: Aids
-        self.stream_requests: StreamRequests  # what is asked for, and what comes of it
-        self.preflight: Preflight  # what is compared with the policy
-        self.settings: VehicleParameters  # what is read and set for a preparation (`adapters.preparation`),
-        self.prepares = False  # which is under way: nothing is ready, nor is a fence handed over
-        self._heeded: set[str]  # what more is made of than readings
-        self.system = 0
-        self._kind = (0, 0)  # its MAV_TYPE and MAV_AUTOPILOT,
-        self._strangers: set[str] = set()  # and what was said of who speaks under its ids and is of another
-        #: that it is no multirotor, in words
-        self.other_kind: str | None = None
-        #: the vehicle's own time of day is wanted: it is asked for until it is told,
-        self.asks_utc = False
-        #: and so long it is waited for before anything begins, once nothing else is missing
-        self.utc_patience_us = 0
-        #: before then it is not certain that the mission was issued already: until then nothing begins
-        self.issued_from_us = 0
-        #: and the number that a boundary wants it to send back before, 0 for none
+        self._strangers: set[str] = set()  # notes about other senders under the vehicle's ids
+        #: the number that a boundary wants to get back with the vehicle's time of day, 0 for none
         self.asks_back: Callable[[], int] = int
-        #: what else it is asked on the ground, and told of each of its messages
-        self.asks: GroundQuestions | None = None
-        #: and in the air too, where an earlier run left it: what it is, before anything else is made of it
-        self.asks_first: GroundQuestions | None = None
         self._asked_utc_us = 0
-        self._lacks_utc_us: int | None = None  # since when nothing else is missing
-        #: an earlier run broke off: a vehicle that is armed may have been told to take off, so it counts as flying
-        self.resumes = False
-        #: and what that run may have left it doing; None: nobody knows
-        self.left: Left | None = None
-        #: it may have, so who it is is asked of whatever autopilot speaks: its next heartbeat may be a second away
-        self.hurries = False
+        self._lacks_utc_us: int | None = None  # since when only the time of day is missing
         self._who_us: int | None = None
         self._commander = Commander(slack)
         self._manoeuvre: Manoeuvre | None = None
-        self._left_mode: int | None = None  # one report says that it left this mode, by nobody of ours
+        self._left_mode: int | None = None  # one report shows a mode change away from this mode that is not ours
         self._others: str | None = None  # how a takeover showed; nothing of ours begins after it
-        self._unsent: int | None = None  # the token of a command of which no frame left yet
-        self._steered_us: int | None = None  # when a frame that moves the vehicle last left, and nothing was said of it
-        self._moving = False  # a frame that moves the vehicle is among those to be packed
+        self._unsent: int | None = None  # the token of a command of which no frame has left yet
+        self._steered_us: int | None = None  # when a moving frame last left, until a crossing is reported
+        self._moving = False  # a frame that moves the vehicle is among the frames to pack
         self._watch = LinkWatch(slack)
         self._was_mute = False
-        self._answers_us: int | None = None  # it was found to answer in the air, before it was ready
-        self._timed = False  # and the times of what it says are known, or not waited for any more,
-        self._aimless = False  # and it was asked for its target, and has none
+        self._answers_us: int | None = None  # when it was found to answer in the air, before it was ready
+        self._timed = False  # the ages of its reports are known, or no longer waited for
+        self._aimless = False  # it was asked for its target and has none
         self._crash = CrashWatch()
-        self._spoken: set[str] = set()
+        self._spoken: set[str] = set()  # messages that the autopilot itself has sent
         self._beats_us = 0  # when our next heartbeat is due
         self._was_ready = False
-        self._unfit_us: int | None = 0  # since when nothing is known that no waiting changes; None: it was told
+        self._unfit_us: int | None = 0  # when it was last fit; None once its unfitness was reported
         self._released = False
         self._was_air: tuple[bool, bool] | None = None
 
@@ -209,7 +210,7 @@ class Driver:
 
     @property
     def unready(self) -> str | None:
-        """What `Ready` waits for, in words; None once it was given, or when only streams are still to come."""
+        """What `Ready` waits for, in words; None once it was reported, or when only streams are outstanding."""
         if self._was_ready:
             return None
         if self.flavour is None:
@@ -220,17 +221,22 @@ class Driver:
             return self.link.crowd or mute or self.seen.unready
         if self.prepares:
             return self.other_kind or self.link.crowd or "its parameters are being set"
-        keyless = mute if self._mute == KEYLESS else None  # why its clock is not known either
-        waits = (
+        return self._unready_on_ground(mute)
+
+    def _unready_on_ground(self, mute: str | None) -> str | None:
+        return (
             self.other_kind
             or self.link.crowd
             or self._contradicted
-            or keyless
+            or (mute if self.keyless else None)  # also why the clock is not known
             or self.source.unready
             or mute
             or self.preflight.astray
+            or self.seen.unready
+            or self.preflight.unready
+            or self._uncounted
+            or self._undated
         )
-        return waits or self.seen.unready or self.preflight.unready or self._uncounted or self._undated
 
     @property
     def _uncounted(self) -> str | None:
@@ -260,7 +266,7 @@ class Driver:
 
     @property
     def keyless(self) -> bool:
-        """It signs what it sends, we cannot, and it answered nothing yet: what we send, it does not obey."""
+        """Whether it signs its frames, we cannot, and it has answered nothing yet: it obeys nothing that we send."""
         return self._mute == KEYLESS and not self._watch.answers
 
     def overhear(self, datagram: bytes, now_us: int) -> None:
@@ -268,31 +274,33 @@ class Driver:
         self.link.overhear(datagram, now_us)
 
     def receive(self, datagram: bytes, now_us: int) -> DatagramContents:
-        """Take in a datagram; whatever its bytes, never raises."""
+        """Take in a datagram. Never raises, whatever its bytes."""
         events: list[Event] = []
         send: list[Message] = []
-        received, watch = self.link.parse(datagram, now_us), self._watch
+        received = self.link.parse(datagram, now_us)
         for frame in received:
             if self.flavour is None:
                 self._choose(frame)
-                if self.flavour is None:
-                    continue
-            _, name, system, component, _, _, _ = frame
-            if system == self.system or is_radio(frame):
-                if name == "HEARTBEAT" and component == AUTOPILOT and self._is_strange(frame, now_us, events):
-                    continue
-                if component == AUTOPILOT and (watch.heard_us != now_us or watch.down or self._was_mute):
-                    watch.heard_us = now_us  # one frame tells of a moment what all of that moment do
-                    self._look(now_us, events)
-                told, manoeuvre = self._take(frame, now_us, events, send), self._manoeuvre
-                if told or (manoeuvre is not None and now_us >= manoeuvre.due_us):
-                    self._advance(now_us, send, events)
+            if self.flavour is not None and (frame.system == self.system or is_radio(frame)):
+                self._receive_frame(frame, now_us, events, send)
         if self.flavour is None:
             return DatagramContents(events, self._ask_who(received, now_us) if self.hurries else [], received)
         return DatagramContents(events, self._pack(send, now_us, events) if send else [], received)
 
+    def _receive_frame(self, frame: ReceivedFrame, now_us: int, events: list[Event], send: list[Message]) -> None:
+        watch = self._watch
+        if frame.component == AUTOPILOT:
+            if frame.name == "HEARTBEAT" and self._is_strange(frame, now_us, events):
+                return
+            if watch.heard_us != now_us or watch.down or self._was_mute:  # once for all frames of one moment
+                watch.heard_us = now_us
+                self._look(now_us, events)
+        new, manoeuvre = self._take(frame, now_us, events, send), self._manoeuvre
+        if new or (manoeuvre is not None and now_us >= manoeuvre.due_us):
+            self._advance(now_us, send, events)
+
     def tick(self, now_us: int) -> tuple[list[Event], list[bytes]]:
-        """What is due at a time: heartbeat, requests for streams, retries, a link that went down."""
+        """Do what is due at a time: heartbeat, stream requests, retries, link loss."""
         if self.flavour is None:
             return [], []
         events: list[Event] = []
@@ -308,13 +316,9 @@ class Driver:
             self._advance(now_us, send, events)
         if now_us >= self._aids.query.due_us:
             send += self._ask(now_us)
-        if not self._was_ready and self._is_ready(now_us):
-            self._was_ready = True
-            events.append(ports.Ready(now_us, self._flown_by_others()))
-        if not self._was_ready and self._unfit_us is not None:
-            self._judge_fitness(now_us, events)
-        if seen.notes or self.stream_requests.notes or self.preflight.notes or self._telemetry.notes:
-            self._tell_notes(now_us, events)
+        if not self._was_ready:
+            self._judge_readiness(now_us, events)
+        self._tell_notes(now_us, events)
         if self._announcer.waiting:
             send += self._announcer.due(now_us, busy=bool(send) or self._commander.waits)
         frames = self._pack(send, now_us, events) if send else []
@@ -322,9 +326,14 @@ class Driver:
             if self._flies_without_frame:
                 self._renew_ahead(now_us, events, begins=True)
             self._renew_ahead(now_us, events, begins=False)
-        if self.settings.outstanding:
-            frames += self._set_parameters(now_us)
-        return events, frames
+        return events, frames + self._set_parameters(now_us) if self.settings.outstanding else frames
+
+    def _judge_readiness(self, now_us: int, events: list[Event]) -> None:
+        if self._is_ready(now_us):
+            self._was_ready = True
+            events.append(ports.Ready(now_us, self._flown_by_others()))
+        elif self._unfit_us is not None:
+            self._judge_fitness(now_us, events)
 
     def _judge_fitness(self, now_us: int, events: list[Event]) -> None:
         """Tell what keeps it from being ready that no waiting changes, once that stood for a while."""
@@ -470,15 +479,9 @@ class Driver:
             )
             self.settings = VehicleParameters(bytewise=flavour.bytewise, slack=slack)
             self.preflight = Preflight(
-                self._policy,
-                flavour,
-                self.seen,
-                self._steps,
-                fence=self._fence,
-                slack=slack,
-                judges=self.judges,
-                meant=self.meant,
-            )
+                self._policy, flavour, self.seen, self._steps,
+                fence=self._fence, slack=slack, judges=self.judges, meant=self.meant,
+            )  # fmt: skip
             self._heeded = {*observed.HEEDED, flavour.estimator, *preflight.HEEDED, "STATUSTEXT"}
             for kind in (MotionKind.HOME, MotionKind.LAND):  # made ahead: when a fallback must fly there is no time
                 flavour.stages(Command(-1, "", kind, (), (), 0, 0), self.seen, frame.system)
@@ -517,7 +520,7 @@ class Driver:
             self.asks.take(name, message)
 
     def _take(self, frame: ReceivedFrame, now_us: int, events: list[Event], send: list[Message]) -> bool:
-        """Take in one frame; whether a manoeuvre may see something new in it."""
+        """Take in one frame; return whether it may be new to a manoeuvre."""
         message, name, _, component, _, _, octets = frame
         source, seen = self.source, self.seen
         at_us = source.of(frame, now_us)
@@ -528,7 +531,7 @@ class Driver:
             seen.count(source.place)
             self._spoken.add(name)
         elif name in self._spoken:
-            return False  # what the autopilot itself tells is not taken from anybody else
+            return False  # what the autopilot itself reports is not taken from another component
         if name == "COMMAND_ACK":
             return self._acknowledge(frame, now_us, events) or self._asks
         self.stream_requests.heard(name, now_us, len(octets))
@@ -538,12 +541,17 @@ class Driver:
             )
             if values and at_us is not None:
                 events.append(ports.Readings(at_us, values))
-        if component == AUTOPILOT:
-            self._tell(name, message)
-        if component != AUTOPILOT or name not in self._heeded:
+        if component != AUTOPILOT:
             return False
-        before = seen.mode
-        new = seen.take(name, message, now_us, at_us, source.place)
+        self._tell(name, message)
+        return name in self._heeded and self._update(name, message, at_us, now_us, events, send)
+
+    def _update(
+        self, name: str, message: Message, at_us: int | None, now_us: int, events: list[Event], send: list[Message]
+    ) -> bool:
+        """Update the observed state with a message of the autopilot; return whether it may be new to a manoeuvre."""
+        seen, before = self.seen, self.seen.mode
+        new = seen.take(name, message, now_us, at_us, self.source.place)
         crashed = self._crash.look(seen, name, now_us)
         if crashed is not None:
             events.append(ports.Crashed(now_us, crashed))
@@ -708,8 +716,9 @@ class Driver:
 
     def _tell_notes(self, now_us: int, events: list[Event]) -> None:
         for notes in (self.seen.notes, self.stream_requests.notes, self.preflight.notes, self._telemetry.notes):
-            events += [ports.Noted(now_us, text) for text in notes]
-            notes.clear()
+            if notes:
+                events += [ports.Noted(now_us, text) for text in notes]
+                notes.clear()
 
     def _ask_time(self, now_us: int) -> list[Message]:
         """Ask for the vehicle's clock, if it is time to."""

@@ -364,34 +364,40 @@ class SourceTime:
         if self._goes_on(number):
             self.place = self._count = self._count + 1
             return self._sent_us
-        sent_us, newest, order = self._sent_us, self._newest, self._order
-        fresh = at_us is not None and (sent_us is None or at_us > sent_us)
-        ahead = (number - newest) % _NUMBERS
-        # what waited while nobody read comes just before what follows a gap: then only its stamp tells the gap
-        resumed = fresh and sent_us is not None and at_us is not None and at_us - sent_us > GAP_US
+        sent_us, ahead = self._sent_us, (number - self._newest) % _NUMBERS
+        later_us = at_us if at_us is not None and (sent_us is None or at_us > sent_us) else None
+        # frames that waited while nobody read them come just before the first one after a gap: only its stamp shows it
+        resumed = later_us is not None and sent_us is not None and later_us - sent_us > GAP_US
         if 0 < ahead < _AHEAD or resumed or now_us - self._came_us > GAP_US:
-            if ahead > 1:
-                self._aside = (newest + 1) % _NUMBERS, 0
-                for skipped in range(newest + 1, newest + ahead):
-                    order[skipped % _NUMBERS] = sent_us
-            if fresh:
-                self._sent_us = sent_us = at_us
-            order[number] = sent_us
-            self._newest = number
-            self._count += ahead or _NUMBERS
-            self.place = self._count
-        else:  # overtaken: sent after what was numbered before it, and before what was numbered after it
-            if fresh:
-                self._sent_us = at_us
-            self.place = self._count - (newest - number) % _NUMBERS
-            sent_us = order[number]
-            if at_us is not None and (sent_us is None or at_us > sent_us):
-                sent_us = at_us
-                for later in range(number, number + 1 + (newest - number) % _NUMBERS):
-                    order[later % _NUMBERS] = max(order[later % _NUMBERS] or at_us, at_us)
-            if sent_us is not None and now_us - sent_us > self._held_us:
-                self._held_us = now_us - sent_us
+            sent_us = self._jump(number, ahead, later_us)
+        else:
+            sent_us = self._overtaken(number, at_us, later_us, now_us)
         self._came_us = now_us
+        return sent_us
+
+    def _jump(self, number: int, ahead: int, later_us: int | None) -> int | None:
+        """Take in a frame that was sent after all before; `later_us` is its stamp if no frame had a later one."""
+        newest, sent_us = self._newest, self._sent_us
+        if ahead > 1:
+            self._aside = (newest + 1) % _NUMBERS, 0
+            for skipped in range(newest + 1, newest + ahead):
+                self._order[skipped % _NUMBERS] = sent_us
+        self._sent_us = self._order[number] = sent_us if later_us is None else later_us
+        self._newest = number
+        self.place = self._count = self._count + (ahead or _NUMBERS)
+        return self._sent_us
+
+    def _overtaken(self, number: int, at_us: int | None, later_us: int | None, now_us: int) -> int | None:
+        """Take in a frame that others overtook: sent after the frame before its number and before the one after."""
+        order, behind = self._order, (self._newest - number) % _NUMBERS
+        self._sent_us = self._sent_us if later_us is None else later_us
+        self.place, sent_us = self._count - behind, order[number]
+        if at_us is not None and (sent_us is None or at_us > sent_us):
+            sent_us = at_us
+            for later in range(number, number + 1 + behind):
+                order[later % _NUMBERS] = max(order[later % _NUMBERS] or at_us, at_us)
+        if sent_us is not None:
+            self._held_us = max(self._held_us, now_us - sent_us)
         return sent_us
 
     def _find(self, name: str) -> _Stamp | None:

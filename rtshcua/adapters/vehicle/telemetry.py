@@ -69,8 +69,10 @@ class Telemetry:
         for signal in policy.signals:
             for source in signal.sources:
                 _check(signal, source)
-                name = source.message
-                self._by_message.setdefault(name, []).append(_carried(signal, source, policy.projection))
+                carried = _carried(signal, source, policy.projection)
+                self._by_message.setdefault(source.message, []).append(carried)
+        self._uniform = {name for name, each in self._by_message.items() if not any(one.where for one in each)}
+        self._uniform -= {"WIND", BATTERY}
         #: the messages that carry some signal, and how often each is needed; by the contracts of a mission's steps too
         self.rates: Mapping[str, Rate] = rates(policy, contracts)
         #: for each signal, the messages that may carry it
@@ -109,39 +111,44 @@ class Telemetry:
         if carried is None:
             return ()
         if component != AUTOPILOT:
-            doubtful = _NONE
-        elif not doubtful and name in self._whole and _instance(message) == self._whole[name]:
+            values, _ = self._select(name, message, component, carried, _NONE)
+            return tuple((slot, value) for slot, value in values if slot not in self._own)
+        if not doubtful and name in self._whole and _instance(message) == self._whole[name]:
             return tuple([value for each in carried for value in each.read(message)])
-        empty = name == "WIND" and _says_nothing(message)
+        values, found = self._select(name, message, component, carried, doubtful)
+        if name == BATTERY:
+            charges = [reading for each in carried if each.is_charge for reading in each.read(message)]
+            values += self.batteries.take(message, charges, now_us) if charges else ()
+        self._learn(name, message, values, found)
+        return tuple(values)
+
+    def _learn(
+        self, name: str, message: Any, values: list[tuple[int, int | None]], found: list[tuple[str, Where]]
+    ) -> None:
+        """Note the slots that the autopilot reports itself, and the messages that may be read without a selection."""
+        if not self._told.issuperset(found):
+            self._told.update(found)
+            self._own.update(slot for slot, _ in values)
+        if found and name in self._uniform:
+            self._whole[name] = _instance(message)
+
+    def _select(
+        self, name: str, message: Any, component: int, carried: "Sequence[_Carried]", doubtful: frozenset[str]
+    ) -> tuple[list[tuple[int, int | None]], list[tuple[str, Where]]]:
+        """The values of the first instance of each selected sensor, charges excepted, and the sensors found."""
         values: list[tuple[int, int | None]] = []
-        instance = _instance(message)
-        told: list[tuple[str, Where]] = []
-        charges: list[tuple[int, int | None]] = []
-        for fields, slots, read, selected in carried:
-            if selected and not _is_selected(selected, message):
+        found: list[tuple[str, Where]] = []
+        instance, empty = _instance(message), name == "WIND" and _says_nothing(message)
+        for each in carried:
+            if each.where and not _is_selected(each.where, message):
                 continue
-            if name == BATTERY and _is_charge(fields, selected):
-                if component == AUTOPILOT:
-                    told.append((name, selected))
-                    charges += read(message)
+            if not (each.is_charge or instance is None or self._is_first(name, instance, component, each.where)):
                 continue
-            if instance is not None and not self._is_first(name, instance, component, selected):
-                continue
-            told.append((name, selected))
-            if empty or (doubtful and not doubtful.isdisjoint(fields)):
-                values += [(slot, None) for slot in slots]
-            else:
-                values += read(message)
-        if charges:
-            values += self.batteries.take(message, charges, now_us)
-        if component == AUTOPILOT:
-            if not self._told.issuperset(told):
-                self._told.update(told)
-                self._own.update(slot for slot, _ in values)
-            if name not in ("WIND", BATTERY) and told and not any(each.where for each in carried):
-                self._whole[name] = instance
-            return tuple(values)
-        return tuple((slot, value) for slot, value in values if slot not in self._own)
+            found.append((name, each.where))
+            if not each.is_charge:
+                unknown = empty or (doubtful and not doubtful.isdisjoint(each.fields))
+                values += [(slot, None) for slot in each.slots] if unknown else each.read(message)
+        return values, found
 
     def _is_first(self, name: str, instance: int, component: int, where: Where) -> bool:
         """Whether this is the lowest instance that the component was heard to have of a selected sensor."""
@@ -236,12 +243,12 @@ class Batteries:
             each.since += other != (number, flies)
         if not self._are_known(now_us):
             return [(slot, None) for slot, _ in readings] if self._known else ()
-        if not counts:
-            return ()
-        counted = [each for (_, flying), each in charges.items() if flying and each.counts]
-        if any(self._is_silent(each, now_us) for each in counted):
-            return [(slot, None) for slot, _ in readings]
-        return [(slot, _least([each.values[slot] for each in counted])) for slot, _ in readings]
+        return self._worst(readings, now_us) if counts else ()
+
+    def _worst(self, readings: Sequence[tuple[int, int | None]], now_us: int) -> Sequence[tuple[int, int | None]]:
+        counted = [each for (_, flying), each in self._charges.items() if flying and each.counts]
+        silent = any(self._is_silent(each, now_us) for each in counted)
+        return [(slot, None if silent else _least(counted, slot)) for slot, _ in readings]
 
     def _after(self, before: _Charge | None, values: Mapping[int, int | None], now_us: int) -> _Charge:
         """One more report of a battery, which was like `before`."""
@@ -292,25 +299,25 @@ class Batteries:
         return ", ".join(words) + counts
 
 
-def _least(values: Sequence[int | None]) -> int | None:
+def _least(batteries: "Sequence[_Charge]", slot: int) -> int | None:
     """The least of several charges; None where one is not known."""
-    known = [value for value in values if value is not None]
-    return min(known) if len(known) == len(values) else None
+    known = [each.values[slot] for each in batteries]
+    return None if None in known else min(known)  # type: ignore[type-var]
 
 
 _FEEDS: Final = {MAV_BATTERY_FUNCTION_AVIONICS: "avionics", MAV_BATTERY_FUNCTION_PAYLOAD: "payload"}
 
 
-def _is_charge(fields: tuple[str, ...], where: Where) -> bool:
-    """Whether a signal is the charge of whatever battery, and not of one that it names."""
-    return fields == _CHARGE and not where
+def _is_charge(source: SignalSource) -> bool:
+    """Whether a signal is the charge of any battery, not of a selected one."""
+    return source.fields == _CHARGE and not source.where
 
 
 def _battery_stale_us(policy: Policy) -> int:
     """How old the charge may be; the shortest, where several signals read it."""
     every = [
         signal.stale_us for signal in policy.signals for source in signal.sources
-        if source.message == BATTERY and _is_charge(source.fields, source.where)
+        if source.message == BATTERY and _is_charge(source)
     ]  # fmt: skip
     return min(every, default=0)
 
@@ -344,15 +351,16 @@ class _Carried(NamedTuple):
     slots: tuple[int, ...]
     read: Callable[[Any], Sequence[tuple[int, int | None]]]
     where: Where
+    is_charge: bool
 
 
 def _carried(signal: Signal, source: SignalSource, projection: Projection) -> _Carried:
     """Prepared once, for it is read from each message of its name."""
     first, *more = [_field(source, field) for field in source.fields]
-    slot = signal.slot
+    slot, where, charge = signal.slot, source.where, source.message == BATTERY and _is_charge(source)
     if signal.kind == POSITION:
-        return _Carried(source.fields, (slot, slot + 1), _place(slot, first, more[0], projection), source.where)
-    return _Carried(source.fields, (slot,), _number(slot, first, *more), source.where)
+        return _Carried(source.fields, (slot, slot + 1), _place(slot, first, more[0], projection), where, charge)
+    return _Carried(source.fields, (slot,), _number(slot, first, *more), where, charge)
 
 
 def _number(slot: int, first: _Read, second: _Read | None = None) -> Callable[[Any], Sequence[tuple[int, int | None]]]:

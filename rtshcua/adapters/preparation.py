@@ -109,39 +109,45 @@ class Preparations:
                 self._driver.settings.drop(name)
 
     def _begin(self, turn: Callable[[], bool]) -> str | None:
-        # what broke off in the air is not waited for: nothing steers it until this is over
-        stands = self._stands(turn, 0 if self._driver.resumes else BEFORE_US)
-        if not stands:
-            record = self._tell if self._flies else self._record
-            if self.owed:
-                record(NOT_RESTORED, f"the vehicle is not known to be on the ground: {self._kept()}")
-            if self._settings:
-                record(NOT_PREPARED, "the vehicle is not known to be on the ground: nothing is set")
-            return "the vehicle is not known to be on the ground: nothing is set" if self._settings else None
+        # a run that broke off in the air is not waited for: nothing steers the vehicle until this is over
+        if not self._stands(turn, 0 if self._driver.resumes else BEFORE_US):
+            return self._leave()
         if self._trouble is not None:
             return self._refuse(self._trouble)
         self._restore(turn, BEFORE_US)
         if not self._settings:
-            return None  # what is not put back is recorded, and the mission judged by what is there
+            return None  # a value that is not restored is recorded, and the mission is judged by the present values
         values = self._read(self._settings, turn)
-        missing = [name for name in self._settings if name not in values]
-        if missing:
-            return self._refuse(f"the vehicle does not report `{'`, `'.join(missing)}`, which is to be set")
-        left = sorted(self._settings.keys() & self.owed)
-        if left:
-            return self._refuse(f"`{'`, `'.join(left)}` could not be put back first")
-        changes = {name: value for name, value in self._settings.items() if values[name] != value}
-        if not changes:
-            return None
-        unfit = [name for name, value in changes.items() if not self._driver.settings.fits(name, value_of(value))]
-        if unfit:
-            listed = ", ".join(f"{name} {shown(changes[name])}" for name in unfit)
-            return self._refuse(f"the vehicle's type for the parameter cannot hold {listed}")
+        changes = {name: value for name, value in self._settings.items() if values.get(name) != value}
+        why = self._why_not(changes, values)
+        if why or not changes:
+            return self._refuse(why) if why else None
         self.owed |= {name: Owed(values[name], value) for name, value in changes.items()}
         problem = self._write(changes, values, turn, restoring=False)
         if problem is not None:
             self._restore(turn, AFTER_US)
         return problem
+
+    def _leave(self) -> str | None:
+        """Record that nothing is set or restored, because the vehicle may not be on the ground."""
+        record, why = self._tell if self._flies else self._record, "the vehicle is not known to be on the ground"
+        if self.owed:
+            record(NOT_RESTORED, f"{why}: {self._kept()}")
+        if not self._settings:
+            return None
+        record(NOT_PREPARED, f"{why}: nothing is set")
+        return f"{why}: nothing is set"
+
+    def _why_not(self, changes: Values, values: Values) -> str | None:
+        missing = [name for name in self._settings if name not in values]
+        if missing:
+            return f"the vehicle does not report `{'`, `'.join(missing)}`, which is to be set"
+        left = sorted(self._settings.keys() & self.owed)
+        if left:
+            return f"`{'`, `'.join(left)}` could not be restored first"
+        fits = self._driver.settings.fits
+        unfit = [f"{name} {shown(value)}" for name, value in changes.items() if not fits(name, value_of(value))]
+        return f"the vehicle's type for the parameter cannot hold {', '.join(unfit)}" if unfit else None
 
     @property
     def _flies(self) -> bool:

@@ -449,6 +449,19 @@ def _signals(
         yield _signal(vehicle, policy, signal, slots, bad, signed=unheard.isdisjoint(slots))
 
 
+def _known_later(signal: Signal, policy: Policy) -> VehicleFinding | None:
+    """That a signal is known in the air only; None for another."""
+    slug = f"signal/{signal.name}"
+    if signal.name == DRAIN:
+        declared = f"{drained(policy.vehicle) / 100:.1f} % a minute"
+        found = f"`{signal.name}` is measured in the air only; until then the declared {declared} counts"
+        return VehicleFinding(slug, UNKNOWN, found, "", "no action needed")
+    if not IN_THE_AIR.issuperset(source.message for source in signal.sources):
+        return None
+    found = f"`{signal.name}` is known in the air only, so it is unknown now"
+    return VehicleFinding(slug, UNKNOWN, found, "no rule about a takeoff may depend on it")
+
+
 def _signal(
     vehicle: ExaminingDriver, policy: Policy, signal: Signal, slots: Sequence[int], bad: MissionVerdict, *, signed: bool
 ) -> VehicleFinding:
@@ -459,13 +472,9 @@ def _signal(
         return VehicleFinding(slug, bad, found, names, "`--unsigned-radio`, here and for `run`")
     heard = next((name for name in sources if name in vehicle.streams), None)
     unknown = any(vehicle.values.get(slot) is None for slot in slots)
-    if unknown and signal.name == DRAIN and not vehicle.seen.airborne:
-        declared = f"{drained(policy.vehicle) / 100:.1f} % a minute"
-        found = f"`{signal.name}` is measured in the air only; until then the declared {declared} counts"
-        return VehicleFinding(slug, UNKNOWN, found, "", "no action needed")
-    if unknown and IN_THE_AIR.issuperset(sources) and not vehicle.seen.airborne:
-        found = f"`{signal.name}` is known in the air only, so it is unknown now"
-        return VehicleFinding(slug, UNKNOWN, found, "no rule about a takeoff may depend on it")
+    later = _known_later(signal, policy) if unknown and not vehicle.seen.airborne else None
+    if later is not None:
+        return later
     if heard is None:
         return VehicleFinding(slug, bad, f"`{signal.name}` stays unknown: no {names} arrives", names, _ADVICE)
     if unknown:
@@ -580,18 +589,14 @@ def _words(setting: VehicleSetting, value: float) -> str:
 
 
 def _setting(
-    setting: VehicleSetting,
-    value: float,
-    need: Need | None,
-    meant: float | None,
-    otherwise: float | None,
-    *,
-    alone: bool = False,
-) -> VehicleFinding:
-    """What it is, what is needed, and how to change it. What a mission cannot fly with is said as `mission/unready`.
+    setting: VehicleSetting, value: float, need: Need | None, meant: float | None, otherwise: float | None,
+    *, alone: bool = False,
+) -> VehicleFinding:  # fmt: skip
+    """The value of a setting, the value that is needed, and how to change it. Settings with which a mission cannot fly
+    are reported as `mission/unready`.
 
-    `meant` is what a run with the same `--set` would set it to; then that is judged. `otherwise` counts if it is 0.
-    `alone`: nothing else sees that the battery fails, so what it warns of stops a mission.
+    With `meant`, the value of `--set`, that value is judged. `otherwise` is used in place of 0. `alone`: nothing else
+    notices a failing battery, so a warning about this setting stops a mission.
     """
     slug, name = f"settings/{setting.parameter.lower()}", setting.parameter
     found = f"{setting.label}: {_words(setting, value)} ({name} = {value:g})"
@@ -603,25 +608,34 @@ def _setting(
     if wrong is not None:
         proved = f"the proofs about the way home do not cover this setting; set `{name}` to {wrong.accepted}"
         return _graded(slug, found, wrong.accepted, proved, warns=True)
-    why = setting.warns.get(value, "")
-    if why:
-        better = setting.better
-        how = f"; set `{name}` to {better:g}" if better is not None else ""
-        needed = setting.words.get(better, "") if better is not None else ""
-        if alone:
-            why += ", and no condition of the policy reads a voltage: nothing would notice a failing battery"
-        return _graded(slug, found, needed, why + how, warns=True, stops=alone)
-    if value == 0 and otherwise is not None:
-        value = otherwise
+    if setting.warns.get(value):
+        return _warned(setting, slug, found, setting.warns[value], alone=alone)
+    bound = _broken_bound(setting, otherwise if value == 0 and otherwise is not None else value, need)
+    if bound is None:
+        return VehicleFinding(slug, OK, found)
+    wanted, should = bound
+    needed = f"{wanted} {should * setting.mm / _METRE:g}{setting.unit}"
+    return _graded(slug, found, needed, f"set `{name}` to {should:.10g}", warns=True)
+
+
+def _warned(setting: VehicleSetting, slug: str, found: str, why: str, *, alone: bool) -> VehicleFinding:
+    better = setting.better
+    needed, how = (
+        ("", "") if better is None else (setting.words.get(better, ""), f"; set `{setting.parameter}` to {better:g}")
+    )
+    if alone:
+        why += ", and no condition of the policy reads a voltage: nothing would notice a failing battery"
+    return _graded(slug, found, needed, why + how, warns=True, stops=alone)
+
+
+def _broken_bound(setting: VehicleSetting, value: float, need: Need | None) -> tuple[str, float] | None:
+    """The bound that a value breaks, in words and in units of the parameter; None for none."""
     if need is None or setting.mm == 0 or (value == 0 and setting.at_zero):
-        return VehicleFinding(slug, OK, found)
-    has = value * setting.mm
-    exact = setting.mm == _METRE and "speed" in setting.about  # a number with decimals, of which they count
+        return None
+    has, mm = value * setting.mm, setting.mm
+    exact = mm == _METRE and "speed" in setting.about  # a number whose decimals count
     if need.least is not None and has < need.least - SAME_MM:
-        wanted, should = "at least", need.least / _METRE if exact else -(-need.least // setting.mm)
-    elif need.most is not None and has > need.most + SAME_MM:
-        wanted, should = "at most", need.most / _METRE if exact else need.most // setting.mm
-    else:
-        return VehicleFinding(slug, OK, found)
-    bound = should * setting.mm / _METRE
-    return _graded(slug, found, f"{wanted} {bound:g}{setting.unit}", f"set `{name}` to {should:.10g}", warns=True)
+        return "at least", need.least / _METRE if exact else -(-need.least // mm)
+    if need.most is not None and has > need.most + SAME_MM:
+        return "at most", need.most / _METRE if exact else need.most // mm
+    return None

@@ -94,9 +94,9 @@ def unflown(record: Qualification) -> list[str]:
 
 
 def standing(record: Qualification | str | None, firmware: Firmware | None, known: Mapping[str, bytes]) -> Standing:
-    """How a vehicle stands that tells this firmware and these parameters. A text in place of the record says why it is
-    not to be trusted; None: there is none. What was flown in a simulation alone qualifies no
-    vehicle: nobody here can tell whether it is one, for both may have the same identity and address.
+    """Whether a vehicle with this firmware and these parameters is qualified by a record. A text in place of the record
+    says why the record cannot be trusted; None: no record. A flight in simulation qualifies no real vehicle, because
+    both may have the same identity and address.
     """
     if record is None:
         return Standing(False, "this vehicle is not qualified: no flight test of its autopilot is on record")
@@ -114,8 +114,11 @@ def standing(record: Qualification | str | None, firmware: Firmware | None, know
         return Standing(False, f"this vehicle was qualified in simulation only, on {day}")
     left_out = unflown(record)
     if left_out:
-        text = f"this vehicle is only partly qualified: not flown: {', '.join(left_out)} (`--only`)"
-        return Standing(False, text)
+        return Standing(False, f"this vehicle is only partly qualified: not flown: {', '.join(left_out)} (`--only`)")
+    return _unchanged(record, firmware, known, day)
+
+
+def _unchanged(record: Qualification, firmware: Firmware | None, known: Mapping[str, bytes], day: str) -> Standing:
     held = sum(each.outcome == CheckOutcome.HELD for each in record.checks)
     left = sum(each.outcome == CheckOutcome.UNCHECKED for each in record.checks)
     unsaid = [] if firmware is not None else ["the vehicle does not report its version now"]

@@ -278,18 +278,7 @@ class WhoFliesQuery:
         """The question to put now, if one is due. `flies`: something of ours does, or the vehicle is in the air."""
         half_us = self._within_us // 2
         wants, self.wants_target = self.wants_target, False
-        if wants:
-            every_us = 0
-        elif self._doubts:
-            every_us = CONFIRM_US
-        elif self._came is not None:
-            every_us = self._again_us(now_us)
-        elif not flies:
-            every_us = IDLE_US
-        elif seen.heartbeat_us is not None and now_us - seen.heartbeat_us < half_us:
-            every_us = STREAMED_US
-        else:
-            every_us = half_us
+        every_us = 0 if wants else self._interval_us(seen, now_us, flies=flies)
         if self._asked_us is not None and now_us - self._asked_us < every_us:
             if every_us == STREAMED_US:  # until the last heartbeat is too old for that
                 self.due_us = min(self._asked_us + every_us, (seen.heartbeat_us or 0) + half_us)
@@ -305,6 +294,17 @@ class WhoFliesQuery:
         names = ("HEARTBEAT", "POSITION_TARGET_GLOBAL_INT") if with_target else ("HEARTBEAT",)
         self.asked += len(names)
         return [messages.request(system, name) for name in names]
+
+    def _interval_us(self, seen: ObservedVehicle, now_us: int, *, flies: bool) -> int:
+        half_us = self._within_us // 2
+        if self._doubts:
+            return CONFIRM_US
+        if self._came is not None:
+            return self._again_us(now_us)
+        if not flies:
+            return IDLE_US
+        streamed = seen.heartbeat_us is not None and now_us - seen.heartbeat_us < half_us
+        return STREAMED_US if streamed else half_us
 
     def _again_us(self, now_us: int) -> int:
         """So long after the last question for a frame the next one is put."""
@@ -476,38 +476,48 @@ class Manoeuvre:
 
     def _advance(self, seen: ObservedVehicle, now_us: int) -> tuple[list[Message], Sequence[Event]]:
         how = self._aids.sure(self._taken_over(seen), seen) or self._flown_otherwise(seen, now_us)
+        if how is None and self.over:
+            return [], ()
+        reason = None
+        if how is None:
+            sent = self._go_through_stages(seen, now_us)
+            if sent:  # its effect shows later
+                return sent, ()
+            reason = self._failure(seen) if self._left else self._left_its_place(seen)
+            how = self._takeover_behind(reason, seen, now_us)
         if how is not None:
             self.over = self._taken = True
             return [], [TakenOver(now_us, how)]
-        if self.over:
+        if reason is None and self._left:
+            slowed = self._hindered(seen, now_us)
+            return self._again(seen, now_us), slowed
+        if reason is None and not self._has_held(seen):
             return [], ()
+        self.over = True
+        failed = None if reason is None else CommandFailed(now_us, self.token, reason, seen.text)
+        return [], [failed or Succeeded(now_us, self.token)]
+
+    def _go_through_stages(self, seen: ObservedVehicle, now_us: int) -> list[Message]:
+        """Leave the stages that are done, up to the first frame that may be sent; return it."""
         while self._left:
             if self._waits:
                 if not self._may_send(seen, now_us):
                     break
                 sent = self._send(seen)
-                if sent:  # what it does shows later
-                    return sent, ()
+                if sent:
+                    return sent
             if not self._is_done(seen):
                 break
             self._left.pop(0)
             self._enter(seen)
-        reason = self._failure(seen) if self._left else self._left_its_place(seen)
+        return []
+
+    def _takeover_behind(self, reason: str | None, seen: ObservedVehicle, now_us: int) -> str | None:
+        """How a failure shows that somebody else flies the vehicle; None where it does not."""
         if reason in _GETS_NOWHERE and self._is_kept(seen, now_us):
-            self.over = self._taken = True
-            return [], [TakenOver(now_us, PAUSED)]
-        if reason in _AS_IF_OTHERS_FLEW and self._aids.contradictions.stand(now_us):
-            self.over = self._taken = True
-            return [], [TakenOver(now_us, self._aids.suspicion.how or "two speak")]
-        if reason is None and self._left:
-            told = self._hindered(seen, now_us)
-            return self._again(seen, now_us), told
-        if reason is None and not self._has_held(seen):
-            return [], ()
-        self.over = True
-        return [], [
-            Succeeded(now_us, self.token) if reason is None else CommandFailed(now_us, self.token, reason, seen.text)
-        ]
+            return PAUSED
+        crossed = reason in _AS_IF_OTHERS_FLEW and self._aids.contradictions.stand(now_us)
+        return (self._aids.suspicion.how or "two speak") if crossed else None
 
     def _hindered(self, seen: ObservedVehicle, now_us: int) -> Sequence[Event]:
         """That it is flown slower than it was told, once."""

@@ -58,9 +58,7 @@ class Preflight:
         self._told = self._rally_told = False
         self._missed: set[str] = set()  # what limits its way home and was not answered, as far as that was told
         self._advised = 0  # what its circle was said to be set to
-        self._reached: tuple[tuple[int, int], bounds.FlightReach] | None = (
-            None  # where it stood, and what was made of it
-        )
+        self._reached: tuple[tuple[int, int], bounds.FlightReach] | None = None  # a position and the reach from there
         self._checked_us: int | None = None
         self.notes: list[str] = []
 
@@ -79,6 +77,11 @@ class Preflight:
             out.append(messages.command(system, messages.RUN_PREARM_CHECKS))
         if not (self.unplaced or self.astray or self.unread):  # a fence is of one place only
             out += self._fencing.due(system, now_us)
+        self._note_results()
+        return out
+
+    def _note_results(self) -> None:
+        """Note what is settled now, once."""
         for names in self.silent:
             if names not in self._missed:
                 self._missed.add(names)
@@ -96,7 +99,6 @@ class Preflight:
             self._told = True
             self.notes.append(self._fencing.note)
             self.notes += self._narrower_than_airspace()
-        return out
 
     def take(self, name: str, message: Any, system: int, now_us: int) -> list[Message]:
         """A message of the autopilot; what answers it."""

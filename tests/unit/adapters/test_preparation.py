@@ -137,7 +137,7 @@ def test_what_cannot_be_put_back_first_is_not_set(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(parameters, "write", lambda name, raw, kind: parameters.read(name, -1))
     flown = one.fly()
     assert flown.ending is Ending.REFUSED
-    assert "`FENCE_ALT_MAX` could not be put back first" in [each["detail"] for each in flown.effects("not-prepared")]
+    assert "`FENCE_ALT_MAX` could not be restored first" in [each["detail"] for each in flown.effects("not-prepared")]
     assert (has(one), owed) == (60.0, {"FENCE_ALT_MAX": Owed(bits(15.0), bits(60.0))})
     assert flown.audit().report.failure is None
 

@@ -30,7 +30,7 @@ _DIMENSIONS: Final = {dimension.value: dimension for dimension in Dimension}
 
 def describe_difference(one: Difference, old: Policy, new: Policy) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """A line or more of what was, and of what is; none where there was, or is, no such thing."""
-    if one.what == "rule":
+    if one.kind == "rule":
         before, after = (
             tuple(name(" ".join(each.split())) for each in (text,) if each) for text in (one.before, one.after)
         )
@@ -40,7 +40,7 @@ def describe_difference(one: Difference, old: Policy, new: Policy) -> tuple[tupl
 
 
 def _described(one: Difference, policy: Policy) -> tuple[str, ...]:
-    match one.what:
+    match one.kind:
         case "airspace":
             return (_airspace(policy),)
         case "contingency":
@@ -60,7 +60,7 @@ def _described(one: Difference, policy: Policy) -> tuple[str, ...]:
 
 def _figures(one: Difference, policy: Policy) -> Mapping[str, Callable[[], str]] | None:
     """The figures of the vehicle, or of a zone, skill or signal; None where the policy has none of the name."""
-    match one.what:
+    match one.kind:
         case "vehicle":
             return _vehicle(policy)
         case "zone":
@@ -240,7 +240,7 @@ class PolicyChanges:
 def describe_changes(old: Policy, new: Policy) -> tuple[ChangeView, ...]:
     """What differs, in words, and which way each goes."""
     return tuple(
-        ChangeView(each.told.removeprefix("looser: "), *describe_difference(each, old, new), direction(each, old, new))
+        ChangeView(each.text.removeprefix("looser: "), *describe_difference(each, old, new), direction(each, old, new))
         for each in compared(old, new)
     )
 

@@ -1,6 +1,6 @@
-"""A case: one request in one situation, and what must be decided. A test is one; with a table, each row is.
+"""A case: one request in one situation, and the expected decision. A test is one case, or one for each row of a table.
 
-`case_lowering` makes the cases of a program, `case_result.run_case` decides one of them.
+`case_lowering` makes the cases of a program, `case_result.run_case` decides a case.
 """
 
 from collections.abc import Mapping
@@ -20,7 +20,7 @@ from rtshcua.model.ir.tests import Expectation, NominalDecl, TestDecl
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PolicyUnderTest:
-    """A policy for a vehicle as tests need it: lowered, and prepared as on board. Made once for all its cases."""
+    """A policy for a vehicle, lowered and prepared as on board. All its cases share it."""
 
     lowered: LoweredPolicy
     prepared: PreparedPolicy
@@ -31,11 +31,11 @@ class PolicyUnderTest:
         return self.lowered.policy.name
 
     def span(self, part: Clause | Rule | Link | Airspace) -> Span:
-        """Where a part of the policy, or of a contract under it, is written."""
+        """The span of a part of the policy, or of a contract."""
         return self.lowered.files.span(part.source, part.start, part.end)
 
     def text(self, part: Clause | Rule | Airspace) -> str:
-        """All of its text, also what is too long to be carried on board: a rule's behind what made it."""
+        """The full text of a part, even if it is too long for the vehicle; a rule comes after the text that made it."""
         files = self.lowered.files
         if isinstance(part, Rule):
             rule = self.lowered.written[part]
@@ -45,11 +45,11 @@ class PolicyUnderTest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PolicyCase:
-    """What is decided on, and what must be decided.
+    """A request in a situation, and the expected decision.
 
-    `name` is stable: that of the test, and for a row its cells in brackets. `span` is the row, or the test's name.
-    `phases` are those of the mission that the request stands in, in order. `row` is the row's number from 0, None
-    without a table. `nominal` is where the test starts from.
+    `name` is stable: the name of the test, and for a row its cells in brackets. `span` is the row, or the test's name.
+    `phases` are those of the request's mission, in order. `row` is the row's number from 0, None without a table.
+    `nominal` is the nominal from which the test starts.
     """
 
     name: str
@@ -69,10 +69,10 @@ class PolicyCase:
 
 @dataclass(frozen=True, slots=True)
 class CaseSuite:
-    """The cases of the file that was asked for, in the order of the text; none where the sources have errors.
+    """The cases of the first file, in source order; none if the sources have errors.
 
-    `diagnostics` are all findings on the declarations and on the tests (not on what they decide), `policies` those that
-    cases are under, `sources` the texts that findings speak of.
+    `diagnostics` are all findings on the declarations and the tests (not on decisions), `policies` those of the cases,
+    `sources` the texts to which findings refer.
     """
 
     cases: tuple[PolicyCase, ...]

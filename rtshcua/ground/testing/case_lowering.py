@@ -1,7 +1,7 @@
-"""E1408 to E1410: tests become cases, one a row of a table, under the policy as it was lowered.
+"""Lowers tests to cases, one for each row of a table, under a lowered policy.
 
-A request is a real one: a mission of one step, lowered, bound and prepared as any other. The proofs of missions are
-left out, so that a test can ask for what they would refuse: the case says what becomes of it.
+A request is a real one: a mission of one step, lowered, bound and prepared like any other. Missions of tests are not
+proved, so that a test can make a request that the proofs would refuse.
 """
 
 from collections import Counter
@@ -44,7 +44,7 @@ OWN_SOURCE = "operator"
 
 
 class Requests:
-    """The requests of the tests under one policy; those that are the same are made once. `names` are for spans."""
+    """The requests of the tests under one policy; equal ones are made once. `names` are the signed names of files."""
 
     def __init__(self, context: CheckContext, policy: PolicyUnderTest, names: Mapping[str, str]) -> None:
         self._context = context
@@ -61,7 +61,7 @@ class Requests:
         columns: Sequence[ArgumentValue],
         issued_at_us: int,
     ) -> PreparedInvocation | None:
-        """A request with the arguments that it says and those of a row; None after a finding."""
+        """Return a request with its own arguments and those of a row; None after a finding."""
         skill = self._context.symbols.skills[request.skill.text]
         arguments = (*request.arguments, *columns)
         bound = self._bound(skill, arguments, request)
@@ -76,7 +76,7 @@ class Requests:
             step = Step(span=request.span, skill=request.skill, arguments=arguments, on_inadmissible="abort")
             mission = MissionDecl(
                 span=test.span,
-                name=Name(span=test.name.span, text="test"),  # what a test is called is a sentence, and no name
+                name=Name(span=test.name.span, text="test"),  # the title of a test is not a valid name
                 policy=start.nominal.policy,
                 policy_version=self._policy.lowered.policy.version,
                 vehicle=start.nominal.vehicle,
@@ -96,22 +96,22 @@ class Requests:
         return self._made[key]
 
     def _bound(self, skill: SkillDecl, arguments: Sequence[ArgumentValue], request: RequestDecl) -> list[Bound] | None:
-        """The value of every parameter, which was found to be of its type; it may be out of its range."""
+        """The value of every parameter, of the right type but perhaps out of range; None if one is missing."""
         context = self._context
         pairs = pair(context, skill, arguments, request.span)
         known = context.arguments(skill)
-        unheard = Scope(context.symbols, Report(context.report.sources))
+        silent = Scope(context.symbols, Report(context.report.sources))
         bound: list[Bound] = []
         for parameter in skill.parameters:
             value = None if pairs is None else pairs.get(parameter.name.text, parameter.default)
-            found = None if value is None else bind_value(unheard, unranged(known[parameter.name.text]), value)
+            found = None if value is None else bind_value(silent, unranged(known[parameter.name.text]), value)
             if found is None:
                 return None
             bound.append(found)
         return bound
 
     def _phase(self, request: RequestDecl, start: TestStart) -> str | None:
-        """The phase that the step stands in: the mission's own, or else the first in which the skill is valid."""
+        """The phase of the step: the mission's own, or else the first in which the skill is valid."""
         assert start.phase is not None
         valid = [name.text for name in self._context.symbols.skills[request.skill.text].phases]
         order = [name.text for name in start.order]
@@ -119,14 +119,14 @@ class Requests:
             return start.phase.phase.text
         found = next((name for name in order if name in valid), None)
         if found is None:
-            words = ", ".join(f"`{name}`" for name in valid)
+            phases = ", ".join(f"`{name}`" for name in valid)
             current = start.phase.phase.text
             self._context.report.add(
                 codes.UNKNOWN_PHASE,
                 request.skill.span,
-                f"`{request.skill.text}` is valid only during {words}, and the test knows no such phase",
-                help=f"say the phases in their order, as in `phase {current} of {current}, {valid[0]}`",
-                labels=[(start.phase.span, "the phase is said here")],
+                f"`{request.skill.text}` is valid only during {phases}, and the test has no such phase",
+                help=f"name the phases in order, as in `phase {current} of {current}, {valid[0]}`",
+                labels=[(start.phase.span, "the phase is set here")],
             )
         return found
 
@@ -145,13 +145,13 @@ class Requests:
         context.report.add(
             codes.REFUSED_ON_BOARD,
             step.span,
-            f"this request would be refused before anything is decided on it: {prepared.text}",
-            help="ask for what is nearer to what the skill takes",
+            f"the vehicle would refuse this request without a decision: {prepared.text}",
+            help="use arguments nearer to the ranges of the skill",
         )
         return None
 
     def _within(self, skill: SkillDecl, bound: list[Bound]) -> tuple[Bound, ...]:
-        """The arguments, the nearest in its range for one that is out of it: for that there is a plan."""
+        """The arguments moved into their ranges, because only those can be planned."""
         known = self._context.arguments(skill)
         found: list[Bound] = []
         for parameter, value in zip(skill.parameters, bound, strict=True):
@@ -163,7 +163,7 @@ class Requests:
 
 
 def _with_arguments(mission: Mission, arguments: tuple[int, ...]) -> Mission:
-    """The mission with these arguments of its one step, which flies as high and as fast as they say."""
+    """The mission with these arguments in its one step, and the altitude and speed of its plan from them."""
     (invocation,) = mission.invocations
     if arguments == invocation.arguments:
         return mission
@@ -186,16 +186,16 @@ def _bound_key(bound: Bound) -> object:
     return (bound.latitude, bound.longitude) if isinstance(bound, Coordinates) else bound
 
 
-#: what validation and dispatch are taken to need, in us: what is assumed on board until enough was measured
+#: the time for validation and dispatch in us, which is assumed on board until enough was measured
 REMAINING_US = 20_000
-#: the moment of every decision, monotonic, in us: so that all that was before it has a time of its own
+#: the monotonic time of every decision in us, large enough for all earlier times to be positive
 AT_US = MAX_DURATION
 
 Lower = Callable[[PolicyDecl, VehicleDecl], PolicyUnderTest | None]
 
 
 class _Under:
-    """What is kept for all tests under one policy."""
+    """A policy with the data that its tests share."""
 
     def __init__(self, context: CheckContext, policy: PolicyUnderTest, names: Mapping[str, str]) -> None:
         self.policy = policy
@@ -204,9 +204,9 @@ class _Under:
 
 
 def cases_of(context: CheckContext, lower: Lower, names: Mapping[str, str]) -> Iterator[PolicyCase]:
-    """The cases of the tests in `context`, which were checked; without those in which something is found.
+    """Yield the cases of the checked tests in `context`, except those with findings.
 
-    `lower` gives a policy for a vehicle, `names` what files are called in what is signed.
+    `lower` returns a policy for a vehicle; `names` are the signed names of files.
     """
     symbols = context.symbols
     known: dict[tuple[str, str], _Under] = {}
@@ -224,7 +224,7 @@ def cases_of(context: CheckContext, lower: Lower, names: Mapping[str, str]) -> I
 
 
 class _Cases:
-    """The cases of one test."""
+    """Lowers the cases of one test."""
 
     def __init__(
         self, context: CheckContext, under: _Under, test: TestDecl, request: RequestDecl, start: TestStart
@@ -235,14 +235,14 @@ class _Cases:
         self._request = request
         self._start = start
         premises = test.premises, start.nominal.premises
-        self._given = [
+        self._assigned = [
             SubjectValue(each.subject, each.cell, each.span) for held in reversed(premises) for each in held.given
         ]
         self._released = next((held.released.value for held in premises if held.released is not None), 0)
         self._issue = next((held.issued for held in premises if held.issued is not None), None)
 
     def made(self) -> Iterator[PolicyCase]:
-        """One case for each row, or the only one."""
+        """Yield the case of each row, or the only one."""
         test = self._test
         if test.table is None:
             assert test.expectation is not None
@@ -271,13 +271,13 @@ class _Cases:
     ) -> PolicyCase | None:
         under, start = self._under, self._start
         assert start.instant is not None
-        said, arguments = list(self._given), []
+        assigned, arguments = list(self._assigned), []
         for column, cell in zip(columns, () if row is None else row.cells, strict=True):
             if isinstance(column, Named) and column.name.text not in self._context.symbols.signals:
                 assert cell.value is not None
                 arguments.append(ArgumentValue(span=cell.span, name=column.name, value=cell.value))
             else:
-                said.append(SubjectValue(column, cell, column.span))
+                assigned.append(SubjectValue(column, cell, column.span))
         within = start.instant.within
         now = Now(AT_US, start.instant.utc_us, 0 if within is None else within.value)
         distance = 0 if self._issue is None else self._issue.distance.value
@@ -286,9 +286,9 @@ class _Cases:
         if invocation is None:
             return None
         before = len(self._context.report.found)
-        state = under.situations.state(said, now)
+        state = under.situations.state(assigned, now)
         standing = self._standing(invocation)
-        self._not_given(invocation, said)
+        self._warn_of_missing(invocation, assigned)
         quoted = quoted_clauses(self._context, expected, invocation, under.policy)
         errors = self._context.report.found[before:]
         if any(found.code.severity is codes.Severity.ERROR for found in errors):
@@ -311,7 +311,7 @@ class _Cases:
         )
 
     def _standing(self, invocation: PreparedInvocation) -> Standing:
-        """Where the mission stands: as the request would have it, but for what the test says."""
+        """The context of the mission: as the request expects it, except for the premises of the test."""
         test, nominal = self._test.premises, self._start.nominal.premises
         policy = self._under.policy.lowered.policy
         binding = invocation.invocation.binding
@@ -332,23 +332,22 @@ class _Cases:
             approvals=self._under.situations.approvals(answered.values(), AT_US),
         )
 
-    def _not_given(self, invocation: PreparedInvocation, said: list[SubjectValue]) -> None:
-        """Warn of signals that are unknown because nothing says what they are."""
-        missing = self._under.situations.missing((slot for slot, _ in invocation.reads), said)
+    def _warn_of_missing(self, invocation: PreparedInvocation, assigned: list[SubjectValue]) -> None:
+        """Warn of signals that are unknown because they have no value."""
+        missing = self._under.situations.missing((slot for slot, _ in invocation.reads), assigned)
         if missing:
-            are = "it is unknown" if len(missing) == 1 else "they are unknown"
+            have = "has no value: it is unknown" if len(missing) == 1 else "have no values: they are unknown"
             self._context.report.add(
                 codes.NOT_GIVEN,
                 self._request.skill.span,
-                f"a decision on `{self._request.skill.text}` reads {listed(missing)}, and nothing gives "
-                f"{'it' if len(missing) == 1 else 'them'}: {are}",
-                help=f"add to the nominal or the test what it is, or say so: `given {missing[0]} = unknown`",
+                f"a decision on `{self._request.skill.text}` reads {listed(missing)}, which {have}",
+                help=f"add a value to the nominal or the test, or write `given {missing[0]} = unknown`",
                 labels=[(self._start.nominal.name.span, "the test starts from here")],
             )
 
 
 def _numbered(answers: Sequence[Answer]) -> dict[tuple[str, int], Answer]:
-    """Answers by the role, and which of its people it is."""
+    """The answers by role, and whether it is the first or second person of the role."""
     found: dict[tuple[str, int], Answer] = {}
     for answer in answers:
         found[answer.role.text, (answer.role.text, 0) in found] = answer

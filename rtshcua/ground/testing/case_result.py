@@ -1,4 +1,4 @@
-"""Decides a case, and compares the decision with what was expected. Pure; only `decide` decides."""
+"""Decides a case with `decide`, and compares the decision with the expectation. Pure."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -17,14 +17,14 @@ from rtshcua.model.quantity import Dimension, display
 
 _DIMENSIONS = {dimension.value: dimension for dimension in Dimension}
 _MINUTE = 60_000_000  # us
-#: how many permits a finding points at
+#: the most permits that a finding labels
 MAX_PERMITS = 3
 
 
 class CaseResult(NamedTuple):
-    """A case, the way to its decision, what was expected, and whether it was met; where not, `finding` (E1411).
+    """The result of a case: the trace of its decision, the expectation, whether it was met, and else a `finding`.
 
-    `took_us`: how long that took, where somebody measured it.
+    `took_us` is the time that it took, if measured.
     """
 
     case: PolicyCase
@@ -36,14 +36,14 @@ class CaseResult(NamedTuple):
 
 
 def run_case(case: PolicyCase) -> CaseResult:
-    """The case, decided. The finding underlines the expectation, and points at what decided."""
+    """Decide a case. The finding underlines the expectation and labels what decided."""
     found = trace(case.invocation, case.state, case.policy.prepared, case.context, case.now)
     wrong = list(_unmet(case, found.decision))
     return CaseResult(case, found, case.expected, not wrong, _finding(case, found, wrong) if wrong else None)
 
 
 def decision_words(case: PolicyCase, decision: Decision) -> str:
-    """A decision in the words of `expect`."""
+    """Describe a decision in the syntax of `expect`."""
     words = [decision.outcome.name.lower()]
     if decision.target is not None:
         words.append(case.policy.lowered.policy.contracts[decision.target.skill].name)
@@ -51,22 +51,22 @@ def decision_words(case: PolicyCase, decision: Decision) -> str:
 
 
 def _unmet(case: PolicyCase, decision: Decision) -> Iterator[str]:
-    """What of the expectation is not so: the outcome alone, or else every part that is."""
+    """Yield the parts of the expectation that are not met: the outcome alone, or else every other part."""
     expected = case.expected
     outcome = decision.outcome.name.lower()
     if expected.outcome != outcome:
-        yield f"`{expected.outcome}` is expected, and the decision is `{decision_words(case, decision)}`"
+        yield f"expected `{expected.outcome}`; the decision is `{decision_words(case, decision)}`"
         return
     if expected.target is not None:
         flies = None if decision.target is None else case.policy.lowered.policy.contracts[decision.target.skill].name
         if flies != expected.target.text:
             what = "nothing may fly" if flies is None else f"`{flies}` flies"
-            yield f"`{expected.target.text}` is expected to fly, and {what}"
+            yield f"expected `{expected.target.text}` to fly; {what}"
     if expected.reason is not None and expected.reason.text != decision.reason.value:
-        yield f"the reason `{expected.reason.text}` is expected, and it is `{decision.reason.value}`"
+        yield f"expected the reason `{expected.reason.text}`; it is `{decision.reason.value}`"
     if expected.clause is not None and decision.clause not in case.quoted:
         by = "no clause" if decision.clause is None else f"`{decision.clause.text}`"
-        yield f"`{expected.clause.text}` is expected to decide, and {by} does"
+        yield f"expected `{expected.clause.text}` to decide; {by} decided"
 
 
 def _finding(case: PolicyCase, found: Trace, wrong: list[str]) -> Diagnostic:
@@ -78,7 +78,7 @@ def _finding(case: PolicyCase, found: Trace, wrong: list[str]) -> Diagnostic:
         number, name = next((each.number, each.name) for each in found.steps if each.passed is False)
         assert case.test.request is not None
         labels.append(
-            Label(case.test.request.span, f"step {number}, {name}, decided: no clause, but the request itself")
+            Label(case.test.request.span, f"step {number}, {name}, decided by the request itself, not by a clause")
         )
     if decision.outcome is Outcome.ALLOW or (case.expected.outcome == "deny" and decision.outcome is not Outcome.DENY):
         labels += [Label(case.policy.span(each), "this permit allowed it") for each in _shown_permits(found, met=True)]
@@ -89,25 +89,24 @@ def _finding(case: PolicyCase, found: Trace, wrong: list[str]) -> Diagnostic:
 
 
 def _shown_permits(found: Trace, *, met: bool) -> list[Rule]:
-    """The permits about the request that are true, or that are not; the first ones."""
+    """The first permits about the request that are met, or that are not."""
     checks = (check for step in found.steps for check in step.checks if check.role == "permit")
     every = [each.clause for each in checks if isinstance(each.clause, Rule) and (each.truth == TRUE) is met]
     return every[:MAX_PERMITS]
 
 
 def _result_help(case: PolicyCase, found: Trace) -> str | None:
-    """What would have passed, or what is unknown, where the decision was a refusal; of an `allow`, what allowed it, and
-    that nothing stood against it.
+    """Return the help: for a refusal the values that would have passed, or that are unknown; for an `allow` its
+    cause.
     """
     decision = found.decision
     if found.nearest:
         return "it would have passed with " + " and ".join(map(_would_pass, found.nearest))
     if decision.outcome is Outcome.ALLOW:
-        nothing = f"no rule and no clause stands against it: a `{case.expected.outcome}` needs one that does"
         allowing = _shown_permits(found, met=True)
         if case.expected.outcome != "deny" or not allowing:
-            return nothing
-        return f"`{allowing[0].text}` allows it, and {nothing}, or a narrower `permit`"
+            return f"no rule and no clause prevents it: a `{case.expected.outcome}` needs one that does"
+        return f"`{allowing[0].text}` allows it: make it narrower, or add a rule or clause that prevents the request"
     flat = case.invocation.invocation
     read = read_values(decision.clause, case.policy.prepared.policy, flat.contract, flat.arguments, case.state)
     stale = [f"`{each.name}` is stale" for each in read if each.stale and None not in each.values]

@@ -1,6 +1,6 @@
-"""The situation of a case: what its nominal gives, what its test gives instead, and then its row.
+"""The situation of a case: the values of its nominal, replaced by those of its test, and then by those of its row.
 
-A condition over time is found again among those that the policy observes by what it says.
+A condition over time is matched with the policy's monitors by its content.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -27,7 +27,7 @@ from rtshcua.model.ir.tests import Answer, Named, OverTime, Subject, TableCell
 
 
 class _Timed(NamedTuple):
-    """What is kept of a condition over time: how it looks back, how far, and at what."""
+    """A condition over time: its kind, its window, and its operand."""
 
     kind: MonitorKind
     window_us: int
@@ -35,19 +35,19 @@ class _Timed(NamedTuple):
 
 
 class MonitorIndex:
-    """The monitors of a policy by their condition: what it says counts, not where it is written."""
+    """The monitors of a policy by the content of their condition, whatever its place."""
 
     def __init__(self) -> None:
         self._numbers: dict[tuple[MonitorKind, int, Any], tuple[int, ...]] = {}
         self.texts: list[str] = []
 
     def numbers(self, condition: Condition) -> Sequence[int]:
-        """The monitors of a condition: none where nothing observes it, two where it is kept for either safe side."""
+        """The monitors of a condition: none if it is not observed, two if it is observed for both safe sides."""
         timed = next(_timed_of(condition), None)
         return () if timed is None else self._numbers.get(_key(timed), ())
 
     def add(self, timed: _Timed, found: ConditionLowering, text: str) -> None:
-        """Note what a condition of the policy became."""
+        """Add the monitors of a condition of the policy."""
         numbers = found.monitors_of(timed.operand, timed.kind, timed.window_us)
         if numbers and _key(timed) not in self._numbers:
             self._numbers[_key(timed)] = numbers
@@ -55,7 +55,7 @@ class MonitorIndex:
 
 
 def monitors_of(context: CheckContext, under: LoweredPolicy) -> MonitorIndex:
-    """All that the rules of a policy, and the contracts under it, observe over time."""
+    """Return the index of all conditions over time in a policy's rules and contracts."""
     found = MonitorIndex()
     for condition in _conditions(context, under) if under.policy.monitors else ():
         for part in walk(condition):
@@ -92,7 +92,7 @@ def _key(timed: _Timed) -> tuple[MonitorKind, int, Any]:
 
 
 def _without_spans(node: Any) -> Any:
-    """A node without its places."""
+    """A node without its spans."""
     if isinstance(node, Node):
         fields = (name for name in type(node).__struct_fields__ if name != "span")
         return type(node).__name__, *(_without_spans(getattr(node, name)) for name in fields)
@@ -103,7 +103,7 @@ TRUTHS = {"true": TRUE, "false": FALSE}
 
 
 class SubjectValue(NamedTuple):
-    """A subject, its cell, and where both are said."""
+    """A subject and its value, with the span of both."""
 
     subject: Subject
     cell: TableCell
@@ -111,7 +111,7 @@ class SubjectValue(NamedTuple):
 
 
 class Situations:
-    """Makes the states of the cases under one policy; what it does not read is reported, once each."""
+    """Makes the states of the cases under one policy, and reports subjects that the policy does not read."""
 
     def __init__(self, context: CheckContext, policy: PolicyUnderTest) -> None:
         self._context = context
@@ -119,17 +119,17 @@ class Situations:
         self._signals = {signal.name: signal for signal in policy.lowered.policy.signals}
         self._monitors = monitors_of(context, policy.lowered)
 
-    def state(self, said: Iterable[SubjectValue], now: Now) -> State:
-        """The state in which all that is said holds, the last word on each, and nothing else is known.
+    def state(self, assigned: Iterable[SubjectValue], now: Now) -> State:
+        """Return the state with the assigned values, of which later ones replace earlier ones; all else is unknown.
 
-        Conditions over time are as if the state had been so for longer than any of them looks back, but for those that
-        are set by hand.
+        Conditions over time are computed as if the state had lasted longer than their windows, except those that are
+        assigned.
         """
         flat = self._policy.lowered.policy
         values: list[int | None] = [None] * flat.slots
         ages = [0] * flat.slots
         truths: list[tuple[Sequence[int], int]] = []
-        for subject, cell, span in said:
+        for subject, cell, span in assigned:
             if isinstance(subject, OverTime):
                 truths.append((self._numbers(subject), _truth_of(cell)))
                 continue
@@ -148,9 +148,9 @@ class Situations:
         return State(state.values, state.ages, tuple(monitors))
 
     def approvals(self, answers: Iterable[Answer], at_us: int) -> tuple[ConfirmAnswer, ...]:
-        """What people answered to the `confirm` rules that wait for them, at monotonic times before `at_us`.
+        """Return the approvals for the `confirm` rules, at monotonic times before `at_us`.
 
-        Each answer is another person's.
+        Each answer is by a different person.
         """
         under = self._policy.lowered
         found: list[ConfirmAnswer] = []
@@ -168,11 +168,11 @@ class Situations:
             found += [ConfirmAnswer(number, role, int(answer.granted), moment, person) for number in rules]
         return tuple(found)
 
-    def missing(self, reads: Iterable[int], said: Iterable[SubjectValue]) -> list[str]:
-        """The signals in these slots of which nothing is said."""
-        given = {each.subject.name.text for each in said if isinstance(each.subject, Named)}
+    def missing(self, reads: Iterable[int], assigned: Iterable[SubjectValue]) -> list[str]:
+        """The signals in these slots that have no assigned value."""
+        known = {each.subject.name.text for each in assigned if isinstance(each.subject, Named)}
         slots = set(reads)
-        return [name for name, signal in self._signals.items() if signal.slot in slots and name not in given]
+        return [name for name, signal in self._signals.items() if signal.slot in slots and name not in known]
 
     def _cells(self, signal: Signal, cell: TableCell) -> tuple[int | None, ...]:
         value = None if cell.value is None else self._context.given.get((signal.name, cell.value))
@@ -187,12 +187,12 @@ class Situations:
     def _numbers(self, subject: OverTime) -> Sequence[int]:
         numbers = self._monitors.numbers(subject.condition)
         if not numbers:
-            words = self._context.report.text(subject.condition.span)
-            near = suggestion(words, self._monitors.texts)
+            text = self._context.report.text(subject.condition.span)
+            near = suggestion(text, self._monitors.texts)
             self._context.report.add(
                 codes.WITHOUT_EFFECT,
                 subject.span,
-                f"nothing in `{self._policy.name}` observes `{words}`, so its truth changes nothing",
+                f"`{self._policy.name}` does not observe `{text}`, so its value has no effect",
                 help=near or (f"it observes {listed(self._monitors.texts)}" if self._monitors.texts else None),
                 labels=[(self._policy.lowered.declaration.name.span, "the policy is declared here")],
             )
@@ -202,8 +202,8 @@ class Situations:
         self._context.report.add(
             codes.WITHOUT_EFFECT,
             span,
-            f"nothing in `{self._policy.name}` reads `{subject.name.text}`, so its value changes nothing",
-            help="the vehicle is without it"
+            f"`{self._policy.name}` does not read `{subject.name.text}`, so its value has no effect",
+            help="the vehicle is without this signal"
             if subject.name.text in self._policy.lowered.policy.vehicle.without
             else f"it reads {listed(self._signals)}",
             labels=[(self._policy.lowered.declaration.name.span, "the policy is declared here")],

@@ -1,11 +1,10 @@
-"""What decisions reach of policies, by clause and outcome: never by line, so that no formatting changes it.
+"""The coverage of policies by decisions. It counts clauses and outcomes, not lines, so formatting does not change it.
 
-A clause decided where the decision names it. Two kinds of rules do more than deny, and decide without being named:
-a `permit` decides where the request is allowed and no other permit would have allowed it, a `degrade` where the link
-that flies is the one that it asks for.
+A clause decides if the decision names it. Two kinds of rules decide without being named: a `permit` decides if the
+request is allowed and no other permit would have allowed it, a `degrade` decides if the link that flies is its target.
 
-What two programs import is the same policy if it says the same, for the same vehicle, in the same words: it is counted
-once, and all their cases count for it. Counts are integers, and so is the share.
+A policy that several programs import is counted once if its content and vehicle are the same. All counts and shares
+are integers.
 """
 
 from collections import Counter
@@ -36,24 +35,24 @@ from rtshcua.model.flat.policy import Airspace, Policy, Rule, RuleKind
 from rtshcua.model.ir.program import Unit
 from rtshcua.model.outcome import Outcome, Reason
 
-#: goals that some decision reached, of the items by their numbers
+#: the goals that a decision reached, with the numbers of their items
 ReachedGoals = frozenset[tuple[int, Goal]]
 
 
 class ItemCoverage(NamedTuple):
-    """An item with how often each of its goals was reached."""
+    """An item, and how often each of its goals was reached."""
 
     item: CoverageItem
     counts: tuple[int, ...]
 
     @property
     def missing(self) -> tuple[Goal, ...]:
-        """The goals that nothing reached."""
+        """The goals that no decision reached."""
         return tuple(goal for goal, count in zip(self.item.goals, self.counts, strict=True) if not count)
 
 
 class Coverage(NamedTuple):
-    """Everything that there is to cover of a policy, and how many decisions were looked at."""
+    """The coverage of a policy's items, and the number of decisions."""
 
     policy: Policy
     lines: tuple[ItemCoverage, ...]
@@ -61,22 +60,22 @@ class Coverage(NamedTuple):
 
     @property
     def total(self) -> int:
-        """How many goals there are."""
+        """The number of goals."""
         return sum(len(line.counts) for line in self.lines)
 
     @property
     def covered(self) -> int:
-        """How many of them were reached."""
+        """The number of goals that were reached."""
         return sum(1 for line in self.lines for count in line.counts if count)
 
     @property
     def undecided(self) -> tuple[CoverageItem, ...]:
-        """The clauses that could decide and never did: whatever they say, no test would notice if it changed."""
+        """The clauses that can decide and never did: no test notices if they change."""
         return tuple(line.item for line in self.lines if Goal.DECIDED in line.missing)
 
 
 def coverage(of: Universe, reached: Iterable[ReachedGoals]) -> Coverage:
-    """Decisions under one policy, added up."""
+    """Add up the goals that decisions under one policy reached."""
     counts: Counter[tuple[int, Goal]] = Counter()
     decisions = 0
     for each in reached:
@@ -89,28 +88,28 @@ def coverage(of: Universe, reached: Iterable[ReachedGoals]) -> Coverage:
 
 
 def per_mille(covered: int, total: int) -> int:
-    """A share in 1/1000, rounded down, so that 1000 means all; where there is nothing to cover, all is covered."""
+    """A share in 1/1000, rounded down, so that 1000 means all. If there are no goals, it is 1000."""
     return covered * 1000 // total if total else 1000
 
 
 def enough(coverages: Sequence[Coverage], percent: int) -> bool:
-    """Whether all together cover a share; computed without rounding."""
+    """Whether the total coverage is at least a share, computed without rounding."""
     covered, total = sum(each.covered for each in coverages), sum(each.total for each in coverages)
     return covered * 100 >= percent * total
 
 
 def share(covered: int, total: int) -> str:
-    """A share for a person: `93.4 %`, rounded down."""
+    """A share in per cent, rounded down: `93.4 %`."""
     whole, tenth = divmod(per_mille(covered, total), 10)
     return f"{whole}.{tenth} %"
 
 
-#: reasons without a clause that are about the charge; `SAFETY_UNKNOWN` with a clause is about that clause
+#: reasons about the charge, if the decision has no clause
 _CHARGE = frozenset({Reason.ENERGY, Reason.SAFETY_UNKNOWN})
 
 
 def reached_goals(universe: Universe, invocation: PreparedInvocation, trace: Trace) -> frozenset[tuple[int, Goal]]:
-    """Which goals of which items (by their numbers) a decision reached, as far as they count."""
+    """The goals that a decision reached, with the numbers of their items."""
     found = _reached(universe, invocation, trace)
     return frozenset((item, goal) for item, goal in found if goal in universe.items[item].goals)
 
@@ -137,7 +136,7 @@ def _reached(universe: Universe, invocation: PreparedInvocation, trace: Trace) -
 
 
 def _item_of(universe: Universe, skill: int, check: ConditionCheck) -> int | None:
-    """The item that a check is about; None for a clause that a step of a mission has on its own."""
+    """The item of a check; None for a clause that a mission adds to a step."""
     clause = check.clause
     if isinstance(clause, Rule):
         return universe.rules.get(clause)
@@ -149,7 +148,7 @@ def _item_of(universe: Universe, skill: int, check: ConditionCheck) -> int | Non
 
 
 def _decisive_items(universe: Universe, skill: int, decision: Decision) -> Iterator[int]:
-    """The items that the decision names. A permit that it names is one that did not permit."""
+    """The items that decided. A permit that the decision names did not permit, so it does not count."""
     clause, item = decision.clause, None
     if isinstance(clause, Rule):
         item = None if clause.kind == RuleKind.PERMIT else universe.rules.get(clause)
@@ -166,14 +165,14 @@ def _decisive_items(universe: Universe, skill: int, decision: Decision) -> Itera
 
 
 def _degrade(invocation: PreparedInvocation, decision: Decision) -> Rule | None:
-    """The rule whose target flies."""
+    """The degrade rule whose target flies, or None."""
     if decision.link != DEGRADE:
         return None
     return next(each.rule for each in invocation.candidates.degrades if each.target.link == decision.target)
 
 
 class PolicyCoverage(NamedTuple):
-    """The coverage of one policy, and where each of its lines is written; None where that is no one place."""
+    """The coverage of one policy, and the span of each of its lines; None if it has no single place."""
 
     coverage: Coverage
     spans: tuple[Span | None, ...]
@@ -186,14 +185,14 @@ class _Kept(NamedTuple):
 
 
 class CoverageTally:
-    """Adds up what cases reach. `sources` are the texts that spans are about."""
+    """Adds up the coverage of cases. `sources` are the texts of the spans."""
 
     def __init__(self) -> None:
         self._kept: dict[Policy, _Kept] = {}
         self.sources: dict[str, Source] = {}
 
     def policy(self, tested: PolicyUnderTest, units: Iterable[Unit], sources: Mapping[str, Source]) -> None:
-        """Count a policy, of which perhaps no case is run; `units` are those of its program."""
+        """Add a policy, even if it has no cases; `units` are those of its program."""
         self.sources.update(sources)
         if tested.lowered.policy not in self._kept:
             found = universe_of(tested.prepared)
@@ -203,16 +202,16 @@ class CoverageTally:
             self._kept[tested.lowered.policy] = _Kept(found, spans, [])
 
     def case(self, ran: CaseResult) -> None:
-        """Count what a case reached; its policy is counted."""
+        """Add the goals of a case, whose policy was added before."""
         kept = self._kept[ran.case.policy.lowered.policy]
         kept.reached.append(reached_goals(kept.universe, ran.case.invocation, ran.trace))
 
     def flights(self, tested: PolicyUnderTest, reached: Iterable[ReachedGoals]) -> None:
-        """Count what the decisions of flights reached; their policy is counted."""
+        """Add the goals of the decisions of flights, whose policy was added before."""
         self._kept[tested.lowered.policy].reached.extend(reached)
 
     def all(self) -> tuple[PolicyCoverage, ...]:
-        """The coverage of each policy, in the order in which they came."""
+        """The coverage of each policy, in the order of their addition."""
         return tuple(PolicyCoverage(coverage(kept.universe, kept.reached), kept.spans) for kept in self._kept.values())
 
 

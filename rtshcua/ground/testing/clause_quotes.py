@@ -1,4 +1,4 @@
-"""E1410: the clause that a test expects to decide, one of those that can."""
+"""Finds the clause that a test quotes among those that can decide."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from difflib import SequenceMatcher
@@ -15,13 +15,13 @@ from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.ir.tests import Expectation
 
-#: what stands for the rest of a clause, so that a long one need not be quoted whole
+#: stands for the rest of a clause, so that a long one need not be quoted in full
 REST = "..."
 MAX_SHOWN = 6
 
 
 class _Candidate(NamedTuple):
-    """A clause that can decide: the word for its role, and all of its text, on one line."""
+    """A clause that can decide, with its role and its full text on one line."""
 
     role: str
     text: str
@@ -29,9 +29,7 @@ class _Candidate(NamedTuple):
 
 
 def quotes(quoted: str, text: str) -> bool:
-    """Whether a text quotes a clause: whole, or up to `...`, of which something must stand before; how it is spaced
-    does not count.
-    """
+    """Whether a text quotes a clause: in full, or its beginning before `...`. White space is ignored."""
     words = _spaced(quoted)
     if words.endswith(REST):
         start = words.removesuffix(REST).rstrip()
@@ -42,8 +40,9 @@ def quotes(quoted: str, text: str) -> bool:
 def quoted_clauses(
     context: CheckContext, expected: Expectation, invocation: PreparedInvocation, policy: PolicyUnderTest
 ) -> tuple[Decisive, ...]:
-    """The clause that an expectation quotes, in all its flat forms; none where it quotes none, or after a finding: that
-    it quotes what no decision on this request can name, or what could be several.
+    """Return the clause that an expectation quotes, in all its flat forms; empty if it quotes none.
+
+    A quotation that no clause can match, or more than one, is reported, and the result is empty.
     """
     quoted = expected.clause
     if quoted is None:
@@ -66,10 +65,10 @@ def _unknown(
     quoted = expected.clause
     assert quoted is not None
     near, help = clause_meant(quoted.text, dict.fromkeys(shortened(each.text) for each in every))
-    message = "nothing of a clause is quoted"
+    message = "the quotation is empty"
     if quoted.text.strip(". "):
         skill = invocation.invocation.contract.name
-        message = f"no decision on `{skill}` here is made by a clause `{shortened(quoted.text)}`"
+        message = f"no clause `{shortened(quoted.text)}` can decide on `{skill}` here"
     context.report.add(
         codes.UNKNOWN_CLAUSE,
         quoted.span,
@@ -80,17 +79,17 @@ def _unknown(
 
 
 def clause_meant(quoted: str, texts: Iterable[str]) -> tuple[str | None, str]:
-    """What a quotation of none of these clauses was probably to be, if anything, and the help that says so."""
+    """Return the clause that a wrong quotation probably means, or None, and the help."""
     every = list(texts)
     near = _nearest(_spaced(quoted), every)
     if near is not None:
         return near, f"did you mean `{near}`?"
     likely = sorted(every, key=lambda text: -SequenceMatcher(None, _spaced(quoted), text).ratio())
-    return None, f"there are {shown_clauses(likely)}" if likely else "no clause decides here"
+    return None, f"possible clauses: {shown_clauses(likely)}" if likely else "no clause decides here"
 
 
 def _nearest(words: str, texts: Sequence[str]) -> str | None:
-    """The clause, or the beginning of one, that is nearest to a quotation. A beginning is held against beginnings."""
+    """The clause nearest to a quotation, or its beginning. A quoted beginning is compared with beginnings."""
     begun = words.endswith(REST)
     start = words.removesuffix(REST).rstrip()
     if not start:
@@ -119,19 +118,19 @@ def _ambiguous(context: CheckContext, expected: Expectation, fitting: Sequence[_
         quoted.span,
         f"`{shortened(quoted.text)}` quotes {'more than one clause' if alike else 'the beginning of several clauses'}"
         f" that can decide here",
-        help=f"say `because`: it stands in {shown_clauses(roles)}"
+        help=f"add the reason with `because`: the clause is in {shown_clauses(roles)}"
         if alike
         else f"quote more of one: {shown_clauses(texts)}",
     )
 
 
 def shown_clauses(texts: Sequence[str]) -> str:
-    """The first clauses of some, for a person."""
+    """List the first clauses for a message."""
     return ", ".join(f"`{text}`" for text in texts[:MAX_SHOWN]) + (", ..." if len(texts) > MAX_SHOWN else "")
 
 
 def _decisive(invocation: PreparedInvocation, policy: PolicyUnderTest) -> Iterator[_Candidate]:
-    """All clauses that a decision on a request can name."""
+    """Yield all clauses that can decide on a request."""
     contract = invocation.invocation.contract
     for role, clause in clauses_of(contract):
         yield _Candidate(role, _spaced(policy.text(clause)), clause)

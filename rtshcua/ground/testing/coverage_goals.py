@@ -1,11 +1,11 @@
-"""What there is to cover of a policy: its clauses, and of each the outcomes that it can have.
+"""The coverage items of a policy: its clauses, each with the results that it can have.
 
-Clauses are the rules as they are after elaboration (of templates and delegations, each shown as it is written, behind
-the `use` or the `delegate` that made it), the airspace, and of each skill that a rule permits its `require`, `assume`
-and `maintain` clauses and the charge that it needs. One more line stands for the outcomes of the policy's decisions.
+Clauses are the rules after elaboration (those of templates and delegations are shown after the `use` or `delegate` that
+made them), the airspace, and for each permitted skill its `require`, `assume` and `maintain` clauses and its charge.
+One more item is for the outcomes of the policy's decisions.
 
-An outcome is left out where it is shown to be impossible, by the analysis that the compiler's proofs use. What is not
-shown impossible counts, even if nothing can bring it about.
+A result is excluded if the analysis of the compiler's proofs shows that it is impossible. All other results count, even
+if no situation leads to them.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -25,7 +25,7 @@ from rtshcua.model.outcome import Outcome
 
 
 class Goal(StrEnum):
-    """What can be reached of a clause: a truth, or that it decided. Of a policy's decisions: an outcome."""
+    """A coverage goal. For a clause: a truth, or that it decided. For a policy's decisions: an outcome."""
 
     TRUE = "true"
     FALSE = "false"
@@ -37,19 +37,19 @@ class Goal(StrEnum):
     FALLBACK = "fallback"
 
 
-#: the goal that stands for a truth, and for an outcome
+#: the goals of truths and of outcomes
 TRUTHS: dict[Truth, Goal] = {TRUE: Goal.TRUE, FALSE: Goal.FALSE, UNKNOWN: Goal.UNKNOWN}
 OUTCOMES: dict[Outcome, Goal] = {outcome: Goal(outcome.name.lower()) for outcome in Outcome}
 
-#: the roles of clauses of a skill, besides the words of its lists
+#: the roles of items that are not in a list of clauses
 ENERGY, AIRSPACE, DECISIONS = "energy", "airspace", "outcomes"
-#: us: how wrong a clock may be, where that makes the time unknown
+#: us: a clock error that makes the time unknown near a limit
 _CLOCK_ERROR = 1_000_000
 ENERGY_TEXT = "the charge to finish, to come home, and the reserve"
 
 
 class Where(NamedTuple):
-    """Where a clause is written: an index into the policy's `sources`, and character offsets."""
+    """The place of a clause: an index into the policy's `sources`, and character offsets."""
 
     source: int
     start: int
@@ -57,9 +57,9 @@ class Where(NamedTuple):
 
 
 class CoverageItem(NamedTuple):
-    """One clause. `skill` is the name of the skill that it belongs to, "" for what is the policy's own.
+    """A coverage item. `skill` is the name of its skill, "" for an item of the policy itself.
 
-    `goals` are what counts, in the order of `Goal`; `impossible` what was shown to be out of reach.
+    `goals` are those that count, in the order of `Goal`; `impossible` are those that cannot be reached.
     """
 
     role: str
@@ -71,9 +71,7 @@ class CoverageItem(NamedTuple):
 
 
 class Universe(NamedTuple):
-    """All items of a policy, in the order of its text, and where to find each: rules by themselves, the clauses of
-    skills by the skill's number.
-    """
+    """All coverage items of a policy, in source order, with indexes by rule and by the number of the skill."""
 
     prepared: PreparedPolicy
     items: tuple[CoverageItem, ...]
@@ -85,18 +83,18 @@ class Universe(NamedTuple):
 
     @property
     def total(self) -> int:
-        """How many goals there are."""
+        """The number of goals."""
         return sum(len(item.goals) for item in self.items)
 
 
 def universe_of(prepared: PreparedPolicy) -> Universe:
-    """What there is to cover of a policy."""
-    policy, made = prepared.policy, _Made(prepared)
+    """Return the coverage items of a policy."""
+    policy, builder = prepared.policy, _ItemBuilder(prepared)
     items: list[CoverageItem] = []
     rules: dict[Rule, int] = {}
     for group in _written(policy.rules):
         rules |= dict.fromkeys(group, len(items))
-        items.append(made.rule(group))
+        items.append(builder.rule(group))
     airspace = None
     if policy.airspace is not None:
         airspace = len(items)
@@ -107,25 +105,25 @@ def universe_of(prepared: PreparedPolicy) -> Universe:
         contract = policy.contracts[skill]
         for role, clause in clauses_of(contract):
             clauses[skill, role, clause] = len(items)
-            items.append(made.clause(skill, role, clause))
+            items.append(builder.clause(skill, role, clause))
         energy[skill] = len(items)
-        items.append(made.energy(contract))
+        items.append(builder.energy(contract))
     decisions = len(items)
     items.append(CoverageItem(DECISIONS, "", "the outcomes of its decisions", None, tuple(OUTCOMES.values()), ()))
     return Universe(prepared, tuple(items), rules, clauses, energy, airspace, decisions)
 
 
 def clauses_of(contract: Contract) -> Iterator[tuple[str, Clause]]:
-    """The conditions of a contract, each with the word of its list."""
+    """Yield the clauses of a contract, each with the keyword of its list."""
     for role, clauses in (("require", contract.require), ("assume", contract.assume), ("maintain", contract.maintain)):
         for clause in clauses:
             yield role, clause
 
 
 def _written(rules: Iterable[Rule]) -> Iterable[list[Rule]]:
-    """The rules as a person wrote them: one over skills that keep their arguments in different cells became several.
+    """Group the flat rules by the source rule: one over skills with arguments in different cells became several.
 
-    Where the text was cut, what differs may stand behind that: only what no skill has in common is one rule then.
+    If the text was truncated, the rest may differ, so that only rules over different skills count as one source rule.
     """
     groups: dict[object, list[list[Rule]]] = {}
     for rule in rules:
@@ -149,7 +147,7 @@ def _written(rules: Iterable[Rule]) -> Iterable[list[Rule]]:
 
 
 def _apart(rule: Rule, others: Iterable[Rule]) -> bool:
-    """Whether a rule is about none of the skills that others are about."""
+    """Whether a rule has no skill in common with the others."""
     return bool(rule.skills) and all(each.skills and not set(each.skills) & set(rule.skills) for each in others)
 
 
@@ -158,30 +156,32 @@ def _permitted(rules: Iterable[Rule], skills: int) -> list[int]:
     return sorted({skill for rule in permits for skill in rule.skills or range(skills)})
 
 
-class _Made:
-    """Makes items, and asks what is impossible; how the zones lie is found out once."""
+class _ItemBuilder:
+    """Makes items and finds their impossible goals."""
 
     def __init__(self, prepared: PreparedPolicy) -> None:
         self._prepared = prepared
         self._questions = Questions(prepared)
 
     def rule(self, group: Sequence[Rule]) -> CoverageItem:
-        """One rule, in all its flat forms."""
+        """The item of a rule, from all its flat forms."""
         first = group[0]
         every = range(len(self._prepared.policy.contracts))
-        asked = [(skill, node) for rule in group for skill in rule.skills or every for node in [self._when(rule)]]
+        cases = [(skill, node) for rule in group for skill in rule.skills or every for node in [self._when(rule)]]
         possible = {
             goal
             for truth, goal in TRUTHS.items()
-            if any((truth == TRUE) if node is None else self._possible(skill, node, truth) for skill, node in asked)
+            if any((truth == TRUE) if node is None else self._possible(skill, node, truth) for skill, node in cases)
         }
         decides = {Goal.TRUE} if first.kind == RuleKind.PERMIT else {Goal.TRUE, Goal.UNKNOWN}
         where = Where(first.source, first.start, first.end)
         return _coverage_item(RuleKind(first.kind).name.lower(), "", first.text, where, possible, decides)
 
     def clause(self, skill: int, role: str, clause: Clause) -> CoverageItem:
-        """A condition of a skill. Over a planned volume, a comparison of sums may be false where no place of it is, so
-        that a `maintain` clause is never shown not to be false.
+        """The item of a clause of a skill.
+
+        A `maintain` clause can always be false: over a planned volume, a comparison of sums may be false although it
+        holds at every place of the volume.
         """
         contract = self._prepared.policy.contracts[skill]
         node = self._prepared.compiler.node(clause, contract)
@@ -191,7 +191,7 @@ class _Made:
         return _coverage_item(role, contract.name, clause.text, where, possible, {Goal.FALSE, Goal.UNKNOWN})
 
     def energy(self, contract: Contract) -> CoverageItem:
-        """The charge that a skill needs: none is too little where it needs none."""
+        """The item of the charge that a skill needs. If it needs none, no charge is too low."""
         vehicle = self._prepared.policy.vehicle
         energy = Energy(contract, vehicle)
         possible = {Goal.TRUE, Goal.FALSE, Goal.UNKNOWN}
@@ -205,8 +205,9 @@ class _Made:
         return self._prepared.compiler.when(rule)
 
     def _possible(self, skill: int, node: tree.Node, truth: Truth) -> bool:
-        """Whether a condition may have a truth in some situation of a skill; false only where it is proved not to. What
-        asks for the time is unknown only where the clock may be wrong.
+        """Whether a condition may have a truth in some situation of a skill; False only if that is proved impossible.
+
+        A condition on the time can be unknown only if the clock has an error.
         """
         space = self._questions.space(skill)
         if truth == UNKNOWN:
@@ -223,7 +224,7 @@ def _airspace(airspace: Airspace) -> CoverageItem:
 def _coverage_item(
     role: str, skill: str, text: str, where: Where | None, possible: set[Goal], decides: set[Goal]
 ) -> CoverageItem:
-    """An item; it can decide where it can have one of the truths that decide."""
+    """Make an item, which can decide if it can have one of the truths `decides`."""
     if possible & decides:
         possible = possible | {Goal.DECIDED}
     every = (Goal.TRUE, Goal.FALSE, Goal.UNKNOWN, Goal.DECIDED)

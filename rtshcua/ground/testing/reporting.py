@@ -1,4 +1,4 @@
-"""What tests found, as JSON and as the suites of JUnit. E1610: what flights of scenarios found, as findings too."""
+"""The results of tests and scenarios, as JSON, as JUnit suites and, for scenarios, as findings."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -19,19 +19,19 @@ from rtshcua.model.flat.policy import Policy
 
 
 def tests_json(ran: Iterable[CaseResult], sources: Mapping[str, Source]) -> list[dict[str, Any]]:
-    """One object a case, in the order of the text; every key is always there."""
+    """The JSON of cases, in source order. Every key is always present."""
     return [_case_json(each, sources) for each in ran]
 
 
 def summary_json(ran: Sequence[CaseResult]) -> dict[str, int]:
-    """How many tests and cases there were, and how they ended."""
+    """The numbers of tests and cases, and of those that passed and failed."""
     passed = sum(each.met for each in ran)
     tests = len({(each.case.test.span.file, each.case.test.span.start) for each in ran})
     return {"tests": tests, "cases": len(ran), "passed": passed, "failed": len(ran) - passed}
 
 
 def coverage_json(covered: Sequence[PolicyCoverage], sources: Mapping[str, Source]) -> dict[str, Any]:
-    """The coverage of all policies together and of each, by clause."""
+    """The JSON of the total coverage and of each policy's, by clause."""
     reached, total = sum(one.coverage.covered for one in covered), sum(one.coverage.total for one in covered)
     return _share_json(reached, total) | {"policies": [_policy_json(one, sources) for one in covered]}
 
@@ -39,7 +39,7 @@ def coverage_json(covered: Sequence[PolicyCoverage], sources: Mapping[str, Sourc
 def case_suites(
     ran: Iterable[CaseResult], sources: Mapping[str, Source], covered: Sequence[PolicyCoverage] | None
 ) -> tuple[Suite, ...]:
-    """A suite for each file, a test of it for each case; what all of them cover is in the properties of the first."""
+    """The JUnit suites, one for each file with a test for each case. The first has the coverage as properties."""
     files = [(file, tuple(group)) for file, group in groupby(ran, lambda each: each.case.span.file)]
     properties = () if covered is None else tuple(_properties(covered))
     return tuple(
@@ -49,17 +49,17 @@ def case_suites(
 
 
 def policy_name(policy: Policy) -> str:
-    """A policy as missions name it."""
+    """The name of a policy with its version, as in missions."""
     return f"{policy.name}@{policy.version}"
 
 
 def clause_words(item: CoverageItem) -> str:
-    """A clause with the skill and the list that it belongs to; a rule, and an airspace, says by itself what it is."""
+    """The text of a clause with its skill and list; the text alone for a rule or an airspace."""
     return f"{item.skill} {item.role}: {item.text}" if item.skill else item.text
 
 
 def place_json(span: Span | None, sources: Mapping[str, Source]) -> dict[str, Any] | None:
-    """A place in a source."""
+    """The JSON of a span; None if there is none."""
     if span is None:
         return None
     at = sources[span.file].position(span.start)
@@ -132,12 +132,12 @@ def _policy_json(one: PolicyCoverage, sources: Mapping[str, Source]) -> dict[str
     return head | {"decisions": found.decisions} | _share_json(found.covered, found.total) | {"clauses": clauses}
 
 
-#: of a failure that is no expectation's: its number among them
+#: the number of a failure that the judge found
 JUDGED: Final = -1
 
 
 class FlightFailure(NamedTuple):
-    """What is wrong with a flight: the number of an expectation, or `JUDGED` with the judge's slug; and in words."""
+    """A failure of a flight: the number of an expectation, or `JUDGED` with the judge's slug; and a text."""
 
     expectation: int
     slug: str
@@ -146,8 +146,8 @@ class FlightFailure(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class FlightResult:
-    """What came of a flight. `reached`: what it covers of its policy, each time that a step was decided on; `took_us`:
-    how long it took to fly and judge, by the machine's clock; `notes`: why a run of it did not begin, in words.
+    """The result of a flight. `reached` are the coverage goals of each decision on a step; `took_us` is the real time
+    of the flight and the judge; `notes` say why a run did not begin.
     """
 
     number: int
@@ -163,7 +163,7 @@ class FlightResult:
 
 
 class ScenarioResult(NamedTuple):
-    """A scenario with all of its flights, and a finding (E1610) for each thing that went wrong in some of them."""
+    """A scenario with all of its flights, and a finding for each kind of failure."""
 
     scenario: ScenarioFlight
     flights: tuple[FlightResult, ...]
@@ -171,17 +171,17 @@ class ScenarioResult(NamedTuple):
 
     @property
     def failed(self) -> int:
-        """In how many flights something went wrong."""
+        """The number of flights with a failure."""
         return sum(bool(each.wrong) for each in self.flights)
 
     @property
     def endings(self) -> dict[str, int]:
-        """How many flights ended in which way."""
+        """The number of flights by ending."""
         return dict(sorted(Counter(each.ending for each in self.flights).items()))
 
 
 def findings(scenario: ScenarioFlight, flights: Sequence[FlightResult]) -> Iterator[Diagnostic]:
-    """One for each expectation that some flight did not meet, and one for each failure that the judge found."""
+    """Yield a finding for each expectation that a flight did not meet, and for each failure that the judge found."""
     found: dict[tuple[int, str], list[tuple[FlightResult, str]]] = {}
     for flight in flights:
         for expectation, slug, text in flight.wrong:
@@ -190,7 +190,7 @@ def findings(scenario: ScenarioFlight, flights: Sequence[FlightResult]) -> Itera
         (first, text), many = failed[0], len(failed)
         where = f"on {first.flavour} with seed {first.seed}"
         others = f", and in {many - 1} more of {len(flights)} flights" if many > 1 else ""
-        what = text if expectation == JUDGED else f"{text}, which is not as expected"
+        what = text if expectation == JUDGED else f"{text}, which was not expected"
         head = f"`{slug}`: " if expectation == JUDGED else ""
         yield Diagnostic(
             codes.FLIGHT_FAILED,
@@ -210,12 +210,12 @@ def _expectation_span(scenario: ScenarioFlight, expectation: int) -> Span:
 def _flight_help(flight: FlightResult) -> str:
     happened = ", ".join(flight.happened)
     before = f"before it ended as `{flight.ending}`"
-    told = f"{before}: {happened}" if happened else f"nothing went wrong {before}"
-    return "; ".join((told, *flight.notes))
+    history = f"{before}: {happened}" if happened else f"no fault occurred {before}"
+    return "; ".join((history, *flight.notes))
 
 
 def scenarios_json(flown: Sequence[ScenarioResult], sources: Mapping[str, Source]) -> list[dict[str, Any]]:
-    """One object a scenario, in the order of the text, with one for each flight; every key is always there."""
+    """The JSON of scenarios, in source order, each with its flights. Every key is always present."""
     return [
         {
             "name": each.scenario.scenario.name,
@@ -240,7 +240,7 @@ def scenarios_json(flown: Sequence[ScenarioResult], sources: Mapping[str, Source
 
 
 def scenario_suites(flown: Sequence[ScenarioResult], sources: Mapping[str, Source]) -> tuple[Suite, ...]:
-    """A suite for each file, a test of it for each scenario."""
+    """The JUnit suites, one for each file with a test for each scenario."""
     files = groupby(flown, lambda each: each.scenario.declaration.span.file)
     return tuple(Suite(file, tuple(_scenario_outcome(each, sources) for each in group), ()) for file, group in files)
 

@@ -1,7 +1,4 @@
-"""E1404, E1410, E1607, E1609: scenarios as they are flown, with their mission and its policy as `compile` makes them.
-
-`virtual` flies them.
-"""
+"""Lowers scenarios, with their mission and its policy. `virtual` flies them."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -69,7 +66,7 @@ T = TypeVar("T")
 
 
 class ScenarioMission(NamedTuple):
-    """A mission that a scenario flies, and its policy, lowered and prepared, with the files of both."""
+    """The mission of a scenario and its policy, lowered and prepared."""
 
     policy: PolicyUnderTest
     mission: Mission
@@ -78,7 +75,7 @@ class ScenarioMission(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScenarioFlight:
-    """A scenario with all that flying it needs: policy and mission as `compile` has them, not yet bound."""
+    """A scenario with its policy and mission, which are not yet bound."""
 
     declaration: ScenarioDecl
     scenario: Scenario
@@ -88,9 +85,9 @@ class ScenarioFlight:
 
 @dataclass(frozen=True, slots=True)
 class ScenarioSuite:
-    """The scenarios of the file that was asked for, in the order of the text; none where the sources have errors.
+    """The scenarios of the first file, in source order; none if the sources have errors.
 
-    `diagnostics` are all findings on the program, `sources` the texts that they speak of.
+    `diagnostics` are all findings on the program, `sources` the texts to which they refer.
     """
 
     found: tuple[ScenarioFlight, ...]
@@ -101,9 +98,9 @@ class ScenarioSuite:
 def scenarios_of(
     context: CheckContext, missions: Mapping[str, ScenarioMission], names: Mapping[str, str]
 ) -> Iterator[ScenarioFlight]:
-    """The scenarios in `context`, which were checked; without those in which something is found.
+    """Yield the checked scenarios in `context`, except those with findings.
 
-    `missions` are those that were lowered, by their name, `names` what files are called in what is signed.
+    `missions` are the lowered ones by name; `names` are the signed names of files.
     """
     for declaration in context.symbols.scenarios:
         under = missions.get(declaration.mission.text)
@@ -114,7 +111,7 @@ def scenarios_of(
 
 
 class _Lowering:
-    """One scenario's lowering."""
+    """Lowers the scenarios of one mission."""
 
     def __init__(self, context: CheckContext, under: ScenarioMission, names: Mapping[str, str]) -> None:
         self._context = context
@@ -125,7 +122,7 @@ class _Lowering:
         )
 
     def scenario(self, declaration: ScenarioDecl) -> Scenario | None:
-        """The scenario; None after a finding."""
+        """Lower a scenario; None after a finding."""
         before = len(self._context.report.found)
         incidents = _all_or_none(
             [
@@ -176,13 +173,13 @@ class _Lowering:
                 return None if condition is None else LoweredOnCondition(condition, *_delay(moment.delay))
 
     def _step(self, moment: AfterStepDecl) -> int:
-        """The number of the step in the mission, of all steps of that skill the one that is meant."""
+        """The index in the mission of the step that a moment refers to."""
         steps = [step.skill.text for phase in self._under.declaration.phases for step in phase.steps]
         numbers = [number for number, name in enumerate(steps) if name == moment.skill.text]
         return numbers[0 if moment.number is None else moment.number.value - 1]
 
     def _condition(self, moment: OnConditionDecl) -> Clause | None:
-        """The condition with the slots and zones of the policy: with either safe side of a grown zone that it has."""
+        """Lower a condition with the slots and zones of the policy, with either safe side of a grown zone."""
         lacking: list[MissingFromPolicy] = []
         for strict in (True, False):
             place = ConditionPlace(self._context.scope(), {}, strict)
@@ -195,7 +192,7 @@ class _Lowering:
                 codes.UNREAD_TRIGGER,
                 each.span,
                 f"the condition {each.what}",
-                help=f"wait for what the policy of the mission uses; {each.has}",
+                help=f"use what the policy of the mission uses; {each.has}",
                 labels=[(self._lowered.declaration.name.span, "the policy is declared here")],
             )
         return None
@@ -210,7 +207,7 @@ class _Lowering:
             codes.NO_SUCH_ROLE,
             written.value.span,
             f"no rule of `{self._lowered.policy.name}` is about the role `{fault.role}`",
-            help=suggestion(fault.role, roles) or "its rules are about " + ", ".join(f"`{each}`" for each in roles),
+            help=suggestion(fault.role, roles) or "known roles: " + ", ".join(f"`{each}`" for each in roles),
             fix=correction(self._context.report, written.value.span, fault.role, roles),
             labels=[(self._lowered.declaration.name.span, "the policy is declared here")],
         )
@@ -256,7 +253,7 @@ class _Lowering:
         )
 
     def _flies(self, skill: Name) -> bool:
-        """Whether a skill can fly under the policy at all; reports it where it cannot."""
+        """Whether a skill can fly under the policy; report it if it cannot."""
         known = self._lowered.skills
         if skill.text in known:
             return True
@@ -264,7 +261,7 @@ class _Lowering:
             codes.NEVER_DECIDED,
             skill.span,
             f"`{skill.text}` never flies: no rule and no chain of `{self._lowered.policy.name}` names it",
-            help=suggestion(skill.text, known) or "what may fly is " + ", ".join(f"`{each}`" for each in known),
+            help=suggestion(skill.text, known) or "skills that may fly: " + ", ".join(f"`{each}`" for each in known),
             fix=correction(self._context.report, skill.span, skill.text, known),
         )
         return False
@@ -274,14 +271,14 @@ class _Lowering:
         return self._lowered.zones.index[zone.text] if known else None
 
     def _clause(self, quoted: Quoted) -> str | None:
-        """The text, as a decision carries it, of the one clause that is quoted; None, and reported, where none is."""
+        """The text of the quoted clause in a decision; report an error and return None if there is not exactly one."""
         texts = dict(self._decisive())
         fitting = list(dict.fromkeys(carried for text, carried in texts.items() if quotes(quoted.text, text)))
         if len(fitting) == 1:
             return fitting[0]
         near, help = (None, "") if fitting else clause_meant(quoted.text, map(shortened, texts))
         several = f"`{shortened(quoted.text)}` quotes the beginning of several clauses"
-        none = f"no decision on this mission is made by a clause `{shortened(quoted.text)}`"
+        none = f"no clause `{shortened(quoted.text)}` can decide on this mission"
         self._context.report.add(
             codes.UNKNOWN_CLAUSE,
             quoted.span,
@@ -292,7 +289,7 @@ class _Lowering:
         return None
 
     def _decisive(self) -> Iterator[tuple[str, str]]:
-        """All clauses that a decision of the flight can name: all of the text, and what of it is carried on board."""
+        """Yield the full text of each clause that a decision of the flight can name, and its text on board."""
         policy, mission = self._lowered.policy, self._under.mission
         contracts = (*(step.contract for step in mission.invocations), *policy.contracts)
         for contract in contracts:
@@ -316,6 +313,6 @@ def _incident(when: When | None, fault: Fault | None, text: str) -> Incident | N
 
 
 def _all_or_none(parts: Sequence[T | None]) -> tuple[T, ...] | None:
-    """The parts, if all of them are there."""
+    """The parts; None if one is missing."""
     found = tuple(part for part in parts if part is not None)
     return found if len(found) == len(parts) else None

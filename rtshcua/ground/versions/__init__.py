@@ -1,1 +1,1 @@
-"""A policy against an earlier one of its name: what it means, what differs, and whether its version says so."""
+"""Comparison of a policy with an earlier version: the differences, their direction, and the check of its version."""

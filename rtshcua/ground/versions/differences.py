@@ -1,8 +1,8 @@
-"""In what two policies differ, in a few words each, what matters most first.
+"""The differences between two policies, each in a few words, the most important first.
 
-Compared is what a flat policy means, without what only says where and how it was written. Names stand where the flat
-form has indexes, so that a declaration put in between changes nothing but itself. Files, offsets, digests and quoted
-texts are left out; so is what follows from the rest: slots, sets, tables, derived zones.
+The comparison uses the meaning of flat policies. Names replace the indexes of the flat form, so that an inserted
+declaration is one difference. Files, offsets, digests and quoted texts are ignored, and so are derived data: slots,
+sets, tables, derived zones.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -18,7 +18,7 @@ Fields = Mapping[str, Part]
 
 
 class RuleMeaning(NamedTuple):
-    """What a rule means, and its text."""
+    """The meaning of a rule, and its text."""
 
     meaning: tuple[Part, ...]
     kind: int
@@ -29,7 +29,7 @@ class RuleMeaning(NamedTuple):
 class PolicyMeaning:
     """The parts of a policy by name; `zones` are the declared zones that count as members of sets.
 
-    `moved` leaves out local coordinates, for they count from home.
+    `moved` omits local coordinates, because they are relative to home.
     """
 
     def __init__(self, policy: Policy, zones: frozenset[str], *, moved: bool) -> None:
@@ -43,7 +43,7 @@ class PolicyMeaning:
                 self._slots[signal.slot + 1] = f"{signal.name}.y"
 
     def vehicle(self) -> Fields:
-        """The vehicle by field, and its home."""
+        """The fields of the vehicle, with its home."""
         vehicle, projection = self._policy.vehicle, self._policy.projection
         return {
             "name": vehicle.name,
@@ -73,7 +73,7 @@ class PolicyMeaning:
         }
 
     def signals(self) -> Mapping[str, Fields]:
-        """The signals that are read."""
+        """The signals that the policy reads."""
         return {
             signal.name: {
                 "type": (signal.kind, signal.dimension, tuple(sorted(signal.labels))),
@@ -84,7 +84,7 @@ class PolicyMeaning:
         }
 
     def skills(self) -> Mapping[str, Fields]:
-        """The contracts."""
+        """The contracts of the skills."""
         return {contract.name: self._contract(contract) for contract in self._policy.contracts}
 
     def rules(self) -> tuple[RuleMeaning, ...]:
@@ -92,7 +92,7 @@ class PolicyMeaning:
         return tuple(map(self._rule, self._policy.rules))
 
     def airspace(self) -> Part:
-        """The zones to be inside and outside of."""
+        """The zones to stay inside and outside of."""
         airspace = self._policy.airspace
         return None if airspace is None else (self._names(airspace.inside), self._names(airspace.outside))
 
@@ -101,11 +101,11 @@ class PolicyMeaning:
         return self._chain(self._policy.contingency)
 
     def without_evidence(self) -> Part:
-        """What a flight does while its records are not kept."""
+        """The action of a flight while its records cannot be kept."""
         return self._policy.without_evidence
 
     def without_link(self) -> Part:
-        """What follows after a long silence of the vehicle, and after how long."""
+        """The limit of a silence of the vehicle, and the action after it."""
         return self._policy.silence_us, self._policy.after_silence
 
     def without(self) -> frozenset[str]:
@@ -152,8 +152,8 @@ class PolicyMeaning:
 
     def _link(self, link: Link) -> Part:
         contract = self._policy.contracts[link.skill]
-        given = tuple(self._argument(parameter, link.arguments) for parameter in contract.parameters)
-        return contract.name, given, link.limit_us
+        arguments = tuple(self._argument(parameter, link.arguments) for parameter in contract.parameters)
+        return contract.name, arguments, link.limit_us
 
     def _argument(self, parameter: Parameter, cells: tuple[int, ...]) -> Part:
         value = cells[parameter.cell]
@@ -212,25 +212,25 @@ class PolicyMeaning:
 
 
 def _parameter(parameter: Parameter) -> Part:
-    """A parameter; one that is a zone may be any, so how many there are says nothing of it."""
+    """A parameter. A zone parameter may be any zone, so its range is ignored."""
     ends = None if parameter.kind == ZONE else (parameter.low, parameter.high)
     return parameter.name, parameter.kind, parameter.dimension, parameter.cell, ends, parameter.labels
 
 
-#: so much of a rule's text is quoted
+#: the most characters of a rule's text that are quoted
 _QUOTED = 60
 
 
 class Difference(NamedTuple):
-    """One thing that differs: in a few words, and what it is (`rule`, `order`, `airspace`, `contingency`, `evidence`,
-    `silence`, `sensor`, `vehicle`, `zone`, `skill`, `signal`).
+    """One difference: its text, and its kind (`rule`, `order`, `airspace`, `contingency`, `evidence`, `silence`,
+    `sensor`, `vehicle`, `zone`, `skill`, `signal`).
 
-    A `rule` has its texts, empty where there is none; what has fields has its name, and which of them differ: all of
-    them, where it is new or gone.
+    A `rule` has its old and new text, empty if there is none. A part with fields has its name and the fields that
+    differ: all fields if it is new or removed.
     """
 
-    told: str
-    what: str
+    text: str
+    kind: str
     name: str = ""
     fields: tuple[str, ...] = ()
     before: str = ""
@@ -238,12 +238,12 @@ class Difference(NamedTuple):
 
 
 def differences(old: Policy, new: Policy) -> tuple[str, ...]:
-    """What `new` says otherwise than `old`, in a few words each."""
-    return tuple(each.told for each in compared(old, new))
+    """Return the texts of the differences between two policies."""
+    return tuple(each.text for each in compared(old, new))
 
 
 def compared(old: Policy, new: Policy) -> tuple[Difference, ...]:
-    """What `new` says otherwise than `old`; nothing where both mean the same. Versions and names do not count."""
+    """Return the differences between two policies; empty if both mean the same. Versions and names are ignored."""
     zones = frozenset(zone.name for zone in old.zones[: old.declared])
     common = zones & {zone.name for zone in new.zones[: new.declared]}
     moved = old.projection != new.projection
@@ -251,10 +251,10 @@ def compared(old: Policy, new: Policy) -> tuple[Difference, ...]:
 
 
 def _differences(old: PolicyMeaning, new: PolicyMeaning) -> Iterator[Difference]:
-    # what is no longer watched comes first: a finding tells of few differences
+    # a missing sensor comes first, because a finding lists only a few differences
     for name in sorted(new.without() - old.without()):
-        words = f"looser: the vehicle is now without the signal `{name}`, and clauses `where fitted` on it are left out"
-        yield Difference(words, "sensor", name)
+        text = f"looser: the vehicle is now without the signal `{name}`, and its clauses `where fitted` are left out"
+        yield Difference(text, "sensor", name)
     for name in sorted(old.without() - new.without()):
         yield Difference(f"the vehicle is no longer without the signal `{name}`", "sensor", name)
     yield from _rules(old.rules(), new.rules())
@@ -263,9 +263,9 @@ def _differences(old: PolicyMeaning, new: PolicyMeaning) -> Iterator[Difference]
     if old.contingency() != new.contingency():
         yield Difference("the contingency", "contingency")
     if old.without_evidence() != new.without_evidence():
-        yield Difference("what is done without evidence", "evidence")
+        yield Difference("the action without evidence", "evidence")
     if old.without_link() != new.without_link():
-        yield Difference("what flies after a silence of the vehicle", "silence")
+        yield Difference("the action after a silence of the vehicle", "silence")
     vehicle = _fields(old.vehicle(), new.vehicle())
     if vehicle:
         yield Difference(f"the vehicle ({', '.join(vehicle)})", "vehicle", fields=vehicle)
@@ -274,16 +274,16 @@ def _differences(old: PolicyMeaning, new: PolicyMeaning) -> Iterator[Difference]
     yield from _named("signal", old.signals(), new.signals())
 
 
-def _named(what: str, old: Mapping[str, Fields], new: Mapping[str, Fields]) -> Iterator[Difference]:
+def _named(kind: str, old: Mapping[str, Fields], new: Mapping[str, Fields]) -> Iterator[Difference]:
     for name, fields in new.items():
         if name not in old:
-            yield Difference(f"the new {what} `{name}`", what, name, tuple(fields))
+            yield Difference(f"the new {kind} `{name}`", kind, name, tuple(fields))
         elif fields != old[name]:
             differ = _fields(old[name], fields)
-            yield Difference(f"the {what} `{name}` ({', '.join(differ)})", what, name, differ)
+            yield Difference(f"the {kind} `{name}` ({', '.join(differ)})", kind, name, differ)
     for name, fields in old.items():
         if name not in new:
-            yield Difference(f"the {what} `{name}`, which is gone", what, name, tuple(fields))
+            yield Difference(f"the removed {kind} `{name}`", kind, name, tuple(fields))
 
 
 def _fields(old: Fields, new: Fields) -> tuple[str, ...]:
@@ -291,29 +291,34 @@ def _fields(old: Fields, new: Fields) -> tuple[str, ...]:
 
 
 def _rules(old: tuple[RuleMeaning, ...], new: tuple[RuleMeaning, ...]) -> Iterator[Difference]:
-    gone, more = _without(old, new), _without(new, old)
-    for rule in more:
-        before = next((each for each in gone if each.kind == rule.kind and _alike(each, rule)), None)
-        if before is not None:
-            gone.remove(before)
-        told = f"the {'new ' if before is None else ''}rule `{_quoted(rule)}`"
-        yield Difference(told, "rule", before="" if before is None else before.text, after=rule.text)
-    for rule in gone:
-        yield Difference(f"the rule `{_quoted(rule)}`, which is gone", "rule", before=rule.text)
-    for kind in (RuleKind.CONFIRM, RuleKind.DEGRADE):  # of these the first that holds decides
-        order = [[rule.meaning for rule in rules if rule.kind == kind] for rules in (old, new)]
-        if not more and not gone and order[0] != order[1]:
-            yield Difference(f"the order of its `{kind.name.lower()}` rules", "order", kind.name.lower())
+    removed, added = _without(old, new), _without(new, old)
+    for rule in added:
+        before = next((each for each in removed if _alike(each, rule)), None)
+        if before is None:
+            yield Difference(f"the new rule `{_quoted(rule)}`", "rule", after=rule.text)
+        else:
+            removed.remove(before)
+            yield Difference(f"the rule `{_quoted(rule)}`", "rule", before=before.text, after=rule.text)
+    for rule in removed:
+        yield Difference(f"the removed rule `{_quoted(rule)}`", "rule", before=rule.text)
+    if not added and not removed:
+        for kind in (RuleKind.CONFIRM, RuleKind.DEGRADE):  # the first of these that holds decides
+            if _order(old, kind) != _order(new, kind):
+                yield Difference(f"the order of its `{kind.name.lower()}` rules", "order", kind.name.lower())
+
+
+def _order(rules: tuple[RuleMeaning, ...], kind: RuleKind) -> list[tuple[Part, ...]]:
+    return [rule.meaning for rule in rules if rule.kind == kind]
 
 
 def _without(rules: tuple[RuleMeaning, ...], others: tuple[RuleMeaning, ...]) -> list[RuleMeaning]:
-    """The rules whose meaning none of the others has; one that is written twice says no more than once."""
+    """The rules with a meaning that no other rule has."""
     known = {rule.meaning for rule in others}
     return [rule for rule in rules if rule.meaning not in known]
 
 
 def _alike(one: RuleMeaning, other: RuleMeaning) -> bool:
-    return one.skills == other.skills or not one.skills.isdisjoint(other.skills)
+    return one.kind == other.kind and (one.skills == other.skills or not one.skills.isdisjoint(other.skills))
 
 
 def _quoted(rule: RuleMeaning) -> str:

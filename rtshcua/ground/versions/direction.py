@@ -1,8 +1,8 @@
 """Whether one difference between two policies makes the newer one stricter or looser, as far as intervals decide it.
 
-Each difference is judged by itself: stricter means that whatever passes it now passed it before. Conditions are
-compared as conjunctions of bounds on one signal or argument each; anything else must be the same on both sides.
-Everything that this does not decide is `CANNOT_TELL`, never a guess.
+Each difference is judged by itself: stricter means that everything that passes now also passed before. Conditions are
+compared as conjunctions of bounds on one signal or argument each; all other parts must be equal on both sides. In all
+other cases the result is `CANNOT_TELL`.
 """
 
 import re
@@ -16,17 +16,17 @@ from rtshcua.model.flat.zone import CIRCLE, Zone
 
 STRICTER, LOOSER, CANNOT_TELL = "stricter", "looser", "cannot tell"
 
-#: bounds on integers: whether it is an upper one, and how far from the constant it is
+#: the bounds of a comparison with an integer: whether the bound is an upper one, and its offset from the constant
 _BOUNDS: Final = {Op.LE: ((True, 0),), Op.LT: ((True, -1),), Op.GE: ((False, 0),), Op.GT: ((False, 1),),
                   Op.EQ: ((True, 0), (False, 0))}  # fmt: skip
-#: fields of which less is stricter. Not `energy` and `lasts`: less of them lets a step begin with less charge, or later
-#: in the active time of a zone
+#: fields of which less is stricter. Not `energy` and `lasts`: with less of them a step may begin with less charge, or
+#: later in the active time of a zone
 _LESS: Final = frozenset({"deadline", "stale"})
 _CLAUSES: Final = frozenset({"require", "assume", "maintain"})
 
 
 class Bound(NamedTuple):
-    """What a condition asks of one signal or argument: at most (`upper`) or at least a value."""
+    """A bound of a condition on one signal or argument: at most (`upper`) or at least a value."""
 
     subject: tuple[Any, ...]
     upper: bool
@@ -34,19 +34,19 @@ class Bound(NamedTuple):
 
 
 def direction(one: Difference, old: Policy, new: Policy) -> str:
-    """What one difference does: `STRICTER`, `LOOSER` or `CANNOT_TELL`."""
+    """The direction of one difference: `STRICTER`, `LOOSER` or `CANNOT_TELL`."""
     common = {zone.name for zone in old.zones[: old.declared]} & {zone.name for zone in new.zones[: new.declared]}
     moved = old.projection != new.projection
     before, after = (PolicyMeaning(policy, frozenset(common), moved=moved) for policy in (old, new))
-    match one.what:
+    match one.kind:
         case "sensor":
-            return LOOSER if one.name in new.vehicle.without else STRICTER
+            return _stricter_if(one.name not in new.vehicle.without)
         case "rule":
             return _rule(_written(before, one.before), _written(after, one.after))
         case "airspace":
             return _airspace(before.airspace(), after.airspace())
         case "evidence":
-            return LOOSER if new.without_evidence > old.without_evidence else STRICTER
+            return _stricter_if(new.without_evidence <= old.without_evidence)
         case "silence":
             return _silence(old, new)
         case "vehicle":
@@ -62,14 +62,16 @@ def direction(one: Difference, old: Policy, new: Policy) -> str:
 
 
 def _joined(found: Sequence[str]) -> str:
-    """What several parts come to: one way, or it cannot be told."""
+    """The direction of several parts: their common one, or `CANNOT_TELL`."""
     return found[0] if found and len(set(found)) == 1 else CANNOT_TELL
 
 
-def _towards(*, stricter: bool, looser: bool) -> str:
-    if stricter is looser:
-        return CANNOT_TELL
+def _stricter_if(stricter: bool) -> str:
     return STRICTER if stricter else LOOSER
+
+
+def _towards(*, stricter: bool, looser: bool) -> str:
+    return CANNOT_TELL if stricter is looser else _stricter_if(stricter)
 
 
 def _turned(found: str) -> str:
@@ -85,27 +87,26 @@ def _written(meaning: PolicyMeaning, text: str) -> RuleMeaning | None:
 
 def _rule(old: RuleMeaning | None, new: RuleMeaning | None) -> str:
     kind = (new or old or RuleMeaning((), RuleKind.DEGRADE, frozenset(), "")).kind
-    if kind == RuleKind.DEGRADE:  # what flies instead may be safer or not
+    if kind == RuleKind.DEGRADE:  # its target may be safer or not
         return CANNOT_TELL
     if old is None or new is None:
-        more = new is not None
-        return LOOSER if more is (kind == RuleKind.PERMIT) else STRICTER
+        return _stricter_if((new is not None) is not (kind == RuleKind.PERMIT))
     wider = _wider(old.meaning, new.meaning)
     return _turned(wider) if kind != RuleKind.PERMIT else wider
 
 
 def _wider(old: tuple[Any, ...], new: tuple[Any, ...]) -> str:
-    """Of a rule that permits: `LOOSER` where it holds in more cases."""
+    """The direction of a rule that permits: `LOOSER` if it holds in more cases."""
     found = [
         _towards(stricter=_within(new[at], old[at]), looser=_within(old[at], new[at]))
-        for at in (1, 2, 3)  # skills, roles, sources: none is any
+        for at in (1, 2, 3)  # skills, roles, sources; an empty set means any
         if old[at] != new[at]
     ]
     if old[4] != new[4]:
         was, now = _conjunction(old[4] or ()), _conjunction(new[4] or ())
         found.append(_towards(stricter=_implies(now, was), looser=_implies(was, now)))
-    if old[6] != new[6]:  # another person too: of a `confirm`, whose way is turned
-        found.append(LOOSER if not old[6] else STRICTER if not new[6] else CANNOT_TELL)
+    if old[6] != new[6]:  # the second person of a `confirm`, whose direction the caller inverts
+        found.append(CANNOT_TELL if old[6] and new[6] else _stricter_if(bool(old[6])))
     if (old[5], *old[7:]) != (new[5], *new[7:]):
         return CANNOT_TELL
     return _joined(found)
@@ -119,8 +120,8 @@ def _within(some: frozenset[Any], others: frozenset[Any]) -> bool:
 
 
 def _conjunction(code: Iterable[tuple[Any, ...]]) -> tuple[Any, ...]:
-    """What must hold all together: bounds, and other parts as they are. Nothing: always true."""
-    stack: list[tuple[tuple[Any, ...], tuple[Any, ...]]] = []  # each with its own code, and its conjunction
+    """The parts of a conjunction: bounds, and the code of other parts. Empty means always true."""
+    stack: list[tuple[tuple[Any, ...], tuple[Any, ...]]] = []  # code, and its conjunction
     for step in code:
         op = step[0]
         if op in (Op.CONST, Op.SIGNAL, Op.ARGUMENT, Op.SIGNAL_IN, Op.ARGUMENT_IN, Op.KNOWN, Op.POSITION_IN,
@@ -158,7 +159,7 @@ def _narrower(one: Any, other: Any) -> bool:
 
 def _airspace(old: Any, new: Any) -> str:
     if old is None or new is None:
-        return LOOSER if new is None else STRICTER
+        return _stricter_if(new is not None)
     was, now = (frozenset({*(("in", each) for each in side[0]), *(("out", each) for each in side[1])})
                 for side in (old, new))  # fmt: skip
     return _towards(stricter=was <= now, looser=now <= was)
@@ -167,44 +168,40 @@ def _airspace(old: Any, new: Any) -> str:
 def _silence(old: Policy, new: Policy) -> str:
     found = []
     if old.silence_us != new.silence_us:
-        found.append(LOOSER if new.silence_us > old.silence_us else STRICTER)
+        found.append(_stricter_if(new.silence_us < old.silence_us))
     if old.after_silence != new.after_silence:
-        found.append(LOOSER if new.after_silence == AfterSilence.CONTINUE else STRICTER)
+        found.append(_stricter_if(new.after_silence != AfterSilence.CONTINUE))
     return _joined(found)
 
 
 def _vehicle(field: str, old: Policy, new: Policy) -> str:
-    if field == "reserve":
-        return STRICTER if new.vehicle.reserve > old.vehicle.reserve else LOOSER
-    return CANNOT_TELL
+    return _stricter_if(new.vehicle.reserve > old.vehicle.reserve) if field == "reserve" else CANNOT_TELL
 
 
 def _each(fields: Sequence[str], old: Fields | None, new: Fields | None) -> list[str]:
     if old is None or new is None:
-        return [CANNOT_TELL]  # whether it may be used at all, rules say
+        return [CANNOT_TELL]  # the rules decide whether it may be used at all
     return [_field(field, old, new) for field in fields]
 
 
 def _field(field: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
     was, now = old[field], new[field]
     if field == "grace":
-        return STRICTER if now < was else LOOSER
+        return _stricter_if(now < was)
     if field in _LESS:
-        if not was or not now:  # none at all
-            return STRICTER if now else LOOSER
-        return STRICTER if now < was else LOOSER
+        return _stricter_if(bool(now) and (not was or now < was))  # 0 is no limit
     if field in _CLAUSES:
         before, after = (tuple(each for code in side for each in _conjunction(code)) for side in (was, now))
         return _towards(stricter=_implies(after, before), looser=_implies(before, after))
     if field == "parameters":
         return _parameters(was, now)
     if field == "valid" and was[1] == now[1]:
-        return STRICTER if now[0] < was[0] else LOOSER
+        return _stricter_if(now[0] < was[0])
     return CANNOT_TELL
 
 
 def _parameters(old: tuple[Any, ...], new: tuple[Any, ...]) -> str:
-    """By their ranges, where they are the same parameters."""
+    """The direction of changed ranges, if the parameters are the same."""
     if [each[:4] for each in old] != [each[:4] for each in new]:
         return CANNOT_TELL
     found = []
@@ -221,7 +218,9 @@ def _parameters(old: tuple[Any, ...], new: tuple[Any, ...]) -> str:
 
 
 def _zone(one: Difference, old: Policy, new: Policy) -> str:
-    """A zone counts by what the airspace makes of it. One that conditions name too may be for or against something."""
+    """The direction of a changed zone, by its use in the airspace. A zone in conditions may be for or against a
+    request, so its direction is unknown.
+    """
     zones = [{zone.name: zone for zone in policy.zones[: policy.declared]} for policy in (old, new)]
     if one.name not in zones[0] or one.name not in zones[1] or any(_named(one.name, each) for each in (old, new)):
         return CANNOT_TELL
@@ -242,8 +241,10 @@ def _use(name: str, policy: Policy) -> str:
 
 
 def _named(name: str, policy: Policy) -> bool:
-    """Whether a condition names it, or asks of the zone that is an argument more than to be inside of it: that holds in
-    a larger zone wherever it held, as the airspace does.
+    """Whether a condition uses the zone, by name or as an argument.
+
+    A clause that the vehicle is inside an argument's zone does not count: like the airspace, it still holds if the zone
+    grows.
     """
     word = re.compile(rf"\b{re.escape(name)}\b")
     clauses = [
@@ -258,13 +259,13 @@ def _named(name: str, policy: Policy) -> bool:
 
 
 def _grown(field: str, was: Zone, now: Zone, old: Policy, new: Policy) -> str:
-    """Of a zone to be inside of: `LOOSER` where it is larger."""
+    """The direction of a zone to stay inside of: `LOOSER` if it is larger."""
     match field:
         case "floor":
-            return LOOSER if now.floor < was.floor else STRICTER
+            return _stricter_if(now.floor >= was.floor)
         case "ceiling":
-            return LOOSER if now.ceiling > was.ceiling else STRICTER
+            return _stricter_if(now.ceiling <= was.ceiling)
         case "shape" if old.projection == new.projection and was.shape == now.shape == CIRCLE:
             if was.data[:2] == now.data[:2]:
-                return LOOSER if now.data[2] > was.data[2] else STRICTER
+                return _stricter_if(now.data[2] <= was.data[2])
     return CANNOT_TELL

@@ -1,7 +1,6 @@
-"""E0716: a policy that says something else than an earlier one has a higher version.
+"""Checks that a policy that differs from an earlier one has a higher version.
 
-A vehicle never goes back to an older version of a policy; of two that have the same version it cannot tell which is
-the newer.
+A vehicle never goes back to an older version of a policy, and it cannot order two policies of the same version.
 """
 
 import re
@@ -16,8 +15,8 @@ from rtshcua.ground.versions.differences import differences
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.ir.policies import PolicyDecl
 
-#: of how many differences a finding tells
-MAX_TOLD = 3
+#: the most differences that a finding lists
+MAX_LISTED = 3
 
 _VERSION = re.compile(
     r"(?>(?:\s++|//[^\n]*+|/\*.*?\*/){0,999})version(?>(?:\s++|//[^\n]*+|/\*.*?\*/){0,999})(\d+)", re.DOTALL
@@ -25,7 +24,7 @@ _VERSION = re.compile(
 
 
 class VersionComparison(NamedTuple):
-    """A policy that an earlier one was found for, and what is wrong with its version."""
+    """A policy with its earlier version, and the finding about its version, if any."""
 
     name: str
     version: int
@@ -38,9 +37,9 @@ class VersionComparison(NamedTuple):
 def compare(
     policies: Iterable[LoweredPolicy], earlier: Sequence[Policy], where: str, sources: Mapping[str, Source]
 ) -> tuple[VersionComparison, ...]:
-    """Each policy against the earlier one of its name and vehicle; `where` says in a message where that is from.
+    """Compare each policy with the newest earlier one of its name and vehicle.
 
-    A policy for another vehicle is another policy: it is not compared. Of several earlier ones the newest counts.
+    `where` is the origin of the earlier policies, for messages. A policy for another vehicle is not compared.
     """
     found: list[VersionComparison] = []
     for lowered in policies:
@@ -52,7 +51,7 @@ def compare(
 
 
 def newest_earlier(policy: Policy, earlier: Iterable[Policy]) -> Policy | None:
-    """The earlier policy that one is held against: of its name and vehicle the newest."""
+    """Return the newest earlier policy of the same name and vehicle, or None."""
     own = [each for each in earlier if _same(each, policy)]
     return max(own, key=lambda each: (each.version, not differences(each, policy)), default=None)
 
@@ -70,25 +69,25 @@ def _finding(lowered: LoweredPolicy, old: Policy, where: str, sources: Mapping[s
     fix = Fix(span, str(next_version), f"raise it to version {next_version}")
     differ = differences(old, new)
     if new.version < old.version:
-        message = f"`{new.name}` has version {new.version}, and version {old.version} in `{where}`"
+        message = f"`{new.name}` has version {new.version}, but version {old.version} in `{where}`"
         help = f"a version never goes back: write version {next_version if differ else old.version}"
         fix = fix if differ else Fix(span, str(old.version), f"write version {old.version}")
     elif differ:
-        message = f"`{new.name}` differs from the one in `{where}`, and both have version {new.version}"
+        message = f"`{new.name}` differs from the one in `{where}`, but both have version {new.version}"
         help = f"raise it to version {next_version}, here and in the missions under it"
     else:
         return None
-    told = f"; it differs in {_told(differ)}" if differ else ""
-    return Diagnostic(codes.VERSION_NOT_RAISED, message, span, help + told, fixes=(fix,))
+    listed = f"; it differs in {_listed(differ)}" if differ else ""
+    return Diagnostic(codes.VERSION_NOT_RAISED, message, span, help + listed, fixes=(fix,))
 
 
-def _told(differ: tuple[str, ...]) -> str:
-    more = len(differ) - MAX_TOLD
-    return ", ".join(differ[:MAX_TOLD]) + (f", and {more} more" if more > 0 else "")
+def _listed(differ: tuple[str, ...]) -> str:
+    more = len(differ) - MAX_LISTED
+    return ", ".join(differ[:MAX_LISTED]) + (f", and {more} more" if more > 0 else "")
 
 
 def _version(policy: PolicyDecl, sources: Mapping[str, Source]) -> Span:
-    """The version's number; the policy's name, where its text cannot be had."""
+    """The span of the version number; that of the policy's name if the source is not available."""
     name = policy.name.span
     source = sources.get(name.file)
     found = None if source is None else _VERSION.match(source.text, name.end)

@@ -1,6 +1,6 @@
-"""Cases on both sides of every limit that a policy has: `generation` writes them as tests.
+"""Generates tests with cases on both sides of every limit of a policy (`generation`).
 
-The decision's own machinery finds a limit (`clause_limits`, `zone_edges`, `limit_search`); where another part of its
-condition hides it, `pivot` finds a situation in which it matters; `blocks` and `draft` write it. What is expected is
-what was decided when the case was run.
+`clause_limits`, `zone_edges` and `limit_search` find limits with the code of the decision. If another part of the
+condition hides a limit, `pivot` finds a situation in which it matters. `blocks` and `draft` write the tests, which
+expect the present decisions.
 """

@@ -1,4 +1,4 @@
-"""Blocks of cases for a scene and the limits around it."""
+"""Blocks of cases for a scene and its limits."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
@@ -21,13 +21,13 @@ from rtshcua.model.flat.contract import PLACE, SourceKind
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 
-#: how wrong the clock is in the case that asks what then; us
+#: the clock error in the case with an inexact clock; us
 _CLOCK_ERROR = 1_000_000
 
 
 class CaseFrame(NamedTuple):
-    """What the blocks about one skill and one who asks have in common: the scene, what it changes of the nominal, the
-    nominal's name, and the phase where that is not the nominal's; `label` tells it from others.
+    """The data that the blocks about one skill and requester share: the scene, its changes of the nominal, the name of
+    the nominal, and the phase if it differs from the nominal's. `label` is unique.
     """
 
     label: str
@@ -38,15 +38,16 @@ class CaseFrame(NamedTuple):
 
     @property
     def policy(self) -> Policy:
-        """The policy."""
+        """The policy of the scene."""
         return self.scene.invocation.policy.policy
 
 
 def tables(
     frame: CaseFrame, parts: Sequence[PolicyPart], limits: Iterable[ClauseLimit], bounds: Sequence[tuple[int, int]]
 ) -> Iterator[Block]:
-    """A table for each variable, and for each other situation in which it decides something. `bounds` are what each
-    slot may be.
+    """Yield a table for each variable, and for each other situation in which the variable decides something.
+
+    `bounds` are the ranges of the slots.
     """
     invocation = frame.scene.invocation
     grouped: dict[tuple[SceneVariable, tuple[tuple[SceneVariable, Value], ...]], list[ClauseLimit]] = {
@@ -72,7 +73,7 @@ def tables(
 
 
 def _ages(frame: CaseFrame, variable: SceneVariable) -> list[str]:
-    """What a signal is now, measured as long ago as it may be, and too long ago."""
+    """The present value of a signal, at the greatest accepted age and just above it."""
     if variable.argument or variable.at is None:
         return []
     signal, value = signal_of(frame.policy, variable.at), _present(frame, variable)
@@ -86,7 +87,7 @@ def _present(frame: CaseFrame, variable: SceneVariable) -> Value:
 
 
 def times(frame: CaseFrame, limits: Iterable[ClauseLimit]) -> Iterator[Block]:
-    """A test for each side of each moment at which something turns, and one at which the clock may be wrong."""
+    """Yield a test for each side of each limit in time, and one with an inexact clock."""
     for limit in limits:
         if limit.variable == TIME:
             for value in (limit.holds, limit.fails):
@@ -99,29 +100,23 @@ def times(frame: CaseFrame, limits: Iterable[ClauseLimit]) -> Iterator[Block]:
 
 
 def stretches(frame: CaseFrame) -> Iterator[Block]:
-    """A test on each side of what the contract says of time: its deadline since the release, its validity since the
-    issue.
-    """
+    """Yield tests on both sides of the contract's deadline since the release and validity since the issue."""
     flat = frame.scene.invocation.invocation
     contract, remaining = flat.contract, frame.scene.context.remaining_us
     spare = contract.deadline_us - remaining
     for us in (spare, spare + 1) if spare >= 0 else (0,):
         ago = case_values.duration_text(us)
-        said = f"released {ago} ago"
+        premise = f"released {ago} ago"
         comment = f"deadline {case_values.duration_text(contract.deadline_us)}"
-        yield block(frame, said, frame.made, comments=(comment,), premises=(said,))
+        yield block(frame, premise, frame.made, comments=(comment,), premises=(premise,))
     for us in (contract.validity_us, contract.validity_us + 1):
-        said, comment = (
-            f"issued {case_values.duration_text(us)} ago",
-            f"valid for {case_values.duration_text(contract.validity_us)}",
-        )
-        yield block(frame, said, frame.made, comments=(comment,), premises=(said,))
+        premise = f"issued {case_values.duration_text(us)} ago"
+        comment = f"valid for {case_values.duration_text(contract.validity_us)}"
+        yield block(frame, premise, frame.made, comments=(comment,), premises=(premise,))
 
 
 def phases(frame: CaseFrame) -> Iterator[Block]:
-    """A test before the phases in which the skill means something, and one after them; one for each phase that rules
-    ask for.
-    """
+    """Yield a test before and one after the phases in which the skill is valid, and one for each phase of the rules."""
     valid = frame.scene.invocation.invocation.contract.phases
     if valid:
         first = valid[0]
@@ -133,7 +128,7 @@ def phases(frame: CaseFrame) -> Iterator[Block]:
 
 
 def over_time(frame: CaseFrame, parts: Sequence[PolicyPart]) -> Iterator[Block]:
-    """A table for each condition over time that some part reads: each truth, whatever the signals are."""
+    """Yield a table for each condition over time that a part reads, with a row for each truth."""
     read = {atom.monitor for part in parts for atom in part.atoms if isinstance(atom, tree.MonitorSays)}
     for number in sorted(read):
         column = f"({case_values.monitor_text(frame.policy.monitors[number])})"
@@ -142,7 +137,7 @@ def over_time(frame: CaseFrame, parts: Sequence[PolicyPart]) -> Iterator[Block]:
 
 
 def answers(frame: CaseFrame, limits: Iterable[ClauseLimit]) -> Iterator[Block]:
-    """What becomes of a request that a person must confirm: approved, refused, and not answered in time."""
+    """Yield tests of a request that a person must confirm: approved, refused, and not answered in time."""
     policy = frame.policy
     for limit in limits:
         if limit.part.role != "confirm" or limit.variable == TIME:
@@ -151,10 +146,10 @@ def answers(frame: CaseFrame, limits: Iterable[ClauseLimit]) -> Iterator[Block]:
         here = frame.made | dict(limit.made) | {limit.variable: limit.holds}
         role, comments = policy.roles[rule.approver], _comments([limit])
         for word in ("approved", "refused"):
-            said = [f"{word} by role {role}"]
+            premises = [f"{word} by role {role}"]
             if rule.second != -1:
-                said.append(f"approved by role {policy.roles[rule.second]}")
-            yield block(frame, ", ".join(said), here, comments=comments, premises=tuple(said))
+                premises.append(f"approved by role {policy.roles[rule.second]}")
+            yield block(frame, ", ".join(premises), here, comments=comments, premises=tuple(premises))
         for us in (rule.within_us, rule.within_us + 1):
             ago = f"released {case_values.duration_text(us)} ago"
             yield block(frame, f"not answered, {ago}", here, comments=comments, premises=(ago,))
@@ -174,7 +169,7 @@ def block(
     clock: str = "",
     phase: str | None = None,
 ) -> Block:
-    """A block in the frame's scene, with some values changed of the nominal."""
+    """Make a block in the frame's scene, with some values changed from the nominal."""
     where = phase or frame.phase
     scene = frame.scene.with_all({key: value for key, value in made.items() if key != without and key != TIME})
     given: list[str] = []
@@ -199,7 +194,7 @@ def block(
 
 
 def request(flat: Invocation, frame: CaseFrame, without: SceneVariable | None = None) -> str:
-    """The request as it stands after `when`."""
+    """The text of the request after `when`."""
     policy, contract = frame.policy, flat.contract
     arguments: list[str] = []
     for parameter in contract.parameters:
@@ -212,7 +207,7 @@ def request(flat: Invocation, frame: CaseFrame, without: SceneVariable | None = 
 
 
 def name_of(frame: CaseFrame, variable: SceneVariable) -> str:
-    """What a variable is called."""
+    """The name of a variable."""
     assert variable.at is not None
     if variable.argument:
         return parameter_of(frame.scene.invocation, variable.at).name
@@ -234,5 +229,5 @@ def _cell(frame: CaseFrame, variable: SceneVariable, value: Value) -> str | None
 
 
 def _comments(limits: Iterable[ClauseLimit]) -> tuple[str, ...]:
-    """The clauses that turn here, each once."""
+    """The clauses of the limits, each once."""
     return tuple(dict.fromkeys(f"{limit.part.role}: {limit.part.text}" for limit in limits))

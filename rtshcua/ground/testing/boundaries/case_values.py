@@ -1,6 +1,6 @@
-"""Which values of a variable are worth a case each, and how the language writes them, exactly.
+"""The values of a variable that get a case each, and their exact text in the language.
 
-These are the values around its limits, every member, and that it is unknown.
+These are the values around its limits, every member of an enumeration, and `unknown`.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -21,8 +21,10 @@ from rtshcua.model.quantity import Dimension, display
 
 
 def around(limit: ClauseLimit) -> Iterator[Value]:
-    """Both sides of a limit; of a number also the next beyond the rounder one, which is the one that people mean: so
-    that 24.99 %, 25 % and 25.01 % are there whether the limit itself belongs to the one side or to the other.
+    """Yield both sides of a limit; for a number also the next value beyond the rounder side.
+
+    The rounder side is usually the written limit, so that 24.99 %, 25 % and 25.01 % are tested, whichever side 25 %
+    belongs to.
     """
     yield from (limit.holds, limit.fails)
     one, other = limit.holds, limit.fails
@@ -32,23 +34,23 @@ def around(limit: ClauseLimit) -> Iterator[Value]:
 
 
 def _figures(value: int) -> tuple[int, int]:
-    """How many figures a number takes without the zeros that end it."""
+    """The number of significant digits of a number, and its absolute value."""
     return len(str(abs(value)).rstrip("0")), abs(value)
 
 
 def parameter_of(invocation: PreparedInvocation, cell: int) -> Parameter:
-    """The parameter whose first cell it is."""
+    """The parameter with this first cell."""
     return next(each for each in invocation.invocation.contract.parameters if each.cell == cell)
 
 
 def signal_of(policy: Policy, slot: int) -> Signal:
-    """The signal whose first slot it is."""
+    """The signal with this first slot."""
     return next(each for each in policy.signals if each.slot == slot)
 
 
 def always_tested(variable: SceneVariable, invocation: PreparedInvocation) -> Iterator[Value]:
-    """What is worth a case whatever the limits are: every member of what has members, the ends of what a parameter may
-    be and what is beyond, and that a signal is not known.
+    """Yield the values that get a case whatever the limits are: every member, the ends of a parameter's range and the
+    values beyond them, and None for a signal.
     """
     policy = invocation.policy.policy
     assert variable.at is not None
@@ -68,14 +70,14 @@ def always_tested(variable: SceneVariable, invocation: PreparedInvocation) -> It
 
 
 def reported(signal: Signal) -> Iterator[int]:
-    """The members that a signal may be: one that all its sources call unknown is missing."""
+    """Yield the members that a signal may have, without those that all its sources list as unknown."""
     for value, _ in signal.labels:
         if not signal.sources or any(value not in source.unknown for source in signal.sources):
             yield value
 
 
 def variables(parts: Iterable[PolicyPart], invocation: PreparedInvocation) -> Sequence[SceneVariable]:
-    """Everything that some conditions read, and all parameters: arguments first, each in the order of its cells."""
+    """Return all parameters and all signals that the parts read: arguments first, each in the order of the cells."""
     vehicle = invocation.policy.policy.vehicle
     where = {vehicle.position, vehicle.height}
     slots: set[int] = set()
@@ -102,7 +104,7 @@ def variables(parts: Iterable[PolicyPart], invocation: PreparedInvocation) -> Se
 
 
 def ordered(values: Iterable[Value]) -> list[Value]:
-    """Each value once: numbers upwards, places as they come, what is not known at the end."""
+    """Return each value once: numbers in ascending order, places in the given order, None at the end."""
     unique = list(dict.fromkeys(values))
     numbers = sorted(value for value in unique if isinstance(value, int))
     places = [value for value in unique if isinstance(value, tuple)]
@@ -112,9 +114,7 @@ def ordered(values: Iterable[Value]) -> list[Value]:
 def writable(
     value: Value, variable: SceneVariable, invocation: PreparedInvocation, bounds: Sequence[tuple[int, int]]
 ) -> bool:
-    """Whether a test may ask for a value: an argument may be out of its range by one, a signal not out of its own,
-    which `bounds` has by its slot.
-    """
+    """Whether a test may have a value: an argument may be out of range by one, a signal must be within its `bounds`."""
     if not isinstance(value, int) or variable.at is None:
         return True
     if variable.argument:
@@ -132,7 +132,7 @@ _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 def signal_text(policy: Policy, one: Signal, value: Value) -> str | None:
-    """A value of a signal; None where the language has no words for it."""
+    """The text of a value of a signal; None if the language cannot write it."""
     if value is None:
         return NOT_KNOWN
     if one.kind == POSITION:
@@ -145,7 +145,7 @@ def signal_text(policy: Policy, one: Signal, value: Value) -> str | None:
 
 
 def argument_text(policy: Policy, one: Parameter, value: Value) -> str | None:
-    """A value of a parameter; None where the language has no words for it."""
+    """The text of a value of a parameter; None if the language cannot write it."""
     if one.kind == PLACE:
         assert isinstance(value, tuple)
         return place_text(policy.projection, *value)
@@ -158,12 +158,12 @@ def argument_text(policy: Policy, one: Parameter, value: Value) -> str | None:
 
 
 def duration_text(us: int) -> str:
-    """A duration."""
+    """The text of a duration."""
     return display(us, Dimension.DURATION)
 
 
 def place_text(projection: Projection, x: int, y: int) -> str:
-    """A place in local mm, to the nearest that can be written."""
+    """The text of the writable place nearest to a place in local mm."""
     latitude, longitude = unproject(projection, x, y)
     return f"{_degrees(latitude, 'NS')}, {_degrees(longitude, 'EW')}"
 
@@ -174,13 +174,13 @@ def _degrees(value: int, sides: str) -> str:
 
 
 def moment_text(us: int) -> str:
-    """A UTC time in us since the epoch, as RFC 3339 writes it."""
+    """The text (RFC 3339) of a UTC time in us since the epoch."""
     text = (_EPOCH + timedelta(microseconds=us)).strftime("%Y-%m-%dT%H:%M:%S.%f")
     return f"{text.rstrip('0').rstrip('.')}Z"
 
 
 def monitor_text(one: Monitor) -> str:
-    """A condition over time, as rules have it; in brackets, which mean nothing, for it may be an `or`."""
+    """The text of a condition over time, with its operand in brackets, because that may be an `or`."""
     operand = f"({one.when.text})"
     match one.kind:
         case MonitorKind.RISING:

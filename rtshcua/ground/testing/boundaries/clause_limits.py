@@ -1,9 +1,8 @@
-"""Where a part of a policy turns: two values as near as can be written, at one of which it is true, at the other false.
+"""Finds the limits of a part of a policy: two adjacent writable values, one with a true part, one with a false part.
 
-Along a number, the comparison is read off the condition's own tree, what else it sums up being as it is, and the value
-where it turns is asked of `decision.nearest`. In space it turns along the ground of the zones that it asks for, and at
-their floor and ceiling; in time, at windows of the day or the week, and where zones begin and cease to exist. Each
-limit is tried before it is believed.
+For numbers, the limit follows from the comparison in the condition's tree and `decision.nearest`, with the other terms
+unchanged. In space, limits are the outlines, floors and ceilings of zones. In time, they are windows of the day or week
+and the dates of zones. Each limit is verified by evaluating the part on both sides.
 """
 
 from collections.abc import Iterator
@@ -36,8 +35,9 @@ from rtshcua.model.outcome import Outcome, Reason
 
 
 class ClauseLimit(NamedTuple):
-    """A part is true where a variable is `holds`, and false where it is `fails`, which is as near as can be written;
-    `made` are the other values that are changed so that this part turns on it.
+    """A limit: the part is true if a variable is `holds`, and false if it is the adjacent value `fails`.
+
+    `made` are the changes of other variables with which this limit matters.
     """
 
     part: PolicyPart
@@ -48,7 +48,7 @@ class ClauseLimit(NamedTuple):
 
 
 def comparison_turns(atom: tree.Atom, at: Environment, tables: Tables) -> Iterator[tuple[SceneVariable, int, int]]:
-    """Where a comparison turns: a variable, and two values of it that are next to each other."""
+    """Yield the limits of a comparison: a variable, and two adjacent values of it."""
     if not isinstance(atom, tree.AtMost | tree.Equal):
         return
     for term in atom.terms:
@@ -74,19 +74,19 @@ def comparison_turns(atom: tree.Atom, at: Environment, tables: Tables) -> Iterat
 def limit_between(
     part: PolicyPart, scene: Scene, variable: SceneVariable, one: Value, other: Value
 ) -> ClauseLimit | None:
-    """The limit between two values, if the part is true at one and false at the other."""
+    """Return the limit between two values if the part is true at one and false at the other, else None."""
     found = {part_truth(part, scene.put(variable, value)): value for value in (one, other)}
     return ClauseLimit(part, variable, found[TRUE], found[FALSE]) if found.keys() == {TRUE, FALSE} else None
 
 
 def changes_decision(limit: ClauseLimit, scene: Scene) -> bool:
-    """Whether what is decided is otherwise on the two sides of a limit, in the scene that it is changed from."""
+    """Whether the decisions on the two sides of a limit differ; `scene` is the scene without its changes."""
     here = scene.with_all(dict(limit.made))
     return _expectable(here.put(limit.variable, limit.holds)) != _expectable(here.put(limit.variable, limit.fails))
 
 
 def _expectable(scene: Scene) -> tuple[Outcome, Reason, int | None]:
-    """What a test can expect, as if it had been so for long."""
+    """The expectable parts of the decision, as if the state had lasted for long."""
     policy = scene.invocation.policy
     state = lasting(scene.state, policy, scene.now)
     found = decide(scene.invocation, state, policy, scene.context, scene.now)
@@ -94,12 +94,12 @@ def _expectable(scene: Scene) -> tuple[Outcome, Reason, int | None]:
 
 
 def with_made(limit: ClauseLimit, made: SceneChanges) -> ClauseLimit:
-    """The limit in a scene that was changed so."""
+    """The limit with changes of the scene."""
     return limit._replace(made=tuple(sorted(made.items(), key=lambda one: (one[0].argument, one[0].at or -1))))
 
 
 def zones_of(part: PolicyPart, invocation: PreparedInvocation) -> tuple[Zone, ...]:
-    """The zones that a part asks for, of an argument the one that it is."""
+    """The zones that a part refers to; for an argument the present one."""
     policy = invocation.policy.policy
     numbers: list[int] = []
     if part.airspace is not None:
@@ -118,8 +118,9 @@ def zones_of(part: PolicyPart, invocation: PreparedInvocation) -> tuple[Zone, ..
 
 
 def along_the_ground(question: PolicyPart, part: PolicyPart, scene: Scene) -> Iterator[tuple[str, ClauseLimit]]:
-    """The edges of one zone of a part, of each ring of its outline one, for the vehicle's place and for each argument
-    that is a place: what is looked for is where the question turns, what counts whether the part does.
+    """Yield the edges of a part's zones, one for each ring, for the vehicle's place and each argument that is a place.
+
+    The search follows the `question`; a limit counts if the `part` changes there.
     """
     policy = scene.invocation.policy.policy
     for zone in zones_of(question, scene.invocation):
@@ -146,7 +147,7 @@ def along_the_ground(question: PolicyPart, part: PolicyPart, scene: Scene) -> It
 
 
 def in_height(question: PolicyPart, part: PolicyPart, scene: Scene) -> Iterator[tuple[str, ClauseLimit]]:
-    """The floor and the ceiling of the zones of a part, for the vehicle's height."""
+    """Yield the limits at the floors and ceilings of a part's zones, for the vehicle's height."""
     slot = scene.invocation.policy.policy.vehicle.height
     for zone in zones_of(question, scene.invocation) if slot != -1 and _asks_where(question) else ():
         for word, band in _bands(zone):
@@ -157,19 +158,17 @@ def in_height(question: PolicyPart, part: PolicyPart, scene: Scene) -> Iterator[
 
 
 def in_space(question: PolicyPart, scene: Scene) -> Iterator[str]:
-    """The limits that a question should have in space, in words."""
+    """Yield the names of the limits that a question should have in space."""
     height = scene.invocation.policy.policy.vehicle.height != -1 and _asks_where(question)
     for zone in zones_of(question, scene.invocation):
         for variable in _place_variables(question, scene):
-            asked = isinstance(question.node, tree.PointInside) or not variable.argument
-            for number in range(max(1, len(_rings(zone)))) if asked and not _everywhere(zone) else ():
+            relevant = isinstance(question.node, tree.PointInside) or not variable.argument
+            for number in range(max(1, len(_rings(zone)))) if relevant and not _everywhere(zone) else ():
                 yield _edge_words(zone, variable, number, scene)
         if height:
             yield from (f"the {word} of `{zone.name}`" for word, _ in _bands(zone))
         elif isinstance(question.node, tree.PointInside):
-            yield from (
-                f"the {word} of `{zone.name}`, which counts for no place on the ground" for word, _ in _bands(zone)
-            )
+            yield from (f"the {word} of `{zone.name}`, which a place on the ground ignores" for word, _ in _bands(zone))
 
 
 def _edge_words(zone: Zone, variable: SceneVariable, ring: int, scene: Scene) -> str:
@@ -183,41 +182,42 @@ def _edge_words(zone: Zone, variable: SceneVariable, ring: int, scene: Scene) ->
 
 
 def _rings(zone: Zone) -> list[tuple[Place, ...]]:
-    """The outline of a zone; a circle has none of corners."""
+    """The rings of a zone's outline; empty for a circle."""
     return [] if zone.shape == CIRCLE else list(rings(zone))
 
 
 def _everywhere(zone: Zone) -> bool:
-    """Whether a zone is a circle that has all places in it."""
+    """Whether a zone is a circle that contains all places."""
     return zone.shape == CIRCLE and zone.data[2] >= MAX_COORDINATE * MAX_COORDINATE
 
 
 def _bands(zone: Zone) -> Iterator[tuple[str, int]]:
-    """The floor and the ceiling, as far as a zone has them."""
+    """Yield the floor and the ceiling of a zone, if it has them."""
     for word, band in (("floor", zone.floor), ("ceiling", zone.ceiling)):
         if LOWEST < band < HIGHEST:
             yield word, band
 
 
 def _asks_where(part: PolicyPart) -> bool:
-    """Whether a part asks where the vehicle is."""
+    """Whether a part depends on the position of the vehicle."""
     return part.airspace is not None or isinstance(part.node, tree.InsideZone | tree.InsideArgument)
 
 
 def _place_variables(question: PolicyPart, scene: Scene) -> Iterator[SceneVariable]:
-    """The places that it may turn on: the vehicle's, and arguments, also where they are where the vehicle would fly."""
+    """Yield the places on which a question may depend: the vehicle's position, and arguments."""
     policy, contract = scene.invocation.policy.policy, scene.invocation.invocation.contract
     if _asks_where(question) and policy.vehicle.position != -1:
         yield SceneVariable(False, policy.vehicle.position)
     for parameter in contract.parameters:
-        asked = isinstance(question.node, tree.PointInside) and question.node.cell == parameter.cell
-        if parameter.kind == PLACE and (asked or question.airspace is not None):
+        named = isinstance(question.node, tree.PointInside) and question.node.cell == parameter.cell
+        if parameter.kind == PLACE and (named or question.airspace is not None):  # the vehicle would fly there
             yield SceneVariable(True, parameter.cell)
 
 
 def moments(question: PolicyPart, part: PolicyPart, scene: Scene) -> Iterator[tuple[str, ClauseLimit]]:
-    """Each moment, to the microsecond, between which and the next a part turns: in the scene's day, and at the dates of
-    zones. What is looked for is where the question turns, what counts whether the part does.
+    """Yield the limits in time, to the microsecond: on the scene's day, and at the dates of zones.
+
+    The search follows the `question`; a limit counts if the `part` changes there.
     """
     times = sorted(set(_change_times(question, scene)))
     samples = sorted({scene.now.utc_us, *times, *((one + other) // 2 for one, other in pairwise(times))})
@@ -234,7 +234,7 @@ def moments(question: PolicyPart, part: PolicyPart, scene: Scene) -> Iterator[tu
 
 
 def in_time(question: PolicyPart, scene: Scene) -> Iterator[str]:
-    """The limits that a question should have in the course of time, in words."""
+    """Yield the names of the limits that a question should have in time."""
     windows = isinstance(question.node, tree.InWindow | tree.InWeek) or any(
         len(set(zone.daily)) == 2 or zone.weekly for zone in zones_of(question, scene.invocation)
     )
@@ -245,7 +245,7 @@ def in_time(question: PolicyPart, scene: Scene) -> Iterator[str]:
 
 
 def _moment_words(question: PolicyPart, scene: Scene, moment: int, *, opens: bool) -> str:
-    """What turns at a moment: what lasts a while turns as much before it."""
+    """The name of a limit in time. A limit may come earlier than a date by the duration of the step."""
     early = scene.invocation.lasts_us + 2
     outside = question.airspace is not None and not question.airspace.inside
     dates = [date for zone in zones_of(question, scene.invocation) for date in zone.dates]
@@ -255,7 +255,7 @@ def _moment_words(question: PolicyPart, scene: Scene, moment: int, *, opens: boo
 
 
 def _change_times(part: PolicyPart, scene: Scene) -> Iterator[int]:
-    """Moments between which nothing turns but for what a step takes: those are found between two of these."""
+    """Yield times such that between two consecutive ones there is at most one limit."""
     local = scene.now.utc_us + scene.invocation.policy.tables.local.offset(scene.now.utc_us)
     midnight, monday = scene.now.utc_us - local % DAY, scene.now.utc_us - time_of_week(local)
     daily: list[int] = []

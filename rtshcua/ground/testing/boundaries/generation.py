@@ -1,8 +1,8 @@
-"""Tests for both sides of every limit of a policy, as text; what they expect is what is decided now.
+"""Generates the text of tests for both sides of every limit of a policy; they expect the present decisions.
 
-They start from a nominal, and for each skill and requester from a scene that is allowed. The language itself reads each
-draft (`draft`): where the nominal leads, from where the planned paths are content, what each case is decided as, and at
-last the finished text, of which every case must be met.
+Tests start from a nominal, and for each skill and requester from an allowed scene. The compiler reads each draft
+(`draft`): to find the state of the nominal, places from which the planned path is allowed, and the decision of each
+case. It reads the finished text again, and every case must be met.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -48,7 +48,7 @@ from rtshcua.ground.testing.boundaries.starting_scene import (
     scene_candidate,
     start_places,
 )
-from rtshcua.ground.testing.case import PolicyCase, PolicyUnderTest
+from rtshcua.ground.testing.case import CaseSuite, PolicyCase, PolicyUnderTest
 from rtshcua.ground.testing.case_result import run_case
 from rtshcua.ground.testing.coverage_goals import clauses_of
 from rtshcua.model.flat.code import Clause
@@ -62,13 +62,13 @@ T = TypeVar("T")
 
 #: 2026-06-01T00:00:00Z, the day of generated tests, in us
 _THE_DAY = 1_780_272_000_000_000
-#: the phase of what may be in any
+#: the phase of skills that are valid in any phase
 _ANY_PHASE = "flight"
 
 
 class GenerationPlan(NamedTuple):
-    """What to generate: for which skills (none: all), what the text imports, a nominal that is imported and its phase
-    (None: one is made), and places that a vehicle may be sent to (local mm), the likeliest first.
+    """What to generate: the skills (empty: all), the imports of the text, an imported nominal and its phase (None: a
+    new one), and places to which a vehicle may be sent (local mm), the most likely first.
     """
 
     skills: tuple[str, ...]
@@ -86,9 +86,9 @@ class PlannedFrame(NamedTuple):
 
 
 def plan_frames(
-    tested: PolicyUnderTest, plan: GenerationPlan, asked: Questions, play: ReadSource
+    tested: PolicyUnderTest, plan: GenerationPlan, analysis: Questions, play: ReadSource
 ) -> tuple[Draft, list[PlannedFrame]]:
-    """A draft with its nominal and without blocks, and a frame for each skill and asker. Raises `reading.Refused`."""
+    """Return a draft with its nominal and no blocks, and a frame for each requester. Raises `DraftRefused`."""
     policy = tested.lowered.policy
     draft = Draft(policy.name, policy.version, plan.imports, None, [])
     chosen = [
@@ -99,12 +99,12 @@ def plan_frames(
     state, now = _beginning(policy)
     name = plan.nominal or f"{policy.name}_nominal"
     if plan.nominal is None:
-        state = _agreed(chosen, tested, asked, state, now, plan.entries)
+        state = _agreed(chosen, tested, analysis, state, now, plan.entries)
         draft.nominal = _nominal(tested, name, state, now, chosen[0])
     else:
-        case = _case_of(draft, _frames(chosen[:1], tested, asked, state, now, plan, name), play)
+        case = _case_of(draft, _frames(chosen[:1], tested, analysis, state, now, plan, name), play)
         state, now = (state, now) if case is None else (case.state, case.now)
-    frames = _frames(chosen, tested, asked, state, now, plan, name)
+    frames = _frames(chosen, tested, analysis, state, now, plan, name)
     draft.blocks = [block(each, str(number), each.made) for number, each in enumerate(frames)]
     first = _by_frame(frames, draft.blocks, read_draft(draft, play))
     found = [PlannedFrame(frame._replace(scene=scene_of(cases[0])), allowed(cases[0])) for frame, cases in first]
@@ -117,23 +117,23 @@ def plan_frames(
 def _frames(
     chosen: Sequence[Requester],
     tested: PolicyUnderTest,
-    asked: Questions,
+    analysis: Questions,
     state: State,
     now: Now,
     plan: GenerationPlan,
     nominal: str,
 ) -> list[CaseFrame]:
-    """A frame for each asker, as far as the analysis tells; the place is the nominal's."""
+    """Return a frame for each requester for whom the analysis finds one; its place is the nominal's."""
     policy = tested.lowered.policy
     found: list[CaseFrame] = []
-    for asker in chosen:
-        made = scene_candidate(asker, tested.prepared, asked, state, now, plan.entries)
+    for requester in chosen:
+        made = scene_candidate(requester, tested.prepared, analysis, state, now, plan.entries)
         if made is None:
             continue
-        contract = policy.contracts[asker.skill]
+        contract = policy.contracts[requester.skill]
         label = contract.name
         if any(each.label == label for each in found):
-            label += f" by {policy.roles[asker.role]} through {SourceKind(asker.source).name.lower()}"
+            label += f" by {policy.roles[requester.role]} through {SourceKind(requester.source).name.lower()}"
         current = _ANY_PHASE if plan.nominal is None else plan.phase
         other = contract.phases and current not in contract.phases
         scene = made.scene.with_all({key: value for key, value in made.made.items() if key.argument})
@@ -147,7 +147,7 @@ def _frames(
 def _allowed_frames(
     frames: Sequence[CaseFrame], draft: Draft, play: ReadSource, entries: Sequence[tuple[int, int]]
 ) -> dict[str, PlannedFrame]:
-    """Frames from other places and heights, and with other arguments, the first of each that is allowed."""
+    """Return the first allowed frame of each label, from other places and heights and with other arguments."""
     tries = [
         (frame, _at(frame, start) | other)
         for frame in frames
@@ -164,7 +164,7 @@ def _allowed_frames(
 
 
 def _at(frame: CaseFrame, start: tuple[int, int, int]) -> SceneChanges:
-    """What a frame changes of the nominal, and that the vehicle is elsewhere."""
+    """The changes of a frame, with the vehicle at another place."""
     x, y, height = start
     vehicle = frame.policy.vehicle
     return frame.made | {SceneVariable(False, vehicle.position): (x, y), SceneVariable(False, vehicle.height): height}
@@ -173,19 +173,19 @@ def _at(frame: CaseFrame, start: tuple[int, int, int]) -> SceneChanges:
 def _by_frame(
     frames: Sequence[T], blocks: Sequence[Block], found: Sequence[ReadBlock]
 ) -> list[tuple[T, tuple[PolicyCase, ...]]]:
-    """What was read of the block of each frame, but for those that the language refused."""
+    """The cases of each frame's block, without the refused blocks."""
     by_block = {each.block: each.cases for each in found}
     return [(frame, by_block[one]) for frame, one in zip(frames, blocks, strict=True) if one in by_block]
 
 
 def _case_of(draft: Draft, frames: Sequence[CaseFrame], play: ReadSource) -> PolicyCase | None:
-    """The first frame as the nominal alone has it."""
+    """The case of the first frame with the values of the nominal alone; None if it was refused."""
     draft.blocks = [block(each, "probe", {}) for each in frames]
     return next((each.cases[0] for each in read_draft(draft, play)), None)
 
 
 def _beginning(policy: Policy) -> tuple[State, Now]:
-    """At home, on the ground, fully charged, nothing else there; at noon, local time."""
+    """The initial state: at home, on the ground, fully charged, all other signals 0; at noon, local time."""
     values: list[int | None] = [0] * policy.slots
     for signal in policy.signals:
         if signal.kind == ENUMERATION:
@@ -201,16 +201,16 @@ def _beginning(policy: Policy) -> tuple[State, Now]:
 def _agreed(
     chosen: Sequence[Requester],
     tested: PolicyUnderTest,
-    asked: Questions,
+    analysis: Questions,
     state: State,
     now: Now,
     entries: tuple[tuple[int, int], ...],
 ) -> State:
-    """The state with the values that skills ask for, of each signal what the first asks that asks for any."""
+    """The state with the values that the skills require; for each signal those of the first skill that requires one."""
     policy = tested.lowered.policy
     values, settled = list(state.values), {policy.vehicle.position, policy.vehicle.height}
-    for asker in chosen:
-        made = scene_candidate(asker, tested.prepared, asked, State(tuple(values), state.ages), now, entries)
+    for requester in chosen:
+        made = scene_candidate(requester, tested.prepared, analysis, State(tuple(values), state.ages), now, entries)
         for variable, value in {} if made is None else made.made.items():
             if not variable.argument and variable.at is not None and variable.at not in settled:
                 assert value is None or isinstance(value, int)
@@ -219,8 +219,8 @@ def _agreed(
     return State(tuple(values), state.ages)
 
 
-def _nominal(tested: PolicyUnderTest, name: str, state: State, now: Now, asker: Requester) -> str:
-    """The text of the nominal: everything that the policy reads."""
+def _nominal(tested: PolicyUnderTest, name: str, state: State, now: Now, requester: Requester) -> str:
+    """The text of a nominal with all signals that the policy reads."""
     policy = tested.lowered.policy
     given: list[str] = []
     for signal in policy.signals:
@@ -228,18 +228,18 @@ def _nominal(tested: PolicyUnderTest, name: str, state: State, now: Now, asker: 
         value = cells[0] if signal.kind != POSITION or None in cells else (cells[0] or 0, cells[1] or 0)
         words = case_values.signal_text(policy, signal, value)
         given += [] if words is None else [f"  given {signal.name} = {words}\n"]
-    source = SourceKind(asker.source).name.lower()
+    source = SourceKind(requester.source).name.lower()
     return (
         f"nominal {name} {{\n"
         f"  under {policy.name}\n  on {tested.lowered.vehicle.name.text}\n"
-        f"  by role {policy.roles[asker.role]} through {source}\n"
+        f"  by role {policy.roles[requester.role]} through {source}\n"
         f'  at "{case_values.moment_text(now.utc_us)}"\n  phase {_ANY_PHASE}\n{"".join(given)}}}\n'
     )
 
 
 class UnreachedLimit(NamedTuple):
-    """A limit, or a whole clause, that no case was found for: the skill, the role and the text of its clause, what it
-    is about ("" for the whole clause), and whether the clause turns there, though nothing that is decided does.
+    """A limit, or a whole clause, without a case: the skill, the role and the text of its clause, the limit ("" for the
+    whole clause), and whether the clause changes there but no decision does.
     """
 
     skill: str
@@ -250,18 +250,17 @@ class UnreachedLimit(NamedTuple):
 
     @property
     def words(self) -> str:
-        """For a person, on one line."""
-        what = f"{self.skill}: {self.role}: {self.text}"
+        """A description on one line."""
+        clause = f"{self.skill}: {self.role}: {self.text}"
         if not self.about:
-            return f"{what}: nothing of it"
-        return f"{what}: {self.about}" + (" (turns it, and changes no decision)" if self.turned else "")
+            return f"{clause}: no part of it"
+        return f"{clause}: {self.about}" + (" (changes the clause, but no decision)" if self.turned else "")
 
 
 @dataclass(frozen=True, slots=True)
 class GeneratedTests:
-    """The finished text, how many cases it has, the limits that they surround, for whom no situation was found that is
-    allowed, and the limits that no case reaches. Without a text there are too many cases, or none, or `refused` says
-    why.
+    """The finished text, its number of cases and their limits, the labels of requesters without an allowed scene, and
+    the limits without a case. The text is None if there are too many cases, no cases, or findings in `refused`.
     """
 
     text: str | None
@@ -273,7 +272,7 @@ class GeneratedTests:
 
 
 def generate(tested: PolicyUnderTest, plan: GenerationPlan, play: ReadSource) -> GeneratedTests:
-    """The tests of a policy, or of some of its skills."""
+    """Generate the tests of a policy, or of some of its skills."""
     try:
         return _generated(tested, plan, play)
     except DraftRefused as error:
@@ -281,18 +280,18 @@ def generate(tested: PolicyUnderTest, plan: GenerationPlan, play: ReadSource) ->
 
 
 def _generated(tested: PolicyUnderTest, plan: GenerationPlan, play: ReadSource) -> GeneratedTests:
-    asked = Questions(tested.prepared)
-    draft, frames = plan_frames(tested, plan, asked, play)
+    analysis = Questions(tested.prepared)
+    draft, frames = plan_frames(tested, plan, analysis, play)
     found: list[ClauseLimit] = []
     blocks: list[Block] = []
     unreached: list[UnreachedLimit] = []
     seen: set[object] = set()
     for each in frames:
-        made, turned, missed = _blocks(each, asked, seen)
+        made, turned, missed = _blocks(each, analysis, seen)
         blocks += made
         found += turned
         unreached += missed
-    unreached += _never_asked(tested, plan, seen)
+    unreached += _unused_clauses(tested, plan, seen)
     draft.unreached = tuple(each.words for each in unreached)
     draft.blocks = _titled(blocks)
     count = sum(len(each.rows) for each in blocks)
@@ -301,20 +300,24 @@ def _generated(tested: PolicyUnderTest, plan: GenerationPlan, play: ReadSource) 
     expected = [expectation(case) for each in read_draft(draft, play) for case in each.cases]
     text = draft.text(expected)
     again = play(text)
-    wrong = [ran.finding for case in again.cases for ran in [run_case(case)] if ran.finding is not None]
-    wrong += [each for each in again.diagnostics if each.severity is Severity.ERROR]
+    wrong = _unmet(again)
     if wrong or len(again.cases) != len(expected):
-        return GeneratedTests(None, refused=tuple(wrong))
+        return GeneratedTests(None, refused=wrong)
     without = tuple(each.frame.label for each in frames if not each.allowed)
     return GeneratedTests(text, len(expected), tuple(found), without, tuple(unreached))
 
 
-def _blocks(
-    one: PlannedFrame, asked: Questions, seen: set[object]
-) -> tuple[list[Block], list[ClauseLimit], list[UnreachedLimit]]:
-    """The blocks of one frame; of a second frame for one skill only about rules that the first had none of.
+def _unmet(suite: CaseSuite) -> tuple[Diagnostic, ...]:
+    """The findings on unmet expectations, and the errors; empty if every case is met."""
+    unmet = [ran.finding for case in suite.cases for ran in [run_case(case)] if ran.finding is not None]
+    return (*unmet, *(each for each in suite.diagnostics if each.severity is Severity.ERROR))
 
-    `seen` remembers what was asked about.
+
+def _blocks(
+    one: PlannedFrame, analysis: Questions, seen: set[object]
+) -> tuple[list[Block], list[ClauseLimit], list[UnreachedLimit]]:
+    """Return the blocks, limits and unreached limits of one frame; of a second frame for a skill only those of new
+    rules. `seen` holds the parts that were used before.
     """
     frame, invocation = one.frame, one.frame.scene.invocation
     skill = invocation.invocation.skill
@@ -330,7 +333,7 @@ def _blocks(
     def fits(limit: ClauseLimit) -> bool:
         return all(writable(side, limit.variable, invocation, bounds) for side in (limit.holds, limit.fails))
 
-    found, missed = search(new, every, frame.scene, asked.space(skill), fits)
+    found, missed = search(new, every, frame.scene, analysis.space(skill), fits)
     name = invocation.invocation.contract.name
     unreached = [UnreachedLimit(name, each.part.role, each.part.text, each.about, each.turned) for each in missed]
     if first or found:
@@ -341,23 +344,27 @@ def _blocks(
     return made, list(found), unreached
 
 
-def _never_asked(tested: PolicyUnderTest, plan: GenerationPlan, seen: set[object]) -> Iterator[UnreachedLimit]:
-    """The clauses that bear on no request of any frame that is allowed, of what a rule permits."""
+def _unused_clauses(tested: PolicyUnderTest, plan: GenerationPlan, seen: set[object]) -> Iterator[UnreachedLimit]:
+    """Yield the clauses about permitted skills that no request of an allowed frame uses."""
     policy = tested.lowered.policy
     for skill, contract in enumerate(policy.contracts):
         rules = [rule for rule in policy.rules if skill in (rule.skills or (skill,))]
-        asked = not plan.skills or contract.name in plan.skills
-        if not asked or all(rule.kind != RuleKind.PERMIT for rule in rules):
-            continue
-        bearing = (rule for rule in rules if rule.when and not (rule.target and rule.target.skill == skill))
-        clauses: list[tuple[str, Rule | Clause]] = [(RuleKind(rule.kind).name.lower(), rule) for rule in bearing]
-        for role, clause in (*clauses, *clauses_of(contract)):
-            if (skill, role, clause) not in seen:
-                yield UnreachedLimit(contract.name, role, " ".join(clause.text.split()), "")
+        chosen = not plan.skills or contract.name in plan.skills
+        if chosen and any(rule.kind == RuleKind.PERMIT for rule in rules):
+            for role, clause in (*_conditional(rules, skill), *clauses_of(contract)):
+                if (skill, role, clause) not in seen:
+                    yield UnreachedLimit(contract.name, role, " ".join(clause.text.split()), "")
+
+
+def _conditional(rules: Iterable[Rule], skill: int) -> Iterator[tuple[str, Rule | Clause]]:
+    """The rules with a condition, except those whose target is the skill itself."""
+    for rule in rules:
+        if rule.when and not (rule.target and rule.target.skill == skill):
+            yield RuleKind(rule.kind).name.lower(), rule
 
 
 def _titled(blocks: Iterable[Block]) -> list[Block]:
-    """The same, each with a title of its own."""
+    """Make the titles of the blocks unique."""
     count: dict[str, int] = {}
     named: list[Block] = []
     for each in blocks:

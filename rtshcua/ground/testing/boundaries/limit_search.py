@@ -1,7 +1,7 @@
-"""All limits of what bears on one invocation, and those of them for which no situation was found.
+"""Finds the limits of all parts of a policy that apply to one invocation, and lists those that were not found.
 
-Each comparison, zone and window of a condition should turn it somewhere. From the scene as it is, then from others in
-which that part of the condition decides (`pivot`), each is looked for until what is decided turns too.
+Each comparison, zone and window of a condition should have a limit. The search begins with the present scene, and goes
+on with scenes in which the comparison matters (`pivot`), until the decision changes at the limit too.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -36,16 +36,14 @@ from rtshcua.ground.testing.boundaries.scene import (
 )
 from rtshcua.ground.testing.coverage_goals import ENERGY
 
-#: what has no limit, only sides: all of them are asked for in the scene as it is (`blocks`)
+#: atoms without a limit: `blocks` tests all their values in the present scene
 _WHOLE = (tree.Member, tree.SlotKnown, tree.MonitorSays, tree.PhaseIn)
-#: the limit of what a skill needs, in words
+#: the name of the limit of the charge
 _CHARGE = "the charge that is needed"
 
 
 class MissedLimit(NamedTuple):
-    """A limit of a part, in words, on which nothing that is decided was seen to turn; `turned` says that the part was
-    true and false on its sides.
-    """
+    """The name of a limit of a part at which no decision changes; `turned` means that the part itself changes there."""
 
     part: PolicyPart
     about: str
@@ -53,14 +51,16 @@ class MissedLimit(NamedTuple):
 
 
 class LimitSearch(NamedTuple):
-    """What was found of some parts, and what was not."""
+    """The limits that were found, and those that were missed."""
 
     limits: tuple[ClauseLimit, ...]
     missed: tuple[MissedLimit, ...]
 
 
 class _Field(NamedTuple):
-    """Where limits are looked for: all parts that bear on the invocation, the scene, what may be, what can be asked."""
+    """The input of a search: all parts that apply to the invocation, the scene, the possible situations, and a filter
+    for limits that a test can write.
+    """
 
     parts: Sequence[PolicyPart]
     scene: Scene
@@ -69,7 +69,7 @@ class _Field(NamedTuple):
 
 
 class _Question(NamedTuple):
-    """A question of a part, its atom (of the charge there is none), and the part with the tree that the atom is of."""
+    """A question of a part, its atom (None for the charge), and the part with the tree of the atom."""
 
     part: PolicyPart
     question: PolicyPart
@@ -84,13 +84,13 @@ def search(
     space: SituationSpace,
     fits: Callable[[ClauseLimit], bool] = lambda _: True,
 ) -> LimitSearch:
-    """The limits of the chosen ones of all parts that bear on an invocation; `fits` says whether one can be asked."""
+    """Find the limits of the `chosen` ones of all `parts` that apply to an invocation; `fits` filters limits."""
     field = _Field(parts, scene, space, fits)
     found: list[ClauseLimit] = []
     missed: list[MissedLimit] = []
     for part in chosen:
-        for asked in _questions(part, scene):
-            turned, left = _sides(asked, field)
+        for item in _questions(part, scene):
+            turned, left = _sides(item, field)
             found += turned
             missed += left
     return LimitSearch(tuple(dict.fromkeys(found)), tuple(dict.fromkeys(missed)))
@@ -106,17 +106,17 @@ def _questions(part: PolicyPart, scene: Scene) -> Iterator[_Question]:
         yield _Question(part, question, zone, whole)
 
 
-def _sides(asked: _Question, field: _Field) -> tuple[list[ClauseLimit], list[MissedLimit]]:
-    """The limits of one question, looked for in one situation after the other as long as some are missing."""
-    wanted = dict.fromkeys(_wanted_limits(asked, field.scene), False)  # whether it was seen to turn the part
+def _sides(item: _Question, field: _Field) -> tuple[list[ClauseLimit], list[MissedLimit]]:
+    """Find the limits of one question, in one situation after the other until none is missing."""
+    wanted = dict.fromkeys(_wanted_limits(item, field.scene), False)  # whether the part changes at the limit
     shown: set[str] = set()
     found: list[ClauseLimit] = []
     reached = False
-    for made in _situations(asked, field):
-        reached = reached or not made or not isinstance(asked.atom, _WHOLE)
+    for made in _situations(item, field):
+        reached = reached or not made or not isinstance(item.atom, _WHOLE)
         done = frozenset(shown)
-        for words, limit in _limits_here(asked, field.scene.with_all(made), hidden=bool(made)):
-            known = _without_own(made, limit, asked.part, field.scene)
+        for words, limit in _limits_here(item, field.scene.with_all(made), hidden=bool(made)):
+            known = _without_own(made, limit, item.part, field.scene)
             if known is None or words in done or not field.fits(known):
                 continue
             found.append(known)
@@ -128,14 +128,14 @@ def _sides(asked: _Question, field: _Field) -> tuple[list[ClauseLimit], list[Mis
         if reached and shown >= wanted.keys():
             break
     if not reached:
-        return found, [MissedLimit(asked.part, f"where {_question_words(asked, field.scene)} decides")]
-    return found, [MissedLimit(asked.part, words, turned) for words, turned in wanted.items() if words not in shown]
+        return found, [MissedLimit(item.part, f"where {_question_words(item, field.scene)} decides")]
+    return found, [MissedLimit(item.part, words, turned) for words, turned in wanted.items() if words not in shown]
 
 
-def _situations(asked: _Question, field: _Field) -> Iterator[SceneChanges]:
-    """What is changed to look for limits, each once."""
-    alone = asked.atom is None or asked.part.airspace is not None
-    tries = iter(()) if asked.atom is None else pivots(asked.whole, asked.atom, field.parts, field.scene, field.space)
+def _situations(item: _Question, field: _Field) -> Iterator[SceneChanges]:
+    """Yield the distinct changes of the scene in which to look for limits."""
+    alone = item.atom is None or item.part.airspace is not None
+    tries = iter(()) if item.atom is None else pivots(item.whole, item.atom, field.parts, field.scene, field.space)
     seen: list[SceneChanges] = []
     for made in chain(({},) if alone else (), tries):
         if made not in seen:
@@ -143,9 +143,9 @@ def _situations(asked: _Question, field: _Field) -> Iterator[SceneChanges]:
             yield made
 
 
-def _question_words(asked: _Question, scene: Scene) -> str:
-    """A question that nothing was found for, in words."""
-    match asked.atom:
+def _question_words(item: _Question, scene: Scene) -> str:
+    """The name of a question."""
+    match item.atom:
         case tree.AtMost(terms, _) | tree.Equal(terms, _):
             return " and ".join(_number(term, scene) for term in terms) or "a number"
         case tree.Member(argument, at, _):
@@ -159,11 +159,11 @@ def _question_words(asked: _Question, scene: Scene) -> str:
         case tree.InWindow() | tree.InWeek():
             return "the time"
         case _:
-            return " and ".join(f"`{zone.name}`" for zone in zones_of(asked.question, scene.invocation)) or "the charge"
+            return " and ".join(f"`{zone.name}`" for zone in zones_of(item.question, scene.invocation)) or "the charge"
 
 
 def _without_own(made: SceneChanges, limit: ClauseLimit, part: PolicyPart, scene: Scene) -> ClauseLimit | None:
-    """The limit in what is changed besides what turns; None where it no longer turns without that."""
+    """Return the limit without the change of its own variable; None if it needs that change."""
     rest = {variable: value for variable, value in made.items() if variable != limit.variable}
     if rest == made:
         return with_made(limit, made)
@@ -171,29 +171,29 @@ def _without_own(made: SceneChanges, limit: ClauseLimit, part: PolicyPart, scene
     return None if again is None else with_made(again, rest)
 
 
-def _wanted_limits(asked: _Question, scene: Scene) -> Iterator[str]:
-    """The limits that a question should have, in words."""
-    atom = asked.atom
-    if asked.part.role == ENERGY:
+def _wanted_limits(item: _Question, scene: Scene) -> Iterator[str]:
+    """Yield the names of the limits that a question should have."""
+    atom = item.atom
+    if item.part.role == ENERGY:
         yield from () if scene.invocation.policy.policy.vehicle.battery == -1 else (_CHARGE,)
         return
     if isinstance(atom, tree.AtMost | tree.Equal):
         yield from (_number(term, scene) for term in atom.terms if term.factor)
-    yield from in_space(asked.question, scene)
-    yield from in_time(asked.question, scene)
+    yield from in_space(item.question, scene)
+    yield from in_time(item.question, scene)
 
 
 def _number(term: tree.LinearTerm | SceneVariable, scene: Scene) -> str:
-    """What a comparison reads, by its name."""
+    """The name of the variable that a comparison reads."""
     policy, contract = scene.invocation.policy.policy, scene.invocation.invocation.contract
     cells = {each.cell: each.name for each in contract.parameters}
     slots = {each.slot: each.name for each in policy.signals}
     return f"`{(cells if term.argument else slots).get(-1 if term.at is None else term.at, 'a number')}`"
 
 
-def _limits_here(asked: _Question, scene: Scene, *, hidden: bool) -> Iterator[tuple[str, ClauseLimit]]:
-    """The limits of a question in one situation, each with the words for it; `hidden` ones are in no other."""
-    atom, part, question = asked.atom, asked.part, asked.question
+def _limits_here(item: _Question, scene: Scene, *, hidden: bool) -> Iterator[tuple[str, ClauseLimit]]:
+    """Yield the limits of a question in one situation with their names; `hidden` means a changed situation."""
+    atom, part, question = item.atom, item.part, item.question
     if part.role == ENERGY:
         yield from ((_CHARGE, each) for each in _charge(part, scene))
         return
@@ -211,7 +211,7 @@ def _limits_here(asked: _Question, scene: Scene, *, hidden: bool) -> Iterator[tu
 
 
 def _members(atom: tree.Member, part: PolicyPart, scene: Scene) -> Iterator[tuple[str, ClauseLimit]]:
-    """One member for which a part holds, and one for which it does not."""
+    """Yield a limit between the present member and one with another truth, if there is one."""
     variable = SceneVariable(atom.argument, atom.at)
     members = [each for each in always_tested(variable, scene.invocation) if isinstance(each, int)]
     present = scene.value(variable)
@@ -223,7 +223,7 @@ def _members(atom: tree.Member, part: PolicyPart, scene: Scene) -> Iterator[tupl
 
 
 def _charge(part: PolicyPart, scene: Scene) -> Iterator[ClauseLimit]:
-    """The charge that is needed from where the vehicle is."""
+    """Yield the limit of the charge that the skill needs from the vehicle's place."""
     invocation, slot = scene.invocation, scene.invocation.policy.policy.vehicle.battery
     slots, known = scene.environment().slots, invocation.policy.tables.known
     volume = invocation.planner.volume(slots, known)

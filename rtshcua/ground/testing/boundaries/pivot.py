@@ -1,8 +1,9 @@
-"""What else must be so, that one comparison of a condition decides the condition, and the condition the decision.
+"""Finds situations in which one comparison decides its condition, and the condition the decision.
 
-Of `(area inside bridge_a or area inside bridge_b) and altitude <= 30 m` the height only matters over a bridge. The
-question is put to the analysis that proves policies: the condition with the comparison taken as true must be true, with
-it taken as false must be false; no other rule may decide before. As much as possible stays as the scene has it.
+In `(area inside bridge_a or area inside bridge_b) and altitude <= 30 m` the height only matters over a bridge. The
+analysis of the compiler's proofs finds a situation in which the condition is true if the comparison is replaced by
+true, and false if it is replaced by false, and no other rule decides first. The situation differs from the scene as
+little as possible.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,20 +21,19 @@ from rtshcua.model.flat.limits import DAY
 from rtshcua.model.flat.signal import Signal
 from rtshcua.model.quantity import Dimension
 
-#: boxes that are looked at for one answer
+#: the most boxes that the analysis examines for one answer
 _BUDGET = 400
-#: 100 m, 100 m/s: the largest number of a signal that is written without need
+#: 100 m, 100 m/s: the largest value of a signal that is preferred
 _LARGEST = 100_000
 #: the largest raw value of a voltage, whose field holds 16 bits
 _MOST_RAW = 60_000
-#: the truth that a part must have for the steps after it to be reached
+#: the truth with which a part lets later steps decide
 _PASSED = {"forbid": FALSE, "permit": TRUE, "confirm": FALSE, "degrade": FALSE}
 
 
 def matters(part: PolicyPart, atom: tree.Atom) -> list[Goal]:
-    """What makes an atom decide its condition: true when it is taken as true (false under a `not`), and the reverse.
-
-    The atom is that very one, not what is equal to it.
+    """Return the goals with which an atom decides its condition: the condition is true if the atom is true (false under
+    a `not`), and the reverse. The atom is compared by identity.
     """
     node = part.node
     assert node is not None
@@ -46,7 +46,7 @@ def matters(part: PolicyPart, atom: tree.Atom) -> list[Goal]:
 
 
 def before(part: PolicyPart, parts: Sequence[PolicyPart], scene: Scene) -> list[Goal]:
-    """What the other conditions must be, so that this one decides: those of its step and of the steps before."""
+    """Return the goals for the other conditions of this and of earlier steps, so that this one decides."""
     goals: list[Goal] = []
     for other in parts:
         if other.node is None or (other.role == part.role and other.clause is part.clause):
@@ -61,7 +61,7 @@ def before(part: PolicyPart, parts: Sequence[PolicyPart], scene: Scene) -> list[
 
 
 def permitted(parts: Sequence[PolicyPart], scene: Scene) -> Iterator[Goal]:
-    """Some permit is true; one without a condition, which is no part, permits whatever the others say."""
+    """Yield the goal that some permit is true. An unconditional permit always is, so there is no goal then."""
     permits = [part.node for part in parts if part.role == "permit" and part.node is not None]
     if permits and all(rule.rule.when is not None for rule in scene.invocation.candidates.permits):
         some = permits[0]
@@ -73,8 +73,9 @@ def permitted(parts: Sequence[PolicyPart], scene: Scene) -> Iterator[Goal]:
 def pivots(
     part: PolicyPart, atom: tree.Atom, parts: Sequence[PolicyPart], scene: Scene, space: SituationSpace
 ) -> Iterator[SceneChanges]:
-    """What is changed in a scene so that an atom decides, the nearest first: empty where it does already, nothing where
-    no situation was found. What has several limits, as a zone has, shows each where it is so, and some where it is not.
+    """Yield changes of a scene with which an atom decides, the smallest first: an empty one if it decides already.
+
+    An atom with several limits, such as a zone, shows some of them only where it is true, others where it is false.
     """
     goals, tables, at = matters(part, atom), scene.invocation.policy.tables, scene.environment()
     others = before(part, parts, scene)
@@ -90,7 +91,7 @@ def pivots(
 
 
 def settled(goals: Sequence[Goal], space: SituationSpace, scene: Scene) -> SceneChanges | None:
-    """The changes of a scene that reach goals, of variables as few as one after the other can be kept."""
+    """Return changes of a scene that reach the goals, or None. One variable after the other is kept if possible."""
     invocation = scene.invocation
     preferred = dict(_present(scene))
     kept: dict[SceneVariable, Value | tuple[Value, Value]] = {}
@@ -117,7 +118,7 @@ def settled(goals: Sequence[Goal], space: SituationSpace, scene: Scene) -> Scene
 
 
 def _plain(space: SituationSpace, signals: Sequence[Signal]) -> SituationSpace:
-    """The same without numbers that no vehicle reports."""
+    """The space without numbers that a vehicle hardly reports."""
     most = {
         each.slot: min(_MOST_RAW * source.numerator // source.denominator for source in each.sources)
         for each in signals
@@ -136,7 +137,7 @@ def _plain(space: SituationSpace, signals: Sequence[Signal]) -> SituationSpace:
 
 
 def _present(scene: Scene) -> Iterator[tuple[SceneVariable, Value | tuple[Value, Value]]]:
-    """What each variable is now: arguments first, then the time, then signals."""
+    """Yield the present value of each variable: arguments first, then the time, then signals."""
     invocation, at = scene.invocation, scene.environment()
     policy, contract = invocation.policy.policy, invocation.invocation.contract
     for parameter in contract.parameters:
@@ -166,8 +167,9 @@ def _narrowed(
 
 
 def _of(witness: Witness, variable: SceneVariable, scene: Scene) -> int | tuple[int, int] | None:
-    """The value that a witness has for a variable; None where it is missing. Where nothing asks for dates or for days
-    of the week, and all days have one offset, any day will do, so that it is the scene's.
+    """The value of a variable in a witness; None if it is missing.
+
+    If no condition depends on dates or weekdays, and the UTC offset is fixed, the time is moved to the scene's day.
     """
     invocation, policy = scene.invocation, scene.invocation.policy.policy
     if variable.at is None:

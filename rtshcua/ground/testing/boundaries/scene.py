@@ -1,4 +1,4 @@
-"""One situation to vary (an invocation, a state, the time, where the mission stands), and the parts that decide."""
+"""A situation whose variables can be changed, and the parts of a policy that decide in it."""
 
 from collections.abc import Iterator
 from dataclasses import replace as changed
@@ -26,7 +26,7 @@ Value: TypeAlias = int | tuple[int, int] | None
 
 
 class SceneVariable(NamedTuple):
-    """An argument cell or a state slot (of a place the first of two), or the time (`at` is None), as in `Change`."""
+    """An argument cell or a state slot (the first of two for a place), or the time (`at` is None), as in `Change`."""
 
     argument: bool
     at: int | None
@@ -37,7 +37,7 @@ SceneChanges: TypeAlias = dict[SceneVariable, Value]
 
 
 class Scene(NamedTuple):
-    """What is decided on."""
+    """The input of a decision."""
 
     invocation: PreparedInvocation
     state: State
@@ -45,7 +45,7 @@ class Scene(NamedTuple):
     now: Now
 
     def environment(self) -> Environment:
-        """As conditions read it."""
+        """The environment in which conditions are evaluated."""
         invocation = self.invocation
         sets = situation(self.state, invocation.policy, self.now)
         return environment(sets, invocation.policy, invocation.arguments, invocation.phase)
@@ -59,14 +59,14 @@ class Scene(NamedTuple):
         return self.state.values[variable.at]
 
     def place(self, variable: SceneVariable) -> tuple[int, int] | None:
-        """The present place of a variable that is one."""
+        """The present value of a variable that is a place."""
         assert variable.at is not None
         cells = self.invocation.invocation.arguments if variable.argument else self.state.values
         x, y = cells[variable.at : variable.at + 2]
         return None if x is None or y is None else (x, y)
 
     def put(self, variable: SceneVariable, value: Value) -> "Scene":
-        """The same with another value; what was issued and released so long ago still was."""
+        """Return the scene with another value. The age of the mission and the release stay the same."""
         if variable.at is None:
             assert isinstance(value, int)
             flat = self.invocation.invocation
@@ -85,7 +85,7 @@ class Scene(NamedTuple):
         return self._replace(state=replace(self.state, values=tuple(values)))
 
     def with_all(self, made: SceneChanges) -> "Scene":
-        """The same with other values."""
+        """Return the scene with other values."""
         scene = self
         for variable, value in made.items():
             scene = scene.put(variable, value)
@@ -93,7 +93,7 @@ class Scene(NamedTuple):
 
 
 def replanned(invocation: PreparedInvocation, arguments: tuple[int, ...]) -> PreparedInvocation:
-    """The invocation with other arguments. Its plan follows, but for the path of a survey, which stays what it was."""
+    """Return the invocation with other arguments and their plan. The path of a survey is not planned again."""
     flat, vehicle = invocation.invocation, invocation.policy.policy.vehicle
     contract = flat.contract
     motion, plan = contract.motion, flat.plan
@@ -116,12 +116,12 @@ def replanned(invocation: PreparedInvocation, arguments: tuple[int, ...]) -> Pre
     )
 
 
-#: the clauses that hold for a planned volume, not for the present place alone
+#: the role of clauses that must hold in the whole planned volume
 MAINTAIN = "maintain"
 
 
 class PolicyPart(NamedTuple):
-    """A condition: the word for its role, its clause, and its tree; airspace and energy have none."""
+    """A condition of a policy: its role, its clause, and its tree (None for airspace and energy)."""
 
     role: str
     clause: Decisive
@@ -131,19 +131,17 @@ class PolicyPart(NamedTuple):
 
     @property
     def text(self) -> str:
-        """As it is written."""
+        """The text of the clause on one line."""
         return ENERGY_TEXT if self.clause is None else " ".join(self.clause.text.split())
 
     @property
     def atoms(self) -> list[tree.Atom]:
-        """The atoms of its condition, from left to right."""
+        """The atoms of the condition, from left to right."""
         return [] if self.node is None else [atom for atom, _ in signed_atoms(self.node)]
 
 
 def parts_of(invocation: PreparedInvocation) -> Iterator[PolicyPart]:
-    """Everything that may decide on an invocation, in the order of design 4.1; rules without a condition have no limit
-    and are left out.
-    """
+    """Yield the parts that may decide on an invocation, in the order of design 4.1, without unconditional rules."""
     policy, candidates = invocation.policy, invocation.candidates
     for role, rules in (
         ("forbid", candidates.forbids),
@@ -169,9 +167,7 @@ def _rule_part(role: str, rule: Rule, condition: Condition, node: tree.Node | No
 
 
 def questions(part: PolicyPart, invocation: PreparedInvocation) -> Iterator[tuple[tree.Atom | None, PolicyPart]]:
-    """What a part is made of, each a part of its own: the atoms of its condition, the zones of an airspace; of the
-    charge there is but one.
-    """
+    """Yield the elements of a part as parts: the atoms of its condition, or the zones of an airspace, or the charge."""
     if part.node is not None:
         for atom in part.atoms:
             yield atom, part._replace(node=atom, condition=build(atom, invocation.policy.tables))
@@ -185,7 +181,7 @@ def questions(part: PolicyPart, invocation: PreparedInvocation) -> Iterator[tupl
 
 
 def airspace_tree(part: PolicyPart) -> tuple[PolicyPart, tuple[tree.Atom, ...]]:
-    """An airspace as a condition on the vehicle's place, as the analysis has it, and its zones as in `questions`."""
+    """Return an airspace as a condition on the vehicle's place, and its zones in the order of `questions`."""
     assert part.airspace is not None
     inside = [tree.InsideZone(zone.number) for zone in part.airspace.inside]
     outside = [tree.InsideZone(zone.number) for zone in part.airspace.outside]
@@ -197,7 +193,7 @@ def airspace_tree(part: PolicyPart) -> tuple[PolicyPart, tuple[tree.Atom, ...]]:
 
 
 def part_truth(part: PolicyPart, scene: Scene) -> Truth:
-    """The truth of a part, as the step that asks for it has it."""
+    """The truth of a part in the step of the decision that evaluates it."""
     invocation, at = scene.invocation, scene.environment()
     policy = invocation.policy
     known = policy.tables.known

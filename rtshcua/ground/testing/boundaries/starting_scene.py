@@ -1,7 +1,8 @@
-"""A scene to start from: who asks for a skill, with which arguments, in which state, so that it is allowed.
+"""Finds an allowed scene to start from: the requester, the arguments and the state.
 
-As much as possible stays as a given state has it. The analysis of `ground.analysis` finds values for which every rule
-and every clause of the contract is content; from where the planned path is content too is tried (`start_places`).
+The scene differs from a given state as little as possible. `ground.analysis` finds values with which every rule and
+clause of the contract lets the request pass. Places from which the planned path passes too are found by trying
+(`start_places`).
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,16 +24,16 @@ from rtshcua.model.flat.mission import Invocation, OnInadmissible, Plan
 from rtshcua.model.flat.policy import Policy, Rule, RuleKind
 from rtshcua.model.flat.situation import Context, Now, State
 
-#: the truth that each kind of condition should have; of permits one is enough
+#: the truth that each kind of condition should have; one permit is enough
 _WANTED = {"forbid": FALSE, "confirm": FALSE, "degrade": FALSE}
-#: a height to begin from that is low and in the air, mm
+#: a low height in the air, mm
 _ALOFT = 20_000
-#: a height that most skills may fly at, and a way that most may go, mm
+#: a height and a distance that most skills permit, mm
 _LOW = 10_000
 
 
 class Requester(NamedTuple):
-    """A skill, and the role and the source that ask for it, by their numbers."""
+    """The numbers of a skill, and of the role and the source of a request for it."""
 
     skill: int
     role: int
@@ -40,16 +41,16 @@ class Requester(NamedTuple):
 
 
 class SceneCandidate(NamedTuple):
-    """What to ask for, and what to change of the state; it remains to be tried whether it is allowed."""
+    """A request and the changes of the state with which it may be allowed."""
 
-    asker: Requester
+    requester: Requester
     scene: Scene
     made: SceneChanges
 
 
 def requesters(policy: Policy) -> Iterator[Requester]:
-    """For each permit and skill someone whom it names, and for each other rule someone permitted on whom it bears where
-    it bears on none of these; nobody twice for one skill.
+    """Yield a requester for each permit and skill, and for each other rule a permitted requester to whom it applies, if
+    it applies to none of those before. No requester is repeated.
     """
     every = range(len(policy.contracts))
     permits = [rule for rule in policy.rules if rule.kind == RuleKind.PERMIT]
@@ -66,7 +67,7 @@ def requesters(policy: Policy) -> Iterator[Requester]:
 
 
 def _requesters(policy: Policy, permits: Sequence[Rule], skill: int) -> Iterator[Requester]:
-    """Everybody who may ask for a skill by some permits, for each permit the likeliest first."""
+    """Yield the requesters of a skill whom some permits allow, for each permit the most usual first."""
     timing_class = policy.contracts[skill].timing_class
     for rule in permits:
         for role in rule.roles or _roles(policy):
@@ -76,8 +77,9 @@ def _requesters(policy: Policy, permits: Sequence[Rule], skill: int) -> Iterator
 
 
 def _roles(policy: Policy) -> tuple[int, ...]:
-    """The roles that a policy names, the likeliest first: `operator`, then those that something is permitted to. Every
-    policy has an operator; where it names other roles and not that one, nobody is asked to sign off on it.
+    """The roles that a policy names, the most usual first: `operator`, then those of permits, then the others.
+
+    Every policy has an operator, but it is listed only if a rule names it or no rule names any role.
     """
     permitted = [role for rule in policy.rules if rule.kind == RuleKind.PERMIT for role in rule.roles]
     named = dict.fromkeys((*permitted, *(role for rule in policy.rules for role in rule.roles)))
@@ -85,41 +87,44 @@ def _roles(policy: Policy) -> tuple[int, ...]:
     return tuple(sorted(named, key=lambda role: role != usual)) or (usual,)
 
 
-def _bears(rule: Rule, asker: Requester) -> bool:
-    """Whether a rule is about someone's requests."""
-    return asker.role in (rule.roles or (asker.role,)) and asker.source in (rule.sources or (asker.source,))
+def _bears(rule: Rule, requester: Requester) -> bool:
+    """Whether a rule applies to a requester."""
+    return requester.role in (rule.roles or (requester.role,)) and requester.source in (
+        rule.sources or (requester.source,)
+    )
 
 
 def scene_candidate(
-    asker: Requester,
+    requester: Requester,
     prepared: PreparedPolicy,
-    asked: Questions,
+    analysis: Questions,
     state: State,
     now: Now,
     entries: Sequence[tuple[int, int]],
 ) -> SceneCandidate | None:
-    """Values for which nothing refuses; `entries` are places that a vehicle may be sent to, the likeliest first. None
-    where the analysis finds none.
+    """Return a candidate that no condition refuses; None if the analysis finds none.
+
+    `entries` are places to which a vehicle may be sent, the most likely first.
     """
     best: SceneCandidate | None = None
     for place in (*entries, (0, 0)):
-        scene = _sketch(asker, prepared, state, now, place, asked)
+        scene = _sketch(requester, prepared, state, now, place, analysis)
         if scene is None:
             continue
-        made = _content(scene, asked)
+        made = _passing(scene, analysis)
         if made is not None and (best is None or len(made) < len(best.made)):
-            best = SceneCandidate(asker, scene, made)
+            best = SceneCandidate(requester, scene, made)
         if best is not None and not any(variable.argument for variable in best.made):
             break
-        if not any(parameter.kind == PLACE for parameter in prepared.policy.contracts[asker.skill].parameters):
+        if not any(parameter.kind == PLACE for parameter in prepared.policy.contracts[requester.skill].parameters):
             break
     return best
 
 
-def _content(scene: Scene, asked: Questions) -> SceneChanges | None:
-    """What is changed so that each condition is content; if need be, but for those that a person is to confirm."""
+def _passing(scene: Scene, analysis: Questions) -> SceneChanges | None:
+    """Return changes with which every condition lets the request pass; if need be, except `confirm` rules."""
     every = list(parts_of(scene.invocation))
-    space = asked.space(scene.invocation.invocation.skill)
+    space = analysis.space(scene.invocation.invocation.skill)
     for without in ((), ("confirm",)):
         goals: list[Goal] = [
             (part.node, _WANTED.get(part.role, TRUE))
@@ -141,11 +146,11 @@ def _in_airspace(invocation: PreparedInvocation) -> Iterator[Goal]:
 
 
 def _sketch(
-    asker: Requester, prepared: PreparedPolicy, state: State, now: Now, place: tuple[int, int], asked: Questions
+    requester: Requester, prepared: PreparedPolicy, state: State, now: Now, place: tuple[int, int], analysis: Questions
 ) -> Scene | None:
-    """A scene with some arguments; the survey of an area is one place of it."""
+    """Return a scene with plain arguments. The path of a survey is one place in its area."""
     policy = prepared.policy
-    contract = policy.contracts[asker.skill]
+    contract = policy.contracts[requester.skill]
     arguments: list[int] = []
     zone = 0
     for parameter in contract.parameters:
@@ -161,7 +166,7 @@ def _sketch(
     if motion.kind == MotionKind.FLY:
         path = place
     elif motion.kind == MotionKind.COVER:
-        path = asked.space(asker.skill).plane.place({zone: True}, lambda _: True) or (0, 0)
+        path = analysis.space(requester.skill).plane.place({zone: True}, lambda _: True) or (0, 0)
     elif motion.kind == MotionKind.HOME:
         path = HOME
     altitude = 0 if motion.altitude == -1 else arguments[motion.altitude]
@@ -170,9 +175,9 @@ def _sketch(
         invocation_id=b"",
         step=0,
         phase=0,
-        skill=asker.skill,
-        source=asker.source,
-        role=asker.role,
+        skill=requester.skill,
+        source=requester.source,
+        role=requester.role,
         arguments=tuple(arguments),
         issued_at_us=now.utc_us,
         phases=1,
@@ -194,8 +199,10 @@ def _sketch(
 
 
 def start_places(scene: Scene) -> Iterator[tuple[int, int, int]]:
-    """Places and heights (local mm) from where the planned path may well be content: where the scene is, where the
-    path begins, and home; as high as the scene, as the plan, low over the ground, and on it.
+    """Yield places and heights (local mm) from which the planned path may be allowed.
+
+    Places are that of the scene, the begin of the path, and home; heights are those of the scene and the plan, a low
+    one, and the ground.
     """
     invocation, vehicle = scene.invocation.invocation, scene.invocation.policy.policy.vehicle
     x, y, height = (scene.state.values[slot] for slot in (vehicle.position, vehicle.position + 1, vehicle.height))
@@ -207,8 +214,8 @@ def start_places(scene: Scene) -> Iterator[tuple[int, int, int]]:
 
 
 def other_arguments(scene: Scene, entries: Sequence[tuple[int, int]]) -> Iterator[SceneChanges]:
-    """The same arguments, and then one that the planned path depends on otherwise: as low as can be, another area, a
-    place nearer to home.
+    """Yield changes of one argument on which the path depends: a lower altitude, another area, another place; first no
+    change.
     """
     flat, policy = scene.invocation.invocation, scene.invocation.policy.policy
     yield {}

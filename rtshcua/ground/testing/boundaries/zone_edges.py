@@ -1,8 +1,8 @@
-"""Where a condition turns along the ground: two places that the language can write, on both sides of a zone's edge.
+"""Finds limits on the ground: two writable places on both sides of a zone's edge.
 
-The language writes places in 1e-7 degree, some 11 mm to the north and less to the east, and the edge runs between. So
-several rows of that lattice are looked at, and of the places on each side one is taken that is within a millimetre of
-the other side, if there is one: a limit that is moved by a millimetre then shows.
+The language writes places in 1e-7 degree, about 11 mm to the north and less to the east, so the edge runs between the
+points of this lattice. The search examines several rows and takes on each side a place within a millimetre of the other
+side, if there is one, so that a test notices if the limit moves by a millimetre.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -18,40 +18,40 @@ Place = tuple[int, int]
 #: whether a condition holds for a place
 Holds = Callable[[Place], Truth]
 
-#: rows of the lattice that are looked at for places near the edge, and how far along a row the edge is looked for
+#: the number of rows of the lattice that are searched, and the reach of the search along a row
 _ROWS: Final = 48
 _REACH: Final = 1 << 14
-#: mm: places further from where the search begins are not looked at
+#: mm: the largest and the first distance from the start of the search
 _FAR: Final = 1 << 25
 _FIRST: Final = 1_000
-#: sides of a ring that are looked at, and how far beside them, in mm
+#: the number of sides of a ring that are searched, and the distance beside them, in mm
 _SIDES: Final = 8
 _ASIDE: Final = 300
 
 
 class ZoneEdge(NamedTuple):
-    """A place where a condition holds, and one beside it where it does not; local mm, exactly as they are written."""
+    """A place where a condition holds, and an adjacent one where it does not; local mm, both exactly writable."""
 
     holds: Place
     fails: Place
 
 
 class Lattice(NamedTuple):
-    """The places that can be written, by their numbers of 1e-7 degree."""
+    """The writable places, with coordinates in 1e-7 degree."""
 
     projection: Projection
 
     def near(self, place: Place) -> Place:
-        """The numbers of the place that can be written nearest to one in local mm."""
+        """The coordinates of the writable place nearest to one in local mm."""
         return unproject(self.projection, *place)
 
     def at(self, number: Place) -> Place:
-        """The place of some numbers, local mm, as the language reads it."""
+        """The place in local mm that the language reads for these coordinates."""
         return project(self.projection, *number)
 
 
 def zone_edge(policy: Policy, holds: Holds, start: Place, zones: tuple[Zone, ...]) -> ZoneEdge | None:
-    """An edge between where the search starts and where a condition is otherwise; `zones` say where to look."""
+    """Find an edge between the start and a place with another truth of the condition; `zones` guide the search."""
     lattice = Lattice(policy.projection)
     first = lattice.near(start)
     known = holds(lattice.at(first))
@@ -67,7 +67,7 @@ def zone_edge(policy: Policy, holds: Holds, start: Place, zones: tuple[Zone, ...
 
 
 def ring_edges(policy: Policy, holds: Holds, ring: Sequence[Place]) -> Iterator[ZoneEdge]:
-    """Edges across some sides of one ring of a zone's outline; none where a condition is the same on both sides."""
+    """Yield edges across some sides of one ring of a zone's outline, if the condition differs on both sides."""
     lattice = Lattice(policy.projection)
     for one, other in _beside_sides(ring):
         first, second = lattice.near(one), lattice.near(other)
@@ -80,7 +80,7 @@ def ring_edges(policy: Policy, holds: Holds, ring: Sequence[Place]) -> Iterator[
 
 
 def _beside_sides(ring: Sequence[Place]) -> Iterator[tuple[Place, Place]]:
-    """Of some sides of a ring the places to the left and to the right of their middle."""
+    """Yield the places to the right and to the left of the middle of some sides of a ring."""
     for number in range(0, len(ring), max(1, len(ring) // _SIDES)):
         (x1, y1), (x2, y2) = ring[number], ring[(number + 1) % len(ring)]
         x, y, length = (x1 + x2) // 2, (y1 + y2) // 2, max(abs(x2 - x1), abs(y2 - y1), 1)
@@ -89,8 +89,8 @@ def _beside_sides(ring: Sequence[Place]) -> Iterator[tuple[Place, Place]]:
 
 
 def _elsewhere(start: Place, zones: tuple[Zone, ...]) -> Iterator[Place]:
-    """Where a condition may be otherwise: in the middle of the zones, beside their outlines, and ever further away in
-    eight directions.
+    """Yield places where a condition may differ: in the middle of the zones, beside their outlines, and at growing
+    distances in eight directions.
     """
     for zone in zones:
         yield middle(zone)
@@ -115,7 +115,7 @@ def middle(zone: Zone) -> Place:
 
 
 def _between(lattice: Lattice, holds: Holds, one: Place, other: Place, wanted: Truth) -> tuple[Place, Place] | None:
-    """Two numbers next to each other on the way; the second has the truth `wanted`, the first has not."""
+    """Return two adjacent coordinates between two places; only the second has the truth `wanted`."""
     steps = max(abs(other[0] - one[0]), abs(other[1] - one[1]))
 
     def on_the_way(step: int) -> Place:
@@ -132,7 +132,7 @@ def _between(lattice: Lattice, holds: Holds, one: Place, other: Place, wanted: T
 
 
 def _closest(lattice: Lattice, holds: Holds, pair: tuple[Place, Place], known: Truth) -> ZoneEdge | None:
-    """Of many pairs along the edge the places that are nearest to the other side."""
+    """Return the pair along the edge with the places nearest to the other side."""
     best: dict[Truth, tuple[bool, Place]] = {}
     for one, other in _along(lattice, holds, pair, known):
         for number in (one, other):
@@ -146,7 +146,7 @@ def _closest(lattice: Lattice, holds: Holds, pair: tuple[Place, Place], known: T
 
 
 def _along(lattice: Lattice, holds: Holds, pair: tuple[Place, Place], known: Truth) -> Iterator[tuple[Place, Place]]:
-    """The pair, and pairs of the rows and columns beside it, as long as the edge is found again."""
+    """Yield the pair, and pairs in the adjacent rows and columns as long as the edge is found there."""
     yield pair
     for axis in (0, 1):  # along a row of one latitude, then along a column of one longitude
         for side in (1, -1):
@@ -162,7 +162,7 @@ def _along(lattice: Lattice, holds: Holds, pair: tuple[Place, Place], known: Tru
 def _again(
     lattice: Lattice, holds: Holds, last: tuple[Place, Place], axis: int, row: int, known: Truth
 ) -> tuple[Place, Place] | None:
-    """The edge in another row, looked for around where it was in the last."""
+    """Find the edge in another row, near its place in the last row."""
 
     def number(along: int) -> Place:
         return (row, along) if axis == 0 else (along, row)
@@ -186,6 +186,6 @@ def _again(
 
 
 def _beside(holds: Holds, place: Place, truth: Truth) -> bool:
-    """Whether the other side is within a millimetre."""
+    """Whether a place with another truth is within a millimetre."""
     x, y = place
     return any(holds(each) != truth for each in ((x + 1, y), (x - 1, y), (x, y + 1), (x, y - 1)))

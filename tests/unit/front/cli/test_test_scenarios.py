@@ -117,7 +117,7 @@ def test_what_went_wrong_in_many_flights_is_told_once(here: Path, capsys: pytest
     assert scenario["flights"][4]["wrong"][1] == {"slug": "collision", "text": "it hit <something>"}
     assert [each["message"] for each in found["diagnostics"]] == [
         "on px4 with seed 3, and in 3 more of 12 flights: `collision`: it hit <something>",
-        "on px4 with seed 3, and in 3 more of 12 flights: it ended as `aborted`, which is not as expected",
+        "on px4 with seed 3, and in 3 more of 12 flights: it ended as `aborted`, which was not expected",
     ]
     assert [each["at"]["line"] for each in found["diagnostics"]] == [3, 9]
 

@@ -159,11 +159,11 @@ def test_of_what_changed_old_and_new_words_are_told(part: Callable[[Path], Repor
     told = changes(everything, airspace=None, without_evidence=int(WithoutEvidence.LAND))
     assert told["the airspace"].before[0].startswith("This policy sets no limits")
     assert told["the airspace"].after[0].startswith("The vehicle may only be inside of `yard` and outside of `works`")
-    assert "comes down" in told["what is done without evidence"].before[0]
-    assert "may finish" in told["what is done without evidence"].after[0]
+    assert "comes down" in told["the action without evidence"].before[0]
+    assert "may finish" in told["the action without evidence"].after[0]
     told = changes(everything, silence_us=30_000_000, after_silence=int(AfterSilence.CONTINGENCY))
     (silence,) = told.values()
-    assert silence.what == "what flies after a silence of the vehicle"
+    assert silence.what == "the action after a silence of the vehicle"
     assert "longer than 30 s, the mission is given up" in silence.before[0]
     assert "longer than 45 s, the step goes on" in silence.after[0]
     told = changes(everything, contingency=policy.contingency[1:])

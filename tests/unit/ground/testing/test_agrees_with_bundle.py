@@ -1,4 +1,4 @@
-"""A test decides as the vehicle would: the same step, compiled, sealed and opened on board, comes to the same."""
+"""A test gives the vehicle's decision: the same step, compiled, sealed and opened on board, is decided equally."""
 
 from datetime import UTC, datetime
 from functools import cache
@@ -26,7 +26,7 @@ from rtshcua.onboard.enforcement.load import Loaded
 DIALECT = dialect.load()
 AT = 7_000 * S  # monotonic
 PHASES = ("departure", "inspection", "recovery")
-#: of each signal the values that are worth a try: as they are written, and as they are kept
+#: the interesting values of each signal: as written, and in canonical units
 VALUES: dict[str, list[tuple[str, int | tuple[int, int] | None]]] = {
     "battery": [(f"{n} %", n * 100) for n in (80, 80, 80, 41, 36, 35, 26, 24, 12)] + [("unknown", None)],
     "battery.cell": [("3.9 V", 3_900), ("3.9 V", 3_900), ("3.5 V", 3_500), ("3.49 V", 3_490), ("unknown", None)],
@@ -49,7 +49,7 @@ VALUES: dict[str, list[tuple[str, int | tuple[int, int] | None]]] = {
 
 
 class Flight(NamedTuple):
-    """A mission that compiles: its policy's name and version, and its steps, each with the number of its phase."""
+    """A mission that compiles: its policy's name and version, and its steps with the numbers of their phases."""
 
     policy: str
     version: int
@@ -76,7 +76,7 @@ FLIGHTS = (
 
 
 class Asked(NamedTuple):
-    """Which step in which situation: indexes into `VALUES`, ages in us, what somebody answered, the mission's phase."""
+    """A step and its situation: indexes into `VALUES`, ages in us, the answer of a person, the mission's phase."""
 
     flight: Flight
     step: int
@@ -91,7 +91,7 @@ class Asked(NamedTuple):
 
 @st.composite
 def asked(draw: st.DrawFn) -> Asked:
-    """Anything, but mostly what is near to being allowed."""
+    """Any situation, but mostly one that is nearly allowed."""
     flight = draw(st.sampled_from(FLIGHTS))
     step = draw(st.integers(0, len(flight.steps) - 1))
     amiss = draw(st.sets(st.sampled_from(sorted(VALUES)), max_size=2))
@@ -120,7 +120,7 @@ def program(text: str) -> Program:
 
 @cache
 def aboard(flight: Flight) -> Loaded:
-    """The bundle of a flight, as `rtshcua compile` makes it, in force on board."""
+    """The bundle of a flight, compiled like by `rtshcua compile` and in force on board."""
     parts = [[step for step, phase in flight.steps if phase == number] for number in range(len(PHASES))]
     phases = "\n".join(f"phase {name} {{ {' '.join(part)} }}" for name, part in zip(PHASES, parts, strict=True))
     text = f"""import "lib:policies/{flight.policy}.rts"
@@ -136,7 +136,7 @@ mission it under {flight.policy}@{flight.version} on quad {{
 
 
 def known(policy: Policy, asked: Asked) -> dict[str, tuple[str, Any, int]]:
-    """Of each signal that a policy reads its text, its value and its age."""
+    """The text, value and age of each signal that a policy reads."""
     found = {}
     for signal in policy.signals:
         text, value = VALUES[signal.name][asked.values[signal.name]]
@@ -146,7 +146,7 @@ def known(policy: Policy, asked: Asked) -> dict[str, tuple[str, Any, int]]:
 
 
 def on_board(asked: Asked) -> tuple[str, str, str | None]:
-    """What is decided on the step of the bundle."""
+    """The decision on the step of the bundle."""
     of = aboard(asked.flight)
     policy, invocation = of.policy.policy, of.invocations[asked.step]
     values: list[int | None] = [None] * policy.slots
@@ -157,7 +157,7 @@ def on_board(asked: Asked) -> tuple[str, str, str | None]:
         cells = project(policy.projection, *value) if signal.kind == POSITION else (value,)
         for offset, cell in enumerate(cells):
             values[signal.slot + offset], ages[signal.slot + offset] = cell, age
-    assert not policy.monitors  # else they would have to be observed
+    assert not policy.monitors  # others would need observations
     answers = tuple(
         ConfirmAnswer(number, rule.approver, asked.granted, AT)
         for number, rule in enumerate(policy.rules)
@@ -174,7 +174,7 @@ def on_board(asked: Asked) -> tuple[str, str, str | None]:
 
 
 def as_tested(asked: Asked) -> tuple[str, str, str | None]:
-    """What a test says of the same request."""
+    """A test of the same request."""
     policy = aboard(asked.flight).policy.policy
     request, _ = asked.flight.steps[asked.step]
     given = ", ".join(f"{name} = {text}" for name, (text, _, _) in known(policy, asked).items())
@@ -202,5 +202,5 @@ test "it" {{
 
 @settings(max_examples=settings().max_examples // 2)
 @given(asked())
-def test_a_case_is_decided_as_the_step_of_a_bundle_on_board(asked: Asked) -> None:
+def test_case_is_decided_like_the_step_of_a_bundle_on_board(asked: Asked) -> None:
     assert as_tested(asked) == on_board(asked)

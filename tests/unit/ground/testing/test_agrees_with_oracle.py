@@ -1,5 +1,6 @@
-"""Random situations, written as rows of a table, are decided as the naive oracle decides them; nothing of what stands
-between the text and the decision (units, slots, ages, times, phases, people) is shared with it.
+"""Random situations, written as rows of a table, are decided like by the naive oracle.
+
+The oracle shares no code with the compiler: not for units, slots, ages, times, phases or people.
 """
 
 from typing import Any, NamedTuple
@@ -24,7 +25,7 @@ NOMINAL = """nominal empty {
 }
 """
 SIGNALS = ("battery", "gps.fix", "wind.speed", "link.quality", "obstacle.distance", "height", "position", "landed")
-#: of each signal: how values are written, and as what they are kept; the place is projected by the policy
+#: the values of each signal: as written, and in canonical units; the policy projects the place
 FORMS: dict[str, Any] = {
     "battery": (st.integers(0, 100), "{} %", 100),
     "link.quality": (st.integers(0, 100), "{} %", 100),
@@ -34,23 +35,23 @@ FORMS: dict[str, Any] = {
 }
 FIXES = {"dgps": 4, "fix_3d": 3, "fix_2d": None, "no_fix": None}  # None: `unknown at`
 PLACES = {"47.39876 N, 8.54698 E": (473987600, 85469800), "47.39300 N, 8.54559 E": (473930000, 85455900)}
-STALE = {"battery": 5, "link.quality": 5, "wind.speed": 10, "landed": 3}  # s; of all others 2
+STALE = {"battery": 5, "link.quality": 5, "wind.speed": 10, "landed": 3}  # s; 2 for all others
 
 
 class Row(NamedTuple):
-    """What a row says, and what it must come to: by signal the values and the age."""
+    """A row, and the expected values and age of each signal."""
 
     text: str
     values: dict[str, tuple[tuple[int | tuple[int, int] | None], int]]
 
 
-#: what is written of the signals that nothing is amiss with
+#: the text of good signals
 GOOD = {"battery": 80, "link.quality": 90, "wind.speed": 3, "obstacle.distance": 40, "height": 20}
 
 
 @st.composite
 def rows(draw: st.DrawFn) -> Row:
-    """One cell for each signal: good for most, random for a few, sometimes about to be stale, sometimes unknown."""
+    """One cell for each signal: mostly good, a few random, sometimes nearly stale or unknown."""
     cells, values = [], {}
     amiss = draw(st.sets(st.sampled_from(SIGNALS), max_size=2))
     for name in SIGNALS:
@@ -81,12 +82,12 @@ def _written(draw: st.DrawFn, name: str, amiss: bool) -> tuple[str, Any]:
 
 
 class Asked(NamedTuple):
-    """The parts of a test, and what they must come to."""
+    """The parts of a test, and their expected values."""
 
     parts: tuple[str, ...]
     source: int
     role: str
-    ages: tuple[int, int, int]  # us: of the issue and the release, and the error of the clock
+    ages: tuple[int, int, int]  # us: the ages of the issue and the release, and the clock error
     phase: int
     granted: int | None
     skill: str
@@ -102,7 +103,7 @@ REQUESTS = [
 
 @st.composite
 def asked(draw: st.DrawFn) -> Asked:
-    """A request that may be had, but for up to two things about it."""
+    """A request that is allowed except for up to two mistakes."""
     amiss = draw(
         st.sets(st.sampled_from(["source", "role", "issued", "released", "error", "phase", "height"]), max_size=2)
     )
@@ -132,7 +133,7 @@ def asked(draw: st.DrawFn) -> Asked:
 
 
 def expected(case: PolicyCase, asked: Asked, row: Row) -> tuple[Outcome, str, str | None]:
-    """What the oracle decides in the situation as it is put together here."""
+    """The oracle's decision in a situation that is built here."""
     policy, invocation = case.policy.lowered.policy, case.invocation.invocation
     assert policy.contracts[invocation.skill].name == asked.skill
     assert (invocation.source, policy.roles[invocation.role]) == (asked.source, asked.role)
@@ -171,7 +172,7 @@ def _answers(policy: Policy, granted: int, at_us: int) -> tuple[ConfirmAnswer, .
 
 @settings(max_examples=settings().max_examples // 2)
 @given(asked(), st.lists(rows(), min_size=1, max_size=12))
-def test_decided_as_the_oracle_decides(asked: Asked, rows: list[Row]) -> None:
+def test_case_is_decided_like_by_the_oracle(asked: Asked, rows: list[Row]) -> None:
     columns = ", ".join(SIGNALS)
     table = "\n".join(row.text for row in rows)
     found = made(f'test "it" {{ {" ".join(asked.parts)} table {columns} {{ {table} }} }}', IMPORT + NOMINAL)

@@ -1,4 +1,4 @@
-"""A test's cases: their names and places, what they share, and what is said where a decision is not as expected."""
+"""The cases of a test: their names and places, shared data, and the finding on an unmet expectation."""
 
 from pathlib import Path
 
@@ -40,7 +40,7 @@ MISSION = """mission survey under bridge_inspection@7 on quad {
 CHECKOUT = Path(__file__).resolve().parents[4]
 
 
-def test_each_row_is_a_case_of_its_own_name_and_place() -> None:
+def test_each_row_is_a_case_with_its_own_name_and_place() -> None:
     cases = made(TABLE).cases
     assert [(case.name, case.row) for case in cases] == [
         ("charge and wind [80 %, 3 m/s]", 0),
@@ -54,14 +54,14 @@ def test_each_row_is_a_case_of_its_own_name_and_place() -> None:
     assert text[cases[4].span.start : cases[4].span.end] == '"again"'
 
 
-def test_all_are_met_and_share_the_policy_and_the_request() -> None:
+def test_cases_share_the_policy_and_the_request() -> None:
     results = ran(TABLE)
     assert all(each.met and each.finding is None for each in results)
     assert len({id(each.case.policy) for each in results}) == 1
     assert len({id(each.case.invocation) for each in results}) == 1
 
 
-def test_the_request_is_the_one_that_a_mission_makes() -> None:
+def test_request_is_the_same_as_in_a_mission() -> None:
     text = IMPORT + NOMINAL + TABLE
     compiled = compile_program(program(IMPORT + MISSION), dialect.load(), mission=None, issued_at_us=0)
     assert compiled.mission is not None
@@ -76,7 +76,7 @@ def test_the_request_is_the_one_that_a_mission_makes() -> None:
     assert asked.policy.lowered.policy == compiled.policy
 
 
-def test_it_is_bound_as_a_real_one_is() -> None:
+def test_request_is_bound_to_the_policy() -> None:
     (case, *_) = made(TABLE).cases
     flat = case.invocation.invocation
     assert len(flat.invocation_id) == 16
@@ -85,12 +85,12 @@ def test_it_is_bound_as_a_real_one_is() -> None:
     assert flat.issued_at_us == case.now.utc_us
 
 
-def test_what_dispatch_takes_is_what_is_assumed_on_board() -> None:
+def test_dispatch_time_is_the_one_assumed_on_board() -> None:
     assert REMAINING_US == CONSERVATIVE_US
 
 
-def test_nothing_that_is_signed_changes_by_tests() -> None:
-    """But for the digest of the text of the file that they are written into, as with a comment."""
+def test_tests_do_not_change_what_is_signed() -> None:
+    """Except the digest of the file's text, which also changes with a comment."""
     with_tests = program('import "lib:policies/bridge_inspection.rts"\n' + MISSION + NOMINAL + TABLE)
     without = program('import "lib:policies/bridge_inspection.rts"\n' + MISSION)
     digests, missions = [], []
@@ -104,13 +104,13 @@ def test_nothing_that_is_signed_changes_by_tests() -> None:
     assert missions[0] == missions[1]
 
 
-def test_an_import_that_only_a_test_uses_is_used() -> None:
+def test_import_used_by_a_test_only_is_not_unused() -> None:
     (unit, *_) = program(IMPORT + NOMINAL + TABLE).units
     assert {"bridge_inspection", "quad", "inspect_area", "bridge_a", "battery", "wind.speed"} <= mentioned_by(unit)
 
 
 def unmet(expectation: str, *given: str) -> CaseResult:
-    """One test that is not met."""
+    """A test whose expectation is not met."""
     suite_of = made(f'test "it" {{ {" ".join(given)} {WHEN} {expectation} }}')
     assert suite_of.diagnostics == ()
     (one,) = (run_case(case) for case in suite_of.cases)
@@ -124,51 +124,51 @@ def unmet(expectation: str, *given: str) -> CaseResult:
         (
             "expect allow",
             "given battery = 30 %",
-            "`allow` is expected, and the decision is `fallback hover because state/violated`",
+            "expected `allow`; the decision is `fallback hover because state/violated`",
             "it would have passed with `battery = 35.01 %`",
         ),
         (
             "expect fallback return_home",
             "given battery = 30 %",
-            "`return_home` is expected to fly, and `hover` flies",
+            "expected `return_home` to fly; `hover` flies",
             "it would have passed with `battery = 35.01 %`",
         ),
         (
             'expect fallback hover because timing/no-slack at "battery > 35 %"',
             "given wind.speed = 11 m/s",
-            "the reason `timing/no-slack` is expected, and it is `state/violated`; "
-            "`battery > 35 %` is expected to decide, and `wind.speed < 10 m/s` does",
+            "expected the reason `timing/no-slack`; it is `state/violated`; "
+            "expected `battery > 35 %` to decide; `wind.speed < 10 m/s` decided",
             "it would have passed with `wind.speed = 9.999 m/s`",
         ),
         (
             "expect allow",
             "given gps.fix = unknown, battery = 80 %",
-            "`allow` is expected, and the decision is `defer because state/unknown`",
+            "expected `allow`; the decision is `defer because state/unknown`",
             "`gps.fix` is unknown",
         ),
         (
             "expect allow",
             "given battery = 80 % measured 6 s ago",
-            "`allow` is expected, and the decision is `defer because state/unknown`",
+            "expected `allow`; the decision is `defer because state/unknown`",
             "`battery` is stale",
         ),
         (
             "expect deny",
             "",
-            "`deny` is expected, and the decision is `allow because admitted`",
+            "expected `deny`; the decision is `allow because admitted`",
             "`permit inspect_area by role operator through agent, operator when (area inside bridge_a or area inside "
-            "bridge_b) and altitude <= 30 m` allows it, and no rule and no clause stands against it: a `deny` needs "
-            "one that does, or a narrower `permit`",
+            "bridge_b) and altitude <= 30 m` allows it: make it narrower, or add a rule or clause that prevents the "
+            "request",
         ),
     ],
 )
-def test_what_is_not_met_is_told(expectation: str, given: str, message: str, help: str) -> None:
+def test_unmet_expectation_is_described(expectation: str, given: str, message: str, help: str) -> None:
     finding = unmet(expectation, given).finding
     assert finding is not None
     assert (finding.code.id, finding.message, finding.help) == ("E1411", message, help)
 
 
-def test_a_finding_points_at_the_expectation_and_at_what_decided() -> None:
+def test_finding_points_at_the_expectation_and_the_deciding_clause() -> None:
     one = unmet("expect allow", "given battery = 30 %")
     assert one.finding is not None
     sources = made(TABLE).sources | {"probe.rts": one.case.policy.lowered.files._report.sources["probe.rts"]}
@@ -177,10 +177,10 @@ def test_a_finding_points_at_the_expectation_and_at_what_decided() -> None:
     assert "skills/inspect_area.rts:20:34" in text
     late = unmet("expect allow", "released 1 min ago").finding
     assert late is not None
-    assert [label.text for label in late.labels] == ["step 5, timing, decided: no clause, but the request itself"]
+    assert [label.text for label in late.labels] == ["step 5, timing, decided by the request itself, not by a clause"]
 
 
-def test_a_finding_points_at_every_permit_that_allowed_and_at_those_that_did_not() -> None:
+def test_finding_points_at_the_permits_that_allowed_or_did_not() -> None:
     wide = "permit hover by any"
     rules = (
         "policy own version 1 { permit takeoff by role operator when altitude <= 9 m "
@@ -207,13 +207,13 @@ def test_a_finding_points_at_every_permit_that_allowed_and_at_those_that_did_not
     assert other == ("permit takeoff by role operator when altitude >= 90 m", "this permit does not allow it either")
 
 
-def test_check_finds_what_is_wrong_with_tests_and_runs_none() -> None:
+def test_check_reports_wrong_tests_without_running_any() -> None:
     wrong = IMPORT + NOMINAL + f'test "it" {{ {WHEN} expect deny }} test "b" {{ {WHEN} expect allow at "x" }}'
     assert [each.code.id for each in examine_program(program(wrong), dialect.load()).diagnostics] == ["E1410"]
 
 
 @pytest.mark.parametrize("path", sorted((CHECKOUT / "policies").glob("*_test.rts")), ids=lambda path: path.stem)
-def test_the_shipped_tests_are_met(path: Path) -> None:
+def test_shipped_tests_pass(path: Path) -> None:
     loaded = load([str(path)], lambda name: Path(name).read_bytes(), str(CHECKOUT))
     cases = suite(loaded, dialect.load())
     assert cases.diagnostics == ()
@@ -221,7 +221,7 @@ def test_the_shipped_tests_are_met(path: Path) -> None:
     assert [run_case(case).finding for case in cases.cases if not run_case(case).met] == []
 
 
-def test_the_examples_of_the_reference_are_met() -> None:
+def test_examples_of_the_reference_pass() -> None:
     page = (CHECKOUT / "docs" / "language.md").read_text(encoding="utf-8")
     section = page.partition("\n## Tests\n")[2].partition("\n## Scenarios\n")[0]
     blocks = [block.partition("```")[0] for block in section.split("```rts\n")[1:]]

@@ -1,4 +1,4 @@
-"""What there is to cover of a policy, and what a decision reaches of it."""
+"""The coverage items of a policy, and the goals that a decision reaches."""
 
 from msgspec.structs import replace
 
@@ -34,13 +34,13 @@ UNIVERSE = universe_of(PREPARED)
 
 
 def item(role: str, text: str, skill: str = "", of: Universe = UNIVERSE) -> CoverageItem:
-    """The one item of a role, a skill and a text."""
+    """The item of a role, a skill and a text."""
     (found,) = [each for each in of.items if (each.role, each.skill) == (role, skill) and each.text == text]
     return found
 
 
 def seen(step: int, state: State, approvals: tuple[ConfirmAnswer, ...] = ()) -> dict[tuple[str, str, str], set[Goal]]:
-    """What deciding on a step reaches, by item."""
+    """The goals that the decision on a step reaches, by item."""
     invocation = STEPS[step]
     context = flat.context(invocation.invocation, approvals=approvals)
     found: dict[tuple[str, str, str], set[Goal]] = {}
@@ -50,7 +50,7 @@ def seen(step: int, state: State, approvals: tuple[ConfirmAnswer, ...] = ()) -> 
     return found
 
 
-def test_every_rule_clause_and_outcome_is_there() -> None:
+def test_every_rule_clause_and_outcome_is_an_item() -> None:
     roles = [each.role for each in UNIVERSE.items]
     permitted = ("takeoff", "hover", "goto", "inspect_area", "return_home", "emergency_land")
     assert roles.count("permit") == 4
@@ -63,11 +63,11 @@ def test_every_rule_clause_and_outcome_is_there() -> None:
     assert UNIVERSE.items[-1].goals == (Goal.ALLOW, Goal.DENY, Goal.DEFER, Goal.FALLBACK)
 
 
-def test_a_skill_that_nothing_permits_has_no_clauses_to_cover() -> None:
+def test_skill_without_a_permit_has_no_items() -> None:
     assert not [each for each in UNIVERSE.items if each.skill == "track_target"]
 
 
-def test_what_cannot_be_is_left_out() -> None:
+def test_impossible_goals_are_excluded() -> None:
     reads_arguments = item("permit", "permit (0,)")
     assert reads_arguments.impossible == (Goal.UNKNOWN,)
     without_condition = item("forbid", "forbid (6,)")
@@ -78,18 +78,18 @@ def test_what_cannot_be_is_left_out() -> None:
     assert lands.impossible == (Goal.FALSE,)  # it needs nothing
 
 
-def test_a_clause_that_is_constant_has_nothing_but_its_truth() -> None:
+def test_constant_clause_has_only_its_truth_as_goal() -> None:
     always = flat.clause("20 m <= 30 m", flat.apply(flat.Op.LE, flat.const(20), flat.const(30)))
     rules = (*flat.RULES, flat.rule(RuleKind.FORBID, flat.TAKEOFF, when=always))
     ready, _ = prepared(replace(POLICY, rules=rules))
     assert universe_of(ready).items[7].goals == (Goal.TRUE, Goal.DECIDED)
 
 
-def test_a_time_of_day_can_be_unknown_because_a_clock_may_be_wrong() -> None:
+def test_time_of_day_can_be_unknown_by_a_clock_error() -> None:
     assert Goal.UNKNOWN in item("permit", "permit (3,)").goals
 
 
-def test_an_allowed_step_reaches_what_it_looked_at_and_its_permit_decided() -> None:
+def test_allowed_step_reaches_its_checks_and_its_permit_decides() -> None:
     found = seen(TAKEOFF, flat.state())
     assert found["permit", "", "permit (0,)"] == {Goal.TRUE, Goal.DECIDED}
     assert found["require", "takeoff", "battery > 35 %"] == {Goal.TRUE}
@@ -98,7 +98,7 @@ def test_an_allowed_step_reaches_what_it_looked_at_and_its_permit_decided() -> N
     assert not [key for key in found if key[1] not in ("", "takeoff")]
 
 
-def test_of_two_permits_that_both_permit_none_decided() -> None:
+def test_no_permit_decides_if_two_permits_allow() -> None:
     again = flat.rule(RuleKind.PERMIT, flat.TAKEOFF, roles=(flat.OPERATOR,), sources=(SourceKind.AGENT,), start=90)
     ready, invocations = prepared(replace(POLICY, rules=(*flat.RULES, again)))
     of, step = universe_of(ready), invocations[TAKEOFF]
@@ -106,24 +106,24 @@ def test_of_two_permits_that_both_permit_none_decided() -> None:
     assert {goal for number, goal in found if of.items[number].role == "permit"} == {Goal.TRUE}
 
 
-def test_what_the_decision_names_decided_and_later_steps_are_not_reached() -> None:
+def test_named_clause_decides_and_later_steps_are_not_reached() -> None:
     found = seen(TAKEOFF, flat.state({flat.BATTERY: 3_000}))
     assert found["require", "takeoff", "battery > 35 %"] == {Goal.FALSE, Goal.DECIDED}
     assert found["permit", "", "permit (0,)"] == {Goal.TRUE}
     assert not [key for key in found if key[0] in ("airspace", "energy", "degrade")]
 
 
-def test_an_unknown_clause_that_defers_decided() -> None:
+def test_unknown_clause_that_defers_decides() -> None:
     found = seen(TAKEOFF, flat.state({flat.BATTERY: None}))
     assert found["require", "takeoff", "battery > 35 %"] == {Goal.UNKNOWN, Goal.DECIDED}
 
 
-def test_the_charge_decides_without_being_named() -> None:
+def test_charge_decides_without_being_named() -> None:
     found = seen(RETURN, flat.state({flat.BATTERY: 700}))
     assert {Goal.FALSE, Goal.DECIDED} <= found["energy", "return_home", item_text("return_home")]
 
 
-def test_a_degrade_that_says_what_flies_decided_though_a_clause_refused() -> None:
+def test_degrade_whose_target_flies_decides_although_a_clause_refused() -> None:
     found = seen(TAKEOFF, flat.state({flat.BATTERY: 2_000}))
     assert found["require", "takeoff", "battery > 35 %"] == {Goal.FALSE, Goal.DECIDED}
     assert found["degrade", "", "degrade ()"] == {Goal.TRUE, Goal.DECIDED}
@@ -133,12 +133,12 @@ def item_text(skill: str) -> str:
     return next(each.text for each in UNIVERSE.items if (each.role, each.skill) == ("energy", skill))
 
 
-def test_shares_are_whole_numbers_rounded_down_and_all_is_only_all() -> None:
+def test_share_is_rounded_down_and_full_only_for_full_coverage() -> None:
     assert (per_mille(999_999, 1_000_000), per_mille(7, 7), per_mille(0, 0)) == (999, 1000, 1000)
     assert share(2, 3) == "66.6 %"
 
 
-def test_a_threshold_is_met_exactly() -> None:
+def test_threshold_is_compared_without_rounding() -> None:
     found = coverage(UNIVERSE, [])
     assert (found.covered, enough([found], 0), enough([found], 1)) == (0, True, False)
     whole = frozenset((number, goal) for number, each in enumerate(UNIVERSE.items) for goal in each.goals)
@@ -148,7 +148,7 @@ def test_a_threshold_is_met_exactly() -> None:
     assert not enough([found, full], 51)
 
 
-def test_a_rule_that_never_decided_is_named() -> None:
+def test_rule_that_never_decided_is_listed() -> None:
     invocation = STEPS[TAKEOFF]
     decided = trace(invocation, flat.state(), PREPARED, flat.context(invocation.invocation), flat.NOW)
     found = coverage(UNIVERSE, [reached_goals(UNIVERSE, invocation, decided)])

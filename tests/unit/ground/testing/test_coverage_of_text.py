@@ -1,4 +1,4 @@
-"""Coverage counts what a policy says: where its text breaks into lines, and what its comments say, changes nothing."""
+"""Coverage does not depend on line breaks and comments."""
 
 import random
 import re
@@ -50,7 +50,7 @@ test "hovering" from day {
 }
 test "a trainee" from day { when hover(10 s) by role trainee through agent expect allow }
 """
-#: what stands together, and must not be torn: texts, numbers with their fractions, words with their dots
+#: tokens that a line break must not split: strings, numbers with fractions, words with dots
 TOKENS = re.compile(r'"[^"]*"|[0-9][0-9:]*(?:\.[0-9]+)?|[A-Za-z_][A-Za-z0-9_/]*(?:\.[A-Za-z_]+)*|\.\.|[<>=!]=|\S')
 BREAKS = (" ", "\n", "  ", "\n\n", " // a word\n", " /* some\n words */ ", "\t")
 
@@ -75,7 +75,7 @@ def coverage(text: str) -> Coverage:
 AS_WRITTEN = coverage(TEXT)
 
 
-def test_what_these_tests_reach() -> None:
+def test_coverage_of_the_sample_is_as_expected() -> None:
     rules = {line.item.text: line for line in AS_WRITTEN.lines if line.item.role in ("permit", "forbid", "degrade")}
     assert list(rules) == [
         "use low(20 m): permit hover by role operator through agent when height <= top",
@@ -91,7 +91,7 @@ def test_what_these_tests_reach() -> None:
 
 @settings(max_examples=settings().max_examples // 2)
 @given(st.randoms(use_true_random=False))
-def test_formatting_and_comments_change_nothing(chance: random.Random) -> None:
+def test_formatting_and_comments_do_not_change_coverage(chance: random.Random) -> None:
     text = "".join(token + chance.choice(BREAKS) for token in TOKENS.findall(TEXT))
     found = coverage(text)
     assert (found.covered, found.total, found.decisions) == (AS_WRITTEN.covered, AS_WRITTEN.total, AS_WRITTEN.decisions)

@@ -1,4 +1,4 @@
-"""Every reason that a decision can have is reached by some test, written as people write them."""
+"""Every reason of a decision is reached by a test in the language."""
 
 import pytest
 
@@ -6,7 +6,7 @@ from reference.deciding import IMPORT, NOMINAL, WHEN, decided
 from rtshcua.model.outcome import Reason, outcome_of
 from virtual.rows import rows
 
-#: a policy of its own, for what the shipped one never decides
+#: a policy for reasons that the shipped one never gives
 OWN = """import "lib:policies/site.rts"
 import "lib:skills/hover.rts"
 import "lib:skills/goto.rts"
@@ -87,7 +87,7 @@ CASES = [
 
 @pytest.mark.slow
 @rows(("before", "parts", "expected"), CASES, ids=[" ".join(case[1])[-60:] for case in CASES])
-def test_decided(before: str, parts: tuple[str, ...], expected: str) -> None:
+def test_case_is_met(before: str, parts: tuple[str, ...], expected: str) -> None:
     assert decided(*parts, before=before) == expected
 
 

@@ -1,4 +1,4 @@
-"""What is wrong with nominals and tests is said in the words that are used elsewhere."""
+"""Findings on nominals and tests have the same wording as findings elsewhere."""
 
 from reference.deciding import IMPORT, NOMINAL, WHEN, found
 from virtual.rows import rows
@@ -40,7 +40,7 @@ WRONG = [
     (
         "given (battery < 30 % for the last 5 s) = true",
         "E1409",
-        "nothing in `bridge_inspection` observes `battery < 30 % for the last 5 s`, so its truth changes nothing",
+        "`bridge_inspection` does not observe `battery < 30 % for the last 5 s`, so its value has no effect",
         None,
     ),
     (
@@ -52,7 +52,7 @@ WRONG = [
     (
         "given gps.accuracy = 3 m",
         "E1409",
-        "nothing in `bridge_inspection` reads `gps.accuracy`, so its value changes nothing",
+        "`bridge_inspection` does not read `gps.accuracy`, so its value has no effect",
         None,
     ),
     (
@@ -68,14 +68,14 @@ WRONG = [
     (
         "phase a of a, b",
         "E0802",
-        "`inspect_area` is valid only during `inspection`, and the test knows no such phase",
-        "say the phases in their order, as in `phase a of a, inspection`",
+        "`inspect_area` is valid only during `inspection`, and the test has no such phase",
+        "name the phases in order, as in `phase a of a, inspection`",
     ),
 ]
 
 
 @rows(("part", "code", "message", "help"), WRONG, ids=[each[0] for each in WRONG])
-def test_a_premise(part: str, code: str, message: str, help: str | None) -> None:
+def test_wrong_premise_is_found(part: str, code: str, message: str, help: str | None) -> None:
     findings = found(f'test "it" {{ {WHEN} {part} expect allow }}')
     assert {each[0] for each in findings} == {code}
     assert not message or (message in [each[1] for each in findings])
@@ -103,7 +103,7 @@ zone own = circle(47.39850 N, 8.54600 E, 30 m)
 
 
 @rows(("request_", "code", "message"), ASKED)
-def test_a_request(request_: str, code: str, message: str) -> None:
+def test_wrong_request_is_found(request_: str, code: str, message: str) -> None:
     findings = found(f'{SPIN}test "it" {{ when {request_} expect allow }}')
     assert [each[:2] for each in findings] == [(code, message)]
 
@@ -128,13 +128,13 @@ TABLES = [
 
 
 @rows(("table", "code", "message"), TABLES)
-def test_a_table(table: str, code: str, message: str) -> None:
+def test_wrong_table_is_found(table: str, code: str, message: str) -> None:
     findings = found(f'test "it" {{ {WHEN} table {table} }}')
     assert (code, message) in [each[:2] for each in findings]
     assert {each[0] for each in findings} == {code}
 
 
-def test_a_test_says_what_is_asked_and_what_must_be_decided() -> None:
+def test_test_without_request_or_expectation_is_found() -> None:
     both = found(f'test "it" {{ {WHEN} expect allow table battery {{ 80 % expect allow }} }}')
     neither = found('test "it" { }')
     assert [each[1] for each in both] == ["the test has both `expect` and a `table`"]
@@ -144,7 +144,7 @@ def test_a_test_says_what_is_asked_and_what_must_be_decided() -> None:
     ]
 
 
-def test_who_asks_and_when_and_in_which_phase_is_never_made_up() -> None:
+def test_role_time_and_phase_have_no_defaults() -> None:
     bare = IMPORT + "nominal bare { under bridge_inspection on quad }\n"
     findings = found(f'test "it" {{ {WHEN} expect allow }}', bare)
     assert [each[1] for each in findings] == [
@@ -154,7 +154,7 @@ def test_who_asks_and_when_and_in_which_phase_is_never_made_up() -> None:
     ]
 
 
-def test_a_nominal_has_a_policy_and_a_vehicle() -> None:
+def test_nominal_without_policy_or_vehicle_is_found() -> None:
     findings = found('test "it" { expect allow }', IMPORT + "nominal bare { }\n")
     assert findings[0] == ("E0107", "nominal `bare` lacks `under`, `on`", "add `under`, `on`")
     findings = found("", IMPORT + NOMINAL.replace("on quad", "on quat").replace("under bridge", "under brid"))
@@ -164,7 +164,7 @@ def test_a_nominal_has_a_policy_and_a_vehicle() -> None:
     ]
 
 
-def test_a_nominal_is_named_imported_or_the_only_one() -> None:
+def test_nominal_of_a_test_is_named_or_the_only_one() -> None:
     test = f'test "it" FROM {{ {WHEN} expect allow }}'
     beside = {"good": IMPORT + NOMINAL, "other": IMPORT + NOMINAL.replace("morning", "noon")}
     imports = 'import "good.rts"\nimport "other.rts"\n'
@@ -180,18 +180,18 @@ def test_a_nominal_is_named_imported_or_the_only_one() -> None:
     assert found(test.replace("FROM", ""), imports + own, **beside) == []
 
 
-def test_of_a_signal_that_is_not_given_a_warning_tells() -> None:
+def test_signal_without_a_value_is_a_warning() -> None:
     without = NOMINAL.replace(", wind.speed = 3 m/s", "")
     (told,) = found(f'test "it" {{ {WHEN} expect allow }}', IMPORT + without)
     assert told[:2] == (
         "E1408",
-        "a decision on `inspect_area` reads `wind.speed`, and nothing gives it: it is unknown",
+        "a decision on `inspect_area` reads `wind.speed`, which has no value: it is unknown",
     )
     assert found(f'test "it" {{ {WHEN} given wind.speed = unknown expect allow }}', IMPORT + without) == []
     assert found('test "it" { when return_home() expect allow }', IMPORT + without) == []
 
 
-def test_a_clause_is_quoted_whole_or_up_to_what_is_left_out() -> None:
+def test_clause_is_quoted_in_full_or_up_to_dots() -> None:
     def quoting(clause: str) -> list[tuple[str, str, str | None]]:
         return found(f'test "it" {{ {WHEN} expect fallback at "{clause}" }}')
 
@@ -200,7 +200,7 @@ def test_a_clause_is_quoted_whole_or_up_to_what_is_left_out() -> None:
     (wrong,) = quoting("battery > 34 %")
     assert wrong == (
         "E1410",
-        "no decision on `inspect_area` here is made by a clause `battery > 34 %`",
+        "no clause `battery > 34 %` can decide on `inspect_area` here",
         "did you mean `battery > 35 %`?",
     )
     for clause, meant in (
@@ -217,12 +217,12 @@ def test_a_clause_is_quoted_whole_or_up_to_what_is_left_out() -> None:
             assert quoting(meant) == []
     (other,) = quoting("forbid anything ...")
     assert other[0] == "E1410"
-    assert (other[2] or "").startswith("there are `")
+    assert (other[2] or "").startswith("possible clauses: `")
     (likely,) = quoting("degrade nothing when wind")
     assert (likely[2] or "").startswith("there are `degrade "), "the most alike first"
 
 
-def test_hostile_tables_end_at_a_limit() -> None:
+def test_table_over_the_limit_of_cases_is_refused() -> None:
     rows = "80 % expect allow\n" * 5_000
     (many,) = found(f'test "it" {{ {WHEN} table battery {{ {rows} }} }}')
     assert many[:2] == ("E1001", "with this test the file has more than 4096 cases, the limit of a file")
@@ -233,6 +233,6 @@ def test_hostile_tables_end_at_a_limit() -> None:
     assert "E1001" in {each[0] for each in found(f'test "it" {{ {WHEN} phase p1 of {phases} expect allow }}')}
 
 
-def test_an_imported_files_tests_are_its_own_business() -> None:
+def test_tests_of_an_imported_file_are_ignored() -> None:
     beside = {"good": IMPORT + NOMINAL + 'test "wrong" { when nothing() expect deny because x }'}
     assert found(f'test "it" {{ {WHEN} expect allow }}', 'import "good.rts"\n', **beside) == []

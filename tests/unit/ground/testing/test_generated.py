@@ -1,4 +1,4 @@
-"""Generated tests are sources that pass, surround every limit, and notice when one is moved."""
+"""Generated tests pass, cover both sides of every limit, and fail if a limit moves."""
 
 import re
 from pathlib import Path
@@ -61,7 +61,7 @@ def shipped() -> GeneratedTests:
     return generated(text, "bridge_inspection.rts", "lib:policies/bridge_inspection.rts")
 
 
-def test_what_is_generated_passes_and_keeps_passing_when_it_is_formatted(small: GeneratedTests) -> None:
+def test_generated_tests_pass_also_after_formatting(small: GeneratedTests) -> None:
     assert small.text is not None
     assert small.without == ()
     assert failures(small, {"small.rts": SMALL}) == []
@@ -73,13 +73,13 @@ def test_what_is_generated_passes_and_keeps_passing_when_it_is_formatted(small: 
     assert played.diagnostics == ()
 
 
-def test_it_says_that_it_records_what_is_so_now(small: GeneratedTests) -> None:
+def test_generated_file_says_that_it_records_present_decisions(small: GeneratedTests) -> None:
     assert small.text is not None
-    assert "record what the policy `small` (version 3) decides" in " ".join(small.text.split())
+    assert "record the present decisions of the policy `small`" in " ".join(small.text.split())
     assert "read them before they are kept" in small.text
 
 
-def test_there_are_limits_of_every_kind_of_clause(small: GeneratedTests) -> None:
+def test_every_kind_of_clause_has_limits(small: GeneratedTests) -> None:
     roles = {each.part.role for each in small.limits}
     assert roles == {"permit", "forbid", "confirm", "degrade", "require", "assume", "airspace", "energy"}
     assert any("delegate rise" in each.part.text for each in small.limits)
@@ -105,13 +105,13 @@ def test_there_are_limits_of_every_kind_of_clause(small: GeneratedTests) -> None
         ("airspace inside city outside school", "airspace inside city"),
     ],
 )
-def test_a_limit_of_a_policy_that_moves_by_one_unit_is_noticed(small: GeneratedTests, written: str, moved: str) -> None:
+def test_limit_moved_by_one_unit_fails_a_generated_test(small: GeneratedTests, written: str, moved: str) -> None:
     assert written in SMALL
     assert noticed(small, {"small.rts": SMALL.replace(written, moved)})
 
 
 def moved_limits() -> dict[str, str]:
-    """The shipped policy with one number moved by one unit, by where the number stands."""
+    """The shipped policy with one number moved by one unit, by the place of the number."""
     text = SHIPPED.read_text(encoding="utf-8")
     numbers = re.compile(r"//[^\n]*|(?P<number>\d+) (?P<unit>m|%|s)(?!\w)")
     finer = {"m": "{}001 mm", "%": "{}.01 %", "s": "{}001 ms"}
@@ -125,11 +125,11 @@ def moved_limits() -> dict[str, str]:
 
 
 LIMITS = moved_limits()
-#: how long the contingency hovers, which nothing that is decided depends on
+#: the duration of the contingency's hover, on which no decision depends
 UNNOTICED = "contingency hover for 10 s"
 
 
-def test_the_shipped_policy_has_limits_to_move() -> None:
+def test_shipped_policy_has_limits_to_move() -> None:
     assert len(LIMITS) == 8
     assert UNNOTICED in LIMITS
 
@@ -142,11 +142,11 @@ def test_the_shipped_policy_has_limits_to_move() -> None:
         for number, place in enumerate(LIMITS)
     ],
 )
-def test_a_limit_of_the_shipped_policy_that_moves_is_noticed(shipped: GeneratedTests, place: str) -> None:
+def test_moved_limit_of_the_shipped_policy_fails_a_generated_test(shipped: GeneratedTests, place: str) -> None:
     assert noticed(shipped, {"bridge_inspection.rts": LIMITS[place]}) == (place != UNNOTICED)
 
 
-def test_some_skills_alone(shipped: GeneratedTests) -> None:
+def test_tests_are_generated_for_chosen_skills_only(shipped: GeneratedTests) -> None:
     text = SHIPPED.read_text(encoding="utf-8")
     alone = generated(text, "bridge_inspection.rts", "lib:policies/bridge_inspection.rts", ("hover",))
     assert alone.text is not None

@@ -1,4 +1,4 @@
-"""Limits in every arm of an `or`, under `not`, of zones in all their kinds: reached, or named."""
+"""Limits in every operand of an `or`, under `not`, and of all kinds of zones are tested, or listed as not reached."""
 
 import re
 from pathlib import Path
@@ -21,7 +21,7 @@ vehicle equipped {
   clock utc +02:00
 }
 """
-#: a ring and a window in one arm, a grown zone in the other; bands for the vehicle; a rule on somebody else
+#: a ring and a window in one operand, a grown zone in the other; heights for the vehicle; a rule about another role
 ARMS = """
 zone yard = difference(circle(47.3981 N, 8.5456 E, 70 m), circle(47.3982 N, 8.5462 E, 11 m)) active 21:15 .. 05:45
 zone block = circle(47.3981 N, 8.5470 E, 40 m) floor 17 m ceiling 33 m above home
@@ -44,7 +44,7 @@ def arms() -> GeneratedTests:
     return generated(TEXT, "arms.rts", "arms.rts", ("goto",))
 
 
-def test_they_pass(arms: GeneratedTests) -> None:
+def test_generated_tests_pass(arms: GeneratedTests) -> None:
     assert failures(arms, {"arms.rts": TEXT}) == []
 
 
@@ -65,7 +65,7 @@ def test_they_pass(arms: GeneratedTests) -> None:
         ("altitude > 13 m", "altitude > 13001 mm"),
     ],
 )
-def test_a_limit_in_any_arm_that_moves_by_one_unit_is_noticed(arms: GeneratedTests, written: str, moved: str) -> None:
+def test_limit_moved_in_any_operand_fails_a_generated_test(arms: GeneratedTests, written: str, moved: str) -> None:
     assert TEXT.count(written) == 1
     assert noticed(arms, {"arms.rts": TEXT.replace(written, moved)})
 
@@ -74,16 +74,16 @@ def named(of: GeneratedTests) -> set[tuple[str, str]]:
     return {(each.role, each.about) for each in of.unreached}
 
 
-def test_what_is_not_reached_is_named_and_nothing_else(arms: GeneratedTests) -> None:
+def test_exactly_the_unreached_limits_are_listed(arms: GeneratedTests) -> None:
     assert named(arms) == {
-        ("permit", "the ceiling of `grow(bridge_a, 7 m)`, which counts for no place on the ground"),
-        ("airspace", "the ceiling of `city`"),  # forbidden before that is looked at, as is the next
+        ("permit", "the ceiling of `grow(bridge_a, 7 m)`, which a place on the ground ignores"),
+        ("airspace", "the ceiling of `city`"),  # a `forbid` decides first, also for the next one
         ("maintain", "`height`"),
-        ("assume", "`speed`"),  # the room for it is there in every scene: its limit is that of `obstacle.distance`
+        ("assume", "`speed`"),  # there is room for it in every scene: its limit is that of `obstacle.distance`
     }
 
 
-def test_what_no_situation_reaches_is_named_where_the_tests_are_read() -> None:
+def test_unreached_limits_are_listed_at_the_head_of_the_file() -> None:
     far = "zone far = circle(47.3981 N, 8.5456 E, 70 m) floor 5 m above home\n"
     text = (
         f"{HEAD}{far}"
@@ -102,8 +102,8 @@ policy arms version 3 {
     assert made.text is not None
     found = named(made)
     assert ("forbid", "`battery`") in found
-    assert ("forbid", "") in found  # nobody with that role is permitted anything
-    assert ("permit", "the floor of `far`, which counts for no place on the ground") in found
+    assert ("forbid", "") in found  # nothing is permitted for this role
+    assert ("permit", "the floor of `far`, which a place on the ground ignores") in found
     comment = " ".join(re.sub(r"\n//\s*", " ", made.text).split())
     assert "NOT REACHED" in comment
     for each in made.unreached:
@@ -111,7 +111,7 @@ policy arms version 3 {
     assert UnreachedLimit("goto", "forbid", "forbid goto by role pilot when altitude > 13 m", "") in made.unreached
 
 
-def test_hours_on_days_of_the_week_of_a_time_zone_are_reached() -> None:
+def test_limits_of_weekly_hours_in_a_time_zone_are_reached() -> None:
     text = (
         HEAD.replace("clock utc +02:00", 'clock "Europe/Zurich"')
         + """policy arms version 3 {
@@ -127,7 +127,7 @@ def test_hours_on_days_of_the_week_of_a_time_zone_are_reached() -> None:
         assert noticed(made, {"arms.rts": text.replace(written, moved)})
 
 
-def test_hours_and_dates_of_an_airspace_are_reached() -> None:
+def test_limits_of_hours_and_dates_of_an_airspace_are_reached() -> None:
     shut = "zone shut = circle(47.3990 N, 8.5470 E, 30 m) active 12:30 .. 14:30\n"
     text = (
         f"{HEAD}{shut}"

@@ -1,4 +1,4 @@
-"""What conditions over time say of a state that has lasted, however they are stacked."""
+"""Conditions over time, also nested ones, in a state that has lasted."""
 
 from reference.deciding import made
 from rtshcua.decision.temporal import initial, lasting, observe
@@ -34,7 +34,7 @@ test "it" {
 """
 
 
-def test_as_if_it_had_been_so_for_longer_than_anything_looks_back() -> None:
+def test_lasting_state_equals_one_observed_longer_than_every_window() -> None:
     suite = made(POLICY, "")
     assert suite.diagnostics == ()
     seen = set()

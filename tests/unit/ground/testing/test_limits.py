@@ -1,4 +1,4 @@
-"""Limits of conditions: found where they are, on both sides, and next to each other."""
+"""Limits of conditions are found at the right values, with adjacent values on both sides."""
 
 from collections.abc import Iterator
 from itertools import pairwise
@@ -59,7 +59,7 @@ def turning(here: Scene, role: str, text: str = "") -> set[tuple[SceneVariable, 
     }
 
 
-def test_each_limit_of_a_step_is_where_its_contract_and_the_rules_have_it() -> None:
+def test_limits_of_a_step_are_those_of_its_contract_and_rules() -> None:
     here = scene()
     numbers = turning(here, "require") | turning(here, "assume")
     assert numbers == {
@@ -71,7 +71,7 @@ def test_each_limit_of_a_step_is_where_its_contract_and_the_rules_have_it() -> N
     assert turning(here, "energy") == {(SceneVariable(False, flat.BATTERY), 1_200, 1_199)}
 
 
-def test_a_clause_with_a_signal_and_an_argument_turns_on_both() -> None:
+def test_clause_with_signal_and_argument_has_limits_for_both() -> None:
     here = scene(step=INSPECT, values={flat.POSITION_X: 110_000, flat.POSITION_Y: -20_000, flat.HEIGHT: 20_000})
     assert turning(here, "maintain", "height") == {
         (SceneVariable(False, flat.HEIGHT), 25_000, 25_001),
@@ -79,7 +79,7 @@ def test_a_clause_with_a_signal_and_an_argument_turns_on_both() -> None:
     }
 
 
-def test_a_window_of_the_day_turns_to_the_microsecond() -> None:
+def test_limits_of_a_daily_window_are_exact_to_the_microsecond() -> None:
     here = scene(step=INSPECT)
     offset = flat.POLICY.vehicle.utc_offset_us
     times = {
@@ -90,7 +90,7 @@ def test_a_window_of_the_day_turns_to_the_microsecond() -> None:
     assert times == {(8 * flat.H, 8 * flat.H - 1), (18 * flat.H, 18 * flat.H + 1)}
 
 
-def test_a_window_of_the_week_turns_to_the_microsecond() -> None:
+def test_limits_of_a_weekly_window_are_exact_to_the_microsecond() -> None:
     code = flat.clause("times", (Op.WEEK_IN, len(flat.POLICY.sets), 0))
     offset = flat.POLICY.vehicle.utc_offset_us
     today = time_of_week(NOW.utc_us + offset) // DAY * DAY
@@ -105,26 +105,26 @@ def test_a_window_of_the_week_turns_to_the_microsecond() -> None:
     assert times == {(week[0], week[0] - 1), (week[1] - 1, week[1])}
 
 
-def test_each_zone_of_an_airspace_has_an_edge_within_what_can_be_written() -> None:
+def test_each_zone_of_an_airspace_has_a_writable_edge() -> None:
     places = {each for each in turning(scene(), "airspace") if each[0].at == flat.POSITION_X}
     assert len(places) == 2  # the city, which is 1 km wide, and the school
     for _, holds, fails in places:
         assert isinstance(holds, tuple)
         assert isinstance(fails, tuple)
         apart = max(abs(holds[0] - fails[0]), abs(holds[1] - fails[1]))
-        assert apart <= 1_000  # mm; most are next to each other, some were nearer to the edge elsewhere
+        assert apart <= 1_000  # mm; most are adjacent, some are closer to the edge elsewhere
     (height,) = [each for each in turning(scene(), "airspace") if each[0].at == flat.HEIGHT]
     assert height[1:] == (119_999, 120_000)
 
 
 @pytest.mark.parametrize("step", [TAKEOFF, GOTO, INSPECT, RETURN])
-def test_on_its_two_sides_every_limit_has_two_truths(step: int) -> None:
+def test_part_has_different_truths_on_both_sides_of_a_limit(step: int) -> None:
     here = scene(step=step)
     assert [each for each in found(here) if sides(each, here) != (TRUE, FALSE)] == []
 
 
-def test_a_part_that_another_part_hides_is_brought_out() -> None:
-    """Of `a and (b or c)` the limit of c shows only where b is not so."""
+def test_limit_hidden_by_another_part_is_found() -> None:
+    """In `a and (b or c)` the limit of c matters only if b is false."""
     low_wind = flat.apply(Op.LE, flat.signal(flat.WIND), flat.const(5_000))
     high_link = flat.apply(Op.GE, flat.signal(flat.LINK), flat.const(7_000))
     text = "wind.speed <= 5 m/s or link.quality >= 70 %"
@@ -146,7 +146,7 @@ LOW, HIGH = 0, 24
 
 @st.composite
 def conditions(draw: st.DrawFn, depth: int = 2) -> flat.Code:
-    """A condition over the wind alone, with small numbers."""
+    """A condition on the wind only, with small numbers."""
     if depth == 0 or draw(st.booleans()):
         op = draw(st.sampled_from([Op.LT, Op.LE, Op.GT, Op.GE, Op.EQ, Op.NE]))
         operands = [flat.signal(flat.WIND), flat.const(draw(st.integers(LOW + 2, HIGH - 2)))]
@@ -159,7 +159,7 @@ def conditions(draw: st.DrawFn, depth: int = 2) -> flat.Code:
 
 
 def flips(part: PolicyPart, here: Scene) -> Iterator[frozenset[int]]:
-    """Where a condition turns, by trying all values there are."""
+    """The limits of a condition, by trying all values."""
     values = [part_truth(part, here.put(SceneVariable(False, flat.WIND), value)) for value in range(LOW, HIGH + 1)]
     for value, (one, other) in enumerate(pairwise(values)):
         if one != other:
@@ -167,7 +167,7 @@ def flips(part: PolicyPart, here: Scene) -> Iterator[frozenset[int]]:
 
 
 @given(conditions(), st.integers(LOW, HIGH))
-def test_every_place_where_a_condition_turns_is_found(code: flat.Code, wind: int) -> None:
+def test_every_limit_of_a_condition_is_found(code: flat.Code, wind: int) -> None:
     clause = flat.clause("of the wind", code)
     contract = replace(flat.CONTRACTS[flat.TAKEOFF], assume=(clause,))
     contracts = (contract, *flat.CONTRACTS[1:])

@@ -1,4 +1,4 @@
-"""What is quoted after `at` is one clause, told from others by all of its text and by what it is."""
+"""A quotation after `at` is one clause, identified by its full text and its role."""
 
 import pytest
 
@@ -19,7 +19,7 @@ nominal noon {
   given battery = 80 %, gps.fix = fix_3d, position = 47.39774 N, 8.54559 E, height = 10 m
 }
 """
-#: more than fits on board, the same for all that begin so
+#: the beginning of several clauses, longer than the text on board
 LONG = "/* " + "x" * MAX_TEXT + " */"
 
 
@@ -33,13 +33,13 @@ def findings(clause: str, because: str = "", before: str = IMPORT + NOMINAL, whe
 
 
 @pytest.mark.parametrize("clause", ["...", " ... ", "", "  "])
-def test_nothing_is_quoted_by_nothing(clause: str) -> None:
+def test_empty_quotation_is_refused(clause: str) -> None:
     (message,) = findings(clause)
-    assert message == "nothing of a clause is quoted"
+    assert message == "the quotation is empty"
     assert not quotes(clause, "forbid any")
 
 
-def test_a_beginning_that_several_clauses_have_is_refused() -> None:
+def test_quotation_of_a_common_beginning_is_refused() -> None:
     rules = ("forbid hover by any when battery < 20 %", "forbid hover by any when battery < 30 %")
     (told,) = found('test "it" { when hover(5 s) expect deny at "forbid hover ..." }', policy(*rules))
     assert told == (
@@ -51,14 +51,14 @@ def test_a_beginning_that_several_clauses_have_is_refused() -> None:
         assert findings(quoted, before=policy(*rules), when="when hover(5 s)") == []
 
 
-def test_the_wrong_one_of_two_clauses_that_begin_alike_is_not_met() -> None:
+def test_quotation_of_the_other_clause_with_this_beginning_is_not_met() -> None:
     rules = ("forbid hover by any when battery < 20 %", "forbid hover by any when battery < 90 %")
     text = 'test "{0}" {{ when hover(5 s) expect deny at "{0}" }}'
     met = [each.met for each in ran("".join(text.format(rule) for rule in rules), policy(*rules))]
     assert met == [False, True]
 
 
-def test_clauses_that_differ_behind_what_is_carried_on_board_are_two() -> None:
+def test_clauses_that_differ_after_the_text_on_board_are_two() -> None:
     rules = [f"forbid hover by any {LONG} when battery > {more} %" for more in (45, 95)]
     assert len(rules[0]) > MAX_TEXT
     text = 'test "{0}" {{ when hover(5 s) expect deny at "{1}" }}'
@@ -68,7 +68,7 @@ def test_clauses_that_differ_behind_what_is_carried_on_board_are_two() -> None:
     assert findings(rules[0][: MAX_TEXT - 3] + "...", before=policy(*rules), when="when hover(5 s)") != []
 
 
-def test_uses_of_a_template_that_differ_behind_what_is_carried_on_board_are_covered_each() -> None:
+def test_template_uses_that_differ_after_the_text_on_board_are_two() -> None:
     template = "template narrow(most: ratio in 0 % .. 100 %) { forbid hover by any when battery > most }\n"
     uses = [f"use narrow({LONG} {most} %)" for most in (45, 95)]
     source = policy(*uses).replace("policy long", f"{template}policy long")
@@ -77,7 +77,7 @@ def test_uses_of_a_template_that_differ_behind_what_is_carried_on_board_are_cove
     assert sum(item.role == "forbid" for item in items) == 2
 
 
-def test_a_text_that_stands_in_two_lists_needs_the_reason() -> None:
+def test_quotation_of_a_clause_in_two_lists_needs_the_reason() -> None:
     skill = """skill rest(time: duration in 1 s .. 9 s) {
   motion   hold for time  class tactical  deadline 5 s  valid for 30 min  lasts at most 1 min
   require battery > 20 %  maintain battery > 20 %
@@ -89,6 +89,6 @@ def test_a_text_that_stands_in_two_lists_needs_the_reason() -> None:
     (told,) = found(text.format(""), before)
     assert told[1:] == (
         "`battery > 20 %` quotes more than one clause that can decide here",
-        "say `because`: it stands in `require`, `maintain`",
+        "add the reason with `because`: the clause is in `require`, `maintain`",
     )
     assert found(text.format("because state/violated"), before) == []

@@ -1,4 +1,4 @@
-"""Scenarios are held against what there is, and lowered with the mission and the policy that they fly."""
+"""Scenarios are checked and lowered with their mission and policy."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -38,31 +38,31 @@ def made(text: str, before: str = IMPORT) -> ScenarioSuite:
 
 
 def found(body: str, before: str = IMPORT) -> list[tuple[str, str, str | None]]:
-    """The codes, messages and helps of what is found in a scenario of the standard mission."""
+    """The codes, messages and helps of the findings on a scenario of the standard mission."""
     diagnostics = made(f'scenario "it" {{ flies standard {body} }}', before).diagnostics
     return [(each.code.id, each.message, each.help) for each in diagnostics]
 
 
 def flown(body: str, before: str = IMPORT) -> ScenarioFlight:
-    """A scenario of the standard mission in which nothing is found."""
+    """A lowered scenario of the standard mission, without findings."""
     made_of = made(f'scenario "it" {{ flies standard {body} }}', before)
     assert made_of.diagnostics == ()
     (one,) = made_of.found
     return one
 
 
-def test_the_endings_are_those_of_a_run() -> None:
+def test_endings_are_those_of_a_run() -> None:
     assert list(ENDINGS) == [str(ending) for ending in Ending]
 
 
-def test_what_is_not_said_is_as_the_simulated_vehicle_comes() -> None:
+def test_empty_scenario_has_the_defaults_of_the_simulated_vehicle() -> None:
     scenario = flown("").scenario
     assert (scenario.name, scenario.flavours) == ("it", ("px4", "ardupilot"))
     assert (scenario.first_seed, scenario.last_seed, scenario.start) == (1, 1, Start())
     assert (scenario.incidents, scenario.expectations) == ((), ())
 
 
-def test_a_start() -> None:
+def test_start_is_lowered() -> None:
     scenario = flown("aboard px4 seeds 3 .. 9 start wind(speed = 3 m/s, from = 270 deg, gust = 1 m/s), battery = 80 %")
     assert scenario.scenario.flavours == ("px4",)
     assert (scenario.scenario.first_seed, scenario.scenario.last_seed) == (3, 9)
@@ -80,13 +80,13 @@ MOMENTS: list[tuple[str, When]] = [
 
 
 @rows(("text", "when"), MOMENTS)
-def test_a_moment(text: str, when: When) -> None:
+def test_moment_is_lowered(text: str, when: When) -> None:
     (incident,) = flown(f"{text} kill()").scenario.incidents
     assert incident.when == when
     assert incident.text == f"{text} kill()"
 
 
-def test_a_condition_has_the_slots_of_the_policy() -> None:
+def test_condition_has_the_slots_of_the_policy() -> None:
     one = flown("3 s after when height > 10 m and battery < 50 % kill()")
     (incident,) = one.scenario.incidents
     assert isinstance(incident.when, OnCondition)
@@ -97,7 +97,7 @@ def test_a_condition_has_the_slots_of_the_policy() -> None:
     assert read == {one.policy.lowered.policy.vehicle.height, one.policy.lowered.policy.vehicle.battery}
 
 
-def test_a_grown_zone_that_the_policy_has_is_read_on_whichever_side() -> None:
+def test_grown_zone_of_the_policy_is_found_on_either_safe_side() -> None:
     zones = [zone.name for zone in flown("").policy.lowered.policy.zones]
     assert "grow(school, 20 m)" in zones
     flown("when not position outside grow(school, 20 m) kill()")
@@ -115,7 +115,7 @@ FAULTS = [
 
 
 @rows(("text", "fault"), FAULTS)
-def test_a_fault(text: str, fault: object) -> None:
+def test_fault_is_lowered(text: str, fault: object) -> None:
     (incident,) = flown(f"at 2 s {text}").scenario.incidents
     assert incident.fault == fault
 
@@ -131,7 +131,7 @@ def test_every_kind_of_fault_can_be_written() -> None:
     assert {each.fault.at_us for each in incidents} == {0}
 
 
-def test_the_reference_has_every_kind_of_fault_with_what_it_takes() -> None:
+def test_reference_lists_every_kind_of_fault_with_its_parameters() -> None:
     page = (CHECKOUT / "docs" / "language.md").read_text(encoding="utf-8")
     for name, kind in NAMED.items():
         needed = [each.name for each in parameters(kind) if each.needed]
@@ -140,7 +140,7 @@ def test_the_reference_has_every_kind_of_fault_with_what_it_takes() -> None:
         assert f"`{name}({said})`" in page
 
 
-def test_what_is_expected() -> None:
+def test_expectation_is_lowered() -> None:
     one = flown("""
   expect ends completed, stood_down
   expect fallback return_home because state/violated at "wind.speed < 10 ..."
@@ -171,13 +171,13 @@ def test_what_is_expected() -> None:
     assert first.end == first.start + len(first.text)
 
 
-def test_the_mission_is_what_compile_makes_of_it() -> None:
+def test_mission_is_the_compiled_one() -> None:
     one = flown("")
     compiled = compile_program(program(IMPORT), dialect.load(), mission="standard", issued_at_us=5)
     assert (one.policy.lowered.policy, one.mission) == (compiled.policy, compiled.mission)
 
 
-def test_a_mission_with_parameters_flies_with_their_defaults() -> None:
+def test_mission_with_parameters_flies_with_their_defaults() -> None:
     mission = """import "lib:policies/bridge_inspection.rts"
 mission lift(top: altitude in 10 m .. 30 m = 20 m) under bridge_inspection@7 on quad {
   proposed by agent openclaw for role operator
@@ -185,7 +185,7 @@ mission lift(top: altitude in 10 m .. 30 m = 20 m) under bridge_inspection@7 on 
 }
 scenario "it" { flies lift after takeoff kill() }
 """
-    for default in ("20 m", "30 m"):  # the end of the range is a value that it is checked with anyway
+    for default in ("20 m", "30 m"):  # `check` uses the end of the range in any case
         text = mission.replace("20 m", default)
         (one,) = made(text, "").found
         compiled = compile_program(program(text), dialect.load(), mission="lift", issued_at_us=5)
@@ -195,8 +195,8 @@ scenario "it" { flies lift after takeoff kill() }
     assert without.found == ()
 
 
-def test_a_mission_is_proved_for_when_its_scenarios_begin() -> None:
-    """A mission that may fly on Saturdays alone is none to fly on another day; each scenario has its own time."""
+def test_mission_is_proved_for_the_begin_of_its_scenarios() -> None:
+    """A mission that may only fly on Saturdays fails on another day; each scenario has its own time."""
     text = """import "lib:policies/site.rts"
 import "lib:skills/takeoff.rts"
 import "lib:skills/return_home.rts"
@@ -228,7 +228,7 @@ scenario "late" { flies lift start at "2026-11-28T15:00:00Z" }
     assert on_monday.found == ()
 
 
-def test_scenarios_of_an_imported_file_are_its_own_business() -> None:
+def test_scenarios_of_an_imported_file_are_ignored() -> None:
     files = {"other": IMPORT + 'scenario "theirs" { flies nothing }'}
     made_of = scenarios(
         program('import "other.rts"\n' + 'scenario "ours" { flies standard }', **files), dialect.load(), 0
@@ -237,7 +237,7 @@ def test_scenarios_of_an_imported_file_are_its_own_business() -> None:
     assert made_of.diagnostics == ()
 
 
-def test_what_is_wrong_elsewhere_is_found_and_nothing_flies() -> None:
+def test_error_elsewhere_is_found_and_no_scenario_flies() -> None:
     made_of = made('zone z = circle(47 N, 8 E, 3 s)\nscenario "it" { flies standard }')
     assert made_of.found == ()
     assert [each.code.id for each in made_of.diagnostics] == ["E0310"]
@@ -349,7 +349,7 @@ WRONG: Sequence[tuple[str, str, str, str | None]] = [
     (
         'expect fallback at "wind.sped < 10 m/s"',
         "E1410",
-        "no decision on this mission is made by a clause `wind.sped < 10 m/s`",
+        "no clause `wind.sped < 10 m/s` can decide on this mission",
         "did you mean `wind.speed < 10 m/s`?",
     ),
     (
@@ -379,36 +379,36 @@ WRONG: Sequence[tuple[str, str, str, str | None]] = [
 
 
 @rows(("body", "code", "message", "help"), WRONG)
-def test_what_is_wrong_is_said(body: str, code: str, message: str, help: str | None) -> None:
+def test_wrong_scenario_is_found(body: str, code: str, message: str, help: str | None) -> None:
     ((has, said, more),) = found(body, OTHERS)
     assert has == code
     assert message in ("", said)
     assert help in (None, more)
 
 
-def test_that_nothing_bad_flies_is_no_finding() -> None:
+def test_expectation_that_nothing_else_flies_is_no_finding() -> None:
     assert found("expect never dance", OTHERS) == []
 
 
-def test_a_mission_that_there_is_not() -> None:
+def test_unknown_mission_is_found() -> None:
     diagnostics = made('scenario "it" { flies standrd after takeoff 9 kill() }').diagnostics
     assert [(each.code.id, each.message) for each in diagnostics] == [
         ("E0201", "`standrd` is not declared; expected a mission")
     ]
 
 
-def test_two_scenarios_are_called_differently() -> None:
+def test_two_scenarios_of_one_name_are_found() -> None:
     diagnostics = made('scenario "it" { flies standard }\nscenario "it" { flies standard }').diagnostics
     assert [(each.code.id, each.message) for each in diagnostics] == [("E1604", "two scenarios have the name `it`")]
 
 
-def test_check_finds_what_lowering_finds() -> None:
+def test_check_reports_findings_of_lowering() -> None:
     body = 'scenario "it" { flies standard when satellites > 3 kill() expect lands in elsewhere }'
     diagnostics = check_program(program(OTHERS + body), dialect.load())
     assert [each.code.id for each in diagnostics] == ["E1607", "E0207"]
 
 
-def test_a_fix_is_what_was_meant() -> None:
+def test_fix_is_the_nearest_name() -> None:
     for body in ("at 2 s gps_loss(4 s)", "at 2 s kil()", "seeds 9 .. 1", "at 2 s link_silence(way = upp)"):
         text = IMPORT + f'scenario "it" {{ flies standard {body} }}'
         (diagnostic,) = made(text, "").diagnostics

@@ -1,4 +1,4 @@
-"""E0716: what counts as a difference between two versions of a policy, what does not, and what is said of it."""
+"""The differences between two versions of a policy, their direction, and the finding on a version not raised."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -96,7 +96,7 @@ def changed(changes: Mapping[str, str]) -> str:
     [
         ("policy yard", "// a comment\npolicy   yard"),
         ("top <= 20 m and", "top <= 2000 cm and"),
-        ("zone school", "zone aside = circle(47.39900 N, 8.54500 E, 5 m)\nzone school"),  # then below: only the zone
+        ("zone school", "zone aside = circle(47.39900 N, 8.54500 E, 5 m)\nzone school"),  # below: only the zone
         ("by role operator, trainee", "by role trainee, operator"),
         ("through agent, operator", "through operator, agent"),
         ("deadline 5 s valid for 40 min lasts", "valid for 2400 s  deadline 5000 ms lasts"),
@@ -106,12 +106,12 @@ def changed(changes: Mapping[str, str]) -> str:
         ),
     ],
 )
-def test_what_only_looks_different(before: LoweredPolicy, old: str, new: str) -> None:
+def test_change_without_a_new_meaning_is_no_difference(before: LoweredPolicy, old: str, new: str) -> None:
     words = differences(before.policy, lowered(changed({old: new})).policy)
     assert words == (("the new zone `aside`",) if "aside" in new else ())
 
 
-def test_declarations_in_another_order_mean_the_same(before: LoweredPolicy) -> None:
+def test_order_of_declarations_is_no_difference(before: LoweredPolicy) -> None:
     school, roof = (line for line in SITE.splitlines() if line.startswith(("zone school", "zone roof")))
     text = (
         TEXT.replace(school, "").replace(roof, f"{roof}\n{school}").replace(POLICY, "").replace(SKILLS, POLICY + SKILLS)
@@ -119,7 +119,7 @@ def test_declarations_in_another_order_mean_the_same(before: LoweredPolicy) -> N
     assert differences(before.policy, lowered(text).policy) == ()
 
 
-def test_rules_in_another_order_mean_the_same_unless_the_first_decides(before: LoweredPolicy) -> None:
+def test_order_of_rules_is_a_difference_only_if_the_first_decides(before: LoweredPolicy) -> None:
     lines = POLICY.splitlines()
     lines[2:4] = lines[3], lines[2]
     assert differences(before.policy, lowered(TEXT.replace(POLICY, "\n".join(lines))).policy) == ()
@@ -137,7 +137,7 @@ def test_rules_in_another_order_mean_the_same_unless_the_first_decides(before: L
         ("permit home, down by any", "permit home, down by any permit look by role chief when at <= 9 m",
          "the new rule `permit look by role chief when at <= 9 m`"),
         ("degrade any when battery < 25 % to home\n", "",
-         "the rule `degrade any when battery < 25 % to home`, which is gone"),
+         "the removed rule `degrade any when battery < 25 % to home`"),
         ("phase == landing", "phase == hover", "the rule `forbid look by any when phase == hover or"),
         ("22:00 .. 06:00", "21:00 .. 06:00", "the rule `forbid look by any when phase == landing or"),
         ("within 30 s", "within 31 s", "the rule `confirm look when at < 10 m by role chief within 31 s`"),
@@ -146,16 +146,16 @@ def test_rules_in_another_order_mean_the_same_unless_the_first_decides(before: L
          "the rule `degrade any when position inside grow(school, 21 m) to down`"),
         ("inside field outside school", "inside field", "the airspace"),
         ("contingency home, down", "contingency home for 2 min, down", "the contingency"),
-        ("contingency home, down", "contingency home, down without evidence refuse", "what is done without evidence"),
+        ("contingency home, down", "contingency home, down without evidence refuse", "the action without evidence"),
         (
             "contingency home, down",
             "contingency home, down without link for 31 s contingency",
-            "what flies after a silence of the vehicle",
+            "the action after a silence of the vehicle",
         ),
         (
             "contingency home, down",
             "contingency home, down without link for 30 s continue",
-            "what flies after a silence of the vehicle",
+            "the action after a silence of the vehicle",
         ),
         ("reserve 15 %", "reserve 16 %", "the vehicle (reserve)"),
         ("position error 3 m energy 100 % = 18 min", "position error 4 m energy 100 % = 19 min",
@@ -173,13 +173,13 @@ def test_rules_in_another_order_mean_the_same_unless_the_first_decides(before: L
         ("fallback down energy", "grace 1 s fallback down energy", "the skill `home` (grace)"),
     ],
 )  # fmt: skip
-def test_what_differs(before: LoweredPolicy, old: str, new: str, words: str) -> None:
+def test_difference_is_described(before: LoweredPolicy, old: str, new: str, words: str) -> None:
     (found,) = differences(before.policy, lowered(changed({old: new})).policy)
     assert found.startswith(words)
 
 
-def test_a_sensor_that_is_missing_now_is_told_first_and_as_looser(before: LoweredPolicy) -> None:
-    """And one that is there again as what it is."""
+def test_newly_missing_sensor_is_listed_first_and_as_looser(before: LoweredPolicy) -> None:
+    """A sensor that is present again is listed too."""
     fitted = changed({"require battery > 30 %": "require battery > 30 % assume wind.speed < 9 m/s where fitted"})
     old = lowered(fitted).policy
     new = lowered(
@@ -189,17 +189,17 @@ def test_a_sensor_that_is_missing_now_is_told_first_and_as_looser(before: Lowere
     assert [clause.text for clause in new.left_out] == ["wind.speed < 9 m/s"]
     first, *rest = differences(old, new)
     assert first.startswith("looser: the vehicle is now without the signal `wind.speed`")
-    assert [told.partition(" `")[0] for told in rest] == ["the rule", "the skill", "the signal"]
+    assert [told.partition(" `")[0] for told in rest] == ["the rule", "the skill", "the removed signal"]
     assert differences(new, old)[0] == "the vehicle is no longer without the signal `wind.speed`"
 
 
-def test_a_zone_that_lies_elsewhere_in_the_list_is_not_another(before: LoweredPolicy) -> None:
-    """Sets and tables have more members then; what they say of the zones that were there is the same."""
+def test_zone_at_another_index_is_no_difference(before: LoweredPolicy) -> None:
+    """Sets and tables have more members then, but the same ones for the old zones."""
     inside = "zone shed = circle(47.39780 N, 8.54500 E, 5 m)\nzone field"
     after = lowered(changed({"zone field": inside})).policy
     assert after.sets != before.policy.sets
     assert differences(before.policy, after) == ("the new zone `shed`",)
-    assert differences(after, before.policy) == ("the zone `shed`, which is gone",)
+    assert differences(after, before.policy) == ("the removed zone `shed`",)
 
 
 def compared(before: LoweredPolicy, text: str) -> VersionComparison:
@@ -210,7 +210,7 @@ def compared(before: LoweredPolicy, text: str) -> VersionComparison:
 
 
 def finding(before: LoweredPolicy, text: str) -> tuple[Diagnostic, str, str]:
-    """The finding, what it underlines, and the text with its fix."""
+    """The finding, the text under its span, and the source after its fix."""
     found = compared(before, text).finding
     assert found is not None
     assert found.code.id == "E0716"
@@ -219,12 +219,12 @@ def finding(before: LoweredPolicy, text: str) -> tuple[Diagnostic, str, str]:
     return found, text[slice(*found.span[1:])], text[: fix.span.start] + fix.replacement + text[fix.span.end :]
 
 
-def test_a_change_without_a_higher_version(before: LoweredPolicy) -> None:
+def test_change_without_a_higher_version_is_found(before: LoweredPolicy) -> None:
     text = changed({"top <= 20 m": "top <= 21 m", "reserve 15 %": "reserve 16 %", "ceiling 60 m": "ceiling 61 m",
                     "battery > 30 %": "battery > 31 %"})  # fmt: skip
     found, underlined, fixed = finding(before, text)
     assert underlined == "3"
-    assert found.message == "`yard` differs from the one in `old.bundle`, and both have version 3"
+    assert found.message == "`yard` differs from the one in `old.bundle`, but both have version 3"
     assert found.help == (
         "raise it to version 4, here and in the missions under it; it differs in the rule `permit rise by role "
         "operator, trainee through agent, oper...`, the vehicle (reserve), the zone `roof` (ceiling), and 1 more"
@@ -232,11 +232,11 @@ def test_a_change_without_a_higher_version(before: LoweredPolicy) -> None:
     assert compared(before, fixed).finding is None
 
 
-def test_a_lower_version_with_and_without_a_change(before: LoweredPolicy) -> None:
+def test_lower_version_is_found_with_and_without_a_change(before: LoweredPolicy) -> None:
     lower = changed({"version 3": "/* as\nversion 9 */ version // 8\n 2"})
     found, underlined, fixed = finding(before, lower)
     assert underlined == "2"
-    assert found.message == "`yard` has version 2, and version 3 in `old.bundle`"
+    assert found.message == "`yard` has version 2, but version 3 in `old.bundle`"
     assert found.help == "a version never goes back: write version 3"
     assert compared(before, fixed).finding is None
     found, _, fixed = finding(before, lower.replace("top <= 20 m", "top <= 21 m"))
@@ -247,11 +247,11 @@ def test_a_lower_version_with_and_without_a_change(before: LoweredPolicy) -> Non
 
 
 @pytest.mark.parametrize("change", [{}, {"version 3": "version 4"}, {"version 3": "version 9", "20 m and": "21 m and"}])
-def test_what_is_fine(before: LoweredPolicy, change: dict[str, str]) -> None:
+def test_raised_or_unchanged_version_is_accepted(before: LoweredPolicy, change: dict[str, str]) -> None:
     assert compared(before, changed(change)).finding is None
 
 
-def test_a_changed_name_or_vehicle_makes_another_policy(before: LoweredPolicy) -> None:
+def test_policy_of_another_name_or_vehicle_is_not_compared(before: LoweredPolicy) -> None:
     for change in ({"policy yard": "policy field_trip"}, {"quad-07": "hexa-01", "vehicle quad": "vehicle hexa"}):
         program = load_text(changed(change | {"version 3": "version 1"}))
         checked = examine_program(program, dialect.load())
@@ -261,7 +261,7 @@ def test_a_changed_name_or_vehicle_makes_another_policy(before: LoweredPolicy) -
     assert "the vehicle (identity)" in (renamed.help or "")
 
 
-def test_the_newest_of_several_earlier_ones_counts(before: LoweredPolicy) -> None:
+def test_policy_is_compared_with_the_newest_earlier_one(before: LoweredPolicy) -> None:
     older, other = (
         lowered(changed({"version 3": "version 2"})).policy,
         lowered(changed({"reserve 15 %": "reserve 16 %"})).policy,
@@ -273,7 +273,7 @@ def test_the_newest_of_several_earlier_ones_counts(before: LoweredPolicy) -> Non
         assert (found.earlier, found.finding) == (3, None)
 
 
-def test_a_program_with_errors_has_no_policies_to_compare() -> None:
+def test_program_with_errors_has_no_policies_to_compare() -> None:
     assert examine_program(load_text(TEXT + "zone z = nowhere"), dialect.load()).policies == ()
 
 
@@ -326,10 +326,10 @@ def test_a_program_with_errors_has_no_policies_to_compare() -> None:
         ("position error 3 m", "position error 4 m", CANNOT_TELL),
     ],
 )  # fmt: skip
-def test_which_way_a_difference_goes(before: LoweredPolicy, old: str, new: str, way: str) -> None:
+def test_direction_of_a_difference(before: LoweredPolicy, old: str, new: str, way: str) -> None:
     after = lowered(changed({old: new})).policy
     found = [direction(each, before.policy, after) for each in parted(before.policy, after)]
-    if way.endswith("?"):  # true, and more than intervals decide: it may say so, and must not say the opposite
+    if way.endswith("?"):  # intervals alone do not decide it, but the opposite would be wrong
         assert found in ([way[:-1]], [CANNOT_TELL])
         return
     assert found == [way]
@@ -337,8 +337,8 @@ def test_which_way_a_difference_goes(before: LoweredPolicy, old: str, new: str, 
     assert back == [{STRICTER: LOOSER, LOOSER: STRICTER}.get(way, way)], "the other way round it is the opposite"
 
 
-def test_a_zone_of_the_airspace_grows_or_shrinks_by_its_use() -> None:
-    """Where no condition names it: then what it is to the airspace is all that it is."""
+def test_direction_of_a_changed_zone_depends_on_its_use() -> None:
+    """If no condition names the zone, only the airspace uses it."""
     text = TEXT.replace(" area inside field and", "").replace(
         "  degrade any when position inside grow(school, 20 m) to down\n", ""
     )

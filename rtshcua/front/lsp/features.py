@@ -224,7 +224,7 @@ def offered(session: EditorSession, params: lsp.CodeActionParams) -> list[lsp.Co
     offers = [each for each in offers if each.kind is not None and _is_of(each.kind, wanted)]
     safe = all_safe(found, name)
     if safe and _is_of(everything, wanted) and all(each.kind != everything for each in offers):
-        title = "correct everything that is safe to correct"
+        title = "apply all safe fixes"
         offers.append(lsp.CodeAction(title, everything, edit=_corrected(session, name, safe)))
     return offers
 

@@ -1,5 +1,5 @@
-"""What an editor asks of sources while they are written: pure answers over texts, positions as character offsets.
+"""Editor features for sources: pure functions over texts, with positions as character offsets.
 
-`workspace` holds the open texts, `incremental_parse` parses again only what an edit changed, `positions` is the one
-place that knows how editors count. `rtshcua.front.lsp` speaks the protocol.
+`workspace` holds the open texts, `incremental_parse` parses only what an edit changed, `positions` converts to the
+positions of the protocol. `rtshcua.front.lsp` implements the protocol.
 """

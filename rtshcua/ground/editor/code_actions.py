@@ -7,11 +7,11 @@ from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Applicability, Diagnostic, Fix
 from rtshcua.diagnostics.span import Span
 
-ALL = "correct everything that is safe to correct"
+ALL = "apply all safe fixes"
 
 
 class CodeAction(NamedTuple):
-    """A change with a title: the texts that replace spans, all of one file. `safe` keeps the author's meaning."""
+    """A change of one file, with a title. `safe` means that it keeps the author's intent."""
 
     title: str
     fixes: tuple[Fix, ...]
@@ -20,7 +20,7 @@ class CodeAction(NamedTuple):
 
 
 def actions(found: Sequence[Diagnostic], file: str, start: int, end: int, text: str) -> Iterator[CodeAction]:
-    """The actions for a range of a file."""
+    """Yield the actions for a range of a file."""
     for each in found:
         if each.span is None or each.span.file != file or each.span.start > end or each.span.end < start:
             continue
@@ -37,7 +37,7 @@ def actions(found: Sequence[Diagnostic], file: str, start: int, end: int, text: 
 
 
 def all_safe(found: Iterable[Diagnostic], file: str) -> tuple[Fix, ...]:
-    """The safe fixes of a file that do not stand in each other's way, in the order of the text."""
+    """The safe fixes of a file that do not overlap, in source order."""
     fixes = {fix for each in found for fix in each.fixes
              if fix.applicability is Applicability.SAFE and fix.span.file == file}  # fmt: skip
     kept: list[Fix] = []
@@ -48,8 +48,9 @@ def all_safe(found: Iterable[Diagnostic], file: str) -> tuple[Fix, ...]:
 
 
 def _ignore(found: Diagnostic, span: Span, text: str) -> Fix:
-    """A comment on a line of its own, before that of the finding. Its reason is left to be written: without one the
-    comment ignores nothing, and E1310 says so.
+    """A fix that inserts an ignore comment before the line of the finding.
+
+    The author must write the reason: without one, the comment ignores nothing and is reported.
     """
     line = text.rfind("\n", 0, span.start) + 1
     blank = text[line : line + len(text[line:]) - len(text[line:].lstrip(" \t"))]

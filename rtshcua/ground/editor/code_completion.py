@@ -1,4 +1,4 @@
-"""Completion while a text is written: words by the parser's table, names by their use, paths, and signatures."""
+"""Code completion: keywords from the parser's table, names by their use, import paths, and signatures."""
 
 import posixpath
 from collections.abc import Iterable, Iterator, Mapping
@@ -24,7 +24,7 @@ from rtshcua.ground.editor.cursor_context import (
 )
 from rtshcua.ground.editor.incremental_parse import ParsedText
 from rtshcua.ground.editor.keyword_help import KEYWORDS, REASONS, TYPES
-from rtshcua.ground.editor.occurrences import NameKind
+from rtshcua.ground.editor.occurrences import NameKind, owned, parameters_owner
 from rtshcua.ground.editor.syntax import Token, inside_comment_or_text, note_before, tokens
 from rtshcua.ground.editor.workspace import ProgramView, Workspace
 from rtshcua.ground.language.build.literals import DAYS
@@ -40,15 +40,15 @@ _ENDINGS = {"import": (".rts",), "from": (".geojson", ".json")}
 
 
 class ImportPath(NamedTuple):
-    """What is written of a path up to the cursor, where it begins, and which word stands before it."""
+    """The part of a path before the cursor, its start, and the keyword before the path."""
 
     text: str
     start: int
-    word: str
+    keyword: str
 
 
 def import_path_at(text: str, offset: int, since: int) -> ImportPath | None:
-    """The path that a place is in; None where it is in none."""
+    """Return the path at an offset; None if there is none."""
     last = ""
     for token in tokens(text, since, offset):
         if token.kind == "string" and token.start < offset and (offset < token.end or not _is_closed(token)):
@@ -63,8 +63,8 @@ def _is_closed(token: Token) -> bool:
 
 
 def import_paths(workspace: Workspace, view: ProgramView, path: ImportPath, file: str) -> Iterator[str]:
-    """Whole paths that go on from what is written: of the library's shelves, and of the files beside this one."""
-    endings = _ENDINGS[path.word]
+    """Yield full paths that begin with the written part: in the library, in packs, and relative to this file."""
+    endings = _ENDINGS[path.keyword]
     folder = path.text.rpartition("/")[0]
     written = f"{folder}/" if folder else ""
     pack = pack_of(path.text)
@@ -72,10 +72,10 @@ def import_paths(workspace: Workspace, view: ProgramView, path: ImportPath, file
         names = _names_in_pack(workspace, pack, folder.removeprefix(f"{pack}:"))
         yield from _continued_paths(written or f"{pack}:", names, endings)
         return
-    if not folder and path.word == "import":
+    if not folder and path.keyword == "import":
         yield from (f"{LIBRARY}{shelf}/" for shelf in SHELVES)
-    beside = workspace.names_in(posixpath.join(posixpath.dirname(file) or ".", written) or ".")
-    yield from _continued_paths(written, [each for each in beside if each != posixpath.basename(file)], endings)
+    siblings = workspace.names_in(posixpath.join(posixpath.dirname(file) or ".", written) or ".")
+    yield from _continued_paths(written, [each for each in siblings if each != posixpath.basename(file)], endings)
     if not folder:
         yield "../"
 
@@ -100,7 +100,7 @@ def _continued_paths(written: str, names: list[str], endings: tuple[str, ...]) -
 _WORD = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_."
 _NAMES = {"<NAME>", "<LINK_NAME>", "<REASON>"}
 _COMPARING = ("==", "!=", "<", "<=", ">", ">=", "in", "=")
-#: kinds of token that are words where they stand, and how they are written
+#: kinds of tokens that are keywords only in some places, and their texts
 _WRITTEN = {
     "<LOCAL_TIME>": (LOCAL_TIME,), "<_GROW>": ("grow",), "<_CIRCLE>": ("circle",), "<_POLYGON>": ("polygon",),
     "<_CORRIDOR>": ("corridor",), "<COMBINE>": ("union", "difference"), "<FUNCTION>": ("abs", "min", "max"),
@@ -110,18 +110,18 @@ _WRITTEN = {
 
 
 class CompletionItem(NamedTuple):
-    """One proposal: what is inserted, what kind of thing it is, and a few words about it."""
+    """A proposal: the inserted text, its kind, and a short description."""
 
     text: str
     kind: str
     detail: str = ""
-    start: int = 0  # where the text that it replaces begins
+    start: int = 0  # of the text that it replaces
 
 
 def complete(
     workspace: Workspace, view: ProgramView, cut: ParsedText, offset: int, dialect: Dialect
 ) -> tuple[CompletionItem, ...]:
-    """Proposals for a place, each once; filtering by what was typed is the editor's."""
+    """Return the distinct proposals at an offset. The editor filters them by the typed text."""
     text = cut.source.text
     since = last_declaration_start(cut, offset)
     path = import_path_at(text, offset, since)
@@ -135,7 +135,7 @@ def complete(
     start = offset
     while start > since and text[start - 1] in _WORD:
         start -= 1
-    if start < offset and text[start].isdigit():  # `20` or `20m`: a unit is asked behind the digits
+    if start < offset and text[start].isdigit():  # `20` or `20m`: propose a unit after the digits
         while start < offset and text[start] in "0123456789_.":
             start += 1
     written = tokens_before(text, start, since)
@@ -147,7 +147,7 @@ def complete(
 
 
 class _VisibleParameter(NamedTuple):
-    """A parameter that is visible at a place."""
+    """A parameter that is visible at the cursor."""
 
     name: str
     kind: str
@@ -155,7 +155,7 @@ class _VisibleParameter(NamedTuple):
 
     @staticmethod
     def of(parameter: ParameterDecl) -> "_VisibleParameter":
-        """A parameter that was read."""
+        """Make it from a declaration."""
         return _VisibleParameter(parameter.name.text, parameter.type.text, parameter_type(parameter))
 
 
@@ -164,7 +164,7 @@ class _Proposals:
         self.view, self.symbols, self.dialect, self.written, self.here = view, view.symbols, dialect, written, here
 
     def items(self) -> Iterator[CompletionItem]:
-        """Names first, then units, then words."""
+        """Yield names, then units, then keywords."""
         call = open_call(self.written)
         if self.here.symbols & _NAMES:
             yield from self._named(name_use(self.written), call)
@@ -180,12 +180,12 @@ class _Proposals:
                 yield from (CompletionItem(word, "keyword", KEYWORDS.get(word, "")) for word in words)
 
     def fields(self, message: str) -> Iterator[CompletionItem]:
-        """The fields of a message of the dialect."""
+        """Yield the fields of a message of the dialect."""
         known = self.dialect.messages.get(message)
         for name, field in () if known is None else known.fields.items():
             yield CompletionItem(f"{message}.{name}", "field", field.unit)
 
-    def _named(self, what: NameUse, call: OpenCall | None) -> Iterator[CompletionItem]:
+    def _named(self, use: NameUse, call: OpenCall | None) -> Iterator[CompletionItem]:
         symbols = self.symbols
         tables: Mapping[NameUse, Iterable[str]] = {
             NameUse.SKILL: symbols.skills, NameUse.ZONE: symbols.zones, NameUse.POLICY: symbols.policies,
@@ -197,7 +197,7 @@ class _Proposals:
             NameUse.DAY: DAYS, NameUse.NOTHING: (),
             NameUse.NOMINAL: [each.name.text for unit in self.view.units.values() for each in unit.nominals],
         }  # fmt: skip
-        match what:
+        match use:
             case NameUse.STEP:
                 yield from (
                     CompletionItem(f"{name}(", "skill", self._takes(skill)) for name, skill in symbols.skills.items()
@@ -212,8 +212,8 @@ class _Proposals:
             case NameUse.PARAMETER:
                 yield from (CompletionItem(each.name, "parameter", each.kind) for each in self._own())
             case _:
-                yield from (CompletionItem(name, what.value, KEYWORDS.get(name, "")) for name in tables[what])
-                if what is NameUse.ZONE:
+                yield from (CompletionItem(name, use.value, KEYWORDS.get(name, "")) for name in tables[use])
+                if use is NameUse.ZONE:
                     zones = (each for each in self._own() if each.kind == "zone")
                     yield from (CompletionItem(each.name, "parameter", "zone") for each in zones)
 
@@ -229,7 +229,7 @@ class _Proposals:
         yield CompletionItem(PHASE, "keyword", KEYWORDS[PHASE])
 
     def _members(self) -> Iterator[CompletionItem]:
-        """The values of what is compared, or of what a cell is about."""
+        """The possible values of the compared subject, or of a cell's subject."""
         subject = self._subject()
         if subject == PHASE:
             yield from (CompletionItem(name, "phase") for name in self._all(NameKind.PHASE))
@@ -238,23 +238,23 @@ class _Proposals:
             for name, value in type.enumeration.members.items():
                 yield CompletionItem(name, "member", f"{type.enumeration.name} = {value}")
 
-    def _of_fault(self, call: OpenCall | None) -> Mapping[str, FaultField] | None:
-        """What may be said of the fault that a place is among the arguments of; None where it is in none."""
+    def _fault_fields(self, call: OpenCall | None) -> Mapping[str, FaultField] | None:
+        """The fields of the fault whose arguments contain the cursor; None if there is none."""
         fault = None if call is None or self.written[0].text != "scenario" else NAMED_FAULTS.get(call.name)
         return None if fault is None else {each.name: each for each in parameters(fault)}
 
     def _arguments(self, call: OpenCall | None) -> Iterator[CompletionItem]:
         declared = None if call is None else _called(self.view, call)
         begins = bool(self.written) and self.written[-1].text in ("(", ",")
-        of_fault = self._of_fault(call)
-        if call is None or (of_fault is None and declared is None):
+        fields = self._fault_fields(call)
+        if call is None or (fields is None and declared is None):
             yield from self._values()
-        elif of_fault is not None:
-            given = of_fault.get(call.argument or "")
+        elif fields is not None:
+            field = fields.get(call.argument or "")
             if begins:
-                yield from (CompletionItem(f"{name} = ", "parameter") for name in of_fault if name not in call.named)
-            elif given is not None:
-                yield from (CompletionItem(word, "member") for word in given.words)
+                yield from (CompletionItem(f"{name} = ", "parameter") for name in fields if name not in call.named)
+            elif field is not None:
+                yield from (CompletionItem(word, "member") for word in field.words)
         elif declared is not None:
             yield from self._arguments_of(declared, call, begins=begins)
 
@@ -286,16 +286,16 @@ class _Proposals:
     def _units(self, call: OpenCall | None) -> Iterator[CompletionItem]:
         type = self._type_of(self._subject())
         dimension = None if type is None else type.dimension
-        said = (self._of_fault(call) or {}).get("" if call is None else call.argument or "")
-        if said is not None and said.unit is not None:
-            dimension = said.unit.dimension
-        asked_for = Dimension.LENGTH if dimension is Dimension.ALTITUDE else dimension
+        field = (self._fault_fields(call) or {}).get("" if call is None else call.argument or "")
+        if field is not None and field.unit is not None:
+            dimension = field.unit.dimension
+        wanted = Dimension.LENGTH if dimension is Dimension.ALTITUDE else dimension
         for name, unit in UNITS.items():
-            if asked_for in (None, unit.dimension):
+            if wanted in (None, unit.dimension):
                 yield CompletionItem(name, "unit", unit.dimension.value)
 
     def _subject(self) -> str:
-        """The name that is compared with, or given, what stands here."""
+        """The name that is compared with, or assigned, the value at the cursor."""
         braces = [at for at, token in enumerate(self.written) if token.text == "{"]
         listing = bool(braces) and self.written[braces[-1] - 1].text == "in"  # `in {a, b, `
         for number in range(len(self.written) - 1, 0, -1):
@@ -314,34 +314,28 @@ class _Proposals:
         return NAMED.get(name) if signal is None else signal_type(self.symbols, signal)
 
     def _own(self) -> tuple[_VisibleParameter, ...]:
-        """The parameters that are visible: of the declaration, or of the skills that the rule names."""
+        """The visible parameters: of the declaration, or of the skills that the rule names."""
         names = [token.text for token in self.written if token.kind == "word"]
-        if not names:
-            return ()
-        symbols = self.symbols
-        if names[0] in ("skill", "template", "mission") and len(names) > 1:
-            declared = symbols.skills.get(names[1]) or symbols.templates.get(names[1]) or symbols.missions.get(names[1])
-            if declared is None:
-                return tuple(self._written_own())
-            sizes = declared.sizes if isinstance(declared, SkillDecl) else ()
-            return tuple(map(_VisibleParameter.of, (*declared.parameters, *sizes)))
+        if names and names[0] in ("skill", "template", "mission") and len(names) > 1:
+            declared = parameters_owner(self.symbols, names[1])
+            return tuple(self._incomplete_own() if declared is None else map(_VisibleParameter.of, owned(declared)))
         rules = ("permit", "forbid", "confirm", "degrade", "delegate")
-        last = max((at for at, name in enumerate(names) if name in rules), default=None)
-        skills = [] if last is None else [symbols.skills[each] for each in names[last:] if each in symbols.skills]
+        last = max((at for at, name in enumerate(names) if name in rules), default=len(names))
+        skills = [self.symbols.skills[each] for each in names[last:] if each in self.symbols.skills]
         return tuple(_VisibleParameter.of(parameter) for skill in skills for parameter in skill.parameters)
 
-    def _written_own(self) -> Iterator[_VisibleParameter]:
-        """The parameters of a declaration that is not whole."""
+    def _incomplete_own(self) -> Iterator[_VisibleParameter]:
+        """The parameters of an incomplete declaration."""
         for name, colon, kind in zip(self.written, self.written[1:], self.written[2:], strict=False):
             if colon.text == "{":
                 return
             if colon.text == ":" and name.kind == kind.kind == "word":
                 yield _VisibleParameter(name.text, kind.text, NAMED.get(kind.text))
 
-    def _all(self, sort: NameKind) -> tuple[str, ...]:
-        """All names of a sort that the program has anywhere."""
+    def _all(self, kind: NameKind) -> tuple[str, ...]:
+        """All names of a kind in the program."""
         found = (each.target for file in self.view.units for each in self.view.occurrences(file))
-        return tuple(dict.fromkeys(target.name for target in found if target.sort is sort))
+        return tuple(dict.fromkeys(target.name for target in found if target.kind is kind))
 
     def _takes(self, skill: SkillDecl) -> str:
         return ", ".join(each.name.text for each in skill.parameters)
@@ -352,12 +346,12 @@ def _called(view: ProgramView, call: OpenCall) -> SkillDecl | TemplateDecl | Non
 
 
 def _accepted_arguments(declared: SkillDecl | TemplateDecl, written: list[Token]) -> tuple[ParameterDecl, ...]:
-    """What a call may give: the parameters of what it calls, or among sizes those of the skill."""
+    """The parameters of a called skill or template; in a `sizes` declaration the sizes of the skill."""
     return declared.sizes if isinstance(declared, SkillDecl) and in_sizes(written) else declared.parameters
 
 
 class Signature(NamedTuple):
-    """The call as it is declared, its parameters as they are written there, and which of them is being given."""
+    """The declaration of a called skill or template, its parameters, and the index of the present one."""
 
     label: str
     parameters: tuple[str, ...]
@@ -366,7 +360,7 @@ class Signature(NamedTuple):
 
 
 def signature(view: ProgramView, cut: ParsedText, offset: int) -> Signature | None:
-    """The skill or template whose arguments a place is among."""
+    """Return the signature of the call at an offset; None if there is none."""
     written = tokens_before(cut.source.text, offset, last_declaration_start(cut, offset))
     call = open_call(written)
     declared = None if call is None else _called(view, call)

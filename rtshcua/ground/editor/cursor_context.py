@@ -1,5 +1,6 @@
-"""What may stand at a place of an unfinished text: the tokens that the parser accepts, and the use of a name there."""
+"""The context of the cursor in an unfinished text: the tokens that the parser accepts, and the use of a name."""
 
+from collections.abc import Iterator
 from enum import Enum
 from typing import NamedTuple
 
@@ -14,18 +15,18 @@ from rtshcua.ground.language.recovery import misread, resume, shifts
 from rtshcua.ground.language.table import table
 
 _BEGINNINGS = frozenset(word for word in table().words if shifts(table().rows[0], word))
-_STOP = "\x01"  # at which no token begins, so the parser stops there with its stacks as they are
+_STOP = "\x01"  # no token begins with it, so the parser stops there
 
 
 class NameUse(Enum):
-    """What a name at a place is for."""
+    """The use of a name at the cursor."""
 
     NOTHING = "a new name"
     SKILL = "skill"
     STEP = "step"
     ZONE = "zone"
     VALUE = "value"
-    COMPARED = "what is compared with"
+    COMPARED = "compared value"
     ARGUMENT = "argument"
     POLICY = "policy"
     VEHICLE = "vehicle"
@@ -49,14 +50,16 @@ class NameUse(Enum):
 
 
 class AcceptedSymbols(NamedTuple):
-    """The symbols that the parser would take, and the words of the language among them as they are written."""
+    """The symbols that the parser accepts, and the keywords among them."""
 
     symbols: frozenset[str]
     words: tuple[str, ...]
 
 
 class OpenCall(NamedTuple):
-    """The innermost call that a place stands in: its name, the arguments before, and the name of the present one."""
+    """The innermost call around the cursor: its name, the number of earlier arguments, the name of the present
+    argument, and all argument names.
+    """
 
     name: str
     position: int
@@ -64,7 +67,7 @@ class OpenCall(NamedTuple):
     named: tuple[str, ...]
 
 
-#: what stands behind a word, until another of them
+#: the use of a name after a keyword, up to the next of these keywords
 _BEHIND = {
     "under": NameUse.POLICY, "on": NameUse.VEHICLE, "use": NameUse.TEMPLATE, "from": NameUse.NOMINAL,
     "permit": NameUse.SKILL, "forbid": NameUse.SKILL, "confirm": NameUse.SKILL, "degrade": NameUse.SKILL,
@@ -85,12 +88,12 @@ _BEHIND = {
 
 
 def last_declaration_start(text: ParsedText, offset: int) -> int:
-    """Where the last declaration before a place begins that the parser may begin at."""
+    """The start of the last declaration before an offset at which the parser may start."""
     return max((piece.start for piece in text.pieces if piece.firm and piece.start <= offset), default=0)
 
 
 def accepted_symbols(cut: ParsedText, offset: int) -> AcceptedSymbols:
-    """What the parser would take at a place, given all that stands before it."""
+    """Return the symbols that the parser accepts at an offset."""
     text = cut.source.text[:offset] + _STOP
     start = max((piece.start for piece in cut.pieces if piece.firm and piece.start < offset), default=None)
     source = Source(cut.source.file, text)
@@ -112,8 +115,8 @@ def accepted_symbols(cut: ParsedText, offset: int) -> AcceptedSymbols:
 
 
 def tokens_before(text: str, offset: int, since: int) -> list[Token]:
-    """The tokens of the declaration that a place is in, without comments. One that is not whole is told by its first
-    word at the beginning of a line.
+    """The tokens before an offset in its declaration, without comments. An incomplete declaration is found by its first
+    keyword at the beginning of a line.
     """
     found = [token for token in tokens(text, since, offset) if token.kind != "comment" and token.end <= offset]
     begins = (at for at, token in enumerate(found) if token.text in _BEGINNINGS and text[token.start - 1] == "\n")
@@ -121,35 +124,43 @@ def tokens_before(text: str, offset: int, since: int) -> list[Token]:
 
 
 def name_use(written: list[Token]) -> NameUse:
-    """What a name is for behind these tokens."""
-    last = written[-1].text if written else ""
+    """Return the use of a name after these tokens."""
+    if not written:
+        return NameUse.VALUE
+    head, last = written[0].text, written[-1].text
     if last in ("==", "!=", "<", "<=", ">", ">="):
         return NameUse.COMPARED
-    head = written[0].text if written else ""
     if head in ("signal", "enum"):
         return _of_signal(written, head)
     call = open_call(written)
     if call is not None:
         return _in_call(written, call, last)
-    depth = 0
-    for number, token in enumerate(reversed(written)):
-        if token.text in (")", "}"):
-            depth += 1
-        elif token.text in ("(", "{"):
-            if depth == 0:
-                return _in_block(written[: len(written) - number], last)
-            depth -= 1
-        elif depth == 0 and token.kind == "word" and token.text in _BEHIND:
-            follows = written[len(written) - number : len(written) - number + 1]
-            if token.text == "phase" and follows and follows[0].text == "in":
-                return NameUse.PHASE
-            return _behind_word(written, len(written) - 1 - number)
+    for at, token in _unclosed(written):
+        if token.text in ("(", "{"):
+            return _in_block(written[: at + 1])
+        if token.kind == "word" and token.text in _BEHIND:
+            return _behind_word(written, at)
     return NameUse.VALUE
 
 
+def _unclosed(written: list[Token]) -> Iterator[tuple[int, Token]]:
+    """The tokens from the last to the first, without closed brackets and their content."""
+    depth = 0
+    for at in range(len(written) - 1, -1, -1):
+        token = written[at]
+        if token.text in (")", "}"):
+            depth += 1
+        elif depth == 0:
+            yield at, token
+        elif token.text in ("(", "{"):
+            depth -= 1
+
+
 def _behind_word(written: list[Token], at: int) -> NameUse:
-    """What stands behind a word, which may depend on the word before it."""
+    """Return the use of a name after a keyword, which may depend on the tokens around it."""
     word, before_it = written[at].text, written[at - 1].text if at else ""
+    if word == "phase" and [token.text for token in written[at + 1 : at + 2]] == ["in"]:
+        return NameUse.PHASE
     if word == "on":
         header = written[0].text == "mission" and all(token.text != "{" for token in written)
         return NameUse.VEHICLE if header or written[0].text == "nominal" else NameUse.DAY
@@ -178,42 +189,33 @@ def _in_call(written: list[Token], call: OpenCall, last: str) -> NameUse:
     return NameUse.ARGUMENT
 
 
-def _in_block(outer: list[Token], last: str) -> NameUse:
-    """In `{ }`, where no word tells: the steps of a phase, the members that are compared with, the cells of a table."""
-    said = [token.text for token in outer if token.kind == "word"][-2:]
-    if "phase" in said[:1] or "repeat" in said:
+def _in_block(outer: list[Token]) -> NameUse:
+    """Return the use of a name in `{ }`: a step of a phase, a compared member, or a cell of a table."""
+    words = [token.text for token in outer if token.kind == "word"][-2:]
+    if "phase" in words[:1] or "repeat" in words:
         return NameUse.STEP
-    return NameUse.COMPARED if "in" in said else NameUse.VALUE
+    return NameUse.COMPARED if "in" in words else NameUse.VALUE
 
 
 def in_sizes(written: list[Token]) -> bool:
-    """Whether a place is among the sizes that a program gives to a skill."""
+    """Whether the tokens are a `sizes` declaration."""
     return bool(written) and written[0].text == "sizes"
 
 
 def open_call(written: list[Token]) -> OpenCall | None:
-    """The innermost call that is open."""
-    depth, position, argument = 0, 0, None
+    """Return the innermost open call; None if there is none in the innermost block."""
+    position, argument = 0, None
     named: list[str] = []
-    for number in range(len(written) - 1, -1, -1):
-        text = written[number].text
-        if text in (")", "}"):
-            depth += 1
-        elif text == "{":
-            if depth == 0:
-                return None
-            depth -= 1
-        elif text == "(":
-            if depth == 0:
-                name = written[number - 1] if number else None
-                return (
-                    None if name is None or name.kind != "word" else OpenCall(name.text, position, argument, (*named,))
-                )
-            depth -= 1
-        elif depth == 0 and text == ",":
+    for at, token in _unclosed(written):
+        name = written[at - 1] if at else None
+        if token.text == "{":
+            return None
+        if token.text == "(":
+            called = name is not None and name.kind == "word"
+            return OpenCall(name.text, position, argument, (*named,)) if name is not None and called else None
+        if token.text == ",":
             position += 1
-        elif depth == 0 and text == "=" and number:
-            named.append(written[number - 1].text)
-            if position == 0:
-                argument = written[number - 1].text
+        elif token.text == "=" and name is not None:
+            named.append(name.text)
+            argument = name.text if position == 0 else argument
     return None

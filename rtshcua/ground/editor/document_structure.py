@@ -1,4 +1,4 @@
-"""The structure of a file: the outline of its declarations, what may be folded, and semantic tokens."""
+"""The structure of a file: the outline of its declarations, folding ranges, and semantic tokens."""
 
 from collections.abc import Iterator
 from typing import Final, NamedTuple
@@ -19,7 +19,7 @@ from rtshcua.model.ir.signals import EnumDecl, SignalDecl
 from rtshcua.model.ir.skills import SizesDecl, SkillDecl
 from rtshcua.model.ir.tests import TestDecl
 
-#: what a declaration is, by its first word
+#: the kinds of declarations, which are their first words
 DECLARATION_KINDS = (
     "enum",
     "signal",
@@ -36,7 +36,7 @@ DECLARATION_KINDS = (
 
 
 class OutlineSymbol(NamedTuple):
-    """Something that has a name: what kind, where it is whole, where its name stands, and what is in it."""
+    """A named symbol: its kind, its whole span, the span of its name, and the symbols in it."""
 
     name: str
     kind: str
@@ -54,7 +54,7 @@ class Fold(NamedTuple):
 
 
 def outline(cut: ParsedText) -> tuple[OutlineSymbol, ...]:
-    """The declarations of a file, in the order of the text."""
+    """The declarations of a file, in source order."""
     return tuple(symbol for each in declarations(cut.parsed.unit) for symbol in _symbols(cut, each))
 
 
@@ -67,8 +67,8 @@ def _symbols(
         case RoleDecl():
             yield from (OutlineSymbol(name.text, "role", name.span, name.span) for name in node.names)
         case SizesDecl(skill=skill):
-            given = tuple(OutlineSymbol(each.name.text, "parameter", each.span, each.name.span) for each in node.given)
-            yield OutlineSymbol(f"sizes of {skill.text}", "skill", node.span, skill.span, given)
+            sizes = tuple(OutlineSymbol(each.name.text, "parameter", each.span, each.name.span) for each in node.given)
+            yield OutlineSymbol(f"sizes of {skill.text}", "skill", node.span, skill.span, sizes)
         case _:
             yield _symbol(cut, node)
 
@@ -93,11 +93,11 @@ def _inner(node: Node) -> Iterator[OutlineSymbol]:
 
 
 def folds(cut: ParsedText) -> tuple[Fold, ...]:
-    """Blocks and lists in brackets, comments of several lines, and the imports, as far as they go over lines."""
+    """The blocks, lists in brackets, comments and imports that span several lines."""
     text = cut.source.text
     found: list[Fold] = []
     opened: list[int] = []
-    note_end = -1  # where comments of a line each end, the last of which was just read
+    note_end = -1  # the end of a run of line comments, -1 if the last token was none
     for token in tokens(text):
         of_a_line = token.text.startswith("//")
         if of_a_line and note_end >= 0 and text[note_end : token.start].count("\n") == 1:
@@ -115,7 +115,7 @@ def folds(cut: ParsedText) -> tuple[Fold, ...]:
     return tuple(each for each in found if "\n" in text[each.start : each.end])
 
 
-#: the kinds, by their number; names of the protocol, so that every theme has colours for them
+#: the kinds by number; these names of the protocol have colours in every theme
 TOKEN_KINDS: Final = ("function", "variable", "parameter", "enumMember", "enum", "type", "class", "namespace", "macro",
                 "property", "keyword", "struct")  # fmt: skip
 
@@ -133,7 +133,7 @@ _BY_NAME_KIND: Final = {
 
 
 class SemanticToken(NamedTuple):
-    """A range of characters, its kind's number in `TOKEN_KINDS`, and whether it gives the name."""
+    """A range of characters, the number of its kind in `TOKEN_KINDS`, and whether it declares the name."""
 
     start: int
     end: int
@@ -142,17 +142,17 @@ class SemanticToken(NamedTuple):
 
 
 def semantic_tokens(view: ProgramView, file: str) -> tuple[SemanticToken, ...]:
-    """The names of a file, in the order of the text, none over another."""
+    """The names of a file, in source order, without overlaps."""
     found: list[SemanticToken] = []
     end = 0
     for each in view.occurrences(file):
-        if each.span.start < end or each.target.sort in (NameKind.IMPORT, NameKind.PROPOSER):
+        if each.span.start < end or each.target.kind in (NameKind.IMPORT, NameKind.PROPOSER):
             continue
-        if each.target.sort is NameKind.DECLARED:
+        if each.target.kind is NameKind.DECLARED:
             declared = view.symbols.declared.get(each.target.name)
             kind = None if declared is None else _BY_DECLARATION.get(type(declared))
         else:
-            kind = _BY_NAME_KIND[each.target.sort]
+            kind = _BY_NAME_KIND[each.target.kind]
         if kind is not None:
             found.append(SemanticToken(each.span.start, each.span.end, TOKEN_KINDS.index(kind), each.declares))
             end = each.span.end

@@ -1,4 +1,4 @@
-"""What hovering over a place shows, in Markdown: declarations, quantities in other units, and sizes of zones."""
+"""Hover texts in Markdown: declarations, quantities in other units, and sizes of zones."""
 
 from collections.abc import Iterator
 from fractions import Fraction
@@ -11,7 +11,7 @@ from rtshcua.ground.checker.geojson import DataFiles
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.symbols import WORDS, Declaration
 from rtshcua.ground.editor.keyword_help import KEYWORDS, REASONS, TYPES
-from rtshcua.ground.editor.occurrences import NameKind, NameTarget, Occurrence, at
+from rtshcua.ground.editor.occurrences import NameKind, NameTarget, Occurrence, at, owned, parameters_owner
 from rtshcua.ground.editor.syntax import nodes_in, note_before, path_to, token_at
 from rtshcua.ground.editor.workspace import ProgramView
 from rtshcua.ground.geometry.polygons import doubled_area
@@ -27,11 +27,11 @@ from rtshcua.model.ir.signals import EnumDecl, SignalDecl
 from rtshcua.model.ir.skills import ParameterDecl, SkillDecl
 from rtshcua.model.quantity import UNITS, Dimension, UnitOfMeasure, display
 
-_DIGITS = 6  # behind the point, where a unit gives no whole number
+_DIGITS = 6  # decimals of a converted value
 
 
 def quantity_in_units(node: Quantity) -> str:
-    """`20 m = 20000 mm`, and further units."""
+    """Describe a quantity in its canonical unit and in all other units."""
     dimension = Dimension.LENGTH if node.dimension is Dimension.ALTITUDE else node.dimension
     datum = "" if node.datum is None else f" above {node.datum.value}"
     if dimension is Dimension.COUNT:
@@ -42,7 +42,7 @@ def quantity_in_units(node: Quantity) -> str:
 
 
 def converted(value: int, unit: UnitOfMeasure) -> str:
-    """A canonical number in a unit, rounded where it has no end."""
+    """Write a canonical number in a unit, rounded to six decimals."""
     scaled, rest = divmod(abs(value) * unit.denominator * 10**_DIGITS, unit.numerator)
     about = "≈ " if rest else ""
     whole, fraction = divmod(scaled, 10**_DIGITS)
@@ -50,12 +50,12 @@ def converted(value: int, unit: UnitOfMeasure) -> str:
     return f"{about}{'-' if value < 0 else ''}{whole}{'.' + digits if digits else ''}"
 
 
-_PI = Fraction(355, 113)  # to 3e-7; what is shown has three digits
+_PI = Fraction(355, 113)  # accurate to 3e-7, enough for an area
 _MM2 = 1_000_000  # in a square metre
 
 
 def size_of(view: ProgramView, zone: ZoneDecl) -> str | None:
-    """`120 m × 80 m, 9,400 m²`; None where the zone has no outline that could be measured."""
+    """Return the size of a zone, as in `120 m × 80 m, 9,400 m²`; None if its outline is not valid."""
     if _is_circular(view, zone):
         return None
     home = next((vehicle.home for vehicle in view.symbols.vehicles.values()), None) or next(
@@ -66,7 +66,7 @@ def size_of(view: ProgramView, zone: ZoneDecl) -> str | None:
     plans = GroundPlans(projection, view.symbols.zones, data, Report(view.program.sources))
     try:
         shape = plans.of(zone)
-    except (KeyError, ValueError, AssertionError):  # a part of it is not declared, or makes no outline
+    except (KeyError, ValueError, AssertionError):  # a part is not declared, or gives no outline
         return None
     return None if shape is None else _size_in_words(shape)
 
@@ -88,7 +88,7 @@ def _area(shape: Shape) -> int:
 
 
 def _is_circular(view: ProgramView, zone: ZoneDecl) -> bool:
-    """Whether a zone is made of itself, or of what nothing declares."""
+    """Whether a zone refers to itself or to an undeclared zone."""
     waiting = [(zone, frozenset({zone.name.text}))]
     while waiting:
         each, above = waiting.pop()
@@ -100,22 +100,22 @@ def _is_circular(view: ProgramView, zone: ZoneDecl) -> bool:
     return False
 
 
-_LONG = 40  # lines of a declaration that are shown
+_LONG = 40  # the most lines of a declaration that are shown
 
 
 class Hover(NamedTuple):
-    """Markdown, and the text that it is about."""
+    """A text in Markdown, and the span that it explains."""
 
     text: str
     span: Span
 
 
 def hover(view: ProgramView, file: str, offset: int, dialect: Dialect) -> Hover | None:
-    """What stands at a place; None where nothing does that could be explained."""
+    """Return the hover text at an offset; None if there is nothing to explain."""
     found = at(view.occurrences(file), offset)
-    said = list(dict.fromkeys(text for each in found if (text := describe(view, each.target, dialect))))
-    if said:
-        return Hover("\n\n---\n\n".join(said[:3]), found[0].span)
+    texts = list(dict.fromkeys(text for each in found if (text := describe(view, each.target, dialect))))
+    if texts:
+        return Hover("\n\n---\n\n".join(texts[:3]), found[0].span)
     unit = view.units.get(file)
     path = () if unit is None else path_to(unit, offset)
     if path and isinstance(path[-1], Quantity):
@@ -137,23 +137,20 @@ def _hover_word(view: ProgramView, file: str, offset: int, found: tuple[Occurren
 
 
 def describe(view: ProgramView, target: NameTarget, dialect: Dialect) -> str | None:
-    """A target in words."""
-    match target.sort:
+    """Describe a target; None if it is not declared."""
+    match target.kind:
         case NameKind.DECLARED:
             declared = view.symbols.declared.get(target.name)
             return None if declared is None else _declaration(view, declared, dialect)
         case NameKind.PARAMETER:
-            parameter = parameter_of(view, target.owner, target.name)
-            return None if parameter is None else _parameter(view, parameter, target.owner)
+            return _parameter(view, target)
         case NameKind.MEMBER:
-            enum = view.symbols.enums.get(target.owner)
-            values = {} if enum is None else {each.name.text: each.value for each in enum.members}
-            return f"`{target.name}` = {values.get(target.name)}, a value of `{target.owner}`"
+            return _member(view, target)
         case NameKind.CHOICE:
             skill, _, parameter_name = target.owner.partition(".")
             return f"`{target.name}`: a choice for `{parameter_name}` of `{skill}`"
         case NameKind.PHASE:
-            return f"phase `{target.name}`: a stretch of a mission"
+            return f"phase `{target.name}` of a mission"
         case NameKind.ROLE:
             return f"role `{target.name}`. {KEYWORDS['role']}"
         case NameKind.REASON:
@@ -163,13 +160,13 @@ def describe(view: ProgramView, target: NameTarget, dialect: Dialect) -> str | N
         case NameKind.FIELD | NameKind.MESSAGE | NameKind.DIALECT_ENUM:
             return _dialect(target, dialect)
         case NameKind.SOURCE | NameKind.CLASS | NameKind.RECORD | NameKind.WORD:
-            return _explained(f"{target.sort.value} `{target.name}`", KEYWORDS.get(target.name))
+            return _explained(f"{target.kind.value} `{target.name}`", KEYWORDS.get(target.name))
         case NameKind.FAULT:
             return _fault(target.name)
         case NameKind.IMPORT:
             return _import(view, target)
         case _:
-            return f"{target.sort.value} `{target.name}`"
+            return f"{target.kind.value} `{target.name}`"
 
 
 def _explained(name: str, meaning: str | None) -> str:
@@ -177,13 +174,15 @@ def _explained(name: str, meaning: str | None) -> str:
 
 
 def parameter_of(view: ProgramView, owner: str, name: str) -> ParameterDecl | None:
-    """A parameter by its owner's name and its own."""
-    symbols = view.symbols
-    declared = symbols.skills.get(owner) or symbols.templates.get(owner) or symbols.missions.get(owner)
-    parameters = () if declared is None else declared.parameters
-    if isinstance(declared, SkillDecl):
-        parameters += declared.sizes
+    """The parameter of this owner and name."""
+    parameters = owned(parameters_owner(view.symbols, owner))
     return next((each for each in parameters if each.name.text == name), None)
+
+
+def _member(view: ProgramView, target: NameTarget) -> str:
+    enum = view.symbols.enums.get(target.owner)
+    values = {} if enum is None else {each.name.text: each.value for each in enum.members}
+    return f"`{target.name}` = {values.get(target.name)}, a value of `{target.owner}`"
 
 
 def _declaration(view: ProgramView, declared: Declaration, dialect: Dialect | None) -> str:
@@ -228,9 +227,9 @@ def _signal(signal: SignalDecl, dialect: Dialect | None) -> Iterator[str]:
 
 
 def _skill(view: ProgramView, skill: SkillDecl) -> Iterator[str]:
-    def shown(what: str, quantity: Quantity | None) -> Iterator[str]:
+    def shown(keyword: str, quantity: Quantity | None) -> Iterator[str]:
         if quantity is not None:
-            yield f"{what} {display(quantity.value, quantity.dimension)}"
+            yield f"{keyword} {display(quantity.value, quantity.dimension)}"
 
     times = [*shown("deadline", skill.deadline), *shown("valid for", skill.validity),
              *shown("lasts at most", skill.duration), *shown("energy at most", skill.energy)]  # fmt: skip
@@ -246,9 +245,12 @@ def _skill(view: ProgramView, skill: SkillDecl) -> Iterator[str]:
         yield "fallback " + ", ".join(f"`{view.slice(link.span)}`" for link in skill.fallback)
 
 
-def _parameter(view: ProgramView, parameter: ParameterDecl, owner: str) -> str:
+def _parameter(view: ProgramView, target: NameTarget) -> str | None:
+    parameter = parameter_of(view, target.owner, target.name)
+    if parameter is None:
+        return None
     source = " ".join(view.slice(parameter.span).split())
-    parts = [f"```rts\n{source}\n```", f"parameter of `{owner}`"]
+    parts = [f"```rts\n{source}\n```", f"parameter of `{target.owner}`"]
     if parameter.choices:
         parts.append("one of " + ", ".join(f"`{choice.text}`" for choice in parameter.choices))
     elif parameter.type.text in TYPES:
@@ -256,16 +258,16 @@ def _parameter(view: ProgramView, parameter: ParameterDecl, owner: str) -> str:
     if parameter.range is not None:
         parts.append(f"range {view.slice(parameter.range.span)}")
     default = None if parameter.default is None else view.slice(parameter.default.span)
-    parts.append("must be given" if default is None else f"default `{default}`")
+    parts.append("required" if default is None else f"default `{default}`")
     return "\n\n".join(parts)
 
 
 def _dialect(target: NameTarget, dialect: Dialect) -> str:
-    if target.sort is NameKind.DIALECT_ENUM:
+    if target.kind is NameKind.DIALECT_ENUM:
         values = dialect.enums.get(target.name)
         listed = "" if values is None else ": " + ", ".join(f"`{name}` = {value}" for name, value in values.items())
         return f"MAVLink enumeration `{target.name}`{listed}"
-    if target.sort is NameKind.MESSAGE:
+    if target.kind is NameKind.MESSAGE:
         message = dialect.messages.get(target.name)
         listed = "" if message is None else ": " + ", ".join(f"`{name}`" for name in message.fields)
         return f"MAVLink message `{target.name}`{listed}"

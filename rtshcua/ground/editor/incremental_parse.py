@@ -1,9 +1,9 @@
-"""Parses again only what an edit changed: the pieces of a text, one per declaration, and what was found in them.
+"""Incremental parsing: a text is divided into pieces, one for each declaration, and only changed pieces are parsed.
 
-What the parser does at the beginning of a declaration depends on nothing before it. So an edit is followed from the
-declaration that it lies in to the first unchanged one that begins where one began before; from there on everything is
-as it was, only moved. The result is that of `parse.parse` on the whole text, to the last span: a property test says so.
-Where a piece may begin (`ParsedPiece.firm`) is narrow, because the explanation of an error looks around itself.
+At the beginning of a declaration the parser does not depend on earlier text. So parsing starts at the declaration with
+the edit, and stops at the first unchanged declaration that began at this place before. All later pieces are only moved.
+The result equals that of `parse.parse` on the whole text; a property test compares them. Pieces begin only at some
+places (`ParsedPiece.firm`), because the explanation of a syntax error uses the text around it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -32,10 +32,11 @@ _make = tuple.__new__  # a constructor is a function more: 9 % of moving a text 
 
 
 def moved(node: N, by: int) -> N:
-    """A node and all below it, `by` characters further on. It goes around the constructor: a long text has thousands of
-    nodes, and a person waits.
+    """Return a copy of a node and all nodes below it, moved by `by` characters.
+
+    It does not call constructors, because a long text has thousands of nodes.
     """
-    made: N = node.__copy__()  # type: ignore[attr-defined]  # of msgspec.Struct, which does not tell
+    made: N = node.__copy__()  # type: ignore[attr-defined]  # msgspec.Struct has it, but its stub does not
     file, start, end = node.span
     force_setattr(made, "span", _make(Span, (file, start + by, end + by)))
     for name in _inner_of(type(node)):
@@ -50,7 +51,7 @@ def moved(node: N, by: int) -> N:
 
 @cache
 def _inner_of(kind: type[Node]) -> tuple[str, ...]:
-    """The parts of a kind of node that may be nodes, or tuples of them."""
+    """The fields of a kind of node that may hold nodes, or tuples of nodes."""
     return tuple(name for name, hint in get_type_hints(kind).items() if name != "span" and not _is_plain(hint))
 
 
@@ -61,7 +62,7 @@ def _is_plain(hint: Any) -> bool:
 
 
 def moved_finding(found: Diagnostic, by: int, since: int = 0, file: str | None = None) -> Diagnostic:
-    """A finding with all its places at or behind `since` moved, those in `file` if it is given."""
+    """Return a finding with all its spans at or after `since` moved; if `file` is given, only those in this file."""
 
     def place(span: Span) -> Span:
         where, start, end = span
@@ -79,8 +80,8 @@ def moved_finding(found: Diagnostic, by: int, since: int = 0, file: str | None =
 
 
 def same(old: Any, new: Any, edited: Mapping[str, Sequence[Span]] | None = None) -> bool:
-    """Whether two nodes, or tuples of them, say the same, wherever they stand; but for names at places of the old text
-    that were `edited`.
+    """Whether two nodes, or tuples of them, are equal except for spans, and for names at `edited` places of the old
+    text.
     """
     if type(old) is not type(new):
         return False
@@ -107,14 +108,14 @@ def _inner(value: Any, by: int) -> Any:
 
 T = TypeVar("T", bound=Node)
 
-_LIST = "<__file_star_"  # the rule for the declarations that were read
+_LIST = "<__file_star_"  # the grammar rule for the list of declarations
 
 
 class ParsedPiece(NamedTuple):
-    """From behind the declaration before to the end of one: what was declared and found there.
+    """The text from the end of one declaration to the end of the next, with its declarations and findings.
 
-    `start` is where the last declaration of it begins. `firm` says that nothing but blanks and comments stands before
-    it, that a blank stands behind its first word, and no word touches that: then neither side looks over the border.
+    `start` is the start of its last declaration. `firm` means that there is only white space and comments before it,
+    white space after its first word, and no word adjacent to that: then parsing and errors do not cross its start.
     """
 
     start: int
@@ -127,10 +128,10 @@ class ParsedPiece(NamedTuple):
 
 
 class ParsedText(NamedTuple):
-    """A text in pieces; the last one is what stands behind the last declaration.
+    """A text in pieces; the last one is the text after the last declaration.
 
-    `since` is the edit that made it of the text before, where that changed no declaration and no syntax error: only
-    comments and blanks. Then all that was found before still holds, some of it further on.
+    `since` is the last edit, if it changed only comments and white space, not declarations or syntax errors. Then all
+    earlier findings still hold, with moved spans.
     """
 
     source: Source
@@ -140,7 +141,7 @@ class ParsedText(NamedTuple):
 
 
 class _KnownPiece(NamedTuple):
-    """The piece `at` of a cut, which stands `by` characters further on now."""
+    """The piece with index `at` of a text, which is moved by `by` characters in the new text."""
 
     text: ParsedText
     at: int
@@ -148,7 +149,7 @@ class _KnownPiece(NamedTuple):
 
 
 def parse_text(source: Source) -> ParsedText:
-    """A text that is parsed for the first time."""
+    """Parse a text for the first time."""
     if refused(source) is not None:
         return ParsedText(source, (), parse(source))
     reader = _PieceBuilder(source)
@@ -161,8 +162,8 @@ def parse_text(source: Source) -> ParsedText:
 
 
 def parse_edited(old: ParsedText, text: str, earlier: Sequence[ParsedText] = ()) -> ParsedText:
-    """The same file with another text. What `earlier` cuts of it have, and `old` lost, need not be parsed again: behind
-    a comment that was opened and is closed again.
+    """Parse the new text of a file. `earlier` texts of the file supply pieces that `old` lost, for example while a
+    comment was open.
     """
     if text == old.source.text:
         return old
@@ -181,21 +182,24 @@ def parse_edited(old: ParsedText, text: str, earlier: Sequence[ParsedText] = ())
         made, known = _parse_until_known(source, old, first, later)
     except Enough:
         return parse_text(source)
-    replaced, rest = old.pieces[first:], tuple[ParsedPiece, ...]()
-    if known is not None:
-        replaced, rest = old.pieces[first : known.at], known.text.pieces[known.at :]
-        rest = tuple(_moved_piece(piece, known.by) for piece in rest) if known.by else rest
-    pieces = (*old.pieces[:first], *made, *rest)
+    pieces = (*old.pieces[:first], *made, *_moved_rest(known))
     if sum(len(piece.found) for piece in pieces) >= MAX_FINDINGS:
         return parse_text(source)
     comparable = known is None or known.text is old
-    return _joined(source, pieces)._replace(since=edit if comparable and _say_the_same(replaced, made) else None)
+    replaced = old.pieces[first : None if known is None else known.at]
+    return _joined(source, pieces)._replace(since=edit if comparable and _are_same(replaced, made) else None)
+
+
+def _moved_rest(known: _KnownPiece | None) -> tuple[ParsedPiece, ...]:
+    """The known piece and all later ones, at their places in the new text."""
+    rest = () if known is None else known.text.pieces[known.at :]
+    return tuple(_moved_piece(piece, known.by) for piece in rest) if known is not None and known.by else rest
 
 
 def _parse_until_known(
     source: Source, old: ParsedText, first: int, later: Mapping[int, _KnownPiece]
 ) -> tuple[list[ParsedPiece], _KnownPiece | None]:
-    """The pieces from number `first` on, up to one that is known already; None where there is none. Raises Enough."""
+    """Parse the pieces from number `first` on, up to a known one, which is returned too. Raises `Enough`."""
     start = old.pieces[first].start if first else beginning(source)
     reader = _PieceBuilder(source, later, old.pieces[first - 1].end if first else start)
     automaton = Automaton(reader)
@@ -209,7 +213,7 @@ def _parse_until_known(
     return reader.pieces, None
 
 
-def _say_the_same(old: Sequence[ParsedPiece], new: Sequence[ParsedPiece]) -> bool:
+def _are_same(old: Sequence[ParsedPiece], new: Sequence[ParsedPiece]) -> bool:
     return not any(piece.found for piece in (*old, *new)) and same(
         tuple(node for piece in old for node in piece.declarations),
         tuple(node for piece in new for node in piece.declarations),
@@ -217,7 +221,7 @@ def _say_the_same(old: Sequence[ParsedPiece], new: Sequence[ParsedPiece]) -> boo
 
 
 def _later(known: ParsedText, edit: Edit) -> dict[int, _KnownPiece]:
-    """The pieces behind an edit by where they begin now."""
+    """The pieces after an edit, by their start in the new text."""
     by = edit.length - (edit.end - edit.start)
     return {
         piece.start + by: _KnownPiece(known, at, by)
@@ -227,7 +231,7 @@ def _later(known: ParsedText, edit: Edit) -> dict[int, _KnownPiece]:
 
 
 class _MetKnownPiece(Exception):
-    """The parser has come to the beginning of an unchanged piece."""
+    """The parser has reached an unchanged piece."""
 
     def __init__(self, known: _KnownPiece) -> None:
         super().__init__(known)
@@ -235,7 +239,7 @@ class _MetKnownPiece(Exception):
 
 
 class _PieceBuilder(Reader):
-    """Notes after each declaration what has come since the one before."""
+    """A reader that closes a piece after each declaration."""
 
     def __init__(self, source: Source, later: Mapping[int, _KnownPiece] | None = None, end: int | None = None) -> None:
         super().__init__(source)
@@ -245,7 +249,7 @@ class _PieceBuilder(Reader):
         self._kept = self._noted = 0
 
     def declare(self, node: T, name: Name | None = None) -> None:
-        """Keeps a declaration, and closes its piece; raises _Met where what follows is known."""
+        """Keep a declaration and close its piece. Raises `_MetKnownPiece` if the next piece is known."""
         super().declare(node, name)
         text, (_, start, end) = self.source.text, node.span
         self.close(start, end, firm=_is_firm(text, start, self._end))
@@ -255,7 +259,7 @@ class _PieceBuilder(Reader):
             raise _MetKnownPiece(known)
 
     def close(self, start: int, end: int, *, firm: bool) -> None:
-        """Ends a piece."""
+        """Close a piece."""
         kept, noted = tuple(self.declarations[self._kept :]), tuple(self.diagnostics[self._noted :])
         self._kept, self._noted = len(self.declarations), len(self.diagnostics)
         self.pieces.append(ParsedPiece(start, end, firm, kept, noted, frozenset(self.broken), self.whole))
@@ -264,7 +268,7 @@ class _PieceBuilder(Reader):
 
 
 def _behind(text: str, end: int) -> int:
-    """Where the next word begins."""
+    """The start of the next token."""
     return table().skipped(text, end)
 
 
@@ -283,12 +287,12 @@ def _word_end(text: str, start: int) -> int:
 
 
 def _is_before(old: ParsedText, piece: ParsedPiece, edit: Edit) -> bool:
-    """Whether a piece's first word, and the blank behind it, stand before an edit."""
+    """Whether a piece's first word, and the white space after it, are before an edit."""
     return piece.firm and edit.start > _word_end(old.source.text, piece.start)
 
 
 def _begin_behind(automaton: Automaton) -> None:
-    """The parser as it is after a declaration."""
+    """Set the parser to its state after a declaration."""
     row = automaton.table.rows[0]
     automaton.states.append(next(state for symbol, state in row.items() if symbol.startswith(_LIST)))
     assert shifts(automaton.table.rows[automaton.states[-1]], "import")

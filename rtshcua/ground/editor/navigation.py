@@ -1,4 +1,4 @@
-"""Navigation: the meaning of a place, its definitions, and all places with the same meaning, also in other programs."""
+"""Navigation: the target of a name, its definitions, and all references to it, also in other programs."""
 
 from collections.abc import Iterable
 
@@ -9,7 +9,7 @@ from rtshcua.ground.editor.workspace import ProgramView
 
 
 def targets(view: ProgramView, file: str, offset: int) -> tuple[NameTarget, ...]:
-    """What a place means. Within what could not be parsed, a word that is declared somewhere."""
+    """The targets of the name at an offset. In text with syntax errors, a word that is declared somewhere."""
     found = tuple(dict.fromkeys(each.target for each in at(view.occurrences(file), offset)))
     if found:
         return found
@@ -23,10 +23,10 @@ def targets(view: ProgramView, file: str, offset: int) -> tuple[NameTarget, ...]
 
 
 def definitions(view: ProgramView, file: str, offset: int) -> tuple[Span, ...]:
-    """Where the name at a place is given; of an import, the beginning of the file."""
+    """The definitions of the name at an offset; for an import, the beginning of the file."""
     found: list[Span] = []
     for target in targets(view, file, offset):
-        if target.sort is not NameKind.IMPORT:
+        if target.kind is not NameKind.IMPORT:
             found += declared_at(view, target)
     imported = imported_at(view, file, offset)
     if imported is not None:
@@ -35,7 +35,7 @@ def definitions(view: ProgramView, file: str, offset: int) -> tuple[Span, ...]:
 
 
 def imported_at(view: ProgramView, file: str, offset: int) -> str | None:
-    """The file that the import at a place means; None where there is none."""
+    """The file of the import at an offset; None if there is none."""
     unit = view.units.get(file)
     imports = () if unit is None else unit.imports
     return next((view.imports.target(file, each) for each in imports if each.span.start <= offset <= each.span.end),
@@ -50,8 +50,8 @@ def importers(views: Iterable[ProgramView], file: str) -> tuple[Span, ...]:
 
 
 def declared_at(view: ProgramView, target: NameTarget) -> list[Span]:
-    """The places that give a name."""
-    if target.sort is NameKind.DECLARED:
+    """The places that declare a name."""
+    if target.kind is NameKind.DECLARED:
         declared = view.symbols.declared.get(target.name)
         return [] if declared is None else [declared.name.span]
     owner = view.symbols.declared.get(target.owner.partition(".")[0])
@@ -62,10 +62,10 @@ def declared_at(view: ProgramView, target: NameTarget) -> list[Span]:
 
 
 def references(views: Iterable[ProgramView], view: ProgramView, target: NameTarget) -> dict[Span, bool]:
-    """All places that mean `target`, as `view` understands it, in these programs; whether each gives the name.
+    """Return all places in these programs that refer to `target`, and whether each declares it.
 
-    One name may be declared in several files that no program has together: only programs in which it is declared at
-    the same place count.
+    Several files may declare one name if no program contains them together, so only programs count in which the name is
+    declared at the same place as in `view`.
     """
     home = declared_at(view, target)
     places: dict[Span, bool] = {}
@@ -73,6 +73,6 @@ def references(views: Iterable[ProgramView], view: ProgramView, target: NameTarg
         if declared_at(each, target) == home:
             for file in each.units:
                 if target.name not in each.text(file):
-                    continue  # the places of a file are dear
+                    continue  # finding the occurrences of a file is slow
                 places.update(spans(each.occurrences(file), [target]))
     return places

@@ -1,8 +1,8 @@
-"""Every place of a file that means something by name, with what it means in a program."""
+"""Finds all names in a file, with their targets in a program."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from enum import Enum
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from msgspec.structs import astuple
 
@@ -43,7 +43,7 @@ from rtshcua.model.ir.tests import (
 
 
 class NameKind(Enum):
-    """The kinds of names; the value is the word for a person."""
+    """The kinds of names; the value is a description."""
 
     DECLARED = "declaration"
     PARAMETER = "parameter"
@@ -61,31 +61,31 @@ class NameKind(Enum):
     DIALECT_ENUM = "enumeration of the dialect"
     REASON = "reason"
     FAULT = "fault"
-    WORD = "word of the language"
+    WORD = "keyword"
     IMPORT = "import"
 
 
 class NameTarget(NamedTuple):
-    """What is meant: `owner` is the skill, template, mission or enumeration that a parameter or a member belongs to; of
-    a choice it is the skill and the parameter, of an import the importing file.
+    """The target of a name. `owner` is the skill, template, mission or enumeration of a parameter or member, the skill
+    and parameter of a choice, or the importing file of an import.
     """
 
-    sort: NameKind
+    kind: NameKind
     name: str
     owner: str = ""
 
 
 class Occurrence(NamedTuple):
-    """A place that means `target`; `declares` where it is the one that gives the name."""
+    """A place that refers to `target`; `declares` means that it declares the name."""
 
     span: Span
     target: NameTarget
     declares: bool = False
 
 
-#: what the values of a fault's parameters name
+#: the kinds of names in the parameters of faults
 _OF_FAULTS = {"message": NameKind.MESSAGE, "role": NameKind.ROLE}
-#: what the names of parameters mean at a place; several where a rule is about several skills
+#: the targets of parameter names in a scope; several if a rule is about several skills
 Scope = Mapping[str, tuple[NameTarget, ...]]
 
 
@@ -95,24 +95,25 @@ class _OccurrenceFinder:
     def __init__(self, symbols: Symbols) -> None:
         self.symbols = symbols
 
-    def names(self, names: Iterable[Name], sort: NameKind) -> Iterator[Occurrence]:
-        """Names of one sort."""
+    def names(self, names: Iterable[Name | None], kind: NameKind) -> Iterator[Occurrence]:
+        """The occurrences of names of one kind."""
         for name in names:
-            yield Occurrence(name.span, NameTarget(sort, name.text))
+            if name is not None:
+                yield Occurrence(name.span, NameTarget(kind, name.text))
 
     def role(self, name: Name, scope: Scope) -> Iterator[Occurrence]:
-        """A role, or a template's parameter for one."""
+        """The occurrence of a role, or of a template's parameter for a role."""
         for target in scope.get(name.text, (NameTarget(NameKind.ROLE, name.text),)):
             yield Occurrence(name.span, target)
 
     def contract(self, node: SkillDecl | Overrides, scope: Scope) -> Iterator[Occurrence]:
-        """The clauses, phases and records of a contract."""
+        """The names in the clauses, phases and records of a contract."""
         yield from self.names(node.phases, NameKind.PHASE)
         yield from self.names(node.record, NameKind.RECORD)
         yield from self.within((node.require, node.assume, node.maintain), scope)
 
     def within(self, node: Any, scope: Scope) -> Iterator[Occurrence]:
-        """All references below a condition, a value or a shape."""
+        """The names in a condition, a value or a shape."""
         if isinstance(node, Reference):
             yield from self.reference(node, scope)
         elif isinstance(node, Comparison):
@@ -130,7 +131,7 @@ class _OccurrenceFinder:
                 yield from self.within(each, scope)
 
     def reference(self, node: Reference, scope: Scope) -> Iterator[Occurrence]:
-        """A name that stands for a value."""
+        """The occurrence of a name that is used as a value."""
         name, (file, start, _) = node.name, node.span
         if name in scope:
             yield from (Occurrence(node.span, target) for target in scope[name])
@@ -148,7 +149,7 @@ class _OccurrenceFinder:
     def arguments(
         self, written: Sequence[ArgumentValue], owner: SkillDecl | TemplateDecl | None, scope: Scope
     ) -> Iterator[Occurrence]:
-        """The arguments of a step, a link or a use."""
+        """The names in the arguments of a step, a link or a use."""
         parameters = () if owner is None else owner.parameters
         named = {each.name.text: each for each in parameters}
         for position, each in enumerate(written):
@@ -160,7 +161,7 @@ class _OccurrenceFinder:
             yield from self.argument(each.value, parameter, "" if owner is None else owner.name.text, scope)
 
     def argument(self, value: Node, parameter: ParameterDecl | None, owner: str, scope: Scope) -> Iterator[Occurrence]:
-        """A value for a parameter, which may be a choice or a role."""
+        """The names in an argument, which may be a choice or a role."""
         if isinstance(value, Reference) and parameter is not None and value.name not in scope:
             if any(choice.text == value.name for choice in parameter.choices):
                 yield Occurrence(value.span, NameTarget(NameKind.CHOICE, value.name, f"{owner}.{parameter.name.text}"))
@@ -171,21 +172,21 @@ class _OccurrenceFinder:
         yield from self.within(value, scope)
 
     def case(self, node: NominalDecl | TestDecl) -> Iterator[Occurrence]:
-        """A nominal or a test."""
+        """The names in a nominal or a test."""
         scope: dict[str, tuple[NameTarget, ...]] = {}
         if isinstance(node, TestDecl):
             if node.nominal is not None:
                 yield Occurrence(node.nominal.span, NameTarget(NameKind.DECLARED, node.nominal.text))
-            asked = "" if node.request is None else node.request.skill.text
-            skill = self.symbols.skills.get(asked)
+            requested = "" if node.request is None else node.request.skill.text
+            skill = self.symbols.skills.get(requested)
             for parameter in () if skill is None else skill.parameters:
-                scope[parameter.name.text] = (NameTarget(NameKind.PARAMETER, parameter.name.text, asked),)
+                scope[parameter.name.text] = (NameTarget(NameKind.PARAMETER, parameter.name.text, requested),)
         else:
             yield from self.names((node.policy, node.vehicle), NameKind.DECLARED)
         yield from self._case(tuple(value for value in astuple(node) if value is not node.name), scope)
 
     def scenario(self, node: ScenarioDecl) -> Iterator[Occurrence]:
-        """A scenario."""
+        """The names in a scenario."""
         yield from self.names((node.mission,), NameKind.DECLARED)
         faults = [each for each in node.start if isinstance(each, FaultCall)]
         for incident in node.incidents:
@@ -207,18 +208,18 @@ class _OccurrenceFinder:
                     yield from self.names((name,), NameKind.DECLARED)
 
     def _fault(self, fault: FaultCall) -> Iterator[Occurrence]:
-        """A fault, and what its values name: messages, roles; the words of others belong to the fault."""
+        """The names of a fault and of the messages and roles in its arguments."""
         yield from self.names((fault.name,), NameKind.FAULT)
         for each in fault.arguments:
-            sort = None if each.name is None else _OF_FAULTS.get(each.name.text)
-            if sort is not None and isinstance(each.value, Reference):
-                yield Occurrence(each.value.span, NameTarget(sort, each.value.name))
+            kind = None if each.name is None else _OF_FAULTS.get(each.name.text)
+            if kind is not None and isinstance(each.value, Reference):
+                yield Occurrence(each.value.span, NameTarget(kind, each.value.name))
 
     def _case(self, node: Any, scope: Scope) -> Iterator[Occurrence]:
         match node:
             case Asker():
                 yield from () if node.role is None else self.role(node.role, {})
-                yield from () if node.source is None else self.names((node.source,), NameKind.SOURCE)
+                yield from self.names((node.source,), NameKind.SOURCE)
             case Assignment(subject=Named(name=name)):
                 yield from self.reference(Reference(span=name.span, name=name.text), {})
                 if node.cell.value is not None:
@@ -231,23 +232,24 @@ class _OccurrenceFinder:
                 yield from self.arguments(node.arguments, self.symbols.skills.get(node.skill.text), {})
                 yield from self._case(node.asker, scope)
             case Expectation():
-                yield from () if node.target is None else self.names((node.target,), NameKind.DECLARED)
-                yield from () if node.reason is None else self.names((node.reason,), NameKind.REASON)
+                yield from self.names((node.target,), NameKind.DECLARED)
+                yield from self.names((node.reason,), NameKind.REASON)
             case InPhase():
                 yield from self.names((node.phase, *node.order), NameKind.PHASE)
             case Node():
-                role = getattr(node, "role", None)
-                if isinstance(role, Name):
-                    yield from self.role(role, {})
-                condition = getattr(node, "condition", None)
-                if condition is not None:
-                    yield from self.within(condition, {})
-                else:
-                    for value in astuple(node):
-                        yield from self._case(value, scope)
+                yield from self._premise(node, scope)
             case tuple() if not isinstance(node, Span):
                 for each in node:
                     yield from self._case(each, scope)
+
+    def _premise(self, node: Node, scope: Scope) -> Iterator[Occurrence]:
+        role, condition = getattr(node, "role", None), getattr(node, "condition", None)
+        if isinstance(role, Name):
+            yield from self.role(role, {})
+        if condition is not None:
+            yield from self.within(condition, {})
+        else:
+            yield from self._case(astuple(node), scope)
 
     def _table(self, table: CaseTable, scope: Scope) -> Iterator[Occurrence]:
         columns: list[Reference | None] = []
@@ -268,7 +270,7 @@ class _OccurrenceFinder:
             yield from self._case(row.expectation, scope)
 
     def _compared(self, side: Any, other: Any, scope: Scope) -> Iterator[Occurrence]:
-        """One side of a comparison, which may be a member of what the other side is."""
+        """The names in one side of a comparison, which may be a member of the other side's type."""
         if isinstance(side, Reference) and side.name not in scope and side.name not in self.symbols.declared:
             yield from self._member(side, other, scope)
         else:
@@ -298,38 +300,23 @@ class _OccurrenceFinder:
                     yield NameTarget(NameKind.CHOICE, name, f"{target.owner}.{target.name}")
 
     def declaration(self, node: Node) -> Iterator[Occurrence]:
-        """What a declaration says."""
-        if isinstance(node, Import):
-            yield Occurrence(node.span, NameTarget(NameKind.IMPORT, node.path, node.span.file))
-            return
+        """The names in a declaration."""
         name = getattr(node, "name", None)
         if isinstance(name, Name) and not isinstance(node, TestDecl | ScenarioDecl):
             yield Occurrence(name.span, NameTarget(NameKind.DECLARED, name.text), True)
-        match node:
-            case EnumDecl():
-                yield from self._enum(node)
-            case SignalDecl():
-                yield from self._signal(node)
-            case ZoneDecl():
-                yield from self.within(node.shape, {})
-            case SkillDecl():
-                yield from self._skill(node)
-            case SizesDecl():
-                yield from self._sizes(node)
-            case TemplateDecl():
-                yield from self._template(node)
-            case PolicyDecl():
-                yield from self._policy(node)
-            case RoleDecl():
-                yield from (Occurrence(each.span, NameTarget(NameKind.ROLE, each.text), True) for each in node.names)
-            case MissionDecl():
-                yield from self._mission(node)
-            case NominalDecl() | TestDecl():
-                yield from self.case(node)
-            case ScenarioDecl():
-                yield from self.scenario(node)
-            case VehicleDecl():
-                yield from self.names(node.without, NameKind.DECLARED)
+        yield from _FINDERS[type(node)](self, node)
+
+    def _import(self, node: Import) -> Iterator[Occurrence]:
+        yield Occurrence(node.span, NameTarget(NameKind.IMPORT, node.path, node.span.file))
+
+    def _zone(self, zone: ZoneDecl) -> Iterator[Occurrence]:
+        yield from self.within(zone.shape, {})
+
+    def _vehicle(self, vehicle: VehicleDecl) -> Iterator[Occurrence]:
+        yield from self.names(vehicle.without, NameKind.DECLARED)
+
+    def _roles(self, roles: RoleDecl) -> Iterator[Occurrence]:
+        yield from (Occurrence(each.span, NameTarget(NameKind.ROLE, each.text), True) for each in roles.names)
 
     def _enum(self, enum: EnumDecl) -> Iterator[Occurrence]:
         if enum.dialect is not None:
@@ -339,8 +326,10 @@ class _OccurrenceFinder:
 
     def _signal(self, signal: SignalDecl) -> Iterator[Occurrence]:
         enum = None if signal.type.text in NAMED else self.symbols.enums.get(signal.type.text)
-        sort = NameKind.TYPE if enum is None else NameKind.DECLARED  # `signal position : position`: no name of a signal
-        yield Occurrence(signal.type.span, NameTarget(sort, signal.type.text))
+        kind = (
+            NameKind.TYPE if enum is None else NameKind.DECLARED
+        )  # in `signal position : position` the second is a type
+        yield Occurrence(signal.type.span, NameTarget(kind, signal.type.text))
         for source in signal.sources:
             yield Occurrence(source.message.span, NameTarget(NameKind.MESSAGE, source.message.text))
             for field in (*source.fields, *(each.field for each in source.where)):
@@ -391,7 +380,7 @@ class _OccurrenceFinder:
             yield from self._link(link, {})
 
     def _rule(self, rule: RuleDecl, own: Scope | None) -> Iterator[Occurrence]:
-        """A rule; `own` are the parameters of the template that it stands in."""
+        """The names in a rule; `own` are the parameters of its template."""
         yield from self.names(rule.skills, NameKind.DECLARED)
         for role in (*rule.roles, *(each for each in (rule.approver, rule.another) if each is not None)):
             yield from self.role(role, own or {})
@@ -420,13 +409,9 @@ class _OccurrenceFinder:
 
     def _mission(self, mission: MissionDecl) -> Iterator[Occurrence]:
         yield from self.names((mission.policy, mission.vehicle), NameKind.DECLARED)
-        for name, sort in (
-            (mission.source, NameKind.SOURCE),
-            (mission.proposer, NameKind.PROPOSER),
-            (mission.role, NameKind.ROLE),
-        ):
-            if name is not None:
-                yield Occurrence(name.span, NameTarget(sort, name.text))
+        yield from self.names((mission.source,), NameKind.SOURCE)
+        yield from self.names((mission.proposer,), NameKind.PROPOSER)
+        yield from self.names((mission.role,), NameKind.ROLE)
         scope = self._parameters(mission.parameters, mission.name.text)
         yield from self._declared(mission.parameters, mission.name.text)
         for phase in mission.phases:
@@ -449,7 +434,7 @@ class _OccurrenceFinder:
     def _declared(
         self, parameters: Sequence[ParameterDecl], owner: str, sizes: Scope | None = None
     ) -> Iterator[Occurrence]:
-        """Parameters; the `sizes` of their skill may be the ends of their ranges, and their defaults."""
+        """The names in parameters, whose ranges and defaults may use the `sizes` of the skill."""
         for parameter in parameters:
             name = parameter.name.text
             yield Occurrence(parameter.name.span, NameTarget(NameKind.PARAMETER, name, owner), True)
@@ -464,7 +449,7 @@ class _OccurrenceFinder:
                 yield from self.argument(parameter.default, parameter, owner, sizes or {})
 
     def _of_skills(self, names: Iterable[Name]) -> dict[str, tuple[NameTarget, ...]]:
-        """The parameters of the skills that a rule names; of all skills where it names none."""
+        """The parameters of the skills that a rule names, or of all skills if it names none."""
         written = [name.text for name in names] or list(self.symbols.skills)
         found: dict[str, tuple[NameTarget, ...]] = {}
         for name in written:
@@ -479,17 +464,38 @@ class _OccurrenceFinder:
         return {each.name.text: (NameTarget(NameKind.PARAMETER, each.name.text, owner),) for each in parameters}
 
 
+#: finds the names in a declaration, by its type
+_FINDERS: Final[Mapping[type, Callable[[_OccurrenceFinder, Any], Iterator[Occurrence]]]] = {
+    Import: _OccurrenceFinder._import, EnumDecl: _OccurrenceFinder._enum, SignalDecl: _OccurrenceFinder._signal,
+    ZoneDecl: _OccurrenceFinder._zone, VehicleDecl: _OccurrenceFinder._vehicle, SkillDecl: _OccurrenceFinder._skill,
+    SizesDecl: _OccurrenceFinder._sizes, TemplateDecl: _OccurrenceFinder._template, RoleDecl: _OccurrenceFinder._roles,
+    PolicyDecl: _OccurrenceFinder._policy, MissionDecl: _OccurrenceFinder._mission, TestDecl: _OccurrenceFinder.case,
+    NominalDecl: _OccurrenceFinder.case, ScenarioDecl: _OccurrenceFinder.scenario,
+}  # fmt: skip
+
+
 def occurrences(symbols: Symbols, unit: Unit) -> tuple[Occurrence, ...]:
-    """All places of a file, in the order of the text; a place that means several things is there for each."""
+    """Return all occurrences in a file, in source order; a place with several targets has one for each."""
     walk = _OccurrenceFinder(symbols)
     found = [each for declaration in declarations(unit) for each in walk.declaration(declaration)]
     return tuple(sorted(dict.fromkeys(found), key=lambda each: (each.span.start, each.span.end)))
 
 
+def parameters_owner(symbols: Symbols, name: str) -> SkillDecl | TemplateDecl | MissionDecl | None:
+    """The skill, template or mission of this name."""
+    return symbols.skills.get(name) or symbols.templates.get(name) or symbols.missions.get(name)
+
+
+def owned(declared: SkillDecl | TemplateDecl | MissionDecl | None) -> tuple[ParameterDecl, ...]:
+    """The parameters of a declaration, and the sizes of a skill."""
+    own = () if declared is None else declared.parameters
+    return (*own, *declared.sizes) if isinstance(declared, SkillDecl) else own
+
+
 def declarations(
     unit: Unit,
 ) -> tuple[Declaration | Import | NominalDecl | TestDecl | ScenarioDecl | RoleDecl | SizesDecl, ...]:
-    """All declarations of a file, in the order of the text."""
+    """All declarations of a file, in source order."""
     every: tuple[Any, ...] = (
         *unit.imports, *unit.enums, *unit.signals, *unit.zones, *unit.vehicles, *unit.skills, *unit.templates,
         *unit.policies, *unit.missions, *unit.nominals, *unit.tests, *unit.scenarios, *unit.roles,
@@ -499,7 +505,7 @@ def declarations(
 
 
 def at(found: Sequence[Occurrence], offset: int) -> tuple[Occurrence, ...]:
-    """The places that hold a character, or end there; of an entry and its zone the narrower."""
+    """The occurrences at an offset or ending there; of an entry and its zone the smaller one."""
     near = [each for each in found if each.span.start <= offset <= each.span.end]
     inside = [each for each in near if offset < each.span.end] or near
     if not inside:
@@ -509,7 +515,7 @@ def at(found: Sequence[Occurrence], offset: int) -> tuple[Occurrence, ...]:
 
 
 def spans(found: Iterable[Occurrence], targets: Iterable[NameTarget]) -> Mapping[Span, bool]:
-    """The places that mean one of `targets`, and whether they give the name."""
+    """The places that refer to one of `targets`, and whether they declare it."""
     wanted = set(targets)
     places: dict[Span, bool] = {}
     for each in found:

@@ -1,7 +1,7 @@
-"""Places as editors count them: lines from 0, and in a line UTF-16 or UTF-8 units or characters.
+"""Text positions of the protocol: lines from 0, and columns in UTF-16 or UTF-8 units or characters.
 
 The Language Server Protocol (3.17, "Text Documents") counts UTF-16 code units unless both sides agree on another
-`positionEncoding`, and ends lines by `\\n`, `\\r\\n` or `\\r`. Everything else counts characters of the whole text.
+`positionEncoding`, and ends lines with `\\n`, `\\r\\n` or `\\r`. All other code counts characters of the whole text.
 """
 
 import re
@@ -15,7 +15,7 @@ _ASTRAL = 0xFFFF
 
 
 class Encoding(Enum):
-    """What a column counts; the values are those of the protocol."""
+    """The unit of columns; the values are those of the protocol."""
 
     UTF_8 = "utf-8"
     UTF_16 = "utf-16"
@@ -30,7 +30,7 @@ class TextPosition(NamedTuple):
 
 
 class TextChange(NamedTuple):
-    """The text from `start` to `end` is replaced; without a start, all of it."""
+    """A replacement of the text from `start` to `end`; without a start, of the whole text."""
 
     start: TextPosition | None
     end: TextPosition | None
@@ -38,7 +38,7 @@ class TextChange(NamedTuple):
 
 
 class Edit(NamedTuple):
-    """The characters `[start, end)` of the old text became `length` characters."""
+    """A replacement of the characters `[start, end)` of the old text by `length` characters."""
 
     start: int
     end: int
@@ -46,7 +46,7 @@ class Edit(NamedTuple):
 
 
 class LineIndex:
-    """A text, its lines, and places in it."""
+    """A text with an index of its lines."""
 
     def __init__(self, text: str, encoding: Encoding, starts: list[int] | None = None) -> None:
         self.text = text
@@ -55,15 +55,15 @@ class LineIndex:
         self._plain = text.isascii() or encoding is Encoding.UTF_32
 
     def place(self, offset: int) -> TextPosition:
-        """The place of a character; past the end it is the end. In the middle of `\\r\\n` it is the end of the line."""
+        """The position of a character: past the end it is the end, between `\\r` and `\\n` the end of the line."""
         offset = max(0, min(offset, len(self.text)))
         line = bisect_right(self._starts, offset) - 1
         start = self._starts[line]
         return TextPosition(line, self._units(self.text[start : min(offset, self._line_end(line))]))
 
     def offset(self, place: TextPosition) -> int:
-        """The character at a place. Past the end of a line it is the end of it, past the last line that of the text;
-        in the middle of a character it is the start of that one.
+        """The character at a position. Past the end of a line it is the end of the line, past the last line the end of
+        the text; in the middle of a character it is the start of the character.
         """
         line, column = place
         if line < 0:
@@ -76,8 +76,8 @@ class LineIndex:
         return start + self._characters(self.text[start:end], column)
 
     def replaced(self, start: int, end: int, put: str) -> "LineIndex":
-        """The text with `put` in the place of `[start, end)`; only there it is looked at for lines again. Whether one
-        begins at a character, the two around tell.
+        """Return the text with `put` in place of `[start, end)`. Only this part, with a character on either side, is
+        searched for line ends again.
         """
         text = self.text[:start] + put + self.text[end:]
         last, by = start + len(put), len(put) - (end - start)
@@ -88,7 +88,7 @@ class LineIndex:
         return LineIndex(text, self.encoding, [*before, *within, *behind])
 
     def _line_end(self, line: int) -> int:
-        """Where a line ends, without what ends it."""
+        """The end of a line, without its line terminator."""
         if line + 1 == len(self._starts):
             return len(self.text)
         end = self._starts[line + 1] - 1
@@ -117,10 +117,7 @@ class LineIndex:
 
 
 def edited(lines: LineIndex, changes: Iterable[TextChange]) -> LineIndex:
-    """The text after changes that were made one after the other.
-
-    A change whose end is before its start replaces nothing, and inserts at the start.
-    """
+    """Apply changes, one after the other. A change whose end is before its start inserts at the start."""
     for change in changes:
         text = lines.text
         if change.start is None or change.end is None:
@@ -133,7 +130,7 @@ def edited(lines: LineIndex, changes: Iterable[TextChange]) -> LineIndex:
 
 
 def difference(old: str, new: str) -> Edit:
-    """The shortest piece of `old` whose replacement makes `new` of it."""
+    """Return the smallest single replacement that changes `old` to `new`."""
     if old == new:
         return Edit(len(old), len(old), 0)
     least = min(len(old), len(new))
@@ -146,7 +143,7 @@ def difference(old: str, new: str) -> Edit:
 
 
 def _longest(most: int, same: Callable[[int, int], bool]) -> int:
-    """How many characters are the same, at most `most`; halving, so that the work is done by comparisons."""
+    """The number of equal characters, at most `most`. Bisection lets fast slice comparisons do the work."""
     low, high = 0, most
     while low < high:
         middle = (low + high + 1) // 2

@@ -1,9 +1,8 @@
-"""Renames a declaration in every file that means it; refused where that would change what anything means.
+"""Renames a declaration in every file that refers to it. A renaming that changes any meaning is refused.
 
-A program under the new name must parse to the same declarations, each place must mean what it meant, nothing new may be
-found in it (proofs are not run, they depend on meanings alone), and its tests must come to the same decisions. Tests
-quote clauses as text: a quotation is compared with the clause that it quotes, and what changes in the clause changes in
-it.
+With the new name, a program must parse to the same declarations, each name must have the same target, there must be no
+new findings, and the tests must give the same decisions. Proofs are not repeated, because they do not depend on names.
+Tests quote clauses as text: a renaming in a clause is applied to its quotations too.
 """
 
 import re
@@ -27,24 +26,25 @@ from rtshcua.ground.testing.case import PolicyCase
 from rtshcua.ground.testing.case_result import run_case
 from rtshcua.ground.testing.clause_quotes import REST
 from rtshcua.mavlink.dialect import Dialect
-from rtshcua.model.flat.policy import Rule
+from rtshcua.model.flat.code import Clause
+from rtshcua.model.flat.policy import Airspace, Rule
 from rtshcua.model.ir.scenarios import DecidesDecl
 from rtshcua.model.ir.signals import SignalDecl
 from rtshcua.model.ir.tests import Expectation, Quoted, TestDecl
 
 _OWNED = (NameKind.PARAMETER, NameKind.MEMBER, NameKind.CHOICE)
-"""The names that belong to a declaration, whose name they are told apart by."""
+"""The kinds of names whose target includes the name of their declaration."""
 
 
 class ProgramVerdict(NamedTuple):
-    """What is found in a program without proofs, and the cases of its tests; none where it has errors."""
+    """The findings on a program without proofs, and the cases of its tests, if there are no errors."""
 
     found: tuple[Diagnostic, ...]
     cases: tuple[PolicyCase, ...]
 
 
 class NameChange(NamedTuple):
-    """Which name becomes which, and where, by file."""
+    """A target, its new name, and the changed places by file."""
 
     target: NameTarget
     name: str
@@ -52,7 +52,7 @@ class NameChange(NamedTuple):
 
 
 def verdict_of(view: ProgramView, dialect: Dialect) -> ProgramVerdict:
-    """Checks the declarations of a program, lowers it, and makes the cases of its tests."""
+    """Check the declarations of a program, lower it, and make the cases of its tests."""
     run = Compilation(view.program, dialect, 0)
     run.check()
     run.unproved()
@@ -63,10 +63,10 @@ def verdict_of(view: ProgramView, dialect: Dialect) -> ProgramVerdict:
 def consequence(
     old: ProgramView, before: ProgramVerdict, new: ProgramView, dialect: Dialect, made: NameChange, *, declared: bool
 ) -> str | None:
-    """What else than the name changes, for a person; None where nothing does. `declared`: whether it is declared in
-    the program at all, or there alone where other files are imported too.
+    """Return a description of a change other than the name, or None. `declared` says whether the program declares the
+    target.
     """
-    other = f"`{made.name}` would mean something else in the program of `{old.name}`"
+    other = f"`{made.name}` would have another meaning in the program of `{old.name}`"
     if new.units.keys() != old.units.keys() or has_errors(new.program.diagnostics):
         return other
     edited = {file: tuple(sorted(spans)) for file, spans in made.places.items()}
@@ -75,27 +75,27 @@ def consequence(
     after = verdict_of(new, dialect)
     more = _new_finding(before.found, after.found, made)
     if more is not None:
-        return f"in the program of `{old.name}` the name would not do: {more.message} ({more.code.id})"
+        return f"the name would cause a finding in the program of `{old.name}`: {more.message} ({more.code.id})"
     for file in old.units if declared else ():
         now = [(each.target, each.declares) for each in new.occurrences(file)]
         if now != [_expected(each, made) for each in old.occurrences(file)]:
             return other
     if _decisions(before.cases) != _decisions(after.cases):
-        return f"the tests of `{old.name}` would come to other decisions"
+        return f"the tests of `{old.name}` would give other decisions"
     return None
 
 
 def _expected(each: Occurrence, made: NameChange) -> tuple[NameTarget, bool]:
-    """What a place of the old text must mean in the new one."""
+    """The expected target of an old occurrence in the new text, and whether it declares it."""
     meant, target = each.target, made.target
     if meant == target:
         return meant._replace(name=made.name), each.declares
     first, dot, rest = meant.owner.partition(".")
-    if target.sort is NameKind.DECLARED and meant.sort in _OWNED and first == target.name:
+    if target.kind is NameKind.DECLARED and meant.kind in _OWNED and first == target.name:
         return meant._replace(owner=made.name + dot + rest), each.declares
     if (
-        target.sort is NameKind.PARAMETER
-        and meant.sort is NameKind.CHOICE
+        target.kind is NameKind.PARAMETER
+        and meant.kind is NameKind.CHOICE
         and meant.owner == f"{target.owner}.{target.name}"
     ):
         return meant._replace(owner=f"{target.owner}.{made.name}"), each.declares
@@ -103,7 +103,7 @@ def _expected(each: Occurrence, made: NameChange) -> tuple[NameTarget, bool]:
 
 
 def _new_finding(before: Iterable[Diagnostic], after: Iterable[Diagnostic], made: NameChange) -> Diagnostic | None:
-    """The first finding that was not there before."""
+    """The first new finding, or None."""
     known = Counter((each.code, None if each.span is None else _moved_span(each.span, made)) for each in before)
     for each in after:
         key = (each.code, each.span)
@@ -114,7 +114,7 @@ def _new_finding(before: Iterable[Diagnostic], after: Iterable[Diagnostic], made
 
 
 def _moved_span(span: Span, made: NameChange) -> Span:
-    """Where a place of the old text is in the new one."""
+    """The place in the new text of a span of the old text."""
     by_start = by_end = 0
     for place in made.places.get(span.file, ()):
         longer = len(made.name) - (place.end - place.start)
@@ -124,17 +124,17 @@ def _moved_span(span: Span, made: NameChange) -> Span:
 
 
 def _decisions(cases: Iterable[PolicyCase]) -> list[tuple[object, ...]]:
-    """What the cases come to, in order."""
+    """The decisions of the cases, in order."""
     ran = [run_case(case) for case in cases]
     return [(each.case.row, each.met, each.trace.decision.outcome, each.trace.decision.reason) for each in ran]
 
 
-#: where the characters of a text stand, blanks left out; None: the text has one there that no source has
+#: the characters of a text without white space, with their places; None for a character that is not in the source
 Characters = list[tuple[str, Span | None]]
 
 
 def quotations_of(view: ProgramView, cases: Iterable[PolicyCase], places: Collection[Span]) -> tuple[Span, ...]:
-    """The parts of a program's quotations that stand for `places`; `cases` are those of its tests."""
+    """The parts of a program's quotations that quote `places`; `cases` are those of its tests."""
     by_file: dict[str, list[Span]] = {}
     for place in places:
         by_file.setdefault(place.file, []).append(place)
@@ -144,7 +144,7 @@ def quotations_of(view: ProgramView, cases: Iterable[PolicyCase], places: Collec
 
 
 def unresolved_quotation(view: ProgramView, cases: Iterable[PolicyCase], name: str) -> Span | None:
-    """A quotation with `name` in it whose test has an error, so that nobody knows what it quotes; None if none."""
+    """A quotation with `name` in a test with errors, so that its clause is unknown; None if there is none."""
     word = _word(name)
     known = {case.expected.span for case in cases}
     for test in view.symbols.tests:
@@ -156,7 +156,7 @@ def unresolved_quotation(view: ProgramView, cases: Iterable[PolicyCase], name: s
 
 
 def scenario_quotation(view: ProgramView, name: str) -> Span | None:
-    """A quotation with `name` in it in a scenario, of which no case tells what it quotes; None if none."""
+    """A quotation with `name` in a scenario, whose clause is unknown; None if there is none."""
     for scenario in view.symbols.scenarios:
         for demand in scenario.demands:
             clause = demand.decision.clause if isinstance(demand, DecidesDecl) else None
@@ -179,32 +179,32 @@ def _quotations_in(
     view: ProgramView, case: PolicyCase, clause: Quoted, places: dict[str, list[Span]]
 ) -> Iterator[Span]:
     file, start, end = clause.span
-    if view.slice(Span(file, start + 1, end - 1)) != clause.text:
-        return  # characters are escaped in it
-    written = clause.text.rstrip()
-    length = len(written.removesuffix(REST))
-    own = [start + 1 + at for at, letter in enumerate(written[:length]) if not letter.isspace()]
-    if not case.quoted or case.quoted[0] is None:
-        return
-    meant = case.quoted[0]  # all have one text
-    spans = [case.policy.span(meant)]
-    declared = case.policy.lowered.written.get(meant) if isinstance(meant, Rule) else None
-    if declared is not None:
-        spans = [*(node.span for node in declared.origin), declared.span]
+    quoted = case.quoted[0] if case.quoted else None  # all have one text
+    if quoted is None or view.slice(Span(file, start + 1, end - 1)) != clause.text:
+        return  # no clause, or escaped characters
+    written = clause.text.rstrip().removesuffix(REST)
+    own = [start + 1 + at for at, letter in enumerate(written) if not letter.isspace()]
+    spans = _clause_spans(case, quoted)
     characters = _characters(view, spans)
-    text = view.text(file)
-    if len(own) > len(characters) or any(text[at] != letter for at, (letter, _) in zip(own, characters, strict=False)):
-        return  # the clause is put together in another way
-    numbers = {at: number for number, (_, at) in enumerate(characters) if at is not None}
-    for each in (place for span in spans for place in places.get(span.file, ())):
-        first = numbers.get(Span(each.file, each.start, each.start + 1))
-        last = numbers.get(Span(each.file, each.end - 1, each.end))
-        if first is not None and last is not None and last < len(own):
-            yield Span(file, own[first], own[last] + 1)
+    if not "".join(letter for letter, _ in characters).startswith("".join(written.split())):
+        return  # the text of the clause is not that of its spans
+    offsets = {place: at for at, (_, place) in zip(own, characters, strict=False) if place is not None}
+    for span in spans:
+        for each in places.get(span.file, ()):
+            first = offsets.get(Span(each.file, each.start, each.start + 1))
+            last = offsets.get(Span(each.file, each.end - 1, each.end))
+            if first is not None and last is not None:
+                yield Span(file, first, last + 1)
+
+
+def _clause_spans(case: PolicyCase, clause: Clause | Rule | Airspace) -> list[Span]:
+    """The spans whose texts form the text of a clause."""
+    declared = case.policy.lowered.written.get(clause) if isinstance(clause, Rule) else None
+    return [case.policy.span(clause)] if declared is None else [*(node.span for node in declared.origin), declared.span]
 
 
 def _characters(view: ProgramView, spans: Iterable[Span]) -> Characters:
-    """What stands under spans, as a clause's text has it: one after the other, with a colon between."""
+    """The characters under spans, with a colon between spans, as in a clause's text."""
     found: Characters = []
     for span in spans:
         found += [(":", None)] if found else []
@@ -216,23 +216,23 @@ def _characters(view: ProgramView, spans: Iterable[Span]) -> Characters:
     return found
 
 
-#: gives programs one after the other; between them a question may be taken back
+#: yields programs one after the other; between them the request may be cancelled
 Steps = Callable[[Sequence[ProgramView]], Iterable[ProgramView]]
 RENAMED = (NameKind.DECLARED, NameKind.PARAMETER, NameKind.MEMBER, NameKind.CHOICE)
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*", re.ASCII)
 _TAKEN = ("phase", "local")
-"""Names that would be read as words where values stand."""
+"""Names that are keywords where values are expected."""
 _READ = (
     dict.fromkeys(WELL_KNOWN, "every decision needs it")
-    | dict.fromkeys(VELOCITY, "what watches a vehicle that brakes needs it")
-    | dict.fromkeys((*MEASURED, *PER_CELL), "what it tells is worked out by its name")
+    | dict.fromkeys(VELOCITY, "the supervision of a vehicle that brakes needs it")
+    | dict.fromkeys((*MEASURED, *PER_CELL), "the name determines how its value is computed")
 )
-"""Signals that are found by their names, and by nothing that a source says."""
+"""Signals with a fixed name, and the reason."""
 
 
 @dataclass(frozen=True, slots=True)
 class Renaming:
-    """The places that change, by file, and what is written there."""
+    """The places that change, by file, and the new name."""
 
     places: Mapping[str, tuple[Span, ...]]
     name: str
@@ -245,7 +245,7 @@ class Renaming:
 
 
 def renamable(workspace: Workspace, view: ProgramView, file: str, offset: int) -> Span | Refusal:
-    """The name at a place, if it may be changed."""
+    """Return the span of the name at an offset, if it may be renamed."""
     found = _target(workspace, view, file, offset)
     return found if isinstance(found, Refusal) else at(view.occurrences(file), offset)[0].span
 
@@ -260,10 +260,9 @@ def rename(
     dialect: Dialect,
     steps: Steps = iter,
 ) -> Renaming | Refusal:
-    """Renames what stands at a place in the programs of `files`, and of all that are open.
+    """Rename the name at an offset in the programs of `files` and of all open texts.
 
-    Every program that has a file which changes is checked under the new name before this answers, `steps` giving one
-    after the other.
+    Every program with a changed file is checked with the new name, in the order of `steps`.
     """
     target = _target(workspace, view, file, offset)
     if isinstance(target, Refusal):
@@ -285,16 +284,21 @@ def rename(
         return Refusal("rename", why)
     before = {each.name: verdict_of(each, dialect) for each in steps(affected)}
     for each in affected:
-        span = unresolved_quotation(each, before[each.name].cases, target.name)
-        if span is not None:
-            why = f"a test of `{span.file}` has errors, so nobody knows what it quotes: correct these first"
-            return Refusal("rename", why)
-        span = scenario_quotation(each, target.name)
-        if span is not None:
-            why = f"a scenario of `{span.file}` quotes a clause with `{target.name}` in it: quote less of it first"
+        why = _unclear_quotation(each, before[each.name].cases, target.name)
+        if why is not None:
             return Refusal("rename", why)
         places = (*places, *quotations_of(each, before[each.name].cases, places))
     return _checked(workspace, affected, before, NameChange(target, name, _by_file(places)), dialect, steps)
+
+
+def _unclear_quotation(view: ProgramView, cases: Iterable[PolicyCase], name: str) -> str | None:
+    span = unresolved_quotation(view, cases, name)
+    if span is not None:
+        return f"a test of `{span.file}` with errors quotes a clause with `{name}`: correct the errors first"
+    span = scenario_quotation(view, name)
+    if span is not None:
+        return f"a scenario of `{span.file}` quotes a clause with `{name}`: shorten the quotation first"
+    return None
 
 
 def _checked(
@@ -305,10 +309,10 @@ def _checked(
     dialect: Dialect,
     steps: Steps,
 ) -> Renaming | Refusal:
-    """The renaming, if it changes nothing but the name."""
+    """Return the renaming if it changes nothing but the name."""
     shipped = next((each for each in made.places if workspace.is_shipped(each)), None)
     if shipped is not None:
-        return Refusal("rename", f"`{made.target.name}` is used in `{shipped}`, which ships with the library")
+        return Refusal("rename", f"`{made.target.name}` is used in `{shipped}`, which belongs to the library")
     renaming = Renaming(made.places, made.name)
     texts = {file: renaming.applied(file, view.text(file)) for view in affected for file in made.places
              if file in view.units}  # fmt: skip
@@ -329,7 +333,7 @@ def _by_file(places: Iterable[Span]) -> dict[str, tuple[Span, ...]]:
 
 
 def _tested(workspace: Workspace, concerned: Iterable[ProgramView], target: NameTarget) -> Iterator[ProgramView]:
-    """The programs of files whose tests may quote the name: tests are run where their file itself is asked for."""
+    """The programs of files whose tests may quote the name. Tests run only in the program of their own file."""
     files = {file for each in concerned for file, unit in each.units.items()
              if (unit.tests or unit.scenarios) and target.name in each.text(file)}  # fmt: skip
     return (workspace.view(file) for file in sorted(files))
@@ -337,31 +341,36 @@ def _tested(workspace: Workspace, concerned: Iterable[ProgramView], target: Name
 
 def _target(workspace: Workspace, view: ProgramView, file: str, offset: int) -> NameTarget | Refusal:
     if not at(view.occurrences(file), offset):
-        return Refusal("rename", "there is no name here, or what it stands in has a syntax error")
+        return Refusal("rename", "no name here, or its declaration has a syntax error")
     found = targets(view, file, offset)
     if len(found) > 1:
         owners = " and ".join(f"`{each.owner}`" for each in found)
-        return Refusal("rename", f"this means a parameter of {owners} at once: rename each where it is declared")
-    target = found[0]
-    if target.sort not in RENAMED:
-        return Refusal("rename", f"a {target.sort.value} is declared nowhere, so it has no other name")
+        return Refusal("rename", f"this is a parameter of {owners}: rename each at its declaration")
+    why = _fixed(workspace, view, found[0])
+    return found[0] if why is None else Refusal("rename", why)
+
+
+def _fixed(workspace: Workspace, view: ProgramView, target: NameTarget) -> str | None:
+    """The reason why a target may not be renamed, or None."""
+    if target.kind not in RENAMED:
+        return f"a {target.kind.value} is not declared in a source, so it cannot be renamed"
     home = declared_at(view, target)
     if not home:
-        return Refusal("rename", f"nothing declares `{target.name}`")
+        return f"`{target.name}` is not declared"
     if len(home) > 1 or any(target.name == each.name.text for _, each in view.symbols.duplicates):
-        return Refusal("rename", f"`{target.name}` is declared twice")
-    if target.sort is NameKind.DECLARED and target.name in _READ and target.name in view.symbols.signals:
-        return Refusal("rename", f"the signal `{target.name}` is read by this very name: {_READ[target.name]}")
+        return f"`{target.name}` is declared twice"
+    if target.kind is NameKind.DECLARED and target.name in _READ and target.name in view.symbols.signals:
+        return f"the name of the signal `{target.name}` is fixed: {_READ[target.name]}"
     if workspace.is_shipped(home[0].file):
-        return Refusal("rename", f"`{target.name}` belongs to the library")
-    enum = view.symbols.enums.get(target.owner) if target.sort is NameKind.MEMBER else None
+        return f"`{target.name}` belongs to the library"
+    enum = view.symbols.enums.get(target.owner) if target.kind is NameKind.MEMBER else None
     if enum is not None and enum.dialect is not None and target.name in _sentinels(view, target):
-        return Refusal("rename", f"`{target.name}` is a value that the dialect names")
-    return target
+        return f"`{target.name}` is a value of the dialect"
+    return None
 
 
 def _sentinels(view: ProgramView, target: NameTarget) -> set[str]:
-    """The values that signals are unknown at, of an enumeration: these may be those of the dialect."""
+    """The values of an enumeration at which signals are unknown; they may be those of the dialect."""
     of_type = [each for each in view.symbols.signals.values() if each.type.text == target.owner]
     enum = view.symbols.enums[target.owner]
     own = {member.name.text for member in enum.members}
@@ -369,12 +378,12 @@ def _sentinels(view: ProgramView, target: NameTarget) -> set[str]:
 
 
 def _unfit(view: ProgramView, target: NameTarget, name: str) -> str | None:
-    declared = view.symbols.declared.get(target.name) if target.sort is NameKind.DECLARED else None
+    declared = view.symbols.declared.get(target.name) if target.kind is NameKind.DECLARED else None
     dotted = isinstance(declared, SignalDecl)
     if not all(map(_PLAIN.fullmatch, name.split(".") if dotted else [name])):
-        return f"`{name}` is no name: names are of letters, digits and `_`" + (", those of signals with dots" * dotted)
+        return f"`{name}` is not a valid name: use letters, digits and `_`" + (", and dots in a signal" * dotted)
     if dotted and name in _READ:
-        return f"a signal `{name}` is read by this very name: {_READ[name]}"
+        return f"the name of the signal `{name}` is fixed: {_READ[name]}"
     if table().words.get(name) is False or name in _TAKEN:
         return f"`{name}` is a reserved word"
     return None
@@ -399,17 +408,17 @@ def _clash(views: Iterable[ProgramView], target: NameTarget, name: str) -> str |
         for file in (file for file in view.units if name in view.text(file)):
             taken = next((each for each in view.occurrences(file) if _is_taken(each, target, name)), None)
             if taken is not None:
-                return f"`{name}` is already a {taken.target.sort.value} of `{taken.target.owner}`"
+                return f"`{name}` is already a {taken.target.kind.value} of `{taken.target.owner}`"
     return None
 
 
 def _is_taken(each: Occurrence, target: NameTarget, name: str) -> bool:
-    """Whether a name that something else gives stands in the way of `target`."""
+    """Whether an occurrence declares `name` such that `target` cannot have it."""
     if not each.declares or each.target.name != name:
         return False
-    if target.sort is NameKind.DECLARED:
-        return each.target.sort in RENAMED
+    if target.kind is NameKind.DECLARED:
+        return each.target.kind in RENAMED
     return each.target.owner == target.owner or (
-        {each.target.sort, target.sort} == {NameKind.MEMBER, NameKind.PARAMETER}
-        or each.target.sort is NameKind.DECLARED
+        {each.target.kind, target.kind} == {NameKind.MEMBER, NameKind.PARAMETER}
+        or each.target.kind is NameKind.DECLARED
     )

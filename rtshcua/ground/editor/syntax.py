@@ -1,4 +1,4 @@
-"""The tokens and nodes at a place of a text, also where the text is not complete."""
+"""The tokens and nodes at a place of a text, even if the text is incomplete."""
 
 import re
 from collections.abc import Iterator
@@ -29,7 +29,7 @@ class Token(NamedTuple):
 
 
 def tokens(text: str, start: int = 0, end: int | None = None) -> Iterator[Token]:
-    """All tokens that begin in a range, comments too; a rougher reading than the parser's, which none can fail."""
+    """Yield all tokens that begin in a range, with comments. Unlike the parser's tokenizer, this one cannot fail."""
     for found in _TOKEN.finditer(text, start):
         if end is not None and found.start() >= end:
             return
@@ -37,7 +37,7 @@ def tokens(text: str, start: int = 0, end: int | None = None) -> Iterator[Token]
 
 
 def token_at(text: str, offset: int) -> Token | None:
-    """The token that a place is in, or directly behind."""
+    """The token at an offset, or directly before it."""
     line = text.rfind("\n", 0, offset) + 1
     found: Token | None = None
     for token in tokens(text, line, offset + 1):
@@ -47,7 +47,7 @@ def token_at(text: str, offset: int) -> Token | None:
 
 
 def inside_comment_or_text(text: str, offset: int, since: int = 0) -> bool:
-    """Whether a place is within a comment or a text in quotes; `since` is a place that is in neither."""
+    """Whether an offset is in a comment or a string; `since` is an offset that is in neither."""
     for token in tokens(text, since, offset):
         if token.kind in ("comment", "string") and token.start < offset < token.end:
             return True
@@ -57,7 +57,7 @@ def inside_comment_or_text(text: str, offset: int, since: int = 0) -> bool:
 
 
 def path_to(unit: Unit, offset: int) -> tuple[Node, ...]:
-    """The nodes that hold a place, from the declaration inwards."""
+    """The nodes that contain an offset, from the declaration inwards."""
     for declaration in declarations(unit):
         if declaration.span.start <= offset <= declaration.span.end:
             return tuple(_path(declaration, offset))
@@ -90,14 +90,14 @@ def _inner(values: tuple[Any, ...]) -> Iterator[Node]:
 
 
 def note_before(text: str, start: int) -> str:
-    """The comment that stands directly above a declaration, without its marks."""
+    """The line comments directly above a declaration, without `//`."""
     lines = text[:start].split("\n")
     if lines[-1].strip():
         return ""
-    said: list[str] = []
+    comment: list[str] = []
     for line in reversed(lines[:-1]):
         bare = line.strip()
         if not bare.startswith("//"):
             break
-        said.append(bare[2:].strip())
-    return "\n".join(reversed(said))
+        comment.append(bare[2:].strip())
+    return "\n".join(reversed(comment))

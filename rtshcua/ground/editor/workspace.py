@@ -1,4 +1,4 @@
-"""The workspace of an editor: the open texts over the files on disk, and the programs that they make."""
+"""The workspace of an editor: the open texts, the files on disk, and the programs that they form."""
 
 import posixpath
 from collections.abc import Iterable, Iterator, Mapping
@@ -16,16 +16,16 @@ from rtshcua.ground.pipeline.closure import Imports
 from rtshcua.model.ir.program import Unit
 
 REMEMBERED = 1_000
-"""Files on disk whose parse is kept."""
+"""The most files on disk whose parse is kept."""
 LOST, KEPT = 8, 2
-"""An edit that takes more declarations than that from a text, as one that opens a comment, is likely to be followed by
-one that brings them back: so many texts from before such edits are kept.
+"""An edit that removes more than `LOST` declarations, such as opening a comment, is often undone soon, so the last
+`KEPT` texts before such edits are kept.
 """
 
 
 @dataclass(slots=True)
 class ProgramView:
-    """One program as it is just now: a file and all that it imports."""
+    """The present state of a program: a file and all its imports."""
 
     name: str
     program: Program
@@ -42,7 +42,7 @@ class ProgramView:
         return self._units
 
     def text(self, file: str) -> str:
-        """The text of a file of the program; empty where there is none."""
+        """The text of a file of the program; empty if there is none."""
         source = self.program.sources.get(file)
         return "" if source is None else source.text
 
@@ -51,7 +51,7 @@ class ProgramView:
         return self.text(span.file)[span.start : span.end]
 
     def occurrences(self, file: str) -> tuple[Occurrence, ...]:
-        """Every place of a file that means something by name."""
+        """All names in a file with their targets."""
         if file not in self._found:
             unit = self.units.get(file)
             self._found[file] = () if unit is None else occurrences(self.symbols, unit)
@@ -59,8 +59,8 @@ class ProgramView:
 
 
 class Workspace:
-    """Open texts by the names of their files, as `shown` gives them. Nothing here reads a file but `read`, which may
-    raise OSError; what it read is kept until `forget`.
+    """Open texts by the `shown` names of their files. Files are only read by `read`, which may raise OSError; their
+    content is kept until `forget`.
     """
 
     def __init__(
@@ -78,11 +78,11 @@ class Workspace:
 
     @property
     def open(self) -> Mapping[str, ParsedText]:
-        """What is open."""
+        """The open texts by file name."""
         return self._open
 
     def put(self, name: str, text: str) -> ParsedText:
-        """Opens a text, or changes it."""
+        """Open a text, or replace it."""
         old = self._open.get(name)
         earlier = self._earlier.get(name, ())
         self._open[name] = now = parse_text(Source(name, text)) if old is None else parse_edited(old, text, earlier)
@@ -92,13 +92,13 @@ class Workspace:
         return now
 
     def close(self, name: str) -> None:
-        """From now on the file on disk counts."""
+        """Close a text; the file on disk is used from then on."""
         self._open.pop(name, None)
         self._earlier.pop(name, None)
         self.forget()
 
     def forget(self) -> None:
-        """Files on disk may have changed."""
+        """Forget the content of files on disk, which may have changed."""
         self._bytes.clear()
         self._views.clear()
 
@@ -112,7 +112,7 @@ class Workspace:
         return found
 
     def with_texts(self, texts: Mapping[str, str]) -> "Workspace":
-        """Another workspace, with these texts open besides; what is on disk was read already, and is not read again."""
+        """Return a workspace in which these texts are open too. It shares the content of files that were read."""
         other = Workspace(self._read, self._library, self._listing, self._packs)
         other._open, other._files, other._bytes = dict(self._open), dict(self._files), dict(self._bytes)
         for name, text in texts.items():
@@ -120,7 +120,7 @@ class Workspace:
         return other
 
     def text(self, name: str) -> str | None:
-        """The text of a file as the programs see it; None where it cannot be had."""
+        """The open text of a file, or else its text on disk; None if it cannot be read."""
         if name in self._open:
             return self._open[name].source.text
         try:
@@ -129,7 +129,7 @@ class Workspace:
             return None
 
     def views(self, names: Iterable[str]) -> Iterator[ProgramView]:
-        """The programs of several files, and of all that are open."""
+        """Yield the programs of all open texts and of several files."""
         seen: set[str] = set()
         for name in chain(tuple(self._open), names):
             if name not in seen:
@@ -137,18 +137,18 @@ class Workspace:
                 yield self.view(name)
 
     def cut(self, name: str) -> ParsedText | None:
-        """A text in pieces, open or not; None where it cannot be had."""
+        """The parsed text of a file, open or on disk; None if it cannot be read."""
         if name in self._open:
             return self._open[name]
         text = self.text(name)
         return None if text is None else self._cut(Source(name, text))
 
     def learn(self, other: "Workspace") -> None:
-        """Keeps what another workspace has parsed of files on disk; each is held against its text before it counts."""
+        """Take over the parsed files of another workspace. Each is compared with its text before use."""
         self._files.update(other._files)
 
     def read(self, path: str) -> bytes:
-        """What is open counts, and else what is on the disk. Raises what `read` raises."""
+        """Return the bytes of an open text, or else of the file on disk. Raises what `read` raises."""
         name = shown(path)
         if name in self._open:
             return self._open[name].source.text.encode("utf-8", "surrogatepass")
@@ -157,16 +157,16 @@ class Workspace:
         return self._bytes[path]
 
     def is_shipped(self, name: str) -> bool:
-        """Whether a file belongs to the library, which is not the author's to change."""
+        """Whether a file belongs to the shipped library, which the author cannot change."""
         shelves = () if self._library is None else (posixpath.join(self._library, shelf) for shelf in SHELVES)
         return any(shown(name).startswith(f"{shown(shelf)}/") for shelf in shelves)
 
     def folder(self, pack: str) -> str | None:
-        """The folder that a pack's name stands for."""
+        """The folder of a pack."""
         return self._library if pack == "lib" else self._packs(pack)
 
     def names_in(self, folder: str) -> tuple[str, ...]:
-        """What is in a folder; nothing where it cannot be read."""
+        """The sorted names in a folder; empty if it cannot be read."""
         try:
             return tuple(sorted(self._listing(folder))) if self._listing is not None else ()
         except OSError:

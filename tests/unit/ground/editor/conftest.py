@@ -1,4 +1,4 @@
-"""Desks over files that are texts, beside the library that ships."""
+"""Workspaces with files from memory and the shipped library."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -69,7 +69,7 @@ LAKE = {"/w/site.rts": SITE, "/w/look.rts": SKILL, "/w/lake.rts": POLICY, "/w/di
 
 
 def lake(files: dict[str, str]) -> Workspace:
-    """A desk over these files and the library."""
+    """A workspace with these files and the library."""
 
     def read(path: str) -> bytes:
         return files[path].encode() if path.startswith("/w/") and path in files else Path(path).read_bytes()
@@ -80,7 +80,7 @@ def lake(files: dict[str, str]) -> Workspace:
         return [each.name for each in Path(path).iterdir()]
 
     other = Workspace(read, str(root()), listing)
-    other._files = _PARSED  # of the library, once for all tests; what a file says is held against its text
+    other._files = _PARSED  # parsed files of the library, shared by all tests
     return other
 
 
@@ -89,17 +89,17 @@ _PARSED: dict[str, ParsedText] = {}
 
 @pytest.fixture
 def make() -> Callable[[dict[str, str]], Workspace]:
-    """Makes desks."""
+    """A function that makes workspaces."""
     return lake
 
 
 @pytest.fixture
 def desk() -> Workspace:
-    """The lake: four files, of which none is open."""
+    """The sample workspace: four files, none of them open."""
     return lake(LAKE)
 
 
 @pytest.fixture(scope="module")
 def make_lake() -> Workspace:
-    """The same for many examples, which change copies of it."""
+    """A function that makes copies of the sample workspace, for property tests."""
     return lake(LAKE)

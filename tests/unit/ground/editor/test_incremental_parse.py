@@ -1,4 +1,4 @@
-"""Parsing again after an edit gives what parsing the whole text gives: declarations, findings, spans, broken names."""
+"""Incremental parsing gives the same declarations, findings, spans and broken names as parsing the whole text."""
 
 from pathlib import Path
 
@@ -42,9 +42,9 @@ def agree(old: str, *texts: str) -> None:
     st.lists(st.tuples(st.integers(0, 40_000), st.integers(0, 120), st.sampled_from(PARTS)), min_size=1, max_size=4),
     st.integers(0, 24_000),
 )
-def test_edits_one_after_the_other(text: str, edits: list[tuple[int, int, str]], cut_at: int) -> None:
+def test_sequence_of_edits_gives_the_same_parse(text: str, edits: list[tuple[int, int, str]], cut_at: int) -> None:
     start = cut_at % len(text)
-    text = text[start : start + 1_500]  # from anywhere, also the middle of a declaration
+    text = text[start : start + 1_500]  # from any place, also within a declaration
     states = [text]
     for at, removed, put in edits:
         last = states[-1]
@@ -54,12 +54,12 @@ def test_edits_one_after_the_other(text: str, edits: list[tuple[int, int, str]],
 
 
 @given(st.lists(st.sampled_from(PARTS), max_size=12), st.lists(st.sampled_from(PARTS), max_size=12))
-def test_texts_made_of_parts(one: list[str], other: list[str]) -> None:
+def test_text_made_of_parts_gives_the_same_parse(one: list[str], other: list[str]) -> None:
     agree("".join(one), "".join(other), "".join(one) + "".join(other))
 
 
 @pytest.mark.parametrize("char", ["/", "}"])
-def test_one_character_at_each_place(char: str) -> None:
+def test_inserted_character_at_each_place_gives_the_same_parse(char: str) -> None:
     text = (
         'import "a"\nzone a = circle(47 N, 8 E, 5 m)//c\nzone b = a\nsignal c : d = E.f stale after 2\nenum g {h = 1}\n'
     )
@@ -67,8 +67,8 @@ def test_one_character_at_each_place(char: str) -> None:
         agree(text, text[:at] + char + text[at:], text[:at] + text[at + 1 :])
 
 
-def test_few_pieces_are_parsed_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The point of it: an edit in one declaration of many has the parser read that one, and see the next."""
+def test_edit_parses_few_pieces_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After an edit in one of many declarations, the parser reads this one and the start of the next."""
     text = "".join(f"zone z{n} = circle(47.39{n:03} N, 8.54 E, 5 m) // {n}\n" for n in range(200))
     old = parse_text(Source("a.rts", text))
     read: list[int] = []
@@ -83,7 +83,7 @@ def test_few_pieces_are_parsed_again(monkeypatch: pytest.MonkeyPatch) -> None:
         assert len(read) <= 2
 
 
-def test_a_comment_that_is_closed_again_brings_back_what_was_read(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_closing_a_comment_reuses_the_earlier_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     text = "".join(f"zone z{n} = circle(47.39{n:03} N, 8.54 E, 5 m) // {n}\n" for n in range(200))
     before = parse_text(Source("a.rts", text))
     opened = parse_edited(before, text.replace("zone z50", "/* zone z50"))

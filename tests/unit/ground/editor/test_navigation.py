@@ -1,4 +1,4 @@
-"""From names to what they mean: definitions, references across programs, hover, and what is where."""
+"""Navigation: definitions, references across programs, and hover texts."""
 
 from pathlib import Path
 
@@ -24,7 +24,7 @@ def place(desk: Workspace, file: str, around: str) -> int:
 
 
 def shown(desk: Workspace, spans: list[Span] | tuple[Span, ...]) -> list[str]:
-    """Spans as the file's name and the line that they are on."""
+    """Spans as the file's name and the text of their line."""
     found = []
     for span in spans:
         text = desk.text(span.file) or ""
@@ -56,21 +56,21 @@ def shown(desk: Workspace, spans: list[Span] | tuple[Span, ...]) -> list[str]:
         (SITE, "sea.mood : mo|od", ["site.rts: enum mood { calm = 0, wi"]),
     ],
 )  # fmt: skip
-def test_definitions(desk: Workspace, file: str, around: str, where: list[str]) -> None:
+def test_definition_of_a_name(desk: Workspace, file: str, around: str, where: list[str]) -> None:
     view = desk.view(DIP)
     found = definitions(view, file, place(desk, file, around))
     assert shown(desk, found) == [each[: each.index(": ") + 26] for each in where]
 
 
-def test_a_word_in_a_broken_declaration_is_found_too(desk: Workspace) -> None:
+def test_name_in_a_broken_declaration_is_found(desk: Workspace) -> None:
     desk.put(DIP, 'import "lake.rts"\nmission m under lake@1 on quad { phase p { look(pond.entry, } }')
     assert shown(desk, definitions(desk.view(DIP), DIP, place(desk, DIP, "look(po|nd"))) == [
         "site.rts: zone pond = circle(47.39"
     ]
 
 
-def test_references_go_through_all_programs(desk: Workspace) -> None:
-    """Of the zone, in the file that declares it and in those that import it, but not in a program with another."""
+def test_references_are_found_in_all_programs(desk: Workspace) -> None:
+    """In the file that declares the zone and those that import it, but not in a program with another zone."""
     desk.put("/w/other.rts", "zone pond = circle(47.3 N, 8.5 E, 5 m)\nzone two = union(pond, pond)\n")
     view = desk.view(SITE)
     (target,) = targets(view, SITE, place(desk, SITE, "zone po|nd"))
@@ -103,7 +103,7 @@ def test_references_go_through_all_programs(desk: Workspace) -> None:
         (LOOK, "height_abov|e: altitude", ["default `20 m`", "range 5 m .. 60 m"]),
         (LOOK, "class    tac|tical", ["timing class `tactical`: Begins within 30 s"]),
         (LOOK, "gr|ace    1 s", ["How long a clause may be unknown"]),
-        (LAKE, "height_above <= t|op", ["parameter of `near`", "must be given"]),
+        (LAKE, "height_above <= t|op", ["parameter of `near`", "required"]),
         (LAKE, "contin|gency hover", ["What flies when a step is denied in the air."]),
         (LAKE, "who = oper|ator", ["role `operator`"]),
         (DIP, "manner = fa|st", ["a choice for `manner` of `look`"]),
@@ -111,7 +111,7 @@ def test_references_go_through_all_programs(desk: Workspace) -> None:
         (DIP, 'import "lake|.rts"', ["declares `near`, `lake`"]),
     ],
 )
-def test_hover(desk: Workspace, file: str, around: str, said: list[str]) -> None:
+def test_hover_describes_a_name(desk: Workspace, file: str, around: str, said: list[str]) -> None:
     found = hover(desk.view(DIP), file, place(desk, file, around), dialect.load())
     assert found is not None
     assert [each for each in said if each not in found.text] == []
@@ -132,7 +132,7 @@ def test_hover(desk: Workspace, file: str, around: str, said: list[str]) -> None
         ("f|lies  dip", ["the mission"]),
     ],
 )
-def test_hover_over_a_scenario(desk: Workspace, around: str, said: list[str]) -> None:
+def test_hover_describes_names_in_a_scenario(desk: Workspace, around: str, said: list[str]) -> None:
     text = """import "dip.rts"
 scenario "it" {
   flies  dip
@@ -150,14 +150,14 @@ scenario "it" {
     assert [each for each in said if each not in found.text] == []
 
 
-def test_hover_says_nothing_of_nothing(desk: Workspace) -> None:
+def test_hover_is_empty_without_a_name(desk: Workspace) -> None:
     text = desk.text(DIP) or ""
     assert hover(desk.view(DIP), DIP, text.index("\n\n") + 1, dialect.load()) is None
     assert hover(desk.view("/w/none.rts"), "/w/none.rts", 3, dialect.load()) is None
 
 
-def test_every_name_of_the_library_means_something() -> None:
-    """Each occurrence covers just its name, and but for roles, phases and the like is declared somewhere."""
+def test_every_name_of_the_library_has_a_target() -> None:
+    """Each occurrence covers exactly its name and is declared, except for roles, phases and similar kinds."""
     desk = Workspace(lambda path: Path(path).read_bytes(), str(root()))
     view = desk.view(str(root() / "missions" / "standard.rts"))
     free = {
@@ -177,8 +177,8 @@ def test_every_name_of_the_library_means_something() -> None:
     for file in view.units:
         for each in view.occurrences(file):
             seen += 1
-            if each.target.sort.name != "IMPORT":
+            if each.target.kind.name != "IMPORT":
                 assert view.slice(each.span) == each.target.name
-            if each.target.sort.name not in free:
+            if each.target.kind.name not in free:
                 assert definitions(view, file, each.span.start), each
     assert seen > 200

@@ -1,4 +1,4 @@
-"""Places as editors count them, against counting by encoding; changes, against cutting the text."""
+"""Positions agree with a count of encoded units, and changes with slicing the text."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -30,7 +30,7 @@ def naive(text: str, offset: int, encoding: Encoding) -> TextPosition:
 
 
 @given(TEXTS, ENCODINGS, st.integers(0, 30))
-def test_a_place_and_back(text: str, encoding: Encoding, offset: int) -> None:
+def test_position_converts_to_an_offset_and_back(text: str, encoding: Encoding, offset: int) -> None:
     offset = min(offset, len(text))
     lines = LineIndex(text, encoding)
     place = lines.place(offset)
@@ -43,8 +43,8 @@ def test_a_place_and_back(text: str, encoding: Encoding, offset: int) -> None:
     ("place", "encoding", "offset"),
     [
         (TextPosition(0, 0), Encoding.UTF_16, 0),
-        (TextPosition(0, 3), Encoding.UTF_16, 2),  # behind the two units of the clef
-        (TextPosition(0, 2), Encoding.UTF_16, 1),  # in the middle of them: before it
+        (TextPosition(0, 3), Encoding.UTF_16, 2),  # after the two units of the clef
+        (TextPosition(0, 2), Encoding.UTF_16, 1),  # between the two units: before the clef
         (TextPosition(0, 5), Encoding.UTF_8, 2),
         (TextPosition(0, 3), Encoding.UTF_8, 1),
         (TextPosition(0, 2), Encoding.UTF_32, 2),
@@ -55,12 +55,12 @@ def test_a_place_and_back(text: str, encoding: Encoding, offset: int) -> None:
         (TextPosition(1, -4), Encoding.UTF_16, 5),
     ],
 )
-def test_places_by_hand(place: TextPosition, encoding: Encoding, offset: int) -> None:
+def test_positions_by_hand(place: TextPosition, encoding: Encoding, offset: int) -> None:
     assert LineIndex("a𝄞b\r\nc", encoding).offset(place) == offset
 
 
 @given(TEXTS, ENCODINGS, st.integers(0, 30), st.integers(0, 30), TEXTS)
-def test_a_change_is_cutting_and_putting(text: str, encoding: Encoding, one: int, other: int, put: str) -> None:
+def test_change_equals_slicing_the_text(text: str, encoding: Encoding, one: int, other: int, put: str) -> None:
     start, end = sorted((min(one, len(text)), min(other, len(text))))
     lines = LineIndex(text, encoding)
     middle = any(text[at - 1 : at + 1] == "\r\n" for at in (start, end))
@@ -74,7 +74,7 @@ def test_a_change_is_cutting_and_putting(text: str, encoding: Encoding, one: int
     assert now._starts == LineIndex(now.text, encoding)._starts
 
 
-def test_changes_come_one_after_the_other_and_backwards_inserts() -> None:
+def test_changes_are_sequential_and_a_reversed_range_inserts() -> None:
     lines = LineIndex("abc", Encoding.UTF_16)
     changes = [
         TextChange(TextPosition(0, 1), TextPosition(0, 2), "x\ny"),
@@ -85,7 +85,7 @@ def test_changes_come_one_after_the_other_and_backwards_inserts() -> None:
 
 
 @given(TEXTS, TEXTS)
-def test_the_difference_makes_one_of_the_other(old: str, new: str) -> None:
+def test_difference_changes_the_old_text_to_the_new(old: str, new: str) -> None:
     start, end, length = difference(old, new)
     assert old[:start] + new[start : start + length] + old[end:] == new
     if old != new and start < end and length:

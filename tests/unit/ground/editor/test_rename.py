@@ -1,4 +1,4 @@
-"""Renaming: by hand what is refused and why; for any name and any place, that all means the same under the new name."""
+"""Renaming: refusals by hand; and a property test that all names keep their meaning under the new name."""
 
 import re
 from itertools import pairwise
@@ -28,8 +28,8 @@ def place(desk: Workspace, file: str, around: str) -> int:
 @pytest.mark.parametrize(
     ("file", "around", "name", "why"),
     [
-        (SITE, "zone po|nd", "5pond", "is no name"),
-        (SITE, "zone po|nd", "a.b", "is no name"),
+        (SITE, "zone po|nd", "5pond", "is not a valid name"),
+        (SITE, "zone po|nd", "a.b", "is not a valid name"),
         (SITE, "zone po|nd", "inside", "reserved word"),
         (SITE, "zone po|nd", "phase", "reserved word"),
         (SITE, "zone po|nd", "lake", "already a policy"),
@@ -41,36 +41,36 @@ def place(desk: Workspace, file: str, around: str) -> int:
         (LOOK, "one of slo|w", "fast", "already a choice"),
         (SITE, "{ ca|lm", "wild", "already a value"),
         (DIP, "on survey|or", "drone", "belongs to the library"),
-        (DIP, "role oper|ator", "boss", "declared nowhere"),
-        (DIP, "phase sur|vey", "look_around", "declared nowhere"),
+        (DIP, "role oper|ator", "boss", "not declared in a source"),
+        (DIP, "phase sur|vey", "look_around", "not declared in a source"),
         (DIP, "{ take|off(", "rise", "belongs to the library"),
         (LOOK, "gps.fi|x", "gps.lock", "belongs to the library"),
         (LOOK, "dead|line", "x", "no name here"),
     ],
 )
-def test_refused(desk: Workspace, file: str, around: str, name: str, why: str) -> None:
+def test_renaming_is_refused_with_a_reason(desk: Workspace, file: str, around: str, name: str, why: str) -> None:
     found = rename(desk, FILES, desk.view(DIP), file, place(desk, file, around), name, DIALECT)
     assert isinstance(found, Refusal)
     assert why in found.text
 
 
-def test_refused_while_a_program_has_errors(desk: Workspace) -> None:
+def test_renaming_is_refused_while_a_program_has_errors(desk: Workspace) -> None:
     desk.put("/w/half.rts", 'import "site.rts"\nzone half = union(pond')
     found = rename(desk, FILES, desk.view(DIP), SITE, place(desk, SITE, "zone po|nd"), "pool", DIALECT)
     assert isinstance(found, Refusal)
     assert "half.rts` has errors" in found.text
 
 
-def test_refused_where_a_rule_reads_the_parameter_of_two_skills(desk: Workspace) -> None:
+def test_renaming_a_parameter_of_two_skills_is_refused(desk: Workspace) -> None:
     text = (desk.text(LAKE) or "").replace("forbid look by any when target", "forbid look, goto by any when target")
     desk.put(LAKE, text)
     found = renamable(desk, desk.view(DIP), LAKE, place(desk, LAKE, "goto by any when tar|get"))
     assert isinstance(found, Refusal)
-    assert "`look` and `goto` at once" in found.text
+    assert "`look` and `goto`: rename each" in found.text
 
 
-def test_through_all_files(desk: Workspace) -> None:
-    """The zone with its entry, the argument's name in steps and rules, the signal with dots."""
+def test_renaming_changes_all_files(desk: Workspace) -> None:
+    """A zone with its entry, a parameter in steps and rules, a signal with dots."""
     made = rename(desk, FILES, desk.view(DIP), LOOK, place(desk, LOOK, "height_abov|e: altitude"), "clearance", DIALECT)
     assert isinstance(made, Renaming)
     assert {file.rpartition("/")[2]: len(spans) for file, spans in made.places.items()} == {
@@ -93,9 +93,9 @@ NAMES = st.one_of(
 
 @settings(max_examples=settings().max_examples // 4)
 @given(st.data(), st.sampled_from(FILES), NAMES)
-def test_what_is_renamed_means_the_same(make_lake: Workspace, data: st.DataObject, file: str, name: str) -> None:
+def test_renamed_program_has_the_same_meaning(make_lake: Workspace, data: st.DataObject, file: str, name: str) -> None:
     view = make_lake.view(DIP)
-    places = [each for each in view.occurrences(file) if each.target.sort in RENAMED]
+    places = [each for each in view.occurrences(file) if each.target.kind in RENAMED]
     each = data.draw(st.sampled_from(places))
     made = rename(make_lake, FILES, view, file, each.span.start, name, DIALECT)
     if isinstance(made, Refusal):
@@ -116,7 +116,7 @@ def test_what_is_renamed_means_the_same(make_lake: Workspace, data: st.DataObjec
         assert all(back.applied(one, changed.text(one) or "") == view.text(one) for one in made.places)
 
 
-def test_the_places_do_not_overlap(desk: Workspace) -> None:
+def test_changed_places_do_not_overlap(desk: Workspace) -> None:
     made = rename(desk, FILES, desk.view(DIP), SITE, place(desk, SITE, "zone po|nd"), "pool", DIALECT)
     assert isinstance(made, Renaming)
     for spans in made.places.values():

@@ -1,4 +1,4 @@
-"""A renaming that would change more than a name is refused, or spares what means something else."""
+"""A renaming that would change a meaning is refused; equal names with other meanings stay unchanged."""
 
 import re
 from collections.abc import Callable
@@ -64,15 +64,15 @@ def refused(found: Renaming | Refusal) -> str:
 
 
 @pytest.mark.parametrize("name", ["position", "height", "battery", "velocity.north", "velocity.down"])
-def test_a_signal_that_is_read_by_its_name_keeps_it(make: Make, name: str) -> None:
+def test_signal_with_a_fixed_name_is_not_renamed(make: Make, name: str) -> None:
     desk = make({S: (SKILLS / "signals.rts").read_text()})
-    assert "read by this very name" in refused(asked(desk, S, f"signal |{name}", "other", (S,)))
+    assert "is fixed: " in refused(asked(desk, S, f"signal |{name}", "other", (S,)))
 
 
-def test_no_signal_gets_a_name_that_is_read(make: Make) -> None:
+def test_signal_is_not_renamed_to_a_fixed_name(make: Make) -> None:
     charge = "signal charge : ratio = BATTERY_STATUS.battery_remaining stale after 2 s\n"
     desk = make({S: charge})
-    assert "read by this very name" in refused(asked(desk, S, "signal |charge", "battery", (S,)))
+    assert "is fixed: " in refused(asked(desk, S, "signal |charge", "battery", (S,)))
 
 
 FLOWN = """import "m.rts"
@@ -92,7 +92,7 @@ mission one under p@1 on quad {
 @pytest.mark.parametrize(
     ("file", "around"), [(S, "skill |up("), ("/w/m.rts", "zone |field"), ("/w/m.rts", "mission |one")]
 )
-def test_what_a_scenario_names_is_renamed_in_it(make: Make, file: str, around: str) -> None:
+def test_names_in_a_scenario_are_renamed(make: Make, file: str, around: str) -> None:
     old = around.split("|")[1].rstrip("(").split()[-1]
     desk = make({S: SITE[S], "/w/m.rts": M, "/w/f.rts": FLOWN})
     made = asked(desk, file, around, "other", ("/w/f.rts", "/w/m.rts", S))
@@ -100,27 +100,27 @@ def test_what_a_scenario_names_is_renamed_in_it(make: Make, file: str, around: s
     assert made.applied("/w/f.rts", FLOWN) == re.sub(rf"\b{old}\b", "other", FLOWN)
 
 
-def test_what_a_scenario_quotes_is_not_changed_unseen(make: Make) -> None:
+def test_renaming_in_a_clause_quoted_by_a_scenario_is_refused(make: Make) -> None:
     flown = FLOWN.replace("expect flies up", 'expect deny at "permit up by role operator ..."')
     desk = make({S: SITE[S], "/w/m.rts": M, "/w/f.rts": flown})
-    assert "quote less of it" in refused(asked(desk, S, "skill |up(", "other", ("/w/f.rts", "/w/m.rts", S)))
+    assert "shorten the quotation" in refused(asked(desk, S, "skill |up(", "other", ("/w/f.rts", "/w/m.rts", S)))
 
 
-def test_the_type_of_a_signal_is_not_the_signal_of_that_name(make: Make) -> None:
+def test_type_of_a_signal_is_not_the_signal_of_that_name(make: Make) -> None:
     desk = make({S: (SKILLS / "signals.rts").read_text()})
     text = desk.text(S) or ""
     declared, typed = text.index("signal position") + 7, text.index(": position") + 2
-    assert [each.sort for each in targets(desk.view(S), S, declared)] == [NameKind.DECLARED]
-    assert [each.sort for each in targets(desk.view(S), S, typed)] == [NameKind.TYPE]
+    assert [each.kind for each in targets(desk.view(S), S, declared)] == [NameKind.DECLARED]
+    assert [each.kind for each in targets(desk.view(S), S, typed)] == [NameKind.TYPE]
 
 
-def test_a_survey_pattern_keeps_its_name(make: Make) -> None:
+def test_survey_pattern_is_not_renamed(make: Make) -> None:
     desk = make({S: (SKILLS / "inspect_area.rts").read_text()})
     assert "E0608" in refused(asked(desk, S, "one of |grid", "lanes", (S,)))
 
 
-def test_what_has_the_name_of_its_file(make: Make) -> None:
-    """An import belongs to its file, which is called as the policy is, up to the dot."""
+def test_policy_with_the_name_of_its_file_is_renamed(make: Make) -> None:
+    """The import of a file with the policy's name does not change."""
     desk = make({})
     desk.put("s.rts", SITE[S].replace("policy p ", "policy s "))
     desk.put("t.rts", TESTS.replace("under p ", "under s "))
@@ -129,14 +129,14 @@ def test_what_has_the_name_of_its_file(make: Make) -> None:
     assert {file: len(spans) for file, spans in made.places.items()} == {"s.rts": 1, "t.rts": 1}
 
 
-def test_what_has_the_name_of_a_message(make: Make) -> None:
-    """Fields belong to messages, and members to declarations, and the two have nothing to do with each other."""
+def test_declaration_with_the_name_of_a_message_is_renamed(make: Make) -> None:
+    """Fields of messages and members of declarations are independent."""
     own = SITE[S].replace("skill up", "skill HEARTBEAT").replace("permit up", "permit HEARTBEAT")
     desk = make({S: own + "signal mood : count = HEARTBEAT.custom_mode stale after 2 s\n"})
     assert isinstance(asked(desk, S, "skill |HEARTBEAT", "up", (S,)), Renaming)
 
 
-def test_a_quotation_of_another_clause_is_spared(make: Make) -> None:
+def test_quotation_of_another_clause_is_unchanged(make: Make) -> None:
     desk = make(SITE)
     made = asked(desk, S, "skill up(|high", "top_height", (S, T))
     assert isinstance(made, Renaming)
@@ -146,30 +146,30 @@ def test_a_quotation_of_another_clause_is_spared(make: Make) -> None:
     assert 'at "use low(top = 25 m): permit up by role chief when top_height <= top"' in text
 
 
-def test_a_quotation_changes_with_the_use_of_a_template(make: Make) -> None:
+def test_quotation_changes_with_the_use_of_a_template(make: Make) -> None:
     made = asked(make(SITE), S, "template low(|top", "limit", (S, T))
     assert isinstance(made, Renaming)
     assert 'at "use low(limit = 25 m): permit up by role chief when high <= limit"' in made.applied(T, TESTS)
 
 
-def test_a_quotation_that_is_cut_within_the_name(make: Make) -> None:
+def test_quotation_cut_within_the_name_is_unchanged(make: Make) -> None:
     desk = make({**SITE, T: TESTS.replace("operator when high <= ...", "operator when hi...")})
     assert "E1410" in refused(asked(desk, S, "target: position, |high", "height_over", (S, T)))
 
 
-def test_a_quotation_in_a_test_with_errors(make: Make) -> None:
+def test_quotation_in_a_test_with_errors_refuses_the_renaming(make: Make) -> None:
     desk = make({**SITE, T: TESTS.replace("when fly(47.39780 N, 8.5456 E, 40 m)", "when fly(40 m)")})
-    assert "nobody knows what it quotes" in refused(asked(desk, S, "skill up(|high", "top_height", (S, T)))
+    assert "correct the errors first" in refused(asked(desk, S, "skill up(|high", "top_height", (S, T)))
 
 
-def test_what_the_checks_refuse_is_refused(make: Make) -> None:
-    """A template's parameter may not have the name of an argument of the skill that its rule is about."""
+def test_renaming_with_a_new_finding_is_refused(make: Make) -> None:
+    """A template's parameter may not have the name of a parameter of the skill in its rule."""
     assert "E0203" in refused(asked(make(SITE), S, "template low(|top", "how", (S, T)))
     assert "E0203" in refused(asked(make(SITE), S, "60 m, |how", "top", (S, T)))
 
 
-def test_a_program_that_would_lose_the_name(make: Make) -> None:
-    """Two programs share a file that names a zone, and each declares a zone of its own."""
+def test_renaming_that_breaks_another_program_is_refused(make: Make) -> None:
+    """Two programs share a file that uses a zone, and each declares its own zone."""
     zone = "zone yard = circle(47.39774 N, 8.54559 E, 40 m)\n"
     files = {
         "/w/a.rts": f'import "both.rts"\n{zone}', "/w/b.rts": f'import "both.rts"\n{zone}',
@@ -180,6 +180,6 @@ def test_a_program_that_would_lose_the_name(make: Make) -> None:
     assert isinstance(asked(make(files), "/w/a.rts", "zone |yard", "field", ("/w/a.rts", "/w/both.rts")), Renaming)
 
 
-def test_findings_that_were_there_before_stand_in_no_way(make: Make) -> None:
+def test_earlier_findings_do_not_refuse_a_renaming(make: Make) -> None:
     desk = make({**SITE, S: SITE[S] + "zone bad = union(nothing)\n"})
     assert isinstance(asked(desk, S, "zone |bad", "worse", (S,)), Renaming)

@@ -1,4 +1,4 @@
-"""Every name of the sources that ship and of the samples: renamed, it is refused with a reason, or nothing changes."""
+"""Every name of the shipped sources and samples: a renaming is refused with a reason, or no meaning changes."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -28,24 +28,24 @@ SHIPPED = tuple(
     shown(str(each)) for folder in ("skills", "policies", "missions", "examples/starter")
     for each in sorted((CHECKOUT / folder).glob("*.rts"))
 )  # fmt: skip
-#: names that are tried in `make test`, of the sources that ship and of the samples
+#: the number of names that `make test` tries, of the shipped sources and of the samples
 TRIED = 2, 4
 SEED = 20261122
-#: parts of the flat form that are where a source says it, and how
+#: fields of the flat form with the place and text of the source
 TOLD = {"text", "start", "end", "source_digests"}
-NEW = "_zz"  # behind a name, and in none that there is
+NEW = "_zz"  # no existing name ends with it
 _PARSED: dict[str, ParsedText] = {}
 
 
 class Named(NamedTuple):
-    """A name, where it is given, and the files whose programs are looked at."""
+    """A name, its declaration, and the files whose programs are compared."""
 
     files: tuple[str, ...]
     span: Span
 
 
 class Told(NamedTuple):
-    """What a program comes to: findings by code and line, policies, decisions."""
+    """The results of a program: findings by code and line, policies, decisions."""
 
     found: list[tuple[str, str | None, int]]
     policies: list[Any]
@@ -53,7 +53,7 @@ class Told(NamedTuple):
 
 
 class _Anyones(Workspace):
-    """A desk on which the sources that ship may be changed as any others."""
+    """A workspace in which the shipped sources may be changed."""
 
     def is_shipped(self, name: str) -> bool:
         return False
@@ -76,7 +76,7 @@ def _desk() -> Workspace:
 
 def _names(desk: Workspace, file: str, files: tuple[str, ...]) -> Iterator[Named]:
     for each in desk.view(file).occurrences(file):
-        if each.declares and each.target.sort in RENAMED:
+        if each.declares and each.target.kind in RENAMED:
             yield Named(files, each.span)
 
 
@@ -131,7 +131,7 @@ def hold(desk: Workspace, before: dict[str, Told], named: Named, chance: Random,
 
 
 def every() -> tuple[list[Named], list[Named]]:
-    """The names of the sources that ship, and of the samples, each of which is a program of its own."""
+    """The names of the shipped sources and of the samples, each of which is a program."""
     desk = _desk()
     shipped = [each for file in SHIPPED for each in _names(desk, file, SHIPPED)]
     samples = [
@@ -144,7 +144,7 @@ def every() -> tuple[list[Named], list[Named]]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [0, 1], ids=["shipped", "samples"])
-def test_some_names(kind: int) -> None:
+def test_renaming_some_names_changes_no_meaning(kind: int) -> None:
     chance = Random(SEED)
     desk, before = _desk(), dict[str, Told]()
     tried = chance.sample(every()[kind], TRIED[kind])
@@ -154,7 +154,7 @@ def test_some_names(kind: int) -> None:
 
 @pytest.mark.soak
 @pytest.mark.parametrize("kind", [0, 1], ids=["shipped", "samples"])
-def test_every_name(kind: int) -> None:
+def test_renaming_every_name_changes_no_meaning(kind: int) -> None:
     desk, before = _desk(), dict[str, Told]()
     renamed = [hold(desk, before, each, Random(SEED), 100) for each in every()[kind]]
     assert any(renamed)

@@ -1,4 +1,4 @@
-"""While something is written: what may stand at a place, what a call takes, what may be done about a finding."""
+"""Completion, signatures, outline and code actions while a text is written."""
 
 from collections.abc import Callable
 
@@ -26,7 +26,7 @@ SKILL = HEAD + "skill s(far: length in 1 m .. 5 m, area: zone) {\n  "
 
 
 def proposed(desk: Workspace, before: str, after: str = "") -> dict[str, str]:
-    """What is proposed between two texts, with its kind."""
+    """The proposals between two texts, with their kinds."""
     now = desk.put(FILE, before + after)
     return {item.text: item.kind for item in complete(desk, desk.view(FILE), now, len(before), dialect.load())}
 
@@ -103,10 +103,10 @@ def proposed(desk: Workspace, before: str, after: str = "") -> dict[str, str]:
         (HEAD + 'import "lib:skills/', ["lib:skills/goto.rts"], ["lake.rts"]),
         (HEAD + "// so", [], ["zone", "pond"]),
         (POLICY + 'permit look by any when /* battery', [], ["battery"]),
-        (POLICY + "forbid )\n  permit ", ["look"], ["pond"]),  # behind an error in the same block
+        (POLICY + "forbid )\n  permit ", ["look"], ["pond"]),  # after an error in the same block
     ],
 )  # fmt: skip
-def test_proposals(desk: Workspace, before: str, some: list[str], none: list[str]) -> None:
+def test_completion_proposes_what_fits(desk: Workspace, before: str, some: list[str], none: list[str]) -> None:
     found = proposed(desk, before, "\n\nzone z = pond\n")
     assert [each for each in some if each not in found] == []
     assert [each for each in none if each in found] == []
@@ -114,8 +114,8 @@ def test_proposals(desk: Workspace, before: str, some: list[str], none: list[str
 
 @settings(max_examples=settings().max_examples // 2)
 @given(st.integers(0, 10_000), st.integers(0, 400))
-def test_any_place_has_an_answer(make_lake: Workspace, start: int, cut_off: int) -> None:
-    """Also in the middle of anything: no place makes it fail, and what is proposed begins where the word does."""
+def test_completion_never_fails(make_lake: Workspace, start: int, cut_off: int) -> None:
+    """At every place of a text, and a proposal begins at the start of the word."""
     text = "".join(make_lake.text(file) or "" for file in ("/w/site.rts", "/w/look.rts", "/w/lake.rts", "/w/dip.rts"))
     start %= len(text)
     desk = make_lake.with_texts({FILE: text[:start] + text[start + cut_off :]})
@@ -136,7 +136,7 @@ def test_any_place_has_an_answer(make_lake: Workspace, start: int, cut_off: int)
         ("phase a { nothing(", None, 0),
     ],
 )
-def test_signatures(desk: Workspace, before: str, label: str | None, active: int) -> None:
+def test_signature_of_the_open_call(desk: Workspace, before: str, label: str | None, active: int) -> None:
     now = desk.put(FILE, MISSION + before)
     found = signature(desk.view(FILE), now, len(MISSION + before))
     assert (found is None) == (label is None)
@@ -146,7 +146,7 @@ def test_signatures(desk: Workspace, before: str, label: str | None, active: int
         assert found.note == "Look at something from near."
 
 
-def test_outline_and_folds() -> None:
+def test_outline_and_folding_ranges() -> None:
     text = 'import "a"\nimport "b"\n\n// one\n// two\nenum e {\n  a = 1,\n  b = 2,\n}\n'
     text += "mission m under p@1 on q {\n  phase x { }\n}\n"
     now = parse_text(Source(FILE, text))
@@ -164,14 +164,14 @@ def finding(code: str, start: int, end: int, *fixes: tuple[int, int, str, Applic
     return Diagnostic(REGISTRY[code], "wrong", Span(FILE, start, end), fixes=made)
 
 
-def test_actions() -> None:
+def test_code_actions_of_findings() -> None:
     safe, suggested = Applicability.SAFE, Applicability.SUGGESTED
     text = "zone a = b\n  zone C = d\n"
     found = [
         finding("E1302", 18, 19, (18, 19, "c", suggested)),
         finding("E1305", 0, 4, (0, 4, "", safe)),
         finding("E0201", 9, 10),
-        finding("E1305", 2, 6, (2, 6, "", safe)),  # in the way of the other
+        finding("E1305", 2, 6, (2, 6, "", safe)),  # overlaps the other one
         finding("E1305", 9, 10, (9, 10, "x", safe)),
     ]
     here = [(each.title, [(fix.span.start, fix.replacement) for fix in each.fixes], each.safe)
@@ -180,7 +180,7 @@ def test_actions() -> None:
         ("write `c`", [(18, "c")], False),
         ("ignore `naming` here, with a reason",
          [(11, "  // rtshcua: ignore E1302 because\n")], False),
-        ("correct everything that is safe to correct", [(0, ""), (9, "x")], True),
+        ("apply all safe fixes", [(0, ""), (9, "x")], True),
     ]  # fmt: skip
     assert [each.title for each in actions(found, FILE, 9, 9, text)][:2] == [
         "write `x`",
@@ -190,7 +190,7 @@ def test_actions() -> None:
     assert list(actions(found, "/w/other.rts", 0, 99, text)) == []
 
 
-def test_a_desk_reads_what_is_open_before_what_is_on_disk(make: Callable[[dict[str, str]], Workspace]) -> None:
+def test_workspace_prefers_an_open_text_to_the_file_on_disk(make: Callable[[dict[str, str]], Workspace]) -> None:
     desk = make(
         {"/w/a.rts": 'import "b.rts"\nzone one = union(two, two)\n', "/w/b.rts": "zone two = circle(47 N, 8 E, 5 m)\n"}
     )

@@ -219,7 +219,7 @@ def test_clause_is_quoted_in_full_or_up_to_dots() -> None:
     assert other[0] == "E1410"
     assert (other[2] or "").startswith("possible clauses: `")
     (likely,) = quoting("degrade nothing when wind")
-    assert (likely[2] or "").startswith("there are `degrade "), "the most alike first"
+    assert (likely[2] or "").startswith("possible clauses: `degrade "), "the most alike first"
 
 
 def test_table_over_the_limit_of_cases_is_refused() -> None:

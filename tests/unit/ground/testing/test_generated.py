@@ -76,7 +76,7 @@ def test_generated_tests_pass_also_after_formatting(small: GeneratedTests) -> No
 def test_generated_file_says_that_it_records_present_decisions(small: GeneratedTests) -> None:
     assert small.text is not None
     assert "record the present decisions of the policy `small`" in " ".join(small.text.split())
-    assert "read them before they are kept" in small.text
+    assert "review the tests before you keep them" in small.text
 
 
 def test_every_kind_of_clause_has_limits(small: GeneratedTests) -> None:

@@ -1,1 +1,1 @@
-"""What must be true of sources before anything is lowered: names, types, and the checks by their codes."""
+"""The checks of declarations before lowering: names, types, and one module for each subject in `checks`."""

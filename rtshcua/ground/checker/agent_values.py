@@ -1,4 +1,4 @@
-"""Arguments in a specification: texts in the language's own notation, parsed by the language's own parser."""
+"""Parse the arguments of a mission specification, which are written in the language, with its own parser."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -15,7 +15,7 @@ from rtshcua.model.ir.skills import ClauseDecl
 
 N = TypeVar("N", bound=Node)
 
-#: what a value stands in while it is parsed
+#: the source around a value while it is parsed
 _VALUE = "mission m under p@1 on v { phase a { s(x = "
 _AFTER_VALUE = "\n) } }"
 _OVERRIDE = "mission m under p@1 on v { phase a { s() { "
@@ -26,7 +26,7 @@ Found = tuple[Diagnostic, ...]
 
 
 def parse_value(text: str, span: Span, moved: Moved) -> tuple[Value | None, Found]:
-    """The value that `text` spells; `span` is where it stands, `moved` the offset of each of its characters there."""
+    """Return the value of `text`, at `span` of the specification; `moved` maps its offsets to offsets there."""
     given = _Given(_VALUE, text, _AFTER_VALUE, span, moved)
     step, found = given.step()
     if found:
@@ -37,7 +37,7 @@ def parse_value(text: str, span: Span, moved: Moved) -> tuple[Value | None, Foun
 
 
 def parse_quantity(words: str, text: str, span: Span, moved: Moved) -> tuple[Quantity | None, Found]:
-    """The quantity after the words of a step's override: `deadline`, `lasts at most`."""
+    """Return the quantity after the keywords of a step's override: `deadline`, `lasts at most`."""
     given = _Given(f"{_OVERRIDE}{words} ", text, _AFTER_OVERRIDE, span, moved)
     step, found = given.step()
     if found:
@@ -49,7 +49,7 @@ def parse_quantity(words: str, text: str, span: Span, moved: Moved) -> tuple[Qua
 
 
 def parse_clauses(words: str, text: str, span: Span, moved: Moved) -> tuple[tuple[ClauseDecl, ...], Found]:
-    """The clauses of the condition after `require`, `assume` or `maintain`."""
+    """Return the clauses of the condition after `require`, `assume` or `maintain`."""
     given = _Given(f"{_OVERRIDE}{words} ", text, _AFTER_OVERRIDE, span, moved)
     step, found = given.step()
     if found:
@@ -61,7 +61,7 @@ def parse_clauses(words: str, text: str, span: Span, moved: Moved) -> tuple[tupl
 
 
 def _only(step: Step) -> Iterator[Any]:
-    """The one part of a step's overrides; none where there are several."""
+    """The only part of a step's overrides; nothing if there are several."""
     overrides = step.overrides
     names = (name for name in Overrides.__struct_fields__ if name != "span")
     parts = [] if overrides is None else [getattr(overrides, name) for name in names if getattr(overrides, name)]
@@ -69,7 +69,7 @@ def _only(step: Step) -> Iterator[Any]:
 
 
 class _Given(NamedTuple):
-    """A text that stands between others while it is parsed, and where it really stands."""
+    """A text, the source around it while it is parsed, and its real place."""
 
     before: str
     text: str
@@ -78,7 +78,7 @@ class _Given(NamedTuple):
     moved: Moved
 
     def step(self) -> tuple[Step | None, Found]:
-        """The one step that was parsed, or the first finding."""
+        """The parsed step, or the first finding."""
         if "//" in self.text or "/*" in self.text:
             message = "a value contains a comment"
             return None, (Diagnostic(codes.SPECIFICATION_SHAPE, message, self.span, "remove the comment"),)
@@ -93,7 +93,7 @@ class _Given(NamedTuple):
         return None, ()
 
     def placed(self, node: N) -> N:
-        """A parsed node, with the places that it really has."""
+        """A parsed node with its real spans."""
         return _moved(node, self._place)  # type: ignore[no-any-return]
 
     def more(self, what: str, example: str) -> Diagnostic:
@@ -105,7 +105,7 @@ class _Given(NamedTuple):
         return Span(self.span.file, self.moved(start), max(self.moved(end), self.moved(start)))
 
     def _finding(self, diagnostic: Diagnostic) -> Diagnostic:
-        """A finding of the parser, with the places that lie in the text."""
+        """A finding of the parser with its real spans."""
         labels = tuple(Label(self._place(label.span), label.text) for label in diagnostic.labels)
         fixes = tuple(
             Fix(self._place(fix.span), fix.replacement, fix.title, fix.applicability)
@@ -117,7 +117,7 @@ class _Given(NamedTuple):
 
 
 def _moved(node: Any, place: Callable[[Span], Span]) -> Any:
-    """A node with other spans, all through."""
+    """A node with all its spans mapped by `place`."""
     if isinstance(node, Node):
         changes = {name: _moved(getattr(node, name), place) for name in type(node).__struct_fields__}
         return node.copied(**changes)

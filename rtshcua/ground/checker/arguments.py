@@ -1,4 +1,4 @@
-"""E0601 to E0605: the arguments of a step or a link against the parameters of its skill."""
+"""Check the arguments of a step or a link against the parameters of its skill."""
 
 from collections.abc import Sequence
 
@@ -21,7 +21,7 @@ from rtshcua.model.quantity import display
 def bind_arguments(
     context: CheckContext, skill: SkillDecl, written: Sequence[ArgumentValue], span: Span
 ) -> tuple[Bound, ...] | None:
-    """The value of every parameter of `skill`, defaults filled in; None after a finding. `span` is the whole call."""
+    """Return the value of every parameter of `skill`, with defaults; None after a finding. `span` is the whole call."""
     pairs = pair(context, skill, written, span)
     if pairs is None:
         return None
@@ -31,7 +31,7 @@ def bind_arguments(
     for parameter in skill.parameters:
         argument = known.get(parameter.name.text)
         value = pairs.get(parameter.name.text, parameter.default)
-        if argument is None or value is None:  # reported where the parameter is declared, or as missing
+        if argument is None or value is None:  # reported at the declaration, or as missing
             return None
         bound.append(bind_value(scope, argument, value))
     return None if None in bound else tuple(item for item in bound if item is not None)
@@ -103,7 +103,7 @@ def _parameter_of(
 
 
 def _decimal(context: CheckContext, written: Sequence[ArgumentValue], position: int) -> str | None:
-    """What to write for `20,5 m`, where a comma stands between two numbers without a space."""
+    """The help for `20,5 m`: a comma between two numbers, without a space."""
     if not position:
         return None
     whole, rest = context.report.text(written[position - 1].value.span), context.report.text(written[position].span)
@@ -118,7 +118,7 @@ def _count(number: int) -> str:
 
 
 def bind_value(scope: Scope, argument: Argument, value: Value) -> Bound | None:
-    """A constant of the parameter's type and within its range; None after a finding."""
+    """Return the constant value of an argument in its parameter's type and range; None after a finding."""
     name = argument.declaration.name.text
     found = typed(scope, value, argument.type, (argument.declaration.span, f"`{name}` is declared here"))
     if found is None:
@@ -157,10 +157,10 @@ def _place(scope: Scope, value: Value) -> Bound | None:
 
 
 def _wider(scope: Scope, argument: Argument, value: Value, low: bool) -> str:
-    """That a size of the skill would let it have the value, where the end of its range is one."""
+    """The help on a size of the skill that would extend the range, if its end is a size."""
     parameter = argument.declaration
     owner = next((each for each in scope.symbols.skills.values() if parameter in each.parameters), None)
-    if owner is None or parameter.range is None or value.span.file.endswith(".json"):  # an agent sizes no skill
+    if owner is None or parameter.range is None or value.span.file.endswith(".json"):  # agents cannot set sizes
         return ""
     size = named_at(scope.report, owner, (parameter.range.low if low else parameter.range.high).span)
     written = scope.report.text(value.span)
@@ -168,7 +168,7 @@ def _wider(scope: Scope, argument: Argument, value: Value, low: bool) -> str:
 
 
 def in_range(scope: Scope, argument: Argument, value: Value, constant: int) -> None:
-    """Report a number outside of its parameter's range, and the nearest one inside."""
+    """Report a number outside its parameter's range, with the nearest accepted one."""
     low, high = argument.low, argument.high
     if low is None or high is None or low <= constant <= high:
         return

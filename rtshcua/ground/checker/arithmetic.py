@@ -1,4 +1,4 @@
-"""Sums, products, quotients, `abs`, `min` and `max`: the type of each, and the exact number of a constant one."""
+"""Types of sums, products, quotients, `abs`, `min` and `max`, and the exact values of constant ones."""
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
@@ -11,7 +11,7 @@ from rtshcua.ground.checker.types import COUNT, DURATION, LENGTH, RATIO, SPEED, 
 from rtshcua.model.ir.expression import Arithmetic, Function, Value
 from rtshcua.model.quantity import Dimension
 
-#: how many canonical units make the unit that needs no factor in a product: m, m/s, s, degree, the whole, V, one
+#: canonical units per base unit, which needs no factor in a product: m, m/s, s, degree, the whole, V, one
 COHERENT: Mapping[Dimension, int] = {
     Dimension.LENGTH: 1_000,
     Dimension.ALTITUDE: 1_000,
@@ -25,7 +25,7 @@ COHERENT: Mapping[Dimension, int] = {
 
 _QUOTIENTS: Mapping[tuple[Type, Type], Type] = {(LENGTH, SPEED): DURATION, (LENGTH, DURATION): SPEED}
 
-#: what `*` and `/` can do, for a message
+#: the help on `*` and `/`
 PRODUCTS = "a plain number or a ratio times anything keeps its dimension, and a speed times a duration is a length"
 QUOTIENTS = (
     "dividing by a plain number or a ratio keeps the dimension, a length by a speed is a duration, a length by a "
@@ -34,7 +34,7 @@ QUOTIENTS = (
 
 
 def product(left: Type, right: Type) -> Type | None:
-    """The type of `left * right` for two numbers, or None."""
+    """Return the type of `left * right` for two numbers, or None."""
     for factor in (COUNT, RATIO):
         if left == factor:
             return right
@@ -44,7 +44,7 @@ def product(left: Type, right: Type) -> Type | None:
 
 
 def quotient(left: Type, right: Type) -> Type | None:
-    """The type of `left / right` for two numbers, or None."""
+    """Return the type of `left / right` for two numbers, or None."""
     if left == right:
         return COUNT
     if right in (COUNT, RATIO):
@@ -53,7 +53,7 @@ def quotient(left: Type, right: Type) -> Type | None:
 
 
 def arithmetic(scope: Scope, node: Arithmetic, left: Typed, right: Typed) -> Typed | None:
-    """`left operator right`, of sides whose types are known; None after a finding."""
+    """Check `left operator right` for operands of known types; None after a finding."""
     if not _numbers(scope, node.operator, (node.left, node.right), (left, right)):
         return None
     match node.operator:
@@ -66,7 +66,7 @@ def arithmetic(scope: Scope, node: Arithmetic, left: Typed, right: Typed) -> Typ
 
 
 def function(scope: Scope, node: Function, found: Sequence[Typed]) -> Typed | None:
-    """`abs`, `min` or `max` of operands whose types are known; a constant length takes the datum of an altitude."""
+    """Check `abs`, `min` or `max` for operands of known types; a constant length takes the datum of an altitude."""
     if not _numbers(scope, node.name, node.operands, found):
         return None
     leading = next((each for each in found if each.constant is None or each.type.datum is not None), found[0])
@@ -102,7 +102,7 @@ def _coherent(type: Type) -> int:
 
 
 def _product(scope: Scope, node: Arithmetic, left: Typed, right: Typed) -> Typed | None:
-    """A product has a number that is known when it is compiled on one side."""
+    """Check a product: one operand must be constant."""
     type = product(left.type, right.type)
     if type is None:
         scope.report.add(
@@ -129,7 +129,7 @@ def _product(scope: Scope, node: Arithmetic, left: Typed, right: Typed) -> Typed
 
 
 def _quotient(scope: Scope, node: Arithmetic, left: Typed, right: Typed) -> Typed | None:
-    """What divides is known when it is compiled, and not zero."""
+    """Check a quotient: the divisor must be constant and not zero."""
     if right.constant is None or right.constant == 0:
         unknown = right.constant is None
         text = scope.report.text(node.right.span)
@@ -188,7 +188,7 @@ def _sides(node: Arithmetic, left: Typed, right: Typed) -> list[tuple[Span, str]
 
 
 def _sum_type(left: Type, right: Type, sign: int) -> Type | None:
-    """The type of a sum (`sign` 1) or difference (-1); a length moves an altitude, two altitudes differ by a length."""
+    """The type of a sum (`sign` 1) or difference (-1). A length moves an altitude; two altitudes differ by a length."""
     altitudes = (left.dimension is Dimension.ALTITUDE, right.dimension is Dimension.ALTITUDE)
     if altitudes == (True, True):
         return LENGTH if sign < 0 and left == right else None

@@ -1,8 +1,7 @@
-"""E0611 to E0613, E0615, E0806: a chain of links ends, and its last link needs nothing.
+"""Check fallback chains: every link ends, and the last link has no precondition.
 
-The chain that flies is that of the step, or the contingency, to its end: a link's skill has a fallback chain of its
-own, which never flies for it. So a skill that is a link of its own chain is what has just failed, but a circle of
-chains through other skills is none in flight.
+In flight, the chain of the step or the contingency is flown to its end. The fallback chain of a link's own skill is not
+used. So a skill must not be in its own chain, but chains of different skills may refer to each other.
 """
 
 from collections.abc import Sequence
@@ -19,7 +18,7 @@ from rtshcua.model.quantity import Dimension, display
 
 
 def check_link(context: CheckContext, link: LinkDecl) -> SkillDecl | None:
-    """The skill of one link, whose arguments and limit were checked and bound; None where there is no such skill."""
+    """Check and bind the arguments and the limit of one link, and return its skill; None if it is unknown."""
     skill = find_skill(context, link.skill)
     if skill is None:
         return None
@@ -39,7 +38,7 @@ def check_link(context: CheckContext, link: LinkDecl) -> SkillDecl | None:
 
 
 def check_chain(context: CheckContext, links: Sequence[LinkDecl], owner: SkillDecl | None, span: Span) -> None:
-    """Report a chain that might not end; `owner` is the skill whose fallback it is, `span` the whole chain."""
+    """Report a chain that may not end; `owner` is the skill of the chain, `span` the whole chain."""
     if len(links) > MAX_LINKS:
         context.report.add(codes.TOO_MANY, span, f"the chain has {len(links)} links; the limit is {MAX_LINKS}")
     for index, link in enumerate(links):
@@ -61,7 +60,7 @@ def check_chain(context: CheckContext, links: Sequence[LinkDecl], owner: SkillDe
 
 
 def check_end(context: CheckContext, link: LinkDecl, skill: SkillDecl) -> None:
-    """Report a link that something comes after, and that does not end: of a chain, or the target of a `degrade`."""
+    """Report a link before the last, or a target of a `degrade`, that does not end."""
     if link.limit is None and not _ends(skill):
         context.report.add(
             codes.ENDLESS_LINK,
@@ -74,7 +73,7 @@ def check_end(context: CheckContext, link: LinkDecl, skill: SkillDecl) -> None:
 
 
 def _limit(context: CheckContext, link: LinkDecl, skill: SkillDecl) -> None:
-    """Report a link that is to fly for longer than its skill lasts."""
+    """Report a time limit above the duration of the skill."""
     limit, lasts = link.limit, skill.duration
     if limit is None or lasts is None or {limit.dimension, lasts.dimension} != {Dimension.DURATION}:
         return
@@ -95,7 +94,7 @@ def _ends(skill: SkillDecl) -> bool:
 
 
 def _last(context: CheckContext, link: LinkDecl, skill: SkillDecl) -> None:
-    """The last link is always possible, and leaves the vehicle on the ground."""
+    """Check that the last link is always possible and ends on the ground."""
     needs = [*skill.require, *skill.assume]
     if needs:
         context.report.add(

@@ -1,4 +1,4 @@
-"""All checks of declarations, in the order in which a reader wants to hear of them."""
+"""Runs all checks of declarations, in the order in which findings are most useful."""
 
 from rtshcua.ground.checker.checks.contracts import check_contracts, check_durability, check_fallbacks, check_records
 from rtshcua.ground.checker.checks.missions import check_missions
@@ -37,6 +37,6 @@ CHECKS = (
 
 
 def check_declarations(context: CheckContext) -> None:
-    """Report everything that is wrong with the declarations of a program."""
+    """Report all findings on the declarations of a program."""
     for check in CHECKS:
         check(context)

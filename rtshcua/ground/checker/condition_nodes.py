@@ -1,4 +1,4 @@
-"""What conditions and values are made of: one place that knows every node."""
+"""The children of the nodes of conditions and values."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -25,7 +25,7 @@ from rtshcua.model.ir.expression import (
 Part = Condition | Value | Grow
 
 
-#: of each kind of node that consists of others, which
+#: the fields with children, for each kind of node
 _CHILDREN: dict[type, Callable[[Any], tuple[Part, ...]]] = {
     **dict.fromkeys((Arithmetic, Comparison, Near), lambda node: (node.left, node.right)),
     **dict.fromkeys((Function, Junction), lambda node: node.operands),
@@ -38,13 +38,13 @@ _CHILDREN: dict[type, Callable[[Any], tuple[Part, ...]]] = {
 
 
 def children(node: Part) -> tuple[Part, ...]:
-    """The conditions and values that a node consists of, in source order."""
+    """The direct children of a node, in source order."""
     parts = _CHILDREN.get(type(node))
     return () if parts is None else parts(node)
 
 
 def walk(node: Part) -> Iterator[Part]:
-    """A node and all that it consists of, at any depth, in source order."""
+    """A node and all its descendants, in source order."""
     stack = [node]
     while stack:
         part = stack.pop()

@@ -1,4 +1,4 @@
-"""Conditions are well typed: comparisons, memberships, zones, phases, `is known`, and what is observed over time."""
+"""Check the types of conditions: comparisons, memberships, zones, phases, `is known`, temporal operators."""
 
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.condition_nodes import Part, children, walk
@@ -34,7 +34,7 @@ from rtshcua.model.quantity import Datum, Dimension, display
 
 
 def check_inside(scope: Scope, node: Inside) -> None:
-    """Where the vehicle is, where an argument is, or whether a zone argument lies within a zone."""
+    """Check `inside` and `outside`: of the vehicle's position, or of a position or zone argument."""
     region = node.region.zone if isinstance(node.region, Grow) else node.region
     if isinstance(node.region, Grow):
         _margin(scope, node.region.margin)
@@ -67,7 +67,7 @@ def check_inside(scope: Scope, node: Inside) -> None:
 
 
 def _margin(scope: Scope, node: Value) -> None:
-    """A margin is a length that is known at compile time, in whole mm."""
+    """Check a margin: a constant length in whole mm."""
     found = typed(scope, node)
     if found is None:
         return
@@ -103,7 +103,7 @@ def is_phase(scope: Scope, node: Value) -> bool:
 
 
 def is_about_phase(part: Part) -> bool:
-    """Whether a condition itself, not what it consists of, asks for the mission's phase; nothing else is called so."""
+    """Whether a condition itself, not its children, reads the mission's phase."""
     match part:
         case Comparison():
             subject = part.left
@@ -115,7 +115,7 @@ def is_about_phase(part: Part) -> bool:
 
 
 def phase_compared(scope: Scope, node: Comparison) -> None:
-    """`phase == x`, `phase != x`."""
+    """Check `phase == x` and `phase != x`."""
     name = node.right
     if not is_phase(scope, node.left):
         _report(scope, node.left, "`phase` must be the left side of a comparison")
@@ -162,7 +162,7 @@ def check_unturned(scope: Scope, node: Not | Edge) -> None:
 
 
 def _enumeration(scope: Scope, node: Value) -> Type | None:
-    """The enumeration that a name's declaration gives to its value, if it does."""
+    """The enumeration type of a name's declaration, if any."""
     if isinstance(node, Reference):
         found = scope.find(node.name)
         if found is not None:
@@ -173,7 +173,7 @@ def _enumeration(scope: Scope, node: Value) -> Type | None:
 
 
 def _names_type(scope: Scope, node: Value, other: Value) -> bool:
-    """Whether an enumeration is named where its value is meant, and compared with one of its members."""
+    """Whether the name of an enumeration, instead of a signal, is compared with one of its members."""
     if not isinstance(node, Reference) or not isinstance(other, Reference) or scope.find(node.name) is not None:
         return False
     enum = scope.symbols.enums.get(node.name)
@@ -181,13 +181,13 @@ def _names_type(scope: Scope, node: Value, other: Value) -> bool:
 
 
 def check_comparison(scope: Scope, node: Comparison) -> None:
-    """`left operator right`."""
+    """Check `left operator right`."""
     if is_phase(scope, node.left):
         phase_compared(scope, node)
         return
     asked = _enumeration(scope, node.left)
     for enum, member in ((node.left, node.right), (node.right, node.left)):
-        if _names_type(scope, enum, member):  # a signal of that type is meant, and the member is right
+        if _names_type(scope, enum, member):  # only the enumeration is reported, the member is right
             typed(scope, enum)
             return
     left = typed(scope, node.left, _enumeration(scope, node.right) if asked is None else None)
@@ -208,7 +208,7 @@ def check_comparison(scope: Scope, node: Comparison) -> None:
 
 
 def _same(scope: Scope, node: Comparison, left: Typed, right: Typed) -> None:
-    """Both sides of one dimension and datum; a literal length takes the datum of an altitude above home."""
+    """Check that both sides have the same dimension and datum; a literal length becomes an altitude above home."""
     if left.type == right.type:
         check_compared(scope, node, left, right)
         return
@@ -238,7 +238,7 @@ def _lengths(left: Typed, right: Typed) -> bool:
 
 
 def _enumerated(scope: Scope, node: Comparison, left: Typed, right: Typed) -> None:
-    """A name's value against a constant of its enumeration; only an `enum` has an order."""
+    """Check an enumeration against one of its constants; only an `enum` has an order."""
     enumeration = left.type.enumeration
     assert enumeration is not None
     if (left.constant is None) == (right.constant is None):
@@ -260,7 +260,7 @@ def _enumerated(scope: Scope, node: Comparison, left: Typed, right: Typed) -> No
 
 
 def _clock(scope: Scope, node: Comparison, left: Typed, right: Typed) -> None:
-    """`local time` before or after a time of day that is written out; what is meant is a part of the same day."""
+    """Check `local time` against a constant time of day, with an order only."""
     if left.type != right.type:
         odd, other = (node.left, left) if right.type == TIME_OF_DAY else (node.right, right)
         message = (
@@ -291,7 +291,7 @@ def _incomparable(scope: Scope, node: Comparison, left: Typed) -> None:
 
 
 def check_within(scope: Scope, node: Within) -> None:
-    """`subject in low .. high`."""
+    """Check `subject in low .. high`."""
     if is_phase(scope, node.subject):
         phase_in_range(scope, node)
         return
@@ -343,9 +343,9 @@ def check_within(scope: Scope, node: Within) -> None:
 
 
 def check_one_of(scope: Scope, node: OneOf) -> None:
-    """`subject in {a, b}`."""
+    """Check `subject in {a, b}`."""
     if is_phase(scope, node.subject):
-        return  # any name may be a phase's
+        return  # any name may be that of a phase
     subject = typed(scope, node.subject)
     if subject is None:
         return
@@ -368,7 +368,7 @@ Temporal = ForLast | WithinLast | Near | Edge
 
 
 def check_window(scope: Scope, window: Quantity) -> None:
-    """A window is a duration above zero that fits on board."""
+    """Check a window: a duration above zero, within the onboard history."""
     if typed(scope, window, DURATION) is None or 0 < window.value <= MAX_WINDOW:
         return
     longer = window.value > 0
@@ -383,7 +383,7 @@ def check_window(scope: Scope, window: Quantity) -> None:
 
 
 def check_observable(scope: Scope, node: Temporal) -> None:
-    """Report what the condition under a temporal operator, at any depth, may not read."""
+    """Report the phase, arguments and inexact zones under a temporal operator, at any depth."""
     for part in walk(node):
         if is_about_phase(part):
             scope.report.add(
@@ -409,8 +409,8 @@ def check_observable(scope: Scope, node: Temporal) -> None:
 
 
 def _exact(scope: Scope, edge: Edge) -> None:
-    """Report a zone under an edge that is not known exactly: a grown one, or one whose band is above sea where some
-    vehicle's elevation is known to within an error only.
+    """Report an inexact zone under an edge: a grown one, or one with a band above sea if the elevation of a vehicle has
+    an error.
     """
     for part in walk(edge.operand):
         if isinstance(part, Inside) and not isinstance(part.region, Grow):
@@ -448,7 +448,7 @@ def _banded(scope: Scope, edge: Edge, region: Reference) -> None:
 
 
 def check_condition(scope: Scope, node: Condition, *, observed: bool = False) -> None:
-    """Report everything in a condition that has no meaning; `observed` where a temporal operator stands around it."""
+    """Report all findings on a condition; `observed` if it is under a temporal operator."""
     match node:
         case Comparison():
             check_comparison(scope, node)
@@ -478,7 +478,7 @@ def check_condition(scope: Scope, node: Condition, *, observed: bool = False) ->
 
 
 def references(node: Part) -> list[Reference]:
-    """All names that a condition refers to, in source order; the names of phases are none, nor is `phase`."""
+    """All names that a condition refers to, in source order, without `phase` and the names of phases."""
     parts = tuple(walk(node))
     phases = {name for part in parts if is_about_phase(part) for name in children(part)}
     return [part for part in parts if isinstance(part, Reference) and part not in phases]

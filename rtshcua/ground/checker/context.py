@@ -1,4 +1,4 @@
-"""What every check is given: the program's names, the dialect, and where to report."""
+"""The context of all checks: the program's names, the dialect, and the report."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -17,18 +17,18 @@ from rtshcua.model.ir.places import ZoneDecl
 from rtshcua.model.ir.policies import RuleDecl, TemplateDecl
 from rtshcua.model.ir.skills import ArgumentValue, LinkDecl, SkillDecl
 
-#: what has parameters
+#: declarations with parameters
 Parametric = SkillDecl | TemplateDecl | MissionDecl
 
-#: what an argument is bound to: a canonical integer (a choice's ordinal too), a zone, or a place
+#: the value of an argument: a canonical integer (for a choice its ordinal), a zone, or coordinates
 Bound = int | ZoneDecl | Coordinates
 
-#: what calls a skill with arguments
+#: nodes that call a skill with arguments
 Call = Step | LinkDecl
 
 
 class Instance(NamedTuple):
-    """A mission with values for its parameters, and labels that say which."""
+    """A mission with values for its parameters, and labels with these values."""
 
     mission: MissionDecl
     labels: tuple[tuple[Span, str], ...]
@@ -36,12 +36,12 @@ class Instance(NamedTuple):
 
 @dataclass(slots=True)
 class CheckContext:
-    """One compilation's checks.
+    """The context of one compilation's checks.
 
-    What the arguments of a call were bound to is kept by its skill and the arguments as written, the place included
-    (`bind`, `bound`); `given` has the values that premises give to signals, by the signal's name and the value as
-    written. `instances` has, of each mission with parameters, those that are checked; `samples` the rules of templates
-    that no policy uses, with values that their parameters might have. `data` are the files that zones are read from.
+    `bind` and `bound` keep the bound arguments of a call by its skill and the written arguments with their spans.
+    `given` has the values of signals in premises, by the signal's name and the written value. `instances` has the
+    checked instances of each mission with parameters. `samples` has the rules of unused templates, with sample values.
+    `data` has the zone files.
     """
 
     symbols: Symbols
@@ -56,21 +56,21 @@ class CheckContext:
     _plain: Scope | None = None
 
     def scope(self) -> Scope:
-        """Signals and zones, and no argument."""
+        """The scope of signals and zones, without arguments."""
         if self._plain is None:
             self._plain = Scope(self.symbols, self.report)
         return self._plain
 
     def bind(self, call: Call, arguments: tuple[Bound, ...]) -> None:
-        """Keep what the arguments of a call mean, one for each parameter of its skill, for the lowering."""
+        """Keep the bound arguments of a call, one for each parameter of its skill, for the lowering."""
         self._bound[call.skill.text, call.arguments] = arguments
 
     def bound(self, call: Call) -> tuple[Bound, ...]:
-        """What the arguments of a call mean that was checked and in which nothing was found."""
+        """Return the bound arguments of a checked call without findings."""
         return self._bound[call.skill.text, call.arguments]
 
     def arguments(self, skill: Parametric) -> dict[str, Argument]:
-        """The parameters of a skill, a template or a mission that have a type, by name."""
+        """Return the parameters of a skill, a template or a mission with a valid type, by name."""
         found = self._arguments.get(skill.name.span)  # each declaration's name stands in a place of its own
         if found is None:
             found = self._arguments[skill.name.span] = {}
@@ -84,7 +84,7 @@ class CheckContext:
         return found
 
     def missions(self) -> Iterator[MissionDecl]:
-        """Every mission; one with parameters, for each of the values that it is checked with, which findings tell."""
+        """Every mission; one with parameters is repeated for each set of values, which findings name."""
         for name, mission in self.symbols.missions.items():
             instances = self.instances.get(name, (Instance(mission, ()),))
             for instance in instances:
@@ -92,5 +92,5 @@ class CheckContext:
                     yield instance.mission
 
     def scope_of(self, skill: SkillDecl) -> Scope:
-        """What the clauses of a skill may name."""
+        """The scope of a skill's clauses."""
         return Scope(self.symbols, self.report, self.arguments(skill))

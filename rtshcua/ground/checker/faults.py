@@ -1,4 +1,4 @@
-"""E1601: a fault as a source writes it, against the kinds of faults that there are."""
+"""Check the faults of scenarios against the known kinds of faults."""
 
 from typing import Any
 
@@ -16,16 +16,16 @@ from rtshcua.model.ir.scenarios import FaultCall
 from rtshcua.model.ir.skills import ArgumentValue
 from rtshcua.model.quantity import Dimension, display
 
-#: the kinds by the name that sources write
+#: the kinds of faults by their names in sources
 NAMED = {name.replace("-", "_"): kind for name, kind in KINDS.items()}
 WHOLE = 10_000  # 100 %
 FULL_TURN = 360
-#: how often a document comes at most
+#: the most copies of a document
 MAX_COPIES = 1_000
 
 
 def fault_of(context: CheckContext, call: FaultCall) -> Fault | None:
-    """The fault that a source describes, at the time 0; None after a finding."""
+    """Return the fault of a source, at time 0; None after a finding."""
     if not one_of(context, codes.UNKNOWN_FAULT, call.name, NAMED, "fault"):
         return None
     kind = NAMED[call.name.text]
@@ -45,7 +45,7 @@ def fault_of(context: CheckContext, call: FaultCall) -> Fault | None:
 
 
 def example(parameter: FaultField) -> str:
-    """What would be accepted for a parameter."""
+    """An example of an accepted value."""
     if parameter.words:
         return parameter.words[0]
     if parameter.is_name:
@@ -55,7 +55,7 @@ def example(parameter: FaultField) -> str:
 
 
 def _given(context: CheckContext, call: FaultCall, known: dict[str, FaultField]) -> dict[str, ArgumentValue]:
-    """The arguments that have the name of a parameter, each once."""
+    """The arguments by the name of their parameter; reports all others."""
     report, given = context.report, dict[str, ArgumentValue]()
     takes = f"its arguments are {listed(known)}" if known else "it takes no arguments"
     for argument in call.arguments:
@@ -93,7 +93,7 @@ def _given(context: CheckContext, call: FaultCall, known: dict[str, FaultField])
 
 
 def _value(context: CheckContext, call: FaultCall, parameter: FaultField, value: Value) -> Any:
-    """The value as the kind has it; anything after a finding."""
+    """The value for the fault's field; meaningless after a finding."""
     if parameter.words:
         return _word(context, call, parameter, value)
     if parameter.is_name:
@@ -174,7 +174,7 @@ def _number(context: CheckContext, parameter: FaultField, value: Value) -> int |
 
 
 def _fits(context: CheckContext, parameter: FaultField, value: Value, least: int, dimension: Dimension) -> bool:
-    """Whether a number is one that such a fault can have; reports it where it is not."""
+    """Whether a number is in the range of a field; reports it if not."""
     written = context.report.text(value.span)
     if least < 0 and parameter.name not in SIGNED:
         context.report.add(codes.NOT_POSITIVE, value.span, f"`{written}` must not be negative")

@@ -1,4 +1,4 @@
-"""Help for the fields of a declaration: quantities of one dimension, and names from a fixed list."""
+"""Checks of fields of declarations: quantities of one dimension, and names from a fixed list."""
 
 from collections.abc import Collection, Mapping
 
@@ -14,7 +14,7 @@ from rtshcua.model.ir.expression import Coordinates, Quantity
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.quantity import Datum, Dimension, display
 
-#: the largest number of each dimension that is kept on board
+#: the largest onboard value of each dimension
 LARGEST: Mapping[Dimension, int] = {
     Dimension.LENGTH: MAX_COORDINATE,
     Dimension.ALTITUDE: HIGHEST - 1,
@@ -29,7 +29,7 @@ LARGEST: Mapping[Dimension, int] = {
 ABOVE_SEA = number(Dimension.ALTITUDE, Datum.SEA)
 MAX_ELEVATION = 9_000_000  # mm: no ground is higher
 
-#: the local projection has no use nearer to a pole (1e-7 degree)
+#: the local projection is not valid nearer to a pole (1e-7 degree)
 MAX_LATITUDE = 850_000_000
 MAX_LONGITUDE = 1_800_000_000
 
@@ -42,7 +42,7 @@ def quantity(
     positive: bool = True,
     most: int | None = None,
 ) -> None:
-    """Report a field that is no quantity of `dimension`, not above zero where it must be, or larger than fits."""
+    """Report a field of another dimension, below its minimum, or too large."""
     if node is None or not _is(context, node, number(dimension)):
         return
     size(context, node, dimension, node.value, most)
@@ -57,25 +57,25 @@ def quantity(
 
 
 def height(context: CheckContext, node: Quantity | None) -> None:
-    """Report a field that is no altitude, above home or above sea."""
+    """Report a field that is not an altitude, above home or above sea."""
     expected = HEIGHT if node is None or node.datum is not Datum.SEA else ABOVE_SEA
     if node is not None and _is(context, node, expected):
         size(context, node, Dimension.ALTITUDE, node.value)
 
 
 def elevation(context: CheckContext, node: Quantity | None) -> None:
-    """Report a field that is no altitude above sea."""
+    """Report a field that is not an altitude above sea."""
     if node is not None and _is(context, node, ABOVE_SEA):
         size(context, node, Dimension.ALTITUDE, node.value, MAX_ELEVATION)
 
 
 def _is(context: CheckContext, node: Quantity, expected: Type) -> bool:
-    """Whether a number is of a type; reports it where it is not."""
+    """Whether a number has a type; reports it if not."""
     return number(node.dimension, node.datum) is expected or typed(context.scope(), node, expected) is not None
 
 
 def size(context: CheckContext, node: Node, dimension: Dimension, value: int, most: int | None = None) -> bool:
-    """Whether a number of a dimension fits on board; reports it where it does not."""
+    """Whether a number of a dimension fits on board; reports it if not."""
     limit = LARGEST[dimension] if most is None else most
     if abs(value) <= limit:
         return True
@@ -89,7 +89,7 @@ def size(context: CheckContext, node: Node, dimension: Dimension, value: int, mo
 
 
 def one_of(context: CheckContext, code: Code, name: Name, known: Collection[str], what: str) -> bool:
-    """Whether a name is among the known ones; reports it when it is not."""
+    """Whether a name is known; reports it if not."""
     if name.text in known:
         return True
     context.report.add(
@@ -103,7 +103,7 @@ def one_of(context: CheckContext, code: Code, name: Name, known: Collection[str]
 
 
 def on_globe(context: CheckContext, place: Coordinates) -> bool:
-    """Whether coordinates can be projected; reports them when they cannot."""
+    """Whether coordinates can be projected; reports them if not."""
     if abs(place.latitude) <= MAX_LATITUDE and abs(place.longitude) <= MAX_LONGITUDE:
         return True
     context.report.add(

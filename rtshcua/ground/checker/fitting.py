@@ -1,4 +1,4 @@
-"""Whether a value is of the type that is asked for, and what would be, in units and datum."""
+"""Check a value against an expected type, and suggest the unit or datum that fits."""
 
 from fractions import Fraction
 from math import floor
@@ -15,7 +15,7 @@ from rtshcua.model.quantity import UNITS, Datum, Dimension, display
 
 
 def fit(scope: Scope, node: Value, found: Typed, expected: Type, asked: tuple[Span, str] | None = None) -> Typed | None:
-    """`found` as a value of type `expected`; a constant length is an altitude above home where one is asked."""
+    """Return `found` as a value of type `expected`; a constant length may become an altitude above home."""
     if found.type == expected:
         return found
     is_altitude = expected.dimension is Dimension.ALTITUDE
@@ -46,7 +46,7 @@ def fit(scope: Scope, node: Value, found: Typed, expected: Type, asked: tuple[Sp
 
 
 def stored(scope: Scope, node: Value, type: Type, constant: Fraction) -> int | None:
-    """A constant as the whole number in which it is kept on board; None, and reported (E0302), where it is none."""
+    """Return a constant as a whole canonical number; None after a finding if it is not whole."""
     if constant.denominator == 1:
         return constant.numerator
     assert type.dimension is not None
@@ -87,7 +87,7 @@ def _accepted(scope: Scope, node: Value, expected: Type, replacement: str | None
 
 
 def _corrected(scope: Scope, node: Value, found: Typed, expected: Type) -> str | None:
-    """The literal with the unit or the datum that was asked, or a zone's entry, where that is likely what was meant."""
+    """The probable correction: the literal with the expected unit or datum, or a zone's entry."""
     zone = scope.find(node.name) if isinstance(node, Reference) and expected == POSITION else None
     if isinstance(zone, ZoneDecl):
         return None if zone.entry is None else f"{zone.name.text}{ENTRY}"
@@ -105,7 +105,7 @@ def _corrected(scope: Scope, node: Value, found: Typed, expected: Type) -> str |
 
 
 def declaration_labels(scope: Scope, node: Value) -> list[tuple[Span, str]]:
-    """A label that points at the declaration of a name, for a value that is just a name."""
+    """A label at the declaration of a name, if the value is a single name."""
     if not isinstance(node, Reference):
         return []
     found = scope.find(node.name)

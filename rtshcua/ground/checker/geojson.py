@@ -1,11 +1,11 @@
-"""Areas from GeoJSON (RFC 7946): one Polygon or MultiPolygon, of a file that holds it alone or among features.
+"""Areas from GeoJSON (RFC 7946): one Polygon or MultiPolygon of a file, alone or among features.
 
-Read strictly, for a zone is what the policy's signer saw: no key twice, no NaN, no ring that is not closed. Numbers are
-decimal digits until they are whole 1e-7 degrees (rounded to the nearest, half to even: at most 6 mm on the ground), so
-that no float decides on which side of a fence a place lies.
+The parser is strict, because the signer of a policy must see the same zone: no repeated key, no NaN, no open ring.
+Numbers stay decimal until they are whole 1e-7 degrees (rounded to the nearest, half to even: at most 6 mm on the
+ground), so that no float decides on which side of a fence a place is.
 
-`DataFiles` reads each file once. Sections 2, 3.2 and 3.3 of the RFC say which geometry is meant; members that speak of
-heights, times and radii, which no zone takes over, are warned of.
+`DataFiles` reads each file once. Sections 2, 3.2 and 3.3 of the RFC define which geometry is selected. Heights, times
+and radii, which a zone ignores, are refused.
 """
 
 import json
@@ -32,7 +32,7 @@ from rtshcua.model.ir.places import GeoJson
 
 
 class NoArea(Exception):
-    """The text has no such area: what is wrong, and what would help."""
+    """Raised when a file has no valid area: the code, the message and a help."""
 
     def __init__(self, code: Code, message: str, help: str | None = None) -> None:
         super().__init__(message)
@@ -43,7 +43,7 @@ MOST_TOLD = 4
 
 
 class What(Enum):
-    """What a member's name says that it holds."""
+    """The kinds of members that a zone ignores."""
 
     HEIGHT = "height"
     TIME = "time"
@@ -51,7 +51,7 @@ class What(Enum):
     LENGTH = "length"
 
 
-#: parts of names, without what stands between their words; some of national feeds, French and German
+#: parts of names, without separators; some are of national feeds, French and German
 _STEMS = {
     What.HEIGHT: ("altitude", "ceiling", "height", "elevation", "vertical", "lowerlimit", "upperlimit", "hauteur",
                   "plafond", "plancher", "h\u00f6he", "hoehe", "obergrenze", "untergrenze"),
@@ -70,18 +70,18 @@ _WORDS = {
                 "dates"},
     What.RADIUS: {"extent", "buffer"},
 }  # fmt: skip
-#: a time in a name with such a word is of the record, not of the area
+#: a time in a name with such a word is that of the record, not of the area
 _OF_THE_RECORD = {
     "created", "creation", "edit", "edited", "editor", "modified", "modification", "update", "updated", "changed",
     "issued", "published", "imported", "exported", "downloaded", "retrieved", "surveyed", "captured", "generated",
 }  # fmt: skip
-#: names that are known to say something else
+#: names with another meaning
 _HARMLESS = {"admin_level"}
 _NAMES = {"id", "name", "title"}
-#: what RFC 7946 itself calls so, and what is looked at apart
+#: members of RFC 7946 itself, and members with a check of their own
 _STRUCTURE = {"type", "coordinates", "geometry", "geometries", "features", "crs", "bbox"}
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
-#: a text that is one length, with what it counts from, or a flight level
+#: a string that is one length, with its datum, or a flight level
 _LENGTH = re.compile(
     r"\s*(?:FL\s*[0-9]{1,3}|[+-]?[0-9]+(?:[.,][0-9]+)?\s*(?:m|ft|feet|met(?:er|re)s?|km|nm))"
     r"(?:\s*(?:agl|amsl|msl|asl|gnd|sfc))?\s*",
@@ -90,8 +90,8 @@ _LENGTH = re.compile(
 
 
 def refuse_unread(tree: dict[str, Any], pointer: str = "") -> None:
-    """Raises `NoArea` where an object of GeoJSON has such members, at whatever depth, in a feature's geometry
-    too; the features of a collection are not looked at.
+    """Raise `NoArea` if an object has members that a zone ignores, at any depth, also in a feature's geometry; the
+    features of a collection are not examined.
     """
     found = [*_members(tree.get("geometry"), f"{pointer}/geometry"), *_members(tree, pointer)]
     if not found:
@@ -108,7 +108,7 @@ _HELP = (
 
 
 def refuse_height(numbers: list[str], pointer: str) -> None:
-    """Raises `NoArea` where a position (RFC 7946, 3.1.1) has a third number other than zero."""
+    """Raise `NoArea` if a position (RFC 7946, 3.1.1) has a third number other than zero."""
     for text in numbers[2:]:
         if Decimal(text):
             raise NoArea(
@@ -119,7 +119,7 @@ def refuse_height(numbers: list[str], pointer: str) -> None:
 
 
 def said_by(name: str) -> What | None:
-    """What a member holds by its name; None for what is harmless."""
+    """Return the kind of a member by its name; None if it is harmless."""
     if name in _HARMLESS:
         return None
     words = {word.casefold() for word in _WORD.findall(name)}
@@ -161,8 +161,8 @@ def _members(tree: Any, pointer: str) -> Iterator[tuple[str, What]]:
 AREAS = ("Polygon", "MultiPolygon")
 #: RFC 7946, 1.4
 GEOMETRIES = ("Point", "MultiPoint", "LineString", "MultiLineString", *AREAS, "GeometryCollection")
-#: the one reference system of RFC 7946, 4, as files name it that were written before it. The register of EPSG has the
-#: latitude of 4326 first; GeoJSON has the longitude first, whatever a `crs` says (GeoJSON 2008, 2.1.1)
+#: names of the only reference system of RFC 7946, 4, in older files. EPSG 4326 has the latitude first; GeoJSON has the
+#: longitude first, with any `crs` (GeoJSON 2008, 2.1.1)
 _WGS84 = re.compile(
     r"urn:ogc:def:crs:OGC:[0-9.]*:CRS84|OGC:CRS84|(?:urn:ogc:def:crs:)?EPSG:(?:[0-9.]*:)?4326"
     r"|https?://www\.opengis\.net/(?:def/crs/OGC/1\.3/CRS84|def/crs/EPSG/0/4326|gml/srs/epsg\.xml#4326)|WGS ?84",
@@ -172,7 +172,7 @@ MOST_NAMED = 5
 
 
 def chosen(tree: Any, feature: str | None) -> tuple[dict[str, Any], str]:
-    """The Polygon or MultiPolygon that is meant, and the JSON pointer to it."""
+    """Return the selected Polygon or MultiPolygon, and the JSON pointer to it."""
     kind = tree.get("type") if isinstance(tree, dict) else None
     if not isinstance(kind, str) or kind not in (*GEOMETRIES, "Feature", "FeatureCollection"):
         raise NoArea(
@@ -194,7 +194,7 @@ def chosen(tree: Any, feature: str | None) -> tuple[dict[str, Any], str]:
 
 
 def _among(tree: dict[str, Any], feature: str | None) -> tuple[dict[str, Any], str]:
-    """The feature of that name, or the only one that is an area."""
+    """The feature of that name, or the only area."""
     features = tree.get("features")
     if not isinstance(features, list):
         raise NoArea(codes.NOT_GEOJSON, "its `/features` is not an array (RFC 7946, 3.3)")
@@ -220,7 +220,7 @@ def _among(tree: dict[str, Any], feature: str | None) -> tuple[dict[str, Any], s
 
 
 def _geometry(feature: dict[str, Any], pointer: str) -> tuple[dict[str, Any], str]:
-    """RFC 7946, 3.2: a Feature's geometry is a geometry object, or null where it has no place."""
+    """RFC 7946, 3.2: the geometry of a Feature is a geometry object, or null without a place."""
     _reference_system(feature)
     refuse_unread(feature, pointer)
     geometry = feature.get("geometry")
@@ -245,7 +245,7 @@ def _area(geometry: Any, pointer: str) -> tuple[dict[str, Any], str]:
 
 
 def _is_area(geometry: Any) -> bool:
-    """Whether a zone might be meant by it: also what is refused then, such as the circles of ED-318."""
+    """Whether a geometry may describe a zone, also one that is refused later, such as a circle of ED-318."""
     if not isinstance(geometry, dict):
         return False
     inner = geometry.get("geometries")
@@ -257,7 +257,7 @@ def _is_area(geometry: Any) -> bool:
 
 
 def _names(feature: dict[str, Any]) -> Iterator[str]:
-    """What a feature is called: its id, a text or a number (RFC 7946, 3.2), and its property `name`."""
+    """The names of a feature: its id, a string or a number (RFC 7946, 3.2), and its property `name`."""
     properties = feature.get("properties")
     for each in (feature.get("id"), properties.get("name") if isinstance(properties, dict) else None):
         text = getattr(each, "text", each)
@@ -266,7 +266,7 @@ def _names(feature: dict[str, Any]) -> Iterator[str]:
 
 
 def _known(features: list[dict[str, Any]], wanted: str | None = None) -> str | None:
-    """A hint at the features' names."""
+    """A help with the names of the features."""
     names = [name for name in dict.fromkeys(name for each in features for name in _names(each)) if name.isprintable()]
     near = None if wanted is None else nearest(wanted, names)
     if near is not None:
@@ -278,8 +278,7 @@ def _known(features: list[dict[str, Any]], wanted: str | None = None) -> str | N
 
 
 def _reference_system(tree: dict[str, Any]) -> None:
-    """RFC 7946, 4: all positions are WGS 84; a `crs`, as files had before, must say the same,
-    wherever it stands (GeoJSON 2008, 3)."""
+    """RFC 7946, 4: all positions are WGS 84. A `crs` of an older file must be the same (GeoJSON 2008, 3)."""
     crs = tree.get("crs")
     properties = crs.get("properties") if isinstance(crs, dict) else None
     name = properties.get("name") if isinstance(properties, dict) else None
@@ -292,62 +291,62 @@ def _reference_system(tree: dict[str, Any]) -> None:
         )
 
 
-#: a FeatureCollection's MultiPolygon takes nine, foreign members (RFC 7946, 6.1) may take some more
+#: the MultiPolygon of a FeatureCollection needs nine levels; foreign members (RFC 7946, 6.1) may need more
 MAX_DEPTH = 32
-#: objects, lists, texts and numbers of a file beside its positions; keys are none of them. Of positions, which are
-#: lists of two or three numbers, there may be as many as there is room for: borders of countries have hundreds of
-#: thousands. Those of one area are few, and no others are read
+#: the most objects, lists, strings and numbers of a file, without keys and positions. The number of positions is only
+#: limited by the size of the file, because borders of countries have hundreds of thousands. Only those of the selected
+#: area are read
 MAX_VALUES = 250_000
 #: characters of a number: a double needs no more than 24
 MAX_NUMBER = 64
 MAX_EXPONENT = 3  # digits; that of a double has no more
-#: a local projection has no use nearer to a pole
+#: the local projection is not valid nearer to a pole
 MAX_LATITUDE, MAX_LONGITUDE = 85, 180
-#: positions that stand beside one another are left as they are written until they are asked for: to read each of the
-#: millions that a file may have takes seconds, and hundreds of megabytes. A pattern keeps a place for each of these
+#: adjacent positions stay unparsed until they are needed: reading all of the millions in a file takes seconds and
+#: hundreds of megabytes. The pattern keeps a place for each of its repetitions
 _RUN = 1_000
 _SPACE = rb"[ \t\n\r]*+"
 _NUMBER = rb"%b-?(?:0|[1-9][0-9]*+)(?:\.[0-9]++)?(?:[eE][+-]?[0-9]++)?%b" % (_SPACE, _SPACE)
 _POSITION = rb"\[%b,%b(?:,%b)?\]" % (_NUMBER, _NUMBER, _NUMBER)
-#: a text, or the beginning of one; what is no number of JSON; a run of positions
+#: a string, or the beginning of one; a number that is invalid in JSON; a run of positions
 _PART = re.compile(rb'"[^"]*+"?|NaN|%b(?:%b,%b%b){0,%d}' % (_POSITION, _SPACE, _SPACE, _POSITION, _RUN - 1))
-#: what stands for a run while the rest is read
+#: the stand-in for a run while the rest is parsed
 _STAND_IN = "NaN"
 _DEGREE = Decimal(10_000_000)
 _AS_BRACKETS = bytes.maketrans(b"{}", b"[]")
 _NO_BRACKETS = bytes(each for each in range(256) if each not in b"[]{}")
 
-#: corners of one ring as (longitude, latitude) in 1e-7 degree, not closed by a repeated corner
+#: the corners of one ring as (longitude, latitude) in 1e-7 degree, without the closing corner
 GeoRing = tuple[Point, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class GeoPolygon:
-    """An outer ring and the holes in it."""
+    """An exterior ring and its holes."""
 
     outer: GeoRing
     holes: tuple[GeoRing, ...]
 
 
 class Number(msgspec.Struct, frozen=True, gc=False):
-    """A number as it is written."""
+    """A number as written."""
 
     text: str
 
 
 class Run(msgspec.Struct, frozen=True, eq=False, gc=False):
-    """Positions that stand beside one another in a text, as they are written there: from `start` to `end`."""
+    """Adjacent positions in a text, unparsed, from `start` to `end`."""
 
     data: bytes
     start: int
     end: int
 
     def count(self) -> int:
-        """How many."""
+        """The number of positions."""
         return self.data.count(b"[", self.start, self.end)
 
     def read(self) -> list[list[Number]]:
-        """The positions. Raises `NoArea` for a number that is too long."""
+        """Parse the positions. Raises `NoArea` if a number is too long."""
         found: list[list[Number]] = _read(f"[{self.data[self.start : self.end].decode()}]", _no_number)
         return found
 
@@ -357,7 +356,7 @@ def _not_json(message: str) -> NoArea:
 
 
 def read_area(data: bytes, feature: str | None) -> tuple[GeoPolygon, ...]:
-    """The polygons of the one area in a file, or of the feature with that id or name; raises `NoArea`."""
+    """Return the polygons of the only area in a file, or of the feature with that id or name; raises `NoArea`."""
     kind = recognised(data)
     if kind is not None and kind is not GEOJSON:
         raise NoArea(codes.NOT_GEOJSON, f"it is {kind.name}, not GeoJSON", kind.help or None)
@@ -369,7 +368,7 @@ def read_area(data: bytes, feature: str | None) -> tuple[GeoPolygon, ...]:
 
 
 def _json(data: bytes) -> Any:
-    """The value of a text; numbers stay as they are written, and positions that stand side by side are a `Run`."""
+    """Parse JSON. Numbers stay as written, and adjacent positions are a `Run`."""
     try:
         data.decode("utf-8")
     except UnicodeDecodeError as error:
@@ -397,7 +396,10 @@ def _json(data: bytes) -> Any:
 
 
 class _Outline:
-    """A text with a stand-in for each run of positions; one of its own is a run of none. Raises `NoArea` for many."""
+    """A text with a stand-in for each run of positions. Raises `NoArea` for too many runs.
+
+    A stand-in that the text itself has is an empty run.
+    """
 
     def __init__(self, data: bytes) -> None:
         self._data = data
@@ -428,11 +430,11 @@ class _Outline:
         self.text = bytes(made)
 
     def runs(self) -> Iterator["Run"]:
-        """What the stand-ins stand for, in their order."""
+        """The runs of the stand-ins, in order."""
         return (Run(self._data, start, end) for start, end in zip(self._starts, self._ends, strict=True))
 
     def place(self, position: int) -> tuple[int, int]:
-        """The line and column, from 1, of the text itself at an octet of this."""
+        """The line and column of the original text, from 1, at a byte of the text with stand-ins."""
         shorter = 0
         for start, end in zip(self._starts, self._ends, strict=True):
             if start - shorter >= position:
@@ -457,9 +459,10 @@ def _nested() -> NoArea:
 
 
 def _too_deep(bare: bytes) -> bool:
-    """Whether brackets are nested too deep in what has no texts and no positions. Each round takes away the innermost,
-    all at once: one at a time costs seconds where a file has many. What is left over and not deep is no JSON, and is
-    told as that.
+    """Whether brackets are nested too deep, in a text without strings and positions.
+
+    Each round removes all innermost pairs at once, because one at a time takes seconds. Unbalanced brackets remain, and
+    the JSON parser reports them.
     """
     left = bare.translate(_AS_BRACKETS, _NO_BRACKETS)
     for _ in range(MAX_DEPTH):
@@ -484,7 +487,7 @@ def _no_number(text: str) -> NoArea:
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     made: dict[str, Any] = {}
     for key, value in pairs:
-        if key in made:  # RFC 7493, 2.3: names must be unique; RFC 8259 leaves open what else they mean
+        if key in made:  # RFC 7493, 2.3: names must be unique; RFC 8259 does not define repeated ones
             raise _not_json(f"an object repeats the key `{key}`")
         if isinstance(value, Run) and value.count() > 1:
             raise _not_json(f"the key `{key}` has several values without brackets")
@@ -500,7 +503,7 @@ def _polygons(geometry: dict[str, Any], pointer: str) -> tuple[GeoPolygon, ...]:
     pointer = f"{pointer}/coordinates"
     written = geometry.get("coordinates")
     count = _count(written)
-    if count > MAX_VERTICES + MAX_RINGS:  # what is really too much is known in the local plane
+    if count > MAX_VERTICES + MAX_RINGS:  # the exact limit is checked in the local plane
         raise NoArea(
             codes.GEOJSON_SHAPE,
             f"the area at `{pointer}` has {count:,} positions; the limit is {MAX_VERTICES:,} corners",
@@ -523,7 +526,7 @@ def _count(value: Any) -> int:
 
 
 def _laid_out(value: Any) -> Any:
-    """A value with its runs read: each of their positions is one of the list that they stand in."""
+    """A value with its runs parsed into the lists that contain them."""
     if isinstance(value, Run):
         return value.read()[0]
     if not isinstance(value, list):
@@ -538,7 +541,7 @@ def _laid_out(value: Any) -> Any:
 
 
 def _polygon(rings: Sequence[Any], pointer: str) -> GeoPolygon:
-    """RFC 7946, 3.1.6: the first ring is the exterior one, all others are holes."""
+    """RFC 7946, 3.1.6: the first ring is the exterior ring, all others are holes."""
     made = [_ring(_array(ring, f"{pointer}/{i}"), f"{pointer}/{i}") for i, ring in enumerate(rings)]
     if not made:
         raise NoArea(codes.GEOJSON_SHAPE, f"`{pointer}` has no ring")
@@ -547,7 +550,7 @@ def _polygon(rings: Sequence[Any], pointer: str) -> GeoPolygon:
 
 
 def _holes(rings: Sequence[GeoRing], pointer: str) -> None:
-    """RFC 7946, 3.1.6, as for a polygon in a source: all holes lie within the exterior ring, apart from each other."""
+    """RFC 7946, 3.1.6, as for a polygon in a source: all holes are inside the exterior ring and do not overlap."""
     met = touching_edges(rings)
     if met is not None:
         (one, i), (other, j) = met
@@ -571,8 +574,8 @@ def _holes(rings: Sequence[GeoRing], pointer: str) -> None:
 
 
 def _ring(positions: Sequence[Any], pointer: str) -> GeoRing:
-    """RFC 7946, 3.1.6: a closed line of four or more positions, whose first and last ones are identical. It goes around
-    either way: parsers should not reject polygons that do not follow the right-hand rule.
+    """RFC 7946, 3.1.6: a closed line of four or more positions, the first and last identical. Either orientation is
+    accepted: parsers should not reject polygons that do not follow the right-hand rule.
     """
     if len(positions) < 4:
         raise NoArea(
@@ -608,8 +611,8 @@ def _ring(positions: Sequence[Any], pointer: str) -> GeoRing:
 
 
 def _position(numbers: Sequence[Any], pointer: str) -> Point:
-    """RFC 7946, 3.1.1: longitude, latitude, and perhaps an altitude, which must be zero: a zone has its floor and its
-    ceiling in the source. WGS 84 by section 4.
+    """RFC 7946, 3.1.1: longitude, latitude, and an optional altitude, which must be zero: the source has the floor and
+    ceiling of a zone. WGS 84 by section 4.
     """
     if len(numbers) < 2 or not all(isinstance(each, Number) for each in numbers):
         raise NoArea(
@@ -633,7 +636,7 @@ def _position(numbers: Sequence[Any], pointer: str) -> Point:
 
 
 def _whole(degrees: Decimal) -> int:
-    """In 1e-7 degree, rounded to the nearest, half to even; exact, for no number has more digits than the context."""
+    """Degrees in 1e-7 degree, rounded to the nearest, half to even; exact, because the context has enough digits."""
     with localcontext(prec=4 * MAX_NUMBER, rounding=ROUND_HALF_EVEN):
         if degrees.adjusted() < -MAX_NUMBER:
             return 0
@@ -647,13 +650,13 @@ def _array(value: Any, pointer: str) -> Sequence[Any]:
 
 
 def _written(corner: Point) -> str:
-    """A position as it stands in a file."""
+    """A position as written in a file."""
     longitude, latitude = (Decimal(each) / _DEGREE for each in corner)
     return f"[{longitude}, {latitude}]"
 
 
 class DataFiles:
-    """`content` has the bytes of each file; `names` which of them is meant, by the source and the path as written."""
+    """The zone files: `content` has their bytes by name, `names` maps a source and the written path to a name."""
 
     def __init__(
         self, content: Mapping[str, bytes] | None = None, names: Mapping[tuple[str, str], str] | None = None
@@ -663,11 +666,11 @@ class DataFiles:
         self._areas: dict[tuple[str, str | None], tuple[GeoPolygon, ...] | NoArea] = {}
 
     def name(self, shape: GeoJson) -> str | None:
-        """The file that a zone is read from; None where it could not be read."""
+        """The name of a zone's file; None if it could not be read."""
         return self._names.get((shape.span.file, shape.path))
 
     def area(self, shape: GeoJson) -> tuple[GeoPolygon, ...] | NoArea | None:
-        """The polygons of a zone, or why there are none; None where the file could not be read."""
+        """The polygons of a zone, or the reason why there are none; None if the file could not be read."""
         name = self.name(shape)
         if name is None:
             return None

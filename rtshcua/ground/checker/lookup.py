@@ -1,4 +1,4 @@
-"""Declarations by the names that refer to them; what is not found is reported."""
+"""Find declarations by name, and report unknown names."""
 
 from collections.abc import Mapping
 from typing import TypeVar
@@ -53,12 +53,12 @@ def find_vehicle(context: CheckContext, name: Name) -> VehicleDecl | None:
 
 
 def find_flown(context: CheckContext, name: Name) -> MissionDecl | None:
-    """The mission of that name, where a source names it."""
+    """The mission of that name in a source."""
     return _find(context, name, context.symbols.missions, MissionDecl)
 
 
 def find_mission(context: CheckContext, name: str) -> MissionDecl | None:
-    """The mission of that name, asked for on the command line: there is no place to point at."""
+    """The mission of that name from the command line; a finding has no span."""
     found = context.symbols.missions.get(name)
     if found is None and name not in context.symbols.broken:
         context.report.add(

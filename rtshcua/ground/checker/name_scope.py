@@ -1,4 +1,4 @@
-"""What a name means at one place: a parameter of the skill in hand, a signal, a zone, a zone's entry."""
+"""The scope of names at one place: parameters of the current skill, signals, zones, and entries of zones."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -17,13 +17,13 @@ from rtshcua.model.ir.skills import ParameterDecl
 from rtshcua.model.quantity import Dimension
 
 LOCAL_TIME = "local time"
-#: the mission's phase, as a condition names it
+#: the name of the mission's phase in conditions
 PHASE = "phase"
 
 
 @dataclass(frozen=True, slots=True)
 class Argument:
-    """A parameter as seen inside its skill, or by a rule about it; `low`, `high` where it has a range."""
+    """A parameter as seen inside its skill, or by a rule; `low` and `high` if it has a range."""
 
     declaration: ParameterDecl
     type: Type
@@ -33,7 +33,7 @@ class Argument:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """The declared entry of a zone, a place."""
+    """The declared entry of a zone."""
 
     zone: ZoneDecl
     place: Coordinates
@@ -41,14 +41,14 @@ class Entry:
 
 @dataclass(slots=True)
 class Scope:
-    """The names that are visible at one place; a parameter is found first, and is never also something else."""
+    """The names that are visible at one place; parameters are found first."""
 
     symbols: Symbols
     report: Report
     arguments: Mapping[str, Argument] = field(default_factory=dict)
 
     def find(self, name: str) -> Argument | SignalDecl | ZoneDecl | Entry | None:
-        """What `name` stands for as a value, or None."""
+        """Return the declaration that `name` refers to as a value, or None."""
         argument = self.arguments.get(name)
         if argument is not None:
             return argument
@@ -65,7 +65,7 @@ class Scope:
         return None
 
     def type_of(self, found: Argument | SignalDecl | ZoneDecl | Entry) -> Type | None:
-        """The type of what was found; None where its own declaration is wrong, which is reported there."""
+        """Return the type of a declaration; None if the declaration has findings itself."""
         if isinstance(found, Argument):
             return found.type
         if isinstance(found, SignalDecl):
@@ -73,7 +73,7 @@ class Scope:
         return ZONE if isinstance(found, ZoneDecl) else POSITION
 
     def unknown(self, span: Span, name: str) -> None:
-        """Report a name that stands for no value here."""
+        """Report a name that is not a value here."""
         if name in self.symbols.broken or name.removesuffix(ENTRY) in self.symbols.broken:
             return
         kind = self.symbols.kind_of(name)
@@ -135,19 +135,19 @@ class Scope:
 
 
 def enumeration_of(declaration: EnumDecl) -> Enumeration:
-    """An `enum` as a set of values, ordered by value."""
+    """Return an `enum` as a set of values, ordered by value."""
     members = {member.name.text: member.value for member in declaration.members}
     return Enumeration(declaration.name.text, members, True, declaration.name.span)
 
 
 def choices_of(parameter: ParameterDecl) -> Enumeration:
-    """The choices of a `one of` parameter, numbered in the order in which they are written."""
+    """Return the choices of a `one of` parameter, numbered in source order."""
     members = {choice.text: ordinal for ordinal, choice in enumerate(parameter.choices)}
     return Enumeration(parameter.name.text, members, False, parameter.name.span)
 
 
 def signal_type(symbols: Symbols, signal: SignalDecl) -> Type | None:
-    """The type of a signal; an altitude's datum is that of the field it is read from."""
+    """Return the type of a signal; the datum of an altitude is that of its field."""
     name = signal.type.text
     if name == Dimension.ALTITUDE.value:
         source = signal.sources[0]
@@ -161,7 +161,7 @@ def signal_type(symbols: Symbols, signal: SignalDecl) -> Type | None:
 
 
 def parameter_type(parameter: ParameterDecl) -> Type | None:
-    """The type of a parameter, or None where nothing is called so."""
+    """Return the type of a parameter, or None if the type is unknown."""
     if parameter.choices:
         return Type(Kind.ENUMERATION, enumeration=choices_of(parameter))
     return NAMED.get(parameter.type.text)

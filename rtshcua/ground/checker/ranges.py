@@ -1,7 +1,7 @@
-"""E0325: a signal is compared with a value, or given one, that its fields cannot carry.
+"""Check values against the range of a signal, by its fields.
 
-A whole-number field carries what its type holds, two components make a magnitude, and a ratio is between 0 % and 100 %.
-Of a floating-point field nothing is said.
+The range of an integer field is that of its type. Two components make a magnitude. A ratio is between 0 % and 100 %. A
+floating-point field has no range.
 """
 
 from collections.abc import Iterable, Sequence
@@ -23,7 +23,7 @@ from rtshcua.model.ir.signals import SignalDecl
 from rtshcua.model.quantity import Dimension, display
 
 MAX_INTEGER: Final = (1 << 63) - 1
-#: what an integer field can hold, as far as it is kept on board
+#: the range of an integer field, within the onboard limits
 INTEGERS: Final = {
     f"{sign}int{bits}_t": (0, min((1 << bits) - 1, MAX_INTEGER)) if sign else (-(1 << bits - 1), (1 << bits - 1) - 1)
     for sign in ("", "u")
@@ -35,7 +35,7 @@ OPEN: Final = Extent(None, None)
 
 
 class Carrier(NamedTuple):
-    """A message and its fields of a number; a raw value `v` is `v * numerator / denominator` in the canonical unit."""
+    """A message and its numeric fields; a raw value `v` is `v * numerator / denominator` in the canonical unit."""
 
     message: str
     fields: Sequence[str]
@@ -44,7 +44,7 @@ class Carrier(NamedTuple):
 
 
 def carried(dialect: Dialect, dimension: Dimension, carriers: Iterable[Carrier]) -> Extent:
-    """What a signal can report that is read from one of these."""
+    """Return the range of a signal that is read from one of these fields."""
     each = [_carried(dialect, carrier) for carrier in carriers]
     lows, highs = [one.low for one in each if one.low is not None], [one.high for one in each if one.high is not None]
     low = min(lows) if each and len(lows) == len(each) else None
@@ -65,7 +65,7 @@ def _carried(dialect: Dialect, carrier: Carrier) -> Extent:
 
 
 def reported(dialect: Dialect, signal: SignalDecl, dimension: Dimension) -> Extent:
-    """What a declared signal of a number can report; its fields were found to measure it."""
+    """Return the range of a numeric signal, whose fields were checked."""
     units = UNITS[Dimension.LENGTH if dimension is Dimension.ALTITUDE else dimension]
     return carried(
         dialect,
@@ -82,7 +82,7 @@ def reported(dialect: Dialect, signal: SignalDecl, dimension: Dimension) -> Exte
 
 
 def accepted(extent: Extent, dimension: Dimension, value: Fraction | int) -> str:
-    """What a signal can have instead of a value."""
+    """Return the help on the range of a signal, with the value nearest to `value`."""
     low = "" if extent.low is None else f"from `{display(ceil(extent.low), dimension)}`"
     high = "" if extent.high is None else f"to `{display(floor(extent.high), dimension)}`"
     nearest = extent.low if extent.low is not None and value < extent.low else extent.high
@@ -92,7 +92,7 @@ def accepted(extent: Extent, dimension: Dimension, value: Fraction | int) -> str
 
 
 def check_compared(scope: Scope, node: Comparison, left: Typed, right: Typed) -> None:
-    """Report a constant that the other side of a comparison never comes to."""
+    """Report a constant outside the range of the other side of a comparison."""
     if right.constant is not None and left.constant is None:
         _check(scope, node.left, left, node.right, right.constant)
     elif left.constant is not None and right.constant is None:
@@ -100,7 +100,7 @@ def check_compared(scope: Scope, node: Comparison, left: Typed, right: Typed) ->
 
 
 def check_ends(scope: Scope, node: Within, subject: Typed, ends: tuple[Typed, Typed]) -> None:
-    """Report each end of a range that its subject never comes to."""
+    """Report each end of a range that is outside the range of its subject."""
     for written, end in zip((node.range.low, node.range.high), ends, strict=True):
         if end.constant is not None:
             _check(scope, node.subject, subject, written, end.constant)
@@ -116,10 +116,10 @@ def _check(scope: Scope, subject: Value, type: Typed, written: Value, constant: 
 def beyond(
     scope: Scope, written: Value, what: str, extent: Extent, dimension: Dimension, value: Fraction | int
 ) -> None:
-    """Report a value, as written, that something never has."""
+    """Report a value outside the range of the signal or expression `what`."""
     low = extent.low is not None and value < extent.low
     signal, text = scope.symbols.signals.get(what), scope.report.text(written.span)
-    if not any(map(str.isdigit, text)):  # a name that stands for it where a template is used
+    if not any(map(str.isdigit, text)):  # a parameter of a template
         text = display(floor(value), dimension)
     scope.report.add(
         codes.BEYOND_RANGE,
@@ -131,7 +131,7 @@ def beyond(
 
 
 def extent_of(scope: Scope, node: Value) -> Extent:
-    """The values that an expression over signals may have; its types were found to go together."""
+    """Return the range of an expression over signals, whose types were checked."""
     found = typed(scope, node)
     if found is not None and found.constant is not None:
         return Extent(found.constant, found.constant)

@@ -1,4 +1,4 @@
-"""Where checks put what they find."""
+"""The report of one compilation's findings."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -9,12 +9,12 @@ from rtshcua.diagnostics.codes import Code
 from rtshcua.diagnostics.diagnostic import Diagnostic, Fix, Label, has_errors
 from rtshcua.diagnostics.span import Source, Span
 
-#: of how many uses the one finding on a template tells
+#: the most uses that a finding on a template names
 MAX_CONTEXTS = 3
 
 
 class Report:
-    """Collects the findings of one compilation, and lets a check quote the sources."""
+    """Collects the findings of one compilation, and gives access to the source texts."""
 
     def __init__(self, sources: Mapping[str, Source], data: Mapping[str, bytes] | None = None) -> None:
         self.sources = sources
@@ -37,10 +37,10 @@ class Report:
         fix: tuple[Span, str, str] | None = None,
         amount: int = 0,
     ) -> None:
-        """Report one finding; `labels` are places with their words, `fix` is a span, its replacement and a title.
+        """Report one finding; `labels` are spans with texts, `fix` is a span, its replacement and a title.
 
-        `amount` is how much is too much of it: of what is found of a mission with some values and with others, the
-        finding with the most is told.
+        `amount` is the size of the excess: if a mission fails with several values of its parameters, the finding with
+        the largest amount is reported.
         """
         found = Diagnostic(
             code,
@@ -58,9 +58,9 @@ class Report:
 
     @contextmanager
     def within(self, labels: Iterable[tuple[Span, str]], among: int = 0) -> Iterator[None]:
-        """What is reported meanwhile gets these labels too: where a template is used, what a parameter stands for.
+        """Add labels to findings in this context, such as the use of a template or the values of parameters.
 
-        What is reported in all of `among` contexts depends on none of them, and gets no label.
+        A finding in all of `among` contexts does not depend on them and gets no labels.
         """
         before = self._context, self._among
         self._context = (*self._context, *(Label(place, words) for place, words in labels))
@@ -71,9 +71,10 @@ class Report:
             self._context, self._among = before
 
     def merged(self) -> tuple[Diagnostic, ...]:
-        """The findings, each once: those that differ in the labels of `within` alone are one, with those of up to
-        `MAX_CONTEXTS` contexts, of which the others say the same as the first. Of a mission that is checked with
-        several values, findings of one code at one place are one too, of which the worst is told.
+        """Return each finding once.
+
+        Findings that differ only in the labels of `within` are merged, with the labels of up to `MAX_CONTEXTS`
+        contexts. If a mission is checked with several values, the worst finding of each code and place is kept.
         """
         groups: dict[Diagnostic, tuple[dict[Diagnostic, None], int]] = {}
         for found in self.found:
@@ -98,16 +99,16 @@ class Report:
         return tuple(told.values())
 
     def text(self, span: Span) -> str:
-        """The source text under a span, with its white space folded; for quoting in a message."""
+        """The source text under a span with its white space folded, for messages."""
         return " ".join(self.raw(span).split())
 
     def raw(self, span: Span) -> str:
-        """The source text under a span as it stands."""
+        """The source text under a span, unchanged."""
         source = self.sources.get(span.file)
         return "" if source is None else source.slice(span)
 
     def digest(self, file: str) -> bytes:
-        """The SHA-256 of a source's text in UTF-8, or of the bytes of a file that a zone is read from."""
+        """The SHA-256 of a source's text in UTF-8, or of the bytes of a zone file."""
         digest = self._digests.get(file)
         if digest is None:
             source = self.sources.get(file)
@@ -116,12 +117,12 @@ class Report:
         return digest
 
     def failed(self) -> bool:
-        """Whether anything found so far forbids going on."""
+        """Whether any finding so far is an error."""
         return has_errors(self.found)
 
 
 def _joined(group: list[Diagnostic]) -> Diagnostic:
-    """One finding for several that differ in their labels."""
+    """Merge findings that differ only in their labels."""
     first = group[0]
     words = {label.text for label in first.labels}
     alike = [each for each in group if {label.text for label in each.labels} <= words][:MAX_CONTEXTS]

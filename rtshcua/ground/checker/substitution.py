@@ -1,7 +1,7 @@
-"""Values in the place of names: of the parameters of a template or a mission, and of the sizes of a skill.
+"""Substitute values for names: parameters of a template or a mission, and sizes of a skill.
 
-The sizes of `sizes goto(highest = 120 m)` are put in wherever the names of a program are gathered, so nothing after it
-knows of sizes. A size is a number with its unit; a check says whether it is one that the skill may have.
+The sizes of `sizes goto(highest = 120 m)` are substituted when the symbol table is made, so later stages see no sizes.
+A size is a number with its unit; a check compares it with the range of the size.
 """
 
 from collections.abc import Iterator, Mapping
@@ -19,16 +19,16 @@ N = TypeVar("N", bound=Node)
 
 
 def substitute(node: N, values: Mapping[str, Value]) -> N:
-    """The node with the value in the place of every reference to a name of `values`.
+    """Return the node with values substituted for references to the names of `values`.
 
-    What is put in carries the span of the reference, so that a finding underlines what stands in the text. `area.entry`
-    becomes the entry of the zone that `area` stands for. A node without such a reference is given back as it is.
+    A substituted value has the span of the reference, so that findings underline the source text. `area.entry` becomes
+    the entry of the zone that replaces `area`. A node without such a reference is returned unchanged.
     """
     return _substituted(node, values) if values else node
 
 
 def substitute_roles(rule: RuleDecl, roles: Mapping[str, str]) -> RuleDecl:
-    """The rule with the roles that the names of `roles` stand for."""
+    """Return the rule with roles substituted for the names of `roles`."""
     changes: dict[str, Any] = {"roles": tuple(_role(name, roles) for name in rule.roles)}
     if rule.approver is not None:
         changes["approver"] = _role(rule.approver, roles)
@@ -38,7 +38,7 @@ def substitute_roles(rule: RuleDecl, roles: Mapping[str, str]) -> RuleDecl:
 
 
 def names_in(node: Node) -> frozenset[str]:
-    """All names that a node refers to."""
+    """Return all names that a node refers to."""
     return frozenset(_names_in(node))
 
 
@@ -88,8 +88,9 @@ def _reference(node: Reference, values: Mapping[str, Value]) -> Value:
 
 
 def sized(skill: SkillDecl, given: SizesDecl | None) -> SkillDecl:
-    """The skill with what the program gives for its sizes, and else their defaults. Its `sizes` stay as they are
-    declared; `sized` keeps what names no size that has a value.
+    """Return the skill with the values of its sizes: those of the program, else the defaults.
+
+    Its `sizes` stay as declared; `sized` keeps parts that name a size without a value.
     """
     if not skill.sizes and not skill.sized:
         return skill
@@ -105,7 +106,7 @@ def sized(skill: SkillDecl, given: SizesDecl | None) -> SkillDecl:
 
 
 def _summed(node: Any) -> Any:
-    """A node with the numbers that its sums and differences of numbers come to: a size is told as one number."""
+    """A node with constant sums and differences computed, so that messages show a size as one number."""
     if isinstance(node, Node):
         parts = {name: getattr(node, name) for name in type(node).__struct_fields__}
         changes = {name: new for name, old in parts.items() if (new := _summed(old)) is not old}
@@ -126,13 +127,13 @@ def _of_a_kind(left: Quantity, right: Quantity) -> bool:
 
 
 def named_at(report: Report, skill: SkillDecl, span: Span) -> str | None:
-    """The size of a skill that stands at a place; None where something else does."""
+    """Return the name of the size at a span of a skill; None if there is none."""
     text = report.raw(span)
     return text if any(size.name.text == text for size in skill.sizes) else None
 
 
 def sizes_of(skill: SkillDecl, given: SizesDecl | None) -> dict[str, Value]:
-    """The value of each size of a skill that has one."""
+    """Return the values of the sizes of a skill, where known."""
     values: dict[str, Value] = {}
     written = {} if given is None else {each.name.text: each.value for each in reversed(given.given)}
     for size in skill.sizes:

@@ -1,4 +1,4 @@
-"""What each name of a program stands for: one name, one meaning. Findings inside of a template say where it is used."""
+"""The symbol table of a program, in which a name has one meaning, and labels for the uses of a template."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -26,20 +26,20 @@ Declaration = (
 
 
 class Extent(NamedTuple):
-    """From the least to the greatest value, in canonical units; None where there is no bound."""
+    """The range from the lowest to the highest value, in canonical units; None for no bound."""
 
     low: Fraction | int | None
     high: Fraction | int | None
 
     def has(self, value: Fraction | int) -> bool:
-        """Whether a value is within."""
+        """Whether a value is in the range."""
         return (self.low is None or self.low <= value) and (self.high is None or value <= self.high)
 
 
 #: a fix as `Report.add` takes it: the span, the replacement and a title
 Correction = tuple[Span, str, str]
 
-#: how a kind of declaration is called in a message
+#: the kinds of declarations in messages
 WORDS: Mapping[type, str] = {
     EnumDecl: "an enumeration",
     SignalDecl: "a signal",
@@ -55,14 +55,13 @@ WORDS: Mapping[type, str] = {
 
 @dataclass(slots=True)
 class Symbols:
-    """The declarations of a program by name, all kinds in one name space, and once more by kind. Roles have a
-    name space of their own, and may be declared by several files.
+    """The declarations of a program by name, in one name space for all kinds, and again by kind.
 
-    `tests` and `scenarios` are those of the file that was asked for, which has them run; they are called by texts, not
-    by names.
-    `broken` are the names whose declarations have a syntax error: nothing is known of them, and nothing is said.
-    `skills` have the values of their sizes in the places of these; `sizes` is what the program says of them, by skill.
-    `ranges` has, of each signal of a number that was found well declared, what it can report.
+    Roles have a name space of their own, and several files may declare the same role.
+
+    `tests` and `scenarios` are those of the compiled file; they have quoted names. `broken` has the names of
+    declarations with a syntax error, which are never reported. `skills` have the values of their sizes substituted;
+    `sizes` has the declarations of these values by skill. `ranges` has the range of each valid numeric signal.
     """
 
     declared: dict[str, Declaration] = field(default_factory=dict)
@@ -95,16 +94,16 @@ class Symbols:
                 self.duplicates.append((first, declaration))
 
     def kind_of(self, name: str) -> str | None:
-        """What `name` stands for, in words, or None."""
+        """The kind of the declaration of `name` for a message, or None."""
         declaration = self.declared.get(name)
         return None if declaration is None else WORDS[type(declaration)]
 
 
 def collect(units: Iterable[Unit], broken: frozenset[str] = frozenset()) -> Symbols:
-    """The symbol table of a program; of two declarations of one name, or of the sizes of one skill, the first counts,
-    the second is a duplicate.
+    """Return the symbol table of a program.
 
-    Units come in the order in which files are reached, those that were asked for first.
+    Of two declarations of one name, or two `sizes` of one skill, the first counts and the second is a duplicate. Units
+    are in the order in which files were reached, the compiled files first.
     """
     symbols = Symbols(broken=broken)
     for number, unit in enumerate(units):
@@ -136,14 +135,15 @@ def collect(units: Iterable[Unit], broken: frozenset[str] = frozenset()) -> Symb
 
 
 def suggestion(word: str, known: Iterable[str], about: str = "") -> str | None:
-    """`did you mean ...?` for a word that is not among the known ones; `about` are words that stand around it."""
+    """Return `did you mean ...?` for an unknown word; `about` is the surrounding text."""
     near = nearest(word, known, about)
     return None if near is None else f"did you mean `{near}`?"
 
 
 def correction(report: Report, span: Span, word: str, known: Iterable[str], about: str = "") -> Correction | None:
-    """What `suggestion` says as a fix of the text under a span: None where it says nothing, or where the text is not
-    the word itself, bare or in quotation marks, but was brought about elsewhere.
+    """Return the suggestion as a fix of the text under a span.
+
+    None without a suggestion, or if the text is not the word itself, bare or in quotes, as after a substitution.
     """
     near = nearest(word, known, about)
     written = report.raw(span)
@@ -155,18 +155,18 @@ def correction(report: Report, span: Span, word: str, known: Iterable[str], abou
 USED = "used here"
 DELEGATED = "delegated here"
 
-#: of how many uses a finding tells that is about all of them
+#: the most uses that a finding on a template names
 MAX_USES = 3
 
 
 def brought_about(rule: RuleDecl) -> Iterator[tuple[Span, str]]:
-    """Labels for the `use` and the delegations through which a rule came to be."""
+    """Return labels for the `use` and the delegations from which a rule was made."""
     for node in rule.origin:
         yield node.span, USED if isinstance(node, Use) else DELEGATED
 
 
 def with_uses(found: Diagnostic, symbols: Symbols) -> Diagnostic:
-    """The finding; inside of a template, and where nothing says so yet, with the places where the template is used."""
+    """Return the finding; inside a template with labels for its uses, unless it has them."""
     span = found.span
     template = None if span is None else _around(span, symbols.templates.values())
     if template is None or any(label.text == USED for label in found.labels):

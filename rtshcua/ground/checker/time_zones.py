@@ -1,7 +1,7 @@
-"""Local times by the IANA name of a time zone, from the package `tzdata`, and never from the machine: what is compiled
-depends on the sources and on the version of that package, which a policy records.
+"""Time zones by IANA name, from the package `tzdata`, never from the machine.
 
-A policy carries what its vehicle needs: the offsets from UTC from a year before that version on, for eleven years.
+The compiled result depends on the sources and on the version of that package, which a policy records. A policy carries
+the offsets from UTC that its vehicle needs: for eleven years, from one year before that version.
 """
 
 from datetime import UTC, datetime, timedelta
@@ -12,9 +12,9 @@ from zoneinfo import ZoneInfo
 
 import tzdata
 
-#: of the time-zone data, as IANA names its releases: `2026f`
+#: the IANA release of the time-zone data, such as `2026f`
 VERSION: Final[str] = tzdata.IANA_VERSION
-#: between these years' beginnings, UTC, local times are known; a policy is compiled for hours, and signed for weeks
+#: local times are known between the beginnings of these years, UTC; a policy is signed for weeks
 FIRST_YEAR: Final = int(VERSION[:4]) - 1
 LAST_YEAR: Final = FIRST_YEAR + 11
 
@@ -26,13 +26,13 @@ _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 @cache
 def names() -> frozenset[str]:
-    """All time zones that there are."""
+    """Return the names of all time zones."""
     return frozenset((files(tzdata) / "zones").read_text(encoding="utf-8").split())
 
 
 @cache
 def offsets(name: str) -> tuple[int, ...]:
-    """The offsets of a time zone from UTC, as `Vehicle.offsets` has them. Raises `KeyError` if there is none."""
+    """Return the offsets of a time zone from UTC, in the form of `Vehicle.offsets`. Raises `KeyError` if unknown."""
     if name not in names():
         raise KeyError(name)
     with files(tzdata).joinpath("zoneinfo", *name.split("/")).open("rb") as data:

@@ -1,4 +1,4 @@
-"""What a value is: a number with its dimension and datum, an enumeration, a zone, a place, a time of day."""
+"""Types of values: numbers with a dimension and a datum, enumerations, zones, positions, times of day."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -34,7 +34,7 @@ class Enumeration:
 
 @dataclass(frozen=True, slots=True)
 class Type:  # noqa: PLW1641 - the dataclass makes the hash, of the same parts
-    """A value's type; two types are the same where they compare equal."""
+    """The type of a value."""
 
     kind: Kind
     dimension: Dimension | None = None
@@ -42,7 +42,7 @@ class Type:  # noqa: PLW1641 - the dataclass makes the hash, of the same parts
     enumeration: Enumeration | None = None
 
     def __eq__(self, other: object) -> bool:
-        """As of any dataclass, but the parts that differ most often first: an editor checks at every keystroke."""
+        """Equality as of a dataclass, but with the most distinctive field first: editors check at every keystroke."""
         if self is other:
             return True
         if not isinstance(other, Type):
@@ -51,7 +51,7 @@ class Type:  # noqa: PLW1641 - the dataclass makes the hash, of the same parts
         return same and self.enumeration == other.enumeration
 
     def describe(self) -> str:
-        """The type in words, for a message: `an altitude above home`."""
+        """The type for a message: `an altitude above home`."""
         if self.kind is Kind.NUMBER:
             return _WORDS[self.dimension] + ("" if self.datum is None else f" above {self.datum.value}")
         if self.kind is Kind.ENUMERATION:
@@ -72,7 +72,7 @@ _WORDS = {
     None: "a number",
 }
 
-#: a literal of each dimension, to show what would be accepted
+#: an example literal of each dimension, for helps
 EXAMPLES = {
     Dimension.LENGTH: "20 m",
     Dimension.ALTITUDE: "20 m",
@@ -87,7 +87,7 @@ EXAMPLES = {
 
 @cache
 def number(dimension: Dimension, datum: Datum | None = None) -> Type:
-    """A number's type; an altitude is one above home unless said otherwise."""
+    """Return a numeric type; the default datum of an altitude is home."""
     if dimension is Dimension.ALTITUDE and datum is None:
         datum = Datum.HOME
     return Type(Kind.NUMBER, dimension, datum)
@@ -107,13 +107,13 @@ MISSION_PHASE = Type(Kind.PHASE)
 
 
 class Typed(NamedTuple):
-    """A value's type, and its number in the canonical unit where it is known at compile time: exact, not yet whole."""
+    """A value's type and, if constant, its exact value in the canonical unit, which may not be whole."""
 
     type: Type
     constant: Fraction | None
 
 
-#: types by the names that a declaration may write; enumerations are declared
+#: the built-in types by name
 NAMED: Mapping[str, Type] = {
     **{dimension.value: number(dimension) for dimension in Dimension},
     "zone": ZONE,

@@ -1,4 +1,4 @@
-"""The type of a value, and its number where it is constant. What does not fit, by unit or datum, is reported."""
+"""Type values, evaluate constant ones, and report those that do not fit by unit or datum."""
 
 import re
 from fractions import Fraction
@@ -27,9 +27,9 @@ from rtshcua.model.quantity import UNITS
 def typed(
     scope: Scope, node: Value, expected: Type | None = None, asked: tuple[Span, str] | None = None
 ) -> Typed | None:
-    """The type of a value where one of type `expected` (None: any) is asked; None after a finding.
+    """Return the typed value, checked against the type `expected` (None: any); None after a finding.
 
-    `asked` is a label for the place that asks.
+    `asked` is a label for the place that requires the type.
     """
     found = _infer(scope, node, expected)
     if found is None or expected is None:
@@ -64,7 +64,7 @@ def _exactly(value: int) -> Fraction:
 
 
 def _parted(scope: Scope, node: Arithmetic) -> bool:
-    """Whether `8 m / s` is written for `8 m/s`; reports it."""
+    """Whether a value is `8 m / s` instead of `8 m/s`; reports it."""
     number = node.left.right if isinstance(node.left, Arithmetic) else node.left
     name = node.right
     if node.operator != "/" or not isinstance(number, Quantity) or not isinstance(name, Reference):
@@ -106,7 +106,7 @@ def _reference(scope: Scope, node: Reference, expected: Type | None) -> Typed | 
 
 
 def unknown_member(scope: Scope, span: Span, name: str, enumeration: Enumeration) -> None:
-    """Report a name that is no value of an enumeration."""
+    """Report a name that is not a value of an enumeration."""
     members = ", ".join(f"`{member}`" for member in enumeration.members)
     scope.report.add(
         codes.UNKNOWN_MEMBER,
@@ -119,7 +119,7 @@ def unknown_member(scope: Scope, span: Span, name: str, enumeration: Enumeration
 
 
 def typed_range(scope: Scope, node: Range, expected: Type | None) -> tuple[Typed, Typed] | None:
-    """Both ends of a range, of one type; a range whose ends are constant is not empty."""
+    """Return both ends of a range, of one type; report a constant range that is empty."""
     low = typed(scope, node.low, expected)
     high = typed(scope, node.high, expected)
     if low is None or high is None:
@@ -139,9 +139,7 @@ def typed_range(scope: Scope, node: Range, expected: Type | None) -> tuple[Typed
 
 
 def whole_range(scope: Scope, node: Range, expected: Type) -> tuple[int, int] | None:
-    """Both ends of a range as the whole numbers in which they are kept; None after a finding, and where an end is not
-    known at compile time.
-    """
+    """Return both ends of a range as whole canonical numbers; None after a finding, or if an end is not constant."""
     ends = typed_range(scope, node, expected)
     if ends is None or ends[0].constant is None or ends[1].constant is None:
         return None

@@ -1,5 +1,5 @@
-"""Elaboration: templates, delegations, repetitions and a mission's parameters become plain rules and steps.
+"""Elaboration: templates, delegations, repetitions and mission parameters become plain rules and steps.
 
-From IR to IR, between loading and checking, so that nothing after it knows of these constructs. Nodes keep the spans of
-what they were written as; `Rule.origin` says through which `use` and `delegate` a rule came to be.
+It maps IR to IR, between loading and checking, so that later stages do not see these constructs. Nodes keep their
+source spans; `Rule.origin` has the `use` and the `delegate` from which a rule was made.
 """

@@ -1,8 +1,8 @@
-"""E0713, E0714: `delegate goto by role operator to role trainee`: what one role may is permitted to another too.
+"""Elaborate `delegate goto by role operator to role trainee`: permissions of one role are given to another.
 
-Each permit that names the grantor is one to the grantee, for the delegated skills, through no other source and under
-the delegation's condition as well; each `forbid` that names the grantor is one to the grantee. A delegation is made
-after those by which its grantor has what it passes on, so that a chain of them narrows with every link.
+Each permit of the grantor becomes one of the grantee, for the delegated skills and sources, with the condition of the
+delegation added. Each `forbid` of the grantor also becomes one of the grantee. A delegation is elaborated after those
+to its grantor, so that a chain of delegations narrows at each step.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -19,16 +19,16 @@ from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.policies import Delegation, PolicyDecl, RuleDecl
 from rtshcua.model.ir.skills import SkillDecl
 
-#: who speaks for a role where a permit does not say
+#: the source of a role if a permit names none
 OWN_SOURCE = "operator"
-#: two roles need no more than one for each of their skills and conditions
+#: the most delegations of a policy
 MOST_DELEGATIONS = 4_096
 
 
 def delegated(
     context: CheckContext, policy: PolicyDecl, rules: Sequence[RuleDecl], *, whole: bool
 ) -> tuple[RuleDecl, ...]:
-    """The rules of a policy with those that its delegations make of them; `whole` where no rule is missing."""
+    """Return the rules of a policy with those of its delegations; `whole` if no rule is missing."""
     found = list(rules)
     if _too_many(context.report, policy.delegations):
         return tuple(found)
@@ -53,7 +53,7 @@ def delegated(
 
 
 def _too_many(report: Report, delegations: Sequence[Delegation]) -> bool:
-    """Report more delegations, or among more roles, than fit on board: to order them would take minutes."""
+    """Report too many delegations or roles, which would take minutes to order."""
     roles: set[str] = set()
     for number, each in enumerate(delegations, 1):
         roles |= {each.grantor.text, each.grantee.text}
@@ -66,7 +66,7 @@ def _too_many(report: Report, delegations: Sequence[Delegation]) -> bool:
 
 
 def _ordered(report: Report, delegations: Sequence[Delegation]) -> Iterator[Delegation]:
-    """The delegations, each after those to its grantor; those of a circle are reported and left out."""
+    """The delegations, each after those to its grantor; those of a cycle are reported and dropped."""
     waiting = list(delegations)
     while waiting:
         grantees = {each.grantee.text for each in waiting}
@@ -80,7 +80,7 @@ def _ordered(report: Report, delegations: Sequence[Delegation]) -> Iterator[Dele
 
 
 def _circle(waiting: Sequence[Delegation]) -> list[Delegation]:
-    """A circle among delegations of which each has one to its grantor."""
+    """A cycle among delegations, where each grantor is the grantee of another."""
     path: list[Delegation] = [waiting[0]]
     while True:
         before = next(each for each in waiting if each.grantee.text == path[-1].grantor.text)
@@ -109,7 +109,7 @@ def _report_circle(report: Report, circle: Sequence[Delegation]) -> None:
 
 
 def _made(context: CheckContext, delegation: Delegation, rules: Sequence[RuleDecl], *, whole: bool) -> list[RuleDecl]:
-    """The rules that one delegation makes of those before it."""
+    """The rules that one delegation makes from the rules before it."""
     known = [find_skill(context, name) for name in delegation.skills]
     sources = [one_of(context, codes.UNKNOWN_SOURCE, name, SOURCES, "source") for name in delegation.through]
     skills = [skill for skill in known if skill is not None]
@@ -126,7 +126,7 @@ def _made(context: CheckContext, delegation: Delegation, rules: Sequence[RuleDec
 
 
 def _readable(context: CheckContext, delegation: Delegation, skills: Sequence[SkillDecl]) -> bool:
-    """Whether the condition reads what all the delegated skills have."""
+    """Whether all delegated skills have the arguments that the condition reads; reports it if not."""
     if delegation.when is None:
         return True
     as_rule = RuleDecl(
@@ -137,7 +137,7 @@ def _readable(context: CheckContext, delegation: Delegation, skills: Sequence[Sk
 
 
 def _permit(delegation: Delegation, permit: RuleDecl) -> RuleDecl | None:
-    """What a permit of the grantor is to the grantee; None where that is nothing."""
+    """The permit of the grantee made from one of the grantor; None if nothing remains."""
     skills = _shared(delegation, permit)
     through = _through(delegation, permit)
     if skills is None or through is None:
@@ -158,7 +158,7 @@ def _for_grantee(delegation: Delegation, rule: RuleDecl) -> RuleDecl:
 
 
 def _shared(delegation: Delegation, rule: RuleDecl) -> tuple[Name, ...] | None:
-    """The skills of a rule that are delegated, empty for any; None where there are none."""
+    """The delegated skills of a rule, empty for any; None if there are none."""
     if not delegation.skills:
         return rule.skills
     if not rule.skills:
@@ -167,7 +167,7 @@ def _shared(delegation: Delegation, rule: RuleDecl) -> tuple[Name, ...] | None:
 
 
 def _through(delegation: Delegation, permit: RuleDecl) -> tuple[Name, ...] | None:
-    """The sources through which both speak; None where there are none."""
+    """The sources of both the delegation and the permit; None if there are none."""
     if not delegation.through:
         return permit.through
     own = {name.text for name in permit.through} or {OWN_SOURCE}
@@ -187,7 +187,7 @@ def _names(names: Iterable[Name], text: str) -> bool:
 def _nothing(
     context: CheckContext, delegation: Delegation, permits: Sequence[RuleDecl], made: Sequence[RuleDecl]
 ) -> None:
-    """Report every delegated skill that the grantor is not permitted. What anybody may needs no delegation."""
+    """Report every delegated skill that the grantor is not permitted. A skill permitted to any role is not reported."""
     if not delegation.skills and not made:
         _report_nothing(context, delegation, delegation.grantor, "any skill", permits)
     for name in delegation.skills:

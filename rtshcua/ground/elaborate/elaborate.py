@@ -1,6 +1,4 @@
-"""The units of a program with plain rules and steps in the place of what stands for them. `repeat N { ... }` becomes
-its steps, N times over.
-"""
+"""Elaborate the units of a program to plain rules and steps. `repeat N { ... }` becomes its steps, N times."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
@@ -18,7 +16,7 @@ from rtshcua.model.ir.program import Unit
 
 
 def unrolled(report: Report, mission: MissionDecl) -> MissionDecl:
-    """The mission with steps alone; where its repetitions are too many or none, each is taken once, and reported."""
+    """Return the mission with plain steps; invalid repetitions are reported and taken once."""
     repeats = [item for phase in mission.phases for item in _repeats(phase.items)]
     if not repeats:
         return mission
@@ -46,7 +44,7 @@ def _repeats(items: Sequence[Item]) -> Iterator[Repeat]:
 
 
 def _is_positive(report: Report, repeat: Repeat) -> bool:
-    """Whether a repetition says how often; reports it where it does not."""
+    """Whether the count of a repetition is positive; reports it if not."""
     count = repeat.count
     if count.value < 1:
         report.add(
@@ -60,12 +58,12 @@ def _is_positive(report: Report, repeat: Repeat) -> bool:
 
 
 def _total(items: Sequence[Item]) -> int:
-    """How many steps there are, counted without making them."""
+    """The number of steps, without making them."""
     return sum(1 if isinstance(item, Step) else item.count.value * _total(item.items) for item in items)
 
 
 def _steps(items: Sequence[Item], *, once: bool) -> Iterator[Step]:
-    """The steps in order. Each is a node of its own: what is found out about a step is kept by its identity."""
+    """The steps in order. Each is a node of its own, because results about a step are kept by its identity."""
     for item in items:
         if isinstance(item, Step):
             yield item.copied()
@@ -74,12 +72,12 @@ def _steps(items: Sequence[Item], *, once: bool) -> Iterator[Step]:
                 yield from _steps(item.items, once=once)
 
 
-#: a file and all that it imports
+#: a file and all its imports
 Closure = Callable[[str], frozenset[str]]
 
 
 class ElaboratedProgram(NamedTuple):
-    """The units; of each mission with parameters those that are checked; the rules of templates without a use."""
+    """The units, the checked instances of missions with parameters, and sample rules of unused templates."""
 
     units: tuple[Unit, ...]
     instances: dict[str, tuple[Instance, ...]]
@@ -93,10 +91,10 @@ def elaborate(
     chosen: str | None = None,
     settings: ParameterSettings | None = None,
 ) -> ElaboratedProgram:
-    """Elaborate a program; `context` has its names as they are written.
+    """Elaborate a program; `context` has its names as written.
 
-    The mission `chosen` gets the values of `settings` and its defaults, and must have one for every parameter; all
-    other missions are checked for any.
+    The mission `chosen` gets the values of `settings` and its defaults, and needs one for every parameter. All other
+    missions are checked with sample values.
     """
     missions = _Missions(context, closure, chosen, settings or ParameterSettings())
     seen: set[str] = set()
@@ -119,7 +117,7 @@ def elaborate(
 
 
 def _policy(context: CheckContext, policy: PolicyDecl, seen: set[str]) -> PolicyDecl:
-    """A policy with all its rules in source order, then those of its delegations; `seen` gathers used templates."""
+    """A policy with all its rules in source order, then those of its delegations; `seen` collects used templates."""
     if len(policy.rules) > MAX_RULES:
         return policy.copied(rules=_fitting(context, policy, policy.rules), uses=(), delegations=())
     if not policy.uses and not policy.delegations:
@@ -143,7 +141,7 @@ def _policy(context: CheckContext, policy: PolicyDecl, seen: set[str]) -> Policy
 
 
 def _fitting(context: CheckContext, policy: PolicyDecl, rules: tuple[RuleDecl, ...]) -> tuple[RuleDecl, ...]:
-    """As many rules as are looked at; that there are more is reported."""
+    """Report too many rules and return those within the limit."""
     context.report.add(
         codes.TOO_MANY,
         policy.name.span,
@@ -164,7 +162,7 @@ class _Missions:
         self._settings = settings
 
     def elaborated(self, mission: MissionDecl) -> MissionDecl:
-        """A mission with plain steps; with parameters, its first instance."""
+        """Return a mission with plain steps; one with parameters as its first instance."""
         plain = unrolled(self._context.report, mission)
         name = plain.name.text
         if self._context.symbols.missions.get(name) is not mission:

@@ -1,10 +1,10 @@
-"""A mission with parameters: the one that is compiled, with the values that are given (`--set height="20 m"`) or its
-defaults, and those that are checked.
+"""Missions with parameters: the compiled instance, with given values (`--set height="20 m"`) or defaults, and the
+checked instances.
 
-The options are read by the language's own parser, and findings underline them: they are a source of their own, one a
-line. A mission is checked for every zone and every choice that its parameters may have, and for both ends of every
-range: at most `MAX_INSTANCES` of these, the defaults first, then each parameter changed alone, then together; fewer of
-a mission with so many steps that it would take minutes.
+The options are parsed by the language's own parser as a source of their own, one per line, so that findings can
+underline them. A mission is checked with every zone and every choice of its parameters, and with both ends of every
+range: at most `MAX_INSTANCES` instances, the defaults first, then each parameter changed alone, then combinations. A
+mission with very many steps has fewer instances.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -31,7 +31,7 @@ from rtshcua.model.quantity import display
 
 
 def value_of(bound: Bound, argument: Argument, span: Span) -> Value:
-    """The value of a parameter that is bound to an integer, a zone or a place."""
+    """Return the value node of a bound integer, zone or place."""
     if isinstance(bound, ZoneDecl):
         return Reference(span=span, name=bound.name.text)
     if isinstance(bound, Coordinates):
@@ -43,7 +43,7 @@ def value_of(bound: Bound, argument: Argument, span: Span) -> Value:
 
 
 def bound_value(context: CheckContext, argument: Argument, written: Value, *, heard: bool = True) -> Value | None:
-    """The one value that a written one comes to; None after a finding. A default is heard where it is declared."""
+    """Return the bound form of a written value; None after a finding. A default is reported at its declaration."""
     report = context.report if heard else Report(context.report.sources)
     before = len(report.found)
     bound = bind_value(Scope(context.symbols, report), argument, written)
@@ -52,13 +52,13 @@ def bound_value(context: CheckContext, argument: Argument, written: Value, *, he
     return value_of(bound, argument, written.span)
 
 
-#: what the options are called in a finding
+#: the file name of the options in findings
 FILE = "--set"
 
 
 @dataclass(frozen=True, slots=True)
 class ParameterSettings:
-    """The values by name, the text that they were read from, and what was wrong with it."""
+    """The values by name, the text of the options, and the findings on it."""
 
     source: Source = Source(FILE, "")
     values: tuple[tuple[Name, Value], ...] = ()
@@ -66,7 +66,7 @@ class ParameterSettings:
 
 
 def parse_settings(options: Sequence[str]) -> ParameterSettings:
-    """Options as they are given, `name=value` each."""
+    """Parse options of the form `name=value`."""
     texts = [" ".join(option.split()) for option in options]
     values: dict[str, tuple[Name, Value]] = {}
     found: list[Diagnostic] = []
@@ -94,14 +94,14 @@ def parse_settings(options: Sequence[str]) -> ParameterSettings:
     return ParameterSettings(Source(FILE, "\n".join(texts)), tuple(values.values()), tuple(found))
 
 
-#: for how many combinations of values a mission is checked
+#: the most combinations of values with which a mission is checked
 MAX_INSTANCES = 64
-#: how many steps these have at most, together; the first is checked however many it has
+#: the most steps of all instances together; the first instance is always checked
 MOST_STEPS = 4_096
 
 
 def assigned(context: CheckContext, mission: MissionDecl, settings: ParameterSettings) -> Instance | None:
-    """The mission with the values that are given and its defaults; None after a finding."""
+    """Return the mission with the given values and its defaults; None after a finding."""
     before = len(context.report.found)
     given = _given(context, mission, settings)
     known = context.arguments(mission)
@@ -111,7 +111,7 @@ def assigned(context: CheckContext, mission: MissionDecl, settings: ParameterSet
         name = parameter.name.text
         written = given.get(name, parameter.default)
         if name not in known:
-            return None  # its own declaration is wrong, and reported there
+            return None  # reported at its declaration
         value = None if written is None else bound_value(context, known[name], written, heard=name in given)
         if value is not None:
             values[name] = value
@@ -149,9 +149,9 @@ def _given(context: CheckContext, mission: MissionDecl, settings: ParameterSetti
 
 
 def instances(context: CheckContext, mission: MissionDecl, files: frozenset[str]) -> Iterator[Instance]:
-    """The mission for the values that it is checked with; `files` are those of its policy, of which the zones are.
+    """Yield the mission with each set of checked values; zones are those declared in `files`, the files of its policy.
 
-    None where nothing is known of a parameter but that it is some place: that is noted.
+    Nothing, with a note, if a position parameter has no default.
     """
     ranges: list[tuple[str, list[Value]]] = []
     known = context.arguments(mission)
@@ -180,7 +180,7 @@ def instances(context: CheckContext, mission: MissionDecl, files: frozenset[str]
 
 
 def _combinations(ranges: Sequence[Sequence[Value]]) -> Iterator[tuple[int, ...]]:
-    """Which value of each parameter: all first ones, one changed at a time, the last ones, then all; each once."""
+    """The combinations of values, each once: all first ones, one changed at a time, all last ones, then the rest."""
     seen: set[tuple[int, ...]] = set()
     for each in _repeating([len(found) for found in ranges]):
         if each not in seen:
@@ -199,7 +199,7 @@ def _repeating(sizes: Sequence[int]) -> Iterator[tuple[int, ...]]:
 
 
 def ambiguous(context: CheckContext, mission: MissionDecl) -> bool:
-    """Whether a clause of a step reads a name that may be the mission's parameter, or something else; reports it."""
+    """Whether a clause of a step reads a name that is both a mission parameter and something else; reports it."""
     own = {parameter.name.text: parameter for parameter in mission.parameters}
     before = len(context.report.found)
     for step in (step for phase in mission.phases for step in phase.steps if step.overrides is not None):
@@ -222,7 +222,7 @@ def ambiguous(context: CheckContext, mission: MissionDecl) -> bool:
 
 
 def _candidates(context: CheckContext, mission: MissionDecl, argument: Argument, files: frozenset[str]) -> list[Value]:
-    """The values with which a parameter is checked, its default first; each is written as the default, or its type."""
+    """The values with which a parameter is checked, its default first."""
     parameter = argument.declaration
     default = parameter.default
     found: list[Value] = []

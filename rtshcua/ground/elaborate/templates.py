@@ -1,4 +1,4 @@
-"""`use low_flight(bridge_a, top = 20 m)`: the rules of a template, with these values in the place of its parameters."""
+"""Elaborate `use low_flight(bridge_a, top = 20 m)`: the rules of a template with values for its parameters."""
 
 from collections.abc import Iterator
 from typing import NamedTuple
@@ -17,27 +17,28 @@ from rtshcua.model.ir.node import Node
 from rtshcua.model.ir.policies import RuleDecl, TemplateDecl, Use
 from rtshcua.model.ir.skills import ParameterDecl
 
-#: the role that stands for any, where a template is checked that nothing uses
+#: the role in sample rules of an unused template
 ANY_ROLE = "operator"
 
 
 class TemplateBinding(NamedTuple):
-    """The values of a template's parameters, and the roles."""
+    """The values and the roles of a template's parameters."""
 
     values: dict[str, Value]
     roles: dict[str, str]
 
 
 def used(context: CheckContext, use: Use) -> tuple[RuleDecl, ...] | None:
-    """The rules that a `use` stands for; None after a finding."""
+    """Return the rules of a `use`; None after a finding."""
     template = find_template(context, use.template)
     given = None if template is None else _bound(context, template, use)
     return None if template is None or given is None else tuple(_rules(template, given, (use,)))
 
 
 def sample(context: CheckContext, template: TemplateDecl) -> tuple[RuleDecl, ...]:
-    """The rules of a template that nothing uses, with values that its parameters may have: its names and types are
-    checked with them. Without those that read a parameter which may have none.
+    """Return the rules of an unused template with sample values, to check its names and types.
+
+    Rules that read a parameter without a sample value are left out.
     """
     given = TemplateBinding({}, {})
     known = context.arguments(template)
@@ -56,7 +57,7 @@ def sample(context: CheckContext, template: TemplateDecl) -> tuple[RuleDecl, ...
 
 
 def _possible(context: CheckContext, argument: Argument) -> Value | None:
-    """A value that a parameter may have: its default, or one of its type."""
+    """A sample value of a parameter: its default, or a value of its type."""
     parameter = argument.declaration
     if parameter.default is not None:
         return bound_value(context, argument, parameter.default, heard=False)

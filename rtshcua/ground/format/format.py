@@ -1,4 +1,4 @@
-"""Formats a source, or reports why it is left as it is."""
+"""Format a source, or report why it cannot be formatted."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ from rtshcua.ground.language.parse import parse
 
 @dataclass(frozen=True, slots=True)
 class Formatted:
-    """The text in the one style; None where it was refused, for which the diagnostics say why."""
+    """The formatted text, or None with the diagnostics that explain the refusal."""
 
     text: str | None
     diagnostics: tuple[Diagnostic, ...] = ()

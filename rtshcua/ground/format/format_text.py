@@ -1,8 +1,8 @@
-"""Formats a text, and checks that the result says the same.
+"""Format a text, and check that the result has the same meaning.
 
-The check compares parse tree, words and comments of both texts: the same comments must stand between the same words.
-The parser itself is not imported, its table is enough: so `rtshcua fmt` starts fast. `format.formatted` adds what the
-parser says of a text that cannot be formatted.
+The check compares the parse trees, tokens and comments of both texts: the same comments must be between the same
+tokens. It imports only the table of the parser, not the parser itself, so that `rtshcua fmt` starts fast.
+`format.formatted` adds the findings on a text that cannot be formatted.
 """
 
 from bisect import bisect_left
@@ -21,7 +21,7 @@ from rtshcua.ground.lint.ignores import ignores_line
 
 
 class FormatDifference(NamedTuple):
-    """What would not be the same, and the offset in the first text where it is."""
+    """A difference between two texts, and its offset in the first."""
 
     what: str
     offset: int
@@ -38,8 +38,8 @@ class FormatDifference(NamedTuple):
 
 
 class _Comparable(NamedTuple):
-    """What is compared: the words and where they stand, the comments with how many words are before each, and for each
-    comment that ignores findings of a line how many words are before those on that line, and before what follows them.
+    """The compared parts: tokens with their offsets, comments with the number of tokens before each, and for each
+    `ignore` comment the range of tokens on its line.
     """
 
     words: list[str]
@@ -49,11 +49,10 @@ class _Comparable(NamedTuple):
 
 
 def difference(before: TokenizedText, after: TokenizedText | None) -> FormatDifference | None:
-    """The first thing that `after` does not say as `before` does; None if there is none.
+    """Return the first difference between two texts; None if there is none.
 
-    The parser is a function of the tokens: where both texts have the same words, and the same rules were applied to
-    them in the same order, both make the same IR but for where things stand. Only commas at the ends of lists may come
-    and go.
+    The parser is a function of the tokens: two texts with the same tokens, reduced by the same rules in the same order,
+    have the same IR apart from spans. Only commas at the ends of lists may differ.
     """
     if after is None:
         return FormatDifference("the syntax", 0)
@@ -72,7 +71,7 @@ def difference(before: TokenizedText, after: TokenizedText | None) -> FormatDiff
 
 
 def _first(one: list[str] | list[tuple[int, str]], other: list[str] | list[tuple[int, str]]) -> int:
-    """Where two lists differ first."""
+    """The index of the first difference of two lists."""
     pairs = enumerate(zip(one, other, strict=False))
     return next((number for number, (a, b) in pairs if a != b), min(len(one), len(other)))
 
@@ -105,8 +104,8 @@ def _comparable(read: TokenizedText) -> _Comparable:
 
 
 class _CommentLines:
-    """The lines that comments speak of, asked for in the order of the text; none is looked through twice, for one may
-    have all the text, and all the comments.
+    """The lines that comments refer to, requested in source order. No line is scanned twice: a single line may have the
+    whole text and all the comments.
     """
 
     def __init__(self, read: TokenizedText) -> None:
@@ -115,7 +114,7 @@ class _CommentLines:
         self._next, self._after = -1, 0  # a token, and where its line ends
 
     def about(self, offset: int) -> tuple[int, int]:
-        """The tokens before a comment on its line; where there are none, those on the next line that has any."""
+        """The tokens before a comment on its line; if there are none, those on the next line with tokens."""
         text, starts = self._text, self._starts
         self._begin = text.rfind("\n", self._asked, offset) + 1 or self._begin
         self._asked = offset
@@ -128,16 +127,15 @@ class _CommentLines:
         return begin, end
 
 
-#: brackets within brackets; the parser gives up before (E0105), and what has more would be too deep for us to walk
+#: the deepest nesting of brackets; the parser reports E0105 at a lower level
 MAX_DEPTH = 100
 
 
 def format_text(text: str, width: int = WIDTH) -> str | FormatDifference | None:
-    """`text` in the one style, in lines of at most `width` characters where that can be.
+    """Return `text` in the standard style, in lines of at most `width` characters where possible.
 
-    None where the parser does not take the text, it is nested too deeply, or has too many words or comments. A
-    Difference where the result would not say the same, with the same comments in the same places: that is a fault of
-    ours.
+    None if the text has syntax errors, is nested too deeply, or has too many tokens or comments. A `FormatDifference`
+    if the result would have another meaning or other comments, which is an internal fault.
     """
     before = read(text) if len(text) <= MAX_SIZE and "\0" not in text else None
     if before is None or before.depth > MAX_DEPTH or len(before.words) > MAX_TOKENS or has_too_many_comments(before):
@@ -149,7 +147,7 @@ def format_text(text: str, width: int = WIDTH) -> str | FormatDifference | None:
 
 
 def has_too_many_comments(read: TokenizedText) -> bool:
-    """Whether there are more comments than are laid out: each of them may be a line."""
+    """Whether there are more comments than the formatter accepts: each may need a line."""
     text = read.text
     if text.count("//") + text.count("/*") <= MAX_TOKENS:
         return False
@@ -158,14 +156,14 @@ def has_too_many_comments(read: TokenizedText) -> bool:
 
 
 def lay_out(before: TokenizedText, width: int) -> str:
-    """The text in the one style, not yet held against what was there."""
+    """Return the formatted text without the comparison."""
     return align(layout(sheet(before), width), width)
 
 
 def not_formatted(source: Source, text: str) -> Diagnostic | None:
-    """The finding on `source`, of which `text` is the formatted one; None where both are the same.
+    """Return the finding on a `source` that differs from its formatted `text`; None if both are equal.
 
-    It stands at the first line that differs; its fix is safe, and writes the whole text.
+    Its span is the first different line; its fix is safe and replaces the whole text.
     """
     if source.text == text:
         return None

@@ -1,7 +1,7 @@
-"""Lays out the tokens of a text in lines, then aligns columns and comments of neighbouring lines.
+"""Lay out the tokens of a text in lines, then align columns and comments of adjacent lines.
 
-A line holds what fits and what its author did not end; `style` says where else it may end. Ranges are of tokens,
-`[first, end)`; columns count from 0.
+A line ends where its author ended it, or where it would be too long; `style` defines the possible places. Ranges are of
+tokens, `[first, end)`; columns count from 0.
 """
 
 from collections.abc import Callable, Iterator
@@ -13,11 +13,11 @@ from rtshcua.ground.format.token_sheet import BLANKS, BLOCK, GROUP, TokenSheet
 
 @dataclass(slots=True)
 class OutputLine:
-    """One line: what stands on it after its indentation, piece by piece, and the comment at its end.
+    """One line: its pieces after the indentation, and the comment at its end.
 
-    `width` counts the indentation, and not the comment. `kind` and `cuts` are for lines that align with neighbours of
-    their kind: which columns it has, and where in its text each begins. `blank` asks for an empty line before it, `own`
-    says that it is a comment alone.
+    `width` includes the indentation, but not the comment. `kind` and `cuts` align the line with adjacent lines of the
+    same kind: `cuts` are the offsets of its columns. `blank` requests an empty line before it. `own` marks a line with
+    only a comment.
     """
 
     indent: int
@@ -30,18 +30,18 @@ class OutputLine:
     cuts: tuple[tuple[int, int], ...] = ()
 
     def __post_init__(self) -> None:
-        """Counts what it has so far."""
+        """Compute the initial width."""
         self.width = self.indent + sum(map(len, self.pieces))
 
     @property
     def text(self) -> str:
-        """What stands on it."""
+        """The text of the line, without indentation and comment."""
         return "".join(self.pieces)
 
 
 @dataclass(slots=True)
 class OutputPage:
-    """Takes text token by token; `line` is the one that is being written."""
+    """Collects lines token by token; `line` is the current line."""
 
     sheet: TokenSheet
     line: OutputLine = field(default_factory=lambda: OutputLine(0))
@@ -49,34 +49,34 @@ class OutputPage:
 
     @property
     def column(self) -> int:
-        """Where the next character would stand, from 0."""
+        """The column of the next character, from 0."""
         return self.line.width
 
     @property
     def fresh(self) -> bool:
-        """Whether nothing stands on the line yet."""
+        """Whether the current line is empty."""
         return self.line.width == self.line.indent
 
     def add(self, text: str) -> None:
-        """Goes on, on the same line."""
+        """Append text to the current line."""
         self.line.pieces.append(text)
         self.line.width += len(text)
 
     def word(self, token: int) -> None:
-        """The token itself, without what stands before it."""
+        """Append the token without the gap before it."""
         self.add(self.sheet.written[2 * token + 1])
 
     def step(self, token: int, indent: int) -> None:
-        """What stands before a token in the middle of a line, which a comment may end all the same."""
+        """Append the gap before a token on the same line; a comment in it may still end the line."""
         if self.sheet.ends_before(token):
             self.new(token, indent)
         else:
             self.add(self.sheet.gaps[token])
 
     def new(self, token: int, indent: int, *, blank: bool = False, closing: bool = False) -> None:
-        """Ends the line before `token`, with the comments that stand there; `blank` if an empty line may follow.
+        """End the line before `token`, with the comments of the gap; `blank` if an empty line may follow.
 
-        Comments before a closing bracket are indented as what is within. On a line that is held it goes on.
+        Comments before a closing bracket are indented like the contents of the bracket. A held line is not ended.
         """
         gap = self.sheet.note(token)
         if token in self.sheet.held:
@@ -113,7 +113,7 @@ _CELLS = 1000  # more than a row of a table has; its cells are columns too, befo
 
 
 def layout(sheet: TokenSheet, width: int) -> list[OutputLine]:
-    """The lines of a text, before their columns are aligned."""
+    """Return the lines of a text, before alignment."""
     made = _Layout(sheet, width)
     count = len(sheet.read.words)
     made.items(0, count, 0, "")
@@ -122,14 +122,14 @@ def layout(sheet: TokenSheet, width: int) -> list[OutputLine]:
 
 
 class _Layout:
-    """Walks the tokens; `page` has what was written."""
+    """Walks the tokens and writes lines to `page`."""
 
     def __init__(self, sheet: TokenSheet, width: int) -> None:
         self.sheet, self.limit, self.page = sheet, width, OutputPage(sheet)
         self.symbols = sheet.read.symbols
 
     def items(self, first: int, end: int, indent: int, owner: str) -> None:
-        """Declarations, or the items of a block, each on lines of its own."""
+        """Write declarations or the items of a block, each on lines of its own."""
         known, at = self.sheet.read.items, first
         while at < end:
             item = known.get(at)
@@ -142,7 +142,7 @@ class _Layout:
             at = after
 
     def item(self, first: int, end: int, indent: int, action: str, owner: str) -> None:
-        """One of them, from where the page stands."""
+        """Write one item at the current position."""
         sheet, page = self.sheet, self.page
         style = ITEMS.get(action, _PLAIN)
         begun, fresh = page.line, page.fresh
@@ -164,7 +164,7 @@ class _Layout:
             self.cut(first, end, style, action)
 
     def cut(self, first: int, end: int, style: Style, action: str) -> None:
-        """Notes where the columns of an item begin that took one line, if they stand in their order."""
+        """Record the columns of an item on one line, if they are in order."""
         sheet, found = self.sheet, list[tuple[int, int]]()
         for at in self.level(first + 1, end):
             number = -1
@@ -178,23 +178,23 @@ class _Layout:
             self.page.line.kind, self.page.line.cuts = action, tuple(found)
 
     def level(self, first: int, end: int) -> Iterator[int]:
-        """The tokens that stand in no brackets of their own, and opening brackets."""
+        """The tokens of a range outside of inner brackets, with the opening brackets."""
         at = first
         while at < end:
             yield at
             at = self.sheet.pairs.get(at, at) + 1
 
     def separates(self, token: int, *, named: bool = False) -> bool:
-        """Whether a token is a comma between two parts of a list; of one whose parts are `named` as parameters are,
-        one part is `a: one of x, y`.
+        """Whether a token is a comma between two parts of a list. In a list of `named` parts, as of parameters,
+        `a: one of x, y` is one part.
         """
         if self.symbols[token] != "," or self.symbols[token - 1] in PLACES:
             return False
         return not named or self.symbols[token + 2 : token + 3] == [":"]
 
     def clauses(self, first: int, end: int, indent: int, column: int, style: Style, action: str) -> None:
-        """An item's rest, broken where its author did or where it gets too wide, before what its style names, before
-        items within, and after the commas of a list.
+        """Write the rest of an item. Lines end where the author ended them or where they are too wide: before the words
+        of its style, before inner items, and after the commas of a list.
         """
         sheet, page = self.sheet, self.page
         breaks = [
@@ -219,16 +219,14 @@ class _Layout:
             broken = line is not page.line
 
     def first_line(self, first: int, end: int) -> int:
-        """How wide the first of the lines is that these tokens surely take."""
+        """The width of the first line that these tokens need."""
         sheet = self.sheet
         if not sheet.ends_within(first, end):
             return sheet.width(first, end)
         return sheet.width(first, next(at for at in range(first + 1, end) if sheet.ends_before(at)))
 
     def clause(self, first: int, end: int, indent: int, column: int, action: str, *, inner: bool = False) -> None:
-        """A condition or a part of one, or anything without: on one line, or else broken at its `or`s, at its `and`s,
-        or within brackets.
-        """
+        """Write a condition or a part of one on one line, or broken at its `or`s, at its `and`s, or in brackets."""
         sheet, page = self.sheet, self.page
         if not sheet.ends_within(first, end) and page.column + sheet.width(first, end) <= self.limit:
             page.add(sheet.flat(first, end))
@@ -253,7 +251,7 @@ class _Layout:
                 begin = at + 1
 
     def brackets(self, first: int, end: int, indent: int, column: int, action: str) -> None:
-        """Tokens with brackets among them, of which some must be laid out over lines."""
+        """Write tokens with brackets that need several lines."""
         sheet, page = self.sheet, self.page
         for at in self.level(first, end):
             if at > first:
@@ -281,7 +279,7 @@ class _Layout:
                 self.listed(at, close, action)
 
     def reach(self, close: int, end: int) -> int:
-        """Up to where a line goes on after a closing bracket: after the next opening one, or before a line's end."""
+        """The end of a line after a closing bracket: after the next opening bracket, or at a line end."""
         at = close + 1
         while at < end and not self.sheet.ends_before(at):
             if at in self.sheet.pairs:
@@ -290,7 +288,7 @@ class _Layout:
         return at
 
     def listed(self, opening: int, close: int, action: str) -> None:
-        """A list, one part a line; the last has its comma too."""
+        """Write a list with one part per line; the last part has a comma too."""
         sheet, page = self.sheet, self.page
         indent = page.line.indent
         page.word(opening)
@@ -314,7 +312,7 @@ class _Layout:
         page.word(close)
 
     def cut_part(self, first: int, line: OutputLine, *, named: bool, action: str) -> None:
-        """Notes the column in a parameter, after its colon, and in an enumerator."""
+        """Record the column after the colon of a parameter, or in an enumerator."""
         at = first + 2 if named else first + 1
         if named or action == "enum":
             sheet = self.sheet
@@ -327,7 +325,7 @@ _APART = 2  # blanks before a comment
 
 
 def align(lines: list[OutputLine], width: int) -> str:
-    """The text of the lines, with what stands in columns in columns."""
+    """Return the text of the lines with aligned columns."""
     for run in _runs(lines, lambda line, last: line.kind not in ("", ROW) and line.kind == last.kind):
         _columns(run, width)
     for run in _tables(lines):
@@ -343,7 +341,7 @@ def align(lines: list[OutputLine], width: int) -> str:
 
 
 def _runs(lines: list[OutputLine], belongs: Callable[[OutputLine, OutputLine], bool]) -> Iterator[list[OutputLine]]:
-    """Neighbours of one indentation that belong together."""
+    """Groups of adjacent lines of the same indentation."""
     run = lines[:1]
     for line in lines[1:]:
         if run[-1].indent == line.indent and not line.blank and belongs(line, run[-1]):
@@ -355,7 +353,7 @@ def _runs(lines: list[OutputLine], belongs: Callable[[OutputLine, OutputLine], b
 
 
 def _tables(lines: list[OutputLine]) -> Iterator[list[OutputLine]]:
-    """The rows of each table, whatever stands between them."""
+    """The rows of each table, with other lines between them ignored."""
     run: list[OutputLine] = []
     for line in lines:
         if run and line.indent < run[0].indent:
@@ -368,7 +366,7 @@ def _tables(lines: list[OutputLine]) -> Iterator[list[OutputLine]]:
 
 
 def _columns(run: list[OutputLine], width: int) -> None:
-    """Aligns as many columns, from the left, as leave no line too wide that was not."""
+    """Align as many columns, from the left, as possible without making a line too wide."""
     cuts = [dict(line.cuts) for line in run]
     room = [max(width - line.width, 0) for line in run]
     pads: list[list[tuple[int, int]]] = [[] for _ in run]
@@ -393,7 +391,7 @@ def _columns(run: list[OutputLine], width: int) -> None:
 
 
 def _comments(run: list[OutputLine], width: int) -> None:
-    """Puts the comments of a run below each other, if that makes no line too wide that was not."""
+    """Align the comments of a run, if that does not make a line too wide."""
     told = [line for line in run if line.comment]
     column = max((line.width for line in told), default=0) + _APART
     fits = all(column + len(line.comment) <= max(width, line.width + _APART + len(line.comment)) for line in told)

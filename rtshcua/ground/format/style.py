@@ -1,6 +1,6 @@
-"""The style, as tables: how wide lines are, which items there are, and in which column what follows a first word is.
+"""The style as tables: line widths, items, and columns of the text after a first word.
 
-A test holds `ITEMS` against the grammar: a declaration or an item that it gains must be entered here.
+A test compares `ITEMS` with the grammar: a new declaration or item needs an entry here.
 """
 
 from typing import NamedTuple
@@ -10,11 +10,11 @@ INDENT = 2
 
 
 class Style(NamedTuple):
-    """How an item is laid out.
+    """The layout of an item.
 
-    `breaks` are the words before which a line may end where the author ended it, or where it would be too long. What
-    follows the first word is `aligned` with that of the item's neighbours, in the column of the block, or is not.
-    `cuts` name what begins a column in a run of like items that take a line each.
+    `breaks` are the words before which a line may end, where the author ended it or where it would be too long.
+    `aligned` says whether the text after the first word is aligned in the column of the block. `cuts` are the words
+    that start a column in a run of similar items on one line each.
     """
 
     breaks: frozenset[str] = frozenset()
@@ -26,8 +26,8 @@ def _style(*breaks: str, aligned: bool = True, cuts: tuple[str, ...] = ()) -> St
     return Style(frozenset(breaks), aligned, cuts)
 
 
-#: in a block of these, how wide the column of first words is; longer ones stand out. A fixed width, so that a line that
-#: comes or goes changes no other.
+#: the width of the column of first words in a block; longer words exceed it. The width is fixed, so that a new or
+#: removed line does not change others.
 COLUMNS = (
     dict.fromkeys(("vehicle", "skill", "mission", "step", "nominal"), 8)
     | dict.fromkeys(("policy", "template"), 7)
@@ -77,17 +77,17 @@ ITEMS = dict.fromkeys(_PLAIN_ITEMS, Style()) | {
     "demand": _style("because", "<_AT_CLAUSE>"),
 }
 
-#: what an opening bracket after it belongs to, and stands close to: the rest of a call, a shape or a list
+#: words without a blank before an opening bracket: of a call, a shape or a list
 CALLS = frozenset(
     {"<NAME>", "<LINK_NAME>", "<FAULT>", "<FUNCTION>", "<COMBINE>", "<_GROW>", "<_CIRCLE>", "<_POLYGON>", "<_CORRIDOR>"}
 )
 #: other words before an opening bracket of a list
 LISTS = CALLS | {"hole", "sizes"}
-#: what a number may follow as its sum's or product's left side; after anything else a sign is the number's own
+#: tokens that may end the left operand of a sum; after any other token a sign belongs to the number
 OPERANDS = frozenset(
     {"<NAME>", "<NUMBER>", "<UNIT>", "<TIME_OF_DAY>", "<LOCAL_TIME>", "<LINK_NAME>", ")", "home", "sea", "E", "W"}
 )
-#: the comma after these belongs to a place on the ground, `47.39 N, 8.54 E`
+#: the comma after these belongs to coordinates, `47.39 N, 8.54 E`
 PLACES = frozenset({"N", "S"})
-#: words whose condition begins after them
+#: words before a condition
 LEADS = frozenset({"when", "require", "assume", "maintain"})

@@ -1,7 +1,6 @@
-"""Reads the tokens and items of a text by the parser's table, without building anything.
+"""Read the tokens and items of a text with the parser's table, without building the IR.
 
-The table and its lexers are those of the parser, so both agree on what a token is; reading twice costs less than
-parsing once.
+The table and its lexers are those of the parser, so both agree on tokens; reading twice is faster than parsing once.
 """
 
 from functools import cache
@@ -10,23 +9,23 @@ from typing import NamedTuple
 from rtshcua.ground.format.style import ITEMS
 from rtshcua.ground.language.table import END, table
 
-#: the kinds of tokens that may have blanks inside, as `one of`: one is enough
+#: the kinds of tokens with blanks inside, such as `one of`, which are written with one blank
 SPACED = frozenset({"<LOCAL_TIME>", "<_ONE_OF>", "<_ON_INADMISSIBLE>", "<_AT_CLAUSE>"})
 
 
 class ItemRange(NamedTuple):
-    """An item, as `deadline 2 s`: the action of its rule, and the number of the token after its last."""
+    """An item, such as `deadline 2 s`: the action of its rule, and the number of the token after its last."""
 
     action: str
     end: int
 
 
 class TokenizedText(NamedTuple):
-    """The tokens of a text, by their number: offsets, what is written, and the symbol that the parser took each for.
+    """The tokens of a text by number: their offsets, texts and symbols.
 
-    `items` has those of the rules in `style.ITEMS`, by their first token; of two that begin there the larger. `rules`
-    is the parse tree in postfix, without the tokens: each rule after its parts. A comma that a list may end in does
-    not show in it.
+    `items` has the items of the rules in `style.ITEMS` by their first token; of two with the same first token, the
+    larger. `rules` is the parse tree in postfix order without tokens: each rule follows its parts. An optional comma at
+    the end of a list is not part of it.
     """
 
     text: str
@@ -39,7 +38,7 @@ class TokenizedText(NamedTuple):
 
     @property
     def depth(self) -> int:
-        """How deep brackets stand within each other at most."""
+        """The maximal nesting depth of brackets."""
         depth = deepest = 0
         for symbol in self.symbols:
             if symbol in ("(", "{"):
@@ -51,7 +50,7 @@ class TokenizedText(NamedTuple):
 
 
 class _Reduction(NamedTuple):
-    """What a reduction does here: `tag` stands for the rule, `item` is its action where it is an item."""
+    """A reduction: `tag` identifies the rule, `item` is its action if it is an item."""
 
     origin: str
     length: int
@@ -61,10 +60,10 @@ class _Reduction(NamedTuple):
 
 @cache
 def _reductions() -> tuple[_Reduction, ...]:
-    """For each rule of the table its step.
+    """Return the reduction of each rule of the table.
 
-    Rules with one action that keep the same parts differ in an optional comma alone, and share their tag. What only
-    passes its one part on needs none.
+    Rules with the same action and the same kept parts differ only in an optional comma, and share a tag. A rule that
+    only passes its part on has no tag.
     """
     tags: dict[tuple[str, str, tuple[int | None, ...]], int] = {}
     made = []
@@ -78,7 +77,7 @@ def _reductions() -> tuple[_Reduction, ...]:
 
 
 def read(text: str) -> TokenizedText | None:
-    """The text's tokens; None where the parser does not take it."""
+    """Return the tokens of a text; None if it has a syntax error."""
     known = table()
     rows, lexers, last, steps = known.rows, known.lexers, known.end, _reductions()
     starts, ends, words, symbols = list[int](), list[int](), list[str](), list[str]()
@@ -129,7 +128,7 @@ def read(text: str) -> TokenizedText | None:
 
 
 def _with_single_spaces(words: list[str], symbols: list[str]) -> list[str]:
-    """The words, with single spaces in those that have any."""
+    """The tokens, with single blanks inside tokens of several words."""
     for number in [number for number, symbol in enumerate(symbols) if symbol in SPACED]:
         words[number] = " ".join(words[number].split())
     return words

@@ -1,6 +1,6 @@
-"""What stands between the tokens of a text: comments, blanks and line ends, and which of these must stay.
+"""The gaps between the tokens of a text: comments, blanks and line ends, and those that must stay.
 
-`gap_of` reads one gap; `sheet` collects everything that the layout must know of a text.
+`gap_of` reads one gap; `sheet` collects the input of the layout.
 """
 
 import re
@@ -13,14 +13,12 @@ from rtshcua.ground.format.token_reader import SPACED, TokenizedText
 from rtshcua.ground.lint.ignores import ignores_line
 
 COMMENT = re.compile(r"//[^\n]*+|/\*(?s:.)*?\*/")
-#: what may be taken away at the end of a line; other characters that Python calls blank are what a comment says
+#: blanks that may be removed at the end of a line; other Unicode blanks are part of a comment
 BLANKS = " \t\r\f"
 
 
 class CommentRow(NamedTuple):
-    """Comments that stand on one line: whether the line begins with them, whether it ends with them, and whether a
-    blank line is before it.
-    """
+    """Comments on one line: whether they start the line, whether they end it, and whether a blank line precedes it."""
 
     text: str
     first: bool
@@ -29,23 +27,23 @@ class CommentRow(NamedTuple):
 
     @property
     def inline(self) -> bool:
-        """Whether code may follow on the line: no `//`, no line end within, and no line of its own."""
+        """Whether code may follow on the line: no `//`, no line end inside, not a line of its own."""
         return not self.ends_line and not (self.first and self.last)
 
     @property
     def ends_line(self) -> bool:
-        """Whether it cannot be followed by code on its line, or goes over several."""
+        """Whether no code can follow on the line, or the comments span several lines."""
         return "\n" in self.text or bool(COMMENT.findall(self.text)[-1].startswith("//"))
 
     @property
     def ignores(self) -> bool:
-        """Whether it ignores findings, by the line."""
+        """Whether it is an `ignore` comment for a line."""
         return any(map(ignores_line, COMMENT.findall(self.text)))
 
 
 class TokenGap(NamedTuple):
-    """What is between two tokens: the comments, whether a line ends there, and whether the next token's line has a
-    blank one before it.
+    """The gap between two tokens: its comments, whether a line ends in it, and whether a blank line precedes the next
+    token's line.
     """
 
     comments: tuple[CommentRow, ...]
@@ -54,14 +52,14 @@ class TokenGap(NamedTuple):
 
 
 def content(comment: str) -> str:
-    """A comment, without what is blank at the end of its lines."""
+    """A comment without trailing blanks in its lines."""
     if "\n" not in comment:
         return comment.rstrip(BLANKS)
     return "\n".join(line.rstrip(BLANKS) for line in comment.split("\n"))
 
 
 def gap_of(text: str, *, at_start: bool, at_end: bool) -> TokenGap:
-    """What a gap holds; that of the file's start begins a line, that of its end ends one."""
+    """Read a gap. The gap at the start of a file starts a line, that at the end ends one."""
     if "/" not in text:
         lines = text.count("\n")
         return TokenGap((), lines > 0, lines > 1)
@@ -95,13 +93,12 @@ LIST, GROUP, BLOCK = "list", "group", "block"
 
 @dataclass(frozen=True, slots=True)
 class TokenSheet:
-    """A text's tokens by their number, and what stands before each of them, `gaps`, where it stands on one line.
+    """The tokens of a text by number, and the `gaps` before them on a single line.
 
-    `written` has gap and word of each token in turn, and `places` where each of these would begin if all of it stood
-    on one line. `pairs` has the closing bracket of each opening one, `kinds` what they enclose. `notes` has the gaps
-    that are not empty nor one blank. `lines` counts the gaps before a token at which the author ended a line,
-    `kept` those at which a line ends whatever its width. `held` are gaps at which no line may end: a comment that
-    ignores findings speaks of the line.
+    `written` has the gap and the text of each token in turn, and `places` their offsets if all were on one line.
+    `pairs` has the closing bracket of each opening one, `kinds` what they enclose. `notes` has the gaps other than none
+    or one blank. `lines` counts the gaps up to a token in which the author ended a line, `kept` those that always end
+    one. `held` has the gaps in which no line may end, because an `ignore` comment refers to the line.
     """
 
     read: TokenizedText
@@ -116,7 +113,7 @@ class TokenSheet:
     held: set[int]
 
     def width(self, first: int, end: int) -> int:
-        """How wide the tokens from `first` to before `end` are on one line."""
+        """The width of the tokens `[first, end)` on one line."""
         return self.places[2 * end] - self.places[2 * first + 1]
 
     def flat(self, first: int, end: int) -> str:
@@ -124,24 +121,24 @@ class TokenSheet:
         return "".join(self.written[2 * first + 1 : 2 * end])
 
     def ends_within(self, first: int, end: int) -> bool:
-        """Whether a line ends between two of these tokens, whatever their width."""
+        """Whether a line must end between two of these tokens."""
         return end > first and self.kept[end - 1] > self.kept[first]
 
     def ends_before(self, token: int) -> bool:
-        """Whether a line ends just before this token, whatever the width."""
+        """Whether a line must end before this token."""
         return token > 0 and self.kept[token] > self.kept[token - 1]
 
     def author_ended(self, token: int) -> bool:
-        """Whether the author ended a line just before this token."""
+        """Whether the author ended a line before this token."""
         return token > 0 and self.lines[token] > self.lines[token - 1]
 
     def note(self, token: int) -> TokenGap:
-        """What the gap before a token holds."""
+        """The gap before a token."""
         return self.notes.get(token, NO_GAP)
 
 
 def sheet(read: TokenizedText) -> TokenSheet:
-    """The sheet of a text."""
+    """Return the sheet of a text."""
     text, count = read.text, len(read.words)
     raw = [text[end:start] for end, start in zip([0, *read.ends], [*read.starts, len(text)], strict=True)]
     raw[0] = raw[0].removeprefix("\ufeff")
@@ -177,7 +174,7 @@ def sheet(read: TokenizedText) -> TokenSheet:
 
 
 def _gaps(read: TokenizedText) -> list[str]:
-    """What stands before each token if nothing is between them but what the style asks for."""
+    """The gap of the style before each token: a blank or nothing."""
     gaps: list[str] = []
     before = last = ""
     for symbol in read.symbols:
@@ -204,7 +201,7 @@ def _gaps(read: TokenizedText) -> list[str]:
 
 
 def _brackets(read: TokenizedText) -> tuple[dict[int, int], dict[int, str]]:
-    """The closing bracket of each opening one, and what they enclose; inner ones first."""
+    """The closing bracket of each opening one, and what they enclose; inner pairs first."""
     pairs: dict[int, int] = {}
     kinds: dict[int, str] = {}
     symbols, opened = read.symbols, list[int]()
@@ -234,8 +231,8 @@ def _settle_brackets(
     kept: list[int],
     held: set[int],
 ) -> None:
-    """What a pair of brackets says of the gaps in it: where the author opened a list or a block over several lines it
-    stays so. The comma that a list ends in is not written; laying the list out over lines does that.
+    """Set the gaps in a pair of brackets. A list or block that the author opened over several lines stays so. The comma
+    at the end of a list is dropped; the layout of a list over several lines adds it.
     """
     if kind is LIST and read.symbols[opening] == "{" and read.symbols[opening - 1] == "in":
         gaps[opening + 1] = gaps[close] = ""
@@ -252,7 +249,7 @@ def _settle_brackets(
 
 
 def _held_gaps(read: TokenizedText, notes: dict[int, TokenGap], ended: list[int], kept: list[int]) -> set[int]:
-    """Gaps on the lines that an ignore speaks of; such a line also begins and ends where it did."""
+    """The gaps on the lines of `ignore` comments; such a line also keeps its beginning and end."""
     count, held = len(read.words), set[int]()
     ignoring = [number for number, note in notes.items() if any(each.ignores for each in note.comments)]
     if not ignoring:

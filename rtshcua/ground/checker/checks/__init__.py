@@ -1,1 +1,1 @@
-"""One file a subject; the first line of each says which codes it reports. `check.py` calls their checks in order."""
+"""The checks, one module for each subject; `check.py` calls them in order."""

@@ -1,16 +1,16 @@
-"""Skill contracts: complete, with a motion of the right parameters, a fallback chain that lands, and enough records.
+"""Check skill contracts: completeness, motion parameters, fallback chains and records.
 
-For a decision to be derived again its records must hold what was decided, every signal that was read, and on what
-authority; the intent and the effect say why and what then happened. A reflex has no authority to record: the step that
-it belongs to gave it beforehand, and its effect shows what was decided.
+To verify a decision, an auditor needs the decision, every signal that it read, and the authority; intent and effect
+record the reason and the result. A reflex has no authority to record: its step was authorised before, and its effect
+shows the decision.
 
 | class | must record |
 |---|---|
 | `semantic`, `tactical` | decision, state, authorization |
 | `reflex` | decision, state, effect |
 
-A skill that names no kind records all of it. Only a reflex may have `buffered` records, which are lost with the
-process (design section 6).
+A skill that names no kind records all kinds. Only a reflex may have `buffered` records, which a crash of the process
+loses (design section 6).
 """
 
 from collections.abc import Sequence
@@ -35,14 +35,14 @@ from rtshcua.model.quantity import Dimension
 CLASSES = tuple(each.name.lower() for each in TimingClass)
 #: kinds of evidence (paper symbol `ev`)
 KINDS = ("intent", "decision", "state", "authorization", "effect")
-#: what a `record` clause may name: what is recorded, and how durably
+#: the words of a `record` clause: kinds of evidence and durabilities
 RECORDS = (*KINDS, *DURABILITIES)
-#: survey patterns that a `cover` motion knows
+#: survey patterns of a `cover` motion
 PATTERNS = ("grid", "perimeter", "orbit")
 
 
 def check_contracts(context: CheckContext) -> None:
-    """Report every contract that leaves open what the decision needs."""
+    """Report incomplete or invalid contracts."""
     for skill in context.symbols.skills.values():
         _complete(context, skill)
         if skill.timing_class is not None:
@@ -62,7 +62,7 @@ def check_contracts(context: CheckContext) -> None:
 
 
 def more_than_full(context: CheckContext, energy: Quantity | None, what: str) -> None:
-    """Report a share of the energy that no battery has."""
+    """Report an energy above 100 %."""
     if energy is not None and energy.dimension is Dimension.RATIO and energy.value > FULL:
         context.report.add(
             codes.BEYOND_VEHICLE,
@@ -73,7 +73,7 @@ def more_than_full(context: CheckContext, energy: Quantity | None, what: str) ->
 
 
 def _complete(context: CheckContext, skill: SkillDecl) -> None:
-    """Everything that has no default which would be safe in silence; a landing needs nothing to fall back on."""
+    """Report missing clauses without a safe default; a landing needs no fallback."""
     kind = None if skill.motion is None else skill.motion.kind
     written = {
         "motion": skill.motion is not None,
@@ -142,7 +142,7 @@ def _not_parameter(context: CheckContext, skill: SkillDecl, name: Name, expected
 
 
 def check_fallbacks(context: CheckContext) -> None:
-    """Report every fallback chain that might not end on the ground."""
+    """Report every fallback chain that may not end on the ground."""
     for skill in context.symbols.skills.values():
         if skill.fallback:
             check_chain(context, skill.fallback, skill, skill.fallback[0].span.to(skill.fallback[-1].span))
@@ -153,13 +153,13 @@ NEEDED = {"semantic": _AUTHORIZED, "tactical": _AUTHORIZED, "reflex": ("decision
 
 
 def check_records(context: CheckContext) -> None:
-    """Report every skill that leaves out what an auditor needs."""
+    """Report every skill whose `record` lacks a kind that an auditor needs."""
     for skill in context.symbols.skills.values():
         written = {name.text for name in skill.record}
         if written.isdisjoint(KINDS) or skill.timing_class is None:
             continue
         if not written.issubset(RECORDS):
-            continue  # what is misspelt may be what is missing
+            continue  # a misspelt word may be the missing one
         missing = [f"`{name}`" for name in NEEDED.get(skill.timing_class.text, ()) if name not in written]
         if missing:
             span = skill.record[0].span.to(skill.record[-1].span)
@@ -175,7 +175,7 @@ def check_records(context: CheckContext) -> None:
 
 
 def check_durability(context: CheckContext) -> None:
-    """Report every skill whose `record` asks for two durabilities, or for less than its class may have."""
+    """Report every skill whose `record` has two durabilities, or one that its class does not allow."""
     for skill in context.symbols.skills.values():
         words = durability(context, skill.record)
         if words is None or words.text != WORDS[BUFFERED] or skill.timing_class is None:
@@ -192,7 +192,7 @@ def check_durability(context: CheckContext) -> None:
 
 
 def durability(context: CheckContext, record: Sequence[Name]) -> Name | None:
-    """The word for the durability among those of a `record` clause; reports a second one that is another."""
+    """Return the durability in a `record` clause; report a second, different one."""
     words = [name for name in record if name.text in WORDS]
     other = next((name for name in words if name.text != words[0].text), None)
     if other is not None:

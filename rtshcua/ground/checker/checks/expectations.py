@@ -1,4 +1,4 @@
-"""E1403, E1404: what a test expects can be decided."""
+"""Check that the expected outcome of a test is possible."""
 
 from collections.abc import Iterator
 
@@ -18,7 +18,7 @@ _REASONS = {str(reason.value): reason for reason in Reason}
 def check_expectation(
     context: CheckContext, expected: Expectation, skill: SkillDecl | None, policy: PolicyDecl | None
 ) -> None:
-    """Report a reason that there is not, one that another outcome has, and a target that never flies."""
+    """Report an unknown reason, a reason of another outcome, and a target that never flies."""
     if expected.reason is not None:
         _reason(context, expected, expected.reason)
     if expected.target is not None and skill is not None and policy is not None:
@@ -66,7 +66,7 @@ def _target(context: CheckContext, target: Name, skill: SkillDecl, policy: Polic
 
 
 def _targets(skill: SkillDecl, policy: PolicyDecl) -> Iterator[tuple[str, Span]]:
-    """What may fly instead of a skill: the links of its chain, and what degrades it."""
+    """The possible replacements of a skill: the links of its chain, and targets of `degrade`."""
     for link in skill.fallback:
         yield link.skill.text, link.span
     for rule in policy.rules:

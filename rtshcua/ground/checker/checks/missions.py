@@ -1,4 +1,4 @@
-"""A mission names a policy, a vehicle and skills that exist, and a step only tightens the contract of its skill."""
+"""Check missions: their policy, vehicle and skills exist, and overrides only tighten contracts."""
 
 from rtshcua.decision.durability import recorded_as
 from rtshcua.diagnostics import codes
@@ -14,12 +14,12 @@ from rtshcua.model.ir.missions import MissionDecl, Overrides, Step
 from rtshcua.model.ir.skills import SkillDecl
 from rtshcua.model.quantity import Dimension, display
 
-#: who may propose a mission; the other sources decide on board
+#: sources that may propose a mission; the others decide on board
 PROPOSERS = ("agent", "operator")
 
 
 def check_missions(context: CheckContext) -> None:
-    """Report every mission whose parts do not exist."""
+    """Report every mission with unknown parts."""
     for mission in context.symbols.missions.values():
         _header(context, mission)
         if not any(phase.items for phase in mission.phases):
@@ -70,12 +70,12 @@ def _step(context: CheckContext, step: Step) -> None:
             check_overrides(context, skill, step.overrides)
 
 
-#: how long a clause may be unknown where a skill does not say (us)
+#: the default grace: how long a clause may be unknown (us)
 DEFAULT_GRACE_US = 500_000
 
 
 def check_overrides(context: CheckContext, skill: SkillDecl, overrides: Overrides) -> None:
-    """Report what is wrong with the block after a step of `skill`."""
+    """Report invalid overrides of a step of `skill`."""
     for field in (overrides.deadline, overrides.validity, overrides.duration):
         quantity(context, field, Dimension.DURATION)
     quantity(context, overrides.grace, Dimension.DURATION, positive=False)
@@ -92,7 +92,7 @@ def check_overrides(context: CheckContext, skill: SkillDecl, overrides: Override
 
 
 def _shorter(context: CheckContext, skill: SkillDecl, overrides: Overrides) -> None:
-    """No time is longer than the skill's, and no less energy is kept ready."""
+    """Report times above those of the skill, and an energy below it."""
     for words, mine, skills, most in (
         ("deadline", overrides.deadline, skill.deadline, None),
         ("valid for", overrides.validity, skill.validity, None),
@@ -122,7 +122,7 @@ def _looser(
 
 
 def _durable(context: CheckContext, skill: SkillDecl, overrides: Overrides) -> None:
-    """The records of a step are no less durable than its skill's."""
+    """Report records that are less durable than those of the skill."""
     mine = durability(context, overrides.record)
     least = recorded_as(tuple(name.text for name in skill.record))
     if mine is None or WORDS.index(mine.text) >= least:
@@ -140,7 +140,7 @@ def _durable(context: CheckContext, skill: SkillDecl, overrides: Overrides) -> N
 
 
 def _phases(context: CheckContext, skill: SkillDecl, overrides: Overrides) -> None:
-    """A step is valid in no phase in which its skill is not."""
+    """Report phases in which the skill is not valid."""
     valid = {name.text for name in skill.phases}
     for name in overrides.phases:
         if valid and name.text not in valid:

@@ -1,4 +1,4 @@
-"""E0202, E0203: one name, one meaning."""
+"""Check that a name has one meaning."""
 
 from collections.abc import Iterable
 
@@ -13,11 +13,11 @@ from rtshcua.model.ir.skills import SkillDecl
 
 
 def check_names(context: CheckContext) -> None:
-    """Report every name that is declared twice, or that hides another."""
+    """Report every name that is declared twice, or that shadows another."""
     symbols, report = context.symbols, context.report
     for first, again in symbols.duplicates:
         nearer, other, words = again, first, "first declared here"
-        if first.span.file != again.span.file:  # a file is reached before what it imports, which is not at fault
+        if first.span.file != again.span.file:  # the importing file comes first, and must not reuse a name
             nearer, other, words = first, again, "also declared here"
         report.add(
             codes.DUPLICATE_NAME,
@@ -64,7 +64,7 @@ def check_names(context: CheckContext) -> None:
 
 
 def _ambiguous(context: CheckContext, template: TemplateDecl) -> None:
-    """Report a name in a rule that may be the template's parameter, or the rule's argument."""
+    """Report a name in a rule that is both a parameter of the template and an argument."""
     own = {parameter.name.text: parameter for parameter in template.parameters}
     for rule in template.rules:
         skills = [context.symbols.skills[name.text] for name in rule.skills if name.text in context.symbols.skills]
@@ -84,7 +84,7 @@ def _ambiguous(context: CheckContext, template: TemplateDecl) -> None:
 
 
 def _called_phase(context: CheckContext) -> None:
-    """Report a value called `phase`, by which conditions ask for the mission's phase."""
+    """Report a value named `phase`, which conditions use for the mission's phase."""
     symbols = context.symbols
     names = [signal.name for signal in symbols.signals.values()] + [zone.name for zone in symbols.zones.values()]
     names += [member.name for enum in symbols.enums.values() for member in enum.members]
@@ -118,7 +118,7 @@ def _distinct(context: CheckContext, names: Iterable[Name], what: str) -> None:
 
 
 def _hides(context: CheckContext, name: Name, what: str) -> None:
-    """Report a name within a declaration that is also a declaration's."""
+    """Report a name inside a declaration that is also the name of a declaration."""
     declaration = context.symbols.declared.get(name.text)
     if declaration is not None:
         context.report.add(

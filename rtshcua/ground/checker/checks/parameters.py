@@ -1,4 +1,4 @@
-"""Parameters and sizes of skills: type, range and default belong together, and a size is given within its range."""
+"""Check parameters and sizes of skills: their type, range and default fit together."""
 
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.arguments import bind_value
@@ -16,12 +16,12 @@ from rtshcua.model.ir.expression import Quantity, Range, Reference
 from rtshcua.model.ir.policies import TemplateDecl
 from rtshcua.model.ir.skills import GivenSize, ParameterDecl, SizesDecl, SkillDecl
 
-#: the type of a template's parameter that stands for a role
+#: the type of a template's role parameters
 ROLE = "role"
 
 
 def check_parameters(context: CheckContext) -> None:
-    """Report every parameter whose arguments could not be checked before the flight."""
+    """Report every parameter whose arguments cannot be checked before the flight."""
     symbols = context.symbols
     owners: list[Parametric] = [*symbols.skills.values(), *symbols.templates.values(), *symbols.missions.values()]
     for owner in owners:
@@ -52,7 +52,7 @@ def check_parameters(context: CheckContext) -> None:
 
 
 def check_range(context: CheckContext, argument: Argument, range: Range) -> None:
-    """Report the ends of a parameter's range that are no numbers of its type, or too large."""
+    """Report ends of a parameter's range that are not numbers of its type, or too large."""
     scope, before = context.scope(), len(context.report.found)
     ends = whole_range(scope, range, argument.type)
     if ends is None and len(context.report.found) == before:
@@ -63,7 +63,7 @@ def check_range(context: CheckContext, argument: Argument, range: Range) -> None
 
 
 def _unknown_end(scope: Scope, range: Range) -> None:
-    """Report the ends of a range that are read in flight, or are an argument."""
+    """Report ends of a range that are signals or arguments."""
     for end in (range.low, range.high):
         if any(isinstance(part, Reference) for part in walk(end)):
             scope.report.add(
@@ -76,14 +76,14 @@ def _unknown_end(scope: Scope, range: Range) -> None:
 
 
 def _types(owner: type[Parametric]) -> str:
-    """The types that the parameters of a declaration may have."""
+    """The allowed types of a declaration's parameters."""
     if owner is TemplateDecl:
         return ", ".join(f"`{name}`" for name in (*NAMED, ROLE) if name != Kind.POSITION.value)
     return ", ".join(f"`{name}`" for name in NAMED) + " and `one of ...`"
 
 
 def _of_template(context: CheckContext, parameter: ParameterDecl) -> bool:
-    """Whether no more is to say of a template's parameter: it is a role, or of a type that no rule can use."""
+    """Whether the check of a template's parameter is complete: it is a role, or its type was reported."""
     if parameter.type.text == ROLE and not parameter.choices:
         if parameter.range is not None:
             no_range(context, parameter)
@@ -100,7 +100,7 @@ def _of_template(context: CheckContext, parameter: ParameterDecl) -> bool:
 
 
 def no_range(context: CheckContext, parameter: ParameterDecl) -> None:
-    """Report a parameter that has no range and is a number, or has one and is none."""
+    """Report a number without a range, and a range of anything else."""
     name = parameter.name.text
     type = NAMED.get(parameter.type.text)
     if parameter.range is None and type is not None and type.dimension is not None:
@@ -123,7 +123,7 @@ def no_range(context: CheckContext, parameter: ParameterDecl) -> None:
 
 
 def check_sizes(context: CheckContext) -> None:
-    """Report every size that no contract could be checked with."""
+    """Report every invalid size."""
     for skill in context.symbols.skills.values():
         for each in skill.sizes:
             _declared(context, each)
@@ -169,7 +169,7 @@ def _declared(context: CheckContext, size: ParameterDecl) -> None:
 
 
 def _argument(context: CheckContext, size: ParameterDecl) -> Argument | None:
-    """A size as an argument is seen; None where it is no number."""
+    """A size as an argument; None if it is not a number."""
     type = None if size.choices else NAMED.get(size.type.text)
     if type is None or type.kind is not Kind.NUMBER:
         return None
@@ -179,11 +179,11 @@ def _argument(context: CheckContext, size: ParameterDecl) -> Argument | None:
 
 
 def _named(context: CheckContext, skill: SkillDecl) -> None:
-    """Report each part of a contract that names what is no size of it."""
+    """Report each part of a contract that names an unknown size."""
     known = [size.name.text for size in skill.sizes]
     for each in skill.sized:
         name, span = each.size.name, each.size.span
-        if name not in known:  # else what is wrong with that size is reported where it is declared
+        if name not in known:  # findings on a known size are reported at its declaration
             context.report.add(
                 codes.UNKNOWN_NAME,
                 span,

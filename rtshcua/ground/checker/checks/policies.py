@@ -1,4 +1,4 @@
-"""E0707 to E0710: the rules of a policy name what exists, and its contingency ends on the ground."""
+"""Check policies: their rules name known declarations, and the contingency ends on the ground."""
 
 from collections.abc import Sequence
 
@@ -20,7 +20,7 @@ SOURCES = tuple(each.name.lower() for each in SourceKind)
 
 
 def check_policies(context: CheckContext) -> None:
-    """Report every rule that could not be decided, and every policy that leaves the vehicle in the air."""
+    """Report every invalid rule, and every policy without a valid contingency."""
     for policy in context.symbols.policies.values():
         if policy.version > MAX_VALUE:
             context.report.add(
@@ -85,7 +85,7 @@ def _confirm(context: CheckContext, rule: RuleDecl) -> None:
 
 
 def shared_arguments(context: CheckContext, rule: RuleDecl, skills: Sequence[SkillDecl]) -> dict[str, Argument] | None:
-    """The arguments that a rule's condition may read: those that all its skills have; None after a finding."""
+    """Return the arguments that all skills of a rule have, which its condition may read; None after a finding."""
     assert rule.when is not None
     signatures = [context.arguments(skill) for skill in skills]
     shared = dict(signatures[0]) if signatures else {}
@@ -108,7 +108,7 @@ def shared_arguments(context: CheckContext, rule: RuleDecl, skills: Sequence[Ski
             continue
         having = [signature[name] for signature in signatures if name in signature]
         if not having:
-            continue  # an enumerator, a zone's entry, or unknown: the condition's check tells
+            continue  # an enumerator, a zone's entry, or unknown: the check of the condition reports it
         if len(having) < len(skills) or any(each.type != having[0].type for each in having):
             lacking = next(
                 skill

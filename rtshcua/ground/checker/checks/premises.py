@@ -1,4 +1,4 @@
-"""Where a test starts: its nominal, and what the two hold for given, which is well typed and said once."""
+"""Check the premises of nominals and tests: each is well typed and given once."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -34,13 +34,13 @@ from rtshcua.model.ir.tests import (
 )
 from rtshcua.model.quantity import Dimension
 
-#: the truths of a condition over time, as they are written; `unknown` is a word of the grammar
+#: the values of a temporal condition, as written; `unknown` is a keyword
 TRUTHS = ("true", "false")
 SOURCES = tuple(kind.name.lower() for kind in SourceKind)
 
 
 def check_premises(context: CheckContext, premises: Premises) -> None:
-    """Report what a nominal or a test gives that nothing can have."""
+    """Report invalid premises of a nominal or a test."""
     for assignment in premises.given:
         check_subject(context, assignment.subject)
         check_cell(context, assignment.subject, assignment.cell)
@@ -56,13 +56,13 @@ def check_premises(context: CheckContext, premises: Premises) -> None:
 
 
 def check_asker(context: CheckContext, asker: Asker | None) -> None:
-    """Report a source that there is not; roles are those of the policy, which is looked at when it is lowered."""
+    """Report an unknown source. Roles are those of the policy, and are checked when the test is lowered."""
     if asker is not None and asker.source is not None:
         one_of(context, codes.UNKNOWN_SOURCE, asker.source, SOURCES, "source of requests")
 
 
 def check_subject(context: CheckContext, subject: Subject) -> None:
-    """Report what is no signal, and what is no condition over time."""
+    """Report a subject that is neither a signal nor a temporal condition."""
     scope = context.scope()
     if isinstance(subject, Named):
         if signal_of(context, subject) is None:
@@ -82,7 +82,7 @@ def check_subject(context: CheckContext, subject: Subject) -> None:
 
 
 def check_cell(context: CheckContext, subject: Subject, cell: TableCell) -> None:
-    """Report a value that the subject cannot have, and keep the one that it has, in `CheckContext.given`."""
+    """Report an invalid value of a subject; keep a valid one in `CheckContext.given`."""
     quantity(context, cell.measured, Dimension.DURATION, positive=False)
     if isinstance(subject, OverTime):
         _truth(context, cell)
@@ -106,21 +106,21 @@ def check_cell(context: CheckContext, subject: Subject, cell: TableCell) -> None
 
 
 def check_size(context: CheckContext, value: Value, bound: Bound, dimension: Dimension | None) -> bool:
-    """Report a value that is no place on earth, or a number that is too large; whether it is neither."""
+    """Whether coordinates are supported, or a number fits on board; reports it if not."""
     if isinstance(bound, Coordinates):
         return on_globe(context, bound)
     return not isinstance(bound, int) or dimension is None or size(context, value, dimension, bound)
 
 
 def signal_of(context: CheckContext, subject: Named) -> SignalDecl | None:
-    """The signal of that name."""
+    """The signal of that name, if any."""
     return context.symbols.signals.get(subject.name.text)
 
 
 def once(
     context: CheckContext, subjects: Iterable[tuple[Subject, Span]], first_words: str = "first given here"
 ) -> None:
-    """Report what is given twice."""
+    """Report premises that are given twice."""
     seen: dict[str, Span] = {}
     for subject, span in subjects:
         words = context.report.text(subject.span)
@@ -174,7 +174,7 @@ def _order(context: CheckContext, order: tuple[Name, ...]) -> None:
 
 
 def check_nominals(context: CheckContext) -> None:
-    """Report every nominal whose parts do not exist or do not fit."""
+    """Report every nominal with unknown or invalid parts."""
     for nominal in context.symbols.nominals.values():
         find_policy(context, nominal.policy)
         find_vehicle(context, nominal.vehicle)
@@ -183,7 +183,7 @@ def check_nominals(context: CheckContext) -> None:
 
 
 class TestStart(NamedTuple):
-    """What a test begins with: its own words, and its nominal's where it has none. None: neither says it."""
+    """The start of a test: its own premises, else those of its nominal, else None."""
 
     nominal: NominalDecl
     role: Name | None
@@ -194,9 +194,9 @@ class TestStart(NamedTuple):
 
 
 def nominal_of(context: CheckContext, test: TestDecl) -> NominalDecl | None:
-    """The nominal that a test names; else the only one of its file, or, where that has none, the only one there is.
+    """Return the nominal that a test names; else the only one of its file; else the only one of the program.
 
-    None after a finding, and where its declaration has an error.
+    None after a finding, or if its declaration has an error.
     """
     if test.nominal is not None:
         return find_nominal(context, test.nominal)
@@ -219,7 +219,7 @@ def nominal_of(context: CheckContext, test: TestDecl) -> NominalDecl | None:
 
 
 def start_of(test: TestDecl, nominal: NominalDecl) -> TestStart:
-    """What the two say together; what the test says replaces what the nominal says."""
+    """Return the premises of a test and its nominal; those of the test come first."""
     askers = [None if test.request is None else test.request.asker, nominal.asker]
     said = [asker for asker in askers if asker is not None]
     phase = test.premises.phase or nominal.premises.phase

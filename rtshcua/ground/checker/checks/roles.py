@@ -1,6 +1,6 @@
-"""E0202, E0208: a role that rules name is declared, for a misspelt one would be a rule without effect.
+"""Check that the roles of rules are declared: a rule with a misspelt role would have no effect.
 
-That of a mission, of a test's asker and of a fault is one of the policy's, which is looked at where these are lowered.
+The role of a mission, of a test's requester and of a fault must be one of the policy: the lowering checks it.
 """
 
 from collections.abc import Iterator
@@ -13,12 +13,12 @@ from rtshcua.model.ir.expression import Reference
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.policies import RuleDecl, Use
 
-#: the role that every vehicle has
+#: the role that needs no declaration
 OPERATOR = "operator"
 
 
 def check_roles(context: CheckContext) -> None:
-    """Report every role that is declared twice in a file, and every one that a rule names and nothing declares."""
+    """Report every role that is declared twice in a file, and every undeclared role of a rule."""
     for first, again in context.symbols.roles_again:
         text = f"the role `{again.text}` is declared twice"
         context.report.add(codes.DUPLICATE_NAME, again.span, text, labels=[(first.span, "first declared here")])
@@ -39,14 +39,14 @@ def check_roles(context: CheckContext) -> None:
 
 
 def _rule(context: CheckContext, rule: RuleDecl, own: frozenset[str]) -> None:
-    """The roles of a rule, but for the `own` parameters of the template that it stands in."""
+    """The roles of a rule, without the `own` parameters of its template."""
     for name in (*rule.roles, rule.approver, rule.another):
         if name is not None and name.text not in own:
             _role(context, name)
 
 
 def _given(context: CheckContext, use: Use) -> Iterator[Name]:
-    """The roles that a template is given."""
+    """The role arguments of a template."""
     template = context.symbols.templates.get(use.template.text)
     if template is None:
         return

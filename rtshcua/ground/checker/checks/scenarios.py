@@ -1,6 +1,6 @@
-"""E1602 to E1608: a scenario flies a mission that there is, and speaks of faults and endings that there are.
+"""Check scenarios: their mission, faults and endings exist, and their start is valid.
 
-Only those of the file that was asked for are looked at: the scenarios of an imported file are its own business.
+Only the scenarios of the compiled file itself are checked, not those of imported files.
 """
 
 from rtshcua.diagnostics import codes
@@ -38,16 +38,16 @@ from rtshcua.model.ir.scenarios import (
 from rtshcua.model.quantity import Dimension
 from rtshcua.model.scenario import ENDINGS, FLAVOURS, MAX_SEEDS
 
-#: what stands around the vehicle, whichever it is, in `expect distance to obstacle`
+#: any obstacle, in `expect distance to obstacle`
 OBSTACLE = "obstacle"
 #: the endings as sources write them
 ENDS = tuple(each.replace("-", "_") for each in ENDINGS)
-#: what a flight starts with: the charge, the air, and the time
+#: the parts of `start`: the charge, the wind, and the time
 BATTERY, WIND, AT = "battery", "wind", "at"
 
 
 def check_scenarios(context: CheckContext) -> None:
-    """Report every scenario that cannot be flown, or that expects what cannot be."""
+    """Report every scenario that cannot be flown, or whose expectation is impossible."""
     seen: dict[str, ScenarioDecl] = {}
     for scenario in context.symbols.scenarios:
         first = seen.setdefault(scenario.name.text, scenario)
@@ -88,7 +88,7 @@ def _check(context: CheckContext, scenario: ScenarioDecl) -> None:
 
 
 def _values(context: CheckContext, scenario: ScenarioDecl, mission: MissionDecl) -> None:
-    """A mission with parameters is flown with their defaults."""
+    """Report mission parameters without a default."""
     lacking = [each for each in mission.parameters if each.default is None]
     if lacking:
         context.report.add(

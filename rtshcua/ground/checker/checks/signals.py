@@ -1,4 +1,4 @@
-"""E0401 to E0412, E0415: enumerations and signals against the MAVLink dialect."""
+"""Check enumerations and signals against the MAVLink dialect."""
 
 from collections.abc import Mapping
 
@@ -18,12 +18,12 @@ from rtshcua.model.ir.signals import EnumDecl, Selected, SignalDecl, SourceDecl
 from rtshcua.model.quantity import Dimension
 
 PLACE_UNIT = "degE7"
-#: the field that says into which direction a sensor looks
+#: the field for the direction of a sensor
 _DIRECTION = "orientation"
 
 
 def check_signals(context: CheckContext) -> None:
-    """Report every enumeration and signal that the dialect does not bear out."""
+    """Report every enumeration and signal that contradicts the dialect."""
     for enum in context.symbols.enums.values():
         _enum(context, enum)
     for signal in context.symbols.signals.values():
@@ -129,7 +129,7 @@ def _source(context: CheckContext, signal: SignalDecl, source: SourceDecl, type:
 
 
 def _selector(context: CheckContext, source: SourceDecl, message: Message) -> None:
-    """Each selected field is one whole number that has such a value, and a direction is always selected."""
+    """Check selected fields: integers with a valid value, and always a direction."""
     report, seen = context.report, set[str]()
     for each in source.where:
         name, value = each.field, each.value.text
@@ -173,7 +173,7 @@ def _selector(context: CheckContext, source: SourceDecl, message: Message) -> No
 
 
 def selected_value(dialect: Dialect, message: str, selected: Selected) -> int | None:
-    """The raw value that a selected field must have; None where it has no such value."""
+    """Return the raw value of a selected field; None if it is invalid."""
     field = dialect.messages[message].fields[selected.field.text]
     value = sentinel(selected.value.text, {} if field.enum is None else dialect.enums.get(field.enum, {}))
     low, high = INTEGERS[field.type]
@@ -185,7 +185,7 @@ def _fields(message: Message) -> str:
 
 
 def _count(context: CheckContext, signal: SignalDecl, source: SourceDecl, type: Type | None) -> bool:
-    """A position is read from two fields, a speed from one or two, everything else from one."""
+    """Check the number of fields: two for a position, one or two for a speed, else one."""
     given = len(source.fields)
     allowed = (2,) if type == POSITION else (1, 2) if type == SPEED else (1,)
     if given in allowed:
@@ -203,7 +203,7 @@ def _count(context: CheckContext, signal: SignalDecl, source: SourceDecl, type: 
 def _field(
     context: CheckContext, signal: SignalDecl, source: SourceDecl, name: Name, field: Field, type: Type | None
 ) -> None:
-    """The field measures what the signal does."""
+    """Check that the field has the quantity of the signal."""
     if signal.type.text == Dimension.ALTITUDE.value:
         _altitude(context, signal, source, name, field, type)
     elif type == POSITION:
@@ -286,7 +286,7 @@ def _sentinels(context: CheckContext, signal: SignalDecl, field: Field) -> None:
 
 
 def sentinel(text: str, members: Mapping[str, int]) -> int | None:
-    """The raw value that a mark for `not known` stands for, or None."""
+    """Return the raw value of an `unknown at` entry, or None."""
     if text in members:
         return members[text]
     digits = text.removeprefix("-")

@@ -1,6 +1,6 @@
-"""A test says what is asked, where it starts from and what must be decided, for each row of its table.
+"""Check tests: each has a request, a start and an expected outcome, for each row of its table.
 
-Only those of the file that was asked for are looked at: the tests of an imported file are its own business.
+Only the tests of the compiled file itself are checked, not those of imported files.
 """
 
 from rtshcua.diagnostics import codes
@@ -28,12 +28,12 @@ from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.skills import ArgumentValue, SkillDecl
 from rtshcua.model.ir.tests import CaseTable, Named, RequestDecl, Subject, TableCell, TableRow, TestDecl
 
-#: of one file; beyond that a generator went wild, and nobody reads what they find
+#: the most test cases of one file
 MAX_CASES = 4096
 
 
 def check_tests(context: CheckContext) -> None:
-    """Report every test that does not say what it must, or says what cannot be."""
+    """Report every incomplete or invalid test."""
     tests = context.symbols.tests
     if _too_many(context, tests):
         return
@@ -134,7 +134,7 @@ def _complete(context: CheckContext, test: TestDecl, start: TestStart) -> None:
 
 
 def check_request(context: CheckContext, test: TestDecl, request: RequestDecl, skill: SkillDecl) -> None:
-    """Report arguments that do not fit their parameters. One out of its range does: the decision denies it."""
+    """Report arguments of a wrong type. A value outside the range is valid: the decision denies it."""
     columns = () if test.table is None else columns_of(test.table, skill)
     stand_ins = tuple(
         ArgumentValue(span=name.span, name=name, value=Reference(span=name.span, name=name.text)) for name in columns
@@ -147,24 +147,24 @@ def check_request(context: CheckContext, test: TestDecl, request: RequestDecl, s
             bind_value(context.scope(), unranged(argument), value)
 
 
-#: of one table; far above what anybody reads
+#: the most columns of one table
 MAX_COLUMNS = 64
 
 
 def columns_of(table: CaseTable, skill: SkillDecl) -> tuple[Name, ...]:
-    """The columns that are parameters of the skill that is asked for."""
+    """Return the columns that are parameters of the requested skill."""
     names = {parameter.name.text for parameter in skill.parameters}
     named = (column.name for column in table.columns if isinstance(column, Named))
     return tuple(dict.fromkeys(name for name in named if name.text in names))
 
 
 def unranged(argument: Argument) -> Argument:
-    """A parameter without its range: what is out of it is for the decision to deny."""
+    """Return a parameter without its range, because the decision denies values outside it."""
     return Argument(argument.declaration, argument.type)
 
 
 def check_table(context: CheckContext, test: TestDecl, table: CaseTable, skill: SkillDecl | None) -> None:
-    """Report columns that nothing is called, and cells that do not fit their columns."""
+    """Report unknown columns, and cells that do not fit their columns."""
     if len(table.columns) > MAX_COLUMNS:
         context.report.add(
             codes.TOO_MANY,

@@ -1,14 +1,14 @@
-"""E0806, E0807: the times of a contract agree with each other, and with its timing class.
+"""Check that the times of a contract are consistent, and fit its timing class.
 
-A decision must not come, nor what it began go on, when it means nothing any more: the deadline and the longest
-duration fit into the validity, and so does the time for which an approval is awaited. A grace that is longer than the
-skill lasts would bear with anything. The class (paper symbol `cls`) bounds the deadline:
+A decision must not expire before the step starts, nor while it flies: the deadline, the duration and the time for an
+approval must not exceed the validity. A grace above the duration would tolerate any violation. The class (paper symbol
+`cls`) bounds the deadline:
 
 | class | deadline | why |
 |---|---|---|
-| `reflex` | 200 ms | what an obstacle at 10 m and 12 m/s leaves, less the time to brake |
-| `tactical` | 30 s | what is decided on the state of now cannot wait while the battery and the wind change |
-| `semantic` | none | a person or an agent thinks it over |
+| `reflex` | 200 ms | the time to an obstacle at 10 m and 12 m/s, less the time to brake |
+| `tactical` | 30 s | a decision on the current state must not wait while battery and wind change |
+| `semantic` | none | a person or an agent decides |
 """
 
 from collections.abc import Iterable
@@ -24,12 +24,12 @@ from rtshcua.model.ir.policies import RuleDecl
 from rtshcua.model.ir.skills import SkillDecl
 from rtshcua.model.quantity import Dimension, display
 
-#: the longest deadline of each class that has one, us
+#: the longest deadline of a class, us
 LONGEST_DEADLINE = {"reflex": 200_000, "tactical": 30_000_000}
 
 
 class _Times(NamedTuple):
-    """What a contract says; None where it says nothing, or nothing that is a time."""
+    """The times of a contract; None if not written, or not a duration."""
 
     deadline: Quantity | None
     validity: Quantity | None
@@ -38,7 +38,7 @@ class _Times(NamedTuple):
 
 
 def check_times(context: CheckContext) -> None:
-    """Report every contract, override and `confirm` rule whose times cannot all be meant."""
+    """Report every contract, override and `confirm` rule with inconsistent times."""
     for skill in context.symbols.skills.values():
         _coherent(context, _of(skill))
         _class(context, skill)
@@ -68,7 +68,7 @@ def _overridden(skill: _Times, step: _Times) -> _Times:
 
 
 def _coherent(context: CheckContext, times: _Times, of: Iterable[Quantity | None] = ()) -> None:
-    """Report what contradicts each other; with `of`, only what one of these contributes to."""
+    """Report times that contradict each other; with `of`, only contradictions that involve one of these."""
     own = {quantity for quantity in of if quantity is not None}
     deadline, validity, duration, grace = times
     for short, long, words, help in (
@@ -140,7 +140,7 @@ def _approval(context: CheckContext, rule: RuleDecl) -> None:
 
 
 def _awaited(context: CheckContext, policy: Name, step: Step) -> None:
-    """An approval that a step's own validity does not leave time for, where its skill's does."""
+    """Report an approval that takes longer than a step's own validity, but not than that of its skill."""
     under, skill = context.symbols.policies.get(policy.text), context.symbols.skills.get(step.skill.text)
     own = None if step.overrides is None else _time(step.overrides.validity)
     if under is None or skill is None or own is None:

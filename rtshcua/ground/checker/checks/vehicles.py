@@ -1,4 +1,4 @@
-"""E0101, E0106, E0201, E0204, E0310, E0319, E0414, E0502, E0518, E1003: what a vehicle declares of itself."""
+"""Check the fields of vehicles."""
 
 from rtshcua.decision.checks.policy import MAX_POSITION_ERROR, MAX_REACTION
 from rtshcua.diagnostics import codes
@@ -19,7 +19,7 @@ MAX_OFFSET_US = 14 * 3_600_000_000  # local times are at most 14 h from UTC
 
 
 def check_vehicles(context: CheckContext) -> None:
-    """Report every field of a vehicle that is of the wrong dimension or size."""
+    """Report every field of a vehicle with a wrong dimension or value."""
     for vehicle in context.symbols.vehicles.values():
         on_globe(context, vehicle.home)
         quantity(context, vehicle.within, Dimension.LENGTH)
@@ -60,7 +60,7 @@ def _time_zone(context: CheckContext, name: Name) -> None:
 
 
 def _without(context: CheckContext, vehicle: VehicleDecl) -> None:
-    """What it is without are signals, each named once, and none that is always read."""
+    """Check `without`: known signals, each named once, none of them required."""
     needed = read_by_all(vehicle)
     first: dict[str, Span] = {}
     for name in vehicle.without:
@@ -85,12 +85,12 @@ def _without(context: CheckContext, vehicle: VehicleDecl) -> None:
             find_signal(context, name)
 
 
-#: the speeds that a vehicle may declare
+#: the speeds in `speeds`
 SPEEDS = ("cruise", "climb", "descent", "landing", "return", "air")
 
 
 def _speeds(context: CheckContext, vehicle: VehicleDecl) -> None:
-    """Its speeds are known ones, each written once and no more than the most; the wind leaves it some."""
+    """Check the speeds: known, each written once, below the maximum, and above the wind."""
     quantity(context, vehicle.flight, Dimension.DURATION)
     quantity(context, vehicle.wind, Dimension.SPEED, positive=False)
     gains = vehicle.acceleration
@@ -153,12 +153,12 @@ def _against_wind(context: CheckContext, vehicle: VehicleDecl) -> None:
 
 
 def gained(gains: Acceleration) -> int:
-    """What it gains of speed, in mm/s in a second, rounded down; 0 where that is nothing."""
+    """Return the acceleration in mm/s per second, rounded down; 0 if the time is not positive."""
     return gains.speed.value * 1_000_000 // gains.time.value if gains.time.value > 0 else 0
 
 
 def deceleration(braking: Braking) -> int:
-    """What it loses of its speed, in mm/s in a second, rounded down; 0 where that is nothing."""
+    """Return the deceleration in mm/s per second, rounded down; 0 if the time is not positive."""
     return braking.speed.value * 1_000_000 // braking.time.value if braking.time.value > 0 else 0
 
 

@@ -1,4 +1,4 @@
-"""A zone has a clear inside on the globe, its floor is below its ceiling, and it is not made of itself."""
+"""Check zones: their outline is simple, the floor is below the ceiling, and no zone is defined by itself."""
 
 from collections.abc import Iterator
 
@@ -19,7 +19,7 @@ LEAST_WIDTH = 100  # mm
 
 
 def check_zones(context: CheckContext) -> None:
-    """Report every zone that no vehicle could be inside of, or that has no clear inside."""
+    """Report every zone with an invalid outline, band or entry."""
     for zone in context.symbols.zones.values():
         height(context, zone.floor)
         height(context, zone.ceiling)
@@ -151,7 +151,7 @@ def _ring(context: CheckContext, zone: ZoneDecl, shape: Polygon, ring: tuple[Coo
 
 
 def _holes(context: CheckContext, zone: ZoneDecl, shape: Polygon) -> bool:
-    """Whether all holes lie in the polygon, and apart from each other."""
+    """Whether all holes are inside the polygon and do not overlap; reports it if not."""
     rings = (shape.corners, *shape.holes)
     placed = [_corners(shape, ring) for ring in rings]
     met = touching_edges(placed)
@@ -200,12 +200,12 @@ def _corners(shape: Polygon, ring: tuple[Coordinates, ...]) -> list[Point]:
 
 
 def _corner(place: Coordinates, near: Coordinates) -> Point:
-    """A place in the plane of longitudes and latitudes around another, across longitude 180 where that is shorter."""
+    """A point in the plane of longitudes and latitudes near another, across longitude 180 if that is shorter."""
     return meridian(place.longitude, near.longitude), place.latitude
 
 
 def parts(shape: Shape) -> Iterator[Shape]:
-    """A shape, and all shapes that it is made of."""
+    """A shape, and all shapes of which it consists."""
     yield shape
     if isinstance(shape, Combination):
         for each in shape.shapes:
@@ -213,12 +213,12 @@ def parts(shape: Shape) -> Iterator[Shape]:
 
 
 def named(zone: ZoneDecl) -> Iterator[Reference]:
-    """The zones that a zone is made of, by name."""
+    """The zones that the shape of a zone names."""
     return (each for each in parts(zone.shape) if isinstance(each, Reference))
 
 
 def operands(context: CheckContext, zone: ZoneDecl) -> Iterator[Shape]:
-    """The shapes that a zone is made of, but for other zones: of these, reports names that stand for none."""
+    """The shapes of a zone, without other zones; reports names of unknown zones."""
     for each in parts(zone.shape):
         if isinstance(each, Reference):
             find_zone(context, Name(span=each.span, text=each.name))
@@ -227,7 +227,7 @@ def operands(context: CheckContext, zone: ZoneDecl) -> Iterator[Shape]:
 
 
 def circles(context: CheckContext) -> None:
-    """Report each zone that is made of itself, once for each way in which it is."""
+    """Report each zone that is defined by itself, once for each cycle."""
     zones = context.symbols.zones
     finished: set[str] = set()
     for start in zones:

@@ -1,4 +1,4 @@
-"""The actions of the grammar by the names of their rules: the forms of the modules here, and their public functions."""
+"""The actions of the grammar by the names of their rules: the `FORMS` and the public functions of these modules."""
 
 from types import FunctionType, ModuleType
 
@@ -7,7 +7,7 @@ from rtshcua.ground.language.build.reader import Action
 
 
 def _of(module: ModuleType) -> dict[str, Action]:
-    """A function of the name of a rule makes that rule's value."""
+    """The actions of a module: each public function is the action of the rule with its name."""
     own: dict[str, Action] = {
         name: value
         for name, value in vars(module).items()

@@ -1,4 +1,4 @@
-"""Values that are computed, and conditions."""
+"""Actions for computed values and conditions. The docstring of an action shows the source text of its rule."""
 
 from typing import Literal
 
@@ -50,12 +50,12 @@ FORMS: dict[str, Action] = {
 
 
 def reference(reader: Reader, span: Span, text: str) -> Reference:
-    """A name that stands for a value."""
+    """A name used as a value."""
     return Reference(span=span, name=text)
 
 
 def local_time(reader: Reader, span: Span, text: str) -> Reference:
-    """`local time`, one name however it is spaced."""
+    """`local time`, with any white space."""
     return Reference(span=span, name="local time")
 
 
@@ -69,7 +69,7 @@ def function(reader: Reader, span: Span, name: Literal["abs", "min", "max"], *op
 
 
 def bracket(reader: Reader, span: Span, value: Node) -> Node:
-    """Parentheses leave what is in them as it is, and count as a level."""
+    """Parentheses: the inner node itself, one nesting level deeper."""
     return reader.nested(value, value)
 
 

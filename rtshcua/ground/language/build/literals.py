@@ -1,4 +1,4 @@
-"""Numbers, places, times, texts and names, as they are written out."""
+"""Actions for numbers, coordinates, times, strings and names."""
 
 from rtshcua.diagnostics.codes import BAD_COORDINATES, BAD_PERIOD, DATUM_NOT_ALLOWED, OUT_OF_BOUNDS, SYNTAX, Code
 from rtshcua.diagnostics.excerpt import short
@@ -19,12 +19,12 @@ FORMS: dict[str, Action] = {"names": several}
 
 
 def name(reader: Reader, span: Span, text: str) -> Name:
-    """A name where it stands; no row of `FORMS`, because most of what is parsed are names."""
+    """A name. It has no row in `FORMS`, because names are the most frequent nodes."""
     return Name(span=span, text=text)
 
 
 def text(reader: Reader, span: Span, raw: str) -> str:
-    r"""A text in quotes; `\"` and `\\` stand for the quote and the backslash."""
+    r"""A string in quotes; `\"` and `\\` are a quote and a backslash."""
     inner = raw[1:-1]
     return inner.replace('\\"', '"').replace("\\\\", "\\") if "\\" in inner else inner
 
@@ -37,14 +37,14 @@ def integer(reader: Reader, span: Span, number: str) -> int:
 
 
 def count(reader: Reader, span: Span, number: str) -> Quantity:
-    """A plain whole number, with its place."""
+    """A plain whole number, with its span."""
     return Quantity(span=span, value=integer(reader, span, number), dimension=Dimension.COUNT)
 
 
 def quantity(
     reader: Reader, span: Span, minus: str | None, number: str, unit: str | None, datum: str | None
 ) -> Quantity:
-    """A number with its unit, in the canonical unit; a length above something is an altitude."""
+    """A number with its unit, in the canonical unit; a length with a datum is an altitude."""
     value, dimension, trouble = found = exact(number, unit, minus is not None)
     if trouble is not None:
         report_trouble(reader, found, reader.source.slice(span), span, unit, datum, plain=None if unit else number)
@@ -61,7 +61,7 @@ def quantity(
 
 
 def coordinates(reader: Reader, span: Span, latitude: str, north: str, longitude: str, east: str) -> Coordinates:
-    """A place on the ground; south and west are negative."""
+    """Coordinates in 1e-7 degree; south and west are negative."""
     values = (
         degrees(reader, span, latitude, "latitude", north == "S"),
         degrees(reader, span, longitude, "longitude", east == "W"),
@@ -90,7 +90,7 @@ def time_of_day(reader: Reader, span: Span, text: str) -> TimeOfDay:
 
 
 def day(reader: Reader, span: Span, first: Name, last: Name | None) -> tuple[int, ...]:
-    """`monday`, `monday .. friday`, `friday .. monday`, from 0 on."""
+    """`monday`, `monday .. friday`, `friday .. monday`; monday is 0."""
     start = _day(reader, first)
     return (start,) if last is None else tuple((start + n) % 7 for n in range((_day(reader, last) - start) % 7 + 1))
 

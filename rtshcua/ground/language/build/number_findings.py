@@ -1,4 +1,4 @@
-"""Numbers that have no exact value in the unit that they are kept in: what is wrong with each, and the mend."""
+"""Findings on numbers without an exact value in their canonical unit, with fixes."""
 
 import re
 from fractions import Fraction
@@ -14,7 +14,7 @@ from rtshcua.model.flat.limits import MAX_DURATION, MAX_SPEED, MAX_VALUE
 from rtshcua.model.flat.zone import MAX_COORDINATE
 from rtshcua.model.quantity import UNITS, Dimension, display
 
-#: Other ways to write the units, and the ones meant.
+#: Other spellings of the units.
 MEANT = {
     "metre": "m", "metres": "m", "meter": "m", "meters": "m", "mps": "m/s", "kph": "km/h", "kmh": "km/h",
     "sec": "s", "secs": "s", "second": "s", "seconds": "s", "minute": "min", "minutes": "min", "mins": "min",
@@ -22,14 +22,14 @@ MEANT = {
     "degree": "deg", "degrees": "deg", "°": "deg",
 }  # fmt: skip
 
-#: The largest number of each dimension that is kept on board, where it is not `MAX_VALUE`.
+#: The largest onboard value of a dimension, if it is not `MAX_VALUE`.
 LARGEST = {
     Dimension.LENGTH: MAX_COORDINATE,
     Dimension.SPEED: MAX_SPEED,
     Dimension.DURATION: MAX_DURATION,
 }
 
-#: The dimension that a word before a number calls for; the help for an unknown unit shows the units of that first.
+#: The dimension that a keyword before a number expects; the help for an unknown unit lists its units first.
 DIMENSION_OF = {
     word: dimension
     for dimension, words in (
@@ -43,23 +43,23 @@ DIMENSION_OF = {
     for word in words.split()
 }
 
-#: The points of the compass, which stand after a latitude or a longitude, and their opposites.
+#: The compass points after a latitude or a longitude, and their opposites.
 POINTS = {"N": "S", "S": "N", "E": "W", "W": "E"}
 
 _EXPONENT = re.compile(r"[eE][0-9]*")
 
-LOOK_BACK = 120  # characters before a number in which such a word is looked for
+LOOK_BACK = 120  # characters before a number that are searched for such a keyword
 
 
 _NUMBER = r"-?[0-9]{1,3}(?:\.[0-9]{1,12})?"
-#: two numbers without a unit, as a place is written elsewhere; and what stands around a value of its own
+#: two numbers without a unit, as coordinates are written elsewhere, and the text before a value
 _TWO_NUMBERS = re.compile(rf"(?P<latitude>{_NUMBER})\s*,\s*(?P<longitude>{_NUMBER})(?=\s*[,)])")
 _NUMBER_BEFORE = re.compile(rf"[(=]\s*(?P<pair>{_NUMBER}\s*,\s*)$")
 _BEFORE_VALUE = re.compile(r"[(=]\s*$")
 
 
 def degrees(reader: Reader, span: Span, number: str, what: str, negative: bool) -> int:
-    """A latitude or a longitude, in 1e-7 degree."""
+    """Return a latitude or a longitude in 1e-7 degree."""
     found = exact(number, "deg", negative)
     if found.trouble is Trouble.OUT_OF_BOUNDS:
         return 360 * UNITS["deg"].numerator
@@ -82,7 +82,7 @@ def report_trouble(
     datum: str | None = None,
     plain: str | None = None,
 ) -> None:
-    """Reports what is wrong with a number, if anything is; `plain` are the digits of a value without a unit."""
+    """Report the trouble of a number, if any; `plain` are the digits of a value without a unit."""
     match found.trouble:
         case Trouble.UNKNOWN_UNIT if unit is not None:
             _unknown_unit(reader, unit, written, span)
@@ -130,7 +130,7 @@ def _not_exact(
 
 
 def _place(reader: Reader, written: str, span: Span) -> bool:
-    """Reports `47.4, 8.5` where a place is meant, once for both numbers; whether this is one of two such."""
+    """Whether a number is part of `47.4, 8.5`, probably coordinates; reports both numbers once."""
     text, last = reader.source.text, reader.diagnostics[-1] if reader.diagnostics else None
     told = last.span if last is not None and last.code is NOT_EXACT else None
     if told is not None and told.start <= span.start and span.end <= told.end:
@@ -154,7 +154,7 @@ def _place(reader: Reader, written: str, span: Span) -> bool:
 
 
 def _no_unit(reader: Reader, unit: str, written: str, span: Span) -> None:
-    """`-47.4 N, 8.5 E` where a value stands, and `2e3`."""
+    """Report `-47.4 N, 8.5 E` as a value, and `2e3`."""
     if unit in POINTS:
         plain = written.removeprefix("-").strip()
         opposite = plain[: -len(unit)] + POINTS[unit]
@@ -163,27 +163,27 @@ def _no_unit(reader: Reader, unit: str, written: str, span: Span) -> None:
             help = f"coordinates have no sign: write `{opposite}` or `{plain}`"
         last = reader.diagnostics[-1].span if reader.diagnostics else None
         if unit in "EW" and last is not None and reader.source.text[last.end : span.start].strip() == ",":
-            return  # the longitude of a latitude that was reported
+            return  # the latitude before it was reported
     else:
         help = "exponents are not supported: write all digits, which `_` may group, as in `20_000 m`"
     reader.report(UNKNOWN_UNIT, f"`{short(unit)}` is not a unit", span, help)
 
 
 def _expected_dimension(reader: Reader, span: Span) -> Dimension | None:
-    """The dimension that the words before a number call for, if any does."""
+    """The dimension that the keywords before a number expect, if any."""
     before = re.findall(r"[a-z]+", reader.source.text[max(0, span.start - LOOK_BACK) : span.start])
     return next((DIMENSION_OF[word] for word in reversed(before) if word in DIMENSION_OF), None)
 
 
 def _exactly(digits: str) -> str:
-    """A plain number with decimals, as what it is exactly."""
+    """How to write a plain number with decimals exactly."""
     value = Fraction(digits.replace("_", ""))
     ratio = f", or `{display(int(value * 10_000), Dimension.RATIO)}`" if (value * 10_000).denominator == 1 else ""
     return f"in a product, write `({value})`{ratio}"
 
 
 def _written(found: Exact, unit: str | None) -> str:
-    """A canonical value in the unit that the author used, if it is whole there."""
+    """A canonical value in the author's unit if it is whole in that unit."""
     if unit is not None and found.value * UNITS[unit].denominator % UNITS[unit].numerator == 0:
         return f"{found.value * UNITS[unit].denominator // UNITS[unit].numerator} {unit}"
     return display(found.value, found.dimension)

@@ -1,4 +1,4 @@
-"""Imports, roles, policies, templates and missions: who may have what done, and what is to be done."""
+"""Actions for imports, roles, policies, templates and missions."""
 
 from typing import Any
 
@@ -52,7 +52,7 @@ FORMS: dict[str, Action] = {
 
 
 def file(reader: Reader, span: Span, *declarations: None) -> None:
-    """The whole text; its declarations were kept as they ended."""
+    """The whole text. The reader already has its declarations."""
 
 
 def import_file(reader: Reader, span: Span, path: str) -> None:
@@ -61,7 +61,7 @@ def import_file(reader: Reader, span: Span, path: str) -> None:
 
 
 def anyone(reader: Reader, span: Span) -> Names:
-    """`any` skill, or `by any` role: no name in particular."""
+    """`any` skill, or `by any` role: no names."""
     return ()
 
 
@@ -108,7 +108,7 @@ def policy(reader: Reader, span: Span, name: Name, version: int, *given: RuleDec
 
 
 def argument(reader: Reader, span: Span, *parts: Any) -> ArgumentValue:
-    """`altitude = 20 m`, or a value by its place."""
+    """`altitude = 20 m`, or a positional value."""
     name, value = parts if len(parts) == 2 else (None, *parts)
     return ArgumentValue(span=span, name=name, value=value)
 

@@ -1,6 +1,6 @@
-"""The reader of one text: its source, what was declared and found in it so far, and how a rule's parts are made values.
+"""The reader of one text: its source, its declarations and findings so far, and the makers of actions.
 
-The parser calls an action for each rule of the grammar, with the reader, the rule's span and its parts (`actions`).
+The parser calls an action for each rule of the grammar with the reader, the rule's span and its parts (`actions`).
 """
 
 from collections.abc import Callable, Sequence
@@ -15,22 +15,22 @@ from rtshcua.diagnostics.span import Source, Span
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.tests import Quoted
 
-MAX_DEPTH = 64  # of what stands within its like; far above what a person writes, far below what Python can walk
+MAX_DEPTH = 64  # nesting levels: far above what people write, far below the recursion limit of Python
 
-MAX_FINDINGS = 1000  # in one file; a text that has more is not one of ours
+MAX_FINDINGS = 1000  # in one file
 
 T = TypeVar("T", bound=Node)
 
-#: makes the value of a rule, of the reader, the rule's span and the values of its parts
+#: makes the value of a rule from the reader, the rule's span and the values of its parts
 Action = Callable[..., object]
 
 
 class Enough(Exception):
-    """So much was found that reading on helps nobody; `parse` catches it."""
+    """Raised at the limit of findings; `parse` catches it."""
 
 
 class Part(NamedTuple):
-    """One part of a declaration's body, as `deadline 2 s`: what it is called, where it stands, what it says."""
+    """One part of a declaration's body, such as `deadline 2 s`: its key, span and value."""
 
     key: str
     span: Span
@@ -38,16 +38,16 @@ class Part(NamedTuple):
 
 
 class Reader:
-    """Findings and declarations of one text. A declaration in which something was found is not kept, only its name."""
+    """Findings and declarations of one text. Of a declaration with findings only the name is kept."""
 
     def __init__(self, source: Source) -> None:
         self.source = source
         self.diagnostics: list[Diagnostic] = []
         self.declarations: list[Node] = []
         self.broken: set[str] = set()
-        self.whole = True  # whether every import was understood
-        self._settled = 0  # how many findings there were when the last declaration ended
-        self._depths: dict[Span, int] = {}  # how deep what stands there is nested
+        self.whole = True  # whether all imports were parsed
+        self._settled = 0  # the number of findings at the end of the last declaration
+        self._depths: dict[Span, int] = {}  # nesting depths of the nodes of the current declaration
 
     def report(
         self,
@@ -58,17 +58,17 @@ class Reader:
         labels: tuple[Label, ...] = (),
         fixes: tuple[Fix, ...] = (),
     ) -> None:
-        """Notes a finding."""
+        """Add a finding."""
         self.note(Diagnostic(code, message, span, help, labels, fixes))
 
     def note(self, diagnostic: Diagnostic) -> None:
-        """Notes a finding; raises Enough instead of one too many."""
+        """Add a finding; raises Enough at the limit."""
         if len(self.diagnostics) == MAX_FINDINGS:
             raise Enough
         self.diagnostics.append(diagnostic)
 
     def declare(self, node: T, name: Name | None = None) -> None:
-        """Keeps a declaration, unless something was found in it."""
+        """Keep a declaration, unless it has findings."""
         if len(self.diagnostics) == self._settled:
             self.declarations.append(node)
         elif name is not None:
@@ -76,22 +76,22 @@ class Reader:
         self.settle()
 
     def abandon(self, name: Name) -> None:
-        """Drops a declaration in which something was found, and remembers its name."""
+        """Drop a declaration with findings, and keep its name."""
         self.broken.add(name.text)
         self.settle()
 
     def settle(self) -> None:
-        """The declaration is over, kept or not: what is found from now on belongs to the next."""
+        """End the current declaration: later findings belong to the next one."""
         self._settled = len(self.diagnostics)
         self._depths.clear()
 
     @property
     def sound(self) -> bool:
-        """Whether nothing was found in the current declaration so far."""
+        """Whether the current declaration has no findings so far."""
         return len(self.diagnostics) == self._settled
 
     def undotted(self, name: Name, what: str) -> None:
-        """Only signals have dotted names; a dot elsewhere asks for a member, such as a zone's entry."""
+        """Report a dot in a name. Only signals have dotted names; elsewhere a dot refers to a member: `zone.entry`."""
         if "." in name.text:
             plain = name.text.replace(".", "_")
             shown = short(name.text)
@@ -104,7 +104,7 @@ class Reader:
             )
 
     def nested(self, node: Node, *inner: Node, help: str = "split it into several clauses joined by `and`") -> Node:
-        """`node`, counting how deeply such are nested; one level too many is reported once, and not built."""
+        """Return `node` and count its nesting level. A node above the limit is reported once and not built."""
         depth = 1 + max((self._depths.get(part.span, 0) for part in inner), default=0)
         if depth == MAX_DEPTH + 1:
             self.report(TOO_DEEP, f"this is nested more than {MAX_DEPTH} levels deep", node.span, help)
@@ -121,8 +121,9 @@ class Reader:
         required: Sequence[str] = (),
         listed: Sequence[str] = (),
     ) -> dict[str, Any]:
-        """What the parts hold, by their key: each is given at most once, and the required ones are there. Those of the
-        keys `listed` may be given several times; there is a list of what they hold, which may be empty.
+        """Return the values of the parts by key; report repeated parts and missing `required` ones.
+
+        Keys in `listed` may repeat: each has a list of values, which may be empty.
         """
         first: dict[str, Part] = {}
         found: dict[str, Any] = {key: [] for key in listed}
@@ -147,10 +148,9 @@ class Reader:
 
 
 def node(kind: type[Node], /, *fields: str, **constants: object) -> Action:
-    """The action that makes a node of a rule whose parts are, in order, these fields of it.
+    """Return the action that makes a node from a rule whose parts are, in order, these fields.
 
-    A field of a part that was not written has the value in `constants`, or else its default or None, as has a field
-    that the rule has no part for.
+    A field without a part, or whose part was not written, has the value in `constants`, or else its default or None.
     """
     names, defaults = kind.__struct_fields__, kind.__struct_defaults__  # `structs.fields` resolves types: 4 ms for all
     defaults = (NODEFAULT,) * (len(names) - len(defaults)) + defaults
@@ -172,7 +172,7 @@ def node(kind: type[Node], /, *fields: str, **constants: object) -> Action:
 
 
 def nesting(kind: type[Node], /, *fields: str, **constants: object) -> Action:
-    """As `node`, of a node that counts as a level above those of its fields that are nodes."""
+    """Like `node`, for a node that is one nesting level above its fields."""
     make = node(kind, *fields, **constants)
 
     def make_nesting(reader: Reader, span: Span, *values: object) -> object:
@@ -183,7 +183,7 @@ def nesting(kind: type[Node], /, *fields: str, **constants: object) -> Action:
 
 
 def part(key: str, value: Action | None = None) -> Action:
-    """The action that makes a part of a declaration: of what it holds, or of what `value` makes of that."""
+    """Return the action that makes a part of a declaration: its value, or the result of `value`."""
 
     def make(reader: Reader, span: Span, held: object) -> Part:
         return Part(key, span, held)
@@ -195,5 +195,5 @@ def part(key: str, value: Action | None = None) -> Action:
 
 
 def several(reader: Reader, span: Span, *values: T) -> tuple[T, ...]:
-    """A list of any length."""
+    """A list of values."""
     return values

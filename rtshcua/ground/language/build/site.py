@@ -1,4 +1,4 @@
-"""Where is flown, by what: zones, vehicles, and the signals that vehicles report."""
+"""Actions for enumerations, signals, zones and vehicles."""
 
 from typing import Any
 
@@ -27,15 +27,15 @@ from rtshcua.model.ir.places import (
 from rtshcua.model.ir.signals import EnumDecl, Enumerator, Selected, SignalDecl, SourceDecl
 from rtshcua.model.quantity import UNITS, Dimension
 
-#: the keys of two parts that are both written `active`
+#: the keys of the two kinds of `active` parts
 DAILY, DATES = "active (times of day)", "active (dates)"
 
 FULL = 100 * UNITS["%"].numerator
 
-#: The most cells in series that a battery of a multirotor may have.
+#: The most battery cells in series.
 MOST_CELLS = 48
 
-#: the parts that every vehicle has
+#: the required parts of a vehicle
 REQUIRED = ("identity", "home", "speed", "climb", "position error", "energy", "reserve")
 
 FORMS: dict[str, Action] = {
@@ -80,7 +80,7 @@ def enum(reader: Reader, span: Span, name: Name, dialect: Name | None, members: 
 
 
 def sentinel(reader: Reader, span: Span, *parts: str) -> Name:
-    """A raw value or an enumerator that means "not known"."""
+    """A raw value or an enumerator that means "unknown"."""
     return Name(span=span, text="".join(parts))
 
 
@@ -91,7 +91,7 @@ def selected(reader: Reader, span: Span, field: Name, value: Name) -> Selected:
 
 
 def source(reader: Reader, span: Span, *parts: Any) -> SourceDecl:
-    """`GPS_RAW_INT.fix_type`, or two fields of one message; which of the messages count stands last."""
+    """`GPS_RAW_INT.fix_type`, or two fields of one message, then the selected fields of `where`."""
     paths: tuple[Name, ...] = tuple(part for part in parts if isinstance(part, Name))
     where = parts[-1] if isinstance(parts[-1], tuple) else ()
     messages, fields = zip(*[_field(reader, path) for path in paths], strict=True)
@@ -128,7 +128,7 @@ def signal(reader: Reader, span: Span, name: Name, type: Name, *rest: SourceDecl
 
 
 def _field(reader: Reader, path: Name) -> tuple[Name, Name]:
-    """The message and the field of `MESSAGE.field`, each with its own place."""
+    """The message and the field of `MESSAGE.field`, each with its span."""
     message, dot, field = path.text.partition(".")
     if not dot or "." in field:
         reader.report(
@@ -154,7 +154,7 @@ def polygon(reader: Reader, span: Span, corners: tuple[Coordinates, ...], *holes
 
 
 def corridor(reader: Reader, span: Span, *parts: Any) -> Corridor:
-    """`corridor(47.3 N, 8.5 E, 47.4 N, 8.5 E, width 40 m)`: places, and the width."""
+    """`corridor(47.3 N, 8.5 E, 47.4 N, 8.5 E, width 40 m)`."""
     *points, width = parts
     return Corridor(span=span, points=tuple(points), width=width)
 

@@ -1,4 +1,4 @@
-"""Skills: what they take and need, how they move, and what flies when they end early."""
+"""Actions for skills: parameters, contract, motion and fallback chain."""
 
 from itertools import chain
 from typing import Final, NamedTuple
@@ -22,21 +22,21 @@ from rtshcua.model.ir.skills import (
 
 
 class FurtherName(NamedTuple):
-    """A further name of the `one of` before it, perhaps with the default."""
+    """A further name of a `one of`, with the default if it is written here."""
 
     span: Span
     name: Name
     default: Name | None
 
 
-#: the parts of a skill that a size may stand in, by their first words
+#: the parts of a skill that may be a size, by their first keyword
 _SIZED: Final = {"deadline": "deadline", "valid": "validity", "lasts": "duration", "grace": "grace", "energy": "energy"}
-#: parts of a skill that may be written several times: all of them hold
+#: parts of a skill that may repeat: all of them apply
 _CLAUSES = ("require", "assume", "maintain")
 
 
 def _clauses(condition: Condition, where_fitted: bool) -> tuple[ClauseDecl, ...]:
-    """Splits a top-level `and`, so that a refusal can name the one operand that decided."""
+    """Split a top-level `and`, so that a refusal can name the operand that decided."""
     if isinstance(condition, Junction) and condition.operator == "and":
         return tuple(clause for operand in condition.operands for clause in _clauses(operand, where_fitted))
     return (ClauseDecl(span=condition.span, condition=condition, where_fitted=where_fitted),)
@@ -83,7 +83,7 @@ def choice_type(reader: Reader, span: Span) -> Name:
 
 
 def one_of(reader: Reader, span: Span, name: Name, type: Name, first: Name, default: Name | None) -> ParameterDecl:
-    """`pattern: one of grid`, whose further names follow as items of their own."""
+    """`pattern: one of grid`; further names follow as separate items."""
     reader.undotted(name, "parameter")
     return _choices(span, name, type, (first,), default)
 

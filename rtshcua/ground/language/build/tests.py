@@ -1,4 +1,4 @@
-"""Nominals, tests and scenarios: what holds, what is asked or goes wrong, and what must come of it."""
+"""Actions for nominals, tests and scenarios."""
 
 from collections.abc import Sequence
 from itertools import chain
@@ -55,10 +55,10 @@ from rtshcua.model.ir.tests import (
     VersionInForce,
 )
 
-#: of how many people a rule may ask for an approval
+#: the most approvals that a rule may require
 PEOPLE = 2
 
-#: parts of a nominal or a test of which there may be several
+#: parts of a nominal or a test that may repeat
 _LISTED = ("given", "answer")
 
 FORMS: dict[str, Action] = {
@@ -94,7 +94,7 @@ FORMS: dict[str, Action] = {
 
 
 def title(reader: Reader, span: Span, raw: str) -> Quoted:
-    """A text that names something, or quotes a clause."""
+    """A quoted name, or a quoted clause."""
     return Quoted(span=span, text=text(reader, span, raw))
 
 
@@ -127,8 +127,8 @@ def asked(
     source: Name | None,
 ) -> Part:
     """`when inspect_area(area = bridge_a, altitude = 20 m) by operator through agent`."""
-    said = [name.span for name in (role, source) if name is not None]
-    asker = Asker(span=said[0].to(said[-1]), role=role, source=source) if said else None
+    spans = [name.span for name in (role, source) if name is not None]
+    asker = Asker(span=spans[0].to(spans[-1]), role=role, source=source) if spans else None
     return Part("when", span, RequestDecl(span=span, skill=skill, arguments=arguments or (), asker=asker))
 
 
@@ -194,7 +194,7 @@ def test(reader: Reader, span: Span, name: Quoted, nominal: Name | None, *given:
 
 
 def _premises(reader: Reader, span: Span, found: dict[str, Any]) -> Premises:
-    """What holds, of the parts that say it."""
+    """The premises among the parts of a nominal or a test."""
     return Premises(
         span=span,
         given=tuple(chain.from_iterable(found["given"])),
@@ -211,7 +211,7 @@ def _premises(reader: Reader, span: Span, found: dict[str, Any]) -> Premises:
 
 
 def _answers(reader: Reader, given: Sequence[Answer]) -> tuple[Answer, ...]:
-    """Each answer is of another person; no rule asks more than two."""
+    """The answers, at most two per role; each is of another person."""
     kept: list[Answer] = []
     for answer in given:
         same = [each for each in kept if each.role.text == answer.role.text]
@@ -266,7 +266,7 @@ def distance(reader: Reader, span: Span, place: Name, operator: Name, least: Qua
 
 
 def _bounded(reader: Reader, operator: Name, meant: str, why: str) -> None:
-    """The one comparison that has a meaning there."""
+    """Report a comparison with another operator than `meant`."""
     if operator.text != meant:
         reader.report(
             SYNTAX,

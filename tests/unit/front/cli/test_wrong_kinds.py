@@ -36,7 +36,7 @@ def test_the_standard_input_is_no_file_where_it_is_a_pipe(capsys: pytest.Capture
         os.close(reads)
         os.close(writes)
     said = "".join(capsys.readouterr())
-    assert "a source must be a file" in said
+    assert "save the source as a file" in said
     assert "did you mean" not in said
 
 

@@ -48,12 +48,7 @@ def pair(
         name = _parameter_of(context, skill, written, position)
         first = argument if name is None else pairs.setdefault(name, argument)
         if first is not argument:
-            report.add(
-                codes.DUPLICATE_ARGUMENT,
-                argument.span,
-                f"`{name}` is given twice",
-                labels=[(first.span, "first given here")],
-            )
+            report.add_twice(codes.DUPLICATE_ARGUMENT, argument.span, f"`{name}`", "given", first.span)
     missing = [p for p in skill.parameters if p.name.text not in pairs and p.default is None]
     if missing and len(report.found) == before:
         report.add(

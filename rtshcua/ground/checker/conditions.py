@@ -299,33 +299,7 @@ def check_within(scope: Scope, node: Within) -> None:
     if subject is None:
         return
     kind = subject.type.kind
-    if node.days and kind is not Kind.TIME_OF_DAY:
-        scope.report.add(
-            codes.NOT_COMPARABLE,
-            node.span,
-            f"only `local time` can have days of the week; `{scope.report.text(node.subject.span)}` is "
-            f"{subject.type.describe()}",
-            help="write `local time in 08:00 .. 18:00 on monday .. friday`",
-            labels=declaration_labels(scope, node.subject),
-        )
-        return
-    if kind in (Kind.ZONE, Kind.POSITION):
-        scope.report.add(
-            codes.NOT_COMPARABLE,
-            node.span,
-            f"`{scope.report.text(node.subject.span)}` is {subject.type.describe()}; a range needs a number",
-            help="use `inside` or `outside` with a zone",
-            labels=declaration_labels(scope, node.subject),
-        )
-        return
-    if kind is Kind.ENUMERATION and subject.type.enumeration is not None and not subject.type.enumeration.ordered:
-        scope.report.add(
-            codes.NOT_COMPARABLE,
-            node.span,
-            f"the values of `{subject.type.enumeration.name}` have no order",
-            help="write `in { ... }`",
-            labels=[(subject.type.enumeration.declared, "declared here")],
-        )
+    if _has_no_range(scope, node, subject):
         return
     ends = typed_range(scope, node.range, subject.type)
     if ends is not None and kind is Kind.NUMBER:
@@ -340,6 +314,26 @@ def check_within(scope: Scope, node: Within) -> None:
             "a range of times needs `local time` and two constant ends",
             help="write `local time in 08:00 .. 18:00`",
         )
+
+
+def _has_no_range(scope: Scope, node: Within, subject: Typed) -> bool:
+    """Whether a subject cannot be in a range; reports it."""
+    kind, enumeration = subject.type.kind, subject.type.enumeration
+    labels = declaration_labels(scope, node.subject)
+    text, type = scope.report.text(node.subject.span), subject.type.describe()
+    if node.days and kind is not Kind.TIME_OF_DAY:
+        message = f"only `local time` can have days of the week; `{text}` is {type}"
+        help = "write `local time in 08:00 .. 18:00 on monday .. friday`"
+    elif kind in (Kind.ZONE, Kind.POSITION):
+        message = f"`{text}` is {type}; a range needs a number"
+        help = "use `inside` or `outside` with a zone"
+    elif enumeration is not None and not enumeration.ordered:
+        message, help = f"the values of `{enumeration.name}` have no order", "write `in { ... }`"
+        labels = [(enumeration.declared, "declared here")]
+    else:
+        return False
+    scope.report.add(codes.NOT_COMPARABLE, node.span, message, help=help, labels=labels)
+    return True
 
 
 def check_one_of(scope: Scope, node: OneOf) -> None:

@@ -83,12 +83,7 @@ def _given(context: CheckContext, call: FaultCall, known: dict[str, FaultField])
             continue
         first = given.setdefault(name, argument)
         if first is not argument:
-            report.add(
-                codes.DUPLICATE_ARGUMENT,
-                argument.span,
-                f"`{name}` is given twice",
-                labels=[(first.span, "first given here")],
-            )
+            report.add_twice(codes.DUPLICATE_ARGUMENT, argument.span, f"`{name}`", "given", first.span)
     return given
 
 

@@ -111,8 +111,6 @@ def declaration_labels(scope: Scope, node: Value) -> list[tuple[Span, str]]:
     found = scope.find(node.name)
     if isinstance(found, Argument):
         return [(found.declaration.span, f"`{node.name}` is declared here")]
-    if isinstance(found, SignalDecl):
-        return [(found.name.span, f"`{node.name}` is declared here")]
-    if isinstance(found, ZoneDecl):
+    if isinstance(found, SignalDecl | ZoneDecl):
         return [(found.name.span, f"`{node.name}` is declared here")]
     return []

@@ -151,10 +151,7 @@ def _arithmetic(scope: Scope, node: Arithmetic) -> Extent:
     if node.operator in ("+", "-"):
         if node.operator == "-":
             right = _times(right, Fraction(-1))
-        return Extent(
-            None if left.low is None or right.low is None else left.low + right.low,
-            None if left.high is None or right.high is None else left.high + right.high,
-        )
+        return Extent(_added(left.low, right.low), _added(left.high, right.high))
     types = [typed(scope, each) for each in (node, node.left, node.right)]
     units = [Fraction(COHERENT[each.type.dimension]) for each in types if each is not None and each.type.dimension]
     assert len(units) == len(types)
@@ -168,20 +165,24 @@ def _arithmetic(scope: Scope, node: Arithmetic) -> Extent:
     return _times(left, whole * other / one / right.low)
 
 
+def _added(one: Fraction | int | None, other: Fraction | int | None) -> Fraction | int | None:
+    return None if one is None or other is None else one + other
+
+
 def _times(extent: Extent, factor: Fraction) -> Extent:
     low, high = (None if end is None else end * factor for end in extent)
     return Extent(low, high) if factor >= 0 else Extent(high, low)
 
 
 def _function(name: str, extents: Sequence[Extent]) -> Extent:
-    lows, highs = [each.low for each in extents], [each.high for each in extents]
     if name == "abs":
-        (low,), (high,) = lows, highs
+        low, high = extents[0]
         if low is not None and low >= 0:
             return extents[0]
         return Extent(0, None if low is None or high is None else max(-low, high))
-    known_lows, known_highs = [end for end in lows if end is not None], [end for end in highs if end is not None]
-    least = known_lows if name == "max" or len(known_lows) == len(lows) else []
-    most = known_highs if name == "min" or len(known_highs) == len(highs) else []
-    pick = min if name == "min" else max
-    return Extent(pick(least) if least else None, pick(most) if most else None)
+    if name == "min":  # min(a, b) = -max(-a, -b)
+        negated = [_times(each, Fraction(-1)) for each in extents]
+        return _times(_function("max", negated), Fraction(-1))
+    lows = [each.low for each in extents if each.low is not None]
+    highs = [each.high for each in extents if each.high is not None]
+    return Extent(max(lows) if lows else None, max(highs) if len(highs) == len(extents) else None)

@@ -56,6 +56,10 @@ class Report:
             self._amounts[plain] = max(amount, self._amounts.get(plain, 0))
         self.found.append(found)
 
+    def add_twice(self, code: Code, span: Span, what: str, how: str, first: Span) -> None:
+        """Report that `what` is given, named or declared (`how`) twice; `first` is the first place."""
+        self.add(code, span, f"{what} is {how} twice", labels=[(first, f"first {how} here")])
+
     @contextmanager
     def within(self, labels: Iterable[tuple[Span, str]], among: int = 0) -> Iterator[None]:
         """Add labels to findings in this context, such as the use of a template or the values of parameters.

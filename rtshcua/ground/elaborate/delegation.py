@@ -17,7 +17,6 @@ from rtshcua.model.flat.limits import MAX_ROLES, MAX_RULES
 from rtshcua.model.ir.expression import Condition, Junction
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.policies import Delegation, PolicyDecl, RuleDecl
-from rtshcua.model.ir.skills import SkillDecl
 
 #: the source of a role if a permit names none
 OWN_SOURCE = "operator"
@@ -110,10 +109,7 @@ def _report_circle(report: Report, circle: Sequence[Delegation]) -> None:
 
 def _made(context: CheckContext, delegation: Delegation, rules: Sequence[RuleDecl], *, whole: bool) -> list[RuleDecl]:
     """The rules that one delegation makes from the rules before it."""
-    known = [find_skill(context, name) for name in delegation.skills]
-    sources = [one_of(context, codes.UNKNOWN_SOURCE, name, SOURCES, "source") for name in delegation.through]
-    skills = [skill for skill in known if skill is not None]
-    if len(skills) < len(known) or not all(sources) or not _readable(context, delegation, skills):
+    if not _is_valid(context, delegation):
         return []
     grantor = delegation.grantor.text
     permits = [rule for rule in rules if rule.kind == "permit" and (not rule.roles or _names(rule.roles, grantor))]
@@ -121,12 +117,16 @@ def _made(context: CheckContext, delegation: Delegation, rules: Sequence[RuleDec
     made = [permit for rule in named if (permit := _permit(delegation, rule)) is not None]
     if whole:
         _nothing(context, delegation, permits, made)
-    forbids = (rule for rule in rules if rule.kind == "forbid" and _names(rule.roles, grantor))
-    return made + [forbid for rule in forbids if (forbid := _forbid(delegation, rule)) is not None]
+    return made + [forbid for rule in rules if (forbid := _forbid(delegation, rule)) is not None]
 
 
-def _readable(context: CheckContext, delegation: Delegation, skills: Sequence[SkillDecl]) -> bool:
-    """Whether all delegated skills have the arguments that the condition reads; reports it if not."""
+def _is_valid(context: CheckContext, delegation: Delegation) -> bool:
+    """Whether the skills and sources exist, and all skills have the arguments of the condition; reports it if not."""
+    known = [find_skill(context, name) for name in delegation.skills]
+    sources = [one_of(context, codes.UNKNOWN_SOURCE, name, SOURCES, "source") for name in delegation.through]
+    skills = [skill for skill in known if skill is not None]
+    if len(skills) < len(known) or not all(sources):
+        return False
     if delegation.when is None:
         return True
     as_rule = RuleDecl(
@@ -146,11 +146,14 @@ def _permit(delegation: Delegation, permit: RuleDecl) -> RuleDecl | None:
     return _for_grantee(delegation, permit).copied(**changes)
 
 
-def _forbid(delegation: Delegation, forbid: RuleDecl) -> RuleDecl | None:
-    skills = _shared(delegation, forbid)
-    if skills is None or _names(forbid.roles, delegation.grantee.text):
+def _forbid(delegation: Delegation, rule: RuleDecl) -> RuleDecl | None:
+    """The forbid of the grantee made from one of the grantor; None if nothing remains."""
+    if rule.kind != "forbid" or not _names(rule.roles, delegation.grantor.text):
         return None
-    return _for_grantee(delegation, forbid).copied(skills=skills)
+    skills = _shared(delegation, rule)
+    if skills is None or _names(rule.roles, delegation.grantee.text):
+        return None
+    return _for_grantee(delegation, rule).copied(skills=skills)
 
 
 def _for_grantee(delegation: Delegation, rule: RuleDecl) -> RuleDecl:

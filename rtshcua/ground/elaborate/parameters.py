@@ -135,9 +135,7 @@ def _given(context: CheckContext, mission: MissionDecl, settings: ParameterSetti
     known = {parameter.name.text for parameter in mission.parameters}
     for name, _ in settings.values:
         if name.text not in known:
-            takes = (
-                "its parameters are " + ", ".join(f"`{each}`" for each in known) if known else "it has no parameters"
-            )
+            takes = "its parameters are " + ", ".join(f"`{each}`" for each in known) if known else "it has none"
             context.report.add(
                 codes.UNKNOWN_ARGUMENT,
                 name.span,

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from rtshcua.ground.format.style import COLUMNS, INDENT, ITEMS, LEADS, PLACES, Style
-from rtshcua.ground.format.token_sheet import BLANKS, BLOCK, GROUP, TokenSheet
+from rtshcua.ground.format.token_sheet import BLANKS, BLOCK, GROUP, CommentRow, TokenSheet
 
 
 @dataclass(slots=True)
@@ -83,24 +83,28 @@ class OutputPage:
             self.add(self.sheet.gaps[token])
             return
         deeper = indent + INDENT if closing else indent
-        before = ""
-        for number, comment in enumerate(gap.comments):
-            alone = not comment.first and not comment.last and number == 0
-            several = "\n" in comment.text
-            opens = token > 0 and self.sheet.read.symbols[token - 1] in ("{", "(", ",")
-            if not comment.first and number == 0 and (not alone or several or not opens):
-                # it ended the line before; but what opens a list or a block is not followed by several lines
-                if several and alone and opens:
-                    self._begin(OutputLine(deeper, [comment.text], blank=False, own=True))
-                else:
-                    self.line.comment = comment.text
-            elif comment.last or several or number < len(gap.comments) - 1:
+        before, comments = "", gap.comments
+        if comments and not comments[0].first and self._trail(token, comments[0], deeper):
+            comments = comments[1:]
+        for number, comment in enumerate(comments, 1):
+            if comment.last or "\n" in comment.text or number < len(comments):
                 self._begin(OutputLine(deeper, [comment.text], blank=blank and comment.blank, own=True))
                 blank = True
-            else:  # code follows on its line, and goes on to do so
+            else:  # code follows on its line
                 before = comment.text + " "
                 gap = gap._replace(blank=comment.blank)
         self._begin(OutputLine(indent, [before], blank=blank and gap.blank and not closing))
+
+    def _trail(self, token: int, comment: CommentRow, indent: int) -> bool:
+        """Write a comment after the code of the current line; False if code follows the comment after a bracket."""
+        opens = not comment.last and token > 0 and self.sheet.read.symbols[token - 1] in ("{", "(", ",")
+        if not opens:
+            self.line.comment = comment.text
+        elif "\n" in comment.text:  # a comment of several lines must not follow an opening bracket
+            self._begin(OutputLine(indent, [comment.text], blank=False, own=True))
+        else:
+            return False
+        return True
 
     def _begin(self, line: OutputLine) -> None:
         if not self.fresh or self.line.comment or self.lines:

@@ -50,6 +50,11 @@ class TokenGap(NamedTuple):
     ends_line: bool
     blank: bool
 
+    @property
+    def inline(self) -> bool:
+        """Whether it has comments, and code may follow all of them on the line."""
+        return bool(self.comments) and all(comment.inline for comment in self.comments)
+
 
 def content(comment: str) -> str:
     """A comment without trailing blanks in its lines."""
@@ -64,21 +69,21 @@ def gap_of(text: str, *, at_start: bool, at_end: bool) -> TokenGap:
         lines = text.count("\n")
         return TokenGap((), lines > 0, lines > 1)
     rows: list[CommentRow] = []
-    beside: list[str] = []  # the comments of the last row, put together once: there may be millions
+    beside: list[str] = []  # the comments of the last row, joined once: there may be millions
     before, end, ended = at_start, 0, at_start
     blank = False
     for found in COMMENT.finditer(text):
         lines = text.count("\n", end, found.start())
         ended = ended or lines > 0
-        told = content(found[0])
+        comment = content(found[0])
         if rows and not lines:
-            beside.append(told)
+            beside.append(comment)
         else:
             if rows:
                 rows[-1] = rows[-1]._replace(text=" ".join(beside), last=True)
             blank = lines > 1
-            beside = [told]
-            rows.append(CommentRow(told, before or lines > 0, False, blank))
+            beside = [comment]
+            rows.append(CommentRow(comment, before or lines > 0, False, blank))
         before, end = False, found.end()
     lines = text.count("\n", end)
     rows[-1] = rows[-1]._replace(text=" ".join(beside), last=lines > 0 or at_end)
@@ -149,19 +154,12 @@ def sheet(read: TokenizedText) -> TokenSheet:
     }
     words, gaps = list(read.words), _gaps(read)
     pairs, kinds = _brackets(read)
-    ended = [0] * (count + 1)
-    kept = [0] * (count + 1)
-    for number, note in notes.items():
-        ended[number] = note.ends_line
-        if note.comments:
-            kept[number] = not all(comment.inline for comment in note.comments)
-        elif note.ends_line and number < count and read.symbols[number] in ("and", "or"):
-            kept[number] = 1
+    ended, kept = _line_ends(read, notes)
     held = _held_gaps(read, notes, ended, kept)
     for opening, close in pairs.items():
         _settle_brackets(read, opening, close, kinds[opening], words, gaps, notes, ended, kept, held)
     for number, note in notes.items():
-        if 0 < number < count and note.comments and all(comment.inline for comment in note.comments):
+        if 0 < number < count and note.inline:
             inside = " ".join(comment.text for comment in note.comments)
             left = "" if words[number - 1] == "(" else " "
             gaps[number] = left + inside + ("" if words[number] in (")", ",") else " ")
@@ -171,6 +169,19 @@ def sheet(read: TokenizedText) -> TokenSheet:
     return TokenSheet(
         read, gaps, written, places, pairs, kinds, notes, list(accumulate(ended)), list(accumulate(kept)), held
     )
+
+
+def _line_ends(read: TokenizedText, notes: dict[int, TokenGap]) -> tuple[list[int], list[int]]:
+    """Whether the author ended a line before each token, and whether the line always ends there."""
+    count = len(read.words)
+    ended, kept = [0] * (count + 1), [0] * (count + 1)
+    for number, note in notes.items():
+        ended[number] = note.ends_line
+        if note.comments:
+            kept[number] = not note.inline
+        elif note.ends_line and number < count and read.symbols[number] in ("and", "or"):
+            kept[number] = 1
+    return ended, kept
 
 
 def _gaps(read: TokenizedText) -> list[str]:
@@ -190,6 +201,12 @@ def _gaps(read: TokenizedText) -> list[str]:
             gap = " "
         gaps.append(gap)
         before, last = last, symbol
+    _special_gaps(read, gaps)
+    return gaps
+
+
+def _special_gaps(read: TokenizedText, gaps: list[str]) -> None:
+    """Set the gaps before quoted clauses after `at`, and between items on one line."""
     for number in [number for number, symbol in enumerate(read.symbols) if symbol == "<STRING>"]:
         close = read.symbols[number - 1] == "at" and read.ends[number - 1] == read.starts[number]
         if close and not _MOMENT.match(read.words[number]):
@@ -197,7 +214,6 @@ def _gaps(read: TokenizedText) -> list[str]:
     for number in read.items:
         if number and read.symbols[number - 1] != "{":
             gaps[number] = "  "
-    return gaps
 
 
 def _brackets(read: TokenizedText) -> tuple[dict[int, int], dict[int, str]]:
@@ -254,20 +270,11 @@ def _held_gaps(read: TokenizedText, notes: dict[int, TokenGap], ended: list[int]
     ignoring = [number for number, note in notes.items() if any(each.ignores for each in note.comments)]
     if not ignoring:
         return held
-    begun = list(ended)  # whether the token after a gap begins on another line than the one before it
+    begun = list(ended)  # whether the token after a gap is on another line than the one before it
     for number, symbol in enumerate(read.symbols):
         if symbol in SPACED and "\n" in read.text[read.starts[number] : read.ends[number]]:
             begun[number + 1] = 1
-    lines = list(accumulate(begun))  # each walked once: one line may have all the ignores of a file
-    before: dict[int, int] = {}  # by line, the last token before a comment that speaks of it
-    after: dict[int, int] = {}  # by line, the first token that such a comment at its beginning speaks of
-    for number in ignoring:
-        comments = notes[number].comments
-        behind = not comments[0].first and "\n" not in comments[0].text
-        if comments[0].ignores and behind:
-            before[lines[number - 1]] = number - 1
-        if any(each.ignores for each in comments[behind:]):
-            after.setdefault(lines[number], number + 1)
+    before, after = _ignored_lines(notes, ignoring, list(accumulate(begun)))
     for token in before.values():
         while token > 0 and not begun[token]:
             held.add(token)
@@ -280,3 +287,22 @@ def _held_gaps(read: TokenizedText, notes: dict[int, TokenGap], ended: list[int]
         if token < count:
             kept[token] = 1
     return held
+
+
+def _ignored_lines(
+    notes: dict[int, TokenGap], ignoring: list[int], lines: list[int]
+) -> tuple[dict[int, int], dict[int, int]]:
+    """By line, the last token before an `ignore` comment on it, and the first token after one at its beginning.
+
+    Each line has one entry, because one line may have all the `ignore` comments of a file.
+    """
+    before: dict[int, int] = {}
+    after: dict[int, int] = {}
+    for number in ignoring:
+        comments = notes[number].comments
+        behind = not comments[0].first and "\n" not in comments[0].text
+        if comments[0].ignores and behind:
+            before[lines[number - 1]] = number - 1
+        if any(each.ignores for each in comments[behind:]):
+            after.setdefault(lines[number], number + 1)
+    return before, after

@@ -86,20 +86,21 @@ def utc_us(text: str) -> int:
     found = _FORM.fullmatch(text)
     if found is None:
         raise ValueError("expected a date, `T`, a time, and `Z` or an offset from UTC")
-    year, month, day, hour, minute, second, fraction, sign, hours, minutes = found.groups()
-    fraction = (fraction or "").rstrip("0")
+    *numbers, fraction, sign, hours, minutes = found.groups("0")
+    year, month, day, hour, minute, second, offset_hours, offset_minutes = map(int, (*numbers, hours, minutes))
+    fraction = fraction.rstrip("0")
     if len(fraction) > 6:
         raise ValueError("seconds have at most 6 decimals")
-    if int(hour) > 23 or int(minute) > 59 or int(second or 0) > 59:
+    if hour > 23 or minute > 59 or second > 59:
         raise ValueError("times are from `00:00:00` to `23:59:59`")
-    if int(hours or 0) > 23 or int(minutes or 0) > 59:
+    if offset_hours > 23 or offset_minutes > 59:
         raise ValueError("the offset from UTC is at most `23:59`")
     try:
-        days = date(int(year), int(month), int(day)).toordinal() - _EPOCH
+        days = date(year, month, day).toordinal() - _EPOCH
     except ValueError:
         raise ValueError("the day does not exist") from None
-    offset = (int(hours or 0) * 60 + int(minutes or 0)) * (-1 if sign == "-" else 1)
-    seconds = (int(hour) * 60 + int(minute) - offset) * 60 + int(second or 0)
+    offset = (offset_hours * 60 + offset_minutes) * (-1 if sign == "-" else 1)
+    seconds = (hour * 60 + minute - offset) * 60 + second
     value = days * DAY + seconds * _SECOND + int(fraction.ljust(6, "0"))
     if not 0 <= value <= MAX_VALUE:
         raise ValueError("the year must be from 1970 to 2255")

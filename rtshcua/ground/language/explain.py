@@ -111,12 +111,10 @@ def _other_word(stop: Stop) -> Advice | None:
     if "<FAULT>" in symbols and found.replace("_", "-") in KINDS:
         fix = Fix(span._replace(start=span.end), "()", "write `()`")
         return Advice(f"a fault needs parentheses, as in `{found}(...)`", fix)
+    datum = DATUMS.get(found.casefold()) if "above" in symbols else None
     meant = "=" if found == ":" and "=" in symbols else WORDS.get(found)
-    if meant in words(symbols) | symbols or (meant == "==" and "<COMPARE>" in symbols):
-        return Advice(f"did you mean `{meant}`?", Fix(span, str(meant), f"write `{meant}`"))
-    datum = DATUMS.get(found.casefold())
-    if datum is not None and "above" in symbols:
-        return Advice(f"write `{datum}`", Fix(span, datum, f"write `{datum}`"))
+    if datum or meant in words(symbols) | symbols or (meant == "==" and "<COMPARE>" in symbols):
+        return Advice(f"did you mean `{datum or meant}`?", Fix(span, str(datum or meant), f"write `{datum or meant}`"))
     return None
 
 

@@ -84,8 +84,7 @@ def is_missing(error: OSError | ValueError) -> bool:
 
 def too_large(file: str, size: int, by: GeoJson | None = None) -> Diagnostic:
     """A file of `size` bytes or characters, above the limit."""
-    limit = MAX_SIZE >> 20
-    message = f"`{file}` is {-(-size >> 20)} MiB; the limit is {limit} MiB"
+    message = f"`{file}` is {-(-size >> 20)} MiB; the limit is {MAX_SIZE >> 20} MiB"
     if by is None:
         return Diagnostic(TOO_LARGE, message, None, _SPLIT)
     return Diagnostic(TOO_LARGE, message, by.span, "keep only the areas that are needed")

@@ -33,9 +33,7 @@ def lark(grammar: str) -> Lark:
 def generate(grammar: str) -> str:
     """Return the table as JSON text, ending in a newline; `table.ParserTable` describes it."""
     made = lark(grammar)
-    fixed = {t.name: t.pattern.value for t in made.terminals if isinstance(t.pattern, PatternStr)}
-    ignored = [t for t in made.terminals if t.name in made.ignore_tokens]
-    patterns = [t for t in made.terminals if t.name not in fixed and t not in ignored]
+    fixed, ignored, patterns = _terminals(made)
     names = re.compile(next(t.pattern.to_regexp() for t in patterns if t.name == "NAME"))
     keys = fixed | {t.name: f"<{t.name}>" for t in patterns} | {"$END": "<END>"}
     rules = sorted(made.rules, key=lambda rule: (rule.origin.name, [symbol.name for symbol in rule.expansion]))
@@ -52,6 +50,13 @@ def generate(grammar: str) -> str:
         "states": [_row(automaton.states[state], keys, order, places) for state in order],
     }
     return "{\n" + ",\n".join(f"{json.dumps(key)}: {_lines(value)}" for key, value in table.items()) + "\n}\n"
+
+
+def _terminals(made: Lark) -> tuple[dict[str, str], list[TerminalDef], list[TerminalDef]]:
+    """The keywords and marks by name, the ignored terminals, and all others."""
+    fixed = {t.name: t.pattern.value for t in made.terminals if isinstance(t.pattern, PatternStr)}
+    ignored = [t for t in made.terminals if t.name in made.ignore_tokens]
+    return fixed, ignored, [t for t in made.terminals if t.name not in fixed and t not in ignored]
 
 
 def _first(terminal: TerminalDef) -> tuple[int, str]:

@@ -1,6 +1,6 @@
 """Check that a name has one meaning."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker.conditions import references
@@ -9,48 +9,23 @@ from rtshcua.ground.checker.name_scope import PHASE
 from rtshcua.ground.checker.symbols import WORDS
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.policies import TemplateDecl
+from rtshcua.model.ir.signals import EnumDecl
 from rtshcua.model.ir.skills import SkillDecl
 
 
 def check_names(context: CheckContext) -> None:
     """Report every name that is declared twice, or that shadows another."""
-    symbols, report = context.symbols, context.report
-    for first, again in symbols.duplicates:
-        nearer, other, words = again, first, "first declared here"
-        if first.span.file != again.span.file:  # the importing file comes first, and must not reuse a name
-            nearer, other, words = first, again, "also declared here"
-        report.add(
-            codes.DUPLICATE_NAME,
-            nearer.name.span,
-            f"`{nearer.name.text}` is declared twice",
-            help="rename one of them: a name has one meaning in a program",
-            labels=[(other.name.span, f"{words}, as {WORDS[type(other)]}")],
-        )
+    symbols = context.symbols
+    _declared_twice(context)
     enumerators = {member.name.text: enum for enum in symbols.enums.values() for member in enum.members}
     for enum in symbols.enums.values():
         _distinct(context, (member.name for member in enum.members), "enumerator")
         for member in enum.members:
             _hides(context, member.name, "enumerator")
-    owners: list[SkillDecl | TemplateDecl] = [*symbols.skills.values(), *symbols.templates.values()]
-    for owner in owners:
-        sizes = owner.sizes if isinstance(owner, SkillDecl) else ()
-        _distinct(context, (each.name for each in (*owner.parameters, *sizes)), "parameter" if not sizes else "name")
-        for size in sizes:
-            _hides(context, size.name, "size")
-        for parameter in owner.parameters:
-            _hides(context, parameter.name, "parameter")
-            enum_of_name = enumerators.get(parameter.name.text)
-            if enum_of_name is not None:
-                report.add(
-                    codes.SHADOWED_NAME,
-                    parameter.name.span,
-                    f"the parameter `{parameter.name.text}` has the name of a value of `{enum_of_name.name.text}`",
-                    help="give the parameter another name",
-                    labels=[(enum_of_name.name.span, "the enumeration is declared here")],
-                )
-            _distinct(context, parameter.choices, "choice")
-            for choice in parameter.choices:
-                _hides(context, choice, "choice")
+    for skill in symbols.skills.values():
+        _owned(context, skill, enumerators)
+    for template in symbols.templates.values():
+        _owned(context, template, enumerators)
     for mission in symbols.missions.values():
         _distinct(context, (phase.name for phase in mission.phases), "phase")
         _distinct(context, (parameter.name for parameter in mission.parameters), "parameter")
@@ -61,6 +36,42 @@ def check_names(context: CheckContext) -> None:
     for template in symbols.templates.values():
         _ambiguous(context, template)
     _called_phase(context)
+
+
+def _declared_twice(context: CheckContext) -> None:
+    for first, again in context.symbols.duplicates:
+        nearer, other, words = again, first, "first declared here"
+        if first.span.file != again.span.file:  # the importing file comes first, and must not reuse a name
+            nearer, other, words = first, again, "also declared here"
+        context.report.add(
+            codes.DUPLICATE_NAME,
+            nearer.name.span,
+            f"`{nearer.name.text}` is declared twice",
+            help="rename one of them: a name has one meaning in a program",
+            labels=[(other.name.span, f"{words}, as {WORDS[type(other)]}")],
+        )
+
+
+def _owned(context: CheckContext, owner: SkillDecl | TemplateDecl, enumerators: Mapping[str, EnumDecl]) -> None:
+    """Check the names of the parameters and sizes of a skill or a template."""
+    sizes = owner.sizes if isinstance(owner, SkillDecl) else ()
+    _distinct(context, (each.name for each in (*owner.parameters, *sizes)), "parameter" if not sizes else "name")
+    for size in sizes:
+        _hides(context, size.name, "size")
+    for parameter in owner.parameters:
+        _hides(context, parameter.name, "parameter")
+        enum = enumerators.get(parameter.name.text)
+        if enum is not None:
+            context.report.add(
+                codes.SHADOWED_NAME,
+                parameter.name.span,
+                f"the parameter `{parameter.name.text}` has the name of a value of `{enum.name.text}`",
+                help="give the parameter another name",
+                labels=[(enum.name.span, "the enumeration is declared here")],
+            )
+        _distinct(context, parameter.choices, "choice")
+        for choice in parameter.choices:
+            _hides(context, choice, "choice")
 
 
 def _ambiguous(context: CheckContext, template: TemplateDecl) -> None:
@@ -109,11 +120,8 @@ def _distinct(context: CheckContext, names: Iterable[Name], what: str) -> None:
     for name in names:
         first = seen.setdefault(name.text, name)
         if first is not name:
-            context.report.add(
-                codes.DUPLICATE_NAME,
-                name.span,
-                f"the {what} `{name.text}` is declared twice",
-                labels=[(first.span, "first declared here")],
+            context.report.add_twice(
+                codes.DUPLICATE_NAME, name.span, f"the {what} `{name.text}`", "declared", first.span
             )
 
 

@@ -198,7 +198,7 @@ def _given(context: CheckContext, declaration: SizesDecl) -> None:
     if skill is None:
         return
     known = {size.name.text: size for size in reversed(skill.sizes)}
-    takes = "its sizes are " + ", ".join(f"`{size.name.text}`" for size in skill.sizes) if known else "it has no sizes"
+    takes = "its sizes are " + ", ".join(f"`{size.name.text}`" for size in skill.sizes) if known else "it has none"
     seen: dict[str, GivenSize] = {}
     for each in declaration.given:
         name = each.name.text
@@ -213,12 +213,7 @@ def _given(context: CheckContext, declaration: SizesDecl) -> None:
                 labels=[(skill.name.span, f"`{skill.name.text}` is declared here")],
             )
         elif first is not each:
-            context.report.add(
-                codes.DUPLICATE_ARGUMENT,
-                each.name.span,
-                f"`{name}` is given twice",
-                labels=[(first.name.span, "first given here")],
-            )
+            context.report.add_twice(codes.DUPLICATE_ARGUMENT, each.name.span, f"`{name}`", "given", first.name.span)
         else:
             argument = _argument(context, known[name])
             if argument is not None:

@@ -12,6 +12,7 @@ from rtshcua.ground.checker.name_scope import Argument, Scope
 from rtshcua.ground.checker.symbols import brought_about
 from rtshcua.model.flat.contract import SourceKind
 from rtshcua.model.flat.limits import MAX_SILENCE, MAX_VALUE
+from rtshcua.model.ir.expression import Reference
 from rtshcua.model.ir.policies import PolicyDecl, RuleDecl
 from rtshcua.model.ir.skills import SkillDecl
 from rtshcua.model.quantity import Dimension
@@ -95,26 +96,14 @@ def shared_arguments(context: CheckContext, rule: RuleDecl, skills: Sequence[Ski
         if name in context.symbols.signals or name in context.symbols.zones:
             continue
         if not rule.skills:
-            owners = [skill for skill in context.symbols.skills.values() if name in context.arguments(skill)]
-            if owners:
-                context.report.add(
-                    codes.RULE_ARGUMENT,
-                    reference.span,
-                    f"a rule for any skill cannot read the argument `{name}`, which some skills lack",
-                    help="name the skills of the rule",
-                    labels=[(rule.span, "this rule is for any skill")],
-                )
-                failed = True
+            failed = _is_argument(context, rule, reference) or failed
             continue
-        having = [signature[name] for signature in signatures if name in signature]
-        if not having:
+        having = next((signature[name] for signature in signatures if name in signature), None)
+        if having is None:
             continue  # an enumerator, a zone's entry, or unknown: the check of the condition reports it
-        if len(having) < len(skills) or any(each.type != having[0].type for each in having):
-            lacking = next(
-                skill
-                for skill, signature in zip(skills, signatures, strict=True)
-                if name not in signature or signature[name].type != having[0].type
-            )
+        for lacking, signature in zip(skills, signatures, strict=True):
+            if name in signature and signature[name].type == having.type:
+                continue
             context.report.add(
                 codes.RULE_ARGUMENT,
                 reference.span,
@@ -122,8 +111,24 @@ def shared_arguments(context: CheckContext, rule: RuleDecl, skills: Sequence[Ski
                 help="write one rule for each skill",
                 labels=[
                     (lacking.name.span, "declared here"),
-                    (having[0].declaration.span, f"`{name}` is declared here"),
+                    (having.declaration.span, f"`{name}` is declared here"),
                 ],
             )
             failed = True
+            break
     return None if failed else shared
+
+
+def _is_argument(context: CheckContext, rule: RuleDecl, reference: Reference) -> bool:
+    """Whether a rule for any skill reads an argument; reports it."""
+    name = reference.name
+    if not any(name in context.arguments(skill) for skill in context.symbols.skills.values()):
+        return False
+    context.report.add(
+        codes.RULE_ARGUMENT,
+        reference.span,
+        f"a rule for any skill cannot read the argument `{name}`, which some skills lack",
+        help="name the skills of the rule",
+        labels=[(rule.span, "this rule is for any skill")],
+    )
+    return True

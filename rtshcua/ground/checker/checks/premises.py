@@ -165,12 +165,7 @@ def _order(context: CheckContext, order: tuple[Name, ...]) -> None:
     for name in order:
         first = seen.setdefault(name.text, name)
         if first is not name:
-            context.report.add(
-                codes.DUPLICATE_NAME,
-                name.span,
-                f"the phase `{name.text}` is named twice",
-                labels=[(first.span, "first named here")],
-            )
+            context.report.add_twice(codes.DUPLICATE_NAME, name.span, f"the phase `{name.text}`", "named", first.span)
 
 
 def check_nominals(context: CheckContext) -> None:

@@ -20,8 +20,7 @@ OPERATOR = "operator"
 def check_roles(context: CheckContext) -> None:
     """Report every role that is declared twice in a file, and every undeclared role of a rule."""
     for first, again in context.symbols.roles_again:
-        text = f"the role `{again.text}` is declared twice"
-        context.report.add(codes.DUPLICATE_NAME, again.span, text, labels=[(first.span, "first declared here")])
+        context.report.add_twice(codes.DUPLICATE_NAME, again.span, f"the role `{again.text}`", "declared", first.span)
     for policy in context.symbols.policies.values():
         for rule in policy.rules:
             if not rule.origin:  # what a template or a delegation brought about names what these were given

@@ -106,12 +106,7 @@ def _flavours(context: CheckContext, scenario: ScenarioDecl) -> None:
         if one_of(context, codes.UNKNOWN_AUTOPILOT, name, FLAVOURS, "kind of autopilot"):
             first = seen.setdefault(name.text, name.span)
             if first is not name.span:
-                context.report.add(
-                    codes.DUPLICATE_NAME,
-                    name.span,
-                    f"`{name.text}` is named twice",
-                    labels=[(first, "first named here")],
-                )
+                context.report.add_twice(codes.DUPLICATE_NAME, name.span, f"`{name.text}`", "named", first)
 
 
 def _seeds(context: CheckContext, seeds: Seeds) -> None:

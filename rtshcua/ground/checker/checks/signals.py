@@ -210,24 +210,26 @@ def _field(
         if field.unit != PLACE_UNIT:
             _unit(context, signal, name, field, (PLACE_UNIT,))
     elif type is not None and type.kind is Kind.ENUMERATION:
-        enum = context.symbols.enums[signal.type.text]
-        mirrored = None if enum.dialect is None else enum.dialect.text
-        if mirrored is not None and mirrored not in context.dialect.enums:
-            return  # reported where it is declared
-        if field.unit or field.type in ("float", "double") or (mirrored is not None and field.enum != mirrored):
-            has = f"has values of `{field.enum}`" if field.enum else "has no enumeration"
-            help = (
-                f"declare an enumeration that mirrors it: `enum ... = {field.enum} {{ ... }}`" if field.enum else None
-            )
-            context.report.add(
-                codes.FIELD_ENUM,
-                name.span,
-                f"`{name.text}` {has}, but the signal is a `{signal.type.text}`",
-                help=help,
-                labels=[(enum.name.span, f"`{enum.name.text}` is declared here")],
-            )
+        _enumerated(context, signal, name, field)
     elif type is not None and type.dimension is not None and field.unit not in UNITS[type.dimension]:
         _unit(context, signal, name, field, tuple(UNITS[type.dimension]))
+
+
+def _enumerated(context: CheckContext, signal: SignalDecl, name: Name, field: Field) -> None:
+    enum = context.symbols.enums[signal.type.text]
+    mirrored = None if enum.dialect is None else enum.dialect.text
+    if mirrored is not None and mirrored not in context.dialect.enums:
+        return  # reported at its declaration
+    if field.unit or field.type in ("float", "double") or (mirrored is not None and field.enum != mirrored):
+        has = f"has values of `{field.enum}`" if field.enum else "has no enumeration"
+        help = f"declare an enumeration that mirrors it: `enum ... = {field.enum} {{ ... }}`" if field.enum else None
+        context.report.add(
+            codes.FIELD_ENUM,
+            name.span,
+            f"`{name.text}` {has}, but the signal is a `{signal.type.text}`",
+            help=help,
+            labels=[(enum.name.span, f"`{enum.name.text}` is declared here")],
+        )
 
 
 def _altitude(

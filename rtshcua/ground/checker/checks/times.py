@@ -72,12 +72,7 @@ def _coherent(context: CheckContext, times: _Times, of: Iterable[Quantity | None
     own = {quantity for quantity in of if quantity is not None}
     deadline, validity, duration, grace = times
     for short, long, words, help in (
-        (
-            validity,
-            deadline,
-            "the deadline {} is longer than the validity {}",
-            "the decision may expire before the start",
-        ),
+        (validity, deadline, "the deadline {} is longer than the validity {}", "the decision may expire too early"),
         (validity, duration, "the duration {} is longer than the validity {}", "the decision may expire in flight"),
         (duration, grace, "the grace {} is longer than the duration {}", "a clause could be unknown all the time"),
     ):
@@ -93,9 +88,12 @@ def _coherent(context: CheckContext, times: _Times, of: Iterable[Quantity | None
             help=f"{help}; the maximum is `{_words(short)}`",
             labels=[(other.span, "conflicts with this")],
         )
-    if grace is not None or duration is None or (own and duration not in own):
-        return
-    if 0 < duration.value < DEFAULT_GRACE_US:
+    if grace is None and (not own or duration in own):
+        _default_grace(context, duration)
+
+
+def _default_grace(context: CheckContext, duration: Quantity | None) -> None:
+    if duration is not None and 0 < duration.value < DEFAULT_GRACE_US:
         context.report.add(
             codes.INCOHERENT_TIMING,
             duration.span,

@@ -233,18 +233,14 @@ class Autopilot:
         self.air = Air(config.wind, Random(f"{config.seed} wind"))
         self.looked_down = False
         """Whether the last DISTANCE_SENSOR was from the downward range finder."""
-        self.battery = Battery(config.battery / 10_000, config.hover_us / 1_000_000)
+        hover_s, others = config.hover_us / 1_000_000, config.other_batteries
+        self.battery = Battery(config.battery / 10_000, hover_s)
         #: by id: what a battery feeds, and the battery
-        self.batteries = [
-            (Purpose.FLIGHT, self.battery),
-            *(
-                (other.purpose, Battery(other.level / 10_000, config.hover_us / 1_000_000))
-                for other in config.other_batteries
-            ),
-        ]
+        self.batteries = [(Purpose.FLIGHT, self.battery)]
+        self.batteries += [(each.purpose, Battery(each.level / 10_000, hover_s)) for each in others]
         self.battery_reports = 0
         #: by id: the shortest report interval, and the time of the last report
-        self.battery_every_us = [0, *(other.every_us for other in config.other_batteries)]
+        self.battery_every_us = [0, *(each.every_us for each in others)]
         self.battery_told_us: dict[int, int] = {}
         self.gauge_rise = config.gauge_rise
         """Percent by which every fifth report overstates the charge."""

@@ -195,20 +195,11 @@ class VirtualFlight:
         self.runtime = Runtime(loaded, self.recorder, resumed=resumed)
         self.vehicle.driver.resumes = resumed
         self.sink: ReadableSink = MemorySink() if sink is None else sink(self.clock)
-        self.sink.append(
-            self.recorder.genesis(
-                now,
-                bundle=bundle,
-                root=root,
-                boot=loaded.in_force.flight,
-                vehicle=loaded.vehicle,
-                mission=mission.name,
-                mode=mode,
-                before=before,
-                received_us=now.monotonic_us,
-            ),
-            SYNCED_FIRST,
-        )
+        genesis = self.recorder.genesis(
+            now, bundle=bundle, root=root, boot=loaded.in_force.flight, vehicle=loaded.vehicle, mission=mission.name,
+            mode=mode, before=before, received_us=now.monotonic_us,
+        )  # fmt: skip
+        self.sink.append(genesis, SYNCED_FIRST)
         loaded.attestation.begin(first)
         self.recorder.attest = loaded.attestation.statement
         append_all(self.sink, self.recorder.attested(now), SYNCED_FIRST)
@@ -216,14 +207,9 @@ class VirtualFlight:
         self.steps = 0
         self._wait_us = wait_us
         self._early: list[Event] = []
-        kept = {} if owed is None else owed
-
-        def keep_owed(now_owed: Mapping[str, Owed]) -> None:
-            kept.clear()
-            kept.update(now_owed)
-
+        self._owed = {} if owed is None else owed
         self.preparations = Preparations(
-            loaded, self.vehicle.driver, self.clock, kept, self._record, self._record, keep_owed
+            loaded, self.vehicle.driver, self.clock, self._owed, self._record, self._record, self._keep_owed
         )
         self.loop = RunLoop(self.runtime, self.vehicle, self.sink, self.clock, self._watch, wait_us, prepares=False)
 
@@ -266,6 +252,10 @@ class VirtualFlight:
             append_all(self.sink, self.recorder.closing(self.clock.now(), ending=ending, tlog=None), SYNCED_FIRST)
             self.sink.close()
         return self.flown(ending, self.sink.lines, self.vehicle, self.steps, self.loaded, self._root_key)
+
+    def _keep_owed(self, owed: Mapping[str, Owed]) -> None:
+        self._owed.clear()
+        self._owed.update(owed)
 
     def _record(self, event: str, detail: str) -> None:
         now = self.clock.now()

@@ -135,7 +135,7 @@ def test_next_run_restores_parameters_of_a_dead_run(flavour: str) -> None:
     flown = second.fly()
     assert flown.ending is Ending.ABORTED
     (kept,) = flown.effects("not-restored")
-    assert "not known to stand on the ground" in kept["detail"]
+    assert "not known to be on the ground" in kept["detail"]
     (put_back,) = flown.effects("preparation")
     assert put_back["detail"].startswith("restore ")
     assert put_back["seq"] > flown.effects("resumed")[0]["seq"]

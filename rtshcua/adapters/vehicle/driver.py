@@ -1,4 +1,6 @@
-"""A vehicle without its socket: frames in, events and frames out, time given; for real and virtual time."""
+"""Drive a vehicle without a socket: take in frames, return events and frames. The caller passes the time, so the driver
+serves real and virtual time.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
@@ -54,31 +56,31 @@ from rtshcua.onboard.left import Left
 from rtshcua.onboard.ports import Command, Event, StatusText
 
 HEARTBEAT_US = 1_000_000
-#: who an autopilot is that was heard is asked so often
+#: how often a heard autopilot is asked for its identity
 WHO_US = 200_000
-#: so long what no waiting changes must stand until it is told: somebody may be about to set a parameter right
+#: how long an obstacle that waiting cannot remove must persist before it is reported: somebody may be correcting it
 UNFIT_US = 5_000_000
-#: why a vehicle that signs answers nothing to whoever does not
+#: why a vehicle that signs does not answer unsigned frames
 KEYLESS = "the vehicle signs its frames and answers no unsigned frame: give the link's key with `--signing-key`"
 
 _UNDATED = "the time of day is not known yet, and no step is decided without it: waiting for the vehicle's SYSTEM_TIME"
 _YOUNG = "the time of day is not certain enough yet: the mission might have been issued in the future"
-_WITHIN_STALE = 8  # so that a poor link does not silence the estimator
-#: how many kinds of others that speak under its ids are told of: whoever makes them up has 65,536
+_WITHIN_STALE = 8  # reports of the estimator within the time to stale, because a poor link loses some
+#: how many other senders under the vehicle's ids are reported: an attacker can make up 65,536
 _MOST_STRANGERS = 8
 _OF_PREFLIGHT = frozenset(preflight.HEEDED)
 _FLAVOURS = {flavour.autopilot: flavour for flavour in (PX4, ARDUPILOT)}
 
 
 class GroundQuestions(Protocol):
-    """What somebody wants to know of a vehicle before it flies: housekeeping, of which nothing waits."""
+    """Questions to a vehicle before it flies. They are housekeeping: nothing waits for the answers."""
 
     def due(self, system: int, now_us: int) -> Sequence[Message]:
-        """What to ask now."""
+        """Return the messages to send now."""
         ...
 
     def take(self, name: str, message: Message) -> None:
-        """A message of the autopilot."""
+        """Take in a message of the autopilot."""
         ...
 
 
@@ -176,11 +178,11 @@ class Driver:
         self._was_air: tuple[bool, bool] | None = None
 
     def carried_by(self, capacity: int | None) -> None:
-        """The link carries so many octets a second each way; said before the first heartbeat."""
+        """Set the capacity of the link, in octets a second each way. To be called before the first heartbeat."""
         self._capacity = capacity
 
     def plan(self, flavour: AutopilotFlavour) -> StreamPlan:
-        """The streams that an autopilot of this flavour is asked for, on this link."""
+        """The streams to request from an autopilot of this flavour on this link."""
         always = {name: Rate(AT_LEAST[name], SUFFICES[name]) for name in AT_LEAST}
         estimator = {flavour.estimator: Rate(STALE_US // _WITHIN_STALE, STALE_US // 4)}
         wanted = {**always, **self._telemetry.rates, **estimator, **AT_TIMES}
@@ -188,16 +190,16 @@ class Driver:
 
     @property
     def batteries(self) -> Batteries:
-        """The batteries that it told of."""
+        """The batteries that the vehicle has reported."""
         return self._telemetry.batteries
 
     @property
     def consumption(self) -> Consumption:
-        """What flying takes of the charge, as measured."""
+        """The measured consumption of charge in flight."""
         return self._telemetry.consumption
 
     def expect(self, steps: Sequence[Invocation]) -> None:
-        """These are the mission's steps from now on: what they need more often is asked for anew."""
+        """Replace the mission's steps, and request the streams that the new ones need more often."""
         self._telemetry.need(self._policy, [each.contract for each in steps])
         if self.flavour is not None:
             self.stream_requests.replan(self.plan(self.flavour))
@@ -240,16 +242,16 @@ class Driver:
 
     @property
     def _uncounted(self) -> str | None:
-        """That it is not known yet which batteries count, in words: meanwhile the deadline of the first step would
-        pass.
+        """That it is not known yet which batteries count, in words. Waiting later would cost the first step its
+        deadline.
         """
         number = self.batteries.awaited(self.seen.now_us)
         return None if number is None else f"battery {number} was reported once: waiting for a second report"
 
     @property
     def _undated(self) -> str | None:
-        """That the time of day is still to come, or to be certain enough, in words: meanwhile the deadline of the first
-        step would pass.
+        """That the time of day is missing or not certain enough, in words. Waiting later would cost the first step its
+        deadline.
         """
         since_us, now_us = self._lacks_utc_us, self.seen.now_us
         if now_us < self.issued_from_us:
@@ -259,7 +261,7 @@ class Driver:
 
     @property
     def _contradicted(self) -> str | None:
-        """That reports under its ids contradict each other, in words."""
+        """That reports under the vehicle's ids contradict each other, in words."""
         if not self._aids.contradictions.stand(self.seen.now_us):
             return None
         return f"two senders use the ids {self.system}/{AUTOPILOT}: their reports contradict each other"
@@ -270,7 +272,7 @@ class Driver:
         return self._mute == KEYLESS and not self._watch.answers
 
     def overhear(self, datagram: bytes, now_us: int) -> None:
-        """Take in a datagram of another sender than the vehicle's."""
+        """Take in a datagram from a sender other than the vehicle."""
         self.link.overhear(datagram, now_us)
 
     def receive(self, datagram: bytes, now_us: int) -> DatagramContents:
@@ -336,7 +338,7 @@ class Driver:
             self._judge_fitness(now_us, events)
 
     def _judge_fitness(self, now_us: int, events: list[Event]) -> None:
-        """Tell what keeps it from being ready that no waiting changes, once that stood for a while."""
+        """Report, once it has persisted, an obstacle to readiness that waiting cannot remove."""
         why = None if self.prepares or self._flies else self.other_kind or self.preflight.unfit
         if why is None:
             self._unfit_us = now_us
@@ -345,7 +347,7 @@ class Driver:
             events.append(ports.VehicleUnfit(now_us, why))
 
     def _housekeeping(self, now_us: int) -> list[Message]:
-        """The heartbeat and the questions that are due, whatever flies."""
+        """The heartbeat and the questions that are due at any stage."""
         send: list[Message] = []
         if now_us >= self._beats_us:
             self._beats_us = now_us + HEARTBEAT_US
@@ -370,27 +372,28 @@ class Driver:
         return send
 
     def _ask_once(self, now_us: int) -> list[Message]:
-        """What is awaited in the air: one report of each kind, and the target that it may have."""
+        """The requests in the air: one report of each kind, and the target where there may be one."""
         query, named = self._aids.query, self._aids.named
         send = self.stream_requests.due_once(self.system, now_us)
-        query.asked += len(send)  # their answers are counted, too
+        query.asked += len(send)  # their answers are counted as well
         if self._awaits_target(now_us):
             gone = named.is_gone(self.seen, now_us, query.asked)
-            self._aimless = gone and self.flavour is ARDUPILOT  # PX4 has one always, and may only be slow to tell it
+            # PX4 always has a target, and may only be slow to report it
+            self._aimless = gone and self.flavour is ARDUPILOT
             if named.asks:
                 named.asks, query.wants_target = False, True
                 send += self._ask(now_us)
         return send
 
     def begin(self, command: Command, now_us: int) -> tuple[list[Event], list[bytes]]:
-        """Start a manoeuvre in place of the one under way. Raises RuntimeError before a vehicle was heard.
+        """Start a manoeuvre in place of the present one. Raises RuntimeError before a vehicle was heard.
 
-        What goes out may be a question only: a frame that moves the vehicle waits until its mode is known.
+        The returned frames may be questions only: a frame that moves the vehicle waits until its mode is known.
         """
         flavour = self.flavour
         if flavour is None:
             raise RuntimeError("no vehicle has been heard yet, so nothing can be commanded")
-        if self._others is not None:  # also where this was on its way while the takeover showed
+        if self._others is not None:  # also for a command that was under way when the takeover showed
             return [ports.CommandFailed(now_us, command.token, "taken-over", self._others)], []
         contradicted = None if self._flies or self._manoeuvre is not None else self._contradicted
         if contradicted is not None:
@@ -406,7 +409,7 @@ class Driver:
             slug = "no-datum" if isinstance(error, NoDatum) else "broken-manoeuvre"
             return [ports.CommandFailed(now_us, command.token, slug, str(error))], []
         self._manoeuvre = Manoeuvre(command, self._aids, self.seen, stages, before, doubted)
-        self._left_mode = None  # it goes on as a suspicion of the manoeuvre
+        self._left_mode = None  # the new manoeuvre keeps it as a suspicion
         self.consumption.fly(command.speed)
         self._unsent = command.token
         events: list[Event] = []
@@ -416,7 +419,7 @@ class Driver:
 
     def _stages(self, flavour: AutopilotFlavour, command: Command) -> list[Stage]:
         way, packs = flavour.stages, self._manoeuvres
-        if packs:  # a skill of its own, else it is flown as any skill of its kind
+        if packs:  # stages for the skill or for the flavour, where a pack has some
             way = packs.get(f"{flavour.name}.{command.skill}") or packs.get(flavour.name, way)
         return way(command, self.seen, self.system)
 
@@ -426,14 +429,14 @@ class Driver:
 
     @property
     def _flies_without_frame(self) -> bool:
-        """Whether a step is under way that needed no frame so far."""
+        """Whether a step is under way that has needed no frame so far."""
         of = self._manoeuvre
         if of is None or not of.command.needs_record or self._unsent != of.token:
             return False
         return not (of.over or of.awaits_frame)
 
     def _encoded(self, command: Command) -> Sequence[Message]:
-        """What a command would be flown by from here, retries included; nothing where that is not known."""
+        """The messages that would fly a command from here, retries included; none where they cannot be known."""
         assert self.flavour is not None
         try:
             stages = self._stages(self.flavour, command)
@@ -442,7 +445,7 @@ class Driver:
         return [each for stage in stages for each in sendings(stage)]
 
     def release(self) -> None:
-        """Stand down: nothing that moves the vehicle is sent any more."""
+        """Stand down: send nothing more that moves the vehicle."""
         self._manoeuvre, self._unsent, self._released = None, None, True
 
     def _ask_who(self, received: Sequence[ReceivedFrame], now_us: int) -> list[bytes]:
@@ -455,7 +458,7 @@ class Driver:
         return self.link.ask_who(system, now_us)
 
     def announce(self, severity: int, text: str) -> None:
-        """Tell any ground station; goes out with a later `tick`, when the link has nothing better to do."""
+        """Send a text to every ground station; it leaves with a later `tick`, when the link is idle."""
         self._announcer.add(severity, text)
 
     def _choose(self, frame: ReceivedFrame) -> None:
@@ -483,22 +486,23 @@ class Driver:
                 fence=self._fence, slack=slack, judges=self.judges, meant=self.meant,
             )  # fmt: skip
             self._heeded = {*observed.HEEDED, flavour.estimator, *preflight.HEEDED, "STATUSTEXT"}
-            for kind in (MotionKind.HOME, MotionKind.LAND):  # made ahead: when a fallback must fly there is no time
+            # made in advance: there is no time when a fallback has to fly
+            for kind in (MotionKind.HOME, MotionKind.LAND):
                 flavour.stages(Command(-1, "", kind, (), (), 0, 0), self.seen, frame.system)
 
     def _hears_both(self, heartbeat: Message, now_us: int) -> bool:
-        """Whether heartbeats as the vehicle's own contradict each other, by now."""
+        """Whether heartbeats under the vehicle's ids contradict each other now."""
         contradictions = self._aids.contradictions
         contradictions.report((heartbeat.custom_mode, heartbeat.base_mode & ARMED), now_us)
         return contradictions.stand(now_us)
 
     def speaks(self, heartbeat: Message) -> bool:
-        """Whether a heartbeat under the vehicle's ids is its own, by what it says that it is."""
+        """Whether a heartbeat under the vehicle's ids has the vehicle's type and autopilot."""
         return (heartbeat.type, heartbeat.autopilot) == self._kind
 
     def _is_strange(self, frame: ReceivedFrame, now_us: int, events: list[Event]) -> bool:
-        """Whether a heartbeat comes under the vehicle's ids and is not its own: of a gimbal or a companion computer
-        that was given them, or of another vehicle. It says neither how the vehicle flies nor that it is heard.
+        """Whether a heartbeat under the vehicle's ids comes from another sender: a gimbal or a companion computer with
+        the same ids, or another vehicle. Such a heartbeat is no evidence of how the vehicle flies or that it is heard.
         """
         if self.speaks(frame.message):
             self.seen.disputed = self._hears_both(frame.message, now_us)
@@ -513,7 +517,7 @@ class Driver:
         return True
 
     def _tell(self, name: str, message: Message) -> None:
-        """A message of the autopilot, to who asks it."""
+        """Pass a message of the autopilot to the pending questions."""
         if self.asks_first is not None:
             self.asks_first.take(name, message)
         if self.asks is not None:
@@ -571,8 +575,8 @@ class Driver:
         return new or (name != "ATTITUDE" and self._asks)
 
     def _tell_air(self, now_us: int, events: list[Event]) -> None:
-        """Whether it is armed and in the air. What is disarmed in the air says at once that it is on the ground: it
-        counts as in the air until it is seen to lie there.
+        """Report whether the vehicle is armed and in the air. A vehicle that is disarmed in the air reports at once
+        that it is on the ground; it counts as in the air until it is seen at rest.
         """
         seen, was = self.seen, self._was_air
         if was is not None and was[1] and seen.down and not seen.rests:
@@ -584,11 +588,11 @@ class Driver:
 
     @property
     def _asks(self) -> bool:
-        """Whether a frame waits until it is known who flies, which it may be time to ask."""
+        """Whether a frame waits to know who flies."""
         return self._aids.query.waits
 
     def _acknowledge(self, frame: ReceivedFrame, now_us: int, events: list[Event]) -> bool:
-        """Take in a COMMAND_ACK; whether it is of the command under way."""
+        """Take in a COMMAND_ACK; return whether it belongs to the present command."""
         message = frame.message
         if frame.component != AUTOPILOT:
             return False
@@ -604,8 +608,8 @@ class Driver:
         return self._commander.acknowledge(message.command, message.result, self.seen.up_us)
 
     def _overhear_answer(self, message: Message, now_us: int, events: list[Event]) -> None:
-        """Somebody else was told that it obeys: what leaves from now on waits for reports that are of after that. Where
-        a frame of ours left just before, nobody knows which of the two counts.
+        """Note that the vehicle has accepted somebody else's command: later frames wait for reports from after it. If a
+        frame of ours left just before, it is unknown which of the two commands takes effect.
         """
         what = others.STEERS.get(message.command)
         if what is None or message.result not in others.GRANTED:
@@ -615,7 +619,7 @@ class Driver:
         self._tell_crossed(f"{message.target_system}/{message.target_component} was granted {what}", now_us, events)
 
     def _tell_crossed(self, what: str, now_us: int, events: list[Event]) -> None:
-        """Say, once for each frame of ours, that it left within W of what shows now."""
+        """Report, once for each frame of ours, that it left within W before this observation."""
         steered_us, flavour = self._steered_us, self.flavour
         if steered_us is None or flavour is None or now_us - steered_us > flavour.mode_within_us:
             return
@@ -624,7 +628,7 @@ class Driver:
         self._announcer.add(others.WARNING, others.CROSSED)
 
     def _is_for_us(self, message: Message) -> bool:
-        """Whether a message that names whom it is for is for us, or for everybody. We are of the vehicle's system."""
+        """Whether a message is addressed to us or to everybody. We belong to the vehicle's system."""
         return is_addressed(message, self.system, OURS)
 
     def _hear(self, said: Sequence[StatusText], events: list[Event]) -> None:
@@ -633,8 +637,8 @@ class Driver:
             events.append(each)
 
     def _watch_mode(self, before: int | None, now_us: int, events: list[Event]) -> None:
-        """In the air, and outside of any manoeuvre of ours, too, whoever changes the mode has taken over. What may have
-        landed while nothing was heard chose another mode itself.
+        """Report a mode change in the air outside of our manoeuvres as a takeover. A vehicle that may have landed
+        during a silence has changed its mode itself.
         """
         mode, flavour = self.seen.mode, self.flavour
         if self._manoeuvre is not None or self._released or not self.seen.airborne or mode is None or flavour is None:
@@ -644,7 +648,7 @@ class Driver:
         if before in (None, mode) or self.seen.may_rest or (before, mode) in flavour.natural:
             return
         if not arrives(self.left, flavour, before, mode):
-            if left is None and not self._signed:  # the next report has to say so, too
+            if left is None and not self._signed:  # the next report has to confirm it
                 self._left_mode = before
                 return
             self._others = flavour.mode_name(mode)
@@ -652,8 +656,8 @@ class Driver:
             events.append(ports.TakenOver(now_us, self._others, self.seen.critical))
 
     def _look(self, now_us: int, events: list[Event]) -> None:
-        """Whether the link is up, and how long it was so far. One that is heard and does not hear us may still be sent
-        what stops it.
+        """Update whether the link is up, and for how long it has been. A vehicle that is heard but does not hear us may
+        still be sent a stop.
         """
         watch = self._watch
         was = watch.down
@@ -678,7 +682,7 @@ class Driver:
             events.append(ports.Noted(now_us, "the vehicle answers again"))
 
     def _advance(self, now_us: int, send: list[Message], events: list[Event]) -> None:
-        """Go on with the manoeuvre; where a frame of it waits until it is known who flies, ask at once."""
+        """Advance the manoeuvre; if one of its frames waits to know who flies, ask at once."""
         manoeuvre = self._manoeuvre
         if manoeuvre is None:
             return
@@ -700,7 +704,7 @@ class Driver:
             send += self._ask(now_us)
 
     def _doubt(self, now_us: int, send: list[Message]) -> None:
-        """What one report shows is asked after at once; what the next one contradicted is told."""
+        """Ask at once about an observation that rests on one report; report one that the next report contradicted."""
         aids = self._aids
         suspicion = aids.suspicion
         if suspicion.refuted is not None:
@@ -721,18 +725,18 @@ class Driver:
                 notes.clear()
 
     def _ask_time(self, now_us: int) -> list[Message]:
-        """Ask for the vehicle's clock, if it is time to."""
+        """The request for the vehicle's clock, if due."""
         ts1_ns = self.source.clock.due(now_us)
         return [] if ts1_ns is None else [messages.time_sync(ts1_ns)]
 
     def _set_parameters(self, now_us: int) -> list[bytes]:
-        """The frames that read or set a parameter now, as far as the boundary lets them out."""
+        """The frames that read or set a parameter now, as far as the boundary permits them."""
         frames, refused = self.link.pack(self.settings.due(self.system, now_us), now_us)
         self.settings.refused = refused[0] if refused else self.settings.refused
         return frames
 
     def _ask(self, now_us: int) -> list[Message]:
-        """Ask who flies, if it is time to."""
+        """The question who flies, if due."""
         if self._released:
             return []
         flies = (self._manoeuvre is not None and not self._manoeuvre.over) or self.seen.airborne
@@ -751,7 +755,7 @@ class Driver:
         return self.seen.airborne or (self.resumes and self.seen.armed)
 
     def _flown_by_others(self) -> str:
-        """How it flies already, if nothing of ours would make it; what lands is left to it."""
+        """How the vehicle flies already if no command of ours explains it; a landing is left to the vehicle."""
         seen, flavour, left = self.seen, self.flavour, self.left
         if not self._flies or flavour is None or seen.mode is None:
             return ""
@@ -760,12 +764,13 @@ class Driver:
         if seen.mode not in flavour.ours:
             return flavour.mode_name(seen.mode)
         if left is None or any(f"{flavour.name}.{each.command.skill}" in self._manoeuvres for each in left.in_force):
-            return ""  # nobody knows in which modes a pack's own way flies
+            return ""  # the modes of a pack's stages are not known
         return flown_by(left, flavour, seen)
 
     def _is_ready(self, now_us: int) -> bool:
-        """In the air it need not be fit to arm, but what brings it home is chosen by what is known of it. So it must
-        answer, for a while the times of what it says are awaited, and then one report of each kind.
+        """Whether `Ready` can be reported. In the air the vehicle need not be fit to arm, but the way home depends on
+        its reports: it must answer, then the ages of its reports are awaited for a while, and then one report of each
+        kind.
         """
         if not self._flies:
             lacks = self.unready
@@ -784,19 +789,19 @@ class Driver:
         return self._timed and self.stream_requests.settled(now_us, aloft=True) and not self._awaits_target(now_us)
 
     def _awaits_target(self, now_us: int) -> bool:
-        """Whether the target may still come that tells whose flight this is; ArduCopter has none in a takeoff, and says
-        so by telling all else that it was asked.
+        """Whether the target that shows whose flight this is may still arrive. ArduCopter has none in a takeoff, and
+        shows that by answering everything else.
         """
         if self.left is None or self.flavour is None or self.seen.targets or self._answers_us is None or self._aimless:
             return False
         return self.seen.mode in self.flavour.aims and now_us - self._answers_us <= PATIENCE_REFUSED_US
 
     def _pack(self, send: Sequence[Message], now_us: int, events: list[Event]) -> list[bytes]:
-        """The frames that the boundary lets out. A manoeuvre that it stops has failed."""
+        """The frames that the boundary permits. A manoeuvre whose frame it refuses has failed."""
         of = self._manoeuvre
         begins = self._gate_may_be_lost and self._moving and self._unsent is not None and of is not None
         if begins and of is not None and now_us <= of.command.not_after_us:
-            self._renew_ahead(now_us, events, begins=True)  # what brings it down is there before it sets off
+            self._renew_ahead(now_us, events, begins=True)  # the frames that bring it down are there before it sets off
         frames, refused = self.link.pack(send, now_us)
         moving, self._moving = self._moving, False
         if moving and frames:

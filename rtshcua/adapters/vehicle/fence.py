@@ -1,8 +1,9 @@
-"""The policy's airspace as a geofence of the autopilot's: a second line of defence, and never narrower than the first.
+"""Upload the policy's airspace as a geofence of the autopilot: a second line of defence that is never narrower than the
+policy.
 
-A fence has neither heights nor times, an excluded area has no holes, and autopilots differ in what several inclusions
-mean. What cannot be said exactly is left out, so that the autopilot never takes over where the policy lets the vehicle
-be; each such loss is told. How little a fence protects: docs/adr/0019-what-a-vehicle-says.md.
+A fence has neither heights nor times, an excluded area has no holes, and autopilots differ in the meaning of several
+inclusions. What a fence cannot represent exactly is left out and reported, so that the autopilot never takes over where
+the policy permits the vehicle to be. How little a fence protects: docs/adr/0019-what-a-vehicle-says.md.
 """
 
 from collections.abc import Iterator, Sequence
@@ -28,14 +29,14 @@ Ring = tuple[int, ...]
 
 
 class Fence(NamedTuple):
-    """What is uploaded, and what of the airspace it does not say, for a person."""
+    """The items to upload, and the parts of the airspace that they leave out, in words."""
 
     items: tuple[FenceItem, ...]
     left_out: tuple[str, ...]
 
 
 def fence_of(policy: Policy, habits: FenceHabits) -> Fence:
-    """The fence of a policy's airspace; without items where there is nothing that a fence could say."""
+    """The fence of a policy's airspace; without items where a fence cannot represent it."""
     airspace = policy.airspace
     if airspace is None:
         return Fence((), ("the policy has no airspace",))
@@ -81,10 +82,10 @@ def _can_exclude(zone: Zone, left_out: list[str]) -> bool:
 
 
 def _items(zone: Zone, projection: Projection, *, inside: bool) -> Iterator[FenceItem]:
-    """What includes a zone (a hole of it is an exclusion), or excludes it; outer rings first."""
+    """The items that include a zone (its holes become exclusions) or exclude it; outer rings first."""
     if zone.shape == CIRCLE:
         x, y, square = zone.data
-        # whole centimetres, so that a 32-bit float says the same everywhere, rounded away from the airspace
+        # whole centimetres, which a 32-bit float holds exactly, rounded away from the airspace
         centimetres = isqrt(square) // 10 + inside
         command = INCLUDE_CIRCLE if inside else EXCLUDE_CIRCLE
         yield FenceItem(command, *unproject(projection, x, y), centimetres / 100)
@@ -95,7 +96,7 @@ def _items(zone: Zone, projection: Projection, *, inside: bool) -> Iterator[Fenc
 
 
 def _rings(zone: Zone) -> Iterator[Ring]:
-    """The rings of a zone that is no circle, outer ones counter-clockwise."""
+    """The rings of a zone that is not a circle, outer ones counter-clockwise."""
     if zone.shape == AREA:
         count = zone.data[0]
         at = 1 + count
@@ -116,7 +117,7 @@ def _is_outer(ring: Ring) -> bool:
 
 
 def _size(zone: Zone) -> int:
-    """Twice the area, in mm^2, near enough to say which zone is the smallest."""
+    """Twice the area in mm^2, approximately, to find the smallest zone."""
     return 6 * zone.data[2] if zone.shape == CIRCLE else sum(map(_twice_area, _rings(zone)))
 
 
@@ -124,7 +125,7 @@ def _size(zone: Zone) -> int:
 
 RETRY_US: Final = 1_000_000
 RETRIES: Final = 8
-#: Between two requests of the vehicle; ArduCopter itself gives up after 8 s.
+#: The longest pause between two requests of the vehicle; ArduCopter itself gives up after 8 s.
 SILENCE_US: Final = 8_000_000
 
 _RESULTS: Final = {
@@ -134,7 +135,7 @@ _ACCEPTED, _UNSUPPORTED, _OUT_OF_ORDER = 0, 3, 13
 
 
 class UploadState(Enum):
-    """Where an upload stands."""
+    """The state of an upload."""
 
     IDLE = auto()
     SENDING = auto()
@@ -146,12 +147,13 @@ class UploadState(Enum):
 
 
 class Upload:
-    """One fence, to one vehicle: upload, then download, and the two must be the same. An acknowledged upload says
-    little (docs/adr/0019-what-a-vehicle-says.md). `problem` says what went wrong when it FAILED.
+    """One fence for one vehicle: uploaded, then downloaded and compared. An acknowledged upload proves little
+    (docs/adr/0019-what-a-vehicle-says.md). `problem` says why it FAILED.
 
-    Source: https://mavlink.io/en/services/mission.html; PX4 asks with MISSION_REQUEST_INT, and at times with both,
-    ArduCopter with the older MISSION_REQUEST and takes MISSION_ITEM_INT for an answer (recorded). It says of an item
-    that it does not ask for now that its number is wrong, and goes on (MissionItemProtocol.cpp, `handle_mission_item`).
+    Source: https://mavlink.io/en/services/mission.html. PX4 requests items by MISSION_REQUEST_INT, at times by both
+    messages; ArduCopter requests them by the older MISSION_REQUEST and accepts MISSION_ITEM_INT (recorded). It rejects
+    an item that it has not requested as out of sequence, and continues (MissionItemProtocol.cpp,
+    `handle_mission_item`).
     """
 
     def __init__(self, items: tuple[FenceItem, ...], frame: int, slack: int = 1) -> None:
@@ -160,14 +162,14 @@ class Upload:
         self._frame = frame
         self.state = UploadState.IDLE
         self.problem = ""
-        self._request: Message = None  # the last one, which is put again until it is answered
+        self._request: Message = None  # the last request, repeated until it is answered
         self._tries = 0
         self._sent_us = 0
-        self._asked = False  # the vehicle asks now
-        self._read = 0  # how many items of it came back as they were sent
+        self._asked = False  # it is the vehicle's turn to request
+        self._read = 0  # how many of the items were read back unchanged
 
     def due(self, system: int, now_us: int) -> list[Message]:
-        """What to send now: the beginning, or again what was not answered."""
+        """The messages to send now: the first one, or the unanswered one again."""
         if self.state is UploadState.IDLE:
             return self._ask(UploadState.SENDING, messages.fence_count(system, len(self._items)), now_us)
         if self.state not in (UploadState.SENDING, UploadState.COUNTING, UploadState.READING):
@@ -181,7 +183,7 @@ class Upload:
         return [self._request]
 
     def take(self, name: str, message: Any, system: int, now_us: int) -> list[Message]:
-        """A message of the mission protocol, about fences and for us; what answers it."""
+        """Take in a mission message about fences that is addressed to us; return the answer."""
         match name, self.state:
             case (("MISSION_REQUEST" | "MISSION_REQUEST_INT"), UploadState.SENDING):
                 if message.seq >= len(self._items):
@@ -194,7 +196,7 @@ class Upload:
                 if message.type == _UNSUPPORTED:
                     self.state = UploadState.UNSUPPORTED
                     return []
-                if message.type == _OUT_OF_ORDER:  # an item came twice: what is late is asked for twice
+                if message.type == _OUT_OF_ORDER:  # an item came twice, because a delayed one is requested twice
                     return []
                 return self._fail(f"refuses it ({_RESULTS.get(message.type, f'result {message.type}')})")
             case "MISSION_COUNT", UploadState.COUNTING:
@@ -207,7 +209,7 @@ class Upload:
 
     def _compare(self, message: Any, system: int, now_us: int) -> list[Message]:
         if message.seq != self._read:
-            return []  # of an earlier request
+            return []  # an answer to an earlier request
         item = self._items[self._read]
         same = (message.command, message.x, message.y) == (item.command, item.latitude, item.longitude)
         if not (same and isclose(message.param1, item.parameter, abs_tol=0.01)):
@@ -227,19 +229,18 @@ class Upload:
         return []
 
 
-# ---------------------------------------------------------------- what is made of it
+# ---------------------------------------------------------------- the whole procedure
 
-#: After a failure it waits so long before it begins again.
+#: How long it waits after a failure before it begins again.
 AGAIN_US: Final = 10_000_000
 
-#: The messages of the mission protocol that `take` looks at.
+#: The mission messages that `take` uses.
 HEEDED: Final = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK", "MISSION_COUNT", "MISSION_ITEM_INT")
 
 
 class Fencing:
-    """The airspace becomes the vehicle's fence: uploaded, read back, switched on; begun anew when that failed.
-
-    `unready` says what is not settled; `note` what an operator should know once it is.
+    """Makes the airspace the vehicle's fence: uploads, reads back, switches on, and starts again after a failure.
+    `unready` says what is not settled; `note` is the result for the operator.
     """
 
     def __init__(
@@ -254,7 +255,7 @@ class Fencing:
         self._problem: str | None = None
 
     def due(self, system: int, now_us: int) -> list[Message]:
-        """What to send now."""
+        """The messages to send now."""
         if self._upload is None:
             return []
         problem = self._failure()
@@ -273,14 +274,14 @@ class Fencing:
         return out
 
     def take(self, name: str, message: Any, system: int, now_us: int) -> list[Message]:
-        """A message of the mission protocol; what answers it."""
+        """Take in a mission message; return the answer."""
         if self._upload is None or name not in HEEDED or message.mission_type != FENCE:
             return []
         return self._upload.take(name, message, system, now_us)
 
     @property
     def unready(self) -> str | None:
-        """Why the fence is not there yet; None where none is wanted, or possible."""
+        """Why the fence is not set yet; None where none is wanted or possible."""
         if self._state in (None, UploadState.UNSUPPORTED):
             return None
         if self._state is UploadState.DONE and all(self._parameters.has(*each) for each in self._habits.switches):
@@ -289,12 +290,12 @@ class Fencing:
 
     @property
     def read_back(self) -> bool:
-        """Whether the vehicle has it, item by item."""
+        """Whether the vehicle holds the fence, item by item."""
         return self._state is UploadState.DONE
 
     @property
     def note(self) -> str:
-        """What became of it, once nothing is outstanding."""
+        """The result, in words, once everything is settled."""
         fence = self._fence
         if fence is None:
             return "the vehicle's own fence was left unchanged"

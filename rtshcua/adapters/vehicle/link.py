@@ -1,5 +1,5 @@
-"""Our end of the link: what came, once it proved to be the vehicle's, what leaves, once the boundary let it, and
-whether it is up.
+"""Our end of the link: which frames are received as the vehicle's, which leave with the boundary's permission, and
+whether the link is up.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -17,29 +17,28 @@ from rtshcua.mavlink.signing import FrameVerifier
 from rtshcua.onboard.enforcement.frames import OURS, UNSIGNED, Gate
 from rtshcua.onboard.ports import Command, Event
 
-#: what we call ourselves before we know whose system we belong to; nothing is sent under it
+#: our system id before the vehicle's is known; nothing is sent under it
 _NOBODY: Final = 255
-#: the system id that both autopilots are delivered with (`MAV_SYS_ID`, `SYSID_THISMAV`)
+#: the default system id of both autopilots (`MAV_SYS_ID`, `SYSID_THISMAV`)
 _DELIVERED: Final = 1
-#: what the boundary learns of the vehicle from
+#: messages from which the boundary learns about the vehicle
 _OBSERVED: Final = frozenset({"HEARTBEAT", "GLOBAL_POSITION_INT", "EXTENDED_SYS_STATE", "PARAM_VALUE"})
 
 
 def is_radio(frame: ReceivedFrame) -> bool:
-    """Whether it is the status of a SiK radio in a link between two: it speaks for itself, as no part of a vehicle.
-
-    Which vehicle's link it is about nobody can tell where several speak, so with a named `system` it is not heard.
+    """Whether it is the status of a SiK radio between two ends of a link, which is not part of a vehicle. With several
+    vehicles the link it is about is unknown, so with a given `system` it is ignored.
     """
     return frame.name == "RADIO_STATUS" and (frame.system, frame.component) == (RADIO_SYSTEM, RADIO)
 
 
 def two_speak(system: int, who: str) -> str:
-    """That somebody else speaks under the ids of the vehicle, for a person."""
+    """The message that another sender uses the vehicle's ids."""
     return f"two senders use the ids {system}/{AUTOPILOT}: {who} besides the vehicle; give each component its own ids"
 
 
 class DatagramContents(NamedTuple):
-    """What a datagram brought: events, frames that answer it, and its good frames, for the raw log."""
+    """The contents of a datagram: events, frames to send in reply, and its valid frames for the raw log."""
 
     events: Sequence[Event]
     answers: Sequence[bytes]
@@ -47,11 +46,11 @@ class DatagramContents(NamedTuple):
 
 
 class VehicleLink:
-    """Frames in and out. There is no other way out than through `frames`, the boundary's gate.
+    """Receives and sends frames. Every frame leaves through `frames`, the boundary's gate.
 
-    `verifier` holds the link's key, if it has one: what is not signed with it is dropped. With a `system`, nobody else
-    is heard from the beginning: the operator said which one is flown. Others may speak too then, but under no
-    circumstances under the same id: two autopilots that send to one port, of which one is flown, must not go unnoticed.
+    `verifier` holds the link's key, if any: frames without its signature are dropped. With a `system` all other systems
+    are ignored from the beginning, because the operator selected the vehicle. Others may then send too, but never under
+    the same id: two autopilots on one port must not go unnoticed.
     """
 
     def __init__(self, frames: Gate, verifier: FrameVerifier | None = None, system: int | None = None) -> None:
@@ -62,36 +61,37 @@ class VehicleLink:
         self._codec = Codec(_NOBODY, OURS, only=None if system is None else {system}, verifier=verifier)
         self._codec_ahead = Codec(_NOBODY, OURS)
         self._system = 0
-        #: until the flight begins: what is not the chosen vehicle's, of its own sender and of another one
+        #: until the flight begins: decoders for other vehicles, from the vehicle's sender and from another one
         self._others: tuple[Codec, Codec] | None = None
-        #: another vehicle that was heard on the link before the flight, in words; None while there is none that matters
+        #: another vehicle that was heard on the link before the flight, in words; None if none matters
         self.crowd: str | None = None
 
     def settle(self, system: int) -> None:
-        """From now on be part of this system, and hear nobody else."""
+        """Join this system and ignore all others from now on."""
         self._system = system
         heard = {system} if self._named else {system, RADIO_SYSTEM}
         self._codec = Codec(system, OURS, only=heard, verifier=self._verifier)
         self._codec_ahead = Codec(system, OURS)
         others = Codec(0, 0, only=frozenset(range(256)) - {system}, verifier=self._verifier)
-        # with a key, a second sender of the vehicle's own frames is nobody: at most it repeats them
+        # with a key, a second sender of the vehicle's own frames can only repeat them
         self._others = others, Codec(0, 0) if self._verifier is None else others
 
     @property
     def outdated(self) -> int:
-        """How many frames were signed with the link's key, and are too old to be believed. An autopilot whose signing
-        clock is behind sends such until it hears a later timestamp: ArduPilot's counts frames while it hears nobody.
+        """The number of frames that were signed with the link's key but are too old. An autopilot whose signing clock
+        is behind sends such frames until it receives a later timestamp: ArduPilot's clock advances per frame until
+        then.
         """
         return 0 if self._verifier is None else self._verifier.counts.stale
 
     def greet(self, now_us: int) -> list[bytes]:
-        """Our heartbeat to a vehicle that waits to be spoken to, before it is known which one it is. It is of the
-        system that was named, or of the one that autopilots are delivered as.
+        """Our heartbeat to a vehicle that waits to be addressed, before it is known. It uses the given system id or the
+        autopilots' default.
         """
         return self._sealed(self._system or self._greets_as, messages.heartbeat(), now_us)
 
     def ask_who(self, system: int, now_us: int) -> list[bytes]:
-        """Ask who an autopilot is that was heard, and not chosen yet: for its HEARTBEAT."""
+        """Request the HEARTBEAT of an autopilot that was heard but not chosen yet."""
         return self._sealed(system, messages.request(system, "HEARTBEAT"), now_us)
 
     def _sealed(self, system: int, message: Message, now_us: int) -> list[bytes]:
@@ -99,11 +99,11 @@ class VehicleLink:
         return [] if isinstance(sealed, Refusal) else [sealed]
 
     def begin(self) -> None:
-        """The flight begins: from now on nothing is made of other vehicles."""
+        """Begin the flight: other vehicles are ignored from now on."""
         self._others = None
 
     def overhear(self, datagram: bytes, now_us: int, *, elsewhere: bool = True) -> None:
-        """Look for another vehicle in a datagram; `elsewhere`: of another sender than the vehicle's."""
+        """Look for another vehicle in a datagram. `elsewhere`: it comes from a sender other than the vehicle's."""
         if self._others is None:
             return
         for frame in self._others[elsewhere].parse(datagram, now_us):
@@ -117,12 +117,12 @@ class VehicleLink:
                 self.crowd = f"two vehicles send here, systems {ours} and {theirs}: `--system` selects one"
 
     def meets(self, other: str) -> None:
-        """Another vehicle speaks under the ids of ours, in words: before the flight that keeps it from being ready."""
+        """Note another vehicle under our vehicle's ids, in words: before the flight it prevents readiness."""
         if self._others is not None:
             self.crowd = other
 
     def parse(self, datagram: bytes, now_us: int) -> list[ReceivedFrame]:
-        """The good frames in a datagram, in order; never raises, whatever the bytes."""
+        """The valid frames in a datagram, in order. Never raises, whatever the bytes."""
         if self._others is not None:
             self.overhear(datagram, now_us, elsewhere=False)
         received = self._codec.parse(datagram, now_us)
@@ -137,11 +137,11 @@ class VehicleLink:
         return received
 
     def _is_nobody(self, frame: ReceivedFrame) -> bool:
-        """Whether a frame comes under a radio's system id, and is neither of the vehicle nor a radio's status."""
+        """Whether a frame has a radio's system id but is neither the vehicle's nor a radio's status."""
         return self._system not in (0, RADIO_SYSTEM) and not is_radio(frame)
 
     def pack(self, send: Iterable[Message], now_us: int) -> tuple[list[bytes], list[Refusal]]:
-        """The frames that may be sent, and why others may not."""
+        """The frames that may be sent, and the reasons why others may not."""
         frames: list[bytes] = []
         refused: list[Refusal] = []
         for message in send:
@@ -160,8 +160,8 @@ class VehicleLink:
     def renew_ahead(
         self, encode: Callable[[Command], Sequence[Message]], now_us: int, *, begins: bool
     ) -> Sequence[str]:
-        """Have signed ahead what is due, where there may be a need for it; why something is not, in words. The frames
-        have numbers of their own: they count as none of those that leave.
+        """Have frames signed in advance where they may be needed; return the reasons why some are not, in words. These
+        frames have sequence numbers of their own.
         """
         codec = self._codec_ahead
         return self._frames.renew_ahead(
@@ -169,13 +169,13 @@ class VehicleLink:
         )
 
 
-# ---------------------------------------------------------------- whether it is up
+# ---------------------------------------------------------------- link state
 
-#: Nothing at all came from the autopilot for this long: the link is silent. Its streams come several times a second.
+#: The link is silent after this long without a frame of the autopilot. Its streams come several times a second.
 SILENT_US: Final = 1_000_000
-#: Nothing that was asked was answered for this long, though the autopilot is heard: it does not hear us.
+#: The autopilot does not hear us after this long without an answer, although it is heard.
 UNANSWERED_US: Final = 3_000_000
-#: Between two looks: the computer stood still, and what is read next waited.
+#: A gap this long between two calls means that the computer stood still, and that the next frames have waited.
 STOOD_US: Final = 500_000
 
 SILENT: Final = "silent"
@@ -183,48 +183,48 @@ UNANSWERED: Final = "heard, but answers nothing"
 
 
 class LinkWatch:
-    """Whether the link to the autopilot is up, in both directions, and a clock that only runs while it is.
+    """Whether the link to the autopilot is up in both directions, and a clock that only runs while it is.
 
-    Nothing that we send arrives on a link that is cut, and nothing that we see is the present. So what waits for an
-    effect or an answer waits in *link time*: a manoeuvre does not fail because nobody could hear of its success.
-    Told of every frame, question and answer; `slack` stretches its limits, see `Driver`. Times in us.
+    On a broken link nothing arrives, and nothing received is current. So timeouts for effects and answers count *link
+    time*: a manoeuvre does not fail because its success could not be heard. It is notified of every frame, question and
+    answer; `slack` multiplies its limits, see `Driver`. Times in us.
     """
 
     def __init__(self, slack: int = 1) -> None:
         self._silent_us, self._unanswered_limit_us = SILENT_US * slack, UNANSWERED_US * slack
         self._stood_us = STOOD_US * slack
-        #: when a frame of the autopilot last came
+        #: when the last frame of the autopilot arrived
         self.heard_us: int | None = None
-        self._unanswered_us: int | None = None  # since when a question stands open
+        self._unanswered_us: int | None = None  # since when a question is unanswered
         self._seen_us: int | None = None
-        #: link time: how long the link was up in sum, as of the last look
+        #: link time: the total time that the link was up, as of the last call
         self.up_us = 0
-        #: whether it ever answered anything
+        #: whether it has ever answered
         self.answers = False
-        #: whether it counts as unanswered though it never answered anything, too
+        #: whether it also counts as unanswered if it has never answered
         self.strict = False
-        #: whether it answered nothing for too long, and did not since; also while it is silent
+        #: whether it has not answered for too long, also while it is silent
         self.mute = False
         #: why the link is down; None while it is up
         self.down: str | None = None
-        #: when the computer last went on that had stood still
+        #: when the computer last resumed after standing still
         self.stood_us: int | None = None
 
     def asked(self, now_us: int) -> None:
-        """Something was asked that the autopilot answers."""
+        """Note a question that the autopilot answers."""
         if self._unanswered_us is None:
             self._unanswered_us = now_us
 
     def unasked(self) -> None:
-        """Nothing is asked any more, so that no answer is missed."""
+        """Note that no question is open, so that no answer is missed."""
         self._unanswered_us = None
 
     def answered(self) -> None:
-        """It answered."""
+        """Note an answer."""
         self._unanswered_us, self.answers, self.mute = None, True, False
 
     def look(self, now_us: int) -> bool:
-        """Let time pass; True when `down` is another than at the last look."""
+        """Let time pass; return whether `down` changed."""
         heard_us, seen_us, was, silent_us = self.heard_us, self._seen_us, self.down, self._silent_us
         if heard_us is None:
             return False
@@ -232,10 +232,10 @@ class LinkWatch:
         if seen_us is not None and now_us - seen_us > self._stood_us:
             self.stood_us = now_us
         if seen_us is not None and was is None:
-            self.up_us += min(now_us - seen_us, silent_us)  # we may have been held up
+            self.up_us += min(now_us - seen_us, silent_us)  # this process may have been held up
         down, asked_us = None, self._unanswered_us
         if now_us - heard_us > silent_us:
-            # What was asked meanwhile could not be answered; the question is put anew when it is heard again.
+            # An earlier question could not be answered; it is repeated once the vehicle is heard again.
             down, self._unanswered_us = SILENT, None
         elif asked_us is not None and now_us - asked_us > self._unanswered_limit_us and (self.answers or self.strict):
             down, self.mute = UNANSWERED, True

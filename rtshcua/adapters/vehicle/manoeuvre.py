@@ -1,8 +1,8 @@
-"""One command under way: stage after stage, each ended by its observed effect.
+"""Execute one command stage by stage; each stage ends with its observed effect.
 
-Three things are watched all the while: that nobody else flies the vehicle, that it gets somewhere, and that it stops
-when it is told to. Waits are in link time (`ObservedVehicle.up_us`): while the link is down nothing is expected of
-anybody. Before anything moves the vehicle its flight mode is known.
+Meanwhile three things are watched: whether somebody else flies the vehicle, whether it makes progress, and whether it
+stops on command. Timeouts count link time (`ObservedVehicle.up_us`): they stand still while the link is down. The
+flight mode is known before any frame that moves the vehicle.
 """
 
 from collections.abc import Sequence
@@ -33,9 +33,9 @@ from rtshcua.onboard.ports import PAUSED, Command, CommandFailed, Event, Hindere
 
 RETRY_US = 1_000_000
 RETRIES = 5
-#: what asks for no mode is repeated so often, where it may have been lost, before it asks for one
+#: how often a message that names no mode is repeated before one that names a mode is sent
 SETTLED_TRIES: Final = 1
-#: An answer may come this late; within it, a refusal may belong to an earlier sending of the same command.
+#: An answer may come this late; until then a refusal may belong to an earlier transmission of the same command.
 LATE_US = 5_000_000
 
 _ACCEPTED, _UNSUPPORTED, _IN_PROGRESS = 0, 3, 5
@@ -47,13 +47,13 @@ RESULTS = {
 
 
 def sendings(stage: Stage) -> list[Message]:
-    """The messages of a stage in the order in which they may leave, each as often as it may have to be sent."""
+    """The messages of a stage in the order of sending, with all retries."""
     settled = [] if stage.settled is None else [stage.settled] * (1 + SETTLED_TRIES)
     return settled + ([] if stage.message is None else _retried(stage.message))
 
 
 def _retried(message: Message) -> list[Message]:
-    """A message as often as it may have to be sent, with `confirmation` raised on each retry."""
+    """A message and its retries, with increasing `confirmation`."""
     made = [copy(message) for _ in range(1 + RETRIES)]
     for tries, each in enumerate(made):
         if hasattr(each, "confirmation"):
@@ -62,13 +62,13 @@ def _retried(message: Message) -> list[Message]:
 
 
 class Commander:
-    """Sends the message of one stage and follows its acknowledgement; it serves all manoeuvres of a vehicle in turn.
+    """Sends the message of one stage and follows its acknowledgement. It serves all manoeuvres of a vehicle in turn.
 
-    A missing acknowledgement means that it is not known whether the command was executed; only the effect tells.
+    Without an acknowledgement it is unknown whether the command was executed; only the effect shows it.
 
-    `accepted` and `refused` (the result) tell what the vehicle answered. A refusal counts only while it can belong to
-    nothing but the one sending of this stage: after a retry the first one may have been obeyed, and what is refused is
-    its repetition. `slack` stretches every wait: see `Driver`.
+    `accepted` and `refused` (the result) hold the vehicle's answer. A refusal counts only if it can only belong to the
+    one transmission of this stage: after a retry the first transmission may have been obeyed and the retry refused.
+    `slack` multiplies each timeout: see `Driver`.
     """
 
     def __init__(self, slack: int = 1) -> None:
@@ -78,16 +78,16 @@ class Commander:
         self._tries = 0
         self._doubtful = False
         self._last_us: dict[int, int] = {}
-        self._moded_us: int | None = None  # when a frame left that asks for a mode, or may change it
+        self._moded_us: int | None = None  # when a frame last left that requests or may change a mode
         self.accepted = False
         self.refused: int | None = None
         self.busy_us: int | None = None
-        #: what left last asks for no mode (`Stage.settled`)
+        #: the message sent last names no mode (`Stage.settled`)
         self.settled = False
 
     def start(self, stage: Stage | None, now_us: int, *, settled: bool = False) -> list[Message]:
-        """Begin another stage (None: none); `settled`: the vehicle is in its mode already. It may yet get to what asked
-        for another one shortly before.
+        """Begin a stage (None: none) and return its message. `settled`: the vehicle is in the stage's mode already; a
+        mode that was requested shortly before may still take effect.
         """
         self._stage, self._sent_us, self._tries = stage, now_us, 0
         self.accepted, self.refused, self.busy_us = False, None, None
@@ -106,13 +106,13 @@ class Commander:
 
     @property
     def waits(self) -> bool:
-        """Whether a command of the present stage was sent and not answered yet."""
+        """Whether a command of the present stage is unanswered."""
         stage = self._stage
         return stage is not None and stage.command is not None and not self.accepted and self.refused is None
 
     @property
     def due_us(self) -> int:
-        """When `due` may next have something to send, unless something is acknowledged before."""
+        """When `due` may next have something to send, unless an acknowledgement arrives first."""
         stage = self._stage
         if stage is None or stage.message is None:
             return NEVER
@@ -122,30 +122,30 @@ class Commander:
         return NEVER if is_over or self._tries >= RETRIES else self._sent_us + RETRY_US * self.slack
 
     def acknowledge(self, command: int, result: int, now_us: int) -> bool:
-        """Take in one COMMAND_ACK of the vehicle; whether it belongs to the present stage. PX4 answers some twice:
-        accepted, and then what came of it.
+        """Take in one COMMAND_ACK of the vehicle; return whether it belongs to the present stage. PX4 answers some
+        commands twice: accepted, and later the result.
         """
         if self._stage is None or command != self._stage.command:
             return False
         if result == _IN_PROGRESS:
-            self._sent_us = self.busy_us = now_us  # it is at it: wait on
+            self._sent_us = self.busy_us = now_us  # in progress: extend the wait
         elif result == _ACCEPTED or (self.settled and result == _UNSUPPORTED):
             self.accepted = True
         elif self.settled:
-            pass  # it is in another mode now: its heartbeat tells in which
+            pass  # it is in another mode now, which its heartbeat shows
         elif not self._doubtful:
             self.refused = result
         return True
 
     def due(self, now_us: int) -> list[Message]:
-        """What must be sent again now: an unanswered command with `confirmation` raised, or a repeated target."""
+        """The message to repeat now: an unanswered command with an increased `confirmation`, or a target."""
         stage = self._stage
         if stage is None or stage.message is None or now_us < self.due_us:
             return []
         message = stage.message
         if stage.command is not None:
             if hasattr(message, "confirmation"):
-                message = copy(message)  # a stage may be flown again
+                message = copy(message)  # the stage may be flown again
                 message.confirmation = self._tries + 1
             self._doubtful = True
             self._last_us[stage.command] = now_us
@@ -158,34 +158,34 @@ class Commander:
         return [message]
 
 
-# ---------------------------------------------------------------- who flies it, asked for
+# ---------------------------------------------------------------- asking who flies
 
-#: An unanswered question is put again after this long.
+#: An unanswered question is repeated after this long.
 AGAIN_US: Final = 100_000
-#: While nothing of ours flies it is asked this often, to know that it answers at all;
+#: How often an idle vehicle is asked, to know that it answers at all;
 IDLE_US: Final = 1_000_000
-#: and while something does, where the mode is streamed fast enough.
+#: how often in flight, where the mode is streamed fast enough;
 STREAMED_US: Final = 300_000
-#: What one report shows is asked after so often, until another confirms it.
+#: how often an observation in one report is checked until another report confirms it.
 CONFIRM_US: Final = 20_000
-#: by how much more than `lag_us` two questions are put apart, so that their answers come that far apart
+#: by how much more than `lag_us` two questions are spaced, so that the answers are spaced by `lag_us`
 APART_US: Final = 5_000
-#: So long after the mode a target may be told that was asked for with it. One that has none to tell of tells nothing:
-#: ArduCopter accepts the question then, PX4 denies it.
+#: How long after the mode a requested target may arrive. A vehicle without a target reports none: ArduCopter accepts
+#: the request then, PX4 denies it.
 TARGET_US: Final = 100_000
 
 
 class WhoFliesQuery:
-    """Asks for HEARTBEAT. `within_us`: no frame that moves the vehicle leaves on an older mode report.
+    """Requests HEARTBEAT. `within_us`: no frame that moves the vehicle leaves on an older mode report.
 
-    PX4 sends its HEARTBEAT once a second, whatever interval is asked for, and a pilot who takes over in between would
-    be flown over. Both autopilots answer REQUEST_MESSAGE of HEARTBEAT within milliseconds, so the mode is asked for:
-    again and again while something of ours flies, and once more right before a frame that begins a motion. Where the
-    vehicle has a target of ours, a pilot may have given it another without any change of mode: then
-    POSITION_TARGET_GLOBAL_INT is asked for in the same round trip (docs/adr/0034).
+    PX4 sends its HEARTBEAT once a second, whatever interval is requested, so a frame of ours could undo a takeover in
+    between. Both autopilots answer REQUEST_MESSAGE of HEARTBEAT within milliseconds, so the mode is requested
+    repeatedly in flight, and once more right before a frame that begins a motion. Where the vehicle has a target of
+    ours, a pilot may have given it another without a change of mode: then POSITION_TARGET_GLOBAL_INT is requested in
+    the same round trip (docs/adr/0034).
 
-    An answer tells what was so `lag_us` before: a frame that begins a motion waits for two that came so far apart, and
-    one that somebody was seen to command before waits for an answer that came so much later.
+    An answer shows the state `lag_us` earlier: a frame that begins a motion waits for two answers that far apart, and
+    after somebody else's command a frame waits for an answer that much later.
     """
 
     def __init__(self, within_us: int, lag_us: int = 0, slack: int = 1) -> None:
@@ -193,32 +193,32 @@ class WhoFliesQuery:
         self._lag_us = lag_us
         self._target_us = TARGET_US * slack
         self._asked_us: int | None = None
-        #: before then `due` gives nothing, so nobody need call it
+        #: `due` returns nothing before this time
         self.due_us = 0
-        self._came: tuple[int, int] | None = None  # how many reports of mode and target had, when a frame began to wait
-        self._target = False  # the frame waits for a target, too,
-        self._twice = False  # and for two answers,
-        self._first_us: int | None = None  # of which this is when the first came
+        self._came: tuple[int, int] | None = None  # the counts of mode and target reports when a frame began to wait
+        self._target = False  # the frame waits for a target
+        self._twice = False  # the frame waits for two answers
+        self._first_us: int | None = None  # when the first of two answers came
         self._since_us = 0  # when the frame began to wait
-        self._asked = 0  # how often it was asked for the frame,
-        self._every_us = AGAIN_US  # and so often it is, where no answer comes
-        self._commanded_us: int | None = None  # when somebody else was last seen to be obeyed
-        self._doubts = False  # what was reported is to be confirmed
-        #: how many questions for messages were put
+        self._asked = 0  # how many questions were put for the frame
+        self._every_us = AGAIN_US  # the interval between unanswered questions
+        self._commanded_us: int | None = None  # when somebody else's command was last accepted
+        self._doubts = False  # an observation is to be confirmed
+        #: the number of messages requested so far
         self.asked = 0
-        #: the target is to be asked for, whatever waits
+        #: request the target, whatever waits
         self.wants_target = False
-        #: when the frame waits no longer for a target; None while it waits for the mode, or for nothing
+        #: until when the frame waits for a target; None while it waits for the mode or for nothing
         self.ends_us: int | None = None
 
     @property
     def waits(self) -> bool:
-        """Whether a frame waits for the answer, or something else does."""
+        """Whether a frame or another question waits for the answer."""
         return self._came is not None or self.wants_target
 
     def is_young(self, seen: ObservedVehicle, now_us: int, trip_us: int = 0) -> bool:
-        """Whether the last mode report will do for a frame that stops the vehicle, or brings it home or down. What came
-        just now, and waited while nobody read for longer than a round trip takes, is not young.
+        """Whether the last mode report is recent enough for a frame that stops the vehicle or brings it home or down. A
+        report that was read late, by more than a round trip, is not.
         """
         if seen.heartbeat_us is None or now_us - seen.heartbeat_us > self._within_us:
             return False
@@ -229,9 +229,9 @@ class WhoFliesQuery:
     def is_newer(
         self, seen: ObservedVehicle, now_us: int, *, target: bool, twice: bool = False, again_us: int = AGAIN_US
     ) -> bool:
-        """Whether a mode report came since this was first asked for one frame, and with `target` a report of that too,
-        or none in good time: it will do for any frame. `twice`: two mode reports, so far apart as one may lag. Where
-        no answer comes it is asked again after `again_us`.
+        """Whether a mode report came after the first call for this frame: it is recent enough for any frame. `target`:
+        a target report is needed too, unless none comes in time. `twice`: two mode reports are needed, as far apart as
+        a mode may lag. An unanswered question is repeated after `again_us`.
         """
         if self._came is None:
             self._came, self._first_us, self._asked = (seen.beats, seen.targets), None, 0
@@ -255,14 +255,14 @@ class WhoFliesQuery:
         return now_us >= self.ends_us
 
     def doubt(self, doubts: bool) -> None:
-        """Whether what was reported is to be confirmed: then it is asked at once, and again and again."""
+        """Set whether an observation is to be confirmed: then the question is put at once and repeated."""
         if doubts and not self._doubts:
             self.due_us = 0
         self._doubts = doubts
 
     def commanded(self, now_us: int) -> None:
-        """Somebody else was seen to be obeyed: what was reported before says nothing of that. Whoever only says so
-        again and again holds up nothing for longer than once a second.
+        """Note that somebody else's command was accepted: earlier reports do not show its effect. Repeated commands
+        hold frames up for at most one second at a time.
         """
         if self._commanded_us is None or now_us - self._commanded_us > IDLE_US:
             self._commanded_us = now_us
@@ -271,16 +271,16 @@ class WhoFliesQuery:
         return self._commanded_us is None or told_us >= self._commanded_us + self._lag_us
 
     def sent(self) -> None:
-        """The frame left, or is not wanted any more: the next one asks anew."""
+        """Note that the frame left or is no longer wanted: the next one asks anew."""
         self._came, self._target, self.ends_us = None, False, None
 
     def due(self, system: int, seen: ObservedVehicle, now_us: int, *, flies: bool) -> list[Message]:
-        """The question to put now, if one is due. `flies`: something of ours does, or the vehicle is in the air."""
+        """The question to put now, if due. `flies`: a manoeuvre of ours is under way, or the vehicle is in the air."""
         half_us = self._within_us // 2
         wants, self.wants_target = self.wants_target, False
         every_us = 0 if wants else self._interval_us(seen, now_us, flies=flies)
         if self._asked_us is not None and now_us - self._asked_us < every_us:
-            if every_us == STREAMED_US:  # until the last heartbeat is too old for that
+            if every_us == STREAMED_US:  # until the last heartbeat is too old for that interval
                 self.due_us = min(self._asked_us + every_us, (seen.heartbeat_us or 0) + half_us)
             elif flies or self._doubts:
                 self.due_us = self._asked_us + every_us
@@ -307,7 +307,7 @@ class WhoFliesQuery:
         return STREAMED_US if streamed else half_us
 
     def _again_us(self, now_us: int) -> int:
-        """So long after the last question for a frame the next one is put."""
+        """How long after the last question for a frame the next one is put."""
         commanded_us = self._commanded_us
         hurries = commanded_us is not None and now_us - commanded_us <= 2 * (self._lag_us + APART_US)
         return self._lag_us + APART_US if hurries or (self._twice and self._asked == 1) else self._every_us
@@ -315,35 +315,35 @@ class WhoFliesQuery:
 
 # ---------------------------------------------------------------- a manoeuvre
 
-#: Never answered, and no effect seen: it may have been executed, or be executed yet.
+#: No answer and no effect: the command may have been executed, or may still be.
 UNKNOWN: Final = "unknown/no-answer"
-#: It stands still, and is not where it was sent.
+#: The vehicle stands still, short of its destination.
 STOPPED_SHORT: Final = "stopped-short"
 _GETS_NOWHERE: Final = (STOPPED_SHORT, "no-progress")
-#: what a command comes to, too, where a pilot flies and somebody goes on reporting our mode
+#: failures that also occur where a pilot flies and another sender keeps reporting our mode
 _AS_IF_OTHERS_FLEW: Final = frozenset(
     (UNKNOWN, STOPPED_SHORT, "no-mode-report", "no-progress", "no-effect", "did-not-stop", "did-not-hold")
 )
-#: The mode that a frame waits for was not told in this time.
+#: The mode that a frame waits for was not reported within this time.
 MODE_UNKNOWN_US: Final = 5_000_000
-#: mm: a vehicle that holds, and is further than this from where it came to stand, does not hold
+#: mm: a holding vehicle that is farther than this from where it stopped does not hold
 HOLDS_WITHIN: Final = 15_000
-#: so long after it accepted a mode, in us of link time, and `MODE_BEATS`, the mode shows
+#: us of link time; a mode shows this long after it was accepted, and after `MODE_BEATS` heartbeats
 TAKEN_BACK_US: Final = 1_500_000
-#: these stop the vehicle, or bring it home or down: they leave on the last mode report, while it is young
+#: these stop the vehicle or bring it home or down: a recent mode report suffices for them
 _URGENT: Final = (MotionKind.HOLD, MotionKind.HOME, MotionKind.LAND)
 _HOMEWARD: Final = (MotionKind.HOME, MotionKind.LAND)
 _LEGS: Final = (MotionKind.FLY, MotionKind.COVER)
-#: a frame that stops the vehicle, or brings it home or down, waits no longer than this to know whether its target is
-#: its own still, in us: with all else that it waits for no longer than its permit lasts
+#: us: how long a frame that stops the vehicle or brings it home or down waits to know whether the target is ours; with
+#: all other waits less than the permit lasts
 UNNAMED_MOST_US: Final = 600_000
-#: so long, and what a round trip takes, a frame that brings it home or down waits for a report of the mode that is of
-#: now, in us: then the last one will do, if that is young
+#: us: how long, in addition to a round trip, a frame that brings the vehicle home or down waits for a new mode report;
+#: then a recent one suffices
 ANSWER_MOST_US: Final = 50_000
 
 
 class Aids:
-    """What serves all manoeuvres of a vehicle in turn."""
+    """State and helpers that all manoeuvres of a vehicle share."""
 
     def __init__(
         self, flavour: AutopilotFlavour, brakes: Brakes, commander: Commander, *, clock: VehicleClock,
@@ -356,7 +356,7 @@ class Aids:
         self.targets = TargetWatch()
         self.named = NamedTargetWatch(commander.slack)
         self.suspicion = Suspicion()
-        #: of its mode and its motors
+        #: about its mode and its motors
         self.contradictions = Contradictions()
         self.sent_us: int | None = None
         """When a frame that moves the vehicle last left, in link time."""
@@ -366,28 +366,28 @@ class Aids:
         self._signed = signed
 
     def is_near_ours(self, up_us: int) -> bool:
-        """Whether a frame of ours may have undone by now what a report shows. A round trip counts no longer than
-        reports would ever do: on a link without a key anybody may make it seem long.
+        """Whether a frame of ours may already have undone what a report shows. The round trip is limited to a plausible
+        value, because on a link without a key an attacker can make it seem long.
         """
         within_us = CROSSED_US * self.commander.slack + min(self.trip_us, self.flavour.mode_within_us)
         return self.sent_us is not None and up_us - self.sent_us <= within_us
 
     @property
     def trip_us(self) -> int:
-        """What a round trip takes, as far as it is known."""
+        """The round trip, as far as it is known."""
         return self._clock.round_trip_us or 0
 
     @property
     def answer_us(self) -> int:
-        """How long a frame that would undo a pilot's mode waits at most for the answer to its own question: what a
-        round trip takes, unless reports come later than would ever do, and `ANSWER_MOST_US`.
+        """How long a frame that would undo a pilot's mode waits at most for the answer to its question: a round trip of
+        plausible length and `ANSWER_MOST_US`.
         """
         trip_us = min(self.trip_us, self.flavour.mode_within_us)
         return ANSWER_MOST_US * self.commander.slack + trip_us
 
     def sure(self, found: tuple[str, str, int] | None, seen: ObservedVehicle) -> str | None:
-        """What is sure of what shows that somebody else flies, or that the motors stopped: nobody can put in a frame
-        where there is a key.
+        """The confirmed evidence that somebody else flies or that the motors stopped. With a key one report is enough,
+        because no frame can be forged.
         """
         suspicion = self.suspicion
         if found is None and not suspicion.stands:
@@ -397,11 +397,12 @@ class Aids:
 
 
 class Manoeuvre:
-    """Runs the stages of `command`; after its last effect, and a HOLD's time, it has succeeded.
+    """Runs the stages of `command`. It has succeeded after its last effect and, for HOLD, its duration. It watches who
+    flies until another manoeuvre takes its place.
 
-    It goes on watching who flies after that, until another manoeuvre takes its place. `before` are the modes that may
-    still show at its start, while its own has not come. `doubted`: what one report showed when it began, and none
-    confirmed or contradicted yet (`Suspicion.kind`). Until its first frame leaves, nothing of it excuses that.
+    `before` holds the modes that may still show at the start, until the manoeuvre's own mode shows. `doubted` is an
+    observation in one report at the start that is neither confirmed nor contradicted yet (`Suspicion.kind`). Until its
+    first frame leaves, this manoeuvre cannot be the cause of it.
     """
 
     def __init__(
@@ -423,7 +424,7 @@ class Manoeuvre:
         self._asked_us: int | None = None  # since when a frame that brings it home or down waits for an answer
         self._stands: tuple[int, int] | None = None
         self._doubted = doubted
-        self._suspected = seen.mode if doubted == "mode" else None  # it is the pilot's, if the next report confirms it
+        self._suspected = seen.mode if doubted == "mode" else None  # the pilot's mode, if the next report confirms it
         if seen.mode is not None:
             before = before - {seen.mode} if self._suspected is not None else before | {seen.mode}
         self._before = before
@@ -431,15 +432,16 @@ class Manoeuvre:
         self._modes: frozenset[int] = frozenset()
         self._was_landing = seen.landing and doubted != "landing"
         self._taken = False
-        self._aimed = False  # the frame is out that says where to go, or to go nowhere,
-        self._named: ExpectedTarget | None = None  # and it was seen to be obeyed, by this target of ours that it named
-        self._shown = False  # or by its mode
-        self._pause: PauseWatch | None = None  # of a leg
+        self._aimed = False  # the frame that sets the destination, or none, has left
+        self._named: ExpectedTarget | None = None  # the target of ours that the vehicle named after it
+        self._shown = False  # the mode has shown that the frame was obeyed
+        self._pause: PauseWatch | None = None  # for a leg
         self._pace: SpeedWatch | None = None
-        self._accepted: tuple[int, int] | None = None  # when the present stage was, and after how many heartbeats
-        self._changed = False  # something was sent, or another stage begun: what that does is still to be looked at
+        # when the present stage was accepted, and after how many heartbeats
+        self._accepted: tuple[int, int] | None = None
+        self._changed = False  # something was sent or a stage began whose effect is still to be checked
         self.over = False
-        #: until then `advance` has nothing to say, unless something is observed or acknowledged
+        #: `advance` does nothing before this time unless something is observed or acknowledged
         self.due_us = 0
         seen.hush()
         aids.query.sent()
@@ -447,7 +449,7 @@ class Manoeuvre:
 
     @property
     def waits(self) -> bool:
-        """Whether a frame waits until it is known who flies, or that is to be asked."""
+        """Whether a frame waits to know who flies, or the target is to be requested."""
         named = self._aids.named
         if named.asks and not self._taken:
             named.asks, self._aids.query.wants_target = False, True
@@ -456,21 +458,21 @@ class Manoeuvre:
 
     @property
     def awaits_frame(self) -> bool:
-        """Whether the frame of its stage was not sent yet."""
+        """Whether the frame of the present stage was not sent yet."""
         return self._waits
 
     @property
     def modes(self) -> frozenset[int]:
-        """The flight modes in which nobody has taken over."""
+        """The flight modes that do not indicate a takeover."""
         return self._modes | self._before
 
     def advance(self, seen: ObservedVehicle, now_us: int) -> tuple[list[Message], Sequence[Event]]:
-        """Messages to send and events, after something was observed or time went by."""
+        """Return the messages to send and the events, after an observation or with time."""
         self._changed = False
         send, events = self._advance(seen, now_us)
         if self._is_newly_obeyed(seen):
             events = [Obeyed(now_us, self.token, seen.target if self._aids.targets.compares else None), *events]
-        looks = self._changed or self._aids.suspicion.stands  # then a report that brings nothing new confirms
+        looks = self._changed or self._aids.suspicion.stands  # then even a report without news confirms
         self.due_us = now_us if looks else self._due_us(seen, now_us)
         return send, events
 
@@ -520,7 +522,7 @@ class Manoeuvre:
         return (self._aids.suspicion.how or "two speak") if crossed else None
 
     def _hindered(self, seen: ObservedVehicle, now_us: int) -> Sequence[Event]:
-        """That it is flown slower than it was told, once."""
+        """That the leg is flown slower than commanded, reported once."""
         pace = self._pace
         if pace is None or not self._aids.targets.shown or not pace.look(seen, self._way_left(seen)):
             return ()
@@ -550,14 +552,14 @@ class Manoeuvre:
             self._commander.start(stage, seen.up_us)
 
     def _may_send(self, seen: ObservedVehicle, now_us: int) -> bool:
-        """Whether it is known well enough who flies, for a frame that moves the vehicle (docs/adr/0034)."""
+        """Whether it is known well enough who flies to send a frame that moves the vehicle (docs/adr/0034)."""
         query, urgent = self._aids.query, self.command.kind in _URGENT
         if self._aids.suspicion.stands or self._aids.contradictions.stand(now_us):
             return False
         if self._is_unnamed(seen, now_us):
             self._unnamed_us = now_us if self._unnamed_us is None else self._unnamed_us
             if now_us - self._unnamed_us <= UNNAMED_MOST_US:
-                query.is_newer(seen, now_us, target=True)  # it is asked for
+                query.is_newer(seen, now_us, target=True)  # this requests the target
                 return False
         if urgent and self._answers_late(seen, now_us) and query.is_young(seen, now_us, self._aids.trip_us):
             return True
@@ -566,7 +568,7 @@ class Manoeuvre:
         return query.is_newer(seen, now_us, target=targets, twice=not urgent, again_us=again_us)
 
     def _answers_late(self, seen: ObservedVehicle, now_us: int) -> bool:
-        """Whether a frame that names a mode, and so would undo one, waits no longer for the answer to its question."""
+        """Whether a frame that names a mode, and so would undo another, no longer waits for its answer."""
         if self.command.kind not in _HOMEWARD:
             return True
         if self._asked_us is None:
@@ -574,7 +576,9 @@ class Manoeuvre:
         return now_us - self._asked_us >= self._aids.answer_us
 
     def _is_unnamed(self, seen: ObservedVehicle, now_us: int) -> bool:
-        """Whether it goes on naming a target of ours as a rule, and did not for as long as a mode report may be old."""
+        """Whether the vehicle, which usually reports our target, has not done so for as long as a mode report may be
+        old.
+        """
         if not self._names_target(seen):
             return False
         return now_us - seen.target_us > self._flavour.mode_within_us * self._commander.slack
@@ -584,11 +588,11 @@ class Manoeuvre:
         return flavour.names_targets and targets.compares and targets.shown and seen.mode in flavour.aims
 
     def _send(self, seen: ObservedVehicle) -> list[Message]:
-        """The message of the stage; none where it would ask for what is so already."""
+        """The message of the stage; none where its effect already holds."""
         self._waits, self._entered_us, self._changed, self._asked_us = False, seen.up_us, True, None
         self._doubted = self._suspected = None
         target = self._left[0].target
-        if target is not None or self.command.kind in _URGENT:  # else it is what it was: a mode, a speed, an arming
+        if target is not None or self.command.kind in _URGENT:  # otherwise it was a mode, a speed or an arming
             self._aids.targets.expect(target, seen)
             self._aimed = True
         if self._left[0].spare and self._is_done(seen):
@@ -599,7 +603,7 @@ class Manoeuvre:
         return self._commander.start(stage, seen.up_us, settled=seen.mode in stage.modes)
 
     def _again(self, seen: ObservedVehicle, now_us: int) -> list[Message]:
-        """The message once more, where it needs to be: never of a target that the autopilot flies to."""
+        """The message to repeat, if any: never a target that the autopilot flies to."""
         commander = self._commander
         if self._waits:
             return []
@@ -617,15 +621,13 @@ class Manoeuvre:
 
     @property
     def _is_followed(self) -> bool:
-        """Whether the message of the present stage is one that is repeated until the autopilot flies to its target, and
-        it does.
-        """
+        """Whether the present message is one that is repeated until the autopilot flies to its target, and it does."""
         if self._left[0].command is not None:
             return self._commander.settled and self._aids.targets.shown
         return self._aids.targets.shown or (self._progress is not None and self._progress.shown)
 
     def _due_us(self, seen: ObservedVehicle, now_us: int) -> int:
-        """When to look again, in real time, unless something is seen before."""
+        """When to check again, in real time, unless something is observed first."""
         at_us = NEVER if self._taken else self._aids.targets.due_us(seen.up_us)
         if self._accepted is not None:
             at_us = min(at_us, self._accepted[0] + TAKEN_BACK_US)
@@ -638,7 +640,7 @@ class Manoeuvre:
 
     @property
     def _ends_us(self) -> int:
-        """When, in link time, the present stage may be over, or have failed, with nothing more seen."""
+        """When, in link time, the present stage may end or fail without a further observation."""
         if not self._left:
             ends = self._held_us is not None and self.command.hold_us
             return (self._held_us or 0) + self.command.hold_us if ends else NEVER
@@ -653,20 +655,20 @@ class Manoeuvre:
 
     @property
     def _shows_us(self) -> int:
-        """When, in link time, the effect of the present stage must show at the latest."""
+        """The latest time, in link time, for the effect of the present stage to show."""
         timeout_us, commander = self._left[0].timeout_us, self._commander
         if not timeout_us:
             return NEVER
         return max(self._entered_us, commander.busy_us or 0) + timeout_us * commander.slack
 
-    # -------------------------------------------------------- what is seen
+    # -------------------------------------------------------- observing
 
     def _is_done(self, seen: ObservedVehicle) -> bool:
         stage = self._left[0]
         return self._commander.accepted if stage.done is None else stage.done(seen)
 
     def _has_held(self, seen: ObservedVehicle) -> bool:
-        """Whether a vehicle that came to stand has done so for the time of a HOLD, and stands still now."""
+        """Whether a vehicle that stopped has stood for the duration of a HOLD, and stands now."""
         if self.command.kind != MotionKind.HOLD:
             return True
         if self._held_us is None:
@@ -675,7 +677,7 @@ class Manoeuvre:
         return over and still(seen)
 
     def _left_its_place(self, seen: ObservedVehicle) -> str | None:
-        """Why a vehicle that came to stand for a HOLD does not hold, as a slug."""
+        """Why a vehicle that stopped for a HOLD does not hold, as a slug."""
         if self.command.kind != MotionKind.HOLD:
             return None
         if seen.down:
@@ -688,11 +690,9 @@ class Manoeuvre:
         return "did-not-hold" if away > 2 * HOLDS_WITHIN or (away > HOLDS_WITHIN and not still(seen)) else None
 
     def _taken_over(self, seen: ObservedVehicle) -> tuple[str, str, int] | None:
-        """What shows that somebody else flies: a mode, a landing, a failsafe or a target that is not of ours; its kind,
-        what it is, and how many reports of its kind there were.
-
-        A mode may belong to this stage or, until its own mode showed, to those before. What was doubted when this began
-        was not of this.
+        """Evidence that somebody else flies: a mode, a landing, a failsafe or a target that is not ours. Returns its
+        kind, its name and the number of reports of that kind. A mode may belong to this stage or, until the stage's own
+        mode showed, to those before. A doubt from before the start was not caused by this manoeuvre.
         """
         if self._taken or seen.mode is None:
             return None
@@ -721,10 +721,10 @@ class Manoeuvre:
         return None
 
     def _flown_otherwise(self, seen: ObservedVehicle, now_us: int) -> str | None:
-        """What shows over a while that somebody else flies, in our mode and without another target."""
+        """Evidence over time that somebody else flies, although our mode shows and no other target."""
         if self._taken or self._aids.suspicion.stands or seen.mode not in self.modes:
             return None
-        if not self._names_target(seen):  # in a climb it names none
+        if not self._names_target(seen):  # it names no target in a climb
             paused = self.command.kind == MotionKind.CLIMB and self._is_paused(seen, now_us)
             return PAUSED if paused else None
         if self._aids.named.is_gone(seen, now_us, self._aids.query.asked):
@@ -737,15 +737,15 @@ class Manoeuvre:
 
     @property
     def _was_granted(self) -> bool:
-        """Whether somebody else was told since this began that the vehicle obeys him."""
+        """Whether the vehicle has accepted somebody else's command since this began."""
         granted_us = self._aids.granted_us
         return granted_us is not None and granted_us >= self._began_us
 
     def _is_kept(self, seen: ObservedVehicle, now_us: int) -> bool:
-        """Whether somebody keeps it where it is for longer than any reason of its own would: it never set off, though
-        it says that it flies there, or it rises no further, however little is missing, and it shows that somebody is
-        why. Its weight, weak motors or a fence keep it down as well, and then it would be left in the air with nobody
-        who flies it. What never rose at all may be without propellers, and is to be told to land.
+        """Whether somebody keeps the vehicle in place for longer than the vehicle itself would: it never set off
+        although it reports our target, or it rises no further and there is evidence of an intervention. Without such
+        evidence its weight, weak motors or a fence may keep it down, and standing down would leave it in the air with
+        nobody in control. A vehicle that never rose may lack propellers, and is commanded to land.
         """
         if self.command.kind == MotionKind.CLIMB:
             rose = self._progress is not None and self._progress.shown
@@ -759,7 +759,7 @@ class Manoeuvre:
         return None if progress is None else progress.measure(seen)
 
     def _was_taken_back(self, seen: ObservedVehicle) -> bool:
-        """Whether our mode was accepted, and another shows in several reports since: somebody chose it again."""
+        """Whether our mode was accepted but several later reports show another: somebody chose that one again."""
         if not self._commander.accepted or self._commander.refused is not None or self._waits:
             self._accepted = None
             return False
@@ -769,10 +769,10 @@ class Manoeuvre:
         return seen.up_us - accepted_us > TAKEN_BACK_US and seen.beats - beats >= MODE_BEATS
 
     def _is_newly_obeyed(self, seen: ObservedVehicle) -> bool:
-        """Whether it shows now, and did not before, that the vehicle does this, and not what it was told before.
+        """Whether it shows now, for the first time, that the vehicle executes this command.
 
-        By its target, each time that it names another of ours; where it names none, once by its mode: that is another
-        one now, or the same and was accepted.
+        The target shows it, each time that the vehicle names another one of ours. Where it names none, the mode shows
+        it once: a changed mode, or the same one after it was accepted.
         """
         targets = self._aids.targets
         if not self._aimed or self._waits or self._taken or seen.mode not in self._modes:
@@ -784,7 +784,7 @@ class Manoeuvre:
         return self._shown and not before_it
 
     def _failure(self, seen: ObservedVehicle) -> str | None:
-        """Why the present stage cannot be waited for any longer, as a slug."""
+        """Why the present stage has failed, as a slug."""
         stage, commander = self._left[0], self._commander
         if self._waits:
             late = seen.up_us - self._entered_us > MODE_UNKNOWN_US * commander.slack

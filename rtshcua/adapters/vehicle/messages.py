@@ -1,4 +1,4 @@
-"""The MAVLink messages that adapters send, made in one place with the fields that nobody uses filled in."""
+"""Build the MAVLink messages that adapters send; unused fields are filled in here."""
 
 from collections import deque
 from copy import copy
@@ -37,7 +37,7 @@ _AUTOPILOT = enums.MAV_COMP_ID_AUTOPILOT1
 
 
 def heartbeat() -> Message:
-    """Of an onboard controller; never of a ground station, which would hide the loss of the real one."""
+    """HEARTBEAT of an onboard controller, never of a ground station: that would hide the loss of the real one."""
     return dialect.MAVLink_heartbeat_message(
         enums.MAV_TYPE_ONBOARD_CONTROLLER, enums.MAV_AUTOPILOT_INVALID, 0, 0, dialect.MAV_STATE_ACTIVE, 3
     )
@@ -46,7 +46,7 @@ def heartbeat() -> Message:
 def command(system: int, number: int, *parameters: float) -> Message:
     """COMMAND_LONG with up to seven parameters, the rest 0."""
     filled = (*parameters, *_ZEROS[len(parameters) :])
-    return _COMMAND.build(*filled, number, system, _AUTOPILOT, 0)  # in the order of the wire
+    return _COMMAND.build(*filled, number, system, _AUTOPILOT, 0)  # in wire order
 
 
 def set_mode(system: int, mode: Px4Mode | CopterMode) -> Message:
@@ -65,18 +65,16 @@ def reposition_amsl(system: int, latitude: int, longitude: int, amsl_m: float, s
 
 
 def stop_here(system: int) -> Message:
-    """DO_REPOSITION to no place, height or heading: PX4 brakes, and stays where it comes to stand ("pause").
-
-    As COMMAND_INT, where INT32_MAX is what NaN is in a float (vehicles.md 5; PX4: `Navigator`, DO_REPOSITION).
+    """DO_REPOSITION without place, height or heading: PX4 brakes and stays where it stops ("pause"). As COMMAND_INT,
+    where INT32_MAX stands for the NaN of a float (vehicles.md 5; PX4: `Navigator`, DO_REPOSITION).
     """
     return _reposition(system, -1.0, enums.NO_PLACE, enums.NO_PLACE, NAN)
 
 
 def in_hold(reposition: Message) -> Message:
-    """The same DO_REPOSITION for a vehicle that is in Hold: it changes no mode, so it takes none from a pilot.
-
-    PX4 from 1.14 to 1.17 answers that it does not support it, and obeys it, in Hold and within half a second alone
-    (recorded; `Navigator::run`, `Loiter::on_active`); from 1.18 on it answers for what it does (pull request 27563).
+    """The same DO_REPOSITION for a vehicle in Hold: it requests no mode, so it cannot undo a pilot's mode. PX4 from
+    1.14 to 1.17 answers "unsupported" and obeys it, but only in Hold and within half a second (recorded;
+    `Navigator::run`, `Loiter::on_active`); from 1.18 on it answers correctly (pull request 27563).
     """
     made = copy(reposition)
     made.param2 = 0.0
@@ -111,12 +109,12 @@ def message_interval(system: int, message: str, interval_us: int) -> Message:
 
 @lru_cache(maxsize=16)
 def request(system: int, message: str) -> Message:
-    """REQUEST_MESSAGE: once, by the name of a message that the dialect has. The same one each time: to be sent only."""
+    """REQUEST_MESSAGE: once, by the name of a message in the dialect. The returned message is shared: send it only."""
     return command(system, enums.MAV_CMD_REQUEST_MESSAGE, number_of(message) or 0)
 
 
 def time_sync(now_ns: int) -> Message:
-    """TIMESYNC: our monotonic time, to come back beside the vehicle's."""
+    """TIMESYNC with our monotonic time, which is returned together with the vehicle's."""
     return dialect.MAVLink_timesync_message(0, now_ns)
 
 
@@ -131,7 +129,7 @@ def parameter_read(system: int, name: str) -> Message:
 
 
 def parameter_set(system: int, name: str, value: float, kind: int) -> Message:
-    """PARAM_SET; the value is encoded as the flavour wants it."""
+    """PARAM_SET; the value is encoded as the flavour needs it."""
     return dialect.MAVLink_param_set_message(system, _AUTOPILOT, name.encode(), value, kind)
 
 
@@ -158,17 +156,17 @@ def fence_item(system: int, number: int, frame: int, item: FenceItem) -> Message
 
 
 def fence_list(system: int) -> Message:
-    """MISSION_REQUEST_LIST: how many items has the fence?"""
+    """MISSION_REQUEST_LIST: request the number of items of the fence."""
     return dialect.MAVLink_mission_request_list_message(system, _AUTOPILOT, FENCE)
 
 
 def rally_list(system: int) -> Message:
-    """MISSION_REQUEST_LIST: how many rally points has it?"""
+    """MISSION_REQUEST_LIST: request the number of rally points."""
     return dialect.MAVLink_mission_request_list_message(system, _AUTOPILOT, RALLY)
 
 
 def rally_received(system: int) -> Message:
-    """MISSION_ACK that ends that question: their number is all that is wanted."""
+    """MISSION_ACK that ends this request: only the number is wanted."""
     return dialect.MAVLink_mission_ack_message(system, _AUTOPILOT, dialect.MAV_MISSION_ACCEPTED, RALLY)
 
 
@@ -183,26 +181,24 @@ def fence_received(system: int) -> Message:
 
 
 LONGEST: Final = 200  # characters
-#: A text whose next chunk does not come is taken as it is after this long.
+#: A text whose next chunk is missing is taken as complete after this long.
 CHUNK_US: Final = 1_000_000
-#: So many texts at once, and one more each so often; what is more is counted.
+#: How many texts are accepted at once, and how often one more is; the rest is counted.
 BURST: Final = 20
 EARNED_US: Final = 500_000
 
 
 def quoted(text: str) -> str:
-    """The text with everything that does not print, and what a terminal or a log could obey, written as escapes."""
+    """The text with all characters that do not print, or that a terminal or log could interpret, as escapes."""
     return "".join([each if each.isprintable() else each.encode("unicode_escape").decode() for each in text])[:LONGEST]
 
 
 class StatusTexts:
-    """Collects the texts of one component, not too many of them. A long one comes in chunks that share an `id`
-    (MAVLink 2).
-    """
+    """Collects the texts of one component, up to a limit. A long text comes in chunks with one `id` (MAVLink 2)."""
 
     def __init__(self) -> None:
         self._id = 0
-        #: what came of a text that is not whole yet
+        #: the chunks of an incomplete text
         self.parts: list[str] = []
         self._severity = 0
         self._at_us = 0
@@ -211,7 +207,7 @@ class StatusTexts:
         self._dropped = 0
 
     def take(self, message: Any, now_us: int) -> list[StatusText]:
-        """Take in one STATUSTEXT; the texts that are complete now."""
+        """Take in one STATUSTEXT; return the texts that are complete now."""
         part: str = message.text
         said: list[StatusText] = []
         if not (self.parts and message.id == self._id and message.chunk_seq == len(self.parts)):
@@ -245,25 +241,25 @@ class StatusTexts:
         return [StatusText(now_us, self._severity, text)]
 
 
-#: So many wait at most: what is older is left out.
+#: How many texts may wait: older ones are dropped.
 KEPT: Final = 4
 EACH_US: Final = 200_000
 
 
 class Announcer:
-    """Keeps what is told to ground stations until the link has nothing better to do."""
+    """Keeps texts for ground stations until the link is idle."""
 
     def __init__(self) -> None:
-        #: what there is to tell
+        #: the texts to send
         self.waiting: deque[tuple[int, str]] = deque(maxlen=KEPT)
         self._sent_us: int | None = None
 
     def add(self, severity: int, text: str) -> None:
-        """Announce a text; of a long one the first 50 octets."""
+        """Queue a text; a long one is cut to 50 octets."""
         self.waiting.append((severity, text))
 
     def due(self, now_us: int, *, busy: bool) -> list[Message]:
-        """The next one, unless the link is busy or was just used for one."""
+        """The next text, unless the link is busy or was just used for one."""
         if busy or not self.waiting or (self._sent_us is not None and now_us - self._sent_us < EACH_US):
             return []
         self._sent_us = now_us

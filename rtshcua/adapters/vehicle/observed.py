@@ -1,9 +1,9 @@
-"""What the vehicle was seen to do: the only ground on which a command counts as done.
+"""The observed state of a vehicle. A command counts as done only by what is observed here.
 
-Position and height are known only while the autopilot's own estimator vouches for them. GLOBAL_POSITION_INT goes on as
-if nothing had happened while the estimator has no position any more, and begins before it has one; the pre-arm bit of
-SYS_STATUS turns good seconds too early (recorded flights of ArduCopter 4.7). Only the flags of ESTIMATOR_STATUS (PX4)
-and EKF_STATUS_REPORT (ArduPilot) tell; up to 0x200 they mean the same in both.
+Position and height are known only while the autopilot's estimator confirms them. GLOBAL_POSITION_INT continues
+unchanged after the estimator has lost its position, and begins before it has one; the pre-arm bit of SYS_STATUS is set
+seconds too early (recorded flights of ArduCopter 4.7). Only the flags of ESTIMATOR_STATUS (PX4) and EKF_STATUS_REPORT
+(ArduPilot) show it; up to 0x200 they mean the same in both.
 """
 
 from collections.abc import Mapping
@@ -21,23 +21,23 @@ VELOCITY_VERTICAL: Final = 0x04
 POSITION_RELATIVE: Final = 0x08
 POSITION: Final = 0x10
 HEIGHT: Final = 0x20
-#: PX4: GPS glitch; ArduPilot: not initialised. Either way its position is worth nothing.
+#: PX4: GPS glitch; ArduPilot: not initialised. Either way the position is unusable.
 _GLITCH: Final = 0x400
 #: ArduPilot alone: GPS glitching
 _GLITCHING: Final = 0x8000
 
-#: A report that is older than this vouches for nothing; it is asked for several times within.
+#: An older report confirms nothing; reports are requested several times within this time.
 STALE_US: Final = 2_000_000
-#: mm above home: motors that stop higher than this did not stop for a landing, unless it was seen to land
+#: mm above home: motors that stop higher than this did not stop for a landing, unless a landing was observed
 ABOVE: Final = 3_000
-#: mm/s: no landing comes down so fast, and what lies on the ground does not move so fast
+#: mm/s: faster than any landing, and faster than a vehicle on the ground moves
 FALLS: Final = 3_000
 STOPPED: Final = 500
-#: us after its motors stopped, what falls is faster than that
+#: us after its motors stopped a falling vehicle is faster than that
 SETTLES_US: Final = 400_000
-#: us: what has no stamp of its own may be younger than the last one before it by this;
+#: us: a report without a stamp may be younger than the last stamp by this;
 STAMPED_US: Final = 300_000
-#: and so long after the computer stood still all that waited meanwhile was read
+#: us: after the computer stood still, reports that waited are read within this time
 UNREAD_US: Final = 2_000_000
 
 _WHERE: Final = POSITION | VELOCITY_HORIZONTAL | ATTITUDE
@@ -45,7 +45,7 @@ _HIGH: Final = HEIGHT | VELOCITY_VERTICAL | ATTITUDE
 _ACROSS: Final = VELOCITY_HORIZONTAL | ATTITUDE
 _UP: Final = VELOCITY_VERTICAL | ATTITUDE
 
-#: What a field rests on. What is not here does not come from the estimator.
+#: The estimator flags that a field depends on. Other fields do not come from the estimator.
 _RESTS_ON: Mapping[str, Mapping[str, int]] = {
     "GLOBAL_POSITION_INT": {
         "lat": _WHERE, "lon": _WHERE, "alt": _HIGH, "relative_alt": _HIGH, "vx": _ACROSS, "vy": _ACROSS, "vz": _UP,
@@ -64,8 +64,8 @@ _NONE: Final = frozenset[str]()
 
 
 class Estimator:
-    """The last report, by `flags` and when it was made. A height is above home, so it means nothing before there is
-    one: the estimator must have had a position once.
+    """The last report of the estimator: `flags` and the time of the report. Heights are above home, so they mean
+    nothing before home is set: the estimator must have had a position once.
     """
 
     def __init__(self, report: str = "") -> None:
@@ -73,36 +73,37 @@ class Estimator:
         self._flags = 0
         self._at_us: int | None = None
         self._homed = False
-        self._doubted: tuple[tuple[str, int, bool] | None, frozenset[str]] = None, _NONE  # the last answer, and to what
+        # the last result of `doubtful`, and its arguments
+        self._doubted: tuple[tuple[str, int, bool] | None, frozenset[str]] = None, _NONE
 
     def take(self, flags: int, at_us: int) -> None:
-        """A report came that was made at `at_us` (see `source_time`); one that is older than the last is set aside."""
+        """Take in a report made at `at_us` (see `source_time`); one older than the last is ignored."""
         if self._at_us is not None and at_us < self._at_us:
             return
         self._flags, self._at_us = flags, at_us
         self._homed = self._homed or self.position(at_us)
 
     def vouches(self, bits: int, now_us: int) -> bool:
-        """Whether a report that is not stale has all these flags, and no sign of being astray."""
+        """Whether a recent report has all these flags and no sign of a fault."""
         if self._at_us is None or now_us - self._at_us > STALE_US:
             return False
         astray = bits & (POSITION | POSITION_RELATIVE | VELOCITY_HORIZONTAL) and self._flags & (_GLITCH | _GLITCHING)
         return not astray and self._flags & bits == bits
 
     def is_stale(self, now_us: int) -> bool:
-        """Whether it has not reported, or not for too long."""
+        """Whether there is no recent report."""
         return self._at_us is None or now_us - self._at_us > STALE_US
 
     def position(self, now_us: int) -> bool:
-        """Whether it knows where it is."""
+        """Whether the position is known."""
         return self.vouches(_WHERE, now_us)
 
     def height(self, now_us: int) -> bool:
-        """Whether it knows how high above home it is."""
+        """Whether the height above home is known."""
         return self._homed and self.vouches(_HIGH, now_us)
 
     def vouches_for(self, message: str, field: str, now_us: int) -> bool:
-        """Whether what this field of a message says is known to the estimator; true of what does not come from it."""
+        """Whether the estimator confirms this field of a message; True for fields that do not depend on it."""
         fields = _RESTS_ON.get(message)
         bits = 0 if fields is None else fields.get(field, 0)
         if bits & HEIGHT and field == "relative_alt":
@@ -110,7 +111,7 @@ class Estimator:
         return not bits or self.vouches(bits, now_us)
 
     def doubtful(self, message: str, now_us: int) -> frozenset[str]:
-        """The fields of a message that are not vouched for."""
+        """The fields of a message that the estimator does not confirm."""
         fields = _RESTS_ON.get(message)
         if fields is None:
             return _NONE
@@ -122,7 +123,7 @@ class Estimator:
         return self._doubted[1]
 
     def missing(self, now_us: int) -> str | None:
-        """What it has not got, in words; None when it has a position and a height."""
+        """What the estimator lacks, in words; None when it has a position and a height."""
         if self._at_us is None:
             return f"no report of the estimator ( {self.report})"
         if now_us - self._at_us > STALE_US:
@@ -132,14 +133,14 @@ class Estimator:
         return None if self.height(now_us) else f"the estimator has no height (flags 0x{self._flags:x})"
 
 
-# ---------------------------------------------------------------- all that it says of itself
+# ---------------------------------------------------------------- the whole state
 
 _IN_AIR = (enums.MAV_LANDED_STATE_IN_AIR, enums.MAV_LANDED_STATE_TAKEOFF, enums.MAV_LANDED_STATE_LANDING)
 _FIX_3D = 3
 _CRITICAL = (5, 6)  # MAV_STATE: CRITICAL, EMERGENCY
 _DEBUG = 7  # MAV_SEVERITY
 _ABOVE_SEA = (enums.MAV_FRAME_GLOBAL, enums.MAV_FRAME_GLOBAL_INT)
-#: the messages that `ObservedVehicle.take` looks at, beside the report of the estimator
+#: the messages that `ObservedVehicle.take` uses, besides the report of the estimator
 HEEDED: Final = (
     "HEARTBEAT", "EXTENDED_SYS_STATE", "GLOBAL_POSITION_INT", "POSITION_TARGET_GLOBAL_INT", "GPS_RAW_INT", "SYS_STATUS",
     "ATTITUDE", "DISTANCE_SENSOR",
@@ -149,7 +150,7 @@ _OF_DOWN: Final = ("HEARTBEAT", "EXTENDED_SYS_STATE")
 _REASONS = ("PreArm:", "Arm:", "Preflight Fail:", "Arming denied")
 _PREARM: Final = 0x1000_0000  # MAV_SYS_STATUS_PREARM_CHECK
 
-#: MAV_SYS_STATUS_SENSOR, as far as arming rests on them
+#: the bits of MAV_SYS_STATUS_SENSOR that matter for arming
 _SENSORS: Final = {
     0x01: "gyroscope", 0x02: "accelerometer", 0x04: "magnetometer", 0x08: "barometer", 0x20: "GPS",
     0x8000: "motor outputs", 0x1_0000: "remote control", 0x10_0000: "geofence", 0x20_0000: "attitude and heading",
@@ -158,8 +159,8 @@ _SENSORS: Final = {
 
 
 class Placed(NamedTuple):
-    """What one report of its place said of the moment at which it was measured, in us: mm above home, None where the
-    estimator did not vouch for that then, and how fast it sank, in mm/s.
+    """One position report, at the time of its measurement in us: mm above home, None where the estimator did not
+    confirm it then, and the sink rate in mm/s.
     """
 
     at_us: int
@@ -172,24 +173,27 @@ Reported = tuple[int, int, int]
 
 
 class NoDatum(RuntimeError):
-    """A height was to be converted before the vehicle said how high its home lies."""
+    """A height cannot be converted, because the vehicle has not reported the altitude of its home."""
 
 
 @dataclass(slots=True)
 class ObservedVehicle:
-    """The last reports, None or 0 before the first. Angles 1e-7 degree, lengths mm, speeds mm/s, times us.
+    """The last reports, None or 0 before the first. Angles in 1e-7 degree, lengths in mm, speeds in mm/s, times in us.
 
-    Place, height and speed are those that the estimator last vouched for; `located` and `levelled` say whether it does
-    so now, of a position that is not old; `placed` is the last report of all, however old. `target` is where the
-    autopilot says that it flies to. `speed_us` is the link time at which the last speed that is known was measured:
-    after a hold-up what waited is of long before. `descent` is how fast it sinks and `tilt` how many degrees it
-    leans (`tilt_us`: measured then), whoever vouches for that. `beats` counts heartbeats and `targets` reports of a
-    target (`target_us`: told last); `up_us` is link time, see `LinkWatch`, `stood_us` when the computer last went
-    on that stood still. `heard` counts frames of the autopilot, `numbered` those that it sent by then, as their
-    numbers tell, and `answers` its answers to questions for messages. `ahead` is what its range finder last saw in
-    front, at `ahead_us`. `notes` collects what an operator should know. `disarms`: one heartbeat says that the
-    motors are off; they count as off when the next one says so, too, or, while two speak under its ids
-    (`disputed`), when nothing else is said for a while. `landings` counts reports of `landed_state`.
+    Position, height and speed are the last ones that the estimator confirmed; `located` and `levelled` say whether it
+    confirms them now, for a position that is not old; `placed` is the last report, however old. `target` is the
+    autopilot's reported target. `speed_us` is the link time at which the last known speed was measured, because reports
+    that waited are old. `descent` is the sink rate and `tilt` the tilt in degrees (measured at `tilt_us`), confirmed or
+    not.
+
+    `beats` counts heartbeats, `targets` reports of a target (the last at `target_us`) and `landings` reports of
+    `landed_state`. `heard` counts the received frames of the autopilot, `numbered` the frames it had sent by then
+    according to their numbers, and `answers` its answers to requests for messages. `up_us` is link time, see
+    `LinkWatch`; `stood_us` is when the computer last resumed after standing still. `ahead` is what its range finder
+    last saw in front, at `ahead_us`. `notes` collects texts for the operator.
+
+    `disarms`: one heartbeat reports the motors off. They count as off when the next one confirms it or, while two
+    senders use its ids (`disputed`), when nothing else is reported for a while.
     """
 
     estimator: Estimator = field(default_factory=Estimator)
@@ -227,7 +231,7 @@ class ObservedVehicle:
     answers: int = 0
     ahead: int | None = None
     ahead_us: int = 0
-    made_us: dict[str, int] = field(default_factory=dict)  # when the last of each message was made
+    made_us: dict[str, int] = field(default_factory=dict)  # when the last message of each name was made
     places: dict[str, int] = field(default_factory=dict)  # and its place in the order of sending
     now_us: int = 0
     stood_us: int | None = None
@@ -239,9 +243,9 @@ class ObservedVehicle:
     prearm_text: str = ""
 
     def take(self, name: str, message: Any, now_us: int, at_us: int | None, place: int) -> bool:
-        """Take in one message of the autopilot's component that was made at `at_us` (None: nobody knows) and sent in
-        this `place`, but for one that is older than the last of its name. Whether there is news in it: a report of
-        mode or place, or anything else that was not so before; a tilt is none.
+        """Take in one message of the autopilot, made at `at_us` (None: unknown) and sent in this `place`; one older
+        than the last of its name is ignored. Return whether it holds news: a report of mode or position, or a change of
+        anything else except tilt.
         """
         places, made_us = self.places, self.made_us
         if place < places.get(name, place):
@@ -260,7 +264,7 @@ class ObservedVehicle:
         return news
 
     def _take(self, name: str, message: Any, now_us: int, at_us: int | None) -> bool:
-        match name:  # what comes most often, first
+        match name:  # the most frequent first
             case "ATTITUDE":
                 self.tilt = _tilt(message.roll, message.pitch)
                 self.tilt_us = now_us if at_us is None else at_us
@@ -308,18 +312,18 @@ class ObservedVehicle:
         return False
 
     def waited(self, since_us: int) -> bool:
-        """Whether the last heartbeat was read only now that the computer goes on, and is of before `since_us`."""
+        """Whether the last heartbeat is from before `since_us` and was read only after the computer resumed."""
         if self.stood_us is None or (self.heartbeat_us or 0) - self.stood_us > UNREAD_US:
             return False
         return self.made_us.get("HEARTBEAT", since_us) + STAMPED_US < since_us
 
     def count(self, place: int) -> None:
-        """A frame came that the autopilot sent in this place."""
+        """Count a frame that the autopilot sent in this place."""
         self.heard += 1
         self.numbered = max(self.numbered, place)
 
     def pass_time(self, now_us: int) -> bool:
-        """Time goes by: where it was, and what the estimator last said, grows old. Whether something grew too old."""
+        """Let time pass, so that positions and reports of the estimator grow old; return whether one became too old."""
         self.now_us = now_us
         if now_us - self.made_us.get("GLOBAL_POSITION_INT", now_us) <= STALE_US:
             return self.estimator.is_stale(now_us) and self._doubt(now_us)
@@ -328,57 +332,59 @@ class ObservedVehicle:
         return was
 
     def _doubt(self, now_us: int) -> bool:
-        """Where it was holds no longer than the estimator vouches for it. Whether it holds no longer."""
+        """Drop the position once the estimator no longer confirms it; return whether that happened now."""
         was = self.located, self.levelled
         self.located = self.located and self.estimator.position(now_us)
         self.levelled = self.levelled and self.estimator.height(now_us)
         return was != (self.located, self.levelled)
 
     def say(self, severity: int, text: str) -> None:
-        """Keep what it said: the gravest text since `hush`, and the last that says why it would not arm."""
+        """Keep a text of the vehicle: the most severe one since `hush`, and the last reason against arming."""
         if severity <= self.text_severity:
             self.text, self.text_severity = text, severity
         if text.startswith(_REASONS):
             self.prearm_text = text
 
     def amsl(self, height: int) -> int:
-        """The altitude above mean sea level of a height above home, both in mm. Raises NoDatum where home's own is not
-        known.
+        """The altitude above mean sea level of a height above home, both in mm. Raises NoDatum where the altitude of
+        home is not known.
 
-        Everything of ours is in mm above home; PX4's commands take altitudes above mean sea level, whatever frame they
-        name. A mistake between the two has crashed real vehicles: they are made of each other here and in `_place`.
+        All our heights are in mm above home; PX4's commands take altitudes above mean sea level, whatever frame they
+        name. Confusing the two has crashed real vehicles, so they are converted only here and in `_place`.
         """
         if self.home_amsl is None:
             raise NoDatum("the vehicle has not reported the altitude of its home, so no altitude can be commanded")
         return self.home_amsl + height
 
     def hush(self) -> None:
-        """What it says from now on may be about something new."""
+        """Forget the kept text: later texts may be about something new."""
         self.text, self.text_severity = "", _DEBUG
 
     @property
     def airborne(self) -> bool:
-        """In the air, as far as it says; an armed vehicle that does not say counts as in the air."""
+        """Whether it is in the air by its own report; an armed vehicle without such a report counts as in the air."""
         return self.landed_state in _IN_AIR or (self.landed_state == 0 and self.armed)
 
     @property
     def landing(self) -> bool:
-        """Coming down to land, as it says itself."""
+        """Whether it reports that it is landing."""
         return self.landed_state == enums.MAV_LANDED_STATE_LANDING
 
     @property
     def down(self) -> bool:
-        """Seen on the ground with its motors off."""
+        """Whether it is on the ground with its motors off."""
         return self.landed_state == enums.MAV_LANDED_STATE_ON_GROUND and not self.armed
 
     @property
     def comes_to_rest(self) -> bool:
-        """On the ground with its motors off, also while only one report says that they are."""
+        """Whether it is on the ground with its motors off, even by one report only."""
         return self.landed_state == enums.MAV_LANDED_STATE_ON_GROUND and (self.disarms or not self.armed)
 
     @property
     def may_rest(self) -> bool:
-        """It comes to rest, as far as is known: its motors are said to be off, that it flies was said long before."""
+        """Whether it comes to rest as far as is known: its motors are reported off, and the report that it flies is
+        old.
+        """
         if self.comes_to_rest:
             return True
         said_us = self.made_us.get("EXTENDED_SYS_STATE")
@@ -387,17 +393,19 @@ class ObservedVehicle:
 
     @property
     def rests(self) -> bool:
-        """Down, and seen to lie there: what is disarmed in the air says at once that it is on the ground, and falls."""
+        """Whether it is down and seen to lie still: a vehicle that is disarmed in the air reports at once that it is on
+        the ground, and falls.
+        """
         if not self.down:
             return False
         is_silent = (self.heartbeat_us or 0) - max(self.placed_us, self.down_us) >= STALE_US
         if abs(self.descent) > STOPPED:
-            return is_silent  # nothing reports how fast it moves any more
+            return is_silent  # its speed is no longer reported
         return self.placed_us >= self.down_us + SETTLES_US or is_silent
 
     @property
     def unready(self) -> str | None:
-        """What stands against arming, in words; None: nothing that it tells of."""
+        """What prevents arming, in words; None if nothing is reported."""
         if self.heartbeat_us is None:
             return "no heartbeat of an autopilot"
         if self.landed_state == 0:
@@ -413,17 +421,19 @@ class ObservedVehicle:
 
     @property
     def prearm_fails(self) -> bool:
-        """Whether its own checks are all that stands against arming."""
+        """Whether only the vehicle's own checks prevent arming."""
         return not self.prearm and self.located and self.levelled and self.estimator.missing(self.now_us) is None
 
     def _reasons(self) -> str:
-        """In its own words, which are untrusted, or by the sensors that it says are not well."""
+        """The reasons, in the vehicle's untrusted words or by its unhealthy sensors."""
         if self.prearm_text:
             return f": {self.prearm_text}"
         return f": {', '.join(self.unwell)} not healthy" if self.unwell else ""
 
     def _count_motors(self, *, armed: bool) -> None:
-        """Motors that stop end a flight, so one report of it is not enough; nor are several while two speak."""
+        """Update whether the motors run. Stopped motors end a flight, so one report is not enough, nor are several
+        while heartbeats contradict each other.
+        """
         if armed or not self.armed:
             self.armed, self.disarms = armed, False
         elif not self.disarms:
@@ -432,7 +442,9 @@ class ObservedVehicle:
             self.armed = self.disarms = False
 
     def _judge(self, status: int) -> None:
-        """A failsafe need not change the mode: a low battery on the way home does not."""
+        """Note a change of the critical state. A failsafe need not change the mode: a low battery on the way home does
+        not.
+        """
         critical = status in _CRITICAL
         if critical != self.critical:
             says = "the vehicle reports a critical state" if critical else "the vehicle's state is no longer critical"
@@ -449,7 +461,7 @@ class ObservedVehicle:
             if self.located:
                 self.home_amsl = message.alt - message.relative_alt
         known = estimator.vouches_for("GLOBAL_POSITION_INT", "vx", now_us)
-        # from cm/s; without a speed that the estimator knows, it does not count as still
+        # from cm/s; a vehicle with an unknown speed does not count as still
         self.speed = round(10 * hypot(message.vx, message.vy, message.vz)) if known else None
         if known:
             self.speed_us = self.up_us - (now_us - at_us)
@@ -457,14 +469,14 @@ class ObservedVehicle:
 
 
 def _tilt(roll: float, pitch: float) -> int:
-    """Degrees between the vehicle's own vertical axis and the world's, of ATTITUDE's radians."""
+    """The angle in degrees between the vehicle's vertical axis and the world's, from ATTITUDE in radians."""
     if not (isfinite(roll) and isfinite(pitch)):
         return 0
     return round(degrees(acos(max(-1.0, min(1.0, cos(roll) * cos(pitch))))))
 
 
 def _unwell(message: Any) -> tuple[str, ...]:
-    """The sensors that are there and in use, and not healthy."""
+    """The sensors that are present and enabled, but not healthy."""
     used = message.onboard_control_sensors_present & message.onboard_control_sensors_enabled
     ill = used & ~message.onboard_control_sensors_health
     return tuple([name for bit, name in _SENSORS.items() if ill & bit])

@@ -1,7 +1,5 @@
-"""What is settled with a vehicle on the ground before it counts as ready: where it stands, its return altitude, its
-fence.
-
-A vehicle that flies already is left alone.
+"""Checks and settings on the ground before a vehicle counts as ready: its position, its return altitude, its fence. A
+vehicle that flies already is left alone.
 """
 
 from collections.abc import Mapping, Sequence
@@ -21,23 +19,22 @@ from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import Projection, project
 
-#: How far the return altitude may be off, in mm: it is a 32-bit float, or whole centimetres.
+#: The tolerance of the return altitude in mm: it is a 32-bit float, or whole centimetres.
 SAME_MM: Final = 10
-#: How often it is asked why it would not arm; by itself ArduPilot says so each 30 s.
+#: How often the vehicle is asked why it would not arm; ArduPilot reports it by itself each 30 s.
 CHECK_US: Final = 10_000_000
-#: More than what its place needs, in m, that its circle is advised to be.
+#: The margin in m, above the required radius, of the radius that is advised.
 ADVISED_ROOM_M: Final = 2
-#: What `take` looks at.
+#: The messages that `take` uses.
 HEEDED: Final = (*FENCE_HEEDED, "PARAM_VALUE")
 
 
 class Preflight:
-    """Compares place and return altitude with the policy's, sees to the fence, and asks why the vehicle would not arm.
+    """Compares position and return altitude with the policy, sets the fence, and asks why the vehicle would not arm.
 
-    `notes` collects what an operator should know. `fence` False leaves the vehicle's fence as it is; what it would be
-    is judged all the same where `judges` says so. `steps` are the mission's: the autopilot's own bounds must leave room
-    for them. `meant` are values that count in place of those that parameters have. `slack` stretches waits, as in
-    `Driver`.
+    `notes` collects texts for the operator. `fence` False leaves the vehicle's fence unchanged; with `judges` it is
+    judged all the same. `steps` are the mission's: the autopilot's own bounds must leave room for them. `meant` holds
+    values that replace those of parameters. `slack` multiplies each timeout, as in `Driver`.
     """
 
     def __init__(
@@ -56,14 +53,14 @@ class Preflight:
         self._arms = (fence or judges) and bool(flavour.fence.switches and fence_of(policy, flavour.fence).items)
         self._meant = meant
         self._told = self._rally_told = False
-        self._missed: set[str] = set()  # what limits its way home and was not answered, as far as that was told
-        self._advised = 0  # what its circle was said to be set to
+        self._missed: set[str] = set()  # unanswered limits of the way home that were reported already
+        self._advised = 0  # the last advised radius of its circle
         self._reached: tuple[tuple[int, int], bounds.FlightReach] | None = None  # a position and the reach from there
         self._checked_us: int | None = None
         self.notes: list[str] = []
 
     def due(self, system: int, now_us: int) -> list[Message]:
-        """What to send now."""
+        """The messages to send now."""
         if self._wanted_mm and self._found is None:
             for each in self._flavour.returns:
                 self._parameters.read(each.parameter)
@@ -75,13 +72,13 @@ class Preflight:
         if self._seen.prearm_fails and (self._checked_us is None or now_us - self._checked_us >= CHECK_US):
             self._checked_us = now_us
             out.append(messages.command(system, messages.RUN_PREARM_CHECKS))
-        if not (self.unplaced or self.astray or self.unread):  # a fence is of one place only
+        if not (self.unplaced or self.astray or self.unread):  # a fence is computed for one position
             out += self._fencing.due(system, now_us)
         self._note_results()
         return out
 
     def _note_results(self) -> None:
-        """Note what is settled now, once."""
+        """Note each result once."""
         for names in self.silent:
             if names not in self._missed:
                 self._missed.add(names)
@@ -101,14 +98,14 @@ class Preflight:
             self.notes += self._narrower_than_airspace()
 
     def take(self, name: str, message: Any, system: int, now_us: int) -> list[Message]:
-        """A message of the autopilot; what answers it."""
+        """Take in a message of the autopilot; return the answer."""
         if name == "PARAM_VALUE":
             self._parameters.take(message)
             return []
         return self._rally.take(name, message, system) + self._fencing.take(name, message, system, now_us)
 
     def _narrower_than_airspace(self) -> list[str]:
-        """What of the airspace its own fence takes away, though the mission does without."""
+        """The parts of the airspace that its own fence excludes although the mission does not need them."""
         if not self._steps:
             return []
         found = bounds.narrower(
@@ -122,35 +119,35 @@ class Preflight:
 
     @property
     def fencing(self) -> Fencing:
-        """What becomes of its fence."""
+        """The procedure that sets its fence."""
         return self._fencing
 
     @property
     def silent(self) -> list[str]:
-        """Names of parameters that limit its way home, if it has them, and that were not answered."""
+        """The unanswered parameters that would limit its way home."""
         return self._limits.silent(self._parameters)
 
     @property
     def unready(self) -> str | None:
-        """What is not settled, in words."""
+        """What is not settled yet, in words."""
         return self.unplaced or self.astray or self.unread or self._fencing.unready
 
     @property
     def astray(self) -> str | None:
-        """What is known to be otherwise than the policy has it, in words."""
+        """What contradicts the policy, in words."""
         returns = None if self._found is None else self._returns_at(self._found)
         wrong = self._limits.wrong(self._values) or self._rally.wrong
         return self._far_from_home() or returns or wrong or self._bounded()
 
     @property
     def unfit(self) -> str | None:
-        """What of its parameters is otherwise than the policy or the mission has it, in words: waiting changes none."""
+        """Which parameter contradicts the policy or the mission, in words: waiting does not help."""
         returns = None if self._found is None else self._returns_at(self._found)
         return returns or self._limits.wrong(self._values) or self._rally.wrong or self._bounded()
 
     @property
     def unplaced(self) -> str | None:
-        """That it is not known where it stands, in words."""
+        """That its position is not known, in words."""
         return None if self._seen.located else "the vehicle does not report its position"
 
     @property
@@ -165,7 +162,7 @@ class Preflight:
         return f"the vehicle's return altitude ({quoted}) was not read yet"
 
     def _bounds_unread(self) -> str | None:
-        """That the bounds of its own fence are not known, in words. One that the vehicle lacks bounds nothing."""
+        """That the bounds of its own fence are not known, in words. A bound that the vehicle lacks limits nothing."""
         own, parameters = self._flavour.own_fence, self._parameters
         if not self._steps:
             return None
@@ -177,7 +174,7 @@ class Preflight:
         return f"the vehicle does not report a bound of its own fence (`{missing}`)"
 
     def _bounded(self) -> str | None:
-        """That its own fence keeps it from where the mission goes."""
+        """That its own fence excludes places that the mission goes to."""
         if not self._steps or not self._seen.located or self._bounds_unread() is not None:
             return None
         own, values = self._flavour.own_fence, self._values
@@ -194,7 +191,7 @@ class Preflight:
         )
 
     def _reach(self) -> bounds.FlightReach:
-        """How far the mission goes from where it stands: asked for much more often than it moves."""
+        """How far the mission goes from its position; cached, because the position rarely changes."""
         place = self._seen.latitude, self._seen.longitude
         if self._reached is None or self._reached[0] != place:
             home = project(self._projection, *place)
@@ -202,8 +199,8 @@ class Preflight:
         return self._reached[1]
 
     def _advice(self, found: bounds.Narrow) -> int:
-        """What to set a bound to. Where it stands, and so how wide a circle has to be, is known to some decimetres:
-        that is given room, and said again while it would do.
+        """The value to set a bound to. Its position, and so the required radius, is known to some decimetres: the
+        advice has a margin, and is repeated while it suffices.
         """
         if found.bit != bounds.CIRCLE_BIT:
             return found.needed
@@ -212,7 +209,9 @@ class Preflight:
         return self._advised
 
     def _far_from_home(self) -> str | None:
-        """Where it stands becomes its home, which all of the policy is drawn around."""
+        """That it is too far from the policy's home. Its position becomes its home, and the policy is laid out around
+        home.
+        """
         if not self._seen.located:
             return None
         away = distance_from_home(self._projection, self._seen.latitude, self._seen.longitude)
@@ -222,7 +221,7 @@ class Preflight:
 
     @property
     def _values(self) -> Mapping[str, float]:
-        """What its parameters are, or would be in a flight."""
+        """Its parameters, or their values in a flight."""
         values, meant = self._parameters.values, self._meant
         return {name: meant.get(name, value) for name, value in values.items()} if meant else values
 

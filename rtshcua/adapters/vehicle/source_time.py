@@ -1,23 +1,23 @@
-"""When the vehicle measured what a frame says, on our monotonic clock: the earliest that it may have been.
+"""When the vehicle measured the contents of a frame, on our monotonic clock: the earliest possible time.
 
-A frame with a stamp was measured at its stamp, moved to our clock by `VehicleClock`. A frame of the autopilot without
-one (HEARTBEAT, SYS_STATUS, BATTERY_STATUS, ...) was sent after every frame that has a lower number, so it is no older
-than the latest stamp among those. The sequence number of a frame tells the order of sending, whatever the order of
+A frame with a time stamp was measured at its stamp, converted to our clock by `VehicleClock`. A frame of the autopilot
+without a stamp (HEARTBEAT, SYS_STATUS, BATTERY_STATUS, ...) was sent after every frame with a lower sequence number, so
+it is no older than the latest stamp among those. Sequence numbers give the order of sending, whatever the order of
 arrival. The clock of another component (a radio, a companion computer) is not known: its frame counts as no younger
-than the latest stamp that came before it, and, where the link was seen to let frames overtake others, as having been
-under way as long as the slowest of those within the last second or two.
+than the latest stamp that came before it and, where the link lets frames overtake others, as delayed as long as the
+slowest of those within the last second or two.
 
-No frame counts as younger than its arrival, and where there is no bound yet there is no time.
+No frame counts as younger than its arrival. Without a bound there is no time.
 
-Stamps are found by the name of their field. `time_boot_ms` counts ms since boot in 32 bits, and wraps after 49 days.
-`time_usec` is us since boot, or UNIX time when it is that large; the last SYSTEM_TIME of the autopilot holds both, and
-translates. In GPS_RAW_INT it is when the fix was measured (ArduPilot: `last_fix_time_ms`), in HOME_POSITION when
-home was set. 0 says nothing: PX4 sends it while the receiver tells no UTC (streams/GPS_RAW_INT.hpp). A stamp that does
-not advance is the same measurement again, and keeps the time that it was given first.
+Stamps are found by field name. `time_boot_ms` counts ms since boot in 32 bits, and wraps after 49 days. `time_usec` is
+us since boot, or UNIX time when it is that large; the last SYSTEM_TIME of the autopilot holds both, and converts
+between them. In GPS_RAW_INT it is the time of the fix (ArduPilot: `last_fix_time_ms`), in HOME_POSITION the time at
+which home was set. 0 means unknown: PX4 sends it until its receiver has UTC (streams/GPS_RAW_INT.hpp). A stamp that
+does not advance belongs to the same measurement, and keeps its first time.
 
-WIND has no stamp, and ArduPilot sends the last estimate of a flight for ever after it (vehicles.md, section 5). An
-estimate of three floating-point numbers is never twice the same while it is made, so one that does not change is the
-same measurement again, too.
+WIND has no stamp, and ArduPilot repeats the last estimate of a flight for ever after it (vehicles.md, section 5). An
+estimate of three floating-point numbers never repeats while it is updated, so an unchanged one is the same measurement,
+too.
 """
 
 from collections import deque
@@ -34,26 +34,26 @@ from rtshcua.wire.clock import UNIX_US
 
 # ---------------------------------------------------------------- the vehicle's clock
 
-#: How often it is asked, in us: until so many answers came, then, and while answers fail to come.
+#: Intervals of TIMESYNC requests in us: before the first answers, afterwards, and while answers are missing.
 FIRST_US, FIRST_ANSWERS = 100_000, 5
 EACH_US: Final = 1_000_000
 RETRY_US: Final = 200_000
-#: an answer that is older than this was followed by requests that got lost
+#: an answer that is older than this was followed by requests that were lost
 MISSED_US: Final = 1_500_000
 
 #: How much faster than ours the vehicle's clock may run, as the us that the bound loses in each `STEP_US`: 1 %. The
 #: crystals of flight controllers keep to 0.01 %; simulated autopilots (PX4 SIH, ArduPilot SITL) were recorded 3 % slow
 #: to 0.6 % fast over seconds. A slow clock needs no allowance: it makes ages too old until the next answer.
 STEP_US, DRIFT_US = 250_000, 2_500
-#: Requests of which an answer is still taken. At `RETRY_US` that is a round trip of 12 s.
+#: How many requests may still be answered. At `RETRY_US` that is a round trip of 12 s.
 _OUTSTANDING: Final = 64
-#: A doubt that follows an answer so soon has to wait, lest a message whose stamps are wrong has us ask without end.
+#: A doubt has to wait this long after an answer, so that a message with wrong stamps cannot cause endless requests.
 _REST_US: Final = 500_000
-#: A bound that proves wrong by no more than this shows that the clocks ran apart, by more that one of them was set.
+#: A bound that is wrong by no more than this shows that the clocks drifted apart; by more, that one of them was set.
 APART_US: Final = 500_000
-#: ArduPilot reckons with the UART's rate where there is none (SITL over TCP), and is early by some ms.
+#: Without the UART's rate (SITL over TCP) ArduPilot's stamp is some ms early.
 _NOTABLE_US: Final = 20_000
-#: requests under way at first; with more the link is not asked any faster for it
+#: requests that may be outstanding at first; with more, the interval grows
 _HASTE: Final = 20
 _TRIPS: Final = 8
 
@@ -100,8 +100,8 @@ class VehicleClock:
         return median_low(self._trips) if self._trips else None
 
     def due(self, now_us: int) -> int | None:
-        """The `ts1` to send now, in ns; None when nothing is due. It ends in our component id, as ArduPilot's do in its
-        system id, so that answers to another program on this machine are not taken for ours.
+        """Return the `ts1` to send now, in ns; None when nothing is due. It ends in our component id, as ArduPilot's
+        ends in its system id, so that answers to another program on this machine are not taken for ours.
         """
         if self._asked_us is not None:
             wait_us = self._wait_us(now_us)
@@ -125,7 +125,7 @@ class VehicleClock:
         return EACH_US
 
     def answer(self, tc1_ns: int, ts1_ns: int, now_us: int) -> bool:
-        """An answer came. True if nothing holds any more that was concluded before: its clock was set forward."""
+        """Take in an answer. Return whether the vehicle's clock was set forward, which invalidates all earlier times."""
         sent_us = self._asked.pop(ts1_ns, None)
         if sent_us is None or tc1_ns <= 0 or now_us < sent_us:
             return False
@@ -141,24 +141,24 @@ class VehicleClock:
         return wrong_us > APART_US
 
     def offset_us(self, now_us: int) -> int | None:
-        """Ours minus the vehicle's, at the least; None before the first answer."""
+        """The lower bound of our clock minus the vehicle's; None before the first answer."""
         if self._least_us is None:
             return None
         return self._least_us - _drift_us(now_us - self._since_us)
 
     def next_step_us(self, now_us: int) -> int:
-        """When the bound goes down next."""
+        """When the bound decreases next."""
         return now_us + STEP_US - (now_us - self._since_us) % STEP_US
 
     def reduce(self, by_us: int, now_us: int) -> None:
-        """A stamp lay ahead of us by so much: the clocks ran apart faster than is allowed for."""
+        """Correct the bound by a stamp that lay ahead of our time: the clocks drift faster than assumed."""
         if self._least_us is not None:
             self._least_us -= by_us
         if by_us > _NOTABLE_US:
             self.doubt(now_us)
 
     def doubt(self, now_us: int) -> None:
-        """Something speaks against the bound: ask soon."""
+        """Note evidence against the bound: ask soon."""
         self._doubted, self.due_us = self.answered_us is not None and now_us - self.answered_us > _REST_US, 0
 
 
@@ -168,22 +168,22 @@ def _drift_us(passed_us: int) -> int:
 
 # ---------------------------------------------------------------- the time of a frame
 
-#: After a silence of this length, by when frames came or by their stamps, the next frame counts as sent after all
-#: before, whatever its number.
+#: After a gap of this length, in arrivals or in stamps, the next frame counts as sent after all earlier ones, whatever
+#: its number.
 GAP_US: Final = 500_000
-#: How long the link holds frames back is the longest within this time, and at most twice as long.
+#: The delay of the link is the longest within this time, and at most twice as long.
 WINDOW_US: Final = 1_000_000
 
 _WRAP, _HALF = 1 << 32, 1 << 31
 _NUMBERS, _AHEAD = 256, 128
-#: frames whose numbers go on from before a jump, until it counts as none of the vehicle's
+#: how many consecutive frames must continue the numbers from before a jump, for the jump to count as another sender's
 _GOES_ON: Final = 6
 _FIELDS: Final = ("time_boot_ms", "time_boot_us", "time_usec")
 _LENGTHS: Final = {"ms": 1_000, "us": 1}
 
 
 class _Stamp(NamedTuple):
-    """A message's field with its time, how many us one of it is, and whether it has 32 bits."""
+    """A message's time field, its unit in us, and whether it has 32 bits."""
 
     read: Callable[[Any], int]
     us: int
@@ -191,7 +191,7 @@ class _Stamp(NamedTuple):
 
 
 class SourceTime:
-    """Takes every frame of the vehicle's system in the order of coming; holds a fixed amount, and never raises."""
+    """Dates every frame of the vehicle's system, in the order of arrival. Uses constant memory; never raises."""
 
     def __init__(self) -> None:
         self.clock = VehicleClock()
@@ -199,31 +199,33 @@ class SourceTime:
         """Whether the last frame showed that the vehicle's clock was set: times from before it mean nothing."""
         self._stamps: dict[str, _Stamp | None] = {}
         self._offset_us: int | None = None
-        self._until_us = 0  # the offset holds until then
+        self._until_us = 0  # until when the offset holds
         self._unix_us: int | None = None  # UNIX time minus time since boot
-        self._told: dict[str, tuple[int, int]] = {}  # the last stamp of a message of the autopilot's, and its time
-        self._others_told: dict[tuple[int, str], tuple[int, int]] = {}  # the same of other components
-        self._wind: tuple[tuple[float, ...], int | None] = (), None  # the last estimate, and its time
+        self._told: dict[str, tuple[int, int]] = {}  # the last stamp of each message of the autopilot, and its time
+        self._others_told: dict[tuple[int, str], tuple[int, int]] = {}  # the same for other components
+        self._wind: tuple[tuple[float, ...], int | None] = (), None  # the last estimate and its time
         self._sent_us: int | None = None  # the last frame was sent at this time or later
         self._came_us = 0
         self._newest = 0
         self._count = 0
-        #: the last frame's place in the order of sending: its number, counted on where numbers begin again
+        #: the last frame's place in the order of sending: its sequence number without wrapping
         self.place = 0
-        self._order: list[int | None] = [None] * _NUMBERS  # the same for each number of the last round
-        self._aside: tuple[int, int] | None = None  # what number goes on from before the last jump, after how many
-        self._held_us = self._held_before_us = 0  # the largest delay of a frame that was overtaken, and the one before
+        # the earliest time of sending, for each number of the last round
+        self._order: list[int | None] = [None] * _NUMBERS
+        # the number that would continue from before the last jump, and how many have
+        self._aside: tuple[int, int] | None = None
+        self._held_us = self._held_before_us = 0  # the largest delay of an overtaken frame, in this window and the last
         self._window_us = 0
 
     @property
     def unready(self) -> str | None:
-        """What stands against trusting any age, in words."""
+        """Why no age can be trusted, in words."""
         return "the vehicle's clock is not known yet: no TIMESYNC answer" if self.clock.answered_us is None else None
 
     def utc(self, now_us: int) -> tuple[int, int] | None:
-        """UTC as the vehicle has it less our monotonic time, and how far the way of the frames leaves it open, in us.
+        """The vehicle's UTC minus our monotonic time, and the uncertainty from the round trip, in us.
 
-        None until it has told its time (SYSTEM_TIME), and has answered when it was asked for its clock.
+        None until the vehicle has reported its time (SYSTEM_TIME) and answered a request for its clock.
         """
         least_us, open_us = self.clock.offset_us(now_us), self.clock.error_us
         if self._unix_us is None or least_us is None or open_us is None:
@@ -232,8 +234,8 @@ class SourceTime:
         return self._unix_us - least_us - half_us, half_us
 
     def of(self, frame: ReceivedFrame, now_us: int) -> int | None:
-        """The earliest time at which what a frame says may have been measured, at most `now_us`; None where no bound is
-        known. To be called once for every frame of the vehicle's system.
+        """The earliest time at which the contents of a frame may have been measured, at most `now_us`; None without a
+        bound. To be called once for every frame of the vehicle's system.
         """
         message, name, _, component, number, _, _ = frame
         self.stepped = False
@@ -257,14 +259,16 @@ class SourceTime:
         return sent_us if at_us is None else at_us
 
     def _of_unstamped(self, wind: Any, sent_us: int | None) -> int | None:
-        """An estimate is as old as the first report of it."""
+        """The time of the first report of this estimate."""
         told = wind.direction, wind.speed, wind.speed_z
         if told != self._wind[0] or self._wind[1] is None:
             self._wind = told, sent_us
         return self._wind[1]
 
     def _of_another(self, name: str, message: Any, component: int, stamp: _Stamp | None, now_us: int) -> int | None:
-        """Its stamps are of a clock of its own: they tell only whether it measured anew."""
+        """The time of a frame of another component. Its stamps are of an unknown clock: they only show a new
+        measurement.
+        """
         if self._sent_us is None:
             return None
         at_us = min(self._sent_us, now_us - max(self._held_us, self._held_before_us))
@@ -277,7 +281,7 @@ class SourceTime:
         return at_us
 
     def _at(self, name: str, message: Any, stamp: _Stamp, now_us: int) -> int | None:
-        """A stamp of the autopilot's on our clock; None if it cannot be read."""
+        """The time of a stamp of the autopilot on our clock; None if it cannot be converted."""
         read, us, short = stamp
         offset_us, raw = self._offset_us, read(message)
         if offset_us is None or not raw:
@@ -308,7 +312,7 @@ class SourceTime:
         return at_us
 
     def _checked(self, at_us: int, now_us: int) -> int | None:
-        """Nothing comes before it was sent: a stamp that lies ahead speaks against the offset, or for nothing."""
+        """Correct a stamp that lies in the future: it contradicts the offset, or is meaningless."""
         ahead_us = at_us - now_us
         if ahead_us <= 0:
             return at_us
@@ -338,8 +342,8 @@ class SourceTime:
             self._held_us, self._window_us = 0, now_us
 
     def _goes_on(self, number: int) -> bool:
-        """Whether the numbers go on from before the last jump, so often that it was none of the vehicle's: one frame
-        with a number far ahead must not have all that the vehicle says count as overtaken.
+        """Whether enough numbers continue from before the last jump for the jump to be another sender's: one frame with
+        a number far ahead must not make all later frames count as overtaken.
         """
         if self._aside is None or number != self._aside[0]:
             return False
@@ -351,7 +355,7 @@ class SourceTime:
         return True
 
     def _follow(self, number: int, at_us: int | None, now_us: int) -> int | None:
-        """Keep the order of sending, by the frame's number; when this frame was sent, at the earliest."""
+        """Keep the order of sending by frame numbers; return the earliest time at which this frame was sent."""
         if (number - self._newest) % _NUMBERS == 1:  # the next one, as nearly all are
             sent_us = self._sent_us
             if at_us is not None and (sent_us is None or at_us > sent_us):
@@ -401,7 +405,7 @@ class SourceTime:
         return sent_us
 
     def _find(self, name: str) -> _Stamp | None:
-        """By the name of its field; a message that is addressed to somebody holds a time of whoever asks (PING)."""
+        """Find the time field of a message by name. An addressed message holds a time of its requester (PING)."""
         fields = dialect.load().messages[name].fields
         found: _Stamp | None = None
         if "target_system" not in fields:

@@ -1,5 +1,5 @@
-"""Telemetry streams: planned against what the link carries, asked for one by one, measured, asked again when they stop
-or come too seldom, left alone when the vehicle has none such.
+"""Telemetry streams: planned within the capacity of the link, requested one by one, measured, requested again when they
+stop or are too slow, and left out where the vehicle lacks them.
 """
 
 from collections import deque
@@ -13,31 +13,32 @@ from rtshcua.codec.frames import kind_of
 from rtshcua.decision.rates import AT_LEAST, Rate
 from rtshcua.mavlink.framing import CHECKSUM, HEADER, SIGNATURE
 
-#: How long one request waits for its acknowledgement; twice as long after each that came to nothing, up to the latter.
+#: How long a request waits for its acknowledgement; doubled after each failure, up to the second value.
 ANSWER_US = 500_000
 LATEST_US = 4_000_000
-QUIET_US = 3_000_000  # a stream that is silent for so long is asked for again
-#: Readiness waits no longer than this for what is needed; and for what the autopilot itself does not have, but somebody
-#: else may send (RADIO_STATUS comes from the radio).
+QUIET_US = 3_000_000  # a stream that is silent for this long is requested again
+#: How long readiness waits for needed streams; for one that the autopilot lacks but another component may send
+#: (RADIO_STATUS comes from the radio).
 PATIENCE_US = 5_000_000
 PATIENCE_REFUSED_US = 2_000_000
-#: and in the air, where what can be asked for was, and what brings it down waits
+#: the same in the air, after the requests, while the way down waits
 PATIENCE_ALOFT_US = 500_000
-#: A stream is measured over this long, and too slow when it comes at less than one `SLOW`th of the rate asked for.
+#: A stream is measured over this time, and is too slow at less than one `SLOW`th of the requested rate.
 MEASURE_US = 5_000_000
 SLOW = 2
 
-#: What is sent at times only, whatever is asked for: PX4 has no target before it flies, ArduCopter in GUIDED alone.
+#: Messages that are sent at times only, whatever was requested: PX4 has no target on the ground, ArduCopter has one
+#: only in GUIDED.
 AT_TIMES: Mapping[str, Rate] = {"POSITION_TARGET_GLOBAL_INT": Rate(100_000, 500_000)}
 
-#: How much of a link streams may fill, in 1/100: the rest is for answers, texts, and for what comes late.
+#: The share of a link for streams, in 1/100: the rest is for answers, texts and retries.
 SHARE: Final = 80
 _SECOND: Final = 1_000_000
 _POSITION: Final = "GLOBAL_POSITION_INT"
-#: of which the first report alone is not believed (`telemetry.Batteries`)
+#: messages whose first report does not count by itself (`telemetry.Batteries`)
 _COUNT_TWICE: Final = frozenset({"BATTERY_STATUS"})
 _NEVER_US: Final = -1
-#: What is no stream, but an answer or an event: it is not turned off.
+#: Answers and events, which are not streams: they are not turned off.
 _ANSWERS: Final = frozenset({
     "AUTOPILOT_VERSION", "COMMAND_ACK", "HEARTBEAT", "HOME_POSITION", "MISSION_ACK", "MISSION_COUNT",
     "MISSION_ITEM_INT", "MISSION_REQUEST", "MISSION_REQUEST_INT", "PARAM_VALUE", "STATUSTEXT", "SYSTEM_TIME",
@@ -46,7 +47,7 @@ _ANSWERS: Final = frozenset({
 
 
 def frame_octets(message: str, *, signed: bool) -> int:
-    """How many octets a message takes on the wire at most: header, the whole payload, checksum, and signature."""
+    """The maximum size of a message on the wire: header, full payload, checksum and signature."""
     number = messages.number_of(message)
     kind = None if number is None else kind_of(number)
     payload = 0 if kind is None else kind.fields.size
@@ -54,10 +55,8 @@ def frame_octets(message: str, *, signed: bool) -> int:
 
 
 class StreamPlan(NamedTuple):
-    """What is asked for on a link: the interval of each message in us, and octets a second.
-
-    `octets`: what this takes; `least`: what it would take if each came as seldom as will do; `capacity`: what the link
-    carries, None where nobody knows.
+    """The requests on a link: the interval of each message in us. `octets`: their total in octets a second; `least`:
+    the total at the slowest sufficient rates; `capacity`: that of the link, None if unknown.
     """
 
     intervals: Mapping[str, int]
@@ -67,12 +66,12 @@ class StreamPlan(NamedTuple):
 
     @property
     def fits(self) -> bool:
-        """Whether the link carries what is needed, and leaves room for the rest."""
+        """Whether the link carries the needed streams with room for the rest."""
         return self.capacity is None or self.least <= self.capacity * SHARE // 100
 
     @property
     def shortfall(self) -> str | None:
-        """That the link does not carry what is needed, and what would, in words."""
+        """That the link cannot carry the needed streams, and which one could, in words."""
         if self.fits:
             return None
         would = next((baud for baud in BAUDS if baud // BITS_OF_AN_OCTET * SHARE // 100 >= self.least), None)
@@ -84,7 +83,7 @@ class StreamPlan(NamedTuple):
 
 
 def plan_streams(rates: Mapping[str, Rate], capacity: int | None, *, signed: bool) -> StreamPlan:
-    """The fastest rates that the link carries: all are slowed by the same factor, none below what suffices."""
+    """Plan the fastest rates for the link: all are slowed by the same factor, none below its sufficient rate."""
     sizes = {name: frame_octets(name, signed=signed) for name in rates}
 
     def load(intervals: Mapping[str, int]) -> int:
@@ -102,20 +101,17 @@ def plan_streams(rates: Mapping[str, Rate], capacity: int | None, *, signed: boo
     return StreamPlan(intervals, load(intervals), least, capacity)
 
 
-#: What comes in the air only, so that nothing waits for it on the ground: an estimate of the wind.
+#: Messages that come in the air only, so that nothing waits for them on the ground: wind estimates.
 IN_THE_AIR = frozenset({"WIND", "WIND_COV"})
 
 
 class StreamRequests:
-    """SET_MESSAGE_INTERVAL for each message of the plan, one request outstanding at a time.
+    """Sends SET_MESSAGE_INTERVAL for each message of the plan, one request at a time.
 
-    Those of `AT_TIMES` are asked for like the others, and not missed when they do not come. `needed` holds groups of
-    messages of which one is enough: the sources of one signal. A position counts as heard where one came after a report
-    of the `estimator`, if that is named: what nobody vouches for yet is none. `notes` collects what an operator should
-    know: which streams come too seldom, when they are right again, and once how much is delivered of what was asked
-    for.
-
-    On a link whose capacity is known, what nobody here asked for is turned off where there is no room for it.
+    Messages of `AT_TIMES` are requested like others, but not missed. `needed` holds groups of messages of which one is
+    enough: the sources of one signal. A position counts once it comes after a report of the `estimator`, if one is
+    given. `notes` collects texts for the operator: which streams are too slow, when they recover, and once the measured
+    total. On a link of known capacity, streams that nobody requested here are turned off if there is no room for them.
     """
 
     def __init__(self, plan: StreamPlan, needed: Iterable[frozenset[str]], estimator: str = "") -> None:
@@ -126,27 +122,27 @@ class StreamRequests:
         self._queue = [*self._wanted, *self._at_times]
         self._refused: set[str] = set()
         self._heard_us: dict[str, int] = {}
-        self._first: set[str] = set()  # what was heard once, and does not count yet
+        self._first: set[str] = set()  # heard once, which does not count yet
         self._asking: str | None = None
         self._asked_us = self._looked_us = 0
-        #: before then `due` gives nothing, so nobody need call it
+        #: `due` returns nothing before this time
         self.due_us = 0
         self._answer_us = ANSWER_US
-        self._late_us: deque[int] = deque()  # when requests were given up whose answers may come yet
-        self._once_us: int | None = None  # when what is missing was last asked for once
+        self._late_us: deque[int] = deque()  # when requests were given up whose answers may still come
+        self._once_us: int | None = None  # when missing messages were last requested once
         self._since_us: int | None = None
         self._counts = dict.fromkeys(self._wanted, 0)
         self._measured_us: int | None = None
         self._slow: set[str] = set()
-        self._octets = 0  # of all that came since the last measurement
-        self._others: dict[str, int] = {}  # of what was not asked for
-        self._off: set[str] = set()  # what was turned off
-        #: octets a second that came, and the interval in us of each message that was asked for; None before measured
+        self._octets = 0  # the octets received since the last measurement
+        self._others: dict[str, int] = {}  # those of streams that were not requested
+        self._off: set[str] = set()  # streams that were turned off
+        #: the received octets a second, and the interval in us of each requested message; None before the measurement
         self.measured: tuple[int, Mapping[str, int]] | None = None
         self.notes: list[str] = []
 
     def replan(self, plan: StreamPlan) -> None:
-        """Other rates are needed: those that differ are asked for, and measured anew."""
+        """Change the plan: the rates that differ are requested and measured anew."""
         before, self.plan = {**self._wanted, **self._at_times}, plan
         self._at_times, self._wanted = _sorted(plan)
         self._queue += [name for name, us in {**self._wanted, **self._at_times}.items() if before.get(name) != us]
@@ -155,7 +151,7 @@ class StreamRequests:
             self.notes.append(plan.shortfall)
 
     def heard(self, name: str, now_us: int, octets: int = 0) -> None:
-        """A message came, in a frame of so many octets."""
+        """Count a message, in a frame of this size."""
         if name in _COUNT_TWICE and name not in self._first:
             self._first.add(name)
         elif name != _POSITION or not self._estimator or self._estimator in self._heard_us:
@@ -168,10 +164,10 @@ class StreamRequests:
             self._others[name] = self._others.get(name, 0) + octets
 
     def answered(self, accepted: bool, now_us: int) -> None:
-        """A request was acknowledged. An acknowledgement does not say of which message it is."""
+        """Take in an acknowledgement, which does not say which message it is about."""
         while self._late_us and now_us - self._late_us[0] > LATEST_US:
             self._late_us.popleft()
-        if self._late_us:  # of an earlier one, then: a refusal must not be taken for one of what is asked now
+        if self._late_us:  # it belongs to an earlier request: its refusal must not count for the present one
             self._late_us.popleft()
             return
         if self._asking is not None:
@@ -180,7 +176,7 @@ class StreamRequests:
             self._asking, self.due_us = None, 0
 
     def due(self, system: int, now_us: int) -> list[Message]:
-        """The request to send now, if one is due. One that is not answered goes to the end of the queue."""
+        """The request to send now, if due. A request without an answer goes to the end of the queue."""
         if self._since_us is None:
             self._since_us = now_us
         if self._asking is not None:
@@ -209,22 +205,22 @@ class StreamRequests:
 
     @property
     def slow(self) -> Sequence[str]:
-        """Which of those that it has come at less than half the rate asked for."""
+        """The present streams that come at less than half of the requested rate."""
         return sorted(self._slow)
 
     def interrupted(self) -> None:
-        """The link was silent: rates are measured anew."""
+        """Note a silence of the link: rates are measured anew."""
         self._measured_us, self.due_us = None, 0
 
     def renew(self, now_us: int) -> None:
-        """What was heard so far does not count as heard."""
+        """Forget which messages were heard."""
         self._heard_us.clear()
         self._first.clear()
         self._since_us, self._once_us = now_us, None
 
     def due_once(self, system: int, now_us: int) -> list[Message]:
-        """The requests for one message of each group that was not heard since `renew`, where they are due: a stream of
-        which one is awaited in the air may take a second for it.
+        """The requests for one message of each group that was not heard since `renew`, if due: a stream may take a
+        second to deliver one.
         """
         if self._since_us is None or (self._once_us is not None and now_us - self._once_us < ANSWER_US):
             return []
@@ -232,7 +228,7 @@ class StreamRequests:
         names = {name for group in self._missing for name in group}
         if _POSITION in names and self._estimator and self._estimator not in self._heard_us:
             names.add(self._estimator)
-        ordered = sorted(names, key=lambda name: (name == _POSITION, name))  # after who vouches for it
+        ordered = sorted(names, key=lambda name: (name == _POSITION, name))  # after the messages that confirm it
         ordered += sorted(names & _COUNT_TWICE)
         return [messages.request(system, name) for name in ordered if messages.number_of(name) is not None]
 
@@ -241,7 +237,7 @@ class StreamRequests:
         return [group for group in self._needed if not group & self._heard_us.keys()]
 
     def settled(self, now_us: int, *, aloft: bool = False) -> bool:
-        """Whether one message of each group was heard, or was waited for long enough; `aloft`: to bring it down."""
+        """Whether one message of each group was heard, or waited for long enough; `aloft`: in the air."""
         if self._since_us is None:
             return False
         missing = self._missing
@@ -250,7 +246,7 @@ class StreamRequests:
         return not missing or now_us - self._since_us > patience_us
 
     def _measure(self, now_us: int) -> None:
-        """Once every request was answered: compare what came since with what was asked for."""
+        """Compare the received rates with the requested ones, once every request was answered."""
         if self._measured_us is not None:
             self._compare(now_us - self._measured_us)
         self._measured_us, self._counts = now_us, dict.fromkeys(self._wanted, 0)
@@ -266,14 +262,14 @@ class StreamRequests:
         self._make_room(octets)
 
     def _delivery(self, octets: int) -> str:
-        """How much was asked for and how much came, in words."""
+        """The requested and the received total, in words."""
         capacity = self.plan.capacity
         of = "" if capacity is None else f" of {capacity} that the link carries"
         slow = f"; too seldom: {', '.join(self.slow)}" if self._slow else ""
         return f"streams: {self.plan.octets} bytes/s requested{of}, {octets} bytes/s received in all{slow}"
 
     def _make_room(self, octets: int) -> None:
-        """Turn off what was not asked for, if it takes the room of what was."""
+        """Turn off streams that were not requested if they take the room of those that were."""
         capacity = self.plan.capacity
         if capacity is None or not self._others or not (self._slow or octets > capacity * SHARE // 100):
             return
@@ -288,13 +284,13 @@ class StreamRequests:
         for name, asked_us in self._wanted.items():
             count = self._counts[name]
             if name in self._refused or not count:
-                continue  # silence is told by the age of what it carries
+                continue  # a silent stream shows in the age of its signals
             came_us = passed_us // count
             if (came_us > SLOW * asked_us) == (name in self._slow):
                 continue
             self._slow ^= {name}
             if name in self._slow:
-                self._queue.append(name)  # somebody may have asked for another rate since
+                self._queue.append(name)  # somebody may have changed the rate since
                 self.notes.append(f"{name} comes every {came_us // 1_000} ms, requested every {asked_us // 1_000} ms")
             else:
                 self.notes.append(f"{name} comes at the requested rate again")
@@ -305,7 +301,7 @@ class StreamRequests:
 
 
 def _sorted(plan: StreamPlan) -> tuple[dict[str, int], dict[str, int]]:
-    """The intervals of what comes at times only, and of all else that the dialect has."""
+    """The intervals of the messages that come at times only, and of the others in the dialect."""
     known = {name: us for name, us in plan.intervals.items() if messages.number_of(name) is not None}
     at_times = {name: us for name, us in known.items() if name in AT_TIMES}
     return at_times, {name: us for name, us in known.items() if name not in AT_TIMES}

@@ -1,5 +1,5 @@
-"""What is watched while something flies: whether it gets anywhere, whether it stops, whether somebody else flies it,
-whether it crashed. A mode report or an acknowledgement proves nothing, only what is seen does.
+"""Supervise a vehicle in flight: whether it makes progress, whether it stops, whether somebody else flies it, whether
+it crashed. A mode report or an acknowledgement proves nothing; only observed motion does.
 """
 
 from collections import deque
@@ -12,15 +12,15 @@ from rtshcua.adapters.vehicle.observed import ABOVE, FALLS, STALE_US, STOPPED, O
 from rtshcua.model.flat.policy import VehicleLimits
 
 NEVER: Final = (1 << 63) - 1  # us
-#: so many heartbeats after a mode took effect it shows
+#: a mode shows within this many heartbeats after it took effect
 MODE_BEATS: Final = 2
 
-#: mm by which some measure must fall for it to count as progress
+#: mm by which a measure must fall to count as progress
 LEAST: Final = 1_000
 
 
 class StageProgress:
-    """Follows one stage."""
+    """The progress of one stage."""
 
     def __init__(self, expected: ExpectedProgress) -> None:
         self._expected = expected
@@ -32,11 +32,11 @@ class StageProgress:
 
     @property
     def due_us(self) -> int:
-        """When it will have stalled, in link time, unless something is seen before."""
+        """When the stage will count as stalled, in link time, without a further observation."""
         return NEVER if self._since_us is None else self._since_us + self._expected.within_us
 
     def has_stalled(self, seen: ObservedVehicle) -> bool:
-        """Whether nothing fell for too long. What is not known meanwhile is not held against it."""
+        """Whether no measure has fallen for too long. Time in which a measure was unknown does not count."""
         left = self._expected.measure(seen)
         if left is None or self._best is None or self._since_us is None:
             self._best, self._since_us = left, None if left is None else seen.up_us
@@ -47,7 +47,7 @@ class StageProgress:
             return False
         at_first = not self.shown and seen.up_us - (self._began_us or 0) <= self._expected.within_us
         if at_first and self._has_come_further(left, self._best):
-            self._best, self._since_us = left, seen.up_us  # it may have to turn round
+            self._best, self._since_us = left, seen.up_us  # it may have to turn round first
         return seen.up_us - self._since_us > self._expected.within_us
 
     def _has_come_further(self, best: tuple[int, ...], left: tuple[int, ...]) -> bool:
@@ -60,10 +60,10 @@ class StageProgress:
 
 # ---------------------------------------------------------------- stopping
 
-#: us of link time between a command to stop that was obeyed and the time from which its effect must show: what
-#: filters, reports and a gust take. PX4 1.16 needs it: from 4.5 m/s it is below 0.4 m/s after 3.6 to 4.6 s only.
+#: us of link time between an obeyed stop command and the time by which its effect must show, for filters, reports and
+#: gusts. PX4 1.16 needs it: from 4.5 m/s it is below 0.4 m/s only after 3.6 to 4.6 s.
 LAG_US: Final = 2_000_000
-#: what a vehicle is taken to brake with that does not say: mm/s^2, and us before it begins
+#: assumed braking of a vehicle that declares none: mm/s^2, and us before it begins
 UNDECLARED_BRAKING: Final = 1_000
 UNDECLARED_REACTION_US: Final = 1_000_000
 _SECOND: Final = 1_000_000
@@ -71,30 +71,30 @@ _SECOND: Final = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Brakes:
-    """How a vehicle brakes, as its policy declares it (`brakes from 12 m/s in 6 s after 500 ms`): mm/s^2 and us."""
+    """How a vehicle brakes according to its policy (`brakes from 12 m/s in 6 s after 500 ms`): mm/s^2 and us."""
 
     braking: int
     reaction_us: int
 
     @classmethod
     def of(cls, vehicle: VehicleLimits) -> "Brakes":
-        """Those of a signed vehicle, or a cautious guess for one that declares none."""
+        """The declared values of a signed vehicle, or a cautious assumption without them."""
         if not vehicle.braking:
             return cls(UNDECLARED_BRAKING, UNDECLARED_REACTION_US)
         return cls(vehicle.braking, vehicle.reaction_us)
 
     def fastest(self, speed: int, passed_us: int) -> int:
-        """How fast it may still be, mm/s, so long after it was told to stop at a speed of `speed`."""
+        """The highest permitted speed in mm/s, this long after a stop command at `speed`."""
         falling_us = max(passed_us - self.reaction_us - LAG_US, 0)
         return max(speed - self.braking * falling_us // _SECOND, STILL)
 
     def stands_us(self, speed: int) -> int:
-        """By when it must stand still, told to stop at a speed of `speed`."""
+        """The time by which a vehicle must stand still after a stop command at `speed`."""
         return self.reaction_us + speed * _SECOND // self.braking + 2 * LAG_US
 
 
 class BrakingWatch:
-    """Follows a vehicle that was told to stop, from the speed that it then had."""
+    """Supervises a vehicle after a stop command, from the speed that it had then."""
 
     def __init__(self, brakes: Brakes, seen: ObservedVehicle) -> None:
         self._brakes = brakes
@@ -103,21 +103,21 @@ class BrakingWatch:
 
     @property
     def due_us(self) -> int:
-        """From when it may be found too fast, in link time; never while it was not seen to obey."""
+        """The link time from which it may be found too fast; never before it was seen to obey."""
         return NEVER if self._since_us is None else self._since_us + self._brakes.reaction_us + LAG_US
 
     def has_failed(self, seen: ObservedVehicle, *, obeyed: bool) -> bool:
-        """Whether it is faster than it may be by now, or moves when it must stand still.
+        """Whether it is faster than permitted by now, or moves when it must stand still. `obeyed`: the command was
+        acknowledged, or its mode shows.
 
-        `obeyed`: the command was acknowledged, or its mode shows. The speed that it must lose is the greatest until its
-        effect must show. A speed counts at the time at which it was measured. One that is not known any more, and was
-        not for as long as it may be old, is none that fell.
+        The initial speed is the highest one until the effect must show. A speed counts at the time of its measurement.
+        A speed that has been unknown for as long as a report may be old counts as not reduced.
         """
         if self._since_us is None and obeyed:
             self._since_us = seen.up_us
         at_us = seen.up_us if seen.speed is None else seen.speed_us
         if self._since_us is None or at_us - self._since_us <= self._brakes.reaction_us + LAG_US:
-            if seen.speed is not None:  # it may have been told to stop while it still gathered speed
+            if seen.speed is not None:  # the stop command may have come while it still accelerated
                 self._speed = max(self._speed or 0, seen.speed)
             return False
         passed_us, speed = at_us - self._since_us, self._speed or 0
@@ -127,19 +127,19 @@ class BrakingWatch:
         return seen.speed > (STILL if stands else self._brakes.fastest(speed, passed_us) + STILL)
 
 
-# ---------------------------------------------------------------- somebody else's target
+# ---------------------------------------------------------------- targets of others
 
-#: Until ours shows, what is reported may be older than our frame; in us of link time.
+#: us of link time: until our target shows, a reported target may be older than our frame.
 SETTLES_US: Final = 1_500_000
 _REMEMBERED: Final = 4
 
 
 class TargetWatch:
-    """The target that the autopilot says it flies to, against those that we gave it, over all manoeuvres of a vehicle.
+    """Compares the target that the autopilot reports with those that we commanded, over all manoeuvres of a vehicle.
 
-    A ground station takes over without any change of mode: PX4's pause and go-to, ArduCopter's guided targets. The
-    autopilot then reports another target than ours (POSITION_TARGET_GLOBAL_INT). PX4 reports one whenever it has one,
-    ArduCopter in GUIDED only.
+    A ground station can take over without a change of mode: by PX4's pause and go-to, by ArduCopter's guided targets.
+    The autopilot then reports a target that is not ours (POSITION_TARGET_GLOBAL_INT). PX4 reports one whenever it has
+    one, ArduCopter only in GUIDED.
     """
 
     def __init__(self) -> None:
@@ -147,29 +147,29 @@ class TargetWatch:
         self._expected: ExpectedTarget | None = None
         self._prior: Reported | None = None
         self._settled_us = 0
-        self._given: ExpectedTarget | None = None  # the present target as it was given, before the vehicle named it
-        self._more = 0  # how often it may name another, for it was told again
-        self._left: Reported | None = None  # what it flew to before a command that has no target
-        self._strayed: int | None = None  # the number of the heartbeat after which it flew elsewhere
-        #: whether the autopilot was seen to fly to the present target,
+        self._given: ExpectedTarget | None = None  # the present target as commanded, before the vehicle reported it
+        self._more = 0  # how many other targets it may report, because the command was repeated
+        self._left: Reported | None = None  # its target before a command without a target
+        self._strayed: int | None = None  # the count of heartbeats when it left for another target
+        #: whether the autopilot was seen to fly to the present target
         self.shown = False
-        self._shown: Reported | None = None  # and as what it was last reported
+        self._shown: Reported | None = None  # and the last report of that target
 
     @property
     def compares(self) -> bool:
-        """Whether there is a target of ours of which the autopilot's report is worth waiting for."""
+        """Whether there is a target of ours whose report is worth waiting for."""
         return self._expected is not None and self._expected.told
 
     @property
     def named(self) -> ExpectedTarget | None:
-        """The present target as the vehicle named it; None before it did."""
+        """The present target as the vehicle reported it; None before it did."""
         return self._expected if self.shown else None
 
     def expect(self, target: ExpectedTarget | None, seen: ObservedVehicle) -> None:
-        """From now on this is what it should fly to; None: nothing that could be compared.
+        """Set the expected target; None: nothing to compare.
 
-        Where it flew to a target of its own, that may show for a while yet. Where it flew to one of ours, any other is
-        somebody else's, also one that shows only after our next frame left.
+        Where the vehicle flew to a target of its own, that one may be reported for a while longer. Where it flew to one
+        of ours, any other target is somebody else's, even if it is reported only after our next frame left.
         """
         settles_us = 0 if self.shown else SETTLES_US
         if target is not None:
@@ -183,13 +183,11 @@ class TargetWatch:
             self._ours.append(target)
 
     def due_us(self, up_us: int) -> int:
-        """From when a report that is older than our frame counts as somebody else's, in link time, if that is to come
-        yet.
-        """
+        """The link time from which a report from before our frame would count as somebody else's, if in the future."""
         return NEVER if self._expected is None or up_us >= self._settled_us else self._settled_us
 
     def told_again(self) -> None:
-        """The present target went out once more: each time that it stops anew, it stops somewhere else."""
+        """Note that the present target was sent again: after each stop command it stops somewhere else."""
         self._more += 1
 
     def is_foreign(self, seen: ObservedVehicle) -> bool:
@@ -200,9 +198,9 @@ class TargetWatch:
         if expected is None:
             return self._has_strayed(reported, seen.beats)
         if reported == self._prior and not self.shown:
-            return False  # not obeyed yet; when it never is, there is no progress
+            return False  # not obeyed yet; if it never is, there is no progress
         if not self.shown and not expected.is_given(reported) and self._is_late(reported):
-            return False  # a stop might end there
+            return False  # the place may be where a stop ends
         if expected.matches(reported):
             self._show(expected, reported)
             return False
@@ -217,14 +215,15 @@ class TargetWatch:
         return seen.up_us >= self._settled_us
 
     def obeyed(self) -> None:
-        """The mode of the present command shows: where it has no target, it goes where the autopilot has it go."""
+        """Note that the mode of the present command shows: a command without a target flies where the autopilot
+        decides.
+        """
         if self._expected is None:
             self._left = None
 
     def _has_strayed(self, reported: Reported, beats: int) -> bool:
-        """Whether it left for somewhere else before our command, which has no target, showed in its mode.
-
-        Where our command itself is why, two heartbeats after that tell its mode.
+        """Whether it left for another target before the mode of our command, which has no target, showed. If our
+        command is the reason, its mode shows within two heartbeats.
         """
         if self._left is None or _same(self._left, reported) or self._is_late(reported):
             self._strayed = None
@@ -234,11 +233,11 @@ class TargetWatch:
         return beats - self._strayed >= MODE_BEATS
 
     def _is_late(self, reported: Reported) -> bool:
-        """Whether this is the place of a command before, which was on its way still when the present one left."""
+        """Whether this is the target of an earlier command that was still on its way when the present one left."""
         return any(ours.is_given(reported) for ours in self._ours if ours is not self._expected)
 
     def _show(self, expected: ExpectedTarget, reported: Reported) -> None:
-        if not self.shown:  # this is the one, from now on
+        if not self.shown:  # from now on this is the target
             self._ours[-1] = self._expected = expected.as_reported(reported)
         self.shown, self._shown = True, reported
 
@@ -247,34 +246,37 @@ def _same(one: Reported, other: Reported) -> bool:
     return abs(one[2] - other[2]) <= KEPT_LEVEL and apart(*one[:2], *other[:2]) <= KEPT
 
 
-#: A target that was not named for this long is asked for; it is streamed at twice that rate.
+#: A target that was not reported for this long is requested; it is streamed at twice that rate.
 UNNAMED_US: Final = 150_000
-#: So long after the last answer to such a question, or to the one before, it would have come;
+#: An answer would have come within this time after the last one, or the one before;
 NAMED_WITHIN_US: Final = 100_000
-#: and after this long, unless something was lost meanwhile, the question is put anew.
+#: and after this long, unless a frame was lost meanwhile, the request is repeated.
 ASKED_ANEW_US: Final = 400_000
-#: So many heartbeats without a target: on a link that loses more than half of all, one in 10**7 of such rows is chance.
+#: Heartbeats in a row without a target: on a link that loses more than half of all frames, one in 10**7 such rows is
+#: chance.
 MANY_BEATS: Final = 25
 
 
 class NamedTargetWatch:
-    """Whether an autopilot that goes on naming its target stopped doing so: somebody commands a velocity, say.
+    """Detects that an autopilot which repeats its target stopped doing so, for example because somebody commands a
+    velocity.
 
-    That nothing came proves nothing, for frames are lost. It was asked, it answered, and the numbers of its frames show
-    that none is missing: then it names none.
+    Missing reports alone prove nothing, because frames are lost. The target counts as gone when the autopilot was
+    asked, answered, and the numbers of its frames show that none was lost.
     """
 
     def __init__(self, slack: int = 1) -> None:
         self._slack = slack
         self._targets = -1
-        self._beats = 0  # how many heartbeats had come when it last named its target
-        self._asked: tuple[int, int, int, int] | None = None  # when, and what was missing, answered and heard before
-        self._answered: tuple[int, int] | None = None  # when the last answer came, and how many had
-        #: it is to be asked for its target now
+        self._beats = 0  # the count of heartbeats at the last report of a target
+        # when it was asked, and the counts of missing, answered and received frames then
+        self._asked: tuple[int, int, int, int] | None = None
+        self._answered: tuple[int, int] | None = None  # when the last answer came, and the count of answers
+        #: the target is to be requested now
         self.asks = False
 
     def is_gone(self, seen: ObservedVehicle, now_us: int, asked: int) -> bool:
-        """Whether it names no target any more; `asked` counts the questions that were put so far."""
+        """Whether it no longer reports a target; `asked` is the number of requests so far."""
         if seen.targets != self._targets or now_us - seen.target_us <= UNNAMED_US * self._slack:
             self._targets, self._beats, self._asked, self.asks = seen.targets, seen.beats, None, False
             return False
@@ -290,54 +292,55 @@ class NamedTargetWatch:
         if is_lost:
             return False
         if seen.answers - asked < self._asked[2] or seen.beats == self._asked[3] or self.asks:
-            return False  # not all that was asked is answered
+            return False  # a request is still unanswered
         if self._answered is None or self._answered[1] != seen.answers:
             self._answered = now_us, seen.answers
         return now_us - self._answered[0] >= NAMED_WITHIN_US * self._slack
 
 
-#: us of link time that it must stand, after it moved, before that is somebody's pause;
+#: us of link time that a vehicle must stand after moving before this counts as a pause;
 STANDS_US: Final = 1_500_000
-#: mm/s: it moved, if it was as fast as this,
+#: mm/s: the speed at which it counts as having moved,
 MOVED: Final = 1_500
-#: us of link time that it must fly to the side in its climb, where it rises no further;
+#: us of link time that it must fly sideways in a climb without rising;
 ASIDE_US: Final = 2_500_000
-#: mm: and it is far from its target, where it would not slow down by itself;
+#: mm: it must be this far from its target, where it would not slow down by itself;
 FAR: Final = 10_000
 #: mm: or from the height of its climb;
 FAR_BELOW: Final = 2_000
-#: degrees: what leans more fights the wind;
+#: degrees: with more tilt it may be fighting the wind;
 LEANS: Final = 15
-#: mm, us: what is as near ahead may be why it stands
+#: mm, us: an obstacle this near ahead may be why it stands
 BLOCKED: Final = 10_000
 BLOCKED_US: Final = 2_000_000
 
 
 class PauseWatch:
-    """Whether a vehicle on its way to its target was stopped by somebody, who changed neither mode nor target.
+    """Detects that somebody stopped a vehicle on its way, without changing mode or target. After ArduCopter's
+    DO_PAUSE_CONTINUE it stops within 3 s from 5.6 m/s (recorded).
 
-    ArduCopter's DO_PAUSE_CONTINUE takes 3 s from 5.6 m/s (recorded). Wind makes it lean, an obstacle is seen ahead, at
-    the end of a leg it is near its target, and without a position nothing is known. `climb`: it is to get higher, and
-    names no target, so somebody else's velocity is seen by that it flies to the side and rises no further. That it
-    rises no further shows nothing alone: its weight, weak motors or a fence above keep it down as well.
+    Other causes are excluded: wind shows as tilt, an obstacle is reported ahead, near the target it stops anyway, and
+    without a position nothing is known. In a `climb` no target is reported, so somebody else's velocity shows as
+    sideways motion without a rise. A climb that stops is no evidence by itself: weight, weak motors or a fence above
+    have the same effect.
     """
 
     def __init__(self, *, climb: bool = False) -> None:
         self._far, self._climb = FAR_BELOW if climb else FAR, climb
         self._moved = False
         self._since_us: int | None = None
-        self._aside_us: int | None = None  # since when it moved to the side in a climb, and rose no further
+        self._aside_us: int | None = None  # since when it has moved sideways in a climb without rising
 
     @property
     def due_us(self) -> int:
-        """When it will have stood for long enough, in link time, unless something is seen before."""
+        """When it will have stood for long enough, in link time, without a further observation."""
         return NEVER if self._since_us is None else self._since_us + STANDS_US
 
     def is_paused(
         self, seen: ObservedVehicle, left: tuple[int, ...] | None, now_us: int, *, granted: bool = False
     ) -> bool:
-        """Whether it stands so since it moved; `left` is how far its target is. `granted`: somebody else was told that
-        it obeys.
+        """Whether it has been standing since it moved; `left` is the distance to its target. `granted`: the vehicle
+        accepted somebody else's command.
         """
         self._moved = self._moved or (seen.speed is not None and seen.speed >= MOVED)
         idle = stands_idly(seen, left, now_us, self._far, climb=self._climb)
@@ -358,14 +361,14 @@ class PauseWatch:
         return seen.speed_us - self._since_us >= STANDS_US
 
     def flies_aside(self, seen: ObservedVehicle) -> bool:
-        """Whether it moved to the side all the while in its climb, and rose no further: no climb of its own does."""
+        """Whether it has moved sideways in its climb for long without rising: no climb of ours does that."""
         return self._aside_us is not None and seen.speed_us - self._aside_us >= ASIDE_US
 
 
 def stands_idly(
     seen: ObservedVehicle, left: tuple[int, ...] | None, now_us: int, far: int = FAR, *, climb: bool = False
 ) -> bool:
-    """Whether it stands still far from its target, in a `climb` its height, and nothing that is seen keeps it there."""
+    """Whether it stands still far from its target (in a `climb`: its height) without an observed cause."""
     if left is None or min(left) < far or not (_is_level(seen) if climb else still(seen)):
         return False
     blocked = seen.ahead is not None and seen.ahead < BLOCKED and now_us - seen.ahead_us <= BLOCKED_US
@@ -376,25 +379,25 @@ def _is_level(seen: ObservedVehicle) -> bool:
     return seen.airborne and seen.speed is not None and abs(seen.descent) <= STOPPED
 
 
-#: us of link time that a leg must be flown steadily at less than `SLOWER` % of the speed that it was told
+#: us of link time that a leg must be flown steadily at less than `SLOWER` % of the commanded speed
 SLOW_US: Final = 4_000_000
 SLOWER: Final = 60
-#: mm/s by which a steady speed goes up and down at most
+#: mm/s: the largest variation of a steady speed
 STEADY: Final = 600
 
 
 class SpeedWatch:
-    """Whether a leg is flown steadily slower than it was told: somebody set another speed (DO_CHANGE_SPEED)."""
+    """Detects that a leg is flown steadily slower than commanded: somebody set another speed (DO_CHANGE_SPEED)."""
 
     def __init__(self, told: int) -> None:
         self._told = told
         self._since_us: int | None = None
         self._low = self._high = 0
-        #: how fast it flies instead, in mm/s, once that is known
+        #: the actual speed in mm/s, once known
         self.slow: int | None = None
 
     def look(self, seen: ObservedVehicle, left: tuple[int, ...] | None) -> bool:
-        """Take in what is seen; whether it is found to be slow now, and was not before."""
+        """Take in an observation; return whether it is found to be slow now for the first time."""
         speed = seen.speed
         if not self._told or self.slow is not None:
             return False
@@ -415,25 +418,24 @@ class SpeedWatch:
 
 # ---------------------------------------------------------------- crashes
 
-#: us between what is judged together: its height, that it flies, and that its motors stopped. What lies further apart
-#: is of two moments, between which it may have landed.
+#: us: observations are judged together within this time (height, flight, stopped motors). Between observations further
+#: apart it may have landed.
 RECENT_US: Final = 2_000_000
-#: us between two reports of a tilt, of which a single one proves nothing
+#: us between two reports of a tilt; a single one proves nothing
 LASTS_US: Final = 400_000
-#: from a speed that falls (`FALLS`), no motors stop it to one that stands (`STOPPED`)
-#: within this time, in us, between two reports of its speed.
+#: us: motors cannot stop a fall (`FALLS`) to standing (`STOPPED`) within this time between two speed reports.
 AT_ONCE_US: Final = 400_000
-#: us from there until it says that it lies on the ground, or that its motors are off
+#: us from there until it reports that it is on the ground or that its motors are off
 LIES_WITHIN_US: Final = 10_000_000
-#: degrees: autopilots lean at most 45 of their own accord
+#: degrees: autopilots tilt by at most 45 themselves
 TILTED: Final = 60
 
 _POSITION: Final = "GLOBAL_POSITION_INT"
 
 
 class _Off(NamedTuple):
-    """The first heartbeat that says that the motors are off: its place in the order of sending, what was known of the
-    vehicle's place then, by when they were off, and whether that is by the vehicle's clock.
+    """The first heartbeat with motors off: its place in the order of sending, the vehicle's position then, by when they
+    were off, and whether that time is by the vehicle's clock.
     """
 
     place: int
@@ -443,14 +445,13 @@ class _Off(NamedTuple):
 
 
 class CrashWatch:
-    """A crash told from a landing, once, by each observation of one flight: by the motors, the fall and the attitude.
+    """Distinguishes a crash from a landing, once in a flight: by the motors, by a fall or by the attitude.
 
-    What lies on the ground with its motors off says ON_GROUND however it came there.
-
-    All times are the vehicle's, on our clock (`source_time`): after a stall or a silence what waited comes all at once,
-    with a gap behind it, and only its own time tells what is of one moment. The time of a report without a stamp is at
-    least that of the last stamp before it, and at most that of the next one, or when it came. What must be recent
-    counts by the first, what must have been soon by the second.
+    A vehicle on the ground with its motors off reports ON_GROUND however it got there. All times are the vehicle's, on
+    our clock (`source_time`): after a stall or a silence, reports that waited arrive all at once, and only their own
+    times tell which belong together. The time of a report without a stamp is at least that of the last stamp before it,
+    and at most that of the next one, or its arrival. The first bound decides whether a report is recent, the second
+    whether an event came soon.
     """
 
     def __init__(self) -> None:
@@ -459,15 +460,16 @@ class CrashWatch:
         self.forget()
 
     def forget(self) -> None:
-        """Times from before mean nothing any more: the vehicle's clock was set."""
-        self._flew: tuple[int, int, bool] | None = None  # when it was last seen to, how high, and whether to land
+        """Forget all times: the vehicle's clock was set."""
+        # when it was last seen to fly, its height, and whether it was landing
+        self._flew: tuple[int, int, bool] | None = None
         self._off: _Off | None = None
-        self._tilted: tuple[int, int] | None = None  # since when, and when it was last seen to be
+        self._tilted: tuple[int, int] | None = None  # since when it is tilted, and when it was last seen tilted
         self._fell: tuple[int, int] | None = None  # when, and how fast it came down
         self._impact: tuple[int, int] | None = None
 
     def look(self, seen: ObservedVehicle, name: str, now_us: int) -> str | None:
-        """What shows that it crashed, now that a message of this name came; None, also once that was told."""
+        """Evidence of a crash, after a message of this name; None otherwise, and once it was reported."""
         flies = seen.armed and seen.airborne
         if flies:
             self._flown = True
@@ -510,7 +512,9 @@ class CrashWatch:
         return self._stopped(seen)
 
     def _stopped(self, seen: ObservedVehicle) -> str | None:
-        """Autopilots call a vehicle landed that is disarmed: what counts is how it flew just before."""
+        """Evidence by stopped motors. Autopilots call a disarmed vehicle landed: what counts is how it flew just
+        before.
+        """
         off, flew = self._off, self._flew
         if seen.armed or off is None or flew is None:
             return None
@@ -527,7 +531,7 @@ class CrashWatch:
         if at_us - last_us > RECENT_US:
             since_us = at_us
         self._tilted = since_us, at_us
-        # it may lie on its side after it landed, and be carried
+        # after a landing it may lie on its side, and be carried
         stands = _says_air(seen, at_us) or (seen.armed and not seen.disarms and _is_recent(seen, "HEARTBEAT", at_us))
         return f"the vehicle is tilted by {seen.tilt} degrees" if stands and at_us - since_us >= LASTS_US else None
 
@@ -535,7 +539,7 @@ class CrashWatch:
         if descent >= FALLS:
             self._fell, self._impact = (at_us, descent), None
         elif self._fell is not None:
-            # an estimator takes some reports to believe that it stands
+            # an estimator takes some reports to settle on standing still
             if at_us - self._fell[0] > AT_ONCE_US:
                 self._fell = None
             elif abs(descent) <= STOPPED:
@@ -549,11 +553,11 @@ class CrashWatch:
 
 
 def _says_air(seen: ObservedVehicle, at_us: int) -> bool:
-    """Whether it said not long before that it is in the air."""
+    """Whether it reported shortly before that it is in the air."""
     return seen.airborne and _is_recent(seen, "EXTENDED_SYS_STATE" if seen.landed_state else "HEARTBEAT", at_us)
 
 
 def _is_recent(seen: ObservedVehicle, name: str, at_us: int) -> bool:
-    """Whether a message of this name was made at most `RECENT_US` before; not known is no."""
+    """Whether a message of this name was made at most `RECENT_US` before; False if unknown."""
     made_us = seen.made_us.get(name)
     return made_us is not None and at_us - made_us <= RECENT_US

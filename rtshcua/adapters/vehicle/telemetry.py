@@ -1,4 +1,4 @@
-"""Telemetry messages become readings of the policy's declared signals: quantised here, once; no float goes further."""
+"""Read the policy's signals from telemetry messages. Values are quantised here, once: no float goes further."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,48 +23,48 @@ Where = tuple[tuple[str, int], ...]
 """The fields that select a sensor, and their raw values."""
 
 _NONE: Final = frozenset[str]()
-_NUMBERS: Final = (int, float)  # as `int | float` it would be made anew for each field
+_NUMBERS: Final = (int, float)  # `int | float` would be built anew for each field
 
 
 def _says_nothing(wind: Any) -> bool:
-    """A multirotor of ArduPilot's that estimates no wind reports none from the south, and does so in 8 m/s (recorded):
-    `atan2(-0, -0)` is -180 degrees.
+    """Whether a WIND report is the one that an ArduPilot multirotor without a wind estimate sends: 0 m/s from -180
+    degrees, which is `atan2(-0, -0)`, even in a wind of 8 m/s (recorded).
     """
     return bool(wind.speed == 0 and wind.direction == -180)
 
 
 class UnknownSource(ValueError):
-    """A policy reads a signal from what the dialect does not have, or from what is not one number."""
+    """A policy reads a signal from a field that the dialect does not have or that is not a single number."""
 
 
 class Telemetry:
-    """Knows which messages carry which signals, and of whom each is taken.
+    """Maps messages to signals, by sender.
 
-    What the autopilot reports is never replaced by another component's word, and where the vehicle is and what charge
-    it has is taken from the autopilot alone. Of a sensor that there are several of, the first instance counts, and of
-    batteries the one with the least charge, see `Batteries`. Raises UnknownSource.
+    A value of the autopilot is never replaced by that of another component; position and charge are taken from the
+    autopilot alone. Of several instances of a sensor the first one counts, and of several batteries the one with the
+    least charge, see `Batteries`. Raises UnknownSource.
     """
 
     def __init__(self, policy: Policy, contracts: Sequence[Contract] = ()) -> None:
         self._vehicle = vehicle = policy.vehicle
         self._own = {*where(vehicle), vehicle.battery}
-        self._told: set[tuple[str, Where]] = set()  # what came of the autopilot: of each, always the same slots
+        # sensors that the autopilot has reported: each always has the same slots
+        self._told: set[tuple[str, Where]] = set()
         self._first: dict[tuple[int, str, Where], Any] = {}
         self._by_message: dict[str, list[_Carried]] = {}
-        #: the batteries of which the worst counts
+        #: the batteries; the one with the least charge counts
         self.batteries = Batteries(_battery_stale_us(policy))
         measured = next((each for each in policy.signals if each.name == DRAIN and each.kind == NUMBER), None)
         self._drain = -1 if measured is None else measured.slot
-        #: what flying takes of the charge, as measured
+        #: the measured consumption of charge
         self.consumption = Consumption(vehicle)
         self._height: int | None = None
         slots = () if measured is None else (measured.slot, vehicle.position, vehicle.height)
         self._measured = _carry(policy, *slots)
-        #: what an operator should know, to be taken
+        #: notes for the operator, to be taken from here
         self.notes: list[str] = self.batteries.notes
         self.consumption.notes = self.notes
-        #: of these the autopilot's own carry all that such a message may carry, each time; where there are several
-        #: instances, those of this one
+        #: messages of the autopilot that need no selection, with the instance that counts
         self._whole: dict[str, int | None] = {}
         for signal in policy.signals:
             for source in signal.sources:
@@ -73,29 +73,28 @@ class Telemetry:
                 self._by_message.setdefault(source.message, []).append(carried)
         self._uniform = {name for name, each in self._by_message.items() if not any(one.where for one in each)}
         self._uniform -= {"WIND", BATTERY}
-        #: the messages that carry some signal, and how often each is needed; by the contracts of a mission's steps too
+        #: the messages that carry a signal, and how often the policy and the mission's contracts need each
         self.rates: Mapping[str, Rate] = rates(policy, contracts)
         #: for each signal, the messages that may carry it
         self.sources = [frozenset(source.message for source in signal.sources) for signal in policy.signals]
 
     def need(self, policy: Policy, contracts: Sequence[Contract]) -> None:
-        """Reports are needed as often as these contracts of a mission's steps say."""
+        """Set the contracts of the mission's steps, which determine the needed rates."""
         self.rates = rates(policy, contracts)
 
     def read(
         self, name: str, message: Any, component: int = AUTOPILOT, doubtful: frozenset[str] = _NONE, now_us: int = 0
     ) -> tuple[tuple[int, int | None], ...]:
-        """(slot, canonical integer) of every signal that this message carries; None is "reported as not known".
+        """Return (slot, canonical integer) for every signal in this message; None is "reported as unknown".
 
-        So is a value that rests on a field of the autopilot's which is `doubtful`. It comes at `now_us`.
-        When it was measured is not said
-        here: see `source_time`.
+        A value of the autopilot that rests on a `doubtful` field is unknown, too. The message arrived at `now_us`;
+        `source_time` says when the value was measured.
         """
         values = self._read(name, message, component, doubtful, now_us)
         return self._measure(values, now_us) if name in self._measured else values
 
     def _measure(self, values: tuple[tuple[int, int | None], ...], now_us: int) -> tuple[tuple[int, int | None], ...]:
-        """The same, with what flying takes of the charge in the slot of `battery.drain`."""
+        """The same values, with the measured consumption in the slot of `battery.drain`."""
         known, vehicle = dict(values), self._vehicle
         self._height = known.get(vehicle.height, self._height)
         if vehicle.position in known:
@@ -151,7 +150,7 @@ class Telemetry:
         return values, found
 
     def _is_first(self, name: str, instance: int, component: int, where: Where) -> bool:
-        """Whether this is the lowest instance that the component was heard to have of a selected sensor."""
+        """Whether this is the lowest instance of a selected sensor that the component has sent."""
         key = component, name, where
         first = self._first[key] = min(instance, self._first.get(key, instance))
         return bool(instance == first)
@@ -167,23 +166,23 @@ def _carry(policy: Policy, *slots: int) -> frozenset[str]:
     )
 
 
-#: the message that tells of each battery, and by which field what it holds
+#: the message about each battery, and its field for the charge
 BATTERY: Final = "BATTERY_STATUS"
 _CHARGE: Final = ("battery_remaining",)
 _FEEDS_NO_MOTOR: Final = frozenset({MAV_BATTERY_FUNCTION_AVIONICS, MAV_BATTERY_FUNCTION_PAYLOAD})
-#: how often another battery was reported since one that counts as silent was
+#: how many reports of other batteries must come before a battery counts as silent
 _AMONG: Final = 3
-#: us: two reports that lie no further apart make a battery, and none that counts is silent for longer
+#: us: two reports within this time establish a battery; a battery that counts may be silent no longer than this
 COUNTS_US: Final = 60_000_000
-#: A battery that is reported seldom is silent after so many times as long as usual, by so many of the last times.
+#: A battery that reports seldom is silent after this many of its usual intervals, taken from the last intervals.
 _SELDOM: Final = 3
 _TIMES: Final = 5
 
 
 @dataclass(slots=True)
 class _Charge:
-    """Of one battery: what it told last, by slot, when, whether it counts, how many reports of others came since, how
-    long it was between its last reports, and whether more than one was told while it did not count.
+    """One battery: its last values by slot, their time, whether it counts, the reports of others since, its last
+    intervals, and whether it reported more than once while it did not count.
     """
 
     values: Mapping[int, int | None]
@@ -195,31 +194,31 @@ class _Charge:
 
     @property
     def usual_us(self) -> int:
-        """How long it is between two reports as a rule; 0 where that is not known."""
+        """The usual interval between two reports; 0 where unknown."""
         return sorted(self.between_us)[(len(self.between_us) - 1) // 2] if self.between_us else 0
 
 
 class Batteries:
-    """The batteries that a vehicle flies by, of which the one with the least charge counts.
+    """The batteries that supply the motors; the one with the least charge counts.
 
-    Those are all but what is said to feed avionics or a payload; ArduPilot says of no battery what it feeds, so there
-    all count. A battery counts from its second report on, if that came within a minute or it was not silent between the
-    two: a single report with another number is odd, or somebody else's. Nothing is told before it is known of all that
-    were heard whether they count; before the motors turn, that takes a minute after a single report, once for each
-    number. One that counts and does not know its charge makes the charge unknown. So does one that is silent for as
-    long as makes it stale, or, where its reports are further apart, for `_SELDOM` times as long as is usual for it, and
-    a minute at the most.
+    A battery that is reported to feed avionics or a payload does not count. ArduPilot never reports the function, so
+    there all count. A battery counts from its second report on, if that came within a minute or the battery was not
+    silent in between: a single report with another number is an error or comes from another sender. No charge is
+    reported before it is known which of the batteries count; on the ground that takes up to a minute after a single
+    report, once for each number. If a battery that counts does not know its charge, the charge is unknown. The same
+    applies if it is silent for longer than the time to stale or, for longer intervals, than `_SELDOM` usual intervals,
+    but at most a minute.
     """
 
     def __init__(self, stale_us: int) -> None:
         self._stale_us = stale_us
-        self._charges: dict[tuple[int, bool], _Charge] = {}  # by number, and whether it feeds motors
+        self._charges: dict[tuple[int, bool], _Charge] = {}  # by number and whether it feeds motors
         self._known = False
-        #: the motors may turn, so what comes new now is waited for no more
+        #: the motors may turn, so a new battery is no longer waited for
         self.armed = False
-        #: of each battery that was reported twice: what it feeds (MAV_BATTERY_FUNCTION), and its charge in %
+        #: each battery that was reported twice: its function (MAV_BATTERY_FUNCTION) and its charge in %
         self.told: dict[int, tuple[int, int]] = {}
-        #: what an operator should know, to be taken
+        #: notes for the operator, to be taken from here
         self.notes: list[str] = []
 
     @staticmethod
@@ -230,7 +229,7 @@ class Batteries:
     def take(
         self, message: Any, readings: Sequence[tuple[int, int | None]], now_us: int
     ) -> Sequence[tuple[int, int | None]]:
-        """One BATTERY_STATUS and what it says by itself; the readings that count."""
+        """Take in one BATTERY_STATUS with its own readings; return the readings that count."""
         number, function = message.id, message.battery_function
         flies, charges = self.flies(function), self._charges
         charges[number, flies] = self._after(charges.get((number, flies)), dict(readings), now_us)
@@ -251,7 +250,7 @@ class Batteries:
         return [(slot, None if silent else _least(counted, slot)) for slot, _ in readings]
 
     def _after(self, before: _Charge | None, values: Mapping[int, int | None], now_us: int) -> _Charge:
-        """One more report of a battery, which was like `before`."""
+        """The state of a battery after one more report; `before` is its previous state."""
         if before is None:
             return _Charge(values, now_us, counts=False)
         between_us = max(now_us - before.at_us, 0)
@@ -260,7 +259,7 @@ class Batteries:
         return _Charge(values, now_us, counts, between_us=times, now_and_then=not counts)
 
     def awaited(self, now_us: int) -> int | None:
-        """The number of a battery of which one report came, so that it is not known yet whether it counts."""
+        """The number of a battery that was reported once, so that it is unknown whether it counts."""
         for (number, flying), each in self._charges.items():
             if not flying or each.counts or each.now_and_then:
                 continue
@@ -269,9 +268,7 @@ class Batteries:
         return None
 
     def _are_known(self, now_us: int) -> bool:
-        """Whether each battery that was heard counts, or was heard once and no more; with the motors on, once so that
-        is what is known.
-        """
+        """Whether it is known of each battery whether it counts; once known, it stays known while armed."""
         known = (self.armed and self._known) or self.awaited(now_us) is None
         self._known = self._known or known
         return known
@@ -288,7 +285,7 @@ class Batteries:
 
     @property
     def summary(self) -> str:
-        """Each battery, and which of them counts, in words."""
+        """The batteries and which of them count, in words."""
         flying = [number for number, (function, _) in sorted(self.told.items()) if self.flies(function)]
         words = [
             f"{number} with {'an unknown charge' if charge < 0 else f'{charge} %'}" + ("" if self.flies(function) else
@@ -314,7 +311,7 @@ def _is_charge(source: SignalSource) -> bool:
 
 
 def _battery_stale_us(policy: Policy) -> int:
-    """How old the charge may be; the shortest, where several signals read it."""
+    """The time to stale of the charge; the shortest, where several signals read it."""
     every = [
         signal.stale_us for signal in policy.signals for source in signal.sources
         if source.message == BATTERY and _is_charge(source)
@@ -323,13 +320,13 @@ def _battery_stale_us(policy: Policy) -> int:
 
 
 def _instance(message: Any) -> int | None:
-    """Which instance of a sensor a message is of; None where such a message names none."""
+    """The instance of a sensor that a message is about; None for messages without instances."""
     field = message.instance_field
     return None if field is None else getattr(message, field)
 
 
 def _is_selected(where: Where, message: Any) -> bool:
-    """Whether a message is of the sensor that is meant, where there may be several."""
+    """Whether a message is about the selected sensor."""
     return all(getattr(message, name) == value for name, value in where)
 
 
@@ -345,7 +342,7 @@ def _check(signal: Signal, source: SignalSource) -> None:
 
 
 class _Carried(NamedTuple):
-    """What a message carries of one signal: the fields that it rests on, the slots, and what reads them, in order."""
+    """How a message carries a signal: the fields it rests on, its slots, their reader, and the sensor selection."""
 
     fields: tuple[str, ...]
     slots: tuple[int, ...]
@@ -355,7 +352,7 @@ class _Carried(NamedTuple):
 
 
 def _carried(signal: Signal, source: SignalSource, projection: Projection) -> _Carried:
-    """Prepared once, for it is read from each message of its name."""
+    """Prepare the reader once: it is called for each message."""
     first, *more = [_field(source, field) for field in source.fields]
     slot, where, charge = signal.slot, source.where, source.message == BATTERY and _is_charge(source)
     if signal.kind == POSITION:
@@ -385,7 +382,7 @@ def _place(
         if latitude is None or longitude is None:
             return nowhere
         x, y = project(projection, latitude, longitude)
-        # farther than any zone can be declared, or on no globe: nonsense, not a place
+        # beyond any zone that can be declared, or not on the globe
         if max(abs(x), abs(y)) > MAX_COORDINATE or abs(longitude) > HALF_TURN:
             return nowhere
         return (slot, x), (slot + 1, y)

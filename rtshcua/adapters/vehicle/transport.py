@@ -1,7 +1,7 @@
-"""How octets come from a vehicle and go to it: UDP datagrams, a TCP connection, a serial line.
+"""Carry octets to and from a vehicle: UDP datagrams, a TCP connection, a serial line.
 
-A transport never raises once it is made: what is lost is sent again by those who need it, and a line or connection that
-is gone is opened again until it is back. UDP keeps the borders of datagrams; of a stream whole frames are given.
+A transport never raises once it is made: senders repeat what is lost, and a line or connection that is lost is reopened
+until it is back. UDP keeps the boundaries of datagrams; from a stream, whole frames are returned.
 """
 
 import errno
@@ -16,25 +16,24 @@ from typing import Final, Protocol
 from rtshcua.adapters.vehicle.address import Address, LinkCarrier
 from rtshcua.codec.stream import FrameStream, StreamCounts
 
-#: what is read at once
+#: the most octets that one read returns
 _LARGEST: Final = 65_535
 _CHUNK: Final = 4_096
-_BUFFER: Final = 4 << 20  # asked for; what the system allows is enough for a moment of being held up
-#: a stream that takes nothing more keeps so many octets; what does not fit is lost, as any datagram may be
+_BUFFER: Final = 4 << 20  # requested size; the system's limit suffices for short delays
+#: how many octets a blocked stream keeps; the rest is lost, as any datagram may be
 _UNSENT: Final = 4_096
-#: a connection or line that is gone is opened again this often
+#: a lost connection or line is reopened this often
 _AGAIN_US: Final = 500_000
-#: a connection that nobody answers any more is given up after so many seconds
+#: a connection without any answer is given up after so many seconds
 _DEAD_S: Final = 3
-#: connections at once: the vehicle's, and some that are told apart from it
+#: connections at once: the vehicle's, and others that are kept apart from it
 _MOST: Final = 4
 
 
 class Transport(Protocol):
-    """One way to a vehicle. `capacity`: octets a second each way, None where nobody knows.
-
-    `begins`: something may be sent before anything came, for otherwise nobody would speak. `trouble`: why nothing can
-    come now, for a person. `counts`: what came of it so far.
+    """A connection to a vehicle. `capacity`: octets a second each way, None if unknown. `begins`: our side sends first,
+    because the other one would not. `trouble`: why nothing can be received now, in words. `counts`: what was received
+    so far.
     """
 
     begins: bool
@@ -43,7 +42,7 @@ class Transport(Protocol):
 
     @property
     def counts(self) -> StreamCounts:
-        """What came so far; of UDP octets alone."""
+        """What was received so far; for UDP only octets."""
         ...
 
     def readable(self) -> Sequence[int]:
@@ -51,28 +50,28 @@ class Transport(Protocol):
         ...
 
     def receive(self) -> tuple[bytes, Hashable] | None:
-        """What waits, and who sent it; None if nothing does. The octets may be none."""
+        """The next waiting octets and their sender; None if nothing waits. The octets may be empty."""
         ...
 
     def is_open(self, sender: Hashable) -> bool:
-        """Whether something can still be sent to this sender."""
+        """Whether frames can still be sent to this sender."""
         ...
 
     def send(self, frame: bytes, to: Hashable) -> None:
-        """Send a frame to a sender that was heard; to None before anybody was, where this transport begins."""
+        """Send a frame to a sender that was heard; to None before that, where this transport begins."""
         ...
 
     def tend(self, now_us: int) -> list[str]:
-        """Send on what waits, open again what is gone; what an operator should know of it."""
+        """Send what is queued and reopen what was lost; return notes for the operator."""
         ...
 
     def close(self) -> None:
-        """Give it back."""
+        """Close it."""
         ...
 
 
 def open_transport(address: Address) -> Transport:
-    """The transport of an address. Raises OSError where it cannot be had, for a reason that waiting does not mend."""
+    """Open the transport of an address. Raises OSError for a reason that waiting does not remove."""
     match address.way:
         case LinkCarrier.UDP_IN:
             return UdpTransport(address.host, address.port, begins=False)
@@ -90,7 +89,7 @@ def open_transport(address: Address) -> Transport:
 
 
 class UdpTransport:
-    """One UDP socket: bound to an address that others send to, or, if it `begins`, sending to one."""
+    """One UDP socket: bound to an address that others send to or, with `begins`, sending to one."""
 
     capacity: int | None = None
 
@@ -110,7 +109,7 @@ class UdpTransport:
 
     @property
     def port(self) -> int:
-        """The port listened at (the system's choice when 0 was asked for)."""
+        """The local port (chosen by the system for 0)."""
         return int(self._socket.getsockname()[1])
 
     @property
@@ -125,7 +124,7 @@ class UdpTransport:
             octets, sender = self._socket.recvfrom_into(self._buffer)
         except BlockingIOError:
             return None
-        except OSError as error:  # an ICMP answer to something we sent: the peer is not there (yet)
+        except OSError as error:  # an ICMP answer to an earlier datagram: the peer is not there yet
             self.trouble = _reason(error)
             return b"", None
         self.trouble = None
@@ -142,7 +141,7 @@ class UdpTransport:
             else:
                 self._socket.sendto(frame, to)  # type: ignore[call-overload]
         except OSError:
-            return  # lost, as any datagram may be: what matters is sent again, and only effects count
+            return  # lost, as any datagram may be: important frames are repeated, and only effects count
 
     def tend(self, now_us: int) -> list[str]:
         return []
@@ -155,7 +154,7 @@ class UdpTransport:
 
 
 class _Line:
-    """One open stream: its frames, and what it did not take yet. `write` and `read` raise OSError where it is gone."""
+    """One open stream: its frames and its unsent octets. `write` and `read` raise OSError once it is lost."""
 
     def __init__(self, number: int, read: Callable[[], bytes], write: Callable[[bytes], int]) -> None:
         self.number = number
@@ -165,7 +164,7 @@ class _Line:
         self._unsent = b""
 
     def receive(self) -> bytes | None:
-        """The whole frames among what waits; None if nothing does."""
+        """The whole frames among the waiting octets; None if nothing waits."""
         try:
             octets = self._read()
         except (BlockingIOError, InterruptedError):
@@ -179,14 +178,14 @@ class _Line:
         return b"".join(self.frames.feed(octets))
 
     def send(self, frame: bytes) -> None:
-        """Send a frame, or keep it until there is room; one that does not fit is lost, whole."""
+        """Send a frame, or queue it; a frame that does not fit is dropped as a whole."""
         self.flush()
         if self.gone is None and len(self._unsent) + len(frame) <= _UNSENT:
             self._unsent += frame
             self.flush()
 
     def flush(self) -> None:
-        """Send on what waits."""
+        """Send queued octets."""
         while self._unsent and self.gone is None:
             try:
                 self._unsent = self._unsent[self._write(self._unsent) :]
@@ -197,7 +196,7 @@ class _Line:
 
 
 class _Streams:
-    """What all streams have in common: lines that come and go."""
+    """The common part of all streams: lines that open and close."""
 
     begins = True
     capacity: int | None = None
@@ -205,8 +204,8 @@ class _Streams:
     def __init__(self, address: Address) -> None:
         self.address = address
         self.trouble: str | None = None
-        self.lines: dict[int, tuple[_Line, Callable[[], None], int]] = {}  # with what closes it, and its descriptor
-        self._past = StreamCounts()  # of lines that are gone
+        self.lines: dict[int, tuple[_Line, Callable[[], None], int]] = {}  # with its close function and descriptor
+        self._past = StreamCounts()  # counts of closed lines
         self._made = 0
         self._had = False  # there was a line before
         self._notes: list[str] = []
@@ -225,7 +224,7 @@ class _Streams:
             if line.gone is not None:
                 self._drop(line)
             elif octets is not None:
-                self.lines[line.number] = self.lines.pop(line.number)  # each has its turn
+                self.lines[line.number] = self.lines.pop(line.number)  # round robin
                 return octets, line.number
         return None
 
@@ -246,7 +245,7 @@ class _Streams:
     def add(
         self, descriptor: int, read: Callable[[], bytes], write: Callable[[bytes], int], close: Callable[[], None]
     ) -> None:
-        """Another line is open."""
+        """Add an open line."""
         self._made += 1
         self.lines[self._made] = _Line(self._made, read, write), close, descriptor
         self.trouble = None
@@ -271,7 +270,7 @@ class _Streams:
 
 
 class TcpTransport(_Streams):
-    """Connects to an address, and connects again whenever the connection is gone."""
+    """Connects to an address, and reconnects whenever the connection is lost."""
 
     def __init__(self, address: Address) -> None:
         super().__init__(address)
@@ -288,7 +287,7 @@ class TcpTransport(_Streams):
                 self._pending.setblocking(False)
                 self._settle(self._pending, self._pending.connect_ex(self._peer))
             elif self._pending is not None:
-                # asked again, a socket says whether it is connected by now
+                # a second connect reports whether the socket is connected by now
                 self._settle(self._pending, self._pending.connect_ex(self._peer))
         return self._told()
 
@@ -308,7 +307,7 @@ class TcpTransport(_Streams):
 
 
 class TcpListener(_Streams):
-    """Waits for connections. The vehicle's is the one over which it is heard first; others are told apart from it."""
+    """Waits for connections. The vehicle's is the first one over which it is heard; others are kept apart."""
 
     begins = False
 
@@ -327,7 +326,7 @@ class TcpListener(_Streams):
 
     @property
     def port(self) -> int:
-        """The port listened at (the system's choice when 0 was asked for)."""
+        """The local port (chosen by the system for 0)."""
         return int(self._listener.getsockname()[1])
 
     def readable(self) -> Sequence[int]:
@@ -358,7 +357,7 @@ class TcpListener(_Streams):
 def _add_connection(streams: _Streams, made: socket.socket) -> None:
     made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     made.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
-    # a cable that is pulled sends no end of the connection; options that a system lacks are left out
+    # an unplugged cable does not end a connection; options that a system lacks are left out
     for name, value in (
         ("TCP_KEEPIDLE", 1), ("TCP_KEEPINTVL", 1), ("TCP_KEEPCNT", _DEAD_S), ("TCP_USER_TIMEOUT", 1_000 * _DEAD_S),
     ):  # fmt: skip
@@ -368,9 +367,8 @@ def _add_connection(streams: _Streams, made: socket.socket) -> None:
 
 
 class SerialTransport(_Streams):
-    """A serial device, for us alone. Opened again when it was gone: a cable that is put back is found again.
-
-    Raises OSError where it is busy, is no serial device, cannot be opened, or does not take the baud rate.
+    """A serial device, opened exclusively, and reopened after its cable was unplugged. Raises OSError where it is busy,
+    is not a serial device, cannot be opened, or does not support the baud rate.
     """
 
     def __init__(self, address: Address) -> None:
@@ -415,7 +413,7 @@ def _make_raw(device: int, baud: int) -> None:
         mode[0] = mode[1] = mode[3] = 0
         mode[2] = termios.CS8 | termios.CREAD | termios.CLOCAL
         mode[4] = mode[5] = speed
-        mode[6][termios.VMIN], mode[6][termios.VTIME] = 1, 0  # so that nothing to read is told from the end
+        mode[6][termios.VMIN], mode[6][termios.VTIME] = 1, 0  # so that an empty read differs from the end
         termios.tcsetattr(device, termios.TCSANOW, mode)
         termios.tcflush(device, termios.TCIOFLUSH)
         taken = termios.tcgetattr(device)[4]

@@ -20,7 +20,7 @@ from rtshcua.diagnostics.suggest import nearest
 
 
 class LinkCarrier(StrEnum):
-    """What carries a link, and who begins it."""
+    """The transport of a link, and which side begins it."""
 
     UDP_IN = "udpin"
     UDP_OUT = "udpout"
@@ -29,7 +29,7 @@ class LinkCarrier(StrEnum):
     SERIAL = "serial"
 
 
-#: bits a second that the system's serial driver knows, of those that telemetry uses
+#: baud rates of the system's serial driver, as far as telemetry uses them
 BAUDS: Final = tuple(
     baud
     for baud in (
@@ -53,7 +53,7 @@ _NUMBER: Final = re.compile(r"\d{1,9}", re.ASCII)
 
 
 class AddressError(ValueError):
-    """A text that is no address. `start` and `end` are the part that is wrong; `help` says what is accepted."""
+    """A text that is not an address. `start` and `end` mark the wrong part; `help` says what is accepted."""
 
     def __init__(self, text: str, address: str, start: int, end: int, help: str) -> None:
         super().__init__(text)
@@ -61,7 +61,7 @@ class AddressError(ValueError):
 
 
 class Address(NamedTuple):
-    """Where a link goes: what carries it and who begins it, then host and port, or serial device and baud rate."""
+    """The address of a link: its carrier, then host and port or serial device and baud rate."""
 
     way: LinkCarrier
     host: str
@@ -69,7 +69,7 @@ class Address(NamedTuple):
 
     @property
     def is_loopback(self) -> bool:
-        """Whether the other end is on this machine, by its loopback interface."""
+        """Whether the other end is on this machine, over its loopback interface."""
         if self.way is LinkCarrier.SERIAL:
             return False
         try:
@@ -79,7 +79,7 @@ class Address(NamedTuple):
 
     @property
     def capacity(self) -> int | None:
-        """Octets a second that the link carries each way; None where the address does not say."""
+        """Octets a second each way; None where the address does not determine it."""
         return self.port // BITS_OF_AN_OCTET if self.way is LinkCarrier.SERIAL else None
 
     def __str__(self) -> str:

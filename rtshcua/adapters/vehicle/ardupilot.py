@@ -1,6 +1,5 @@
-"""How ArduCopter is made to do each kind of motion.
-
-It obeys position targets in GUIDED only, and ignores them silently elsewhere; takeoff takes a height above home.
+"""The stages of each kind of motion for ArduCopter. It obeys position targets only in GUIDED, and silently ignores them
+elsewhere; a takeoff takes a height above home.
 """
 
 from functools import cache
@@ -16,7 +15,7 @@ from rtshcua.mavlink.modes import COPTER_NAMES, CopterMode
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.ports import Command
 
-#: mm: so much nearer to its end it flies a leg, whatever else moves it
+#: mm: a leg counts as begun when it is this much nearer to its end, whatever else moves the vehicle
 _NEARER = 1_000
 _SPEED_US = 5_000_000
 _REPEAT_US = 2_000_000  # position targets have no acknowledgement
@@ -53,22 +52,22 @@ def stages(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
 
 @cache
 def _coming_down(system: int, kind: int) -> tuple[Stage, ...]:
-    """Home or down where it is: always the same stages, so they are made once (`Driver` has them made ahead)."""
+    """Return or land: the stages never change, so they are made once (`Driver` has them made in advance)."""
     home = kind == MotionKind.HOME
     return tuple(flavour.returning(system, CopterMode.RTL) if home else flavour.landing(system, CopterMode.LAND))
 
 
 def _above(seen: ObservedVehicle, height: int) -> ExpectedTarget:
-    """What a takeoff flies to. `ModeGuided::get_wp` has no target before a position target comes (recorded: none from
-    the takeoff to the first leg); older versions, to 4.1, name its end. So any other one is somebody else's.
+    """The target of a takeoff. `ModeGuided::get_wp` has no target before a position target (recorded: none from the
+    takeoff to the first leg); versions up to 4.1 report the end of the takeoff. So any other target is somebody else's.
     """
     amsl = None if seen.home_amsl is None else seen.amsl(height)
     return ExpectedTarget(seen.latitude, seen.longitude, amsl, told=False)
 
 
 def _legs(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
-    """Point after point. A speed that is set before the first target in GUIDED is forgotten (recorded): it goes out
-    behind it.
+    """One leg after the other. A speed that is set before the first target in GUIDED is forgotten (recorded), so it is
+    sent after it.
     """
     height = command.altitude
     amsl = None if seen.home_amsl is None else seen.amsl(height)
@@ -89,9 +88,9 @@ def _legs(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
 
 
 def _sets_off(leg: Stage, begins: ObservedVehicle) -> Effect:
-    """The autopilot says that it flies to the leg's target. Of one that names none it is seen: it is nearer than where
-    the leg begins. That it moves is not enough, for at the end of its takeoff it moves still, and names no target; the
-    frame of the leg may have been lost.
+    """The autopilot reports the leg's target. Without a report, the vehicle must be nearer to it than where the leg
+    began. Motion alone is not enough: at the end of a takeoff it still moves without a target, and the frame of the leg
+    may have been lost.
     """
     assert leg.progress is not None
     measure = leg.progress.measure
@@ -141,5 +140,6 @@ ARDUPILOT = AutopilotFlavour(
     own_fence=OwnFence(
         "FENCE_RADIUS", "FENCE_ALT_MAX", "FENCE_ALT_MIN", "FENCE_MARGIN", "FENCE_TYPE", ("FENCE_ENABLE",)
     ),
-    names_targets=True,  # `ModeGuided::get_wp`, until a velocity or another mode comes; a pause keeps it (recorded)
+    # `ModeGuided::get_wp`, until a velocity or another mode comes; a pause keeps the target (recorded)
+    names_targets=True,
 )

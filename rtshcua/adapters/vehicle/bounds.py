@@ -1,7 +1,7 @@
-"""The autopilot's own cylinder around home, by its parameters: whether a mission stays inside.
+"""The autopilot's own cylinder around home, from its parameters, and whether a mission stays inside.
 
-On ArduCopter FENCE_ENABLE arms every type in FENCE_TYPE, so switching on the fence that carries the airspace arms a
-circle (FENCE_RADIUS) and a ceiling (FENCE_ALT_MAX) too. A target beyond is ignored without a word
+On ArduCopter FENCE_ENABLE arms every type in FENCE_TYPE, so switching on the fence with the airspace arms a circle
+(FENCE_RADIUS) and a ceiling (FENCE_ALT_MAX) too. A target beyond them is silently ignored
 (`AC_Fence::check_destination_within_fence`), and a return stays under FENCE_ALT_MAX - FENCE_MARGIN
 (`ModeRTL::compute_return_target`). PX4 has GF_MAX_HOR_DIST and GF_MAX_VER_DIST, which are off at 0.
 """
@@ -22,8 +22,8 @@ CEILING_BIT, CIRCLE_BIT, FLOOR_BIT = 1, 2, 8
 
 
 class OwnFence(NamedTuple):
-    """The names of an autopilot's parameters. `types` is a set of bits of which kinds are armed, `switches` say whether
-    any is; without them a bound of 0 is off. `margin` is room that it keeps itself.
+    """The names of an autopilot's parameters. `types` is the set of bits of the armed kinds, `switches` say whether the
+    fence is on; without them a bound of 0 is off. `margin` is its own margin.
     """
 
     circle: str
@@ -35,13 +35,13 @@ class OwnFence(NamedTuple):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All that have to be read."""
+        """All parameters that have to be read."""
         extra = (self.floor, self.margin, self.types, *self.switches)
         return (self.circle, self.ceiling, *(name for name in extra if name is not None))
 
 
 class FlightReach(NamedTuple):
-    """How far from home something goes, how high above it and how low, in mm; None where nothing says."""
+    """The greatest distance from home, the greatest and the least height of a flight, in mm; None where unknown."""
 
     farthest: int = 0
     highest: int = 0
@@ -49,7 +49,7 @@ class FlightReach(NamedTuple):
 
 
 class Narrow(NamedTuple):
-    """A bound that is narrower than what is needed: its parameter, what it is and would have to be in its unit."""
+    """A bound that is too narrow: its parameter, its value and the required value in its unit."""
 
     parameter: str
     value: float
@@ -59,7 +59,7 @@ class Narrow(NamedTuple):
 
 
 def reach_of(steps: Sequence[Invocation], policy: Policy, home: tuple[int, int]) -> FlightReach:
-    """Where the targets of a mission lie, its returns among them; `home` is where it stands, in local mm."""
+    """The reach of a mission's targets, including its returns; `home` is the vehicle's position in local mm."""
     targets = [each.plan for each in steps]
     far = [
         hypot_mm(x - home[0], y - home[1])
@@ -72,7 +72,7 @@ def reach_of(steps: Sequence[Invocation], policy: Policy, home: tuple[int, int])
 
 
 def airspace_reach(policy: Policy) -> FlightReach:
-    """How far an airspace goes: as far as the narrowest of the zones that must be kept to."""
+    """The reach of an airspace: that of the narrowest zone to stay in."""
     inside = [] if policy.airspace is None else [policy.zones[number] for number in policy.airspace.inside]
     far = min((_extent(zone) for zone in inside), default=0)
     high = min((zone.ceiling for zone in inside if zone.ceiling < HIGHEST), default=0)
@@ -88,7 +88,7 @@ def _extent(zone: Zone) -> int:
 
 
 def unknown(own: OwnFence, values: Mapping[str, float], *, armed: bool) -> str | None:
-    """Which parameter has to be known and is not; `armed`: a flight of ours switches the fence on."""
+    """The first parameter that must be known and is not; `armed`: a flight of ours switches the fence on."""
     if own.types is not None and own.types not in values:
         return own.types
     return next((name for name, _, _ in _bounds(own, values, armed=armed) if name not in values), None)
@@ -97,7 +97,7 @@ def unknown(own: OwnFence, values: Mapping[str, float], *, armed: bool) -> str |
 def narrower(
     own: OwnFence, values: Mapping[str, float], reach: FlightReach, room: int, *, armed: bool
 ) -> Iterator[Narrow]:
-    """The bounds that are armed and leave less than `room` (mm) around what is reached."""
+    """The armed bounds that leave less than `room` (mm) around the reach."""
     room = max(room, _mm(values.get(own.margin, 0.0)) if own.margin is not None else 0)
     for name, about, bit in _bounds(own, values, armed=armed):
         if name not in values:
@@ -113,7 +113,7 @@ def narrower(
 
 
 def _bounds(own: OwnFence, values: Mapping[str, float], *, armed: bool) -> Iterator[tuple[str, str, int]]:
-    """The bounds that are in force, as parameter, what it is, and bit."""
+    """The bounds in force, as parameter, value and bit."""
     if own.switches and not armed and not any(values.get(name, 0.0) >= 1 for name in own.switches):
         return
     types = None if own.types is None else _bits(values.get(own.types, 0.0))

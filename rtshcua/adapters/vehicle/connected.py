@@ -1,4 +1,4 @@
-"""The `Vehicle` port over a transport: one peer, every good frame kept for the raw log."""
+"""The `Vehicle` port over a transport: one peer, and every valid frame kept for the raw log."""
 
 import select
 from collections.abc import Callable, Hashable, Sequence
@@ -10,25 +10,25 @@ from rtshcua.codec.stream import FrameStream, StreamCounts
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.onboard.ports import Command, Event, Noted
 
-#: One poll takes no more datagrams, and no more time, by its clock or the machine's, than this: a flood must not starve
-#: the runtime, and a backlog is worked off in order.
+#: The limits of one poll, in datagrams and in time (by its clock or the machine's): a flood must not starve the
+#: runtime, and a backlog is processed in order.
 _BATCH = 256
 _SLICE_US, _SLICE_S = 50_000, 0.002
 
 
 class ConnectedVehicle:
-    """Hears the vehicle at the other end of a transport, and answers the first sender that proves to be one.
+    """Receives from the other end of a transport, and replies to the first sender that proves to be a vehicle. Other
+    senders are read from then on only to detect a second vehicle. Where the vehicle's line or connection is lost, the
+    next one that it sends over replaces it.
 
-    What other senders say is read from then on only to learn whether there is a second vehicle. Where the line or
-    connection of the vehicle is gone, the next one that it speaks over takes its place. `keep` gets every good frame
-    that came from the vehicle, and every one that was sent to it, with its UTC time in us: when the next poll begins,
-    or at the end, for nothing that is sent is to wait for it.
+    `keep` gets every valid frame from the vehicle and every frame sent to it, with its UTC time in us, when the next
+    poll begins or at the end, so that no frame waits for it.
     """
 
     def __init__(
         self, transport: Transport, driver: Driver, clock: LinkClock, keep: Callable[[int, bytes], None]
     ) -> None:
-        #: what is known of the vehicle
+        #: the driver of the vehicle
         self.driver = driver
         self._transport = transport
         self._clock = clock
@@ -39,12 +39,12 @@ class ConnectedVehicle:
         self._slice_us = max(_SLICE_US, clock.us_in(_SLICE_S))
         self._greeted_us: int | None = None
         self._looked_us = 0
-        self._seen = StreamCounts()  # of datagrams, while no vehicle is known
+        self._seen = StreamCounts()  # counts of datagrams, until a vehicle is known
         driver.carried_by(transport.capacity)
 
     @property
     def silence(self) -> str | None:
-        """Why no vehicle is heard, as far as what came tells; None where nothing came and nothing is wrong."""
+        """Why no vehicle is heard, judging by the received octets; None if there are none and no fault is known."""
         counts = self._seen if self._seen.octets else self._transport.counts
         if counts.frames:
             return None
@@ -63,10 +63,10 @@ class ConnectedVehicle:
         )
 
     def poll(self, now_us: int, timeout_us: int) -> Sequence[Event]:
-        """Wait at most `timeout_us` of the clock for frames; gives what happened.
+        """Wait at most `timeout_us` of the clock for frames; return the events.
 
-        What waits is taken in together. What has to be waited for is acted on as it comes, one datagram at a time. What
-        is due at a time is looked for as often as where nothing comes: what the vehicle says is acted on first.
+        Frames that wait are processed together; frames that were waited for are processed as they come, one datagram at
+        a time. Timed actions are checked as often as without any frame, but frames are processed first.
         """
         self._keep_all()
         events, self._pending = self._pending, []
@@ -78,7 +78,7 @@ class ConnectedVehicle:
             self._greet(now_us, None)
         links = transport.readable()
         came = bool(select.select(links, [], [], 0)[0])
-        if came:  # before the driver is told the time: it must not take for silence that nobody looked
+        if came:  # before the driver gets the time: it must not mistake unread frames for silence
             self._drain(now_us + self._slice_us, events)
             now_us = self._clock.now().monotonic_us
         if not came or now_us - self._looked_us >= timeout_us:
@@ -102,15 +102,15 @@ class ConnectedVehicle:
         self.driver.release()
 
     def announce(self, severity: int, text: str) -> None:
-        """Tell any ground station on the link."""
+        """Send a text to every ground station on the link."""
         self.driver.announce(severity, text)
 
     def expect(self, steps: Sequence[Invocation]) -> None:
-        """Ask for reports as often as these steps need them."""
+        """Request reports as often as these steps need them."""
         self.driver.expect(steps)
 
     def close(self) -> None:
-        """Give the port back."""
+        """Close the port."""
         self._keep_all()
         self._transport.close()
 
@@ -121,7 +121,7 @@ class ConnectedVehicle:
                 return
 
     def _take(self, events: list[Event]) -> int | None:
-        """Take in what waits of one sender, and give the time; None if there is nothing."""
+        """Process the waiting frames of one sender and return the time; None if there are none."""
         received = self._transport.receive()
         if received is None:
             return None
@@ -139,7 +139,7 @@ class ConnectedVehicle:
             if self.driver.link.outdated > outdated:
                 self._greet(now_us, sender)  # the time stamp of our heartbeat sets its clock; a replay gains nothing
             if self.driver.flavour is None:
-                for question in heard.answers:  # not kept: it is to nobody yet
+                for question in heard.answers:  # not kept: it is addressed to nobody yet
                     self._transport.send(question, sender)
                 self._look(datagram)
                 return now_us
@@ -156,7 +156,7 @@ class ConnectedVehicle:
         return now_us
 
     def _send(self, frames: Sequence[bytes]) -> None:
-        """Send frames, and keep them: also those that find nobody any more, for they passed the gate."""
+        """Send frames and keep them, including those that reach nobody any more, because they passed the gate."""
         if not frames:
             return
         for frame in frames if self._peer is not None else ():
@@ -165,7 +165,9 @@ class ConnectedVehicle:
         self._unkept += [(utc_us, frame) for frame in frames]
 
     def _greet(self, now_us: int, to: Hashable | None) -> None:
-        """Speak before anybody is believed, at most once a heartbeat. Not kept: it is to nobody yet."""
+        """Send our heartbeat before a vehicle is known, at most once a second. It is not kept: it is addressed to
+        nobody yet.
+        """
         if self._greeted_us is not None and now_us - self._greeted_us < HEARTBEAT_US:
             return
         self._greeted_us = now_us
@@ -173,13 +175,13 @@ class ConnectedVehicle:
             self._transport.send(frame, to)
 
     def _look(self, datagram: bytes) -> None:
-        """What there is in a datagram that tells of no vehicle."""
+        """Count the contents of a datagram from no known vehicle."""
         stream, seen = FrameStream(), self._seen
         stream.feed(datagram)
         self._seen = StreamCounts(*map(sum, zip(seen, stream.counts, strict=True)))
 
     def _keep_all(self) -> None:
-        """Hand over what came and left since the last call, in its order."""
+        """Hand over the frames since the last call, in their order."""
         unkept, self._unkept = self._unkept, []
         for utc_us, frame in unkept:
             self._keep(utc_us, frame)

@@ -1,13 +1,12 @@
-"""What flying takes of the battery, as measured: the signal `battery.drain`, what a minute of the way home takes of it.
+"""Measure the consumption of the battery: the signal `battery.drain`, the charge that one minute of the way home takes.
 
-By time: autopilots report their charge in whole percent. So it is timed from one change to another within a window:
-between the changes each percent is known to have been taken. While the next change is still to come, no more than one
-is counted on top of those that came, so a vehicle that takes less than before is believed soon. The window is a minute,
-and as wide as it takes for a drain that is slow.
+By time: autopilots report the charge in whole percent, so the time between changes within a window is measured: each
+percent between two changes has certainly been taken. Until the next change, at most one more is added, so a lower
+consumption shows soon. The window is a minute, or longer for a slow consumption.
 
-By distance: where the vehicle gets on slower over ground than is declared, against more wind, each metre takes more
-charge than is counted, though a minute does not. The way home is counted as time, so a minute of it then takes as many
-times as much.
+By distance: where the vehicle flies slower over ground than declared, against more wind, each metre takes more charge
+than computed although a minute does not. The way home is computed as time, so a minute of it then takes more by the
+same factor.
 """
 
 from collections import deque
@@ -18,27 +17,27 @@ from rtshcua.decision.flying import MINUTE, MOST_DRAIN, SECOND, over_ground, slo
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.flat.policy import VehicleLimits
 
-#: What is looked back on, us, and how many changes tell something: the two stretches between three.
+#: The window in us, and how many changes are needed: three, with two intervals between them.
 WINDOW_US: Final = 60 * SECOND
 LEAST_CHANGES: Final = 3
-#: A charge that stands for so many times as long as it took between the last changes is drained no more.
+#: A charge without a change for this many of its last intervals is no longer drained.
 _STANDS: Final = 2
-#: More than this at once, 1/10000, and so much in a second besides, is a finding about the battery and no drain: what
-#: was measured before counts no more. Some autopilots report their charge in steps of 5 or 10 %.
+#: A greater fall at once, in 1/10000, beyond the same amount per second, is a change in the battery and not
+#: consumption: earlier measurements are dropped. Some autopilots report the charge in steps of 5 or 10 %.
 JUMP: Final = 500
 JUMP_RATE: Final = 200
 STEP: Final = 1_000
-#: A charge that rises by more, 1/10000, is another one.
+#: A charge that rises by more, in 1/10000, belongs to another battery.
 RISE: Final = 300
 
-#: A place is looked at so often, us, and tells nothing after more.
+#: The interval of position samples in us, and the longest useful one.
 _LOOK_US: Final = SECOND
 _GAP_US: Final = 3 * SECOND
-#: mm/s: flight over ground that counts is this fast, and changes by no more in a second, along it or in height:
-#: setting off, arriving and climbing are counted apart
+#: mm/s: level flight counts at this speed and with no greater change in a second, along the path or in height: setting
+#: off, arriving and climbing are computed apart
 _LEAST_SPEED: Final = 1_000
 _STEADY: Final = 500
-#: us of such flight that tell something, and how many looks are kept
+#: us of such flight that are needed, and how many samples are kept
 LEAST_STEADY_US: Final = 10 * SECOND
 _LOOKS: Final = 600
 
@@ -46,27 +45,27 @@ KM: Final = 1_000_000  # mm
 
 
 class DrainMeter:
-    """Measures one charge, 1/10000, by the times at which it was measured itself. All integers.
+    """Measures the consumption of one charge, in 1/10000, at the times of its measurements. All integers.
 
-    It goes by the least charge that was reported: one that rises a little now and then, as an estimate by voltage does
-    where the load falls, is drained all the same. What was measured last is told until a new drain is known or the
-    charge stands: after a jump, and after reports without a charge.
+    It uses the least charge so far: a charge that rises slightly at times, as an estimate by voltage does when the load
+    falls, is drained nevertheless. The last result is reported until a new one is known or the charge stands: after a
+    jump, and after reports without a charge.
     """
 
     def __init__(self) -> None:
-        self._changes: deque[tuple[int, int]] = deque()  # when it came to be so much
-        self._least: tuple[int, int] | None = None  # since when, and how much
+        self._changes: deque[tuple[int, int]] = deque()  # when the charge reached each value
+        self._least: tuple[int, int] | None = None  # the least charge, and since when
         self._at_us = self._between_us = 0
         self._measured: int | None = None
-        #: from when on what was taken tells of the drain, once it is known
+        #: the start of the measurement, once a result is known
         self.since_us = 0
 
     def take(self, charge: int | None, at_us: int) -> int | None:
-        """One report of the charge, None where it is not known; what is taken in a minute, if that is known yet."""
+        """Take in a report of the charge, None if unknown; return the consumption of a minute, if known."""
         if charge is None:
             return None
         least, before_us = self._least, self._at_us
-        self._at_us = at_us = max(at_us, before_us) if least is not None else at_us  # it may come late
+        self._at_us = at_us = max(at_us, before_us) if least is not None else at_us  # a report may come late
         changes = self._changes
         if least is None:
             self._least = at_us, charge
@@ -84,7 +83,7 @@ class DrainMeter:
         return self._measured
 
     def _is_jump(self, least: tuple[int, int], charge: int, before_us: int) -> bool:
-        """Whether it fell by more than any drain takes since the last report, and by more than one step since the last
+        """Whether it fell by more than any consumption since the last report, and by more than one step since the last
         change.
         """
         fell = least[1] - charge
@@ -92,7 +91,7 @@ class DrainMeter:
         return fell > max(JUMP + JUMP_RATE * (self._at_us - before_us) // SECOND, in_steps)
 
     def _look_whether_it_stands(self, now_us: int) -> None:
-        """Nothing is told of a drain that was, and is no more."""
+        """Drop the result once the charge stands."""
         changes = self._changes
         if len(changes) > 1:
             self._between_us = (changes[-1][0] - changes[0][0]) // (len(changes) - 1)
@@ -103,7 +102,7 @@ class DrainMeter:
         self._measured = None
 
     def _rate(self, now_us: int) -> int:
-        """From the first change to the last, or to now with one more: whichever is less. Rounded up."""
+        """From the first change to the last, or to now with one more, whichever is less. Rounded up."""
         (first_us, before), (last_us, after) = self._changes[0], self._changes[-1]
         taken = before - after
         mean = -(-taken // (len(self._changes) - 1))
@@ -112,15 +111,15 @@ class DrainMeter:
 
 
 class PaceMeter:
-    """How fast steady level flight gets on over ground. All integers."""
+    """The speed over ground of steady level flight. All integers."""
 
     def __init__(self) -> None:
-        self._flown: deque[tuple[int, int, int]] = deque(maxlen=_LOOKS)  # since when, for how long, how far
+        self._flown: deque[tuple[int, int, int]] = deque(maxlen=_LOOKS)  # when, for how long, how far
         self._last: tuple[int, int, int, int] | None = None
         self._speed: int | None = None
 
     def move(self, x: int | None, y: int | None, height: int | None, at_us: int) -> None:
-        """Where it was at a time, mm; None is not known."""
+        """Take in a position in mm; None if unknown."""
         last = self._last
         if x is None or y is None or height is None:
             self._last = self._speed = None
@@ -139,7 +138,7 @@ class PaceMeter:
             self._flown.append((last[0], gap_us, way))
 
     def flown(self, since_us: int) -> tuple[int, int]:
-        """For how long it flew so since a time, and how far, us and mm; (0, 1) where that is too little to tell."""
+        """The duration and distance of such flight since a time, in us and mm; (0, 1) where too little."""
         time_us = way = 0
         for began_us, lasted_us, far in reversed(self._flown):
             if began_us < since_us:
@@ -149,30 +148,32 @@ class PaceMeter:
 
 
 class Consumption:
-    """What flying takes of the charge of a policy's vehicle, beside what it declares. All integers."""
+    """The measured consumption of a policy's vehicle, compared with the declared one. All integers."""
 
     def __init__(self, vehicle: VehicleLimits) -> None:
         self._vehicle, self._asked = vehicle, 0
         self._drain, self._pace = DrainMeter(), PaceMeter()
         self._told = 0
-        #: the most that was measured so far to be taken in a minute, 1/10000; 0: nothing was
+        #: the highest measured consumption of a minute, 1/10000; 0: none
         self.in_a_minute = 0
-        #: what was measured to be taken for a km over ground, and what was declared for it at the same speed, when the
-        #: one was the most beside the other, 1/10000
+        #: the measured and the declared consumption of a km over ground at the same speed, 1/10000, where their ratio
+        #: was highest
         self.for_a_km = 0, 1
-        #: what an operator should know, to be taken
+        #: notes for the operator, to be taken from here
         self.notes: list[str] = []
 
     def fly(self, speed: int) -> None:
-        """A command that asks for a speed, mm/s, 0 for none. The slowest counts, as for the way home (`home_us`)."""
+        """Note a command with a speed in mm/s, 0 for none. The slowest counts, as for the way home (`home_us`)."""
         self._asked = slower(self._asked, speed)
 
     def move(self, x: int | None, y: int | None, height: int | None, at_us: int) -> None:
-        """Where the vehicle was at a time, mm; None is not known."""
+        """Take in the vehicle's position in mm; None if unknown."""
         self._pace.move(x, y, height, at_us)
 
     def take(self, charge: int | None, at_us: int) -> int | None:
-        """One report of the charge; what a minute of the way home takes, None where nothing was measured yet."""
+        """Take in a report of the charge; return the consumption of a minute of the way home, None without a
+        measurement.
+        """
         drain = self._drain.take(charge, at_us)
         if drain is None:
             return None
@@ -192,7 +193,7 @@ class Consumption:
 
     @property
     def summary(self) -> tuple[str, ...]:
-        """What was declared and what was measured at the worst, in words; nothing where nothing was measured."""
+        """The declared and the highest measured values, in words; empty without a measurement."""
         minute, (km, km_declared) = self.in_a_minute, self.for_a_km
         told = (minute, drained(self._vehicle), "a minute"), (km, km_declared, "a km")
         return tuple(
@@ -210,24 +211,24 @@ class Consumption:
 
 
 def drained(vehicle: VehicleLimits) -> int:
-    """What the vehicle of a policy takes of a full charge in a minute, as declared at the worst, 1/10000, rounded."""
+    """The declared worst consumption of a minute, in 1/10000 of a full charge, rounded."""
     flight_us = vehicle.endurance_us if vehicle.speeds is None else vehicle.speeds.flight_us
     return (MINUTE * FULL + flight_us // 2) // flight_us
 
 
 def for_a_km(vehicle: VehicleLimits, pace: int) -> int:
-    """What it takes for a km over ground at a speed, mm/s, as declared at the worst, 1/10000, rounded up."""
+    """The declared worst consumption of a km over ground at a speed in mm/s, in 1/10000, rounded up."""
     flight_us = vehicle.endurance_us if vehicle.speeds is None else vehicle.speeds.flight_us
     return -(-FULL * KM * SECOND // (flight_us * pace))
 
 
 def percent(part: int) -> str:
-    """A part of a full charge, 1/10000, in words."""
+    """A part of a full charge, in 1/10000, as text."""
     return f"{part / 100:.1f} %"
 
 
 def _pace(vehicle: VehicleLimits, asked: int) -> int:
-    """The speed over ground that is declared for what is flown, and no more than that of the way home, mm/s."""
+    """The declared speed over ground for the present command, but no more than that of the way home, mm/s."""
     speeds = vehicle.speeds
     return vehicle.speed if speeds is None else over_ground(speeds, min(asked or speeds.cruise, speeds.homeward))
 

@@ -1,6 +1,5 @@
-"""The effects that end a stage, and what is left to them, common to all flavours.
-
-Tolerances are arrival tolerances, not safety margins.
+"""The effects that end a stage, and the measures of progress towards them, for all flavours. Tolerances are for
+arrival; they are not safety margins.
 """
 
 from collections.abc import Callable
@@ -10,10 +9,10 @@ from math import cos, hypot, radians
 from rtshcua.adapters.vehicle.observed import ObservedVehicle
 from rtshcua.model.flat.zone import meridian
 
-_MM_PER_UNIT = 11.1319  # one 1e-7 degree of latitude; only for "has it arrived", never decided, signed or logged
+_MM_PER_UNIT = 11.1319  # one 1e-7 degree of latitude; only for arrival, never for decisions, signatures or logs
 ARRIVED = 2_000  # mm, horizontally
 LEVEL = 1_500  # mm, vertically
-CLIMBED = 1_000  # mm below the height asked for
+CLIMBED = 1_000  # mm below the commanded height
 STILL = 700  # mm/s
 
 Effect = Callable[[ObservedVehicle], bool]
@@ -21,9 +20,9 @@ Measure = Callable[[ObservedVehicle], tuple[int, ...] | None]
 """What is left, in mm, in one or more ways of which one falls while there is progress; None: not known now."""
 
 
-@lru_cache(maxsize=8)  # one report is held against the same place several times
+@lru_cache(maxsize=8)  # a report is compared with the same place several times
 def apart(latitude: int, longitude: int, to_latitude: int, to_longitude: int) -> float:
-    """How far two places (1e-7 degree) are from each other, in mm."""
+    """The distance of two places (1e-7 degree) in mm."""
     north = (latitude - to_latitude) * _MM_PER_UNIT
     east = (meridian(longitude, to_longitude) - to_longitude) * _MM_PER_UNIT * cos(radians(to_latitude / 1e7))
     return hypot(north, east)
@@ -35,27 +34,27 @@ def in_mode(number: int) -> Effect:
 
 
 def in_mode_or_down(number: int) -> Effect:
-    """The heartbeat shows the mode, or there is nothing left to bring down."""
+    """The heartbeat shows the mode, or the vehicle is already down."""
     return lambda seen: seen.mode == number or seen.down
 
 
 def airborne(seen: ObservedVehicle) -> bool:
-    """In the air, as far as it says."""
+    """In the air by its own report."""
     return seen.airborne
 
 
 def still(seen: ObservedVehicle) -> bool:
-    """In the air and not moving, gusts apart."""
+    """In the air and not moving, except for gusts."""
     return seen.airborne and seen.speed is not None and seen.speed <= STILL
 
 
 def climbed(altitude: int) -> Effect:
-    """In the air at the height (mm above home), by what the estimator vouches for."""
+    """In the air at the height (mm above home), confirmed by the estimator."""
     return lambda seen: seen.airborne and seen.levelled and seen.height >= altitude - CLIMBED
 
 
 def arrived(latitude: int, longitude: int, altitude: int) -> Effect:
-    """Near the place (1e-7 degree, mm above home), by what the estimator vouches for."""
+    """Near the place (1e-7 degree, mm above home), confirmed by the estimator."""
 
     def near(seen: ObservedVehicle) -> bool:
         if not (seen.located and seen.levelled):
@@ -66,11 +65,11 @@ def arrived(latitude: int, longitude: int, altitude: int) -> Effect:
     return near
 
 
-# ---------------------------------------------------------------- what is left, in mm: see `ExpectedProgress`
+# ---------------------------------------------------------------- remaining distances in mm: see `ExpectedProgress`
 
 
 def to_place(latitude: int, longitude: int, altitude: int) -> Measure:
-    """The way to a place that is flown to in a straight line."""
+    """The remaining distance to a place, in a straight line."""
 
     def left(seen: ObservedVehicle) -> tuple[int, ...] | None:
         if not (seen.located and seen.levelled):
@@ -82,17 +81,17 @@ def to_place(latitude: int, longitude: int, altitude: int) -> Measure:
 
 
 def up_to(altitude: int) -> Measure:
-    """The height that is missing."""
+    """The remaining height."""
     return lambda seen: (altitude - seen.height,) if seen.levelled else None
 
 
 def to_the_ground(seen: ObservedVehicle) -> tuple[int, ...] | None:
-    """The height above home. On the ground, until the motors stop, nothing is expected of it any more."""
+    """The height above home. On the ground no progress is expected until the motors stop."""
     return (seen.height,) if seen.levelled and seen.airborne else None
 
 
 def homeward(seen: ObservedVehicle) -> tuple[int, ...] | None:
-    """Where it is: a return climbs first, then crosses, to home or to a rally point, then descends; but it moves."""
+    """Its position: a return climbs, crosses to home or a rally point, and descends, but it always moves."""
     if not (seen.located and seen.levelled and seen.airborne):
         return None
     east = seen.longitude * _MM_PER_UNIT * cos(radians(seen.latitude / 1e7))

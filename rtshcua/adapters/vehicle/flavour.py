@@ -1,4 +1,4 @@
-"""What differs between autopilots, as a value that each flavour's package makes, and what they fly alike."""
+"""The differences between autopilots, as a value for each of them, and the stages that they share."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -16,25 +16,25 @@ from rtshcua.onboard.ports import Command
 #: us of link time until a mode shows, and until the motors run
 MODE_US: Final = 5_000_000
 ARM_US: Final = 8_000_000
-#: mm: what rounding, and a height of home that moves a little, may make of a target, before it was reported
+#: mm: the deviation of a target before it was reported, by rounding and by a home altitude that drifts
 SAME: Final = 3_000
-#: and after that: each target of each recorded flight was reported to the same digit until the next command came, and
-#: PX4 copies it from the setpoint that it was given; a pause near the end of a leg names a place as near as this to it
+#: and afterwards: in recorded flights each target was reported to the same digit until the next command, and PX4 copies
+#: it from its setpoint; a pause near the end of a leg reports a place this near to it
 KEPT: Final = 100
 KEPT_LEVEL: Final = 500
-#: mm: how far from where it is it may say that it takes off, or that it will come to stand;
+#: mm: how far from the vehicle its takeoff target, or the place where it will stop, may be;
 TAKES_OFF: Final = 20_000
 _STOPS: Final = 10_000
-_STOPS_S: Final = 3  # and how many seconds' way further, and what braking at 1 m/s^2 takes, if it moves
+_STOPS_S: Final = 3  # plus this many seconds of way, and the braking distance at 1 m/s^2
 
 
 @dataclass(frozen=True, slots=True)
 class ExpectedTarget:
-    """What the autopilot should report: a place, and its height in mm above mean sea level (None: any).
+    """The target that the autopilot should report: a place, and its height in mm above mean sea level (None: any).
 
-    `within` and `level`: how far off, in mm, across and in height, the first one that is reported may be; it then
-    counts as the target (`as_reported`). A vehicle that was told to stop says itself where it will. `told` False: it
-    need not be reported at all, so no frame waits for a report of it.
+    `within` and `level` are the tolerances in mm, horizontal and vertical, of the first reported target; that one then
+    counts as the target (`as_reported`). A vehicle that stops reports by itself where. `told` False: no report is
+    needed, so no frame waits for it.
     """
 
     latitude: int
@@ -46,21 +46,21 @@ class ExpectedTarget:
 
     @property
     def place(self) -> Reported:
-        """The place; of a height that may be any, 0."""
+        """The place, with 0 for any height."""
         return self.latitude, self.longitude, self.amsl or 0
 
     def as_reported(self, reported: Reported) -> "ExpectedTarget":
-        """What is expected once it was reported: just that."""
+        """The expectation after a report: exactly that target."""
         return replace(
             self, latitude=reported[0], longitude=reported[1], amsl=reported[2], within=KEPT, level=KEPT_LEVEL
         )
 
     def is_given(self, reported: Reported) -> bool:
-        """Whether a report is of a place that we gave, and that was not reported before."""
+        """Whether a report names a place that we commanded and that was not reported before."""
         return self.within == SAME and self.amsl is not None and self.as_reported(self.place).matches(reported)
 
     def matches(self, reported: Reported) -> bool:
-        """Whether a report is of this target."""
+        """Whether a report names this target."""
         latitude, longitude, amsl = reported
         level = self.amsl is None or abs(amsl - self.amsl) <= self.level
         return level and effects.apart(latitude, longitude, self.latitude, self.longitude) <= self.within
@@ -68,9 +68,9 @@ class ExpectedTarget:
 
 @dataclass(frozen=True, slots=True)
 class ExpectedProgress:
-    """How a stage shows its progress: some part of `measure` falls by a metre within `within_us` of link time.
+    """The progress of a stage: some part of `measure` falls by a metre within `within_us` of link time.
 
-    `either_way`: that it changes is enough. A return climbs, crosses and descends, to a place that the autopilot knows.
+    `either_way`: any change is enough. A return climbs, crosses and descends to a place that only the autopilot knows.
     """
 
     measure: Measure
@@ -79,17 +79,17 @@ class ExpectedProgress:
 
 
 class Stage(NamedTuple):
-    """One part of a manoeuvre: send, then wait until the effect is seen.
+    """One part of a manoeuvre: send a message, then wait for its effect.
 
-    `message` is sent once the flight mode is known, and again while it is not acknowledged; `command` is the MAV_CMD
-    whose acknowledgement belongs to it. A message without one (None) is sent again each `repeat_us`, until the
-    autopilot reports its `target`. `done` None: it has no effect that could be seen, so its acknowledgement has to do.
-    `modes` are the flight modes that belong to this stage; another one means that somebody took over. `timeout_us` 0:
-    only progress and the skill's own time limit end the wait. `powered`: it cannot go on once the motors are off on the
-    ground. `target`: where the autopilot must say that it flies to. `progress`: what must get less meanwhile.
-    `stops`: the vehicle must brake as its policy declares. `spare`: what is done already is not sent. `settled` leaves
-    in place of `message` where the vehicle is in a mode of the stage already: it asks for none, so it takes none from a
-    pilot who chose another one meanwhile. What it is answered says little: its target tells.
+    `message` is sent once the flight mode is known, and repeated until it is acknowledged; `command` is the MAV_CMD of
+    the acknowledgement. With None there is no acknowledgement: the message is repeated each `repeat_us`, until the
+    autopilot reports its `target`. `done` None: no effect can be observed, so the acknowledgement ends the stage.
+    `modes` are the flight modes of this stage; another one indicates a takeover. `timeout_us` 0: only progress and the
+    skill's time limit end the wait. `powered`: the stage fails once the motors are off on the ground. `target`: the
+    target that the autopilot must report. `progress`: the measure that must fall. `stops`: the vehicle must brake as
+    its policy declares. `spare`: send nothing if the effect holds already. `settled` replaces `message` where the
+    vehicle is in a mode of the stage already: it names no mode, so it cannot undo a pilot's choice. Its acknowledgement
+    proves little: the reported target does.
     """
 
     message: Message | None
@@ -111,10 +111,10 @@ Stages: TypeAlias = Callable[[Command, ObservedVehicle, int], list[Stage]]
 
 
 class FenceHabits(NamedTuple):
-    """How an autopilot takes a fence.
+    """How an autopilot treats a fence.
 
-    `frame` (MAV_FRAME) goes with each item. `all_inclusions`: the vehicle must be inside every inclusion; else inside
-    any of them. `switches` are parameters that must have these bits set for the fence to count.
+    `frame` (MAV_FRAME) is the frame of each item. `all_inclusions`: the vehicle must be inside every inclusion; else
+    inside any of them. `switches` are parameters that need these bits for the fence to be active.
     """
 
     frame: int
@@ -123,7 +123,7 @@ class FenceHabits(NamedTuple):
 
 
 class ReturnAltitude(NamedTuple):
-    """A parameter that holds the height at which the autopilot flies home, and the mm in one of its units."""
+    """A parameter with the height of a return, and the mm in one of its units."""
 
     parameter: str
     mm: int
@@ -131,20 +131,19 @@ class ReturnAltitude(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class AutopilotFlavour:
-    """An autopilot: its name, the names of its modes, how it is made to do each kind of motion, and its own ways.
+    """An autopilot: its name, its modes, the stages of each kind of motion, and its peculiarities.
 
-    `estimator` is the message in which its estimator reports. `natural` are changes of mode (from, to) that it makes
-    in the course of what it was told. `ours` are the modes in which manoeuvres of ours go somewhere or stay, `shows`
-    those that it is in, armed, that was told to do a kind of motion and nothing since, however far it came; `aims` are
-    those in which it names the target that it was given.
-    `lag_us`: so long after it was entered a mode shows in what it tells. `mode_within_us`: no frame that moves the
-    vehicle leaves on a mode report that is older (the link's delay comes on top): what the fastest report of the mode
-    that it really gives allows. `returns` are parameters of which one is there, `limits` groups of such that lower or
-    lift a return. `critical_acts`: a critical state in the air says that a failsafe of its own acts, also where it
-    stays in the mode that it is in; else it may tell only. `bytewise`: integer parameters travel as their bytes.
-    `fence` says how it takes a geofence, `own_fence` what bounds it has besides. `names_targets`: flying to a target
-    that it was given, it goes on naming it, so that one that it names no more is somebody else's doing; and one that it
-    names while it stands far from it is somebody's pause.
+    `estimator` is the message of its estimator. `natural` are changes of mode (from, to) that it makes while it
+    executes a command. `ours` are the modes in which our manoeuvres fly or hold. `shows` maps a kind of motion to the
+    modes that an armed vehicle may show during and after it without another command. `aims` are the modes in which it
+    reports its target. `lag_us` is the delay with which a mode shows. `mode_within_us`: no frame that moves the vehicle
+    leaves on an older mode report (plus the link's delay): the fastest rate at which the autopilot really reports the
+    mode. `returns` are alternative parameters of the return height, `limits` groups of parameters that lower or raise a
+    return. `critical_acts`: a critical state in the air means that a failsafe acts, even without a change of mode;
+    otherwise it may be a report only. `bytewise`: integer parameters are sent as their bytes. `fence` says how it
+    treats a geofence, `own_fence` names its other bounds. `names_targets`: it keeps reporting a commanded target in
+    flight, so a target that is no longer reported was replaced by somebody else, and a report while the vehicle stands
+    far from the target indicates a pause.
     """
 
     name: str
@@ -172,29 +171,29 @@ class AutopilotFlavour:
         return self.mode_names.get(number, f"mode {number}")
 
 
-# ---------------------------------------------------------------- what both fly alike
+# ---------------------------------------------------------------- stages of both
 
 
 def stopping(seen: ObservedVehicle) -> ExpectedTarget | None:
-    """Where it may say that it will come to stand, told to stop now; None while it is not known where it is."""
+    """The place where it may report that it will stop after a stop command now; None without a known position."""
     speed = seen.speed or 0
     within = _STOPS + _STOPS_S * speed + speed * speed // 2_000
     return ExpectedTarget(seen.latitude, seen.longitude, None, within) if seen.located else None
 
 
 def entering(system: int, mode: Px4Mode | CopterMode) -> Stage:
-    """A mode first. Where it is the mode already nothing is sent, for that would undo a takeover under way."""
+    """Enter a mode. If the vehicle is in it already, nothing is sent: that would undo a takeover in progress."""
     message = messages.set_mode(system, mode)
     return Stage(message, messages.DO_SET_MODE, effects.in_mode(mode), frozenset({mode}), MODE_US, spare=True)
 
 
 def arming(system: int, modes: frozenset[int]) -> Stage:
-    """The motors run, in one of these modes."""
+    """Start the motors, in one of these modes."""
     return Stage(messages.arm(system), messages.ARM_DISARM, lambda seen: seen.armed, modes, ARM_US)
 
 
 def climbing(height: int) -> ExpectedProgress:
-    """A climb gets a metre higher."""
+    """The progress of a climb: a metre higher within 10 s."""
     return ExpectedProgress(effects.up_to(height), 10_000_000)
 
 
@@ -202,7 +201,7 @@ def leg(
     message: Message, command: int | None, modes: frozenset[int], place: tuple[int, int], height: int, amsl: int | None,
     repeat_us: int = 0, settled: Message | None = None,
 ) -> Stage:  # fmt: skip
-    """To a place (1e-7 degree) at a height above home, in a straight line: it gets a metre nearer in good time."""
+    """Fly to a place (1e-7 degree) at a height above home in a straight line. Progress: a metre nearer within 8 s."""
     nearer = ExpectedProgress(effects.to_place(*place, height), 8_000_000)
     return Stage(
         message, command, effects.arrived(*place, height), modes, repeat_us=repeat_us, powered=True,
@@ -211,12 +210,12 @@ def leg(
 
 
 def returning(system: int, mode: Px4Mode | CopterMode) -> list[Stage]:
-    """Home, and down there. The window is long: ArduCopter hovers over home for 5 s."""
+    """Return home and land there. The time limit is long: ArduCopter hovers over home for 5 s."""
     return _coming_down(system, mode, ExpectedProgress(effects.homeward, 45_000_000, either_way=True))
 
 
 def landing(system: int, mode: Px4Mode | CopterMode) -> list[Stage]:
-    """Down where it is."""
+    """Land on the spot."""
     return _coming_down(system, mode, ExpectedProgress(effects.to_the_ground, 15_000_000))
 
 

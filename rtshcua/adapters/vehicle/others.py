@@ -1,11 +1,11 @@
-"""What others command over links of their own, as far as it is heard on ours: the autopilot's answers to them."""
+"""Commands of others over their own links, as far as the autopilot's answers are heard on ours."""
 
 from collections.abc import Mapping
 from typing import Final
 
 from rtshcua.mavlink import enums
 
-#: commands after which the vehicle flies otherwise, in words (MAV_CMD)
+#: commands that change how the vehicle flies, in words (MAV_CMD)
 STEERS: Final[Mapping[int, str]] = {
     enums.MAV_CMD_NAV_RETURN_TO_LAUNCH: "a return",
     enums.MAV_CMD_NAV_LAND: "a landing",
@@ -22,12 +22,12 @@ STEERS: Final[Mapping[int, str]] = {
 #: MAV_RESULT: accepted, in progress
 GRANTED: Final = (0, 5)
 WARNING: Final = 4  # MAV_SEVERITY
-#: to ground stations, in at most 50 octets
+#: for ground stations, in at most 50 octets
 CROSSED: Final = "our command crossed yours: check and repeat it"
 
 
 def crossed(what: str, ago_us: int) -> str:
-    """That a frame of ours left so long before something showed, in words."""
+    """That a frame of ours left this long before something showed, in words."""
     return (
         f"a frame of ours left {ago_us // 1_000} ms before this was seen: {what}; if the vehicle does not "
         "do it, repeat the command"

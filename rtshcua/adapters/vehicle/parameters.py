@@ -1,7 +1,5 @@
-"""Parameters of the vehicle, by name: read, or set and seen to be set.
-
-An unknown name is answered by silence, in both flavours, so after a few times it counts as not there; it is asked for
-again now and then.
+"""Parameters of the vehicle by name: read them, or set them and verify the value. Both flavours do not answer unknown
+names, so a parameter without an answer counts as absent after a few requests; it is requested again from time to time.
 """
 
 from dataclasses import dataclass
@@ -15,13 +13,13 @@ from rtshcua.mavlink.parameters import decode, encode, fits
 
 RETRY_US: Final = 1_000_000
 RETRIES: Final = 5
-#: How often one that did not answer is asked for again.
+#: How often an unanswered parameter is requested again.
 AGAIN_US: Final = 10_000_000
 
 
 @dataclass(slots=True)
 class _Wanted:
-    """A parameter that is asked for, or is to be set to `value`."""
+    """A parameter to read, or to set to `value`."""
 
     value: float | None
     tries: int = 0
@@ -30,50 +28,50 @@ class _Wanted:
 
 
 class VehicleParameters:
-    """Each name has one request outstanding. `values` holds what was heard of any that was asked for."""
+    """Has one request outstanding for each name. `values` holds the reported values of requested parameters."""
 
     def __init__(self, *, bytewise: bool, slack: int = 1) -> None:
         self._bytewise = bytewise
         self._slack = slack
         self.values: dict[str, float] = {}
         self._types: dict[str, int] = {}
-        #: what was asked for, or is to be set, and was not answered yet
+        #: parameters to read or set that were not answered yet
         self.outstanding: dict[str, _Wanted] = {}
-        #: what was set: the value that was found, and the one that is wanted
+        #: parameters that were set: the previous and the wanted value
         self.changed: dict[str, tuple[float, float]] = {}
-        #: why the boundary did not let out what was to be set, last
+        #: why the boundary last refused to set a parameter
         self.refused: Refusal | None = None
 
     def read(self, name: str) -> None:
-        """Ask for one that is not asked for yet."""
+        """Request a parameter, unless it was requested already."""
         self.outstanding.setdefault(name, _Wanted(None))
 
     def forget(self, name: str) -> None:
-        """As if it had never been asked for."""
+        """Forget a parameter as if it had never been requested."""
         self.outstanding.pop(name, None)
         self.values.pop(name, None)
 
     def drop(self, name: str) -> None:
-        """Ask for it, or set it, no more; what was heard of it stays."""
+        """Stop reading or setting it; its reported value stays."""
         self.outstanding.pop(name, None)
         self.refused = None
 
     def write(self, name: str, value: float) -> None:
-        """Set one that was read before."""
+        """Set a parameter that was read before."""
         before, _ = self.changed.get(name, (self.values[name], 0.0))
         self.changed[name] = before, value
         self.outstanding[name] = _Wanted(value)
 
     def fits(self, name: str, value: float) -> bool:
-        """Whether one that was read keeps this value as it is, by the type that the vehicle says it has."""
+        """Whether a parameter that was read can hold this value exactly, by its reported type."""
         return fits(value, self._types[name])
 
     def has(self, name: str, bits: int) -> bool:
-        """Whether one that was read has all these bits set."""
+        """Whether a parameter that was read has all these bits."""
         return self._bits(name) & bits == bits
 
     def ensure(self, name: str, bits: int) -> None:
-        """Read it if it was not, and set the bits that it lacks."""
+        """Read it if necessary, and set the missing bits."""
         if name not in self.values:
             self.read(name)
         elif self.is_settled(name) and not self.has(name, bits):
@@ -84,19 +82,19 @@ class VehicleParameters:
         return int(value) if isfinite(value) else 0
 
     def is_absent(self, name: str) -> bool:
-        """Whether it did not answer, as often as it was asked."""
+        """Whether it never answered, after all requests."""
         return name in self.outstanding and self.outstanding[name].silent
 
     def is_known(self, name: str) -> bool:
-        """Whether it answered, or is given up for now."""
+        """Whether it answered or was given up for now."""
         return name in self.values or self.is_absent(name)
 
     def is_settled(self, name: str) -> bool:
-        """Whether nothing about it is outstanding."""
+        """Whether no request about it is outstanding."""
         return name not in self.outstanding
 
     def take(self, message: Any) -> None:
-        """A PARAM_VALUE."""
+        """Take in a PARAM_VALUE."""
         name, value = message.param_id, decode(message.param_value, message.param_type, bytewise=self._bytewise)
         wanted = self.outstanding.get(name)
         if wanted is None and name not in self.values:
@@ -106,7 +104,7 @@ class VehicleParameters:
             del self.outstanding[name]
 
     def due(self, system: int, now_us: int) -> list[Message]:
-        """The requests to send now. What no message can carry, by the type that the vehicle says now, is given up."""
+        """The requests to send now. A value that no message can hold, by the type reported now, is given up."""
         out: list[Message] = []
         unfit: list[str] = []
         for name, wanted in self.outstanding.items():

@@ -1,7 +1,6 @@
-"""How PX4 is made to do each kind of motion.
-
-Altitudes in commands are above mean sea level here, whatever the frame says. An acknowledgement of DO_REPOSITION or
-DO_SET_MODE says nothing: only the heartbeat tells, and of a stop only the speed.
+"""The stages of each kind of motion for PX4. Altitudes in its commands are above mean sea level, whatever the frame
+says. An acknowledgement of DO_REPOSITION or DO_SET_MODE proves nothing: the heartbeat shows the mode, and for a stop
+only the speed counts.
 """
 
 from functools import cache
@@ -42,14 +41,14 @@ def stages(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
 
 @cache
 def _coming_down(system: int, kind: int) -> tuple[Stage, ...]:
-    """Home or down where it is: always the same stages, so they are made once (`Driver` has them made ahead)."""
+    """Return or land: the stages never change, so they are made once (`Driver` has them made in advance)."""
     home = kind == MotionKind.HOME
     return tuple(flavour.returning(system, Px4Mode.RETURN) if home else flavour.landing(system, Px4Mode.LAND))
 
 
 def _climb(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
-    """Armed in Hold, and only then told to take off: it would accept both the other way round, and one that was refused
-    its arming would take off whenever somebody armed it.
+    """Arm in Hold, and then command the takeoff. PX4 also accepts the opposite order, but if the arming was refused, it
+    would take off whenever somebody armed it.
     """
     height, amsl = command.altitude, seen.amsl(command.altitude)
     own = frozenset({Px4Mode.TAKEOFF, Px4Mode.HOLD})
@@ -66,13 +65,15 @@ def _climb(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
 
 
 def _is_above(height: int) -> Effect:
-    """Climbed, and in Hold, which follows by itself: the next leg then asks for no mode, so it takes none."""
+    """Climbed and in Hold, which follows by itself: so the next leg names no mode, and cannot undo a pilot's."""
     climbed = effects.climbed(height)
     return lambda seen: seen.mode == Px4Mode.HOLD and climbed(seen)
 
 
 def _stop(seen: ObservedVehicle, system: int) -> Stage:
-    """Not DO_SET_MODE: in Hold already, flying to a place, PX4 acknowledges that and flies on (vehicles.md 5)."""
+    """A stop by DO_REPOSITION. Not by DO_SET_MODE: in Hold, flying to a place, PX4 acknowledges that and flies on
+    (vehicles.md 5).
+    """
     stop, here = messages.stop_here(system), flavour.stopping(seen)
     return Stage(
         stop, messages.REPOSITION, None, _HOLD, flavour.MODE_US, powered=True, target=here, stops=True,
@@ -98,7 +99,7 @@ PX4 = AutopilotFlavour(
     },
     aims=frozenset({Px4Mode.TAKEOFF, Px4Mode.HOLD}),
     lag_us=20_000,  # 10 to 15 ms, recorded
-    mode_within_us=300_000,  # HEARTBEAT is asked for at twice that rate: by itself it comes each second only
+    mode_within_us=300_000,  # HEARTBEAT is requested at twice that rate: by itself it comes once a second
     returns=(ReturnAltitude("RTL_RETURN_ALT", 1_000),),
     limits=(
         (ReturnLimit("RTL_MIN_DIST", 1_000, returns.near),),

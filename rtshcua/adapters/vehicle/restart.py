@@ -1,8 +1,9 @@
-"""Whose flight it is that a run finds in the air: what an earlier run of ours left it doing, or somebody else's.
+"""Whose flight a run finds in the air: the effect of an earlier run's last command, or somebody else's.
 
-Nothing of ours runs out: PX4 is never flown in Offboard, whose stream would have to go on, and ArduCopter flies to a
-position target without an end (its GUID_TIMEOUT is for velocities). Neither counts our heartbeat as a ground station's
-(vehicles.md 1). So what was told last is in force while there is no process, until somebody, or a failsafe, takes over.
+Our commands do not expire: PX4 is never flown in Offboard, which needs a continuous stream, and ArduCopter flies to a
+position target without a time limit (its GUID_TIMEOUT applies to velocities). Neither autopilot counts our heartbeat as
+a ground station's (vehicles.md 1). So the last command stays in force without a process, until somebody, or a failsafe,
+takes over.
 """
 
 from collections.abc import Iterator
@@ -18,7 +19,7 @@ _LEGS = (MotionKind.FLY, MotionKind.COVER)
 
 
 def flown_by(left: Left, flavour: AutopilotFlavour, seen: ObservedVehicle) -> str:
-    """How it is flown by somebody else; empty where a command that was left in force may be what it does."""
+    """How the vehicle is flown by somebody else; empty where a command still in force may explain it."""
     if left.taken:
         return f"{left.taken}, as the previous run commanded"
     assert seen.mode is not None
@@ -33,13 +34,13 @@ def flown_by(left: Left, flavour: AutopilotFlavour, seen: ObservedVehicle) -> st
 
 
 def modes_of(left: Left | None, flavour: AutopilotFlavour) -> frozenset[int]:
-    """The modes that may still show of what was left in force, which may get there only now."""
+    """The modes that may still show because of commands in force, which may reach the vehicle only now."""
     in_force = () if left is None else left.in_force
     return frozenset(mode for each in in_force for mode in flavour.shows[each.command.kind])
 
 
 def arrives(left: Left | None, flavour: AutopilotFlavour, before: int, mode: int) -> bool:
-    """Whether a change of mode may come from a command that was still on its way: it came after one that shows so."""
+    """Whether a change of mode may come from a command that was in transit: it came after a command that shows so."""
     if left is None:
         return False
     shows = [flavour.shows[each.command.kind] for each in left.in_force]
@@ -47,10 +48,9 @@ def arrives(left: Left | None, flavour: AutopilotFlavour, before: int, mode: int
 
 
 def _goes_there(of: CommandInForce, seen: ObservedVehicle, kept: int) -> bool:
-    """Whether the target that the vehicle names may be the command's; one that names none may go to any.
-
-    `kept`: how far off, in mm, what it names may be from what it named before. To the digit, where another command came
-    after this one: then it most likely obeyed that, and was stopped since.
+    """Whether the vehicle's reported target may be the command's; without a report any command may explain it. `kept`:
+    the tolerance in mm against an earlier report. It is exact where another command came later: then the vehicle most
+    likely obeyed that one and was stopped since.
     """
     if seen.target is None:
         return True
@@ -59,9 +59,8 @@ def _goes_there(of: CommandInForce, seen: ObservedVehicle, kept: int) -> bool:
 
 
 def _targets(of: CommandInForce, seen: ObservedVehicle, kept: int) -> Iterator[ExpectedTarget]:
-    """Where it may say that it flies to: what it said last, and the next place, of which it had said nothing yet.
-
-    Nothing where it goes by a way of its own, or where nobody knows.
+    """The targets that it may report: its last one, and the next place, which it had not reported yet. None where the
+    stages come from a pack or are not known.
     """
     command, named = of
     amsl = None if seen.home_amsl is None else seen.amsl(command.altitude)

@@ -1,5 +1,5 @@
-"""Parameters of the autopilot that lower or lift its way home, and what they have to be for it to fly as high as is
-proved (`decision.volume`): docs/flying/returns.md has the sources.
+"""Parameters of the autopilot that lower or raise its way home, and the values they need so that it flies at the proved
+height (`decision.volume`). Sources: docs/flying/returns.md.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,34 +16,34 @@ _METRE: Final = 1_000  # mm
 
 
 class Need(NamedTuple):
-    """What is needed of a parameter: at least or at most so much, in mm or mm/s; a slope in 1/1000."""
+    """The required range of a parameter: at least or at most this, in mm or mm/s; a slope in 1/1000."""
 
     least: int | None = None
     most: int | None = None
 
 
 def near(vehicle: VehicleLimits) -> Need | None:
-    """How far from home a return may be low at most, where the height of a return is declared."""
+    """The greatest distance from home at which a return may be low, where a return height is declared."""
     return Need(most=cone(vehicle.return_altitude)) if vehicle.return_altitude else None
 
 
 def slope(vehicle: VehicleLimits) -> Need | None:
-    """How steep the cone is at least in which a return is low; 0 is none."""
+    """The least slope of the cone with low returns; 0 for no cone."""
     return Need(least=STEEP * _METRE) if vehicle.return_altitude else None
 
 
 def climb(vehicle: VehicleLimits) -> Need | None:
-    """How much a return climbs at most above both its height and the vehicle's."""
+    """The greatest climb of a return above both its height and the vehicle's."""
     return Need(most=0) if vehicle.return_altitude else None
 
 
 def corner(vehicle: VehicleLimits) -> Need | None:
-    """How far at most from where it is told to turn it turns, and so below its height sets off for home."""
+    """The greatest distance from the turning point at which it turns, and so sets off for home below its height."""
     return Need(most=SHORT) if vehicle.return_altitude else None
 
 
 def plain(vehicle: VehicleLimits) -> Need | None:
-    """A choice of which only 0 is proved: heights above home, a way to home, no rally points."""
+    """A choice of which only 0 is proved: heights above home, a return to home, no rally points."""
     return ONLY_ZERO if vehicle.return_altitude else None
 
 
@@ -51,23 +51,23 @@ ONLY_ZERO: Final = Need(0, 0)
 
 
 class WrongSetting(NamedTuple):
-    """A value that does not fit: the parameter, what it is, and what is accepted, in words and as a value to set."""
+    """A value that does not fit: the parameter, its value and the accepted one, in words and as a value to set."""
 
     parameter: str
     is_now: str
     accepted: str
-    proved: str  # what of the way home would be otherwise
+    proved: str  # the property of the way home that it breaks
 
     @property
     def text(self) -> str:
-        """What is wrong, and what to do."""
+        """What is wrong and what to do."""
         name = self.parameter
         return f"its way home would not be {self.proved} (`{name}` is {self.is_now}): set `{name}` to {self.accepted}"
 
 
 class ReturnLimit(NamedTuple):
-    """A parameter, the mm in one of its units (a choice or a count: 1), what is needed of it, and whether 0 is none and
-    always good. A choice has `words` for its values. `proved` is what it would make otherwise than is proved.
+    """A parameter, the mm in one of its units (a choice or a count: 1), its required range, and whether 0 means "off"
+    and is always accepted. A choice has `words` for its values. `proved` is the property that a wrong value breaks.
     """
 
     parameter: str
@@ -83,7 +83,7 @@ class ReturnLimit(NamedTuple):
         return None if need is None or (self.may_be_off and value == 0) else self.misfit(value, need)
 
     def misfit(self, value: float, need: Need) -> WrongSetting | None:
-        """What is wrong with its value where this is needed."""
+        """What is wrong with its value for this range."""
         has = quantise(value, self.mm, 1)
         least, most = need
         if has is not None and (least is None or has >= least) and (most is None or has <= most):
@@ -98,7 +98,7 @@ class ReturnLimit(NamedTuple):
         return f"{value:g}, {self.words[value]}" if value in self.words else f"{value:g}"
 
 
-#: PX4 and ArduCopter: to a rally point instead of home, along a mission, above the terrain
+#: PX4 and ArduCopter: returns to a rally point, along a mission, or above the terrain
 ELSEWHERE: Final = "to the proved place"
 ABOVE_HOME: Final = "at the proved heights above home"
 RETURNS_TO: Final[Mapping[float, str]] = {
@@ -114,21 +114,23 @@ RALLY_TOTAL: Final = ReturnLimit("RALLY_TOTAL", 1, plain, words={0: "none"}, pro
 
 
 class ReturnLimits:
-    """Of one vehicle, as far as its parameters tell. `limits` are groups of names of the same, of which it has one."""
+    """The limits of one vehicle, as far as it reports its parameters. `limits` holds groups of alternative names, of
+    which it has one.
+    """
 
     def __init__(self, limits: tuple[tuple[ReturnLimit, ...], ...], vehicle: VehicleLimits) -> None:
         self._limits = limits if vehicle.return_altitude else ()
         self._vehicle = vehicle
 
     def ask(self, parameters: VehicleParameters) -> None:
-        """Ask for what is not known yet."""
+        """Request the unknown parameters."""
         for group in self._limits:
             if not any(each.parameter in parameters.values for each in group):
                 for each in group:
                     parameters.read(each.parameter)
 
     def unread(self, parameters: VehicleParameters) -> str | None:
-        """That one was not read yet, in words. What the vehicle does not have limits nothing."""
+        """That a limit was not read yet, in words. A parameter that the vehicle lacks limits nothing."""
         for group in self._limits:
             names = [each.parameter for each in group]
             if not any(name in parameters.values for name in names) and not all(map(parameters.is_absent, names)):
@@ -136,14 +138,14 @@ class ReturnLimits:
         return None
 
     def wrong(self, values: Mapping[str, float]) -> str | None:
-        """The first that leads its way home elsewhere than was proved, in words."""
+        """The first limit that leads its way home elsewhere than proved, in words."""
         every = (each for group in self._limits for each in group if each.parameter in values)
         found = (each.wrong(values[each.parameter], self._vehicle) for each in every)
         return next((wrong.text for wrong in found if wrong is not None), None)
 
     def silent(self, parameters: VehicleParameters) -> list[str]:
-        """Those that did not answer, by the names that they may have: one that is not there limits nothing, but one
-        that is there and stayed silent would.
+        """The groups of parameters without an answer: a missing parameter limits nothing, but an existing one that was
+        not answered may.
         """
         groups = [[each.parameter for each in group] for group in self._limits]
         return [" or ".join(f"`{name}`" for name in group) for group in groups if all(map(parameters.is_absent, group))]
@@ -153,9 +155,8 @@ _UNSUPPORTED: Final = 3  # MAV_MISSION_RESULT
 
 
 class RallyPoints:
-    """How many rally points there are, to which a return may lead that is nearer to them than to home: asked for by the
-    mission protocol where no parameter tells. A vehicle that does not answer counts as one that has none, and that is
-    told.
+    """The number of rally points, to which a return may lead if they are nearer than home: requested by the mission
+    protocol where no parameter holds it. A vehicle that does not answer counts as one without, with a note.
     """
 
     def __init__(self, *, wanted: bool, slack: int = 1) -> None:
@@ -166,7 +167,7 @@ class RallyPoints:
         self._count: int | None = None
 
     def due(self, system: int, now_us: int) -> list[Message]:
-        """The question, where it is due."""
+        """The request, if due."""
         early = self._asked_us is not None and now_us - self._asked_us < self._retry_us
         if not self._wanted or self._count is not None or early:
             return []
@@ -177,7 +178,7 @@ class RallyPoints:
         return [messages.rally_list(system)]
 
     def take(self, name: str, message: Any, system: int) -> list[Message]:
-        """A message of the mission protocol; what answers it."""
+        """Take in a mission message; return the answer."""
         if not self._wanted or message.mission_type != messages.RALLY:
             return []
         if name == "MISSION_COUNT":
@@ -189,18 +190,18 @@ class RallyPoints:
 
     @property
     def silent(self) -> bool:
-        """Whether it was asked often enough, and does not answer."""
+        """Whether it was asked often enough without an answer."""
         return self._silent and self._count is None
 
     @property
     def unread(self) -> str | None:
-        """That their number is not known yet, in words."""
+        """That the number is not known yet, in words."""
         waits = self._wanted and self._count is None and not self.silent
         return "the vehicle's rally points were not counted yet" if waits else None
 
     @property
     def wrong(self) -> str | None:
-        """That there are some, in words."""
+        """That there are rally points, in words."""
         if not self._count:
             return None
         many = "1 rally point" if self._count == 1 else f"{self._count} rally points"

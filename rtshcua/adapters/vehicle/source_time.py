@@ -125,7 +125,7 @@ class VehicleClock:
         return EACH_US
 
     def answer(self, tc1_ns: int, ts1_ns: int, now_us: int) -> bool:
-        """Take in an answer. Return whether the vehicle's clock was set forward, which invalidates all earlier times."""
+        """Take in an answer. Return whether the vehicle's clock was set forward, which invalidates earlier times."""
         sent_us = self._asked.pop(ts1_ns, None)
         if sent_us is None or tc1_ns <= 0 or now_us < sent_us:
             return False

@@ -1,30 +1,30 @@
-"""Whether what would end a flight of ours is shown by more than one frame.
+"""Require more than one frame for evidence that would end a flight of ours.
 
-On a link without a key anybody can put in a frame, and a component with the vehicle's ids does so without meaning to.
-So a report that would end what we do (another mode, a landing, a failsafe, another target, motors that stop) counts
-when the next report of its kind shows the same. Until then no frame that moves the vehicle leaves, and the vehicle is
-asked: that is one round trip. Where the next report says otherwise, two speak as the vehicle; that is noted, and what
-the vehicle does goes on being watched. While reports go back and forth, nobody knows whose the vehicle is: no frame
-that moves it leaves, and what then fails, or waits for 5 s, ends as taken over.
+On a link without a key anybody can insert a frame, and a component with the vehicle's ids does so unintentionally. So a
+report that would end a command (another mode, a landing, a failsafe, another target, stopped motors) counts when the
+next report of its kind confirms it. Until then no frame that moves the vehicle leaves, and the vehicle is asked: that
+takes one round trip. If the next report contradicts it, two senders use the vehicle's ids; that is noted, and the
+vehicle's behaviour is watched further. While reports keep contradicting each other, it is unknown who controls the
+vehicle: no frame that moves it leaves, and a command that then fails, or waits for 5 s, ends as taken over.
 
-A frame of ours that is on its way may undo what a pilot chose, which then shows for a moment: near such a frame a
-single report counts (docs/adr/0034).
+A frame of ours in transit may undo a pilot's choice, which then shows only for a moment: near such a frame a single
+report counts (docs/adr/0034).
 """
 
 from collections import deque
 from typing import Final
 
-#: us: how long after a frame of ours left, besides the round trip, what it undid may show
+#: us: how long after a frame of ours left, plus the round trip, the state that it undid may show
 CROSSED_US: Final = 300_000
-#: us: reports that contradict each other so often within this time are of two
+#: us: this many contradictions within this time come from two senders
 WITHIN_US: Final = 4_000_000
 OFTEN: Final = 3
-#: us of link time: while two speak, what one of them shows counts if the other showed nothing else for so long
+#: us of link time: while two senders contradict each other, an observation counts if none contradicted it for this long
 UNBROKEN_US: Final = 2_500_000
 
 
 class Contradictions:
-    """Values of a report that go back to what they were before, again and again: two report. Times in us."""
+    """Detects values that repeatedly return to an earlier value: two senders report. Times in us."""
 
     def __init__(self) -> None:
         self._last: object = None
@@ -32,7 +32,7 @@ class Contradictions:
         self._returns: deque[int] = deque(maxlen=OFTEN)
 
     def report(self, value: object, now_us: int) -> None:
-        """One report."""
+        """Take in one report."""
         if value == self._last:
             return
         if value == self._before:
@@ -40,40 +40,39 @@ class Contradictions:
         self._before, self._last = self._last, value
 
     def stand(self, now_us: int) -> bool:
-        """Whether two report now."""
+        """Whether two senders report now."""
         return len(self._returns) == OFTEN and now_us - self._returns[0] <= WITHIN_US
 
 
 class Suspicion:
-    """What was reported once, and not confirmed yet. Times in us of link time."""
+    """An observation in one report that is not confirmed yet. Times in us of link time."""
 
     def __init__(self) -> None:
         self._kind: str | None = None
         self._how = ""
         self._reports = 0
         self._since_us = 0
-        #: what was reported and then contradicted, to be told
+        #: an observation that was contradicted, to be reported
         self.refuted: str | None = None
 
     @property
     def stands(self) -> bool:
-        """Whether something waits to be confirmed."""
+        """Whether an observation waits for confirmation."""
         return self._kind is not None
 
     @property
     def how(self) -> str:
-        """What was reported last of what may be a takeover, confirmed or not."""
+        """The last observation that may be a takeover, confirmed or not."""
         return self._how
 
     @property
     def kind(self) -> str | None:
-        """The kind of what waits to be confirmed."""
+        """The kind of the unconfirmed observation."""
         return self._kind
 
     def judge(self, found: tuple[str, str, int] | None, up_us: int, *, disputed: bool, at_once: bool) -> str | None:
-        """What is sure, of what was found: its kind, what it is, and how many reports of its kind there were.
-
-        `disputed`: two speak as the vehicle. `at_once`: a single report counts.
+        """The confirmed part of an observation: its kind, its name, and the number of reports of its kind. `disputed`:
+        two senders use the vehicle's ids. `at_once`: a single report counts.
         """
         if found is None:
             if self._kind is not None:

@@ -119,7 +119,7 @@ def test_a_line_may_come_in_pieces(agents: AgentSocket) -> None:
 
 @pytest.mark.parametrize("line", [b"\n", b"{}\n", b"hello\n", b'{"document":"!!"}\n', b'{"document":"aGk=","x":1}\n',
                                   b'{"document":7}\n', b"\xff\xfe\n", b"[" * 5000 + b"\n"])  # fmt: skip
-def test_what_is_no_such_line_is_answered_and_changes_nothing(agents: AgentSocket, line: bytes) -> None:
+def test_malformed_line_is_answered_and_changes_nothing(agents: AgentSocket, line: bytes) -> None:
     with reader(agents) as link:
         link.sendall(line)
         assert agents.poll(0) is None
@@ -138,7 +138,7 @@ def test_what_is_no_such_line_is_answered_and_changes_nothing(agents: AgentSocke
         (b'{"id":7,\n', 0),
     ],
 )
-def test_what_is_no_such_line_is_answered_by_its_own_number(agents: AgentSocket, line: bytes, number: int) -> None:
+def test_malformed_line_is_answered_with_its_id(agents: AgentSocket, line: bytes, number: int) -> None:
     with reader(agents) as link:
         link.sendall(line)
         assert agents.poll(0) is None
@@ -226,7 +226,7 @@ def test_one_process_has_no_more_places_than_its_share(agents: AgentSocket) -> N
 
 
 @pytest.mark.parametrize("alike", [False, True])
-def test_nobody_makes_place_whose_words_were_not_looked_at(
+def test_reader_with_pending_document_keeps_its_place(
     agents: AgentSocket, monkeypatch: pytest.MonkeyPatch, alike: bool
 ) -> None:
     """What came in, and waits for its turn, is not thrown away for whoever comes later."""
@@ -329,7 +329,7 @@ def test_a_socket_that_a_crash_left_is_replaced_and_a_file_never_is(folder: Path
     assert (folder / "file").read_text() == "mine"
 
 
-def test_what_somebody_put_in_the_place_of_a_socket_is_left_there(folder: Path) -> None:
+def test_foreign_file_at_socket_path_is_kept(folder: Path) -> None:
     path = folder / "socket"
     ours = AgentSocket(path, lambda: HELLO)
     path.unlink()
@@ -372,7 +372,7 @@ def test_a_client_hands_in_and_waits_for_its_answer(agents: AgentSocket) -> None
         (b"x" * 400_000, "its line is too long"),
     ],
 )
-def test_a_client_of_what_is_no_flight(folder: Path, monkeypatch: pytest.MonkeyPatch, says: bytes, found: str) -> None:
+def test_client_refuses_other_program(folder: Path, monkeypatch: pytest.MonkeyPatch, says: bytes, found: str) -> None:
     """Whoever listens at a path may say anything; who recalls a flight there is told so."""
     monkeypatch.setattr(agent_socket, "LONGEST_TOLD", 200_000)
     with socket.socket(socket.AF_UNIX) as listener:
@@ -418,7 +418,7 @@ def listener(folder: Path, *says: bytes, every_s: float = 0.0) -> Iterator[Path]
             thread.join(10)
 
 
-def test_a_follower_of_what_never_says_which_flight_it_is_waits_so_long_in_all(folder: Path) -> None:
+def test_follower_waits_a_limited_time_for_identity(folder: Path) -> None:
     """However often something comes."""
     with listener(folder, *[b" "] * 1_000, every_s=0.01) as path, pytest.raises(TimeoutError):
         FlightFollower(path, patience_s=0.1)
@@ -437,7 +437,7 @@ def test_a_follower_of_what_never_says_which_flight_it_is_waits_so_long_in_all(f
     ],
     ids=["a flood", "a late hello", "no end", "no id"],
 )
-def test_a_follower_of_what_is_no_flight(folder: Path, says: tuple[bytes, ...], found: str) -> None:
+def test_follower_refuses_other_program(folder: Path, says: tuple[bytes, ...], found: str) -> None:
     with listener(folder, *says) as path, pytest.raises(ConnectionError, match=found):
         FlightFollower(path)
 
@@ -455,7 +455,7 @@ def test_a_follower_hears_what_came_with_the_first_line_and_a_long_line_in_piece
     assert heard == [hello, long, FlightReply("accepted", "well")]
 
 
-def test_a_client_of_nobody(folder: Path) -> None:
+def test_client_without_a_flight_fails(folder: Path) -> None:
     with pytest.raises(OSError, match="No such file") as raised:
         hand_in(folder / "nothing", b"paper")
     assert raised.value.filename == str(folder / "nothing")

@@ -79,7 +79,7 @@ def stops(found: dict[str, VehicleFinding]) -> set[str]:
 
 
 @FLAVOURS
-def test_a_vehicle_that_is_well(flavour: str) -> None:
+def test_healthy_vehicle_has_no_findings(flavour: str) -> None:
     sent: list[bytes] = []
 
     def watch(vehicle: VirtualVehicle) -> None:
@@ -120,7 +120,7 @@ def test_a_vehicle_that_is_well(flavour: str) -> None:
         ("ardupilot", {"FS_EKF_ACTION": 0.0}, "settings/fs_ekf_action", "land", "set `FS_EKF_ACTION` to 1"),
     ],
 )
-def test_a_parameter_that_interferes_says_what_is_needed_and_how_to_change_it(
+def test_interfering_parameter_names_need_and_remedy(
     flavour: str, parameters: dict[str, float], slug: str, needed: str, advice: str
 ) -> None:
     found = examine(case.simulated(flavour, parameters=tuple(parameters.items())))
@@ -152,7 +152,7 @@ SLOW = {
 
 
 @FLAVOURS
-def test_what_is_slower_than_the_vehicle_says_is_told(flavour: str) -> None:
+def test_slow_speed_parameter_is_reported(flavour: str) -> None:
     policy = case.policy()
     policy = replace(policy, vehicle=replace(policy.vehicle, speeds=SPEEDS))
     parameters = tuple((name, float(value)) for name, (value, _) in SLOW[flavour].items())
@@ -164,7 +164,7 @@ def test_what_is_slower_than_the_vehicle_says_is_told(flavour: str) -> None:
         assert f"set `{name}` to {better:g}" in finding.advice, name
 
 
-def test_a_return_as_fast_as_anything_else_is_compared_as_that() -> None:
+def test_return_speed_of_zero_is_compared_as_cruise_speed() -> None:
     """RTL_SPEED 0 is the speed of WPNAV_SPEED."""
     policy = case.policy()
     policy = replace(policy, vehicle=replace(policy.vehicle, speeds=SPEEDS))
@@ -177,7 +177,7 @@ def test_a_return_as_fast_as_anything_else_is_compared_as_that() -> None:
 
 
 @FLAVOURS
-def test_what_bounds_nothing_is_told_and_well(flavour: str) -> None:
+def test_unlimited_bounds_are_ok(flavour: str) -> None:
     found = examine(case.simulated(flavour))
     told = {slug: each.verdict for slug, each in found.items() if slug.startswith("settings/")}
     bounds = {
@@ -187,7 +187,7 @@ def test_what_bounds_nothing_is_told_and_well(flavour: str) -> None:
     assert {told[slug] for slug in bounds} == {MissionVerdict.OK}
 
 
-def test_what_is_no_multirotor_is_refused() -> None:
+def test_doctor_stops_for_other_than_multirotor() -> None:
     def winged(vehicle: VirtualVehicle) -> None:
         sender = Codec(1, 1)
 
@@ -260,9 +260,7 @@ def test_another_return_altitude_than_the_policy_says() -> None:
         ("ardupilot", ("RALLY_TOTAL", 2.0), "0, none"),
     ],
 )
-def test_what_lowers_or_lifts_the_way_home_stops_a_mission(
-    flavour: str, parameter: tuple[str, float], needed: str
-) -> None:
+def test_parameter_that_changes_way_home_stops_mission(flavour: str, parameter: tuple[str, float], needed: str) -> None:
     policy = case.policy()
     policy = replace(policy, vehicle=replace(policy.vehicle, return_altitude=16_000))
     found = examine(case.simulated(flavour, parameters=(parameter,)), policy)
@@ -286,7 +284,7 @@ def test_it_advises_a_key_only_where_the_release_takes_one(
 
 
 @FLAVOURS
-def test_a_low_battery_that_nobody_sees_stops_a_mission(flavour: str) -> None:
+def test_unnoticed_low_battery_stops_mission(flavour: str) -> None:
     """Where the autopilot does nothing about it, and the policy goes by the charge alone."""
     name = "COM_LOW_BAT_ACT" if flavour == "px4" else "BATT_FS_LOW_ACT"
     config = case.simulated(flavour, parameters=((name, 0.0),))
@@ -306,7 +304,7 @@ def with_cells(policy: Policy, cells: int) -> Policy:
 
 
 @FLAVOURS
-def test_another_number_of_cells_than_the_battery_has_stops_a_mission(flavour: str) -> None:
+def test_wrong_number_of_cells_stops_mission(flavour: str) -> None:
     config = case.simulated(flavour)
     right = examine(config, with_cells(case.policy(), 4))["sensor/cells"]
     assert (right.verdict, right.found[:3]) == (MissionVerdict.OK, "4.2")
@@ -323,7 +321,7 @@ def test_a_drain_is_not_missed_on_the_ground() -> None:
     assert "measured in the air only" in found["signal/battery.drain"].found
 
 
-def test_what_settles_by_itself_is_named_until_it_has() -> None:
+def test_doctor_names_what_is_still_settling() -> None:
     seen: list[str | None] = []
 
     def watched(vehicle: VirtualVehicle) -> None:
@@ -407,7 +405,7 @@ def test_a_signal_that_nobody_sends() -> None:
 
 
 @FLAVOURS
-def test_where_the_kernel_vouches_for_no_clock_the_vehicles_time_counts(flavour: str) -> None:
+def test_vehicle_time_counts_without_synchronised_clock(flavour: str) -> None:
     told = examine(case.simulated(flavour, utc_us=case.flat.ISSUED), utc_error_us=None)["mission/clock"]
     assert told.verdict is MissionVerdict.OK
     silent = case.simulated(flavour, faults=(MessageSilence(0, "SYSTEM_TIME"),))
@@ -417,7 +415,7 @@ def test_where_the_kernel_vouches_for_no_clock_the_vehicles_time_counts(flavour:
 
 
 @FLAVOURS
-def test_where_the_boundary_would_not_take_it_the_vehicles_time_does_not_count(flavour: str) -> None:
+def test_vehicle_time_is_unused_where_boundary_refuses_it(flavour: str) -> None:
     config = case.simulated(flavour, utc_us=case.flat.ISSUED)
     stop = examine(config, utc_error_us=None, vehicle_counts=False)["mission/clock"]
     assert stop.verdict is MissionVerdict.STOP
@@ -440,7 +438,7 @@ def test_a_lossy_link() -> None:
     assert "link/loss" in stops(found)
 
 
-def test_another_one_that_mediates_and_a_ground_station() -> None:
+def test_second_mediator_and_ground_station_are_reported() -> None:
     twin, station = Codec(1, 191), Codec(255, 190)
 
     def crowded(vehicle: VirtualVehicle) -> None:
@@ -475,7 +473,7 @@ def signed(flavour: str, seconds: int = 14, **words: Any) -> dict[str, VehicleFi
     return {each.slug: each for each in findings}
 
 
-def test_a_signal_that_nobody_signs_stops_a_mission_that_needs_it() -> None:
+def test_unsigned_needed_signal_stops_mission() -> None:
     policy = case.policy()
     found = signed("ardupilot", unheard=unheard(policy, {"RADIO_STATUS"}))
     assert stops(found) == {"signal/link.quality"}
@@ -483,7 +481,7 @@ def test_a_signal_that_nobody_signs_stops_a_mission_that_needs_it() -> None:
 
 
 @FLAVOURS
-def test_one_that_answers_signed_frames_only_is_stopped_by_that_alone_where_no_key_was_given(flavour: str) -> None:
+def test_signing_vehicle_without_key_is_the_only_stop(flavour: str) -> None:
     utc_us = VirtualClock().now().utc_us
     found = examine(case.simulated(flavour, signing_key=KEY, utc_us=utc_us))
     assert stops(found) == {"link/signing"}
@@ -494,13 +492,13 @@ def test_one_that_answers_signed_frames_only_is_stopped_by_that_alone_where_no_k
     assert {each.verdict for each in signals.values()} <= {MissionVerdict.OK, MissionVerdict.UNKNOWN}, signals
 
 
-def test_what_is_not_believed_is_no_value() -> None:
+def test_ignored_radio_frames_give_no_link_quality() -> None:
     found = signed("ardupilot")
     assert found["signal/link.quality"].verdict is MissionVerdict.STOP, "the radio's frames are heard, and not taken in"
 
 
 @pytest.mark.parametrize(("return_mm", "said"), [(case.LOW, "home and return altitude are"), (0, "no `return at`")])
-def test_only_what_was_compared_is_said_to_be_that_of_the_policy(return_mm: int, said: str) -> None:
+def test_doctor_names_only_compared_values(return_mm: int, said: str) -> None:
     policy = case.policy()
     policy = replace(policy, vehicle=replace(policy.vehicle, return_altitude=return_mm))
     found = examine(case.simulated("px4", return_mm=case.LOW), policy)["mission/place"]
@@ -509,7 +507,7 @@ def test_only_what_was_compared_is_said_to_be_that_of_the_policy(return_mm: int,
     assert ("return altitude are" in found.found) == bool(return_mm)
 
 
-def test_what_was_never_learned_is_not_well() -> None:
+def test_unreported_facts_are_not_ok() -> None:
     policy = case.policy()
     policy = replace(policy, vehicle=replace(policy.vehicle, return_altitude=47_000))
     codec = Codec(0, 0)
@@ -574,7 +572,7 @@ def test_an_agent_that_runs_as_the_operator_is_not_told_apart(user: int, own: in
 @pytest.mark.parametrize(("flavour", "name", "has", "meant"), [
     ("ardupilot", "FENCE_RADIUS", 30.0, 300.0), ("px4", "GF_MAX_HOR_DIST", 2.0, 300.0),
 ])  # fmt: skip
-def test_what_a_flight_would_set_is_told_and_judged(flavour: str, name: str, has: float, meant: float) -> None:
+def test_values_of_set_option_are_reported_and_judged(flavour: str, name: str, has: float, meant: float) -> None:
     config = case.simulated(flavour, parameters=((name, has),))
     slug, sent = f"settings/{name.lower()}", [0]
 
@@ -599,7 +597,7 @@ def test_what_a_flight_would_set_is_told_and_judged(flavour: str, name: str, has
     assert sent == [0], "nothing is set"
 
 
-def test_a_zero_that_stands_for_something_is_said_as_that() -> None:
+def test_zero_with_a_meaning_is_shown_as_its_meaning() -> None:
     fence = next(each for each in SETTINGS["px4"] if each.parameter == "GF_MAX_HOR_DIST")
     found = {value: _setting(fence, value, None, None, None).found for value in (0.0, 300.0)}
     assert found[0.0] == "radius of its own fence around home: no limit (GF_MAX_HOR_DIST = 0)"

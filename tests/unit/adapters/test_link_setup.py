@@ -89,7 +89,9 @@ def test_the_key_holds_and_that_was_seen(flavour: str, config: dict[str, Any]) -
         ("px4", {"release": (1, 17), "usb": True, "parameters": (("MAV_SIGN_CFG", 2.0),)}, True, False),
     ],
 )
-def test_what_does_not_hold_is_seen_too(flavour: str, config: dict[str, Any], signs: bool, unsigned: bool) -> None:
+def test_link_setup_detects_key_without_full_effect(
+    flavour: str, config: dict[str, Any], signs: bool, unsigned: bool
+) -> None:
     seen = Bench(flavour, **config).set_up()
     assert isinstance(seen, SetUp)
     assert (seen.signs, seen.answers_signed, seen.answers_unsigned) == (signs, True, unsigned)
@@ -126,7 +128,7 @@ def told_wrongly(setup: LinkSetup, state: int | None, autopilot: Codec) -> Refus
     return setup.result
 
 
-def test_who_is_not_known_to_stand_on_the_ground_gets_no_key() -> None:
+def test_vehicle_not_known_on_ground_gets_no_key() -> None:
     assert told_wrongly(LinkSetup(KEY, UTC_US, 0), 2, Codec(1, 1)).slug == "not-landed"
     assert told_wrongly(LinkSetup(KEY, UTC_US, 0), None, Codec(1, 1)).slug == "not-landed"
 
@@ -188,9 +190,7 @@ def test_another_sender_is_noticed_and_gets_nothing(other: int, wanted: int | No
 
 
 @BOTH
-def test_a_key_that_is_lost_on_the_way_is_sent_again_and_a_lost_link_is_no_proof(
-    flavour: str, config: dict[str, Any]
-) -> None:
+def test_lost_key_is_resent_and_lost_link_proves_nothing(flavour: str, config: dict[str, Any]) -> None:
     bench = Bench(flavour, **config)
     seen = bench.set_up(lose=lambda frame: KEY in frame and bench.keys_sent < 3)
     assert isinstance(seen, SetUp)
@@ -212,5 +212,7 @@ def test_a_key_that_is_lost_on_the_way_is_sent_again_and_a_lost_link_is_no_proof
         ("px4", None, "does not report its release"),
     ],
 )
-def test_what_each_release_does_is_said(autopilot: str, release: tuple[int, int, int] | None, says: str) -> None:
+def test_link_setup_describes_signing_of_each_release(
+    autopilot: str, release: tuple[int, int, int] | None, says: str
+) -> None:
     assert says in after_setup(autopilot, release)

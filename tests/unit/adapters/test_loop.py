@@ -102,7 +102,7 @@ def test_actions_are_carried_out_in_their_order() -> None:
     assert world.saw == [(Now(1_000, 1_000, 0), [], actions)]
 
 
-def test_what_is_late_is_not_sent_and_the_runtime_is_told() -> None:
+def test_late_command_is_not_sent_and_is_reported() -> None:
     world = World([command(7, 999, needs_record=False)])
     world.loop.turn()
     assert world.did == []
@@ -111,7 +111,7 @@ def test_what_is_late_is_not_sent_and_the_runtime_is_told() -> None:
     assert world.polled == [WAIT_US, 0]  # and told at once
 
 
-def test_what_could_not_be_recorded_is_withheld() -> None:
+def test_unrecorded_command_is_withheld() -> None:
     world = World([Append(b"1", WRITTEN), command(7, 1_000, needs_record=True)])
     world.full = True
     world.loop.turn()
@@ -204,7 +204,7 @@ def test_a_fallback_passes_a_step_that_waits_and_replaces_it() -> None:
     assert world.did == [("begin", 8), b"violated"]
 
 
-def test_what_a_fallback_is_recorded_by_is_handed_over_whatever_becomes_of_its_frame() -> None:
+def test_record_of_fallback_is_appended_even_if_its_frame_fails() -> None:
     world = World([Append(b"1", WRITTEN), command(7, 1_000, needs_record=False), Append(b"2", WRITTEN)])
 
     def refuses(command: Command, now_us: int) -> None:

@@ -54,7 +54,7 @@ def package(install: Install, name: str, points: str = "", more: str = "", pack:
     install(f"{name}_code", "", FOLDER.format(name) + more)
 
 
-def test_what_ships_comes_through_the_door() -> None:
+def test_shipped_packs_use_the_entry_point() -> None:
     shipped = packs.manoeuvres(frozenset())
     assert shipped == {"px4": px4.stages, "ardupilot": ardupilot.stages}
     folder = packs.folder("lib")
@@ -120,7 +120,7 @@ def test_a_broken_manoeuvre_stops_the_flight_before_it_begins(install: Install, 
         packs.manoeuvres(frozenset({"acme"}))
 
 
-def test_a_pack_that_two_packages_bring_is_nobodys(install: Install) -> None:
+def test_pack_of_two_packages_is_refused(install: Install) -> None:
     package(install, "acme")
     package(install, "evil", pack="acme")
     with pytest.raises(packs.BrokenPack, match=r"is provided by the package `\w+` and the package `\w+`"):

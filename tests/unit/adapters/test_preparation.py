@@ -55,7 +55,7 @@ def test_nothing_is_read_or_written_where_nothing_is_configured() -> None:
     assert sent == []
 
 
-def test_what_is_so_already_is_not_written_and_not_owed() -> None:
+def test_parameter_with_wanted_value_is_not_written() -> None:
     owed: dict[str, Owed] = {}
     one = flight(HAD, owed)
     sent = writes(one)
@@ -85,7 +85,7 @@ def test_a_vehicle_that_keeps_its_own_value_refuses_the_mission(monkeypatch: pyt
     assert owed == {}, "it is what it was"
 
 
-def test_what_its_owner_changed_meanwhile_is_left_so() -> None:
+def test_parameter_changed_by_others_is_not_restored() -> None:
     owed: dict[str, Owed] = {}
     one = flight({"FENCE_ALT_MAX": 80.0}, owed)
 
@@ -103,7 +103,7 @@ def test_what_its_owner_changed_meanwhile_is_left_so() -> None:
 
 
 @pytest.mark.parametrize(("found", "says"), [(15.0, []), (30.0, ["somebody else"])], ids=["as before", "by others"])
-def test_what_an_earlier_run_owes_is_dropped_where_it_is_not_what_that_set(found: float, says: list[str]) -> None:
+def test_owed_parameter_with_another_value_is_dropped(found: float, says: list[str]) -> None:
     owed = {"FENCE_ALT_MAX": Owed(bits(15.0), bits(80.0))}
     one = flight({}, owed)
     one.vehicle.simulation._autopilot.parameters.own("FENCE_ALT_MAX", found)
@@ -114,7 +114,7 @@ def test_what_an_earlier_run_owes_is_dropped_where_it_is_not_what_that_set(found
     assert [each in str(line) for each, line in zip(says, told, strict=True)] == [True] * len(says)
 
 
-def test_what_an_earlier_run_owes_is_put_back_to_what_it_was_at_first() -> None:
+def test_owed_parameter_is_restored_to_its_first_value() -> None:
     owed = {"FENCE_ALT_MAX": Owed(bits(15.0), bits(60.0))}
     one = flight({"FENCE_ALT_MAX": 80.0}, owed)
     one.vehicle.simulation._autopilot.parameters.own("FENCE_ALT_MAX", 60.0)
@@ -129,7 +129,7 @@ def test_what_an_earlier_run_owes_is_put_back_to_what_it_was_at_first() -> None:
     assert flown.audit().report.failure is None
 
 
-def test_what_cannot_be_put_back_first_is_not_set(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_parameter_that_cannot_be_restored_first_is_not_set(monkeypatch: pytest.MonkeyPatch) -> None:
     owed = {"FENCE_ALT_MAX": Owed(bits(15.0), bits(60.0))}
     one = flight({"FENCE_ALT_MAX": 80.0}, owed)
     parameters = one.vehicle.simulation._autopilot.parameters
@@ -142,7 +142,7 @@ def test_what_cannot_be_put_back_first_is_not_set(monkeypatch: pytest.MonkeyPatc
     assert flown.audit().report.failure is None
 
 
-def test_what_is_owed_beside_what_is_configured_is_put_back_first() -> None:
+def test_other_owed_parameters_are_restored_first() -> None:
     owed = {"FENCE_RADIUS": Owed(bits(300.0), bits(400.0))}
     one = flight({"FENCE_ALT_MAX": 80.0}, owed)
     one.vehicle.simulation._autopilot.parameters.own("FENCE_RADIUS", 400.0)
@@ -152,7 +152,7 @@ def test_what_is_owed_beside_what_is_configured_is_put_back_first() -> None:
 
 
 @pytest.mark.parametrize("what", ["the log", "what is owed"])
-def test_what_cannot_be_recorded_is_not_set(what: str) -> None:
+def test_unrecorded_parameters_are_not_set(what: str) -> None:
     one = flight({"FENCE_ALT_MAX": 80.0})
     sent = writes(one)
 
@@ -183,7 +183,7 @@ def test_a_vehicle_that_never_says_that_it_stands_is_not_written_to() -> None:
     assert sent == []
 
 
-def test_what_the_vehicle_makes_of_a_value_is_put_back(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_value_adapted_by_vehicle_is_restored(monkeypatch: pytest.MonkeyPatch) -> None:
     owed: dict[str, Owed] = {}
     one = flight({"FENCE_ALT_MAX": 80.5}, owed)
     parameters = one.vehicle.simulation._autopilot.parameters

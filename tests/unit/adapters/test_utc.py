@@ -195,7 +195,7 @@ def test_the_boundarys_clock_counts_and_no_other() -> None:
     assert not watch.look(SourceTime(), "px4", 0)
 
 
-def test_what_the_operator_stated_holds_once_no_more_is_waited_for() -> None:
+def test_stated_utc_error_holds_once_waiting_ends() -> None:
     own = Own(number=77)
     own.stated = ClockSource.OPERATOR
     watch = UtcWatch(SystemClock(), 500, kernel_us=lambda: None)

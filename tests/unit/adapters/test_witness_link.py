@@ -364,7 +364,7 @@ def test_strangers_are_not_heard(serve: Callable[..., Served], writer: Writer) -
     assert {request.note for request in served.asked} == set(writer.log.notes[:1]), "however often it was asked"
 
 
-def test_answers_that_are_none(writer: Writer) -> None:
+def test_malformed_witness_answers_are_ignored(writer: Writer) -> None:
     """Whoever sits on the link may answer anything: it is only ever asked again."""
     codec = Codec(255, 155)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as liar:

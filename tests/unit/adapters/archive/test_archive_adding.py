@@ -44,7 +44,7 @@ def entries(folder: ArchiveFolder) -> list[ArchiveEntry]:
     return list(index.read_catalogue(folder).values())
 
 
-def test_what_is_known_of_a_log(take: Add, fleet: Path, folder: ArchiveFolder) -> None:
+def test_archive_entry_describes_its_log(take: Add, fleet: Path, folder: ArchiveFolder) -> None:
     first, second = take([fleet / "quad-07-0.jsonl", fleet / "quad-07-1.jsonl"])
     data = (fleet / "quad-07-0.jsonl").read_bytes()
     lines = data.splitlines(keepends=True)
@@ -179,9 +179,7 @@ def test_of_an_unclosed_log_only_what_is_signed_for_is_indexed(
 
 
 @pytest.mark.slow
-def test_what_is_changed_in_the_archive_is_found_and_no_longer_answers(
-    take: Add, fleet: Path, folder: ArchiveFolder
-) -> None:
+def test_changed_archive_file_is_found_and_excluded(take: Add, fleet: Path, folder: ArchiveFolder) -> None:
     one, other = take([fleet / "quad-07-0.jsonl", fleet / "quad-08-0.jsonl"])
     path = folder.log(one.entry.log)
     data = bytearray(path.read_bytes())
@@ -281,7 +279,7 @@ def test_only_one_at_a_time_changes_an_archive(folder: ArchiveFolder, take: Add,
         take([fleet / "quad-07-0.jsonl"])
 
 
-def test_what_cannot_be_read_ends_it_with_the_others_done(take: Add, fleet: Path, folder: ArchiveFolder) -> None:
+def test_unreadable_log_ends_adding_after_the_others(take: Add, fleet: Path, folder: ArchiveFolder) -> None:
     with pytest.raises(FileNotFoundError):
         take([fleet / "quad-07-0.jsonl", fleet / "gone.jsonl", fleet / "quad-07-1.jsonl"])
     assert len(entries(folder)) == 1
@@ -366,7 +364,7 @@ SAID = (
 )  # fmt: skip
 
 
-def test_what_the_world_said_is_kept_as_it_is(take: Add, tmp_path: Path, folder: ArchiveFolder) -> None:
+def test_texts_of_others_are_archived_unchanged(take: Add, tmp_path: Path, folder: ArchiveFolder) -> None:
     key, now = case.KEYS[Duty.LOG], Now(5_000_000, generated_logs.BEGUN_US, 1_000)
     recorder = Recorder(lambda text: key.sign(text, duty=Duty.LOG), key.public, lambda: bytes(32))
     lines = [

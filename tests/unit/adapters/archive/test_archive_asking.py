@@ -42,7 +42,7 @@ def rows(folder: ArchiveFolder, name: str, **conditions: object) -> list[tuple[o
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", canned())
-def test_what_ships_says_what_it_tells_and_answers(name: str, asker: ArchiveReader) -> None:
+def test_shipped_queries_describe_themselves_and_run(name: str, asker: ArchiveReader) -> None:
     question = canned()[name]
     assert len(question.tells) > 20
     assert not question.tells.startswith("--")

@@ -66,13 +66,13 @@ def test_a_stop_is_held_to_the_brakes_that_are_declared(way_mm: int, took_us: in
     assert found.limit == 7_300
 
 
-def test_where_none_are_declared_it_is_held_to_what_is_taken_for_granted_then() -> None:
+def test_stop_without_declared_brakes_is_judged_by_default() -> None:
     found = checks(POLICY, leg(7_400, 4 * S))["stop/fly"]
     assert found.outcome == HELD
     assert "no `brakes` declared" in found.expected
 
 
-def test_what_never_stands_does_not_stop_and_does_not_hold() -> None:
+def test_moving_vehicle_fails_stop_and_hold() -> None:
     flown = leg(7_000, 4 * S)
     flown.samples[-1] = flown.samples[-1]._replace(speed=900)
     found = checks(BRAKED, flown)
@@ -80,7 +80,7 @@ def test_what_never_stands_does_not_stop_and_does_not_hold() -> None:
     assert found["stop/fly"].measured.startswith("the vehicle does not stop")
 
 
-def test_what_strays_while_it_holds_is_seen_at_any_speed() -> None:
+def test_drift_while_holding_fails_hold() -> None:
     flown = leg(7_000, 4 * S)
     flown.samples[-1] = flown.samples[-1]._replace(latitude=place(10_500))
     assert checks(BRAKED, flown)["hold/fly"].outcome == FAILED
@@ -231,7 +231,7 @@ def test_a_fence_that_its_parameters_leave_off_is_no_fence() -> None:
     assert checks(BRAKED, leg(7_000, 4 * S))["fence/on"].outcome == UNCHECKED
 
 
-def test_what_was_not_flown_is_unchecked_with_the_reason() -> None:
+def test_unflown_sortie_is_unchecked_with_reason() -> None:
     found = checks(BRAKED, missing={"leg": "not today", "climb": "too windy"})
     assert found["stop/fly"].measured == "not today"
     assert found["land/down"].measured == "too windy"

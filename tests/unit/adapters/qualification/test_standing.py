@@ -25,12 +25,12 @@ RECORD = Qualification(
 )  # fmt: skip
 
 
-def test_one_that_is_as_it_was_is_qualified() -> None:
+def test_unchanged_vehicle_is_qualified() -> None:
     stands = standing(RECORD, VERSION, dict(PARAMETERS))
     assert stands == (True, "qualified on 2026-01-01 for px4 1.16.0: 3 checks hold, 1 was not made")
 
 
-def test_one_of_which_a_part_was_flown_is_partly_qualified() -> None:
+def test_partly_flown_vehicle_is_partly_qualified() -> None:
     assert [each.name for each in SORTIES if each.takeover is None] == list(WHOLE)
     stands = standing(replace(RECORD, checks=(FLOWN[0], HELD, LEFT)), VERSION, dict(PARAMETERS))
     assert stands == (False, "this vehicle is only partly qualified: not flown: leg (`--only`)")
@@ -51,7 +51,7 @@ def test_a_simulation_qualifies_no_vehicle() -> None:
         (replace(RECORD, checks=(LEFT,)), "nothing was checked"),
     ],
 )
-def test_one_that_was_not_or_did_not_hold_is_none(record: Any, says: str) -> None:
+def test_failed_or_missing_record_does_not_qualify(record: Any, says: str) -> None:
     stands = standing(record, VERSION, dict(PARAMETERS))
     assert not stands.qualified
     assert stands.text.startswith("this vehicle is not qualified: ")
@@ -71,13 +71,13 @@ def test_one_that_was_not_or_did_not_hold_is_none(record: Any, says: str) -> Non
         (VERSION, PARAMETERS[:1], "1 of its parameters are not reported now"),
     ],
 )
-def test_one_that_changed_or_does_not_say_is_none(firmware: Any, parameters: Any, says: str) -> None:
+def test_changed_or_silent_vehicle_is_not_qualified(firmware: Any, parameters: Any, says: str) -> None:
     stands = standing(RECORD, firmware, dict(parameters))
     assert not stands.qualified
     assert says in stands.text
 
 
-def test_what_a_run_switches_itself_does_not_matter() -> None:
+def test_parameters_switched_by_runs_do_not_matter() -> None:
     from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 
     values = {"FENCE_ENABLE": 1.0, "FENCE_TYPE": 7.0, "FENCE_RADIUS": 150.0, "UNHEARD_OF": 1.0}

@@ -42,7 +42,7 @@ def test_a_file_that_ends_in_the_middle(tmp_path: Path) -> None:
         assert read_notes(path)[-1] == MARKS[3]
 
 
-def test_what_cannot_be_read_says_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unreadable_anchor_files_are_ignored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     os.mkfifo(tmp_path / "pipe.anchors")
     (tmp_path / "folder.anchors").mkdir()
     (tmp_path / "gone.anchors").symlink_to(tmp_path / "nowhere")

@@ -8,7 +8,7 @@ from rtshcua.adapters.store.vehicle_records import BoundarySession, BoundaryStor
 from rtshcua.wire.boundary_chain import START
 
 
-def test_what_was_kept_last_is_there(tmp_path: Path) -> None:
+def test_boundary_store_returns_last_session(tmp_path: Path) -> None:
     store = BoundaryStore(tmp_path, "quad/07")
     assert store.kept() == BoundarySession(0, START)
     store.keep(1, b"a" * 32)

@@ -32,7 +32,7 @@ def test_another_log_is_never_replaced(tmp_path: Path) -> None:
     assert (tmp_path / "log").read_bytes() == b"old\n"
 
 
-def test_what_someone_else_appends_is_not_overwritten(tmp_path: Path) -> None:
+def test_foreign_appended_data_is_not_overwritten(tmp_path: Path) -> None:
     log = EvidenceFile(tmp_path / "log")
     with (tmp_path / "log").open("ab") as other:
         other.write(b"other\n")
@@ -89,7 +89,7 @@ def test_a_refused_line_waits_and_is_written_later_in_its_place(tmp_path: Path) 
     assert (tmp_path / "log").read_bytes() == b"one\ntwo\nthree\nfour\n"
 
 
-def test_what_waits_is_written_on_closing(tmp_path: Path) -> None:
+def test_waiting_lines_are_written_on_close(tmp_path: Path) -> None:
     disk = FaultyDisk(0)
     log = EvidenceFile(tmp_path / "log", disk)
     with pytest.raises(OSError, match="No space left"):

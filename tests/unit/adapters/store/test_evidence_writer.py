@@ -41,7 +41,7 @@ def test_lines_are_kept_in_their_order(writer: EvidenceWriter, path: Path) -> No
     assert writer.trouble() is None
 
 
-def test_nobody_waits_for_a_disk_that_stands_still(writer: EvidenceWriter, disk: FaultyDisk, path: Path) -> None:
+def test_stalled_disk_blocks_nobody(writer: EvidenceWriter, disk: FaultyDisk, path: Path) -> None:
     disk.open["write"].clear()
     assert [writer.append(b"x\n", WRITTEN) for _ in range(4)] == [1, 2, 3, 4]
     assert (writer.kept, writer.waiting) == (0, 4)
@@ -67,7 +67,7 @@ def test_a_line_is_kept_when_it_is_written_and_one_of_the_highest_class_is_synce
     writer.close()
 
 
-def test_what_is_to_be_synced_is_synced_in_time_however_much_comes_after_it(disk: FaultyDisk, path: Path) -> None:
+def test_synced_line_is_synced_in_time_under_load(disk: FaultyDisk, path: Path) -> None:
     keeper = Keeper(EvidenceFile(path, disk), sync_after_s=0.5)
     for tenth in range(12):
         keeper.take([(b"plain\n", WRITTEN)], tenth / 10)
@@ -98,7 +98,7 @@ def test_a_line_that_is_not_on_the_disk_in_time_is_told_and_then_counts_as_a_fai
     writer.close()
 
 
-def test_what_nobody_asked_to_sync_is_synced_after_a_while(writer: EvidenceWriter, disk: FaultyDisk) -> None:
+def test_written_lines_are_synced_when_idle(writer: EvidenceWriter, disk: FaultyDisk) -> None:
     writer.append(b"plain\n", WRITTEN)
     until(lambda: disk.synced == 1)
 
@@ -193,7 +193,7 @@ def test_closing_on_a_full_disk_says_so(disk: FaultyDisk, path: Path) -> None:
     assert writer.waiting == 1
 
 
-def test_who_can_wait_may_wait_until_all_is_on_the_disk(disk: FaultyDisk, path: Path) -> None:
+def test_settle_waits_until_all_is_on_disk(disk: FaultyDisk, path: Path) -> None:
     writer = EvidenceWriter(EvidenceFile(path, disk), sync_s=0.001, close_s=0.05)
     writer.append(b"one\n", SYNCED_FIRST)
     writer.append(b"two\n", WRITTEN)

@@ -86,7 +86,7 @@ def test_a_log_that_is_still_written_is_told(last: LastLog, tmp_path: Path) -> N
 @pytest.mark.parametrize(
     "data", [b"", b"x", b"[]", b"{}", b'{"log":1}', b'{"log":"a","last":1}', b'{"log":"a","before":"AB"}', b"\xff"]
 )
-def test_what_nobody_wrote_is_told(last: LastLog, data: bytes) -> None:
+def test_malformed_last_log_file_is_reported(last: LastLog, data: bytes) -> None:
     last.path.parent.mkdir(parents=True)
     last.path.write_bytes(data)
     earlier = last.settle(mend)

@@ -25,7 +25,7 @@ def test_files_are_laid_into_a_folder_that_is_not_there_yet(tmp_path: Path) -> N
     assert sorted(tree(tmp_path / "x/y")) == ["a.rts", "sub", "sub/b.rts", "sub/deep", "sub/deep/.c"]
 
 
-def test_what_is_there_already_stays(tmp_path: Path) -> None:
+def test_laying_files_keeps_existing_files(tmp_path: Path) -> None:
     (tmp_path / "mine").write_bytes(b"mine")
     assert lay(FILES, tmp_path) is None
     assert (tmp_path / "mine").read_bytes() == b"mine"

@@ -67,7 +67,7 @@ def test_a_key_is_raw_or_hexadecimal(tmp_path: Path, data: bytes) -> None:
     "data",
     [b"", KEY[:31], KEY + b"\n", KEY.hex()[:-2].encode(), b"\xff" * 64, bytes(32), b"0" * 64, KEY.hex().encode() * 99],
 )
-def test_what_is_no_key(tmp_path: Path, data: bytes) -> None:
+def test_file_without_a_key_is_refused(tmp_path: Path, data: bytes) -> None:
     assert slug(lambda: read_link_key(put(tmp_path / "key", data))) == "malformed"
 
 
@@ -90,7 +90,7 @@ def test_the_fingerprint_tells_keys_apart_and_nothing_of_them() -> None:
     assert KEY.hex()[:8] not in fingerprint(KEY)
 
 
-def test_what_was_saved_is_loaded_by_vehicle_and_key(tmp_path: Path) -> None:
+def test_link_state_is_loaded_by_vehicle_and_key(tmp_path: Path) -> None:
     store = LinkStore(tmp_path, "quad/07", KEY)
     assert store.load() == SigningState(0, {})
     store.save(STATE)

@@ -112,20 +112,20 @@ def each_operation(kinds: Sequence[str], step: int) -> list[str]:
 
 
 @pytest.mark.slow
-def test_what_was_acknowledged_is_kept_when_process_or_power_fail() -> None:
+def test_acknowledged_lines_survive_process_or_power_failure() -> None:
     assert campaigns(range(25)) == []
 
 
 @pytest.mark.slow
-def test_what_was_acknowledged_is_kept_whatever_operation_fails() -> None:
+def test_acknowledged_lines_survive_one_failed_operation() -> None:
     assert each_operation(KINDS, 29) == []
 
 
 @pytest.mark.soak
-def test_what_was_acknowledged_is_kept_when_they_fail_again_and_again() -> None:
+def test_acknowledged_lines_survive_repeated_failures() -> None:
     assert campaigns(range(1_000, 11_000)) == []
 
 
 @pytest.mark.soak
-def test_what_was_acknowledged_is_kept_whichever_operation_fails() -> None:
+def test_acknowledged_lines_survive_failure_of_any_operation() -> None:
     assert each_operation(KINDS, 1) == []

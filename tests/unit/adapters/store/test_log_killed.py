@@ -19,10 +19,10 @@ def kill(count: int, seed: int) -> None:
 
 
 @pytest.mark.slow
-def test_what_was_acknowledged_survives_a_kill() -> None:
+def test_acknowledged_lines_survive_a_kill() -> None:
     kill(15, 1)
 
 
 @pytest.mark.soak
-def test_what_was_acknowledged_survives_five_hundred_kills() -> None:
+def test_acknowledged_lines_survive_five_hundred_kills() -> None:
     kill(500, 1_000)

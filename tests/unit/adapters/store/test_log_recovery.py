@@ -25,7 +25,7 @@ def torn(folder: Path, more: bytes = b'{"_prev":') -> tuple[Path, list[bytes]]:
     return path, lines
 
 
-def test_what_is_discarded_lies_beside_the_log(tmp_path: Path) -> None:
+def test_recovery_keeps_discarded_octets_beside_log(tmp_path: Path) -> None:
     path, lines = torn(tmp_path)
     done = recover(path, signer(Random(1)))
     assert (done.done, done.found.state, done.discarded) == (True, LogState.TORN, tmp_path / "log.discarded")
@@ -48,7 +48,7 @@ def test_where_nothing_is_discarded_there_is_no_file_for_it(tmp_path: Path) -> N
     assert [entry.name for entry in tmp_path.iterdir()] == ["log.jsonl"]
 
 
-def test_what_was_tampered_with_is_left_as_it_is(tmp_path: Path) -> None:
+def test_recovery_leaves_tampered_log_unchanged(tmp_path: Path) -> None:
     path, lines = torn(tmp_path)
     lines[3] = lines[3].replace(b"quad", b"kwad")
     path.write_bytes(b"".join(lines))
@@ -74,7 +74,7 @@ def test_other_discarded_octets_stay(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("plan", [b"", b"x\ny\n", b'{"_prev":"', bytes(70_000)])
-def test_what_only_looks_begun_is_begun_anew(tmp_path: Path, plan: bytes) -> None:
+def test_invalid_recovery_plan_is_started_anew(tmp_path: Path, plan: bytes) -> None:
     path, lines = torn(tmp_path)
     (tmp_path / "log.recovering").write_bytes(plan)
     assert recover(path, signer(Random(1))).done

@@ -20,7 +20,7 @@ def owed(before: float, value: float) -> Owed:
 WIDER = {"FENCE_RADIUS": owed(50, 300)}
 
 
-def test_what_is_kept_is_read_again_to_the_last_bit(tmp_path: Path) -> None:
+def test_owed_values_round_trip_exactly(tmp_path: Path) -> None:
     kept = OwedParameters(tmp_path, "quad/07")
     assert (kept.left, kept.trouble) == ({}, None)
     for each in ({"FENCE_RADIUS": owed(0.1, 1 / 3), "GF_ACTION": owed(2, 3)}, {"RTL_ALT": owed(-1e-30, 1e30)}, {}):
@@ -50,7 +50,7 @@ def test_a_file_that_cannot_be_read_is_said_so(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("first", [True, False], ids=["it sets", "something is left to it"])
-def test_what_a_run_that_lives_owes_is_not_left_to_another(first: bool, tmp_path: Path) -> None:
+def test_parameters_owed_by_living_run_are_left_to_it(first: bool, tmp_path: Path) -> None:
     one = OwedParameters(tmp_path, "quad.07", sets=True) if first else None
     OwedParameters(tmp_path, "quad.07").keep(WIDER)
     one = one or OwedParameters(tmp_path, "quad.07", sets=False)

@@ -25,7 +25,7 @@ def test_no_more_is_read_than_is_asked_for(root: Path) -> None:
     assert read_regular(str(file), 6, root) == b"inside"
 
 
-def test_what_is_no_file_is_not_waited_for(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pipe_or_device_is_refused_without_waiting(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(root)
     os.mkfifo("pipe")
     with socket.socket(socket.AF_UNIX) as listener:
@@ -53,7 +53,7 @@ def test_links_are_followed_but_not_below_a_root(root: Path) -> None:
     assert read_regular(root.parent / "here/sub/a", 9, root.parent / "here") == b"inside"
 
 
-def test_what_is_missing_is_named_in_full(root: Path) -> None:
+def test_missing_file_is_named_in_full(root: Path) -> None:
     for below in (None, root):
         with pytest.raises(FileNotFoundError) as missing:
             open_regular(root / "sub/b", below)
@@ -61,7 +61,7 @@ def test_what_is_missing_is_named_in_full(root: Path) -> None:
 
 
 @pytest.mark.parametrize(("mode", "told"), [(0o600, None), (0o400, None), (0o640, "0640"), (0o602, "0602")])
-def test_what_others_may_read_is_told(mode: int, told: str | None, root: Path) -> None:
+def test_file_readable_by_others_is_reported(mode: int, told: str | None, root: Path) -> None:
     (root / "sub/a").chmod(mode)
     with open_regular(root / "sub/a") as file:
         assert exposed(file) == (told and f"its mode is {told}")

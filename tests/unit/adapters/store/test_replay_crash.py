@@ -62,7 +62,7 @@ def survived(tmp_path: Path, changes: int, *, half: bool) -> tuple[bool, bool]:
 
 
 @pytest.mark.parametrize("half", [False, True])
-def test_whatever_it_was_doing(tmp_path: Path, half: bool) -> None:
+def test_replay_store_survives_a_crash_at_any_point(tmp_path: Path, half: bool) -> None:
     seen = []
     for changes in range(MOST):
         seen.append(survived(tmp_path / str(changes), changes, half=half))

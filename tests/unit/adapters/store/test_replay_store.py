@@ -21,7 +21,7 @@ OPENED, REPLAYED, OLD_POLICY, DAMAGED = (
 )
 
 
-def test_once_and_never_again(tmp_path: Path) -> None:
+def test_mission_opens_once(tmp_path: Path) -> None:
     store = FileReplayStore(tmp_path, "quad-07")
     assert store.open_once(ONE, 1000, 10, *POLICY) is OPENED
     assert store.open_once(ONE, 1000, 10, *POLICY) is REPLAYED
@@ -29,7 +29,7 @@ def test_once_and_never_again(tmp_path: Path) -> None:
     assert FileReplayStore(tmp_path, "quad-07").open_once(ONE, 2000, 20, *POLICY) is REPLAYED
 
 
-def test_what_is_given_back_opens_again_and_its_policy_does_not_go_back(tmp_path: Path) -> None:
+def test_mission_given_back_opens_again_at_same_policy(tmp_path: Path) -> None:
     store = FileReplayStore(tmp_path, "quad-07")
     assert store.open_once(ONE, 1000, 10, *POLICY) is OPENED
     assert store.open_once(TWO, 1000, 10, *POLICY) is OPENED
@@ -48,7 +48,7 @@ def test_one_that_expired_is_not_opened_again_by_giving_it_back(tmp_path: Path) 
     assert store.open_once(ONE, 1000, 10, *POLICY) is REPLAYED
 
 
-def test_each_vehicle_has_its_own(tmp_path: Path) -> None:
+def test_vehicles_have_separate_replay_stores(tmp_path: Path) -> None:
     for vehicle in ("quad-07", "quad-08", "..", "", "a/b", "quad 07"):
         assert FileReplayStore(tmp_path, vehicle).open_once(ONE, 1000, 10, *POLICY) is OPENED, vehicle
     assert {path.relative_to(tmp_path).parts[0] for path in tmp_path.rglob("*")} == {"replay"}
@@ -98,7 +98,7 @@ def test_versions_that_are_gone_are_damage(tmp_path: Path, beside: str) -> None:
     assert store.open_once(THREE, 9000, 10, "bridge", 1) is DAMAGED
 
 
-def test_what_a_crash_left_of_a_new_floor_is_no_marker(tmp_path: Path) -> None:
+def test_unfinished_floor_file_is_ignored(tmp_path: Path) -> None:
     store = FileReplayStore(tmp_path, "quad-07")
     (store.folder / "floor.new").write_bytes(b"1")
     assert store.open_once(ONE, 1000, 10, *POLICY) is OPENED

@@ -54,7 +54,7 @@ def test_read_only_is_respected(file: Path) -> None:
     assert file.read_bytes() == b"old"
 
 
-def test_what_somebody_else_wrote_meanwhile_is_kept(file: Path) -> None:
+def test_rewrite_keeps_concurrent_change(file: Path) -> None:
     file.write_bytes(b"theirs")
     with pytest.raises(Changed):
         rewrite(file, b"old", b"new")

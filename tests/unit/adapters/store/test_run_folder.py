@@ -79,7 +79,7 @@ def test_a_full_disk_ends_the_telemetry_and_not_the_flight(size: int, tmp_path: 
 
 
 @pytest.mark.parametrize("size", [1, 10 * (8 + len(FRAME)) + 5, 1 << 17])
-def test_what_a_full_disk_took_ends_at_a_whole_frame_and_the_rest_is_counted(size: int, tmp_path: Path) -> None:
+def test_full_disk_leaves_whole_frames_and_count_of_lost(size: int, tmp_path: Path) -> None:
     file = telemetry.TelemetryFile(tmp_path / "telemetry.tlog", FaultyDisk(room=size))
     for number in range(6_000):
         file.write(UTC_US + number, FRAME)
@@ -132,7 +132,7 @@ def test_a_disk_that_does_not_say_how_much_room_it_has(tmp_path: Path, monkeypat
     assert (file.error, file.lost) == (None, 0)
 
 
-def test_nobody_waits_for_a_disk_that_stands_still(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stalled_disk_blocks_nobody(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(telemetry, "MOST_WAITING", 3)
     disk = FaultyDisk()
     disk.open["write"].clear()

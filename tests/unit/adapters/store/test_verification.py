@@ -46,7 +46,7 @@ def test_several_processes_share_the_segments(log: Path, monkeypatch: pytest.Mon
     assert verify_quickly(log, ASKED, jobs=2).report.failure is not None
 
 
-def test_what_is_out_of_place_is_named_by_the_careful_way(log: Path) -> None:
+def test_quick_verification_names_same_fault_as_careful(log: Path) -> None:
     lines = list(flight())
     for number in range(len(lines)):
         changed = [*lines[:number], edit(lines[number], utc_error_us=7), *lines[number + 1 :]]
@@ -116,7 +116,7 @@ def test_each_sound_record_is_handed_on(log: Path) -> None:
     assert [record.seq for record in records] == list(range(5))
 
 
-def test_what_the_signers_forged_is_seen_by_reading_only(log: Path) -> None:
+def test_signed_forgery_is_found_only_line_by_line(log: Path) -> None:
     lines = list(flight())
     log.write_bytes(b"".join(signed([*lines[:3], edit(lines[3], outcome="deny"), *lines[4:]])))
     assert verify_quickly(log, ASKED).report.verdict is LogVerdict.VERIFIED

@@ -71,7 +71,7 @@ def test_one_process_at_a_time(tmp_path: Path) -> None:
     "content",
     [b"", b"{}", b'{"text":"x","signer":"","time_s":0}', b'{"text":"x","signer":"zz","time_s":0}', b"\xff", None],
 )
-def test_what_is_damaged_is_not_cosigned_anew(tmp_path: Path, log: Log, content: bytes | None) -> None:
+def test_damaged_witness_memory_prevents_cosigning(tmp_path: Path, log: Log, content: bytes | None) -> None:
     first = made(tmp_path)
     first.consider(asked(log, None, 4))
     (path,) = first.store.folder.glob("*.seen")

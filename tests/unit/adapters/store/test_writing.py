@@ -46,7 +46,7 @@ def test_a_new_file_replaces_nothing(tmp_path: Path) -> None:
 @pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()])
 @pytest.mark.parametrize("at", ["write", "fsync", "replace"])
 @pytest.mark.parametrize("write", [write_new, replace])
-def test_what_fails_leaves_nothing_behind(
+def test_failed_write_leaves_nothing_behind(
     write: Callable[..., None], at: str, error: BaseException, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fails(*_: object, **__: object) -> None:
@@ -73,16 +73,14 @@ def test_a_file_is_replaced_in_one_step(tmp_path: Path, monkeypatch: pytest.Monk
     assert names(tmp_path) == ["a"]
 
 
-def test_what_lies_beside_it_is_not_touched(tmp_path: Path) -> None:
+def test_replace_leaves_neighbouring_files_alone(tmp_path: Path) -> None:
     (tmp_path / "a.new").write_bytes(b"mine")
     replace(tmp_path / "a", b"one")
     assert (tmp_path / "a.new").read_bytes() == b"mine"
 
 
 @pytest.mark.parametrize("synced", [True, False])
-def test_what_is_to_be_durable_is_synced_with_its_name(
-    synced: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_durable_file_is_synced_with_its_name(synced: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     found: list[Path] = []
     monkeypatch.setattr(os, "fsync", lambda handle: found.append(Path(f"/proc/self/fd/{handle}").readlink()))
     replace(tmp_path / "a", b"one", synced=synced)
@@ -133,7 +131,7 @@ def test_nothing_is_put_behind_what_is_no_file(tmp_path: Path) -> None:
     os.close(reader)
 
 
-def test_what_somebody_named_is_written_where_it_leads(tmp_path: Path) -> None:
+def test_write_out_follows_links(tmp_path: Path) -> None:
     (tmp_path / "real").write_bytes(b"before")
     (tmp_path / "link").symlink_to("real")
     write_out(tmp_path / "link", b"one")

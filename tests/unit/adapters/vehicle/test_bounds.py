@@ -52,7 +52,7 @@ def test_an_airspace_reaches_as_far_as_its_narrowest_zone(shape: int, data: tupl
     ({"FENCE_ENABLE": 1.0}, False, FlightReach(900 * M, 9 * M, 0), [("FENCE_RADIUS", 903)]),
     ({"FENCE_TYPE": float("nan")}, True, FlightReach(900 * M, 900 * M, 0), []),
 ])  # fmt: skip
-def test_what_is_armed_and_too_narrow_is_found(
+def test_narrow_armed_bounds_are_found(
     changed: dict[str, float], armed: bool, reach: FlightReach, found: list[tuple[str, int]]
 ) -> None:
     bounds = narrower(ARDUPILOT.own_fence, COPTER | changed, reach, 3 * M, armed=armed)

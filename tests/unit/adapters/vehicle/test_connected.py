@@ -150,7 +150,7 @@ def test_a_vehicle_whose_signing_clock_is_behind_is_greeted_and_then_believed(ke
     vehicle.socket.close()
 
 
-def test_what_is_sent_is_kept_and_told(link: ConnectedVehicle, vehicle: Peer) -> None:
+def test_sent_frames_are_kept_and_reported(link: ConnectedVehicle, vehicle: Peer) -> None:
     vehicle.beat()
     poll(link)
     hold, now_us = Command(9, "hover", MotionKind.HOLD, (), (), 0, 0), SystemClock().now().monotonic_us
@@ -221,7 +221,7 @@ def test_the_system_that_was_named_is_flown_and_others_may_speak() -> None:
     link.close()
 
 
-def test_what_came_and_left_is_kept_in_its_order_when_there_is_time(link: ConnectedVehicle, vehicle: Peer) -> None:
+def test_frames_are_kept_in_order_between_polls(link: ConnectedVehicle, vehicle: Peer) -> None:
     kept: list[tuple[int, bytes]] = link.kept  # type: ignore[attr-defined]
     vehicle.beat()
     poll(link)
@@ -237,7 +237,7 @@ def test_what_came_and_left_is_kept_in_its_order_when_there_is_time(link: Connec
     assert {Codec(1, 191).parse(frame)[0].component for _, frame in kept} == {1, 191}
 
 
-def test_what_is_waited_for_is_acted_on_as_it_comes(
+def test_awaited_datagrams_are_handled_one_by_one(
     link: ConnectedVehicle, vehicle: Peer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     vehicle.beat()
@@ -282,7 +282,7 @@ class Moment:
 
 
 @pytest.mark.parametrize("waits", [True, False])
-def test_what_was_not_looked_at_for_a_while_is_no_silence(waits: bool) -> None:
+def test_unread_datagrams_are_not_a_silence(waits: bool) -> None:
     """This process was held up: what the vehicle said meanwhile lies in the socket."""
     clock = Moment()
     link = ConnectedVehicle(

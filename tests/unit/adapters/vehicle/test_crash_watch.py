@@ -133,14 +133,14 @@ def test_a_hill_on_which_it_landed_in_the_gap_is_no_height_from_which_it_fell() 
     assert not one.told
 
 
-def test_motors_that_stop_on_a_hill_after_a_landing_are_none_of_a_crash() -> None:
+def test_motors_stopping_on_a_hill_after_landing_are_no_crash() -> None:
     one = Watched().flew()
     one.flies(13 * S, state=LANDING)
     one.motors_off(14 * S)
     assert not one.told
 
 
-def test_what_is_armed_again_flies_as_before() -> None:
+def test_rearmed_vehicle_counts_as_flying() -> None:
     one = Watched().flew()
     one.beat(13 * S, armed=False)
     one.at(13_100_000, 16_000)
@@ -151,7 +151,7 @@ def test_what_is_armed_again_flies_as_before() -> None:
     assert one.told
 
 
-def test_what_leans_while_it_was_just_seen_to_fly_has_crashed() -> None:
+def test_tilt_in_flight_is_a_crash() -> None:
     one = Watched().flew()
     one.leans(12_500_000, 1.5)
     assert not one.told
@@ -159,7 +159,7 @@ def test_what_leans_while_it_was_just_seen_to_fly_has_crashed() -> None:
     assert one.told == ["the vehicle is tilted by 86 degrees"]
 
 
-def test_what_leans_after_a_gap_may_have_landed_and_be_carried() -> None:
+def test_tilt_after_a_gap_is_no_crash() -> None:
     one = Watched().flew()
     for step in range(5):
         one.leans(70 * S + 200_000 * step, 1.5)
@@ -198,7 +198,7 @@ def test_a_descent_that_is_read_at_once_with_its_end_is_no_impact() -> None:
     assert not one.told
 
 
-def test_where_it_lies_long_after_a_hard_stop_it_did_not_fall() -> None:
+def test_lying_long_after_a_hard_stop_is_no_crash() -> None:
     one = Watched().flew()
     one.at(12_500_000, 16_000, sinks=3_500)
     one.at(12_600_000, 16_000)

@@ -88,7 +88,7 @@ def test_a_position_that_is_delayed_by_3_s_is_unknown_when_it_is_stale_after_2_s
     assert seen.located
 
 
-def test_what_is_delayed_by_less_stays_known_and_its_age_says_so(flavour: str) -> None:
+def test_slightly_delayed_position_stays_known_with_its_age(flavour: str) -> None:
     one = ready(flavour)
     one.delay(500_000)
     one.wait(5)

@@ -80,7 +80,7 @@ def test_a_slow_drain_is_measured_once_the_charge_changed_often_enough(rate: int
 
 
 @given(st.integers(1, 12), st.integers(3, 20))
-def test_what_was_taken_and_one_step_more_bounds_a_drain_that_ends(changes_s: int, count: int) -> None:
+def test_ended_drain_is_bounded_by_charge_taken_plus_one_step(changes_s: int, count: int) -> None:
     meter = DrainMeter()
     for number in range(count + 1):
         meter.take(10_000 - 100 * number, number * changes_s * S)

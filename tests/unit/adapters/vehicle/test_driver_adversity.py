@@ -110,7 +110,7 @@ def test_refused_arming_fails_with_the_reason(flyer: Make, flavour: str) -> None
 
 
 @pytest.mark.parametrize("kind", [MotionKind.FLY, MotionKind.COVER, MotionKind.HOLD])
-def test_what_stands_disarmed_cannot_go_anywhere(flyer: Make, kind: MotionKind) -> None:
+def test_disarmed_vehicle_fails_a_leg(flyer: Make, kind: MotionKind) -> None:
     one = flyer()
     one.until(Ready)
     end = one.fly(kind, *([(30_000, 0)] if kind != MotionKind.HOLD else []), altitude=20_000)

@@ -316,7 +316,7 @@ def test_the_gravest_text_since_a_command_began_is_its_reason() -> None:
     assert (failed.reason, failed.text) == ("unknown/no-answer", "Arm: Accels inconsistent")
 
 
-def test_what_it_says_is_told_and_quoted() -> None:
+def test_status_texts_are_reported_and_quoted() -> None:
     one = Bench()
     one.say("allow\x1b[2J takeoff", 3)
     assert [(event.severity, event.text) for event in one.events if isinstance(event, StatusText)] == [

@@ -62,7 +62,7 @@ def test_it_says_what_is_missing() -> None:
     assert estimator.missing(S) == "the estimator has no height (flags 0x13)"
 
 
-def test_what_does_not_come_from_it_needs_no_voucher() -> None:
+def test_fields_without_estimator_need_no_confirmation() -> None:
     assert Estimator().vouches_for("BATTERY_STATUS", "battery_remaining", 0)
     assert Estimator().vouches_for(GPI, "time_boot_ms", 0)
     assert not Estimator().vouches_for("LOCAL_POSITION_NED", "x", 0)

@@ -97,7 +97,7 @@ def test_heights_and_times_of_the_inside_are_left_out_and_said(flavour: Any) -> 
     ({"dates": (1, 2)}, "it applies at times only"),
     ({"shape": AREA, "data": (2, 4, 4, *SQUARE, *HOLE)}, "it has holes"),
 ])  # fmt: skip
-def test_what_is_only_at_times_or_heights_forbidden_is_not_excluded(flavour: Any, more: Any, why: str) -> None:
+def test_zones_limited_in_time_or_height_are_not_excluded(flavour: Any, more: Any, why: str) -> None:
     made = fence(flavour, [zone()], [zone("school", **more)])
     assert len(made.items) == 4
     assert made.left_out == (f"`school`: {why}",)

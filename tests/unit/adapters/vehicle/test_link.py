@@ -17,7 +17,7 @@ LAND = Command(5, "land", MotionKind.LAND, (), (), 0, 0)
 HOLD = Command(6, "hover", MotionKind.HOLD, (), (), 0, 0)
 
 
-def test_what_the_boundary_does_not_let_out_has_failed() -> None:
+def test_frame_refused_by_boundary_fails_the_command() -> None:
     target = Target("px4", keyed=False)
     assert target.driver.begin(LAND, 7)[0] == [], "its mode is asked for"
     failed = [event for event in target.driver.tick(50_007)[0] if isinstance(event, CommandFailed)]
@@ -117,7 +117,7 @@ def test_a_vehicle_may_be_system_51_itself() -> None:
     assert [each.name for each in link.parse(Codec(51, 1).pack(greeting("px4")[0]), 0)] == ["HEARTBEAT"]
 
 
-def test_what_is_logged_has_no_signature() -> None:
+def test_logged_frames_have_no_signature() -> None:
     signed = SignedLink(KEY, SigningState(0, {}), UTC_US, 0).sign(Codec(1, 1).pack(greeting("px4")[0]), 0)
     assert len(unsigned(signed)) == len(signed) - 13
     assert [received.signed for received in Codec(9, 9).parse(unsigned(signed))] == [False]

@@ -42,7 +42,7 @@ def test_a_skill_is_flown_in_its_own_way_and_every_other_as_ever(with_own: Make)
     assert asked == ["climb"]
 
 
-def test_code_that_raises_has_failed_its_skill(with_own: Make) -> None:
+def test_exception_in_pack_fails_its_skill(with_own: Make) -> None:
     def own(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
         raise ZeroDivisionError("no nozzle")
 
@@ -51,7 +51,7 @@ def test_code_that_raises_has_failed_its_skill(with_own: Make) -> None:
     assert (end.reason, end.text) == ("broken-manoeuvre", "no nozzle")
 
 
-def test_an_effect_that_cannot_be_looked_for_has_failed_its_skill(with_own: Make) -> None:
+def test_exception_in_effect_fails_its_skill(with_own: Make) -> None:
     def done(seen: ObservedVehicle) -> bool:
         raise KeyError("tank")
 

@@ -191,7 +191,7 @@ def test_the_same_return_altitude_is_ready(flavour: Flavour, parameters: Any) ->
                                        "is 1, the terrain): set `RTL_ALT_TYPE` to 0, home"),
     (ARDUPILOT, {"RALLY_TOTAL": 2.0}, "(`RALLY_TOTAL` is 2): set `RALLY_TOTAL` to 0, none"),
 ])  # fmt: skip
-def test_what_lowers_or_lifts_the_way_home_keeps_it_from_being_ready(
+def test_parameter_that_changes_way_home_prevents_readiness(
     flavour: Flavour, parameters: dict[str, float], says: str | None
 ) -> None:
     one = preflight(flavour, fence=False)
@@ -214,7 +214,7 @@ def test_the_limits_of_the_way_home_by_their_new_names_and_for_another_height() 
         assert (one.unready is None) is ready, parameters
 
 
-def test_what_limits_the_way_home_is_waited_for() -> None:
+def test_limits_of_the_way_home_are_waited_for() -> None:
     one, port = preflight(PX4, fence=False), Port(PX4)
     port.lose = lambda name: name == "PARAM_VALUE" and len(port.heard) > 1
     port.settle(one, 3)
@@ -357,7 +357,7 @@ def test_lost_frames_delay_and_spoil_nothing(flavour: Flavour, seed: int) -> Non
 
 
 @FLAVOURS
-def test_what_failed_is_begun_again(flavour: Flavour) -> None:
+def test_failed_upload_is_started_again(flavour: Flavour) -> None:
     one, port = preflight(flavour), Port(flavour)
     for lose in ("MISSION", "PARAM"):
         port.lose = lambda name, lose=lose: name.startswith(lose)

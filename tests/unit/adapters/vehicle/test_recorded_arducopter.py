@@ -58,7 +58,7 @@ def test_the_height_stays_known_without_gps(watched: Recorded) -> None:
     assert 14_000 < watched.states[86]["height"] < 16_000
 
 
-def test_what_is_not_reported_is_never_known(watched: Recorded) -> None:
+def test_arducopter_signal_without_report_is_unknown(watched: Recorded) -> None:
     assert watched.known("obstacle.distance") == watched.known("link.quality") == []
 
 

@@ -96,7 +96,7 @@ def test_px4_acknowledges_a_bogus_mode_as_it_does_a_good_one() -> None:
     assert {(each.outcome, each.seen.mode) for each in good} == {("accepted", Px4Mode.HOLD)}
 
 
-def test_what_was_never_answered_is_unknown() -> None:
+def test_unanswered_command_is_unknown() -> None:
     for name in ("px4-commands", "arducopter-commands"):
         (asked,) = find(name, ARM, lambda m: m.target_system != 1)
         assert asked.outcome == "unknown"

@@ -47,7 +47,7 @@ def test_it_is_ready_when_it_would_arm(watched: Recorded) -> None:
     assert READY - 0.3 < ready < READY + 2
 
 
-def test_what_it_was_not_asked_for_is_not_known(watched: Recorded) -> None:
+def test_px4_signal_without_request_is_unknown(watched: Recorded) -> None:
     assert watched.known("wind.speed") == watched.known("link.quality") == []
 
 

@@ -57,7 +57,7 @@ def test_each_command_that_may_be_in_force_counts() -> None:
     assert flown_by(left, ARDUPILOT, seen(CopterMode.BRAKE)) == "BRAKE"
 
 
-def test_what_had_landed_is_flown_by_others_and_so_is_what_was_taken_over_before() -> None:
+def test_landed_or_taken_over_vehicle_is_flown_by_others() -> None:
     assert flown_by(Left(()), PX4, seen(Px4Mode.HOLD)) == "Hold"
     taken = Left((told(MotionKind.HOLD),), "Position")
     assert flown_by(taken, PX4, seen(Px4Mode.HOLD)) == "Position, as the previous run commanded"
@@ -98,7 +98,7 @@ def test_in_the_same_mode_the_target_tells(
     assert flown_by(Left((in_force,)), PX4, seen(Px4Mode.HOLD, target)) == ("" if ours else "another target")
 
 
-def test_what_another_command_came_after_is_in_force_to_the_digit_only() -> None:
+def test_superseded_command_stays_in_force_only_at_exact_place() -> None:
     """A return that is paused as it begins holds where the hold before it was."""
     left = Left((told(MotionKind.HOLD, named=HERE), told(MotionKind.HOME)))
     assert flown_by(left, PX4, seen(Px4Mode.HOLD, HERE)) == ""

@@ -80,7 +80,7 @@ def test_without_a_radio_it_is_ready_at_once_and_its_place_is_known(flavour: str
     assert one.vehicle.driver.seen.located
 
 
-def test_a_target_that_is_anothers_is_seen_though_nothing_is_waited_for() -> None:
+def test_foreign_target_is_seen_without_waiting() -> None:
     one = copied(left_climbing("ardupilot"))
     one.vehicle.simulation.inject(PilotGoto(0, 100_000, 0, 30_000))
     one.wait(0.2)
@@ -96,7 +96,7 @@ def test_where_frames_are_lost_a_target_is_waited_for_as_before() -> None:
 
 
 @pytest.mark.parametrize(("armed", "taken"), [(False, []), (True, ["Return"])])
-def test_what_landed_while_nothing_was_heard_was_not_taken_over(armed: bool, taken: list[str]) -> None:
+def test_landing_during_a_silence_is_no_takeover(armed: bool, taken: list[str]) -> None:
     """The last word that it flies is old, and the first that is new says that its motors are off, in another mode."""
     one = begun_again(copied(left_climbing("px4")))
     one.until(Ready, 1)

@@ -115,7 +115,7 @@ def test_an_estimate_of_the_wind_that_does_not_change_grows_old() -> None:
     assert wind(3.0, 21_500_000) > later  # type: ignore[operator]
 
 
-def test_what_comes_in_a_burst_after_a_stall_is_as_old_as_the_stall() -> None:
+def test_burst_after_a_stall_is_as_old_as_the_stall() -> None:
     ear = Ear()
     before = ear.place(10_100_000, 10_110_000)
     assert ear.hear(HEARTBEAT, 10_990_000) == before, "it may have been sent just after"
@@ -185,7 +185,7 @@ def test_after_a_silence_the_order_begins_anew() -> None:
 
 
 @rows("lost", [80, 127, 128, 200, 255, 256, 900])
-def test_what_follows_a_gap_is_sent_last_though_a_backlog_came_just_before(lost: int) -> None:
+def test_frame_after_a_gap_comes_after_the_backlog(lost: int) -> None:
     """A computer that stood still reads what waited, all at once, and then what comes: what was in between is lost."""
     ear = Ear()
     for step in range(5):
@@ -208,7 +208,7 @@ def test_a_stamp_that_does_not_advance_is_the_same_measurement() -> None:
     assert (ear.hear(gps(33_000_000), 40 * S) or 0) > 39 * S
 
 
-def test_a_time_of_0_says_nothing() -> None:
+def test_stamp_of_zero_is_unknown() -> None:
     ear = Ear()
     sent = ear.place(10_050_000, 10_060_000)
     for now_us in (10_070_000, 10_080_000):

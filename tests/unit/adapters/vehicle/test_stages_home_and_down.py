@@ -31,7 +31,7 @@ def stages(flavour: str, kind: MotionKind, system: int) -> list[Stage]:
 
 
 @rows("flavour, kind", MODES)
-def test_they_are_the_same_whenever_they_are_asked_for(flavour: str, kind: MotionKind) -> None:
+def test_return_and_landing_stages_are_cached(flavour: str, kind: MotionKind) -> None:
     for system in (1, 2, 1):
         first, last = stages(flavour, kind, system)
         expected = messages.set_mode(system, MODES[flavour, kind])
@@ -40,13 +40,13 @@ def test_they_are_the_same_whenever_they_are_asked_for(flavour: str, kind: Motio
 
 
 @rows("flavour, kind", MODES)
-def test_what_a_manoeuvre_has_flown_is_there_for_the_next_one(flavour: str, kind: MotionKind) -> None:
+def test_flown_stages_do_not_affect_next_manoeuvre(flavour: str, kind: MotionKind) -> None:
     flown = stages(flavour, kind, 1)
     flown.clear()
     assert len(stages(flavour, kind, 1)) == 2
 
 
-def test_they_are_made_when_the_vehicle_is_known(
+def test_stages_are_made_when_vehicle_is_known(
     flyer: Callable[..., Flyer], flavour: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     made = {PX4.name: px4, ARDUPILOT.name: ardupilot}[flavour]

@@ -261,7 +261,7 @@ def stalled(flavour: str, after_ms: int, for_ms: int) -> list[Event]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("after_ms", "flavour"), each_once([2_200, 2_900, 3_400], ["px4", "ardupilot"]))
-def test_what_waited_while_nobody_read_is_held_against_its_own_time(after_ms: int, flavour: str) -> None:
+def test_delayed_reports_are_judged_by_their_own_time(after_ms: int, flavour: str) -> None:
     """A speed of before was held against what it may be a second later: `did-not-stop`, and it was flown home."""
     for for_ms in (300, 1_000, 6_000):
         assert stalled(flavour, after_ms, for_ms) == []

@@ -43,7 +43,7 @@ def test_a_narrow_link_is_not_oversubscribed_and_nothing_is_slower_than_suffices
         assert plan.shortfall is None
 
 
-def test_what_no_rate_makes_fit_is_told_with_the_baud_rate_that_would_do() -> None:
+def test_overloaded_link_names_sufficient_baud_rate() -> None:
     plan = plan_streams(RATES, 960, signed=True)
     assert not plan.fits
     assert plan.shortfall is not None
@@ -83,7 +83,7 @@ class Line:
         self.every[name] = int(message.param2)
 
 
-def test_what_is_delivered_is_measured_and_told_once() -> None:
+def test_delivered_rates_are_measured_and_noted_once() -> None:
     line = Line(None, {})
     line.run(3 * MEASURE_US / S)
     assert line.streams.measured is not None
@@ -104,7 +104,7 @@ def test_other_rates_that_are_needed_under_way_are_asked_for() -> None:
     assert "carries 960 octets" in line.streams.notes[-1]
 
 
-def test_what_nobody_asked_for_is_turned_off_where_it_takes_the_room() -> None:
+def test_unrequested_streams_are_turned_off_for_lack_of_room() -> None:
     """As PX4 does on a companion's port: its own streams fill the line."""
     line = Line(2_400, {"ATTITUDE_QUATERNION": 20_000, "HIGHRES_IMU": 20_000, "TIMESYNC": 100_000})
     line.run(4 * MEASURE_US / S)
@@ -120,7 +120,7 @@ def test_what_nobody_asked_for_is_turned_off_where_it_takes_the_room() -> None:
 
 
 @pytest.mark.parametrize(("capacity", "unasked"), [(None, 20_000), (92_160, 20_000), (5_760, 1_000_000)])
-def test_what_takes_nobodys_room_is_left_alone(capacity: int | None, unasked: int) -> None:
+def test_unrequested_streams_with_room_are_left_on(capacity: int | None, unasked: int) -> None:
     """A ground station may look at the same streams."""
     line = Line(capacity, {"HIGHRES_IMU": unasked})
     line.run(4 * MEASURE_US / S)

@@ -212,7 +212,7 @@ NOT_PAUSED: dict[str, tuple[Fault, ...]] = {
 
 
 @pytest.mark.parametrize("name", NOT_PAUSED)
-def test_what_stands_for_a_reason_is_not_paused(name: str) -> None:
+def test_vehicle_standing_for_a_reason_is_not_paused(name: str) -> None:
     one = copied(in_a_leg("ardupilot"))
     streams(one, "DISTANCE_SENSOR", 100 * MS)
     one.wait(0.5)
@@ -240,7 +240,7 @@ def test_a_leg_that_somebody_slows_down_says_so_once(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("result", [0, 4])
-def test_what_another_system_is_granted_makes_older_reports_void(result: int) -> None:
+def test_command_accepted_from_another_invalidates_older_reports(result: int) -> None:
     """Its Land shows in no report yet: the next command of ours waits for one that is of after that."""
     one = copied(held("px4"))
     one.vehicle._tick_us = MS
@@ -255,7 +255,7 @@ def test_what_another_system_is_granted_makes_older_reports_void(result: int) ->
     assert late == (result == 0)
 
 
-def test_what_another_system_is_granted_after_a_frame_of_ours_is_told_with_it() -> None:
+def test_command_accepted_from_another_after_ours_is_noted() -> None:
     one = copied(held("px4"))
     one.begin(MotionKind.FLY, NEXT, altitude=25_000, speed=5_000)
     one.wait(0.2)
@@ -306,7 +306,7 @@ SLOWLY_UP: dict[str, tuple[Fault, ...]] = {
 
 @pytest.mark.parametrize("name", SLOWLY_UP)
 @pytest.mark.parametrize(("height", "within_s"), [(500, 13), (5_000, 5), (15_000, 13)])
-def test_a_climb_that_somebody_keeps_down_is_left_to_him(name: str, height: int, within_s: float) -> None:
+def test_climb_held_down_by_others_is_a_takeover(name: str, height: int, within_s: float) -> None:
     """ArduCopter names no target in a takeoff, so that it flies to the side tells, or that somebody was told that it
     obeys.
     """
@@ -322,7 +322,7 @@ def test_a_climb_that_somebody_keeps_down_is_left_to_him(name: str, height: int,
 
 
 @pytest.mark.parametrize("ceiling_mm", [7_000, 17_000])
-def test_a_climb_that_nobody_keeps_down_is_not_left_to_nobody(ceiling_mm: int) -> None:
+def test_stalled_climb_without_intervention_is_no_takeover(ceiling_mm: int) -> None:
     """Its weight, weak motors or a fence end it: that was called a pause, and it was left in the air."""
     one = Flyer("ardupilot", ceiling_mm=ceiling_mm)
     one.until(Ready)
@@ -456,7 +456,7 @@ def test_sticks_end_what_px4_does_by_itself(flavour: str) -> None:
 
 
 @pytest.mark.slow
-def test_our_own_targets_are_nobody_elses(aloft: Make) -> None:
+def test_our_targets_are_no_takeover(aloft: Make) -> None:
     """Leg after leg, a hold, and another leg."""
     one = aloft()
     path = [(20_000, 0), (20_000, 20_000), (0, 20_000), (0, 0), (20_000, 0)]

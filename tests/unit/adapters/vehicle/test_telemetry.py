@@ -323,7 +323,7 @@ def test_a_source_that_is_no_number_is_refused_before_anything_flies(source: str
         Telemetry(replace(POLICY, signals=(read, *others)))
 
 
-def test_what_is_no_number_is_not_known() -> None:
+def test_value_without_a_number_is_unknown() -> None:
     message = battery(50)
     message.battery_remaining = "50"
     telemetry = Telemetry(POLICY)
@@ -370,7 +370,7 @@ def test_a_measurement_that_is_repeated_makes_nothing_younger() -> None:
     assert held.hear(gps(3, 60 * S), 60 * S)[1] < 20_000
 
 
-def test_a_time_of_0_says_nothing() -> None:
+def test_stamp_of_zero_is_unknown() -> None:
     held = Held(POLICY)
     for now_us in range(S, 10 * S, S // 5):
         fix, age_us = held.hear(gps(3, 0), now_us)
@@ -391,7 +391,7 @@ def test_that_there_is_no_fix_counts_however_often_it_is_said() -> None:
             assert held.hear(gps(1, S), S + 100_000)[0] == none
 
 
-def test_what_the_estimator_does_not_vouch_for_is_not_known() -> None:
+def test_unconfirmed_values_are_unknown() -> None:
     telemetry = Telemetry(POLICY)
     somewhere = position(*HOME)
     lost = telemetry.read("GLOBAL_POSITION_INT", somewhere, AUTOPILOT, frozenset({"lat", "lon"}))

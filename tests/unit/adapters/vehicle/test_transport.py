@@ -99,7 +99,7 @@ def test_a_busy_port_says_so(terminal: Terminal) -> None:
     SerialTransport(address).close()
 
 
-def test_what_is_no_serial_device_says_so(tmp_path: Path) -> None:
+def test_file_that_is_no_serial_device_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(OSError, match="not a serial device"):
         SerialTransport(Address(LinkCarrier.SERIAL, str(tmp_path / "file"), 57_600))

@@ -68,7 +68,7 @@ STRANGERS = [
 
 
 @rows(("name", "kind", "autopilot"), STRANGERS)
-def test_what_is_no_vehicle_is_never_chosen_as_it(name: str, kind: int, autopilot: int) -> None:
+def test_sender_that_is_no_vehicle_is_never_chosen(name: str, kind: int, autopilot: int) -> None:
     driver = Driver(POLICY, FrameSession())
     driver.receive(Codec(255, 1).pack(beat(kind, autopilot)), S)
     assert driver.flavour is None
@@ -278,7 +278,7 @@ def test_who_contradicts_the_vehicle_in_the_air_is_noted_and_ends_nothing(
 
 
 @pytest.mark.parametrize("says_", [Voice.STRAYED])
-def test_what_contradicts_the_vehicle_on_the_ground_keeps_it_from_being_ready(flavour: str, says_: Voice) -> None:
+def test_contradiction_on_the_ground_prevents_readiness(flavour: str, says_: Voice) -> None:
     one = Flyer(flavour, faults=(SecondVoice(0, says_, 250_000, 30 * S),))
     one.wait(20)
     assert not any(isinstance(each, Ready) for each in one.events)

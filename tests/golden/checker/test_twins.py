@@ -81,7 +81,7 @@ def _in_checkout(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.slow
-def test_a_rejected_twin_has_its_one_code_and_reads_well() -> None:
+def test_rejected_twin_has_only_its_code_and_the_golden_text() -> None:
     others, read, kept = {}, {}, {}
     for name in REJECTED:
         found, sources = findings("rejected", name)
@@ -97,17 +97,17 @@ def test_a_rejected_twin_has_its_one_code_and_reads_well() -> None:
 
 
 @pytest.mark.parametrize("names", parts(REJECTED, 3))
-def test_an_accepted_twin_has_no_finding(names: Sequence[str]) -> None:
+def test_accepted_twin_has_no_finding(names: Sequence[str]) -> None:
     seen = {name: findings("accepted", name) for name in names}
     assert {name: render(found, sources) for name, (found, sources) in seen.items() if found != ()} == {}
 
 
-def test_every_code_has_twins_named_by_it() -> None:
+def test_every_code_has_twins_with_its_name() -> None:
     slugs = {f"{code.id.lower()}_{code.slug.replace('-', '_')}" for code in codes.REGISTRY.values()}
     without = {f"{code.id.lower()}_{code.slug.replace('-', '_')}" for code in WITHOUT_TWINS}
     assert {Path(name).stem for name in REJECTED} == slugs - without
     assert sorted(path.name for path in (TESTS / "accepted").iterdir() if path.is_file()) == REJECTED
 
 
-def test_no_golden_is_left_over() -> None:
+def test_every_golden_has_a_twin() -> None:
     assert {path.stem for path in HERE.glob("*.txt")} == {Path(name).stem for name in REJECTED}

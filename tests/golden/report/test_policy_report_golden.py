@@ -37,7 +37,7 @@ def lines(value: Any, depth: int = 0, name: str = "") -> Iterator[str]:
         yield f"{indent}{name}: {value}"
 
 
-def test_the_shipped_policy_is_told_word_for_word() -> None:
+def test_report_of_the_shipped_policy_matches_the_golden() -> None:
     program = load([str(POLICY)], lambda name: Path(name).read_bytes(), str(CHECKOUT))
     checked = examine_program(program, dialect.load())
     part = ReportPart(program, checked.policies, (), checked.diagnostics)

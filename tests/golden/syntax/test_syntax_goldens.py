@@ -29,7 +29,7 @@ def rendering(source: Source, found: Diagnostic) -> str:
 
 
 @rows("path", CASES, ids=lambda path: path.stem)
-def test_golden(path: Path) -> None:
+def test_findings_match_the_golden(path: Path) -> None:
     source = Source(path.name, path.read_bytes().decode())
     found = "\n\n".join(rendering(source, each) for each in parse(source).diagnostics) + "\n"
     golden = path.with_suffix(".txt")
@@ -39,7 +39,7 @@ def test_golden(path: Path) -> None:
 
 
 @rows("path", CASES, ids=lambda path: path.stem)
-def test_style(path: Path) -> None:
+def test_messages_follow_the_style(path: Path) -> None:
     for found in parse(Source(path.name, path.read_bytes().decode())).diagnostics:
         assert found.message[0] == "`" or found.message[0].islower()
         assert not found.message.endswith(".")

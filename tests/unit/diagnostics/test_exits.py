@@ -35,7 +35,7 @@ def test_meanings_are_one_line_each() -> None:
         assert re.fullmatch(r"[^\n|]{20,110}", code.meaning), code
 
 
-def test_markdown_has_a_row_for_each_code() -> None:
+def test_markdown_table_has_a_row_for_each_code() -> None:
     lines = as_markdown().splitlines()
     assert lines[:3] == [
         "| code | slug | meaning |",
@@ -45,5 +45,5 @@ def test_markdown_has_a_row_for_each_code() -> None:
     assert len(lines) == 2 + len(ExitCode)
 
 
-def test_the_readme_shows_the_table_as_it_is(checkout: Path) -> None:
+def test_readme_contains_the_current_table(checkout: Path) -> None:
     assert as_markdown() in (checkout / "README.md").read_text(encoding="utf-8")

@@ -13,7 +13,7 @@ def finding(
     return Diagnostic(code, message, Span("a.rts", at, at + 1))  # type: ignore[arg-type]
 
 
-def test_one_missing_name_is_one_finding_with_a_count() -> None:
+def test_findings_on_one_missing_name_are_merged_with_a_count() -> None:
     found = folded([finding(1), finding(9, "the role `b` is not declared", UNKNOWN_ROLE), *map(finding, range(20, 29))])
     assert [each.message for each in found] == [
         "`fly` is not declared; expected a skill (10 places)",
@@ -22,7 +22,7 @@ def test_one_missing_name_is_one_finding_with_a_count() -> None:
     assert [label.span.start for label in found[0].labels] == [20, 21, 22]
 
 
-def test_other_findings_stay_apart() -> None:
+def test_other_findings_are_not_merged() -> None:
     apart = (
         finding(1),
         finding(2, "`fry` is not declared; expected a skill"), finding(3, "x", SYNTAX), finding(4, "x", SYNTAX),

@@ -40,19 +40,19 @@ BEGINNINGS: tuple[tuple[bytes, str, FileKind | None], ...] = (
 
 
 @rows("data, name, kind", BEGINNINGS)
-def test_recognised(data: bytes, name: str, kind: FileKind | None) -> None:
+def test_kinds_are_recognised_by_their_first_bytes(data: bytes, name: str, kind: FileKind | None) -> None:
     assert recognised(data, name) is kind
     sources = (None, kinds.SOURCE, kinds.SPECIFICATION)
     assert (foreign(data, name) is None) is (kind in sources)
 
 
-def test_a_source_with_a_comment_of_another_language_is_no_page() -> None:
+def test_source_that_begins_with_a_hash_is_not_markdown() -> None:
     assert foreign(b"# a comment\nskill a() { }", "a.rts") is None
     assert foreign(b"#!/usr/bin/env rtshcua\n", "a.rts") is None
     assert foreign(b'{"type": "Feature"}', "a.rts") is kinds.GEOJSON
 
 
-def test_no_source_that_ships_is_taken_for_something_else() -> None:
+def test_shipped_sources_are_recognised_as_sources() -> None:
     files = [
         path for folder in ("skills", "policies", "missions", "examples") for path in (CHECKOUT / folder).rglob("*")
     ]

@@ -23,11 +23,11 @@ def shown(text: str, start: int, end: int) -> list[str]:
     return [line, *underlines]
 
 
-def test_a_span_is_underlined() -> None:
+def test_span_is_underlined() -> None:
     assert shown("one two three\n", 4, 7) == ["one two three", "    ^^^"]
 
 
-def test_a_tab_is_as_wide_as_it_is_shown() -> None:
+def test_tab_is_underlined_at_its_displayed_width() -> None:
     assert TAB_WIDTH == 4
     assert shown("a\tbc\td", 2, 4) == ["a   bc  d", "    ^^"]
 
@@ -37,16 +37,16 @@ def test_wide_characters_take_two_columns_and_combining_ones_none() -> None:
     assert shown("e\u0301x", 2, 3) == ["e\u0301x", " ^"]
 
 
-def test_an_empty_span_has_one_mark_also_at_the_end_of_the_line() -> None:
+def test_empty_span_has_one_mark_even_at_the_line_end() -> None:
     assert shown("ab\n", 2, 2) == ["ab", "  ^"]
     assert shown("", 0, 0) == ["", "^"]
 
 
-def test_a_span_over_several_lines_is_underlined_up_to_the_end_of_the_first() -> None:
+def test_span_over_lines_is_underlined_to_the_end_of_the_first() -> None:
     assert shown("ab cd\nef\n", 3, 8) == ["ab cd", "   ^^"]
 
 
-def test_a_long_line_is_cut_around_the_span() -> None:
+def test_long_line_is_cut_around_the_span() -> None:
     text = "x" * 5_000 + "here" + "y" * 5_000
     line, underline = shown(text, 5_000, 5_004)
     assert line.startswith("...")
@@ -55,7 +55,7 @@ def test_a_long_line_is_cut_around_the_span() -> None:
     assert len(line) <= MAX_WIDTH
 
 
-def test_of_a_very_long_line_only_what_is_near_is_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_very_long_line_is_examined_near_the_span_only(monkeypatch: pytest.MonkeyPatch) -> None:
     """A hundred findings on one line of a megabyte are shown as fast as on short lines."""
     looked_at: list[str] = []
     monkeypatch.setattr(excerpts, "_cell", lambda character: looked_at.append(character) or (character, 1))
@@ -66,7 +66,7 @@ def test_of_a_very_long_line_only_what_is_near_is_looked_at(monkeypatch: pytest.
     assert len(looked_at) == 2 * NEAR
 
 
-def test_nothing_reaches_the_terminal_that_it_would_obey() -> None:
+def test_control_characters_are_escaped() -> None:
     line, underline = shown("a\x1b[31m\u202ebc", 7, 8)
     assert line == "a<U+001B>[31m<U+202E>bc"
     assert line[underline.index("^")] == "b"
@@ -111,13 +111,13 @@ def test_labels_are_shown_with_their_files() -> None:
     ]
 
 
-def test_a_finding_without_a_place_is_one_line() -> None:
+def test_finding_without_a_place_is_one_line() -> None:
     assert render([Diagnostic(codes.NO_MISSION, "the sources declare no mission")], {}) == (
         "error[E0206]: the sources declare no mission\n"
     )
 
 
-def test_a_place_in_an_unknown_file_names_the_file() -> None:
+def test_place_in_an_unknown_file_names_the_file() -> None:
     assert render([Diagnostic(codes.SYNTAX, "bad", Span("gone.rts", 0, 1))], {}).splitlines()[1] == " --> gone.rts"
 
 
@@ -144,7 +144,7 @@ def test_json_has_every_key_and_the_format_of_the_registry() -> None:
     assert set(first) == set(second)
 
 
-def test_what_is_labelled_on_a_long_line_is_in_view() -> None:
+def test_label_on_a_long_line_is_visible() -> None:
     line = "first" + " x" * 100 + " second" + " y" * 100 + " third"
     places = [line.index(word) for word in ("first", "second", "third")]
     spans = [Span("a.rts", at, at + 5) for at in places]

@@ -22,12 +22,12 @@ CASES = [
 
 
 @rows(("word", "known", "about", "meant"), CASES)
-def test_the_name_that_was_meant(word: str, known: list[str], about: str, meant: str | None) -> None:
+def test_nearest_name_is_suggested(word: str, known: list[str], about: str, meant: str | None) -> None:
     assert nearest(word, known, about) == meant
     assert nearest(word, reversed(known), about) == meant
 
 
-def test_a_list_is_bounded() -> None:
+def test_list_of_names_is_bounded() -> None:
     assert listed(["a", "b"]) == "`a`, `b`"
     many = [f"n{number}" for number in range(LISTED + 3)]
     assert listed(many).endswith(f"`n{LISTED - 1}` and 3 more")

@@ -8,12 +8,12 @@ from rtshcua.diagnostics.wrapped import WIDTH, wrapped
 DIGEST = "0123456789abcdef" * 4
 
 
-def test_what_fits_stays_as_it_is() -> None:
+def test_line_that_fits_is_unchanged() -> None:
     for line in ("", "x" * WIDTH, "  a   b", "y" * 10):
         assert wrapped(line) == [line]
 
 
-def test_what_does_not_fit_goes_on_beneath_its_own_text() -> None:
+def test_continuation_lines_are_indented_to_the_text() -> None:
     words = "word " * 30
     for head in (
         "error: ",
@@ -31,14 +31,14 @@ def test_what_does_not_fit_goes_on_beneath_its_own_text() -> None:
     assert all(line.startswith("  word") for line in wrapped(words.strip())[1:])
 
 
-def test_a_command_in_backticks_is_not_taken_apart_where_it_fits() -> None:
+def test_command_in_backticks_is_kept_on_one_line() -> None:
     command = "`rtshcua keys approver NAME --role ROLE`"
     assert any(command in line for line in wrapped(f"error: {'x ' * 25}{command} and so on, at some length"))
     lines = wrapped(f"`{'a b ' * 40}`")
     assert max(map(len, lines)) <= WIDTH
 
 
-def test_what_is_longer_than_a_line_stays_whole_on_a_line_of_its_own() -> None:
+def test_word_longer_than_a_line_gets_a_line_of_its_own() -> None:
     path = "/" + "folder/" * 20
     for long in (DIGEST, path):
         (line,) = [each for each in wrapped(f"  policy        digest {long}, and then some more words") if long in each]
@@ -46,21 +46,21 @@ def test_what_is_longer_than_a_line_stays_whole_on_a_line_of_its_own() -> None:
     assert max(map(len, wrapped(f"  policy        digest {DIGEST}, key"))) <= WIDTH
 
 
-def test_colours_take_no_room() -> None:
+def test_colour_sequences_have_no_width() -> None:
     coloured = "  " + "\x1b[1mword\x1b[0m " * 15
     assert wrapped(coloured.rstrip()) == [coloured.rstrip()]
     assert len(wrapped(coloured * 2)) > 1
 
 
 @given(st.text(st.sampled_from("ab `:.-+=·/ ")), st.integers(0, 40))
-def test_nothing_is_lost_and_only_single_words_are_too_long(text: str, count: int) -> None:
+def test_no_text_is_lost_and_only_single_words_exceed_the_width(text: str, count: int) -> None:
     line = text + "xy " * count + text
     lines = wrapped(line)
     assert "".join("".join(lines).split()) == "".join(line.split())
     assert all(len(each) <= WIDTH or " " not in each.strip() for each in lines)
 
 
-def test_a_command_of_ours_is_never_broken_and_other_words_in_backticks_are() -> None:
+def test_own_commands_are_never_broken() -> None:
     command = f"`rtshcua keys accept {'/a/long/folder/' * 6}root.trust --vehicle IDENTITY`"
     assert command in [line.strip() for line in wrapped(f"type {command} then")]
     assert max(map(len, wrapped(f"a `{'word ' * 40}`"))) <= WIDTH

@@ -32,7 +32,7 @@ def read(line: str) -> tuple[str, dict[str, str], str]:
 @pytest.mark.parametrize(
     ("code", "command"), [(codes.SYNTAX, "error"), (codes.NAMING, "warning"), (codes.UNDECIDED, "notice")]
 )
-def test_severities(code: codes.Code, command: str) -> None:
+def test_severities_map_to_commands(code: codes.Code, command: str) -> None:
     assert github([Diagnostic(code, "so", Span("a.rts", 4, 7))], FILES) == (
         f"::{command} file=a.rts,line=1,endLine=1,col=5,endColumn=8,title={code.id}::"
         f"a.rts:1:5: {code.id} {code.slug}: so\n"
@@ -46,19 +46,19 @@ def test_help_labels_and_pointer_are_lines_of_the_message() -> None:
     assert message.split("\n")[1:] == ["at: /a", "a.rts:2:1: declared here", "help: do that"]
 
 
-def test_a_place_over_lines_has_no_columns() -> None:
+def test_span_over_lines_has_no_columns() -> None:
     _, properties, _ = read(github([Diagnostic(codes.SYNTAX, "so", Span("a.rts", 4, 10))], FILES).rstrip("\n"))
     assert properties == {"file": "a.rts", "line": "1", "endLine": "2", "title": "E0101"}
 
 
-def test_a_file_below_another_folder_is_named_from_the_root() -> None:
+def test_file_name_is_relative_to_the_repository_root() -> None:
     (named,) = github([Diagnostic(codes.SYNTAX, "so", Span("a.rts", 0, 1))], FILES, "/work/drones/").splitlines()
     assert read(named)[1]["file"] == "/work/drones/a.rts"
     (named,) = github([Diagnostic(codes.SYNTAX, "so", Span("/lib/a.rts", 0, 1))], FILES, "/work").splitlines()
     assert read(named)[1] == {"file": "/lib/a.rts", "title": "E0101"}
 
 
-def test_a_finding_about_no_file() -> None:
+def test_finding_without_a_file_has_no_place() -> None:
     assert github([Diagnostic(codes.NO_SUCH_FILE, "`x: 5 %`, gone")], {}) == (
         "::error title=E0108::E0108 no-such-file: `x: 5 %25`, gone\n"
     )

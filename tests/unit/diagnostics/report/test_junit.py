@@ -37,7 +37,7 @@ CASES = (
 )
 
 
-def test_each_outcome_as_jenkins_reads_it() -> None:
+def test_outcomes_follow_the_jenkins_schema() -> None:
     (suite,) = read(Suite("a.rts", CASES, (("coverage", "95 %"),)))
     assert suite.attrib == {
         "name": "a.rts", "tests": "4", "failures": "1", "errors": "1", "skipped": "1", "time": "1.250", "file": "a.rts",
@@ -54,18 +54,18 @@ def test_each_outcome_as_jenkins_reads_it() -> None:
     assert [(each.tag, each.get("message")) for each in skipped] == [("skipped", "not asked for")]
 
 
-def test_all_suites_are_counted_together() -> None:
+def test_root_counts_the_cases_of_all_suites() -> None:
     whole = read(Suite("a.rts", CASES), Suite("b.rts", CASES[1:]))
     assert {name: whole.get(name) for name in ("tests", "failures", "errors", "time")} == {
         "tests": "7", "failures": "2", "errors": "2", "time": "1.250",
     }  # fmt: skip
 
 
-def test_nothing_to_tell_is_a_document_all_the_same() -> None:
+def test_empty_report_is_a_document() -> None:
     assert read().attrib["tests"] == "0"
 
 
-def test_findings_fail_by_their_severity() -> None:
+def test_findings_fail_by_severity() -> None:
     sources = {"a.rts": Source("a.rts", "one two\n")}
     found = [
         Diagnostic(codes.UNDECIDED, "cannot tell", Span("a.rts", 0, 3)),
@@ -89,7 +89,7 @@ anything = st.text(max_size=20) | st.text("<>&'\"]\r\n\t\0\x1b\ufffe\ud800\U0010
 
 
 @given(anything, anything, anything, anything, anything)
-def test_hostile_text_is_read_back_as_it_is_shown(name: str, file: str, why: str, kind: str, output: str) -> None:
+def test_hostile_text_is_shown_escaped(name: str, file: str, why: str, kind: str, output: str) -> None:
     cases = (CaseOutcome(name, file, 1, failure=why, kind=kind, output=output), CaseOutcome(name, file, skipped=why))
     failed, skipped = read(Suite(name, cases, ((kind, why),)))[0].iter("testcase")
     assert failed.get("name") == visible(name)

@@ -50,13 +50,13 @@ def run(*found: Diagnostic, files: dict[str, Source] = FILES, **more: Any) -> di
     return one
 
 
-def test_the_schema_refuses_what_is_not_sarif() -> None:
+def test_schema_refuses_invalid_sarif() -> None:
     log = sarif((BROAD,), FILES, version="1", code=ExitCode.OK)
     log["runs"][0]["results"][0]["level"] = "fatal"
     assert not validator().is_valid(log)
 
 
-def test_a_finding_has_its_rule_level_message_and_place() -> None:
+def test_finding_has_rule_level_message_and_place() -> None:
     one = run(BROAD)
     (rule,), (result,) = one["tool"]["driver"]["rules"], one["results"]
     assert (rule["id"], rule["name"]) == ("E1303", "BroadAuthority")
@@ -72,7 +72,7 @@ def test_a_finding_has_its_rule_level_message_and_place() -> None:
     assert one["columnKind"] == "unicodeCodePoints"
 
 
-def test_labels_are_related_locations_and_fixes_changes() -> None:
+def test_labels_become_related_locations_and_fixes_changes() -> None:
     (result,) = run(BROAD)["results"]
     (related,) = result["relatedLocations"]
     assert related["message"] == {"text": "declared here"}
@@ -87,21 +87,21 @@ def test_labels_are_related_locations_and_fixes_changes() -> None:
     assert mended == TEXT.replace("any", "role operator", 1)
 
 
-def test_the_page_of_a_code_is_its_help() -> None:
+def test_code_page_is_the_help_of_the_rule() -> None:
     page = SimpleNamespace(text="# E1303\n\n## What it means\n\n`{` stays.\n", what="`{` stays.")
     (rule,) = run(BROAD, pages={"E1303": page})["tool"]["driver"]["rules"]
     assert rule["help"] == {"text": page.text, "markdown": page.text}
     assert rule["fullDescription"] == {"text": "`{` stays."}
 
 
-def test_each_rule_is_there_once() -> None:
+def test_rules_are_listed_once() -> None:
     other = Diagnostic(codes.NAMING, "a name", SECOND)
     one = run(BROAD, other, BROAD)
     assert [rule["id"] for rule in one["tool"]["driver"]["rules"]] == ["E1303", "E1302"]
     assert [result["ruleIndex"] for result in one["results"]] == [0, 1, 0]
 
 
-def test_what_is_ignored_is_suppressed_with_its_reason() -> None:
+def test_ignored_finding_is_suppressed_with_its_reason() -> None:
     written = Ignored(Diagnostic(codes.NAMING, "a name", SECOND), "the register says so", Span(NAME, 0, 3))
     configured = Ignored(Diagnostic(codes.UNUSED, "unused", SECOND), "kept for later")
     told, source, setting = run(BROAD, ignored=(written, configured))["results"]
@@ -112,7 +112,7 @@ def test_what_is_ignored_is_suppressed_with_its_reason() -> None:
     assert setting["suppressions"] == [{"kind": "external", "status": "accepted", "justification": "kept for later"}]
 
 
-def test_a_fingerprint_stays_when_lines_above_move_and_tells_twins_apart() -> None:
+def test_fingerprint_survives_moved_lines_and_numbers_duplicates() -> None:
     twin = Diagnostic(BROAD.code, BROAD.message, SECOND)
     before = run(Diagnostic(BROAD.code, BROAD.message, FIRST), twin)["results"]
     above = "// a remark\n\n"
@@ -126,7 +126,7 @@ def test_a_fingerprint_stays_when_lines_above_move_and_tells_twins_apart() -> No
     assert changed["partialFingerprints"][FINGERPRINT] not in marks[0]
 
 
-def test_a_file_that_cannot_be_read_is_a_notification_of_a_run_that_failed() -> None:
+def test_unreadable_file_is_a_notification_of_a_failed_run() -> None:
     one = run(Diagnostic(codes.NO_SUCH_FILE, "`x.rts` cannot be read"), BROAD, code=ExitCode.INPUT)
     (invocation,) = one["invocations"]
     assert (invocation["executionSuccessful"], invocation["exitCode"]) == (False, 3)
@@ -135,17 +135,17 @@ def test_a_file_that_cannot_be_read_is_a_notification_of_a_run_that_failed() -> 
     assert [result["ruleId"] for result in one["results"]] == ["E1303"]
 
 
-def test_a_finding_in_a_specification_stands_at_its_pointer() -> None:
+def test_finding_in_a_specification_has_its_pointer() -> None:
     (result,) = run(Diagnostic(codes.SPECIFICATION_SHAPE, "no such key", pointer="/phases/0"))["results"]
     assert result["locations"] == [{"logicalLocations": [{"fullyQualifiedName": "/phases/0", "kind": "value"}]}]
 
 
 @pytest.mark.parametrize(("folder", "uri"), [("/", "file:///"), ("/a b/c", "file:///a%20b/c/"), (None, None)])
-def test_the_folder_that_names_are_relative_to(folder: str | None, uri: str | None) -> None:
+def test_base_folder_becomes_the_uri_base(folder: str | None, uri: str | None) -> None:
     assert run(base=folder)["originalUriBaseIds"]["SRCROOT"].get("uri") == uri
 
 
-def test_a_finding_in_a_file_that_was_not_read_keeps_its_offsets() -> None:
+def test_finding_in_an_unread_file_keeps_its_offsets() -> None:
     (result,) = run(BROAD, files={})["results"]
     assert result["locations"][0]["physicalLocation"]["region"] == {"charOffset": 23, "charLength": 6}
 

@@ -19,7 +19,7 @@ CONFIRM = "confirm probe by role supervisor within 10 min"
         ("40 min", "probe() { deadline 4 s }", 0),
     ],
 )
-def test_how_long_is_waited(skill_valid: str, step: str, findings: int) -> None:
+def test_approval_time_is_compared_with_the_validity(skill_valid: str, step: str, findings: int) -> None:
     probe = skill("probe()", valid=f"for {skill_valid}")
     text = program(probe, policy(CONFIRM), mission("takeoff(altitude = 10 m)", step, "return_home()"))
     assert [code for code, _ in found(text)].count("E0806") == findings

@@ -54,7 +54,7 @@ class Literals(Maker):
         return self.literal(dimension)
 
 
-def test_a_constant_is_the_fraction_that_it_spells() -> None:
+def test_constant_equals_its_written_fraction() -> None:
     maker = Literals(Random(3))
     nothing = World(0, {}, {}, None, 0)
     whole = 0
@@ -93,12 +93,12 @@ STORED = [
 
 
 @rows(("argument", "code", "help"), STORED)
-def test_an_argument_is_whole(argument: str, code: str, help: str | None) -> None:
+def test_argument_is_a_whole_canonical_number(argument: str, code: str, help: str | None) -> None:
     found = [(each.code.id, each.help) for each in compiled(argument).diagnostics if each.code.id < "E0606"]
     assert found == ([(code, help)] if help is not None or code == "E0322" else [])
 
 
-def test_the_ends_of_a_parameter_and_its_default_are_whole() -> None:
+def test_range_ends_and_default_are_whole() -> None:
     assert not [
         each for each in compiled("", range="1 m .. 2 * 50 m", default="3 * 5 m").diagnostics if "E03" in each.code.id
     ]

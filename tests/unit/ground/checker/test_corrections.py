@@ -44,7 +44,7 @@ def checked(text: str) -> tuple[Diagnostic, ...]:
         ("degrade goto when battery < 9 % to hovver", "degrade goto when battery < 9 % to hover"),
     ],
 )
-def test_of_a_policy(wrong: str, right: str) -> None:
+def test_corrections_in_a_policy(wrong: str, right: str) -> None:
     text = HEAD + POLICY.format(wrong)
     assert fixed(checked(text), text) == HEAD + POLICY.format(right)
 
@@ -57,7 +57,7 @@ def test_of_a_policy(wrong: str, right: str) -> None:
         (f"phase inspektion {WHEN}", f"phase inspection {WHEN}"),
     ],
 )
-def test_of_a_test(wrong: str, right: str) -> None:
+def test_corrections_in_a_test(wrong: str, right: str) -> None:
     before = IMPORT + NOMINAL
     text = f'{before}test "it" {{ {wrong} expect allow }}'
     errors = tuple(each for each in made(text, "").diagnostics if has_errors([each]))
@@ -65,7 +65,7 @@ def test_of_a_test(wrong: str, right: str) -> None:
     assert fixed(first, text) == f'{before}test "it" {{ {right} expect allow }}'
 
 
-def test_what_the_text_does_not_have_is_not_replaced() -> None:
+def test_correction_requires_the_word_in_the_text() -> None:
     report = Report({"x": Source("x", 'goto "gotto" gotto')})
     assert correction(report, Span("x", 5, 12), "gotto", ["goto"]) == (Span("x", 5, 12), '"goto"', "write `goto`")
     assert correction(report, Span("x", 13, 18), "gotto", ["goto"]) == (Span("x", 13, 18), "goto", "write `goto`")

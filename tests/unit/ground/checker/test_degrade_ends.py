@@ -9,6 +9,6 @@ from reference.sources import found, policy, program, skill
     ("target", "codes"),
     [("stay", ["E0611"]), ("stay for 10 s", []), ("return_home", []), ("emergency_land", [])],
 )
-def test_the_target_of_a_degrade_rule_ends(target: str, codes: list[str]) -> None:
+def test_degrade_target_must_end(target: str, codes: list[str]) -> None:
     rule = f"degrade goto when battery < 30 % to {target}"
     assert [code for code, _ in found(program(skill("stay()", lasts=""), policy(rule)))] == codes

@@ -38,7 +38,7 @@ policy p version 1 {
         ("", "410 m above sea", "rising position inside layer", set()),
     ],
 )
-def test_an_edge_reads_no_uncertain_band(within: str, floor: str, condition: str, codes: set[str]) -> None:
+def test_edge_refuses_an_inexact_band(within: str, floor: str, condition: str, codes: set[str]) -> None:
     text = SOURCE.replace("WITHIN", within).replace("FLOOR", floor).replace("CONDITION", condition)
 
     def read(path: str) -> bytes:

@@ -72,7 +72,7 @@ POINT = {"type": "Point", "coordinates": [8.5, 47.3]}
         "crs",
     ],
 )  # fmt: skip
-def test_one_area_is_read_wherever_it_stands(tree: Any, name: str | None) -> None:
+def test_area_is_read_at_any_place_in_the_file(tree: Any, name: str | None) -> None:
     (found,) = read(tree, name)
     assert set(found.outer) == set(CORNERS)
     assert set(found.holes[0]) == set(HOLE_CORNERS)
@@ -84,12 +84,12 @@ def test_rings_keep_their_order_and_lose_the_last_position() -> None:
     assert read(polygon([*SQUARE[:2], SQUARE[1], *SQUARE[2:]])) == (GeoPolygon(CORNERS, ()),)
 
 
-def test_all_polygons_of_a_multipolygon_count() -> None:
+def test_multipolygon_keeps_all_its_polygons() -> None:
     far = [[x + 0.1, y] for x, y in SQUARE]
     assert len(read({"type": "MultiPolygon", "coordinates": [[SQUARE], [far]]})) == 2
 
 
-def test_line_ends_and_a_byte_order_mark_do_no_harm() -> None:
+def test_line_ends_and_a_byte_order_mark_are_accepted() -> None:
     text = json.dumps(polygon(SQUARE), indent=1).replace("\n", "\r\n")
     assert read_area(b"\xef\xbb\xbf" + text.encode(), None) == read(polygon(SQUARE))
 
@@ -114,7 +114,7 @@ def test_fifteen_decimals_are_rounded_to_the_nearest_half_to_even(longitude: str
     [("1.00000005", 10_000_000), ("1.00000015", 10_000_002), ("-1.00000005", -10_000_000), ("1e1", 100_000_000),
      ("1E-7", 1), ("5e-8", 0), ("0.1500000e-6", 2), ("1e-999", 0), ("-0.0", 0)],
 )  # fmt: skip
-def test_numbers_are_decimal_digits_and_no_floats(written: str, whole: int) -> None:
+def test_numbers_are_exact_decimals(written: str, whole: int) -> None:
     text = f'{{"type":"Polygon","coordinates":[[[{written},9],[20,10],[20,20],[{written},9]]]}}'
     assert read_area(text.encode(), None)[0].outer[0][0] == whole
 
@@ -152,7 +152,7 @@ def test_numbers_are_decimal_digits_and_no_floats(written: str, whole: int) -> N
         (b'{"type": "Feature", "geometry": 7}', "`/geometry` is not a geometry"),
     ],
 )
-def test_what_is_no_geojson_is_refused(data: bytes, words: str) -> None:
+def test_invalid_geojson_is_refused(data: bytes, words: str) -> None:
     found = refused(data)
     assert found.code == codes.NOT_GEOJSON
     assert words in found.message
@@ -213,13 +213,13 @@ BOW = [[8.0, 47.0], [8.1, 47.1], [8.1, 47.0], [8.0, 47.1], [8.0, 47.0]]
         (polygon(BOW), None, "crosses or touches itself"),
     ],
 )  # fmt: skip
-def test_what_holds_no_such_area_is_refused(tree: Any, name: str | None, words: str) -> None:
+def test_file_without_the_area_is_refused(tree: Any, name: str | None, words: str) -> None:
     found = refused(tree, name)
     assert found.code == codes.GEOJSON_SHAPE
     assert words in found.message
 
 
-def test_positions_in_texts_are_texts_and_other_values_stand_beside_positions() -> None:
+def test_positions_in_strings_stay_strings() -> None:
     ring = [[8, 47], [9, 47], [9, 48], [8, 47]]
     told = {"name": '"[1,2],[3,4]', "a": [1, 2], "b": [[1, 2], "x"], "c": [[[1, 2]], [3, 4], 5]}
     feature = {"type": "Feature", "properties": told, "geometry": {"type": "Polygon", "coordinates": [ring]}}
@@ -233,7 +233,7 @@ def test_positions_in_texts_are_texts_and_other_values_stand_beside_positions() 
         read_area(json.dumps(feature).encode(), None)
 
 
-def test_hints_name_what_is_there() -> None:
+def test_hints_name_the_features() -> None:
     assert (
         refused(polygon(FIJI)).help
         == "cut the area at longitude 180 into two parts of a MultiPolygon (RFC 7946, 3.1.9)"

@@ -92,7 +92,7 @@ TABLE: list[tuple[Any, tuple[str, ...]]] = [
 
 
 @rows("tree, places", TABLE)
-def test_what_says_more_than_an_outline_is_named_with_its_place(tree: Any, places: tuple[str, ...]) -> None:
+def test_ignored_members_are_named_with_their_place(tree: Any, places: tuple[str, ...]) -> None:
     found = refused(tree)
     if not places:
         assert found is None
@@ -103,13 +103,13 @@ def test_what_says_more_than_an_outline_is_named_with_its_place(tree: Any, place
     assert "`floor` and `ceiling`" in (found.help or "")
 
 
-def test_only_the_feature_that_is_meant_is_looked_at() -> None:
+def test_only_the_selected_feature_is_examined() -> None:
     tree = {"type": "FeatureCollection", "features": [feature(), feature(CEILING=400) | {"id": "other"}]}
     assert refused(tree, "z") is None
     assert refused(tree, "other") is not None
 
 
-def test_many_members_are_counted() -> None:
+def test_many_ignored_members_are_counted() -> None:
     found = refused(feature(**{f"{each}_height": 1 for each in "abcdefghi"}))
     assert found is not None
     assert found.message.count("a height at") == 4
@@ -121,7 +121,7 @@ GATHERED = {"type": "GeometryCollection", "geometries": [OUTLINE]}
 
 
 @pytest.mark.parametrize("other", [CIRCLE, GATHERED])
-def test_an_area_in_another_form_is_not_passed_over(other: Any) -> None:
+def test_area_in_another_form_counts_as_an_area(other: Any) -> None:
     """Without `feature`, the one polygon of a file is meant only where no other area stands beside it."""
     tree = {"type": "FeatureCollection", "features": [feature(), feature(other) | {"id": "other"}]}
     found = refused(tree)
@@ -137,7 +137,7 @@ OTHERS = ("EPSG:43260", "EPSG:3857", "urn:ogc:def:crs:EPSG::4327", "", "4326")
 
 
 @rows("name, taken", [(each, True) for each in NAMES] + [(each, False) for each in OTHERS])
-def test_a_crs_that_names_wgs_84_is_taken_longitude_first(name: str, taken: bool) -> None:
+def test_crs_of_wgs_84_is_read_longitude_first(name: str, taken: bool) -> None:
     tree = {"type": "FeatureCollection", "crs": {"type": "name", "properties": {"name": name}}, "features": [feature()]}
     assert (refused(tree) is None) is taken
     if taken:
@@ -153,14 +153,14 @@ JSON = st.recursive(
 
 
 @given(st.sampled_from(["layer", "CEILING", "upperLimit", "validFrom", "radius"]), st.text("abc", max_size=4), JSON)
-def test_a_member_is_found_at_any_depth_unless_it_says_nothing(name: str, way: str, value: Any) -> None:
+def test_member_with_a_value_is_found_at_any_depth(name: str, way: str, value: Any) -> None:
     tree: Any = {name: value}
     for each in way:
         tree = {each: tree} if each != "c" else {each: [None, tree]}
     assert (refused(feature(**tree)) is None) is (value in (None, "", [], {}))
 
 
-def test_words_of_names_are_told_apart_in_every_way_of_writing() -> None:
+def test_words_of_member_names_are_split_in_any_style() -> None:
     for name in (
         "upper-limit",
         "UpperLimit",

@@ -82,7 +82,9 @@ CASES = [
 
 
 @rows(("text", "code", "help", "replacement"), CASES)
-def test_one_mistake_is_one_finding_with_help(text: str, code: str, help: str | None, replacement: str | None) -> None:
+def test_one_mistake_gives_one_finding_with_help(
+    text: str, code: str, help: str | None, replacement: str | None
+) -> None:
     found = check(text)
     assert {each.code.id for each in found} == {code}
     assert code == "E0101" or len(found) == 1
@@ -91,7 +93,7 @@ def test_one_mistake_is_one_finding_with_help(text: str, code: str, help: str | 
         assert [fix.replacement for fix in found[0].fixes] == ([] if replacement is None else [replacement])
 
 
-def test_of_two_declarations_the_one_of_the_file_that_was_asked_for_is_blamed() -> None:
+def test_duplicate_is_reported_in_the_compiled_file() -> None:
     (found,) = check('import "lib:policies/site.rts"\nzone city = circle(47.39774 N, 8.54559 E, 100 m)\n')
     assert found.code.id == "E0202"
     assert found.span is not None
@@ -125,7 +127,7 @@ mission m under p@1 on quad {
 """
 
 
-def test_a_default_out_of_scope_is_shown() -> None:
+def test_out_of_scope_finding_shows_the_default() -> None:
     (found,) = check(IMPORTS + OBSERVE.replace("TIME", "10 s").replace("HOME", ""))
     assert found.code.id == "E0703"
     assert found.message.startswith("`time = 20 s` is outside")
@@ -135,7 +137,7 @@ def test_a_default_out_of_scope_is_shown() -> None:
     ]
 
 
-def test_a_permit_that_does_not_suffice_for_a_link_is_shown() -> None:
+def test_insufficient_permit_of_a_link_is_shown() -> None:
     found = check(IMPORTS + OBSERVE.replace("TIME", "20 s").replace("HOME", "when battery > 10 %"))
     assert {each.code.id for each in found} == {"E0705"}
     assert "this rule permits it, if its condition holds" in [label.text for label in found[0].labels]

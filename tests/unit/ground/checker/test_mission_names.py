@@ -19,7 +19,7 @@ FLIGHT = mission("takeoff(altitude = 10 m)", "hover(10 s)", "return_home()")
         ("on quad", "on rules", "E0204", "`rules`"),
     ],
 )
-def test_a_name_that_is_not_there(old: str, new: str, code: str, word: str) -> None:
+def test_unknown_name_in_a_mission_is_reported(old: str, new: str, code: str, word: str) -> None:
     assert not found(program(policy(), FLIGHT))
     (only,) = found(program(policy(), FLIGHT.replace(old, new)))
     assert only[0] == code
@@ -27,5 +27,5 @@ def test_a_name_that_is_not_there(old: str, new: str, code: str, word: str) -> N
 
 
 @pytest.mark.parametrize("airspace", ["airspace inside nowhere", "airspace inside city outside nowhere"])
-def test_an_airspace_of_a_zone_that_is_not_there(airspace: str) -> None:
+def test_unknown_zone_in_an_airspace_is_reported(airspace: str) -> None:
     assert [code for code, _ in found(program(policy(airspace)))] == ["E0201"]

@@ -16,5 +16,5 @@ from virtual.rows import rows
         ("side: one of left, right = up", ["E0313"]),
     ],
 )
-def test_a_default(parameter: str, codes: list[str]) -> None:
+def test_default_must_fit_its_parameter(parameter: str, codes: list[str]) -> None:
     assert [code for code, _ in found(program(skill(f"probe({parameter})")))] == codes

@@ -67,12 +67,12 @@ def beyond(when: str) -> list[Diagnostic]:
         ("gps.fix >= fix_3d", []),
     ],
 )
-def test_what_a_signal_never_is_is_a_finding(when: str, written: list[str]) -> None:
+def test_value_outside_a_signal_range_is_reported(when: str, written: list[str]) -> None:
     text = program(SIGNALS, policy(f"degrade takeoff when {when} to return_home"))
     assert [text[each.span.start : each.span.end] for each in beyond(when) if each.span] == written
 
 
-def test_what_it_goes_to_is_said() -> None:
+def test_finding_names_the_range_and_the_nearest_value() -> None:
     (high,), (low,) = beyond("battery < 150 %"), beyond("wind > -1 m/s")
     assert high.message == "`150 %` is above the range of `battery`"
     assert high.help == "its values are from `0 %` to `100 %`; the nearest is `100 %`"
@@ -93,13 +93,13 @@ test "climbs" from base {{
 """
 
 
-def test_what_a_test_gives_is_what_the_signal_can_have() -> None:
+def test_test_premise_must_be_in_the_range_of_its_signal() -> None:
     text = program(policy(), TESTED.format("150 %", "-1 %"))
     found = [(each.code.id, text[each.span.start : each.span.end]) for each in findings(text) if each.span]
     assert [each for each in found if each[0] == "E0325"] == [("E0325", "150 %"), ("E0325", "-1 %")]
 
 
-def test_what_a_template_is_used_with_counts() -> None:
+def test_template_argument_must_be_in_the_range_of_the_signal() -> None:
     template = "template low(most: ratio in 0 % .. 200 %) { degrade takeoff when battery < most to return_home }\n"
     (found,) = findings(program(template, policy("use low(most = 150 %)")))
     assert found.code.id == "E0325"

@@ -24,14 +24,14 @@ def told(*parts: str) -> list[tuple[str, str]]:
         "delegate hover by role ranger to role operator",
     ],
 )
-def test_a_role_that_a_rule_names_is_declared(rule: str) -> None:
+def test_role_of_a_rule_must_be_declared(rule: str) -> None:
     assert told(policy(rule)) == [("E0208", "ranger")]
     assert told("role ranger\n", policy(rule)) == []
     assert told(policy(rule), "role mate, ranger\n") == [], "wherever it stands"
     assert told("role Ranger\n", policy(rule)) == [("E0208", "ranger")]
 
 
-def test_a_template_names_its_own_roles_and_is_given_others() -> None:
+def test_template_may_name_its_role_parameters() -> None:
     assert told(TEMPLATE, policy("use asked(9 m, ranger)")) == [("E0208", "ranger")]
     assert told(TEMPLATE, policy("use asked(who = ranger, low = 9 m)")) == [("E0208", "ranger")]
     assert told("role ranger\n", TEMPLATE, policy("use asked(9 m, ranger)", "use asked(9 m, operator)")) == []
@@ -40,11 +40,11 @@ def test_a_template_names_its_own_roles_and_is_given_others() -> None:
     assert told(TEMPLATE.replace("who: role", "who: altitude"), policy()) == [("E0208", "who")]
 
 
-def test_a_role_is_declared_once_in_a_file() -> None:
+def test_role_declared_twice_in_a_file_is_reported() -> None:
     assert told("role ranger, mate\nrole mate\n", policy()) == [("E0202", "mate")]
     assert told("role mate, mate\n", policy()) == [("E0202", "mate")]
     assert told("role operator\n", policy()) == [], "it may be said"
 
 
-def test_a_role_may_be_called_like_something_else() -> None:
+def test_role_may_have_the_name_of_a_skill() -> None:
     assert told("role hover, rules, who, role\n", TEMPLATE, policy("forbid hover by role hover, role")) == []

@@ -66,7 +66,7 @@ def numbers(one: Contract) -> Any:
 
 
 @pytest.mark.parametrize("given", [{}, GIVEN])
-def test_a_sized_contract_is_as_if_its_numbers_were_written(given: dict[str, str]) -> None:
+def test_sized_contract_equals_one_with_written_numbers(given: dict[str, str]) -> None:
     values = {"highest": "50 m", "longest": "1 min", "share": "9 %"} | given
     plain, _, rest = PROBE.partition(" sizes (")
     plain += rest[rest.index(") {") + 1 :]
@@ -76,7 +76,7 @@ def test_a_sized_contract_is_as_if_its_numbers_were_written(given: dict[str, str
     assert numbers(contract(IMPORTS + PROBE + sizes + RULES)) == numbers(contract(IMPORTS + plain + RULES))
 
 
-def test_the_library_has_the_limits_that_it_had() -> None:
+def test_library_limits_are_unchanged() -> None:
     checked = examined({}, str(CHECKOUT / "policies" / "bridge_inspection.rts"))
     found = {each.name: each for each in checked.policies[0].policy.contracts}
     tops = {found[name].parameters[at].high for name, at in (("takeoff", 0), ("goto", 1), ("inspect_area", 1))}
@@ -113,7 +113,7 @@ def test_the_library_has_the_limits_that_it_had() -> None:
         ("lasts    at most longest", "lasts    at most share", "E0310", ""),
     ],
 )
-def test_a_size_that_no_contract_could_be_checked_with(before: str, after: str, code: str, says: str) -> None:
+def test_invalid_size_is_reported(before: str, after: str, code: str, says: str) -> None:
     text = PROBE.replace(before, after, 1)
     assert text != PROBE
     assert [(one, says in message) for one, message in found(IMPORTS + text) if one == code][:1] == [(code, True)]
@@ -133,11 +133,11 @@ def test_a_size_that_no_contract_could_be_checked_with(before: str, after: str, 
         ("sizes probe(highest = longest)", "E0101"),
     ],
 )
-def test_what_is_given(given: str, code: str | None) -> None:
+def test_invalid_given_size_is_reported(given: str, code: str | None) -> None:
     assert [one for one, _ in found(IMPORTS + PROBE + given)] == ([] if code is None else [code])
 
 
-def test_a_mission_gives_no_sizes_to_what_its_policy_is_signed_with() -> None:
+def test_mission_cannot_set_sizes_of_its_policy() -> None:
     files = {
         "/w/rules.rts": IMPORTS + PROBE + RULES,
         "/w/sizes.rts": 'import "rules.rts"\nsizes probe(highest = 90 m)\n',
@@ -147,7 +147,7 @@ def test_a_mission_gives_no_sizes_to_what_its_policy_is_signed_with() -> None:
     assert [(each.code.id, each.span.file) for each in checked.diagnostics if each.span] == [("E0207", "/w/sizes.rts")]
 
 
-def test_a_value_beyond_a_size_says_which_size_would_let_it_through() -> None:
+def test_argument_outside_a_size_names_the_size_to_change() -> None:
     checked = examined({"/w/m.rts": IMPORTS + PROBE + RULES + ON_WHICH.replace("20 m", "70 m")}, "/w/m.rts")
     assert [each.help for each in checked.diagnostics] == [
         "the nearest accepted value is `50 m`; `sizes probe(highest = 70 m)` extends the range"

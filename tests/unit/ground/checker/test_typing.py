@@ -232,12 +232,12 @@ def findings(condition: str) -> list[str]:
 
 
 @rows("condition", GOOD)
-def test_it_has_a_meaning(condition: str) -> None:
+def test_valid_condition_has_no_finding(condition: str) -> None:
     assert findings(condition) == []
 
 
 @rows(("condition", "code"), BAD)
-def test_it_has_none_and_a_finding_says_why(condition: str, code: str) -> None:
+def test_invalid_condition_has_its_finding(condition: str, code: str) -> None:
     assert set(findings(condition)) == {code}
 
 
@@ -260,7 +260,7 @@ HELPS = [
 
 
 @rows(("condition", "help"), HELPS)
-def test_the_help_says_what_would_do(condition: str, help: str) -> None:
+def test_help_names_an_accepted_form(condition: str, help: str) -> None:
     def read(path: str) -> bytes:
         return SOURCE.replace("CONDITION", condition).encode() if path == "x.rts" else Path(path).read_bytes()
 
@@ -279,7 +279,7 @@ CALLED_PHASE = [
 
 
 @rows("declaration", CALLED_PHASE)
-def test_nothing_that_has_a_value_is_called_phase(declaration: str) -> None:
+def test_phase_is_a_reserved_name_of_values(declaration: str) -> None:
     def read(path: str) -> bytes:
         return (
             f'import "lib:skills/signals.rts"\n{declaration}'.encode() if path == "x.rts" else Path(path).read_bytes()

@@ -28,7 +28,7 @@ vehicle glider {
         ("within 5 m", "within 5 s", ["E0310"]),
     ],
 )
-def test_a_vehicle(old: str, new: str, codes: list[str]) -> None:
+def test_invalid_vehicle_fields_are_reported(old: str, new: str, codes: list[str]) -> None:
     assert [code for code, _ in found(VEHICLE.replace(f"{old} ", f"{new} ").replace(f"{old}\n", f"{new}\n"))] == codes
 
 
@@ -56,11 +56,11 @@ def test_a_vehicle(old: str, new: str, codes: list[str]) -> None:
         ("wind at most 12 s", ["E0310"]),
     ],
 )
-def test_what_a_vehicle_keeps_at_least(parts: str, codes: list[str]) -> None:
+def test_invalid_speeds_are_reported(parts: str, codes: list[str]) -> None:
     assert [code for code, _ in found(VEHICLE.replace("reserve", f"{parts}  reserve"))] == codes
 
 
-def test_a_misspelt_speed_is_corrected() -> None:
+def test_misspelt_speed_is_corrected() -> None:
     [(_, message)] = found(VEHICLE.replace("reserve", "speeds crusie 5 m/s  reserve"))
     assert message == "unknown speed `crusie`"
 
@@ -73,5 +73,5 @@ def test_a_misspelt_speed_is_corrected() -> None:
         ("18 min hover, 0 min flight", ["E0319"]),
     ],
 )
-def test_how_long_it_flies(hover: str, codes: list[str]) -> None:
+def test_flight_time_must_be_a_positive_duration(hover: str, codes: list[str]) -> None:
     assert [code for code, _ in found(VEHICLE.replace("18 min hover", hover))] == codes

@@ -46,7 +46,7 @@ def chain_energy(compiled: Compiled) -> int:
 
 
 @pytest.mark.parametrize("waits", [0, 30])
-def test_they_are_the_sums_of_all_that_may_be(compile_text: Compile, site: str, waits: int) -> None:
+def test_bounds_are_sums_over_all_steps(compile_text: Compile, site: str, waits: int) -> None:
     confirm = f"confirm hover when height > 2 m by role operator within {waits} s" if waits else ""
     compiled = compile_text(site + mission(confirm=confirm))
     assert compiled.mission is not None, compiled.diagnostics
@@ -59,7 +59,7 @@ def test_they_are_the_sums_of_all_that_may_be(compile_text: Compile, site: str, 
     assert compiled.bounds.energy == sum(step.energy for step in steps[:2]) + chain_energy(compiled)
 
 
-def test_a_return_takes_no_less_than_the_way_home(compile_text: Compile, site: str) -> None:
+def test_bound_of_a_return_includes_the_way_home(compile_text: Compile, site: str) -> None:
     """What its contract allows, or the way from the farthest planned place, whichever is more: not both."""
     compiled = compile_text(site + mission())
     assert compiled.mission is not None
@@ -68,7 +68,7 @@ def test_a_return_takes_no_less_than_the_way_home(compile_text: Compile, site: s
     assert _taken(compiled.mission.invocations[-1].contract, 309) == 1700
 
 
-def test_a_step_of_its_own_counts_with_what_it_says(compile_text: Compile, site: str) -> None:
+def test_overridden_step_counts_with_its_own_bounds(compile_text: Compile, site: str) -> None:
     plain = compile_text(site + mission()).bounds
     own = compile_text(
         site + mission(steps="hover(5 s) { deadline 1 s  lasts at most 10 s  energy at most 6 % }")
@@ -91,13 +91,13 @@ def test_a_step_of_its_own_counts_with_what_it_says(compile_text: Compile, site:
         ("lasts at most 0 s", ["E0319"]),
     ],
 )
-def test_they_are_held_against_what_the_mission_says(
+def test_bounds_are_compared_with_the_declared_limits(
     check_text: Check, site: str, header: str, codes: list[str]
 ) -> None:
     assert [each.code.id for each in check_text(site + mission(header)).diagnostics] == codes
 
 
-def test_exactly_what_it_says_is_within(compile_text: Compile, check_text: Check, site: str) -> None:
+def test_bound_equal_to_the_limit_is_accepted(compile_text: Compile, check_text: Check, site: str) -> None:
     bounds = compile_text(site + mission()).bounds
     assert bounds is not None
     for less, codes in ((0, []), (1, ["E0809"])):
@@ -105,7 +105,7 @@ def test_exactly_what_it_says_is_within(compile_text: Compile, check_text: Check
         assert [each.code.id for each in check_text(site + mission(header)).diagnostics] == codes
 
 
-def test_the_largest_steps_are_shown_a_repeated_one_once(check_text: Check, site: str) -> None:
+def test_finding_shows_the_largest_steps_once(check_text: Check, site: str) -> None:
     text = site + mission("energy at most 1 %", steps="repeat 4 { hover(5 s) }")
     found = check_text(text).diagnostics[0]
     assert [(text[label.span.start : label.span.end], label.text) for label in found.labels] == [
@@ -115,12 +115,12 @@ def test_the_largest_steps_are_shown_a_repeated_one_once(check_text: Check, site
     ]
 
 
-def test_of_a_mission_with_parameters_they_are_the_largest() -> None:
+def test_bounds_of_a_mission_with_parameters_are_the_largest() -> None:
     assert greatest(Bounds(3, 5, 9), None) == Bounds(3, 5, 9)
     assert greatest(Bounds(3, 5, 9), Bounds(4, 4, 10)) == Bounds(4, 5, 10)
 
 
-def test_they_are_told_in_one_line() -> None:
+def test_bounds_are_shown_on_one_line() -> None:
     assert (
         bounds_told(Bounds(1, 59 * SECOND + 1, 101)) == "at most 1 step, 1 min from issue to end, 2 % of a full charge"
     )

@@ -142,7 +142,7 @@ def matches(rules: list[Said], kind: str, skill: str, role: str, source: str, he
 
 @settings(max_examples=settings().max_examples * 2, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(rule, min_size=1, max_size=5), st.lists(delegation, min_size=1, max_size=4))
-def test_the_grantee_may_what_the_grantor_may_and_no_more(rules: list[Line], delegations: list[Line]) -> None:
+def test_grantee_has_the_permissions_of_the_grantor_only(rules: list[Line], delegations: list[Line]) -> None:
     lines = [*rules, *delegations]
     skills = "".join(f"skill {name}() {{ motion hold }}\n" for name in SKILLS)
     text = skills + "policy p version 1 {\n" + "".join(line.text() for line in lines) + "}\n"
@@ -178,7 +178,7 @@ def policy(*lines: str) -> str:
     return "policy p version 1 {\n" + "\n".join(lines) + REST + f"role {', '.join(roles)}\n"
 
 
-def test_a_delegated_rule_is_quoted_with_all_that_made_it(compile_text: Compile, site: str) -> None:
+def test_delegated_rule_is_quoted_with_its_delegations(compile_text: Compile, site: str) -> None:
     permit = "permit goto by role operator through agent, operator when altitude <= 30 m or speed <= 2 m/s"
     one = "delegate goto by role operator to role trainee through agent when altitude <= 20 m"
     two = "delegate goto by role trainee to role guest when speed <= 3 m/s"
@@ -200,7 +200,7 @@ mission m under p@1 on quad {
     assert rule.kind == RuleKind.PERMIT
 
 
-def test_a_delegated_step_is_refused_outside_of_what_is_delegated(compile_text: Compile, site: str) -> None:
+def test_step_outside_the_delegation_is_refused(compile_text: Compile, site: str) -> None:
     lines = (
         "permit goto by role operator through agent when altitude <= 30 m",
         "permit takeoff by role trainee through agent",
@@ -268,14 +268,16 @@ mission m under p@1 on quad {{
         (["use nothing()", "delegate inspect_area by role operator to role trainee"], [("E0201", "nothing")]),
     ],
 )
-def test_what_is_refused(check_text: Check, site: str, lines: list[str], found: list[tuple[str, str]]) -> None:
+def test_invalid_delegation_is_refused(
+    check_text: Check, site: str, lines: list[str], found: list[tuple[str, str]]
+) -> None:
     text = site + policy("permit goto by role operator through agent when altitude <= 30 m", *lines)
     errors = [each for each in check_text(text).diagnostics if each.code.severity.value == "error"]
     assert [each.code.id for each in errors] == [code for code, _ in found]
     assert all(words in each.message for each, (_, words) in zip(errors, found, strict=True))
 
 
-def test_many_ways_are_refused_before_they_fill_the_memory(check_text: Check, site: str) -> None:
+def test_exponential_delegations_are_refused_early(check_text: Check, site: str) -> None:
     ways = [
         f"delegate goto by role a{level}{one} to role a{level + 1}{other}"
         for level in range(20)
@@ -294,9 +296,7 @@ def test_many_ways_are_refused_before_they_fill_the_memory(check_text: Check, si
         ["delegate goto by role a to role b"] * 4_200,
     ],
 )
-def test_more_delegations_than_anybody_means_are_refused_before_they_are_ordered(
-    check_text: Check, site: str, ways: list[str]
-) -> None:
+def test_too_many_delegations_are_refused_before_ordering(check_text: Check, site: str, ways: list[str]) -> None:
     text = site + policy("permit goto by role r0 through agent when altitude <= 30 m", *ways)
     found = [each for each in check_text(text).diagnostics if each.code.severity.value == "error"]
     assert [each.code.id for each in found] == ["E1001"]

@@ -57,18 +57,18 @@ def probe(made: Compiled) -> Invocation:
         ("record synced", "{ record effect }", SYNCED),
     ],
 )
-def test_durability(compile_text: Compile, site: str, record: str, block: str, expected: int) -> None:
+def test_durability_of_records(compile_text: Compile, site: str, record: str, block: str, expected: int) -> None:
     contract = probe(compiled(compile_text, site, record, block)).contract
     assert durability_of(contract, Outcome.ALLOW, confirmed=False, kind=STEP) == expected
     assert {"decision", "state", "authorization"} <= set(contract.record)
 
 
-def test_words_of_durability_stand_last_and_once(compile_text: Compile, site: str) -> None:
+def test_durability_is_the_last_word_and_written_once(compile_text: Compile, site: str) -> None:
     contract = probe(compiled(compile_text, site, "record written", "{ record synced_first, synced_first }")).contract
     assert contract.record == ("intent", "decision", "state", "authorization", "effect", "synced_first")
 
 
-def test_a_take_off_is_on_the_disk_first_whatever_is_written(compile_text: Compile, site: str) -> None:
+def test_takeoff_is_always_synced_first(compile_text: Compile, site: str) -> None:
     made = compiled(compile_text, site)
     assert made.mission is not None
     contract = made.mission.invocations[0].contract
@@ -107,7 +107,7 @@ def test_without_link(compile_text: Compile, site: str, without: str, silence_us
 @pytest.mark.parametrize(
     ("limit", "code"), [("0 s", "E0319"), ("-1 s", "E0319"), ("61 min", "E1003"), ("30 m", "E0310")]
 )
-def test_the_silence_is_a_time_above_zero_and_bounded(compile_text: Compile, site: str, limit: str, code: str) -> None:
+def test_silence_must_be_positive_and_bounded(compile_text: Compile, site: str, limit: str, code: str) -> None:
     without = f"without link for {limit} contingency"
     found = compile_text(site + TEXT.format(record="", block="", without=without)).diagnostics
     assert [each.code.id for each in found] == [code]
@@ -124,7 +124,7 @@ def test_the_silence_is_a_time_above_zero_and_bounded(compile_text: Compile, sit
         "without link for 30 s land",
     ],
 )
-def test_no_other_word(compile_text: Compile, site: str, without: str) -> None:
+def test_invalid_without_clause_is_refused(compile_text: Compile, site: str, without: str) -> None:
     found = compile_text(site + TEXT.format(record="", block="", without=without)).diagnostics
     assert found[0].code.id == "E0101"
 
@@ -136,6 +136,6 @@ def test_no_other_word(compile_text: Compile, site: str, without: str) -> None:
         "without link for 30 s continue  without link for 30 s continue",
     ],
 )
-def test_once(compile_text: Compile, site: str, twice: str) -> None:
+def test_clause_is_written_once(compile_text: Compile, site: str, twice: str) -> None:
     found = compile_text(site + TEXT.format(record="", block="", without=twice)).diagnostics
     assert found[0].code.id == "E0106"

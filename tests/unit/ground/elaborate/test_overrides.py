@@ -48,7 +48,7 @@ ALL = """{
 }"""
 
 
-def test_the_step_has_what_it_says_and_the_policy_does_not_know(compile_text: Compile, site: str) -> None:
+def test_override_changes_the_step_and_not_the_policy(compile_text: Compile, site: str) -> None:
     plain, own = compile_text(site + mission("")), compile_text(site + mission(ALL))
     assert own.diagnostics == (), render(own.diagnostics, own.sources)
     assert plain.mission is not None
@@ -77,7 +77,7 @@ def test_the_step_has_what_it_says_and_the_policy_does_not_know(compile_text: Co
     assert not isinstance(prepare_mission(bind(own.mission, b"x" * 32), prepared), Refusal)
 
 
-def test_the_policys_bytes_do_not_depend_on_the_mission(compile_text: Compile) -> None:
+def test_policy_bytes_do_not_depend_on_the_mission(compile_text: Compile) -> None:
     payloads = set()
     for block in ("", "{ maintain height <= 30 m }", "{ require battery > 50 % deadline 1 s }"):
         text = (
@@ -92,7 +92,7 @@ def test_the_policys_bytes_do_not_depend_on_the_mission(compile_text: Compile) -
     assert len(payloads) == 1
 
 
-def test_a_clause_says_where_it_stands_among_the_policys_files_and_then_the_missions(compile_text: Compile) -> None:
+def test_clause_span_names_policy_files_then_mission_files(compile_text: Compile) -> None:
     text = (
         'import "lib:policies/training_field.rts"\n'
         "mission m under training_field@2 on surveyor {\n  proposed by agent openclaw for role operator\n"
@@ -152,21 +152,21 @@ def test_a_clause_says_where_it_stands_among_the_policys_files_and_then_the_miss
         ),
     ],
 )
-def test_what_is_refused(check_text: Check, site: str, block: str, codes: list[str]) -> None:
+def test_invalid_override_is_refused(check_text: Check, site: str, block: str, codes: list[str]) -> None:
     sats = "signal gps.satellites : count = GPS_RAW_INT.satellites_visible unknown at 255 stale after 2 s\n"
     text = site + (sats if "satellites" in block else "") + mission(block)
     errors = [each for each in check_text(text).diagnostics if each.code.severity.value == "error"]
     assert [each.code.id for each in errors] == codes
 
 
-def test_a_looser_override_shows_both_values_and_the_nearest_that_holds(check_text: Check, site: str) -> None:
+def test_looser_override_shows_the_contract_value(check_text: Check, site: str) -> None:
     found = check_text(site + mission("{ deadline 20 s }")).diagnostics[0]
     assert "`deadline 20 s`" in found.message
     assert "5 s" in found.message
     assert [fix.replacement for fix in found.fixes] == ["5 s"]
 
 
-def test_a_zone_of_the_mission_alone_is_not_the_policys(compile_text: Compile) -> None:
+def test_override_cannot_read_a_zone_of_the_mission(compile_text: Compile) -> None:
     text = (
         'import "lib:policies/training_field.rts"\nzone mine = circle(47.398 N, 8.546 E, 10 m)\n'
         "mission m under training_field@2 on surveyor {\n  proposed by agent openclaw for role operator\n"
@@ -175,7 +175,7 @@ def test_a_zone_of_the_mission_alone_is_not_the_policys(compile_text: Compile) -
     assert [each.code.id for each in compile_text(text).diagnostics] == ["E0207"]
 
 
-def test_on_board_no_duration_is_looser_than_any(compile_text: Compile, site: str) -> None:
+def test_missing_duration_is_looser_than_any_on_board(compile_text: Compile, site: str) -> None:
     compiled = compile_text(site + mission("{ lasts at most 12 s }"))
     assert compiled.mission is not None
     contract = compiled.mission.invocations[1].contract

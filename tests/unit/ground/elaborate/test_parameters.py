@@ -57,7 +57,7 @@ def arguments(compiled: Compiled) -> list[tuple[int, ...]]:
         (("high=2 * 5 m + 1 m",), "bridge_a", "11 m"),
     ],
 )
-def test_it_means_what_could_be_written_out(
+def test_mission_with_values_equals_the_written_one(
     compile_text: Compile, site: str, values: tuple[str, ...], zone: str, high: str
 ) -> None:
     given = compile_text(site + mission(TWO), values)
@@ -69,7 +69,7 @@ def test_it_means_what_could_be_written_out(
     assert written.policy is not None
 
 
-def test_the_policy_is_the_same_whatever_a_mission_is_given(compile_text: Compile, site: str) -> None:
+def test_policy_does_not_depend_on_mission_values(compile_text: Compile, site: str) -> None:
     payloads = set()
     for values in ((), ("high=12 m",), ("where=bridge_b",)):
         compiled = compile_text(site + mission(TWO), values)
@@ -97,7 +97,7 @@ def test_the_policy_is_the_same_whatever_a_mission_is_given(compile_text: Compil
         (("high=12 m) } }",), "E0101", None),
     ],
 )
-def test_what_is_given_wrong_is_underlined_in_the_option(
+def test_invalid_value_is_underlined_in_the_option(
     compile_text: Compile, site: str, values: tuple[str, ...], code: str, under: str | None
 ) -> None:
     compiled = compile_text(site + mission(TWO), values)
@@ -111,7 +111,7 @@ def test_what_is_given_wrong_is_underlined_in_the_option(
         assert compiled.sources["--set"].slice(span).strip() == under
 
 
-def test_without_a_value_and_a_default_it_is_checked_and_not_compiled(
+def test_mission_without_a_value_is_checked_but_not_compiled(
     compile_text: Compile, check_text: Check, site: str
 ) -> None:
     text = site + mission("where: zone = bridge_a, high: altitude in 10 m .. 20 m")
@@ -141,7 +141,7 @@ def test_without_a_value_and_a_default_it_is_checked_and_not_compiled(
         ("where: zone, high: altitude in 10 m .. 20 m = 9 m", ["E0605"], None),
     ],
 )
-def test_it_is_checked_for_all_that_its_parameters_may_be(
+def test_mission_is_checked_for_all_zones_choices_and_range_ends(
     check_text: Check, site: str, parameters: str, codes: list[str], label: str | None
 ) -> None:
     found = [each for each in check_text(site + mission(parameters)).diagnostics if each.code.id < "E13"]
@@ -150,14 +150,14 @@ def test_it_is_checked_for_all_that_its_parameters_may_be(
         assert label in {each.text for each in found[0].labels}
 
 
-def test_what_every_value_brings_about_is_one_finding_without_values(check_text: Check, site: str) -> None:
+def test_finding_for_every_value_names_no_values(check_text: Check, site: str) -> None:
     text = site + mission(TWO, BODY.replace("hover()", "hover(time = 3 m)"))
     found = check_text(text).diagnostics
     assert [each.code.id for each in found] == ["E0310"]
     assert not any(label.text.startswith("with ") for label in found[0].labels)
 
 
-def test_what_several_values_bring_about_at_one_place_is_one_finding_the_worst(check_text: Check, site: str) -> None:
+def test_findings_for_several_values_are_merged_to_the_worst(check_text: Check, site: str) -> None:
     body = BODY.replace("goto(where.entry, altitude = high + 2 m)", "goto(where.entry, altitude = 20 m, speed = pace)")
     pace = "pace: speed in 1 m/s .. 2 m/s = 2 m/s"
     text = mission(f"where: zone = bridge_a, high: altitude in 10 m .. 20 m = 15 m, {pace}")
@@ -169,7 +169,7 @@ def test_what_several_values_bring_about_at_one_place_is_one_finding_the_worst(c
         assert each.help.endswith("; it also fails for other values of the mission's parameters")
 
 
-def test_a_place_without_a_default_leaves_the_mission_undecided(check_text: Check, site: str) -> None:
+def test_position_without_a_default_leaves_the_mission_unchecked(check_text: Check, site: str) -> None:
     body = BODY.replace("where.entry", "where")
     found = check_text(site + mission("where: position, high: altitude in 10 m .. 20 m", body)).diagnostics
     assert [(each.code.id, each.severity.value) for each in found] == [("E1103", "note")]
@@ -177,7 +177,7 @@ def test_a_place_without_a_default_leaves_the_mission_undecided(check_text: Chec
     assert check_text(site + mission(place, body)).diagnostics == ()
 
 
-def test_a_clause_that_may_mean_two_things_is_refused(check_text: Check, site: str) -> None:
+def test_ambiguous_name_in_a_clause_is_refused(check_text: Check, site: str) -> None:
     for name, reads in (("height", "height"), ("time", "time")):
         kind = "altitude in 10 m .. 20 m" if name == "height" else "duration in 1 s .. 2 s"
         limit = "30 m" if name == "height" else "30 s"
@@ -192,7 +192,7 @@ def test_a_clause_that_may_mean_two_things_is_refused(check_text: Check, site: s
 
 
 @given(st.lists(st.integers(1, 5), max_size=5))
-def test_the_combinations_begin_with_the_defaults_and_change_one_at_a_time(sizes: list[int]) -> None:
+def test_combinations_start_with_the_defaults(sizes: list[int]) -> None:
     ranges = [[None] * size for size in sizes]
     found = list(_combinations(ranges))  # type: ignore[arg-type]
     assert found[0] == (0,) * len(sizes)
@@ -205,12 +205,12 @@ def test_the_combinations_begin_with_the_defaults_and_change_one_at_a_time(sizes
     assert MAX_INSTANCES >= 5 * 5
 
 
-def test_a_mission_with_many_parameters_is_checked_in_a_bounded_way(check_text: Check, site: str) -> None:
+def test_number_of_checked_instances_is_bounded(check_text: Check, site: str) -> None:
     many = ", ".join(f"x{number}: altitude in 10 m .. 20 m = 15 m" for number in range(20))
     assert check_text(site + mission(f"{TWO}, {many}")).bounds["m"].invocations == 4
 
 
-def test_settings_are_read_by_lines() -> None:
+def test_each_setting_is_a_line() -> None:
     settings = parse_settings(["a=1 m", " b =  2   s "])
     assert settings.diagnostics == ()
     assert settings.source.text == "a=1 m\nb = 2 s"
@@ -220,12 +220,12 @@ def test_settings_are_read_by_lines() -> None:
     ]
 
 
-def test_a_long_mission_is_checked_with_fewer_values() -> None:
+def test_long_mission_is_checked_with_fewer_values() -> None:
     """So that no source takes minutes: each instance is proved step by step."""
     assert MAX_INSTANCES * 64 <= MOST_STEPS <= 1 << 13
 
 
-def test_the_steps_of_all_instances_are_bounded(check_text: Check, site: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_steps_of_all_instances_are_bounded(check_text: Check, site: str, monkeypatch: pytest.MonkeyPatch) -> None:
     many = ", ".join(f"x{number}: altitude in 10 m .. 20 m = 15 m" for number in range(20))
     made: list[Instance] = []
 

@@ -49,7 +49,7 @@ def mission_of(body: str) -> tuple[MissionDecl, Report]:
 
 @settings(max_examples=settings().max_examples * 2, suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(items, max_size=4))
-def test_it_is_unrolled_in_order(phase: list[Any]) -> None:
+def test_repeat_is_unrolled_in_order(phase: list[Any]) -> None:
     mission, report = mission_of(" ".join(map(text_of, phase)))
     plain = unrolled(report, mission)
     assert report.found == []
@@ -71,14 +71,14 @@ def test_it_is_unrolled_in_order(phase: list[Any]) -> None:
         ("repeat 9_007_199_254_740_991 { }", [], 1),
     ],
 )
-def test_what_does_not_fit_is_refused_before_it_is_unrolled(body: str, codes: list[str], steps: int) -> None:
+def test_too_many_repetitions_are_refused_before_unrolling(body: str, codes: list[str], steps: int) -> None:
     mission, report = mission_of(body)
     plain = unrolled(report, mission)
     assert [each.code.id for each in report.found] == codes
     assert sum(len(phase.steps) for phase in plain.phases) == steps
 
 
-def test_each_repetition_is_a_step_on_board(compile_text: Compile, site: str) -> None:
+def test_each_repetition_is_an_onboard_step(compile_text: Compile, site: str) -> None:
     text = (
         site
         + """
@@ -102,7 +102,7 @@ mission m under p@1 on quad {
     assert [step.step for step in compiled.mission.invocations] == list(range(8))
 
 
-def test_a_finding_in_a_repetition_is_one(check_text: Check, site: str) -> None:
+def test_finding_in_a_repetition_is_reported_once(check_text: Check, site: str) -> None:
     text = (
         site
         + """

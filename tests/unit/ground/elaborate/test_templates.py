@@ -64,7 +64,7 @@ def written_out(place: str, top: str, who: str) -> str:
         ("use low(who = trainee, place = bridge_b, top = 2 * 10 m + 5 m)", "bridge_b", "25 m", "trainee"),
     ],
 )
-def test_a_use_means_what_could_be_written_out(
+def test_use_equals_the_written_rules(
     compile_text: Compile, site: str, use: str, place: str, top: str, who: str
 ) -> None:
     used = compile_text(site + TEMPLATE + policy(use) + MISSION)
@@ -72,13 +72,13 @@ def test_a_use_means_what_could_be_written_out(
     assert list(map(meaning, rules_of(used))) == list(map(meaning, rules_of(plain)))
 
 
-def test_a_use_stands_where_it_is_written_among_the_rules(compile_text: Compile, site: str) -> None:
+def test_rules_of_a_use_keep_its_position(compile_text: Compile, site: str) -> None:
     text = policy("  permit goto by role pilot", "use low(bridge_a)", "  permit goto by role zeppelin")
     found = rules_of(compile_text(site + TEMPLATE + text + MISSION))
     assert [rule.text.partition(" ")[0] for rule in found[:6]] == ["permit", "use", "use", "use", "use", "permit"]
 
 
-def test_a_rule_is_quoted_with_its_use_and_points_into_the_template(compile_text: Compile, site: str) -> None:
+def test_rule_of_a_template_is_quoted_with_its_use(compile_text: Compile, site: str) -> None:
     text = site + TEMPLATE + policy("use low(bridge_a, top = 20 m)") + MISSION
     rule = rules_of(compile_text(text))[0]
     assert rule.text.startswith("use low(bridge_a, top = 20 m): permit goto by role who ")
@@ -96,14 +96,14 @@ def found(checked: Checked, text: str) -> list[tuple[str, str, list[str]]]:
     ]
 
 
-def test_a_finding_in_a_template_is_one_and_names_up_to_three_uses(check_text: Check, site: str) -> None:
+def test_finding_in_a_template_names_up_to_three_uses(check_text: Check, site: str) -> None:
     wrong = "template t(top: altitude in 5 m .. 60 m) { permit goto by role operator when altitude <= tpo }\n"
     uses = [f"use t({height} m)" for height in (10, 20, 30, 40, 50)]
     text = site + wrong + policy(*uses)
     assert found(check_text(text), text) == [("E0201", "tpo", uses[:3])]
 
 
-def test_a_finding_that_depends_on_the_argument_names_that_use(check_text: Check, site: str) -> None:
+def test_finding_on_an_argument_names_its_use(check_text: Check, site: str) -> None:
     shrunk = (
         "template t(place: zone, by_: length in -500 m .. 0 m) "
         "{ permit goto by role operator when target inside grow(place, by_) }\n"
@@ -133,9 +133,7 @@ def test_a_finding_that_depends_on_the_argument_names_that_use(check_text: Check
         ("template city(x: zone) { permit goto by any }", ["E0202"]),
     ],
 )
-def test_a_template_is_checked_though_nothing_uses_it(
-    check_text: Check, site: str, template: str, codes: list[str]
-) -> None:
+def test_unused_template_is_checked(check_text: Check, site: str, template: str, codes: list[str]) -> None:
     checked = check_text(site + template + "\n" + policy("  permit goto by role operator"))
     assert [each.code.id for each in checked.diagnostics if each.code.id < "E13"] == codes
 
@@ -158,16 +156,14 @@ def test_a_template_is_checked_though_nothing_uses_it(
         ("use low(bridge_a, top = height)", "E0318", "height"),
     ],
 )
-def test_what_a_use_gives_wrong_is_underlined_there(
-    check_text: Check, site: str, use: str, code: str, under: str
-) -> None:
+def test_invalid_argument_of_a_use_is_underlined(check_text: Check, site: str, use: str, code: str, under: str) -> None:
     text = site + TEMPLATE + policy(use)
     one = [each for each in found(check_text(text), text) if each[0] < "E13"]
     assert [(one[0][0], one[0][1])] == [(code, under)]
     assert len(one) == 1
 
 
-def test_a_template_belongs_to_the_policys_files(check_text: Check) -> None:
+def test_template_file_belongs_to_the_policy(check_text: Check) -> None:
     text = (
         'import "lib:policies/training_field.rts"\n'
         "template t(x: altitude in 1 m .. 2 m) { permit goto by any when altitude <= x }\n"

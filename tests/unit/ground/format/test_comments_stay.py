@@ -44,14 +44,14 @@ def laid_out(text: str) -> str | None:
 
 
 @rows("before", TABLE)
-def test_places(before: str) -> None:
+def test_comments_at_special_places_are_kept(before: str) -> None:
     after = TABLE[before] or before
     assert laid_out(before) == after
     assert laid_out(after) == after
 
 
 @rows("comment", ["// a\n", "/* a */", "/* a\n b */", "\n// a\n", "\n/* a */\n", '// */ "\n'])
-def test_between_any_two_words(comment: str) -> None:
+def test_comments_between_any_two_tokens_are_kept(comment: str) -> None:
     """The words before and after a comment are those that were there."""
     for text in (CONTRACT, 'mission m under p@1 on v { intent "x"  phase a { b(c = 1, 2 m) } }'):
         words = text.replace("(", " ( ").replace(")", " ) ").replace(",", " , ").replace("@", " @ ").split()
@@ -63,7 +63,7 @@ def test_between_any_two_words(comment: str) -> None:
             assert pieces(made) == pieces(written)
 
 
-def test_comments_at_the_ends_of_lines_stand_below_each_other() -> None:
+def test_trailing_comments_are_aligned() -> None:
     parts = [
         "deadline 2 s // a",
         "lasts at most 5 min // b",
@@ -77,18 +77,18 @@ def test_comments_at_the_ends_of_lines_stand_below_each_other() -> None:
     assert [line.find("//") for line in lines] == [-1, 26, 26, -1, 26, -1, 24, -1]
 
 
-def test_a_comment_that_is_too_wide_moves_no_other() -> None:
+def test_wide_comment_is_not_aligned() -> None:
     wide = "x" * 100
     text = f"skill s() {{\n  deadline 2 s // {wide}\n  require battery > 30 % and gps.fix >= fix_3d // b\n}}\n"
     assert f"  deadline 2 s  // {wide}\n" in (laid_out(text) or "")
 
 
 @rows("end", list("\xa0\u3000\u2028\u2029\x85\v\x1c\x1d\x1e\x1f\ufeff"), ids=ascii)
-def test_what_is_no_blank_stays_at_the_end_of_a_comment(end: str) -> None:
+def test_other_unicode_blanks_stay_at_the_end_of_a_comment(end: str) -> None:
     for text in (f"// a{end}\n", f"skill s() {{  // a{end}\n}}\n", f"/* a{end}\n b{end} */\n"):
         assert laid_out(text) == text
 
 
-def test_empty_brackets_are_not_opened_for_a_comment() -> None:
+def test_empty_brackets_stay_closed_with_a_comment() -> None:
     text = "skill land_somewhere(/* it takes no parameters */) {\n  deadline 2 s\n}\n"
     assert formatted(Source("x.rts", text), 40).text == text

@@ -16,7 +16,7 @@ def read(path: Path) -> str:
 
 
 @rows("before", PAIRS, ids=lambda path: path.name.partition(".")[0])
-def test_golden(before: Path) -> None:
+def test_formatted_text_matches_the_golden(before: Path) -> None:
     after = before.with_name(before.name.replace(".before.", ".after."))
     made = formatted(Source("x.rts", read(before)))
     assert made.diagnostics == ()
@@ -24,12 +24,12 @@ def test_golden(before: Path) -> None:
     assert formatted(Source("x.rts", read(after))).text == read(after)
 
 
-def test_each_pair_is_whole() -> None:
+def test_each_golden_is_a_pair() -> None:
     assert len(PAIRS) >= 5
     assert {path.name.partition(".")[0] for path in GOLDEN.iterdir()} == {path.name.partition(".")[0] for path in PAIRS}
 
 
-def test_the_page_shows_the_style() -> None:
+def test_formatting_page_shows_formatted_examples() -> None:
     page = read(GOLDEN.parents[2] / "docs" / "formatting.md")
     blocks = re.findall(r"^```rts\n(.*?)^```$", page, re.DOTALL | re.MULTILINE)
     assert blocks
@@ -37,7 +37,7 @@ def test_the_page_shows_the_style() -> None:
         assert formatted(Source("x.rts", block)).text == block
 
 
-def test_the_examples_of_the_language_are_laid_out() -> None:
+def test_language_page_shows_formatted_examples() -> None:
     """Their columns are their own; none is refused."""
     page = read(GOLDEN.parents[2] / "docs" / "language.md")
     for block in re.findall(r"^```rts\n(.*?)^```$", page, re.DOTALL | re.MULTILINE):

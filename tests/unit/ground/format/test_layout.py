@@ -60,23 +60,23 @@ def test_blanks_within_declarations(written: str, meant: str) -> None:
     assert laid_out(written) == meant + "\n"
 
 
-def test_one_item_a_line_unless_the_author_wrote_the_block_on_one() -> None:
+def test_items_get_a_line_each_unless_the_block_is_on_one() -> None:
     short = "skill s() { deadline 2 s  grace 1 s }\n"
     assert laid_out(short) == short
     assert laid_out("skill s() { deadline 2 s\n grace 1 s }") == "skill s() {\n  deadline 2 s\n  grace    1 s\n}\n"
     assert laid_out(short, 30) == "skill s() {\n  deadline 2 s\n  grace    1 s\n}\n"
 
 
-def test_at_most_one_blank_line() -> None:
+def test_blank_lines_are_reduced_to_one() -> None:
     text = "\n\nskill s() {\n\n\n  grace 1 s\n\n\n\n  deadline 2 s\n\n}\n\n\n\nskill t() { }\n\n\n"
     assert laid_out(text) == "skill s() {\n  grace    1 s\n\n  deadline 2 s\n}\n\nskill t() { }\n"
 
 
-def test_ends_of_lines_and_what_stands_at_them() -> None:
+def test_blanks_and_line_ends_are_normalised() -> None:
     assert laid_out("\ufeffskill s() {\r\n\tgrace 1 s \t\r\n}") == "skill s() {\n  grace    1 s\n}\n"
 
 
-def test_a_condition_is_broken_at_all_of_its_weakest_operators() -> None:
+def test_long_condition_breaks_at_all_its_weakest_operators() -> None:
     text = "skill s() {\n  require a < 1 and b < 2 or c < 3 and d < 4\n}\n"
     assert laid_out(text, 40) == ("skill s() {\n  require  a < 1 and b < 2\n           or c < 3 and d < 4\n}\n")
     assert laid_out(text, 24) == (
@@ -84,7 +84,7 @@ def test_a_condition_is_broken_at_all_of_its_weakest_operators() -> None:
     )
 
 
-def test_when_keeps_the_line_that_its_author_gave_it() -> None:
+def test_when_keeps_its_line() -> None:
     head, condition = "  permit  a by role b", "when c < 1"
     own = f"policy p version 1 {{\n{head}\n          {condition}\n}}\n"
     same = f"policy p version 1 {{\n{head} {condition}\n}}\n"
@@ -93,7 +93,7 @@ def test_when_keeps_the_line_that_its_author_gave_it() -> None:
     assert laid_out(same, 30) == own
 
 
-def test_a_list_that_is_too_long_takes_a_line_for_each_item() -> None:
+def test_long_list_gets_a_line_for_each_item() -> None:
     text = "skill s(a: length, bcd: one of x, y = x) { }"
     broken = "skill s(\n  a:   length,\n  bcd: one of x, y = x,\n) { }\n"
     assert laid_out(text) == text + "\n"
@@ -102,7 +102,7 @@ def test_a_list_that_is_too_long_takes_a_line_for_each_item() -> None:
     assert laid_out("skill s(a: length,\n\n bcd: one of x, y = x) { }") == text + "\n"
 
 
-def test_columns_that_would_make_a_line_too_wide_are_left_out() -> None:
+def test_columns_are_not_aligned_if_a_line_gets_too_wide() -> None:
     long = f"signal {'a' * 20} : length = {'B' * 20}.{'c' * 20}  unknown at 0  stale after 2 s"
     text = f"signal b : altitude = C.d  stale after 2 s\n{long}\n"
     first, second = laid_out(text, len(long)).splitlines()
@@ -114,12 +114,12 @@ def test_columns_that_would_make_a_line_too_wide_are_left_out() -> None:
 
 
 @pytest.mark.parametrize("width", [1, 20, 40, 80])
-def test_what_cannot_be_broken_is_as_wide_as_it_is(width: int) -> None:
+def test_unbreakable_line_may_exceed_the_width(width: int) -> None:
     text = f'mission m under p@1 on v {{\n  intent "{"x" * 200}"\n}}\n'
     assert max(map(len, laid_out(text, width).splitlines())) > 200
 
 
-def test_a_huge_line() -> None:
+def test_huge_line_is_formatted_in_time() -> None:
     parts = 4_000
     text = "skill s() { require " + " + ".join(["1 m"] * parts) + " < 2 m  record " + ", ".join(["a"] * parts) + " }"
     made = laid_out(text)

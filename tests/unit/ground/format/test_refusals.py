@@ -33,7 +33,7 @@ skill s(p: length, q: speed = 1 m/s) {
     ],
     ids=lambda text: text[:20],
 )  # fmt: skip
-def test_what_the_parser_does_not_take(text: str) -> None:
+def test_syntax_error_is_refused(text: str) -> None:
     source = Source("x.rts", text)
     made = formatted(source)
     assert made.text is None
@@ -43,12 +43,12 @@ def test_what_the_parser_does_not_take(text: str) -> None:
 @pytest.mark.parametrize(
     "text", ["zone z = circle(1 N, 2 E, 3 parsec)", "skill s() { grace 1 s grace 2 s }", "signal a.b : c = d.e"]
 )
-def test_other_errors_are_no_hindrance(text: str) -> None:
+def test_other_errors_do_not_prevent_formatting(text: str) -> None:
     assert formatted(Source("x.rts", text)).text is not None
 
 
 @pytest.mark.parametrize("text", ["", " ", "\n\n", "\ufeff", "\t\r\n"])
-def test_nothing_is_nothing(text: str) -> None:
+def test_blank_text_formats_to_nothing(text: str) -> None:
     assert formatted(Source("x.rts", text)).text == ""
 
 
@@ -68,7 +68,7 @@ CHANGES: dict[str, tuple[Callable[[str], str], str]] = {
 
 
 @pytest.mark.parametrize("name", CHANGES)
-def test_a_result_that_says_something_else_is_refused(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_changed_result_is_refused(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     change, what = CHANGES[name]
     monkeypatch.setattr(format_text, "lay_out", lambda before, width: change(before.text))
     made = formatted(Source("x.rts", TEXT))
@@ -80,7 +80,7 @@ def test_a_result_that_says_something_else_is_refused(name: str, monkeypatch: py
     assert "please report it" in found.help
 
 
-def test_the_same_words_in_another_tree_are_refused() -> None:
+def test_same_tokens_with_another_tree_are_refused() -> None:
     """Brackets are words, so no text of ours shows it; the rules that were applied are compared all the same."""
     one = read("skill s() { require a < 1 }")
     assert one is not None
@@ -89,7 +89,7 @@ def test_the_same_words_in_another_tree_are_refused() -> None:
     assert found.what == "the meaning"
 
 
-def test_only_the_comma_at_the_end_of_a_list_may_come_and_go() -> None:
+def test_only_a_trailing_comma_may_differ() -> None:
     def compared(one: str, other: str) -> str | None:
         first = read(one)
         assert first is not None
@@ -101,7 +101,7 @@ def test_only_the_comma_at_the_end_of_a_list_may_come_and_go() -> None:
     assert compared("skill s(a: one of b, c) { }", "skill s(a: one of b c) { }") == "the syntax"
 
 
-def test_the_finding_for_lint_and_editor() -> None:
+def test_unformatted_source_gives_one_finding_with_a_fix() -> None:
     source = Source("x.rts", "// a\nskill s() {}\n")
     text = formatted(source).text
     assert text is not None

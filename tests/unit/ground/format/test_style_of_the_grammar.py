@@ -59,7 +59,7 @@ def test_every_item_of_the_grammar_has_a_style() -> None:
     assert set(ITEMS) - items() <= {"expectation"}, "these are in the grammar no more"
 
 
-def test_the_words_of_the_style_are_words_of_the_grammar() -> None:
+def test_style_words_are_keywords() -> None:
     known = table()
     kinds = {kind for row in known.rows for kind in row}
     written = {word for style in ITEMS.values() for word in (*style.breaks, *style.cuts)}
@@ -68,7 +68,7 @@ def test_the_words_of_the_style_are_words_of_the_grammar() -> None:
     assert set(COLUMNS) <= {rule.action for rule in known.rules}
 
 
-def test_the_kinds_of_tokens_that_may_hold_blanks_are_known() -> None:
+def test_tokens_with_blanks_are_known() -> None:
     """Only these may be written with blanks in more than one way."""
     words = {word for pattern in grammar().terminals for word in re.findall("[a-z]{2,}", pattern.pattern.to_regexp())}
     spaced = [f"{word} \t {other}" for word in words for other in ("time", "of", "inadmissible", "x", '"x"', "(", "")]
@@ -85,7 +85,7 @@ def test_the_kinds_of_tokens_that_may_hold_blanks_are_known() -> None:
 @pytest.mark.parametrize(
     "start", ["declaration", "skill_item", "policy_item", "mission_item", "test_item", "scenario_item", "zone"]
 )
-def test_an_item_begins_a_line(start: str) -> None:
+def test_item_begins_a_line(start: str) -> None:
     """Two of a kind that stand on one line are laid out on two."""
     blocks = {
         "declaration": "{} {}", "zone": "{} {}", "skill_item": "skill s() {{ \n{} {} }}",

@@ -85,12 +85,12 @@ def agree(text: str) -> None:
 
 
 @given(st.text())
-def test_any_text(text: str) -> None:
+def test_any_text_is_parsed_without_an_exception(text: str) -> None:
     sound(text)
 
 
 @given(st.lists(st.sampled_from(TOKENS), max_size=60))
-def test_any_tokens(words: list[str]) -> None:
+def test_any_tokens_are_parsed_like_lark(words: list[str]) -> None:
     sound("\n".join(words))
     agree(" ".join(words))
 
@@ -117,14 +117,14 @@ def test_any_bytes(data: bytes) -> None:
     sound(data.decode("latin-1"))
 
 
-def test_no_text() -> None:
+def test_binary_file_is_refused() -> None:
     (found,) = parse(Source("x", "zone z \0\0")).diagnostics
     assert found.code is NOT_TEXT
     assert found.span is not None
     assert found.span.start == 7
 
 
-def test_too_large() -> None:
+def test_too_large_file_is_refused() -> None:
     (found,) = parse(Source("x", " " * (MAX_SIZE + 1))).diagnostics
     assert found.code is TOO_LARGE
     assert parse(Source("x", " " * MAX_SIZE)).diagnostics == ()
@@ -145,7 +145,7 @@ def long_run(before: str, part: str) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("before", "part"), ONE_PLACE)
-def test_a_long_run_of_one_thing_ends_with_findings(before: str, part: str) -> None:
+def test_long_run_of_one_token_ends_with_findings(before: str, part: str) -> None:
     long_run(before, part)
 
 
@@ -157,7 +157,7 @@ def test_long_runs_in_every_place_end_with_findings(before: str, part: str) -> N
 
 
 @rows("between", ["/**/", "/**/ ", "// a\n", "// a\n\n", '/* \\" */\t//\n'])
-def test_any_number_of_comments_may_stand_between_two_words(between: str) -> None:
+def test_comments_between_tokens_are_unlimited(between: str) -> None:
     comments = between * (3 * MAX_SKIPPED)
     one, other = f"skill{comments} a() {{{comments} deadline 1 s{comments}}}{comments}", "skill b() { deadline 1 s }"
     source = f"{comments}{one}{other}{comments}"
@@ -168,12 +168,12 @@ def test_any_number_of_comments_may_stand_between_two_words(between: str) -> Non
     assert read(source + "}") is None
 
 
-def test_a_text_of_escapes_is_read() -> None:
+def test_string_with_many_escapes_is_read() -> None:
     text = '\\"' * 900
     (mission,) = parse(Source("x", f'mission m under p@1 on v {{ intent "{text}" phase a {{ b() }} }}')).unit.missions
     assert mission.intent == '"' * 900
 
 
-def test_a_text_of_more_escapes_than_are_read_is_refused() -> None:
+def test_string_with_too_many_escapes_is_refused() -> None:
     (found,) = parse(Source("x", 'import "' + '\\"' * 1_000 + '"')).diagnostics
     assert found.code is UNCLOSED

@@ -24,7 +24,7 @@ Plain = Callable[[Any], Any]
         ("skill s() { require max(a, b) < 5 m }", "skill s() { require max(a, b,) < 5 m }"),
     ],
 )
-def test_lists_in_brackets_may_end_in_a_comma(plain: Plain, unit: Read, plainly: str, comma: str) -> None:
+def test_lists_in_brackets_may_have_a_trailing_comma(plain: Plain, unit: Read, plainly: str, comma: str) -> None:
     assert plain(unit(comma)) == plain(unit(plainly))
 
 

@@ -18,7 +18,7 @@ def grammar(checkout: Path) -> str:
     return (checkout / "grammar" / "rtshcua.lark").read_text(encoding="utf-8")
 
 
-def test_is_current(grammar: str) -> None:
+def test_committed_table_is_current(grammar: str) -> None:
     assert PATH.read_text(encoding="utf-8") == generate.generate(grammar), "python -m rtshcua.ground.language.generate"
 
 
@@ -34,7 +34,7 @@ def test_every_terminal_is_named(grammar: str) -> None:
     assert [name for name in names if name.startswith("__")] == []
 
 
-def test_words_of_the_language_are_reserved_only_where_they_must_be(grammar: str) -> None:
+def test_keywords_are_reserved_only_if_necessary(grammar: str) -> None:
     assert {word for word, free in table().words.items() if not free} == {
         "and", "or", "not", "in", "inside", "outside", "any",
     }  # fmt: skip
@@ -42,9 +42,9 @@ def test_words_of_the_language_are_reserved_only_where_they_must_be(grammar: str
     assert set(table().words) == {text for text in fixed if text.isalpha()}
 
 
-def test_actions_are_exactly_those_of_the_grammar() -> None:
+def test_actions_match_the_rules_of_the_grammar() -> None:
     assert ACTIONS.keys() == {rule.action for rule in table().rules if rule.action}
 
 
-def test_every_kind_of_token_has_words_for_a_person() -> None:
+def test_every_token_kind_has_a_description() -> None:
     assert set(WORDS) == {kind for kind in table().lexers.any.kinds if kind} | {END}

@@ -16,7 +16,7 @@ DIGITS = st.text("0123456789", min_size=1, max_size=24)
 
 
 @given(whole=DIGITS, fraction=st.none() | DIGITS, unit=st.sampled_from(sorted(UNITS)), negative=st.booleans())
-def test_agrees_with_fractions(whole: str, fraction: str | None, unit: str, negative: bool) -> None:
+def test_exact_values_agree_with_fractions(whole: str, fraction: str | None, unit: str, negative: bool) -> None:
     written = whole if fraction is None else f"{whole}.{fraction}"
     value = Fraction(written) * UNITS[unit].numerator / UNITS[unit].denominator
     found = exact(written, unit, negative)
@@ -31,7 +31,7 @@ def test_agrees_with_fractions(whole: str, fraction: str | None, unit: str, nega
 
 
 @given(value=st.integers(0, LIMIT), dimension=st.sampled_from([d for d in Dimension if d is not Dimension.ALTITUDE]))
-def test_what_is_displayed_is_read_back(value: int, dimension: Dimension) -> None:
+def test_displayed_value_is_read_back(value: int, dimension: Dimension) -> None:
     number, _, unit = display(value, dimension).partition(" ")
     assert exact(number, unit or None) == (value, dimension, None)
 
@@ -59,7 +59,7 @@ def test_what_is_displayed_is_read_back(value: int, dimension: Dimension) -> Non
         ("0" * 100_000 + "1", "m", 1_000),
     ],
 )
-def test_table(number: str, unit: str | None, expected: int | None) -> None:
+def test_written_numbers_have_their_exact_values(number: str, unit: str | None, expected: int | None) -> None:
     found = exact(number, unit)
     assert (found.value if found.trouble is None else None) == expected
 
@@ -94,11 +94,11 @@ def test_literals(text: str, value: int, dimension: Dimension, datum: Datum | No
 
 
 @given(st.integers(0, 10**9), st.sampled_from(["mm", "cm", "m", "ms", "s", "min", "%", "m/s"]))
-def test_a_literal_is_read_as_written(number: int, unit: str) -> None:
+def test_literal_has_its_written_value(number: int, unit: str) -> None:
     assert quantity(f"{number:_} {unit}").value == number * UNITS[unit].numerator
 
 
-def test_a_value_is_shown_in_the_unit_that_a_person_would_write() -> None:
+def test_value_is_displayed_in_a_common_unit() -> None:
     """Not 150 cm/s for 1.5 m/s, 2 cm for 20 mm, or 37500 ms for 37.5 s."""
     shown = {
         (20_000, Dimension.LENGTH): "20 m",

@@ -41,7 +41,7 @@ def zone(name: str) -> str:
     return f"zone {name} = circle(1 N, 2 E, 3 m)\n"
 
 
-def test_closure_in_the_order_in_which_it_is_reached() -> None:
+def test_imports_are_loaded_in_order_of_reach() -> None:
     files = Files(
         a='import "b.rts" import "sub/c.rts"' + zone("a"),
         b='import "lib:d.rts"' + zone("b"),
@@ -68,7 +68,7 @@ def circles(program: Program) -> list[tuple[str, str]]:
     ]
 
 
-def test_files_of_a_circle_of_imports_are_read_once() -> None:
+def test_files_of_an_import_cycle_are_read_once() -> None:
     files = Files(a='import "b.rts"', b='import "c.rts" import "b.rts"', c='import "a.rts"')
     program = files.load("a", "a", "c")
     assert files.reads == ["/w/a.rts", "/w/c.rts", "/w/b.rts"]
@@ -88,18 +88,18 @@ def test_files_of_a_circle_of_imports_are_read_once() -> None:
         ({"a": "b"}, []),
     ],
 )
-def test_circles_of_imports(files: dict[str, str], expected: list[tuple[str, str]]) -> None:
+def test_import_cycles_are_reported(files: dict[str, str], expected: list[tuple[str, str]]) -> None:
     sources = {name: "".join(f'import "{other}.rts"\n' for other in others) for name, others in files.items()}
     assert circles(Files(**sources).load("a")) == expected
 
 
-def test_a_circle_is_shown_whole() -> None:
+def test_import_cycle_names_all_its_files() -> None:
     (found,) = Files(a='import "b.rts"', b='\nimport "a.rts"').load("a").diagnostics
     assert found.message == "import cycle: `/w/a.rts -> /w/b.rts -> /w/a.rts`"
     assert (found.span, [label.span for label in found.labels]) == (Span("/w/b.rts", 1, 15), [Span("/w/a.rts", 0, 14)])
 
 
-def test_long_circles_are_found_and_cut_short() -> None:
+def test_long_import_cycle_is_abbreviated() -> None:
     names = [f"f{number}" for number in range(300)]
     sources = {name: f'import "{after}.rts"' for name, after in zip(names, [*names[1:], "f0"], strict=True)}
     (found,) = Files(**sources).load("f0").diagnostics
@@ -111,7 +111,7 @@ def test_long_circles_are_found_and_cut_short() -> None:
 SQUARE = b'{"type": "Polygon", "coordinates": []}'
 
 
-def test_files_that_zones_are_read_from() -> None:
+def test_zone_files_are_loaded() -> None:
     files = Files(
         a='import "sub/b.rts" zone p from "p.geojson" zone q from "sub/../p.geojson" feature "f"',
         sub__b='zone r from "../p.geojson" zone s from "lib:zones/s.geojson"',
@@ -136,7 +136,7 @@ def test_files_that_zones_are_read_from() -> None:
     assert files.reads.count("/w/p.geojson") == 1
 
 
-def test_a_file_of_a_zone_that_is_missing() -> None:
+def test_missing_zone_file_is_reported() -> None:
     files = Files(a='zone z from "brigde.geojson" feature "x \\"y\\"" zone y from "brigde.geojson"')
     files.files["/w/bridge.geojson"] = SQUARE
     program = files.load("a")
@@ -154,7 +154,7 @@ def test_a_file_of_a_zone_that_is_missing() -> None:
 
 
 @rows("path", ["", "/etc/passwd", "C:x.geojson", "a\\\\b.geojson", "~/x", "http://x/y.geojson"])
-def test_paths_of_zones_that_mean_nothing_elsewhere(path: str) -> None:
+def test_zone_path_that_is_not_portable_is_refused(path: str) -> None:
     files = Files(a=f'zone z from "{path}"')
     (found,) = files.load("a").diagnostics
     assert found.code is IMPORT_PATH
@@ -162,7 +162,7 @@ def test_paths_of_zones_that_mean_nothing_elsewhere(path: str) -> None:
     assert files.reads == ["/w/a.rts"]
 
 
-def test_files_of_zones_that_are_no_text_or_huge() -> None:
+def test_zone_file_that_is_binary_or_huge_is_refused() -> None:
     files = Files(a='zone y from "y.geojson"\nzone z from "z.geojson" zone l from "lib:l"')
     files.files |= {"/w/y.geojson": b"{\xff}", "/w/z.geojson": b" " * (MAX_SIZE + 1)}
     program = files.load("a", library=None)
@@ -175,7 +175,7 @@ def test_files_of_zones_that_are_no_text_or_huge() -> None:
     assert (program.data, program.data_names) == ({}, {})
 
 
-def test_stable_names_do_not_depend_on_the_machine() -> None:
+def test_stable_names_are_the_same_on_every_machine() -> None:
     files = Files(m__a='import "../b.rts"', b="")
     assert list(files.load("m/a").stable.values()) == ["a.rts", "../b.rts"]
 
@@ -186,7 +186,7 @@ def test_findings_and_broken_names_of_all_files() -> None:
     assert program.broken == {"x", "y"}
 
 
-def test_a_missing_file_is_named_with_where_it_was_looked_for() -> None:
+def test_missing_file_is_reported_with_its_expected_path() -> None:
     (found,) = Files(a='import "sub/gotoo.rts"', sub__goto="").load("a").diagnostics
     assert found.code is NO_SUCH_FILE
     assert found.message == "cannot read `sub/gotoo.rts`: no such file"
@@ -198,14 +198,14 @@ def test_a_missing_file_is_named_with_where_it_was_looked_for() -> None:
     assert found.fixes == ()
 
 
-def test_a_missing_file_that_was_asked_for_has_no_span() -> None:
+def test_missing_input_file_has_no_span() -> None:
     (found,) = Files(mission="").load("misson").diagnostics
     assert (found.code, found.span) == (NO_SUCH_FILE, None)
     assert found.message == "cannot read `/w/misson.rts`: no such file"
     assert found.help == "did you mean `/w/mission.rts`?"
 
 
-def test_a_folder() -> None:
+def test_folder_as_a_source_is_refused() -> None:
     (found,) = Files(a='import "folder.rts"').load("a").diagnostics
     assert found.message == "cannot read `folder.rts`: is a directory"
 
@@ -216,19 +216,19 @@ def test_without_listing_there_is_no_suggestion() -> None:
 
 
 @rows("path", ["", "/etc/passwd", "C:x.rts", "a\\\\b.rts", "~/x.rts", "http://x/y.rts"])
-def test_paths_that_mean_nothing_elsewhere(path: str) -> None:
+def test_import_path_that_is_not_portable_is_refused(path: str) -> None:
     files = Files(a=f'import "{path}"')
     (found,) = files.load("a").diagnostics
     assert found.code is IMPORT_PATH
     assert files.reads == ["/w/a.rts"]
 
 
-def test_the_library_must_be_there() -> None:
+def test_missing_library_is_reported() -> None:
     (found,) = Files(a='import "lib:x.rts"').load("a", library=None).diagnostics
     assert found.code is IMPORT_PATH
 
 
-def test_bytes_that_are_no_text() -> None:
+def test_invalid_utf8_is_reported() -> None:
     program = Files(a='import "b.rts"' + zone("a"), b="é".encode() + b"zone \xff\xfe").load("a")
     (found,) = program.diagnostics
     assert found.code is NOT_TEXT
@@ -238,13 +238,13 @@ def test_bytes_that_are_no_text() -> None:
     assert [unit.file for unit in program.units] == ["/w/a.rts"]
 
 
-def test_a_huge_file_is_not_parsed() -> None:
+def test_huge_file_is_not_parsed() -> None:
     (found,) = Files(a=b" " * (MAX_SIZE + 1)).load("a").diagnostics
     assert (found.code, found.span) == (TOO_LARGE, None)
     assert found.message == "`/w/a.rts` is 9 MiB; the limit is 8 MiB"
 
 
-def test_byte_order_mark_and_line_ends() -> None:
+def test_byte_order_mark_and_line_ends_are_accepted() -> None:
     program = Files(a=b"\xef\xbb\xbf" + zone("a").replace("\n", "\r\n").encode() + b"zone b = ?\r\n").load("a")
     (found,) = program.diagnostics
     assert found.span is not None
@@ -252,5 +252,5 @@ def test_byte_order_mark_and_line_ends() -> None:
     assert program.sources["/w/a.rts"].line(2) == "zone b = ?"
 
 
-def test_nothing_asked_for() -> None:
+def test_no_paths_give_an_empty_program() -> None:
     assert load([], Files().read) == Program((), {}, (), frozenset(), {}, {}, {})

@@ -15,7 +15,7 @@ OFFSETS = st.integers(-24 * 60 + 1, 24 * 60 - 1).map(lambda minutes: timezone(ti
 
 
 @given(st.integers(0, 2**53 - 1), OFFSETS)
-def test_as_the_standard_library_reads_them(expected: int, zone: timezone) -> None:
+def test_moments_agree_with_the_standard_library(expected: int, zone: timezone) -> None:
     time = (EPOCH + timedelta(microseconds=expected)).astimezone(zone)
     assert utc_us(time.isoformat()) == expected
     assert utc_us(time.isoformat().replace("T", "t")) == expected
@@ -35,7 +35,7 @@ def test_as_the_standard_library_reads_them(expected: int, zone: timezone) -> No
         ("2000-02-29T23:59:59.999999Z", 951_868_799_999_999),
     ],
 )
-def test_by_hand(text: str, expected: int) -> None:
+def test_moments_have_their_computed_values(text: str, expected: int) -> None:
     assert utc_us(text) == expected
 
 
@@ -66,7 +66,7 @@ def test_by_hand(text: str, expected: int) -> None:
         ("9999-12-31T23:59Z", "1970 to 2255"),
     ],
 )
-def test_refused(text: str, why: str) -> None:
+def test_invalid_moment_is_refused(text: str, why: str) -> None:
     with pytest.raises(ValueError, match=re.escape(why)):
         utc_us(text)
 

@@ -14,7 +14,7 @@ NUMBERS = (
 
 
 @rows("written, read", NUMBERS)
-def test_number(written: str, read: bool) -> None:
+def test_invalid_number_is_reported(written: str, read: bool) -> None:
     source = "skill s() {\n  require height <= " + written + "\n  maintain height <= 1 m\n}\n"
     assert (parse(Source("x", source)).diagnostics == ()) is read
 
@@ -31,7 +31,7 @@ PLACES = (
 
 
 @rows("given, meant", PLACES)
-def test_two_numbers_where_a_place_stands_are_told_once_as_that_place(given: str, meant: list[str]) -> None:
+def test_two_plain_numbers_are_reported_once_as_coordinates(given: str, meant: list[str]) -> None:
     text = f"mission m under p@1 on quad {{ phase a {{ goto({given}) }} }}"
     found = [each for each in parse(Source("x", text)).diagnostics if each.code.id == "E0302"]
     assert [each.fixes[0].replacement if each.fixes else "" for each in found] == meant

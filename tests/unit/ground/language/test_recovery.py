@@ -25,7 +25,7 @@ def kept(parsed: Parsed) -> set[str]:
     return {node.name.text for node in found}
 
 
-def test_goes_on_at_the_next_declaration() -> None:
+def test_parsing_continues_at_the_next_declaration() -> None:
     parsed = run(
         GOOD.format(1)
         + "zone bad1 = circle(1 N 2 E, 3 m)\n"
@@ -41,7 +41,7 @@ def test_goes_on_at_the_next_declaration() -> None:
     assert parsed.broken == {"bad1", "bad2", "bad3", "bad4"}
 
 
-def test_goes_on_at_the_next_part_of_a_block() -> None:
+def test_parsing_continues_at_the_next_part_of_a_block() -> None:
     parsed = run(
         "skill bad() {\n  clas tactical\n  deadline 2 s\n  require a > > b\n  assume b > c c\n  grace 1 parsec\n}\n"
         + GOOD.format(1)
@@ -51,7 +51,7 @@ def test_goes_on_at_the_next_part_of_a_block() -> None:
     assert parsed.broken == {"bad"}
 
 
-def test_goes_on_after_the_brace_that_closes_the_block() -> None:
+def test_parsing_continues_after_the_closing_brace() -> None:
     parsed = run(
         "mission bad under p@1 on v {\n  phase a { x( } phase b { y(] }\n  phase c { z() }\n}\n" + GOOD.format(1)
     )
@@ -59,19 +59,19 @@ def test_goes_on_after_the_brace_that_closes_the_block() -> None:
     assert kept(parsed) == {"good1"}
 
 
-def test_a_brace_within_the_failed_part_closes_no_block() -> None:
+def test_brace_in_the_failed_part_does_not_close_the_block() -> None:
     parsed = run("skill bad() {\n  require a in {b c}\n  grace 1 s\n}\n" + GOOD.format(1))
     assert codes(parsed) == [SYNTAX.slug]
     assert kept(parsed) == {"good1"}
 
 
-def test_text_and_comments_hold_no_place_to_go_on() -> None:
+def test_parsing_does_not_continue_inside_strings_or_comments() -> None:
     parsed = run('zone bad = x "\nzone z = y /*\nzone z = y\n*/ //\n' + GOOD.format(1))
     assert codes(parsed) == [SYNTAX.slug, SYNTAX.slug]  # a text ends on its line, so its second line is read
     assert kept(parsed) == {"good1"}
 
 
-def test_a_block_that_is_not_closed() -> None:
+def test_unclosed_block_is_reported() -> None:
     parsed = run("skill bad() {\n  grace 1 s\nskill good() { }\nskill bad2() {")
     assert codes(parsed) == [UNCLOSED.slug, UNCLOSED.slug]
     assert kept(parsed) == {"good"}
@@ -81,7 +81,7 @@ def test_a_block_that_is_not_closed() -> None:
     assert first.labels[0].text == "the next declaration begins here"
 
 
-def test_a_block_that_is_not_closed_among_steps() -> None:
+def test_unclosed_block_among_steps_is_reported() -> None:
     """The next declaration's first word may be a step's name there."""
     for block in ("", "repeat 2 {", "repeat 2 { repeat 3 {", "x() {"):
         parsed = run(f"mission bad under p@1 on v {{ phase a {{ x() {block}\n" + GOOD.format(1))
@@ -94,7 +94,7 @@ def test_a_block_that_is_not_closed_among_steps() -> None:
     assert codes(parsed) == []
 
 
-def test_goes_on_within_the_blocks_of_a_mission_and_a_template() -> None:
+def test_parsing_continues_in_blocks_of_missions_and_templates() -> None:
     parsed = run(
         "mission bad under p@1 on v {\n"
         "  phase a { repeat 2 { x() {\n deadlin 2 s\n grace 1 parsec\n require a >\n record b c\n } } }\n"
@@ -113,14 +113,14 @@ def test_goes_on_within_the_blocks_of_a_mission_and_a_template() -> None:
     assert parsed.broken == {"bad", "bad2", "bad3"}
 
 
-def test_parts_are_written_once_and_not_left_out() -> None:
+def test_repeated_and_missing_parts_are_reported() -> None:
     parsed = run('vehicle v { identity "a" identity "b" }\nvehicle w { identity "c" }\n' + GOOD.format(1))
     assert codes(parsed) == [WRITTEN_TWICE.slug, NOT_WRITTEN.slug]
     assert kept(parsed) == {"good1"}
     assert parsed.broken == {"v", "w"}
 
 
-def test_nesting_has_a_limit_and_is_reported_once() -> None:
+def test_nesting_limit_is_reported_once() -> None:
     fits, deep = MAX_DEPTH, MAX_DEPTH * 100
     for text in ("{0}a > 1{1}", "{0}a{1} > 1"):
         good = text.format("(" * fits, ")" * fits)
@@ -150,7 +150,7 @@ def test_nesting_has_a_limit_and_is_reported_once() -> None:
         ("mission m under p@1 on v { phase a { §x()§ } }", "repeat 2 { x() ", " x() }"),
     ],
 )
-def test_every_kind_of_nesting_has_the_limit(text: str, before: str, after: str) -> None:
+def test_nesting_limit_applies_to_every_construct(text: str, before: str, after: str) -> None:
     start, middle, end = text.split("§")
 
     def nested(levels: int) -> str:
@@ -166,7 +166,7 @@ def test_every_kind_of_nesting_has_the_limit(text: str, before: str, after: str)
     assert not runs(MAX_DEPTH * 20)  # beyond what Python's own stack would take
 
 
-def test_a_text_with_very_many_errors_ends_early() -> None:
+def test_parsing_stops_at_the_limit_of_errors() -> None:
     parsed = run("zone bad\n" * 50_000)
     assert len(parsed.diagnostics) == MAX_FINDINGS + 1
     assert parsed.diagnostics[-1].code.slug == "too-many-findings"

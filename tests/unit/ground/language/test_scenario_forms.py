@@ -14,7 +14,7 @@ Read = Callable[[str], Unit]
 Plain = Callable[[Any], Any]
 
 
-def test_a_scenario(unit: Read, plain: Plain) -> None:
+def test_scenario(unit: Read, plain: Plain) -> None:
     (scenario,) = unit("""
 scenario "a dropout over the bridge" {
   flies  standard
@@ -66,7 +66,7 @@ scenario "a dropout over the bridge" {
     assert [each["fault"]["name"] for each in found["incidents"]] == ["link_silence", "gps_loss", *["kill"] * 3]
 
 
-def test_what_is_expected(unit: Read, plain: Plain) -> None:
+def test_scenario_expectations(unit: Read, plain: Plain) -> None:
     (scenario,) = unit("""
 scenario "it" {
   flies  standard
@@ -102,7 +102,7 @@ scenario "it" {
     ]
 
 
-def test_a_seed_alone_is_a_range_of_one(unit: Read, plain: Plain) -> None:
+def test_single_seed_is_a_range_of_one(unit: Read, plain: Plain) -> None:
     (scenario,) = unit('scenario "it" { flies m seeds 7 }').scenarios
     assert plain(scenario.seeds) == {"first": (7, "count"), "last": (7, "count")}
 
@@ -119,14 +119,14 @@ WRONG = [
 
 
 @rows(("body", "message"), WRONG)
-def test_what_is_not_written_as_it_must_be(body: str, message: str | None) -> None:
+def test_invalid_scenario_part_is_reported(body: str, message: str | None) -> None:
     parsed = parse(Source("x.rts", f'scenario "it" {{ {body} }}'))
     assert len(parsed.diagnostics) == 1
     assert message in (None, parsed.diagnostics[0].message)
     assert parsed.unit.scenarios == ()
 
 
-def test_a_mission_must_be_named() -> None:
+def test_scenario_must_name_a_mission() -> None:
     parsed = parse(Source("x.rts", 'scenario "it" { at 20 s kill() }\nscenario "next" { flies m }'))
     assert [each.message for each in parsed.diagnostics] == ["scenario `it` lacks `flies`"]
     assert [each.name.text for each in parsed.unit.scenarios] == ["next"]
@@ -140,7 +140,7 @@ def test_a_mission_must_be_named() -> None:
         ('scenario "it" { flies m expect reaction < 20 ms }', "write `<=`", "<="),
     ],
 )
-def test_the_change_that_is_meant(text: str, help: str, fixed: str | None) -> None:
+def test_probable_correction_is_offered(text: str, help: str, fixed: str | None) -> None:
     (found,) = parse(Source("x.rts", text)).diagnostics
     assert found.help == help
     if fixed is None:
@@ -152,14 +152,14 @@ def test_the_change_that_is_meant(text: str, help: str, fixed: str | None) -> No
         assert parse(Source("x.rts", changed)).diagnostics == ()
 
 
-def test_reading_goes_on_after_a_part_that_is_wrong() -> None:
+def test_parsing_continues_after_an_invalid_part() -> None:
     parsed = parse(Source("x.rts", 'scenario "it" {\n  flies m\n  at at at\n  seeds  1\n  expect lands on z\n}\n'))
     assert [each.span.start for each in parsed.diagnostics if each.span] == [31, 63]
     unclosed = parse(Source("x.rts", 'scenario "it" {\n  flies m\nscenario "next" { flies m }'))
     assert [each.name.text for each in unclosed.unit.scenarios] == ["next"]
 
 
-def test_its_words_are_names_elsewhere(unit: Read) -> None:
+def test_keywords_of_scenarios_are_names_elsewhere(unit: Read) -> None:
     words = ["scenario", "flies", "aboard", "seeds", "start", "ends", "never", "reaction", "distance", "lands"]
     made = unit("".join(f"zone {word} = circle(47 N, 8 E, 20 m)\n" for word in words))
     assert [zone.name.text for zone in made.zones] == words

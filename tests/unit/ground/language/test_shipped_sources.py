@@ -29,7 +29,7 @@ def references(node: Node) -> list[str]:
 
 
 @pytest.mark.parametrize(("name", "steps"), [("short", 3), ("standard", 6), ("extended", 12), ("one_bridge", 4)])
-def test_missions(checkout: Path, name: str, steps: int) -> None:
+def test_shipped_missions_are_parsed(checkout: Path, name: str, steps: int) -> None:
     found = program(checkout, f"missions/{name}.rts")
     (mission,) = [mission for unit in found.units for mission in unit.missions]
     assert mission.name.text == name
@@ -37,7 +37,7 @@ def test_missions(checkout: Path, name: str, steps: int) -> None:
     assert "local time" not in {text for unit in found.units for text in references(unit)}
 
 
-def test_everything_together(checkout: Path) -> None:
+def test_shipped_sources_are_parsed_together(checkout: Path) -> None:
     paths = [str(path) for folder in ("skills", "policies", "missions") for path in (checkout / folder).glob("*.rts")]
     found = program(checkout, *paths)
     assert len(found.units) == len(paths)

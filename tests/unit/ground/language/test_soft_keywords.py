@@ -70,19 +70,19 @@ LED = ["abs", "circle", "corridor", "difference", "falling", "grow", "max", "min
 
 @pytest.mark.slow
 @rows("word", [*SOFT, *LED, "repeat", "one", "local"])
-def test_soft(word: str) -> None:
+def test_soft_keyword_is_a_name_elsewhere(word: str) -> None:
     assert parse(Source("x", EVERYWHERE.replace("§", word))).diagnostics == ()
 
 
 @rows("word", RESERVED)
-def test_reserved(word: str) -> None:
+def test_reserved_word_is_refused_as_a_name(word: str) -> None:
     (found,) = parse(Source("x", f"signal {word} : ratio = A.b stale after 5 s")).diagnostics
     assert found.code is SYNTAX
     assert found.message == f"`{word}` is a reserved word and cannot be a name"
 
 
 @rows("word", [*LED, "repeat", "on"])
-def test_words_that_stand_before_a_name_of_their_own(word: str) -> None:
+def test_keyword_may_be_the_name_of_a_step(word: str) -> None:
     text = f"mission m under p@1 on v {{ phase a {{ {word}() {word} () on inadmissible skip {word}({word}) }} }}"
     parsed = parse(Source("x", text))
     assert parsed.diagnostics == ()
@@ -105,7 +105,7 @@ def test_words_that_stand_before_a_name_of_their_own(word: str) -> None:
         "a > §",
     ],
 )
-def test_a_signal_may_be_called_as_an_edge_is(word: str, text: str) -> None:
+def test_signal_may_be_named_rising_or_falling(word: str, text: str) -> None:
     parsed = parse(Source("x", f"skill s() {{ require {text.replace('§', word)} }}"))
     assert parsed.diagnostics == ()
     assert parsed.unit.skills[0].require[0].condition.kind != "edge"

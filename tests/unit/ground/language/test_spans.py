@@ -95,7 +95,7 @@ def without_spans(value: object) -> object:
 
 
 @rows("text", [pytest.param(read(path), id=path.stem) for path in (*SHIPPED, FORMS)] + [CORNERS])
-def test_spans(text: str) -> None:
+def test_nodes_have_the_spans_of_their_text(text: str) -> None:
     source = Source("x.rts", text)
     parsed = parse(source)
     assert parsed.diagnostics == ()

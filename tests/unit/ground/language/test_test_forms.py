@@ -22,7 +22,7 @@ NOMINAL = """nominal morning {
 }"""
 
 
-def test_a_nominal(unit: Read, plain: Plain) -> None:
+def test_nominal(unit: Read, plain: Plain) -> None:
     (nominal,) = unit(NOMINAL).nominals
     found = plain(nominal)
     assert {key: found[key] for key in ("name", "policy", "vehicle", "asker")} == {
@@ -52,7 +52,7 @@ def test_a_nominal(unit: Read, plain: Plain) -> None:
     assert (premises["replayed"], premises["tampered"]) == ({"kind": "replayed"}, {"kind": "tampered"})
 
 
-def test_the_example_of_the_design(unit: Read, plain: Plain) -> None:
+def test_example_of_the_design_is_parsed(unit: Read, plain: Plain) -> None:
     (test,) = unit("""
 test "low battery turns an inspection into a return" {
   given battery = 20 %, gps.fix = fix_3d
@@ -74,7 +74,7 @@ test "low battery turns an inspection into a return" {
     assert "table" not in found
 
 
-def test_a_row_may_begin_with_a_name_after_any_expectation(unit: Read, plain: Plain) -> None:
+def test_row_may_begin_with_a_name_after_any_expectation(unit: Read, plain: Plain) -> None:
     (test,) = unit("""
 test "rows" from morning {
   when  hover(1 s) through onboard
@@ -96,7 +96,7 @@ test "rows" from morning {
     assert rows[4]["expectation"]["clause"] == {"text": "forbid hover ..."}
 
 
-def test_after_an_expectation_a_moment_is_a_moment_and_another_text_a_clause(unit: Read) -> None:
+def test_string_after_at_is_a_moment_or_a_clause(unit: Read) -> None:
     text = 'test "a" { when hover() expect deny at "battery > 3 %" at "2026-06-01T08:00Z" }'
     other = 'test "a" { when hover() expect deny at "2026-06-01T08:00Z" }'
     for source, clause in ((text, "battery > 3 %"), (other, None)):
@@ -106,7 +106,7 @@ def test_after_an_expectation_a_moment_is_a_moment_and_another_text_a_clause(uni
         assert test.premises.instant is not None
 
 
-def test_old_sources_may_use_these_words_as_names() -> None:
+def test_keywords_of_tests_are_names_elsewhere() -> None:
     words = ("nominal", "test", "given", "expect", "because", "table", "measured", "ago", "allow", "deny", "tampered")
     for word in words:
         text = f"""

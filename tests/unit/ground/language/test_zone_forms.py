@@ -61,7 +61,7 @@ def test_shape(plain: Plain, unit: Read, text: str, expected: dict[str, Any]) ->
     assert plain(unit(f"zone z {text} zone after = circle(1 N, 2 E, 3 m)").zones[0].shape) == expected
 
 
-def test_shapes_are_words_only_before_their_parts(plain: Plain, unit: Read) -> None:
+def test_names_of_shapes_are_keywords_only_before_a_bracket(plain: Plain, unit: Read) -> None:
     text = "zone z = union(circle, polygon , corridor, union, difference, circle (1 N, 2 E, 3 m), circle)"
     assert plain(unit(text).zones[0].shape)["shapes"] == [
         "&circle", "&polygon", "&corridor", "&union", "&difference", CIRCLE, "&circle",
@@ -97,6 +97,6 @@ def test_times(plain: Plain, unit: Read) -> None:
         ),
     ],
 )
-def test_no_times(text: str, code: object, message: str) -> None:
+def test_invalid_times_are_reported(text: str, code: object, message: str) -> None:
     (found,) = parse(Source("x", f"zone z = circle(1 N, 2 E, 3 m) active {text}")).diagnostics
     assert (found.code, found.message) == (code, message)

@@ -326,9 +326,7 @@ class _OccurrenceFinder:
 
     def _signal(self, signal: SignalDecl) -> Iterator[Occurrence]:
         enum = None if signal.type.text in NAMED else self.symbols.enums.get(signal.type.text)
-        kind = (
-            NameKind.TYPE if enum is None else NameKind.DECLARED
-        )  # in `signal position : position` the second is a type
+        kind = NameKind.TYPE if enum is None else NameKind.DECLARED  # a signal may also be called `position`
         yield Occurrence(signal.type.span, NameTarget(kind, signal.type.text))
         for source in signal.sources:
             yield Occurrence(source.message.span, NameTarget(NameKind.MESSAGE, source.message.text))

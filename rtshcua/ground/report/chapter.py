@@ -1,4 +1,4 @@
-"""The chapter of one policy for one vehicle: rules, skills, signals, zones as signed, and missions with their paths."""
+"""The chapter of a policy for a vehicle: rules, skills, signals and zones as signed, and missions with their paths."""
 
 from collections.abc import Iterable, Iterator, Mapping
 
@@ -6,7 +6,7 @@ from rtshcua.decision.outline import rings
 from rtshcua.ground.lower.policy_checks import applies, rule_applies
 from rtshcua.ground.lower.zones import derived_name
 from rtshcua.ground.prove.mission_bounds import Bounds, rounded_energy, rounded_time
-from rtshcua.ground.report.permissions import asked_of, permitted_limits, rights, rule_names
+from rtshcua.ground.report.permissions import permitted_limits, rights, rule_names, vocabulary_of
 from rtshcua.ground.report.policy_changes import PolicyChanges, changes
 from rtshcua.ground.report.prose.mission_steps import (
     describe_asker,
@@ -75,14 +75,14 @@ ALLOWED, FORBIDDEN, OTHER = "allowed", "forbidden", ""
 def zones(subject: ReportedPolicy, changed: frozenset[str]) -> tuple[ZoneView, ...]:
     """The declared zones in their order, then those that rules derive."""
     policy = subject.policy
-    told = [_declared(subject, zone, changed) for zone in policy.zones[: policy.declared]]
+    views = [_declared(subject, zone, changed) for zone in policy.zones[: policy.declared]]
     grown = _grown(subject)
     seen: set[str] = set()
     for zone in policy.zones[policy.declared :]:
         if zone.name in grown and zone.name not in seen:
             seen.add(zone.name)
-            told.append(_derived(zone, grown[zone.name]))
-    return tuple(told)
+            views.append(_derived(zone, grown[zone.name]))
+    return tuple(views)
 
 
 def ground_of(zone: Zone) -> ZoneOutline:
@@ -142,7 +142,7 @@ def _use(subject: ReportedPolicy, name: str) -> str:
 
 
 def _grown(subject: ReportedPolicy) -> dict[str, Grow]:
-    """The zones that rules grow, by the name that they have in what is signed."""
+    """The zones that rules grow, by their signed names."""
     found = {}
     for rule in subject.rules:
         for node in within(rule.when):
@@ -152,7 +152,7 @@ def _grown(subject: ReportedPolicy) -> dict[str, Grow]:
 
 
 def _places(subject: ReportedPolicy, declared: ZoneDecl, zone: Zone) -> Iterator[PlaceView]:
-    """The places that a zone is written by, its entry, and of an outline from a file every corner."""
+    """Yield the places in a zone's declaration, its entry, and every corner of an outline from a file."""
     projection = subject.policy.projection
     written = list(places_of(declared.shape))
     if declared.entry is not None:
@@ -167,7 +167,7 @@ def _places(subject: ReportedPolicy, declared: ZoneDecl, zone: Zone) -> Iterator
 
 
 def _from_file(shape: Shape) -> bool:
-    """Whether no place of a shape, or of a part of it, is written in a source."""
+    """Whether a shape, or a part of it, comes from a GeoJSON file."""
     if isinstance(shape, Combination):
         return any(map(_from_file, shape.shapes))
     return isinstance(shape, GeoJson)
@@ -178,7 +178,7 @@ def _place(what: str, latitude: int, longitude: int, x: int, y: int) -> PlaceVie
 
 
 def mission_view(mission: Mission, policy: Policy, bounds: Bounds | None, values: Mapping[str, str]) -> MissionView:
-    """A mission; `values` are those of its parameters that its way is drawn for."""
+    """Describe a mission; `values` are the parameter values for which its path is drawn."""
     first = mission.invocations[0]
     by = f"Proposed by {mission.proposer or 'a person'}, {describe_asker(first, policy)}."
     drawn = ", ".join(f"`{name}` = {value}" for name, value in values.items())
@@ -195,7 +195,7 @@ def mission_view(mission: Mission, policy: Policy, bounds: Bounds | None, values
 def _bounds(bounds: Bounds) -> Iterator[Fact]:
     yield Fact("Steps", f"at most {bounds.invocations}")
     yield Fact("Time", f"at most {rounded_time(bounds.time_us)} from issue to end")
-    yield Fact("Charge", f"at most {rounded_energy(bounds.energy)} of a full one, as a sum of all that it may take")
+    yield Fact("Charge", f"at most {rounded_energy(bounds.energy)} of a full charge, the sum over all its steps")
 
 
 def _step(step: Invocation, mission: Mission, policy: Policy) -> StepView:
@@ -212,7 +212,7 @@ def _step(step: Invocation, mission: Mission, policy: Policy) -> StepView:
 
 
 def digest_of(policy: Policy) -> str:
-    """What names exactly what is signed: the digest that `compile` gives."""
+    """The digest of the signed policy, the same as from `compile`."""
     return policy_digest(policy_payload(policy)).hex()
 
 
@@ -225,7 +225,7 @@ def chapter(
     old: Policy | None = None,
     since: str = "",
 ) -> Chapter:
-    """The chapter of a policy; `old` is the earlier one that `since` names, if there is one."""
+    """Make the chapter of a policy; `old` is the earlier policy named by `since`, if any."""
     policy, declaration = subject.policy, subject.lowered.declaration
     changed = PolicyChanges() if old is None else changes(old, policy)
     signals = [signal.name for signal in policy.signals]
@@ -285,7 +285,7 @@ def _rule(subject: ReportedPolicy, number: int, changed: PolicyChanges) -> RuleV
 
 
 def _skill(subject: ReportedPolicy, skill: SkillDecl, changed: bool) -> SkillView:
-    names = asked_of(subject, [skill])
+    names = vocabulary_of(subject, [skill])
 
     without = frozenset(subject.policy.vehicle.without)
     parts = (("require", skill.require), ("assume", skill.assume), ("maintain", skill.maintain))
@@ -317,7 +317,7 @@ def _skill(subject: ReportedPolicy, skill: SkillDecl, changed: bool) -> SkillVie
 
 
 def _last_links(subject: ReportedPolicy) -> frozenset[str]:
-    """The skills that the chains of a policy end in."""
+    """The skills at the ends of a policy's chains."""
     chains = [subject.policy.contingency, *(contract.fallback for contract in subject.policy.contracts)]
     return frozenset(subject.policy.contracts[chain[-1].skill].name for chain in chains if chain)
 

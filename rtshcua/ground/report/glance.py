@@ -1,23 +1,22 @@
-"""The first page of a policy: what a person signs on to, from what its chapter says."""
+"""The first page of a policy: a summary of its chapter for the person who signs it."""
 
 from collections.abc import Iterable, Iterator
 
 from rtshcua.ground.report.prose.phrases import listed, name
 from rtshcua.ground.report.report_model import Chapter, Fact, Glance, Rights
 
-#: so many things are told one by one; of more how many there are
+#: the most items that are listed; of more only their number is given
 MANY = 6
-#: what no policy decides, whatever it says
+#: what no policy covers
 BEYOND = (
-    "A pilot who takes the controls, and what the autopilot does by itself (its failsafes): the policy does not hold "
-    "them back.",
-    "Whether the vehicle is airworthy, and whether the flight is allowed by law. What the policy does not read, it "
-    "does not know of: people, other aircraft and obstacles too, where no signal reports them.",
+    "A pilot who takes the controls, and the autopilot's own failsafes: the policy does not restrict them.",
+    "Whether the vehicle is airworthy, and whether the flight is legal. The policy does not know of people, other "
+    "aircraft and obstacles that no signal reports.",
 )
 
 
 def glance(chapter: Chapter) -> Glance:
-    """A chapter on one page."""
+    """Summarise a chapter on one page."""
     return Glance(
         who=tuple(_who(chapter.rights)),
         where=tuple(_where(chapter)),
@@ -30,7 +29,7 @@ def glance(chapter: Chapter) -> Glance:
 
 
 def _some(texts: Iterable[str], rest: str) -> Iterator[str]:
-    """The first of these, and how many more there are."""
+    """Yield the first texts, and the number of further ones."""
     every = list(texts)
     yield from every[:MANY]
     if len(every) > MANY:
@@ -38,14 +37,14 @@ def _some(texts: Iterable[str], rest: str) -> Iterator[str]:
 
 
 def _who(rights: Iterable[Rights]) -> Iterator[Fact]:
-    """For each role what it may have done, by the answer; nothing is told of what it may not."""
+    """Yield the permitted skills of each role, by answer."""
     for each in rights:
         answers: dict[str, list[str]] = {}
         for right in each.rights:
             if right.answer != "no":
                 answers.setdefault(right.answer, []).append(name(right.skill))
-        told = "; ".join(f"{answer}: {listed(skills)}" for answer, skills in answers.items())
-        yield Fact(f"role {name(each.role)}" if each.role else "everybody else", told or "nothing")
+        permitted = "; ".join(f"{answer}: {listed(skills)}" for answer, skills in answers.items())
+        yield Fact(f"role {name(each.role)}" if each.role else "everybody else", permitted or "nothing")
 
 
 def _where(chapter: Chapter) -> Iterator[str]:
@@ -65,7 +64,7 @@ def _height(chapter: Chapter) -> Iterator[str]:
     limits = _permitted(chapter, "altitude")
     yield from limits
     if not bands and not limits:
-        yield "This policy sets no limit to the height."
+        yield "This policy does not limit the height."
 
 
 def _speed(chapter: Chapter) -> Iterator[str]:
@@ -74,7 +73,7 @@ def _speed(chapter: Chapter) -> Iterator[str]:
 
 
 def _permitted(chapter: Chapter, kind: str) -> list[str]:
-    """What the rules permit at most, whoever asks; not what a skill could be asked for."""
+    """The widest limits that the rules permit to anyone."""
     return [
         f"{name(each.skill)} is permitted with {name(each.parameter)} {each.limits}"
         + (", under conditions" if each.conditions else "")
@@ -86,33 +85,33 @@ def _permitted(chapter: Chapter, kind: str) -> list[str]:
 
 
 def _person(chapter: Chapter) -> Iterator[str]:
-    asked = [f"{rule.told} (rule {rule.number})" for rule in chapter.rules if rule.kind == "confirm"]
-    yield from _some(asked, "see the rules")
-    if not asked:
-        yield "Nothing: no rule asks a person to approve a step."
+    confirmed = [f"{rule.told} (rule {rule.number})" for rule in chapter.rules if rule.kind == "confirm"]
+    yield from _some(confirmed, "see the rules")
+    if not confirmed:
+        yield "Nothing: no rule requires a person to approve a step."
 
 
 def _wrong(chapter: Chapter) -> Iterator[Fact]:
     chain = " ".join(chapter.contingency)
-    yield Fact("A step is denied in the air", chain or "The policy says nothing.")
+    yield Fact("A step is denied in the air", chain or "The policy does not say.")
     degrades = [rule.told for rule in chapter.rules if rule.kind == "degrade"]
-    for told in _some(degrades, "see when something goes wrong"):
-        yield Fact("Instead of what was asked", told)
+    for text in _some(degrades, "see when something goes wrong"):
+        yield Fact("Instead of the requested step", text)
     yield Fact("Records cannot be kept", chapter.evidence)
-    yield Fact("The vehicle is not heard", chapter.silence)
+    yield Fact("The vehicle is silent", chapter.silence)
 
 
 def _beyond(chapter: Chapter) -> Iterator[str]:
     signals = [name(signal.name) for signal in chapter.signals]
-    yield f"Only this is known of the vehicle and around it: {listed(signals) or 'nothing'}."
+    yield f"The policy reads only these signals of the vehicle and its surroundings: {listed(signals) or 'none'}."
     left_out = len(chapter.rules_left_out) + sum(len(skill.left_out) for skill in chapter.skills)
     if left_out:
         yield (
-            f"{left_out} rule{'s' * (left_out > 1)} and clauses of the sources do not count, as the vehicle is without "
-            "the sensor for them."
+            f"{left_out} rule{'s' * (left_out > 1)} and clauses of the sources do not apply, because the vehicle does "
+            "not have the sensor for them."
         )
     if not chapter.missions:
-        yield "No mission is listed here: each is agreed to by itself."
+        yield "No mission is listed here: each mission needs its own approval."
     if not chapter.cases and not chapter.scenarios:
-        yield "No test of this policy is among the sources."
+        yield "The sources have no test of this policy."
     yield from BEYOND

@@ -1,7 +1,7 @@
-"""Renders a policy report as one HTML page that needs nothing else: no script, no file, no network.
+"""Renders a policy report as one self-contained HTML page: no script, no other file, no network.
 
-Everything that a source says is escaped where it enters the page (Jinja's autoescape); the page's Content Security
-Policy (level 3) then forbids every style but its own, which it names by its digest.
+All texts of sources are escaped (Jinja's autoescape). The page's Content Security Policy (level 3) also forbids every
+style except its own, which it names by digest.
 """
 
 import re
@@ -25,7 +25,7 @@ from rtshcua.ground.report.report_model import Chapter, PolicyReport
 
 
 class GlossaryEntry(NamedTuple):
-    """A word, and what it means here."""
+    """A term and its meaning."""
 
     word: str
     meaning: str
@@ -34,17 +34,18 @@ class GlossaryEntry(NamedTuple):
 GLOSSARY: Final = (
     GlossaryEntry("above home", "Height over the place where the vehicle starts, not over the ground below it."),
     GlossaryEntry(
-        "agent", "A program that proposes missions. It can ask for what is permitted to it, and command nothing."
+        "agent",
+        "A program that proposes missions. It can request what it is permitted, and cannot command the vehicle.",
     ),
-    GlossaryEntry("airspace", "Where the vehicle may be at all, whatever it is asked to do."),
+    GlossaryEntry("airspace", "Where the vehicle may be, whatever is requested."),
     GlossaryEntry(
-        "charge", "How full the battery is. What a skill may take of it is a bound that counts in the checks."
+        "charge", "How full the battery is. Each skill has an upper bound for its charge, which the checks use."
     ),
     GlossaryEntry("contingency", "What flies when a step is denied while the vehicle is in the air."),
     GlossaryEntry(
         "digest",
-        "A number computed from everything that is signed. If one letter of it is changed, the digest is another; so "
-        "two documents with the same digest say the same.",
+        "A number computed from everything that is signed. If a single letter changes, the digest changes, so two "
+        "documents with the same digest have the same content.",
     ),
     GlossaryEntry(
         "fallback", "What flies when a step that was allowed cannot go on: the chain of its skill, in order."
@@ -54,19 +55,21 @@ GLOSSARY: Final = (
         "mission", "An ordered list of steps, proposed for a role, and checked against the policy before it flies."
     ),
     GlossaryEntry("permit", "A rule that allows. What no permit allows is denied."),
-    GlossaryEntry("phase", "A named stretch of a mission, such as departure."),
+    GlossaryEntry("phase", "A named part of a mission, such as departure."),
     GlossaryEntry(
-        "policy", "The rules of one vehicle: who may have what done, where and when. Its version only rises."
+        "policy", "The rules of one vehicle: who may request what, where and when. Its version only increases."
     ),
-    GlossaryEntry("role", "On whose behalf something is asked for, such as operator or supervisor."),
+    GlossaryEntry("role", "The role on whose behalf a step is requested, such as operator or supervisor."),
     GlossaryEntry("signal", "Something that the vehicle reports about itself or its surroundings."),
-    GlossaryEntry("skill", "Something that the vehicle can do, with its limits. Nothing else can be asked of it."),
-    GlossaryEntry("source", "What speaks for a role: a person at the controls, an agent, software on board, a reflex."),
+    GlossaryEntry("skill", "Something that the vehicle can do, with its limits. Nothing else can be requested."),
+    GlossaryEntry(
+        "source", "Who makes a request for a role: a person at the controls, an agent, software on board, a reflex."
+    ),
     GlossaryEntry(
         "unknown",
-        "A signal that was never received, is too old, or says that it does not know. What is unknown permits nothing: "
-        "a permit that needs it does not hold, a prohibition that needs it makes the step wait, an approval that "
-        "hangs on it must be given, and a rule that would fly something else makes the step wait.",
+        "A signal that was never received, is too old, or reports that its value is not known. An unknown signal never "
+        "permits anything: a permit that needs it does not hold, a prohibition that needs it makes the step wait, an "
+        "approval that depends on it is required, and a rule that would fly something else makes the step wait.",
     ),
     GlossaryEntry(
         "zone", "An area on the ground with, perhaps, a floor, a ceiling and times. Its border does not belong to it."
@@ -74,18 +77,18 @@ GLOSSARY: Final = (
 )
 
 
-#: what a reader does not see, or what turns around the text beside it: a comment or an intent may hold any of it
+#: invisible and reordering characters, which a comment or an intent may contain
 _HIDDEN = re.compile(
     "[\x00-\x09\x0b-\x1f\x7f-\x9f\xad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb]"
 )
-#: what fits at the foot of a page of A4: margins of 14 and 16 mm, letters of 6 pt that are 1.3 mm wide
+#: the size of the footer on A4: margins of 14 and 16 mm, letters of 6 pt, 1.3 mm wide
 FOOT_LINES, FOOT_COLUMNS = 4, 116
-#: a number and its unit stay on one line
+#: the space between a number and its unit, where a line must not break
 _UNIT = re.compile(r"(?<=\d) (?=(?:m/s|km/h|cm|mm|km|m|mV|V|%|s|ms|us|min|h|deg|N|S|E|W)\b|%)")
 
 
 def page(report: PolicyReport) -> str:
-    """The page; the same bytes for the same report."""
+    """Render a report. The same report gives the same bytes."""
     return rendered(
         "policy_report.html",
         _footer(report),
@@ -104,7 +107,7 @@ def page(report: PolicyReport) -> str:
 
 
 def rendered(template: str, more_style: str = "", **values: object) -> str:
-    """The page that a template makes of values, with the style of all pages and perhaps more of it."""
+    """Render a template with values, the common style and an additional one."""
     environment, style = templates()
     style += more_style
     digest = b64encode(sha256(style.encode()).digest()).decode("ascii")
@@ -113,15 +116,15 @@ def rendered(template: str, more_style: str = "", **values: object) -> str:
 
 
 def visibly(text: str) -> str:
-    """A page with what a reader would not see shown as what it is."""
+    """Replace invisible characters of a page by visible descriptions."""
     return _HIDDEN.sub(lambda found: escape(visible(found[0])), text)
 
 
 def _footer(report: PolicyReport) -> str:
-    """A rule of the style that puts what is signed at the foot of every printed page: on a line each name, version and
-    whole digest. Where that does not fit, of each digest the first half, one after the other.
+    """The style of the footer of printed pages: a line for each policy with name, version and full digest, or if that
+    does not fit, all on one line with the first half of each digest.
 
-    A policy's name has letters, digits and `_` only, and so it may stand in a string of CSS.
+    The name of a policy has only letters, digits and `_`, so it is safe in a CSS string.
     """
     lines = [f"{each.name} {each.version}: {each.digest}" for each in report.chapters]
     if len(lines) > FOOT_LINES or max(map(len, lines), default=0) > FOOT_COLUMNS:
@@ -132,7 +135,7 @@ def _footer(report: PolicyReport) -> str:
 
 @cache
 def templates() -> tuple[Environment, str]:
-    """The templates, which take a while to compile, and the style of the page."""
+    """The compiled templates, and the style of the page."""
     folder = files("rtshcua.ground.report") / "templates"
     texts = {each.name: each.read_text(encoding="utf-8") for each in folder.iterdir() if each.is_file()}
     environment = Environment(
@@ -148,7 +151,7 @@ def templates() -> tuple[Environment, str]:
 
 
 def _told(text: str, anchors: dict[str, str] | None = None) -> Markup:
-    """A sentence: names become code, and lead to where they are explained."""
+    """Convert a sentence to HTML: names become code, with links to their explanations."""
     parts = []
     for number_, part in enumerate(_UNIT.sub("\u00a0", text).split("`")):
         if number_ % 2 == 0:
@@ -161,7 +164,7 @@ def _told(text: str, anchors: dict[str, str] | None = None) -> Markup:
 
 
 def _anchors(chapter: Chapter, number_: int) -> dict[str, str]:
-    """Where the names of a chapter, and the reasons of decisions, are explained."""
+    """The anchors of the names of a chapter and of the reasons of decisions."""
     kinds = {
         "signal": [each.name for each in chapter.signals],
         "zone": [each.name for each in chapter.zones],
@@ -172,10 +175,10 @@ def _anchors(chapter: Chapter, number_: int) -> dict[str, str]:
 
 
 def _reason(reason: str) -> str:
-    """Where a reason is explained."""
+    """The anchor of a reason."""
     return f"reason-{reason.replace('/', '-')}"
 
 
 def _chunks(digest: str) -> list[str]:
-    """A digest in groups of eight, which a person can compare."""
+    """A digest in groups of eight characters, which are easy to compare."""
     return [digest[at : at + 8] for at in range(0, len(digest), 8)]

@@ -1,6 +1,6 @@
-"""Missions as checked, as one HTML page: the zones, the planned path, and where it fails.
+"""The HTML page of checked missions: the zones, the planned path, and the places where it fails.
 
-The page includes missions that are refused, as far as their path is planned.
+The page includes refused missions if their path is planned.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,7 +24,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.ir.node import Node
 
-#: a leg is looked at in so many places
+#: the number of places of a leg that are checked
 _PLACES = 400
 
 Point = tuple[int, int]
@@ -32,7 +32,7 @@ Point = tuple[int, int]
 
 @dataclass(frozen=True, slots=True)
 class RefusedLegs:
-    """What of a map is refused: legs in mm, y to the south, as SVG paths; and marks on the page."""
+    """The refused parts of a map: legs in mm, y to the south, as SVG paths; and marks on the page."""
 
     legs: tuple[str, ...]
     marks: tuple[tuple[float, float], ...]
@@ -40,7 +40,7 @@ class RefusedLegs:
 
 @dataclass(frozen=True, slots=True)
 class StepFindings:
-    """A step in words, and what was found of it."""
+    """The description of a step, and its findings."""
 
     told: str
     found: tuple[str, ...]
@@ -60,18 +60,18 @@ class MissionMap:
 
 
 class CheckedProgram:
-    """A program, the missions in it whose way is planned, and all that was found."""
+    """A program with its planned missions and all findings."""
 
     def __init__(self, program: Program, planned: Sequence[PlannedMission], found: Sequence[Diagnostic]) -> None:
         self._program, self._planned, self._found = program, planned, found
         self._sources: Mapping[str, Source] = program.sources
 
     def drawings(self) -> Iterator[MissionMap]:
-        """One a mission."""
+        """Yield the map of each mission."""
         for under, mission, declaration in self._planned:
             subject = ReportedPolicy(self._program, under)
-            told, about = mission_view(mission, under.policy, None, {}), chapter(subject)
-            plan = mission_map(about, told)
+            view, about = mission_view(mission, under.policy, None, {}), chapter(subject)
+            plan = mission_map(about, view)
             written = [step for phase in declaration.phases for step in phase.steps]
             of = [[each for each in self._found if _is_within(each, step)] for step in written]
             errors = [any(map(_is_error, some)) for some in of]
@@ -85,12 +85,12 @@ class CheckedProgram:
                 failed=failed,
                 steps=tuple(
                     StepFindings(step.told, tuple(map(self._words, some)))
-                    for step, some in zip(told.steps, of, strict=True)
+                    for step, some in zip(view.steps, of, strict=True)
                 ),
             )
 
     def others(self) -> list[str]:
-        """What was found elsewhere than in a step that is drawn."""
+        """The findings outside the drawn steps."""
         steps = [step for each in self._planned for phase in each.declaration.phases for step in phase.steps]
         return [self._words(each) for each in self._found if not any(_is_within(each, step) for step in steps)]
 
@@ -103,7 +103,7 @@ class CheckedProgram:
 
 
 def mission_map_page(checkings: Sequence[CheckedProgram]) -> str:
-    """The page; the same bytes for the same sources."""
+    """Render the page. The same sources give the same bytes."""
     drawings = [each for checking in checkings for each in checking.drawings()]
     others = list(dict.fromkeys(text for checking in checkings for text in checking.others()))
     refused = sum(each.refused for each in drawings)
@@ -127,7 +127,7 @@ def _is_error(found: Diagnostic) -> bool:
 
 
 def _failed(policy: Policy, plans: Sequence[flat.Plan], errors: Sequence[bool], drawn: ZoneMap) -> RefusedLegs:
-    """The legs of the steps that are refused, and where each of these first leaves the airspace."""
+    """The legs of the refused steps, and the first place of each outside the airspace."""
     keeps = _Airspace(policy)
     legs: list[str] = []
     marks: list[tuple[float, float]] = []
@@ -156,9 +156,7 @@ def _points_along(one: Point, other: Point) -> Iterator[Point]:
 
 
 class _Airspace:
-    """Whether a place keeps the airspace with the vehicle's position error, at whatever time: a zone to stay out of is
-    there if it may be.
-    """
+    """Whether a place is within the airspace at all times, including the vehicle's position error."""
 
     def __init__(self, policy: Policy) -> None:
         stated, error = policy.airspace, policy.vehicle.position_error

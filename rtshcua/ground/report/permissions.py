@@ -1,8 +1,8 @@
-"""Who may do what under a policy, and within which limits of height, speed and place.
+"""The permissions of a policy: who may request which skill, and within which limits of height, speed and place.
 
-`rights` sorts the rules by role and skill. `permitted_limits` bounds what the rules permit over everyone who may ask:
-what a skill accepts is no promise of the policy, since a rule may permit less. Outside of these bounds no `permit`
-holds (`analysis/extent.py`), so nothing that is permitted lies beyond what is reported.
+`rights` sorts the rules by role and skill. `permitted_limits` gives the widest limits that the rules permit to anyone,
+which may be narrower than those of the skill. No `permit` holds outside these limits (`analysis/extent.py`), so the
+report never shows less than the policy permits.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -51,8 +51,8 @@ def _right(subject: ReportedPolicy, role: str, skill: str) -> Right:
             case "confirm":
                 confirmations.append(Restriction(number, approver(rule), conditions))
             case "forbid":
-                asked = f"asked through {through(sources_of(rule))}" if rule.through else ""
-                prohibitions.append(Restriction(number, asked, conditions))
+                sources = f"asked through {through(sources_of(rule))}" if rule.through else ""
+                prohibitions.append(Restriction(number, sources, conditions))
             case _:
                 pass
     answer = _answer(skill, [rule for _, rule in about])
@@ -60,8 +60,9 @@ def _right(subject: ReportedPolicy, role: str, skill: str) -> Right:
 
 
 def _answer(skill: str, about: list[RuleDecl]) -> str:
-    """In short, for those sources that some permit names and that are not always forbidden; what is forbidden to others
-    is no condition. `yes`: through one of them at least nothing is asked besides.
+    """Return the short answer, over the sources that some permit names and that are not always forbidden.
+
+    `yes` means that through at least one source no condition applies. What is forbidden to other sources is ignored.
     """
     permits, forbids, confirms = (
         [rule for rule in about if rule.kind == kind] for kind in ("permit", "forbid", "confirm")
@@ -85,20 +86,20 @@ def _sources(rules: Iterable[RuleDecl]) -> frozenset[str]:
 
 
 def _about(rule: RuleDecl, role: str, skill: str) -> bool:
-    """Whether a rule says something of a skill asked for by a role; a `confirm` is about all roles."""
+    """Whether a rule applies to a skill and a role; a `confirm` applies to all roles."""
     if rule.skills and skill not in {name.text for name in rule.skills}:
         return False
     return not rule.roles or role in {name.text for name in rule.roles}
 
 
 def rule_names(subject: ReportedPolicy, rule: RuleDecl) -> Vocabulary:
-    """What the names in a rule stand for: it may read those arguments that all of its skills have."""
+    """The vocabulary of a rule, which may read the arguments that all of its skills have."""
     own = [name.text for name in rule.skills] or [contract.name for contract in subject.policy.contracts]
-    return asked_of(subject, [subject.symbols.skills[name] for name in own])
+    return vocabulary_of(subject, [subject.symbols.skills[name] for name in own])
 
 
-def asked_of(subject: ReportedPolicy, skills: Sequence[SkillDecl]) -> Vocabulary:
-    """The names within what is about some skills."""
+def vocabulary_of(subject: ReportedPolicy, skills: Sequence[SkillDecl]) -> Vocabulary:
+    """The vocabulary of a text about some skills, with the arguments that all of them have."""
     types = [{each.name.text: each.type.text for each in skill.parameters} for skill in skills]
     shared = frozenset.intersection(*map(frozenset, types)) if types else frozenset()
     places = [name for name in shared if all(each[name] == "position" for each in types)]
@@ -106,19 +107,19 @@ def asked_of(subject: ReportedPolicy, skills: Sequence[SkillDecl]) -> Vocabulary
 
 
 _ALWAYS: Final = AtMost((), 0)
-#: the quantities that are told, and what a figure of them is measured from
+#: the reported quantities, and their datum
 _FROM: Final = {Dimension.ALTITUDE: " above home", Dimension.SPEED: ""}
 
 
-class _PermitForAsker(NamedTuple):
-    """A `permit`, for some who ask, and the prohibitions about them; all by their numbers."""
+class _PermitForRequester(NamedTuple):
+    """The number of a `permit` for a requester, and the numbers of the `forbid` rules about this requester."""
 
     permit: int
     forbids: tuple[int, ...]
 
 
 def permitted_limits(subject: ReportedPolicy) -> tuple[PermittedLimit, ...]:
-    """What is permitted of every height, speed and place that some step may be asked for."""
+    """Return the permitted limits of every height, speed and place that a step may request."""
     return tuple(_LimitFinder(subject).every())
 
 
@@ -141,8 +142,8 @@ class _LimitFinder:
                 elif parameter.kind in (PLACE, ZONE):
                     yield self._place(contract, parameter, ways)
 
-    def _ways(self, skill: int) -> Iterator[_PermitForAsker]:
-        """Each `permit` of a skill for each who may ask, where nothing forbids it to them always."""
+    def _ways(self, skill: int) -> Iterator[_PermitForRequester]:
+        """Yield each `permit` of a skill for each requester to whom it is not always forbidden."""
         about = [(at, rule) for at, rule in enumerate(self._policy.rules) if not rule.skills or skill in rule.skills]
         for at, rule in about:
             if rule.kind != RuleKind.PERMIT:
@@ -153,10 +154,10 @@ class _LimitFinder:
                         other for other, each in about if each.kind == RuleKind.FORBID and _meets(each, role, source)
                     )
                     if all(self._policy.rules[each].when is not None for each in forbids):
-                        yield _PermitForAsker(at, forbids)
+                        yield _PermitForRequester(at, forbids)
 
     def _quantity(
-        self, contract: Contract, parameter: Parameter, ways: Sequence[_PermitForAsker]
+        self, contract: Contract, parameter: Parameter, ways: Sequence[_PermitForRequester]
     ) -> Iterator[PermittedLimit]:
         cell = (True, parameter.cell)
         reaches = [each[cell] for way in ways for each in self._reaches(contract, way)]
@@ -170,8 +171,8 @@ class _LimitFinder:
             limits = f"exactly {display(low, dimension)}{_FROM[dimension]}"
         yield PermittedLimit(contract.name, parameter.name, parameter.dimension, limits, not plain)
 
-    def _reaches(self, contract: Contract, way: _PermitForAsker) -> list[Bounds]:
-        """What may be asked for by one way: the skill's own ranges within what the rules and its `require` leave."""
+    def _reaches(self, contract: Contract, way: _PermitForRequester) -> list[Bounds]:
+        """The permitted ranges by one permit: the skill's ranges, limited by the rules and the skill's `require`."""
         parts: list[Bounds] = [
             {(True, each.cell): (each.low, each.high) for each in contract.parameters if each.kind != PLACE}
         ]
@@ -179,17 +180,17 @@ class _LimitFinder:
         some = [self._parts(self._nodes[way.permit]), *(self._parts(Negation(self._nodes[at])) for at in way.forbids)]
         for narrower in [*some, *needed]:
             if any(not bounds for bounds in narrower):
-                continue  # it bounds nothing by itself
+                continue  # it does not limit the arguments
             both = (_common(one, other) for one in parts for other in narrower)
             parts = _around([each for each in both if each is not None])
         return parts
 
     def _parts(self, node: Node) -> list[Bounds]:
-        """What a condition says of what is asked for."""
+        """The bounds of a condition on the arguments."""
         return [{cell: ends for cell, ends in part.items() if cell[0]} for part in self._extents.parts(node)]
 
-    def _plain(self, way: _PermitForAsker, cell: tuple[bool, int], low: int, high: int) -> bool:
-        """Whether all from `low` to `high` is permitted whatever else is so."""
+    def _plain(self, way: _PermitForRequester, cell: tuple[bool, int], low: int, high: int) -> bool:
+        """Whether the whole range from `low` to `high` is permitted without other conditions."""
         return all(
             any(
                 not one.others
@@ -202,9 +203,9 @@ class _LimitFinder:
             if node is not _ALWAYS
         )
 
-    def _place(self, contract: Contract, parameter: Parameter, ways: Sequence[_PermitForAsker]) -> PermittedLimit:
-        """What the rules say of a place in their own words; what one says of other things too is under conditions."""
-        told: dict[str, None] = {}
+    def _place(self, contract: Contract, parameter: Parameter, ways: Sequence[_PermitForRequester]) -> PermittedLimit:
+        """The limits of a place in the words of the rules, and whether other conditions apply."""
+        texts: dict[str, None] = {}
         everywhere, plain = False, False
         for way in ways:
             parts = conjuncts(self._subject.rules[way.permit].when)
@@ -214,8 +215,8 @@ class _LimitFinder:
             words = [self._words(way.permit, each) for each in about]
             words += [f"it is not so that ({self._whole(at)})" for at in forbidding]
             everywhere |= not words
-            told[listed(words)] = None
-        limits = "wherever the airspace allows it" if everywhere else f"if {'; or if '.join(told)}"
+            texts[listed(words)] = None
+        limits = "wherever the airspace allows it" if everywhere else f"if {'; or if '.join(texts)}"
         return PermittedLimit(contract.name, parameter.name, "place", limits, not plain)
 
     def _reads(self, number: int, parameter: str) -> bool:
@@ -239,7 +240,7 @@ def _meets(rule: FlatRule, role: int, source: int) -> bool:
 
 
 def _common(one: Bounds, other: Bounds) -> Bounds | None:
-    """What two have in common, by the cells of the first; None where nothing is."""
+    """The intersection of two bounds, by the cells of the first; None if it is empty."""
     made = {}
     for cell, (low, high) in one.items():
         least, most = other.get(cell, (-FAR, FAR))
@@ -250,7 +251,7 @@ def _common(one: Bounds, other: Bounds) -> Bounds | None:
 
 
 def _around(parts: list[Bounds]) -> list[Bounds]:
-    """A few bounds as they are, of many what is around them all."""
+    """Return a few bounds unchanged, and many as one bound that contains all of them."""
     if len(parts) <= 8:
         return parts
     return [{cell: (min(each[cell][0] for each in parts), max(each[cell][1] for each in parts)) for cell in parts[0]}]

@@ -1,6 +1,6 @@
-"""What changed between two policies, in words, and which zones, skills, signals and rules a page marks.
+"""The changes between two policies in words, and the zones, skills, signals and rules that a page marks.
 
-It compares the signed forms, since an earlier policy may have no source left.
+The comparison uses the signed forms, because the source of an earlier policy may no longer exist.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -23,13 +23,13 @@ from rtshcua.model.flat.signal import ENUMERATION, Signal
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone, unproject
 from rtshcua.model.quantity import Dimension, display
 
-#: follows words that are the same before and after
-ELSE: Final = "written alike, but what it names is another"
+#: added if the words before and after are the same
+ELSE: Final = "the same text, but it refers to something else"
 _DIMENSIONS: Final = {dimension.value: dimension for dimension in Dimension}
 
 
 def describe_difference(one: Difference, old: Policy, new: Policy) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """A line or more of what was, and of what is; none where there was, or is, no such thing."""
+    """Return the lines of the old and the new state; empty if there is none."""
     if one.kind == "rule":
         before, after = (
             tuple(name(" ".join(each.split())) for each in (text,) if each) for text in (one.before, one.after)
@@ -59,7 +59,9 @@ def _described(one: Difference, policy: Policy) -> tuple[str, ...]:
 
 
 def _figures(one: Difference, policy: Policy) -> Mapping[str, Callable[[], str]] | None:
-    """The figures of the vehicle, or of a zone, skill or signal; None where the policy has none of the name."""
+    """The fields of the vehicle, or of a zone, skill or signal, as functions that describe them; None if there is none
+    of this name.
+    """
     match one.kind:
         case "vehicle":
             return _vehicle(policy)
@@ -87,9 +89,9 @@ def _chain(links: Iterable[Link], policy: Policy) -> str:
 
 def _link(link: Link, policy: Policy) -> str:
     contract = policy.contracts[link.skill]
-    given = [f"{name(each.name)} {describe_cells(each, link.arguments, policy)}" for each in contract.parameters]
+    arguments = [f"{name(each.name)} {describe_cells(each, link.arguments, policy)}" for each in contract.parameters]
     limit = f" for at most {_time(link.limit_us)}" if link.limit_us else ""
-    return name(contract.name) + (f" with {listed(given)}" if given else "") + limit
+    return name(contract.name) + (f" with {listed(arguments)}" if arguments else "") + limit
 
 
 def _vehicle(policy: Policy) -> Mapping[str, Callable[[], str]]:
@@ -129,8 +131,8 @@ def _speeds(speeds: Speeds | None) -> str:
         "wind at most": speeds.wind,
         "gained in a second": speeds.acceleration,
     }
-    told = ", ".join(f"{what} {display(value, Dimension.SPEED)}" for what, value in names.items())
-    return f"{told}, slow below {_length(speeds.landing_below)}, {_time(speeds.flight_us)} of flight"
+    listing = ", ".join(f"{label} {display(value, Dimension.SPEED)}" for label, value in names.items())
+    return f"{listing}, slow below {_length(speeds.landing_below)}, {_time(speeds.flight_us)} of flight"
 
 
 def _zone(zone: Zone, policy: Policy) -> Mapping[str, Callable[[], str]]:
@@ -228,7 +230,7 @@ def _time(us: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class PolicyChanges:
-    """In words, and which zones, skills, signals and rules (by their number) are new or other than before."""
+    """The changes in words, and the new or changed zones, skills, signals and rules (by number)."""
 
     told: tuple[ChangeView, ...] = ()
     zones: frozenset[str] = frozenset()
@@ -238,7 +240,7 @@ class PolicyChanges:
 
 
 def describe_changes(old: Policy, new: Policy) -> tuple[ChangeView, ...]:
-    """What differs, in words, and which way each goes."""
+    """Describe the differences with their directions."""
     return tuple(
         ChangeView(each.text.removeprefix("looser: "), *describe_difference(each, old, new), direction(each, old, new))
         for each in compared(old, new)
@@ -246,7 +248,7 @@ def describe_changes(old: Policy, new: Policy) -> tuple[ChangeView, ...]:
 
 
 def changes(old: Policy, new: Policy) -> PolicyChanges:
-    """What differs in meaning, as `check --since` counts it."""
+    """Return the changes of meaning, which are the same as those of `check --since`."""
     common = frozenset(zone.name for zone in old.zones[: old.declared])
     common &= {zone.name for zone in new.zones[: new.declared]}
     moved = old.projection != new.projection

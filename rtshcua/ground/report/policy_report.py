@@ -1,4 +1,4 @@
-"""The report of all policies of some programs: a chapter each, with the decided tests of the sources."""
+"""Makes the report of all policies of some programs: a chapter for each, with the decided tests of the sources."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -43,61 +43,60 @@ from rtshcua.model.ir.tests import TestDecl
 
 @dataclass(frozen=True, slots=True)
 class DecidedCases:
-    """The cases of one file that was asked for, decided; `program` is that file with what it imports."""
+    """The decided cases of one file; `program` is the file with its imports."""
 
     program: Program
     ran: tuple[CaseResult, ...]
 
 
 def nominals_and_cases(tried: Sequence[DecidedCases]) -> tuple[tuple[NominalView, ...], tuple[CaseView, ...]]:
-    """What cases start from, and the cases. All are of one policy; a nominal that shares its name with another says
-    where it is written.
-    """
-    told = []
+    """Return the nominals and the cases of one policy. A nominal whose name is not unique is shown with its place."""
+    decided = []
     for one in tried:
         symbols = collect(one.program.units, one.program.broken)
         vocabulary = Vocabulary(frozenset(symbols.signals), frozenset(symbols.zones))
-        told += [
+        decided += [
             (each, _nominal(one.program, each, vocabulary), vocabulary, _is_generated(one.program, each))
             for each in one.ran
         ]
-    starts = tuple(dict.fromkeys(start for _, start, *_ in told))
+    starts = tuple(dict.fromkeys(start for _, start, *_ in decided))
     names = [start.name for start in starts]
     return starts, tuple(
         replace(
             _case(ran, f"`{start.name}`" + (f" ({start.place})" if names.count(start.name) > 1 else ""), vocabulary),
             generated=generated,
         )
-        for ran, start, vocabulary, generated in told
+        for ran, start, vocabulary, generated in decided
     )
 
 
 def describe_test(test: TestDecl, start: str, names: Vocabulary) -> Iterator[CaseView]:
-    """The cases of a test, not decided yet; `start` is the nominal that it starts from, empty for none."""
-    given = tuple(describe_premises(test.premises, names))
+    """Yield the cases of a test before their decision; `start` is the nominal, empty for none."""
+    premises = tuple(describe_premises(test.premises, names))
     if start:
-        given = (f"as in {start}", *given)
-    asked = describe_request(test.request, names)
+        premises = (f"as in {start}", *premises)
+    request = describe_request(test.request, names)
     if test.expectation is not None:
-        yield CaseView(test.name.text, given, asked, describe_expectation(test.expectation), "", met=False)
+        yield CaseView(test.name.text, premises, request, describe_expectation(test.expectation), "", met=False)
     if test.table is None:
         return
     for row in test.table.rows:
         more = tuple(
             describe_given(column, cell, names) for column, cell in zip(test.table.columns, row.cells, strict=False)
         )
-        yield CaseView(test.name.text, (*given, *more), asked, describe_expectation(row.expectation), "", met=False)
+        expected = describe_expectation(row.expectation)
+        yield CaseView(test.name.text, (*premises, *more), request, expected, "", met=False)
 
 
 def _case(ran: CaseResult, start: str, names: Vocabulary) -> CaseView:
-    told = list(describe_test(ran.case.test, start, names))
+    views = list(describe_test(ran.case.test, start, names))
     contracts = ran.case.policy.lowered.policy.contracts
     decided = describe_decision(ran.trace.decision, [contract.name for contract in contracts])
-    return replace(told[ran.case.row or 0], decided=decided, met=ran.met)
+    return replace(views[ran.case.row or 0], decided=decided, met=ran.met)
 
 
 def _is_generated(program: Program, ran: CaseResult) -> bool:
-    """Whether a case stands in a file that `rtshcua test --generate` wrote."""
+    """Whether a case is in a file that `rtshcua test --generate` wrote."""
     source = program.sources.get(ran.case.test.span.file)
     return source is not None and source.text.lstrip().startswith(GENERATED)
 
@@ -107,12 +106,12 @@ def _nominal(program: Program, ran: CaseResult, names: Vocabulary) -> NominalVie
     return NominalView(nominal.name.text, place_of(program, nominal.span), tuple(describe_nominal(nominal, names)))
 
 
-_SECOND = 1_000_000  # us: the date of a page has no parts of one
+_SECOND = 1_000_000  # us: the date of a page is rounded down to seconds
 
 
 @dataclass(frozen=True, slots=True)
 class CompiledMission:
-    """A mission as it compiles, with the defaults of its parameters, and the policy that it is under."""
+    """A mission, compiled with the defaults of its parameters, and its policy."""
 
     policy: Policy
     mission: Mission
@@ -122,8 +121,8 @@ class CompiledMission:
 
 @dataclass(frozen=True, slots=True)
 class ReportPart:
-    """A program without errors: its policies for their vehicles, its missions, what was found, and the cases and
-    scenarios of those of its files that were asked for.
+    """A program without errors: its policies for their vehicles, its missions, the findings, and the cases and
+    scenarios of the files named on the command line.
     """
 
     program: Program
@@ -143,10 +142,10 @@ def policy_report(
     earlier: Sequence[Policy] = (),
     since: str = "",
 ) -> PolicyReport:
-    """The policy report of some programs: the same for the same parts, texts and time.
+    """Make the policy report of some programs. It only depends on the parts, texts and time.
 
     A policy that several programs share has one chapter, with the missions, tests and scenarios of all. `earlier` are
-    the policies to tell changes against; of several of one name and vehicle the newest counts.
+    the policies for comparison, of which the newest one of the same name and vehicle is used.
     """
     shared: dict[str, ReportedPolicy] = {}
     flown: dict[str, dict[MissionView, None]] = {}
@@ -157,8 +156,8 @@ def policy_report(
             subject, digest = ReportedPolicy(part.program, lowered), digest_of(lowered.policy)
             shared.setdefault(digest, subject)
         for each in part.missions:
-            told = mission_view(each.mission, each.policy, each.bounds, _values(each.declaration))
-            flown.setdefault(digest_of(each.policy), {})[told] = None
+            view = mission_view(each.mission, each.policy, each.bounds, _values(each.declaration))
+            flown.setdefault(digest_of(each.policy), {})[view] = None
         for policy, scenario in _scenarios(part):
             scenarios.setdefault(digest_of(policy), {})[scenario] = None
         for one in part.tried:
@@ -187,7 +186,7 @@ def policy_report(
 
 
 def distinct_names(chapters: Sequence[Chapter]) -> list[str]:
-    """The names of policies; of several with one name with the vehicle and the file that tell them apart."""
+    """The names of policies; if a name is not unique, with vehicle and file."""
     names = [each.name for each in chapters]
     return [
         each.name if names.count(each.name) == 1 else f"{each.name} for {each.vehicle[0].value} ({each.place})"
@@ -196,7 +195,7 @@ def distinct_names(chapters: Sequence[Chapter]) -> list[str]:
 
 
 def _scenarios(part: ReportPart) -> Iterator[tuple[Policy, ScenarioView]]:
-    """The scenarios that were asked for, with the policy of the mission that each flies."""
+    """Yield the scenarios of a part, each with the policy of its mission."""
     if not part.scenarios:
         return
     symbols = collect(part.program.units, part.program.broken)
@@ -210,7 +209,7 @@ def _scenarios(part: ReportPart) -> Iterator[tuple[Policy, ScenarioView]]:
 
 
 def _by_policy(tried: DecidedCases) -> Mapping[PolicyUnderTest, list[CaseResult]]:
-    """The cases of a file by the policy that each is under: that of its nominal, whatever else the file declares."""
+    """The cases of a file by the policy of their nominal."""
     found: dict[PolicyUnderTest, list[CaseResult]] = {}
     for ran in tried.ran:
         found.setdefault(ran.case.policy, []).append(ran)
@@ -223,7 +222,7 @@ def _title(chapters: Sequence[Chapter]) -> str:
 
 
 def _values(mission: MissionDecl) -> Mapping[str, str]:
-    """The defaults of a mission's parameters, which its way is drawn for."""
+    """The defaults of a mission's parameters, for which its path is drawn."""
     return {
         each.name.text: describe_value(each.default, Vocabulary())
         for each in mission.parameters

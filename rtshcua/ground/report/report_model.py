@@ -1,7 +1,7 @@
-"""The content of a policy report as one plain value: frozen, comparable, and what `rtshcua docs --json` prints.
+"""The content of a policy report as one immutable value, which `rtshcua docs --json` prints.
 
-Texts are sentences with names between backticks. Lengths are in mm, of the local plane where a place is meant: x east
-and y north of the vehicle's home.
+Texts are sentences with names in backticks. Lengths are in mm. Places are in the local plane: x east and y north of the
+vehicle's home.
 """
 
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class FileDigest:
-    """A file that a policy rests on, named as in the `place` of what stands in it, and the SHA-256 of its bytes."""
+    """A source file of a policy, named as in `place`, and the SHA-256 of its bytes."""
 
     name: str
     sha256: str
@@ -17,7 +17,7 @@ class FileDigest:
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """A figure, and what it is of."""
+    """A value with its label."""
 
     what: str
     value: str
@@ -25,7 +25,7 @@ class Fact:
 
 @dataclass(frozen=True, slots=True)
 class PermitView:
-    """One `permit`: through which sources, and what must hold all together. `rule` is its number."""
+    """A `permit`: its number, sources and conditions, which must all hold."""
 
     rule: int
     through: str
@@ -34,7 +34,7 @@ class PermitView:
 
 @dataclass(frozen=True, slots=True)
 class Restriction:
-    """A `confirm`, `forbid` or `degrade` about a right: what it comes to, and when; `rule` is its number."""
+    """A `confirm` or `forbid` about a right: its number, its effect and its conditions."""
 
     rule: int
     words: str
@@ -43,7 +43,7 @@ class Restriction:
 
 @dataclass(frozen=True, slots=True)
 class Right:
-    """What a role may have done of one skill; any of the ways is enough."""
+    """The right of a role to a skill; one of the ways is sufficient."""
 
     skill: str
     answer: str  # `yes`, `on conditions`, `after approval`, `after approval, on conditions`, `something else`, `no`
@@ -54,7 +54,7 @@ class Right:
 
 @dataclass(frozen=True, slots=True)
 class Rights:
-    """All that a role may have done; an empty role stands for everybody else."""
+    """All rights of a role; an empty role means everybody else."""
 
     role: str
     rights: tuple[Right, ...]
@@ -62,7 +62,7 @@ class Rights:
 
 @dataclass(frozen=True, slots=True)
 class RuleView:
-    """One rule in the order in which they are signed, as a sentence, and as it is written and where."""
+    """A rule by its signed number: its sentence, its text and its place."""
 
     number: int
     kind: str
@@ -74,7 +74,7 @@ class RuleView:
 
 @dataclass(frozen=True, slots=True)
 class ParameterView:
-    """What may be asked of a skill."""
+    """A parameter of a skill."""
 
     name: str
     what: str
@@ -84,8 +84,8 @@ class ParameterView:
 
 @dataclass(frozen=True, slots=True)
 class PermittedLimit:
-    """What the rules permit of a parameter of a skill, over all who may ask. `kind` is `altitude`, `speed` or `place`;
-    `conditions`: something else must hold besides for what is widest in it.
+    """The widest limits of a parameter that the rules permit to anyone. `kind` is `altitude`, `speed` or `place`;
+    `conditions` means that they depend on other conditions too.
     """
 
     skill: str
@@ -97,7 +97,7 @@ class PermittedLimit:
 
 @dataclass(frozen=True, slots=True)
 class PatternView:
-    """What a survey may fly: the pattern's name, and its spacing or radius, start and direction."""
+    """A survey pattern: its name, and its spacing or radius, start and direction."""
 
     name: str
     told: str
@@ -105,10 +105,10 @@ class PatternView:
 
 @dataclass(frozen=True, slots=True)
 class SkillView:
-    """A contract; `as_link` is what is otherwise where a chain ends in it, empty for any other skill.
+    """A skill and its contract. `as_link` describes the difference at the end of a chain, empty if there is none.
 
-    `patterns` are those that a survey may be flown in, none of any other skill. `left_out` are the clauses that do not
-    count, for the vehicle is without a sensor.
+    `patterns` are the patterns of a survey. `left_out` are the clauses that do not apply because the vehicle lacks a
+    sensor.
     """
 
     name: str
@@ -130,7 +130,7 @@ class SkillView:
 
 @dataclass(frozen=True, slots=True)
 class SignalView:
-    """What the vehicle reports."""
+    """A signal of the vehicle."""
 
     name: str
     type: str
@@ -141,8 +141,8 @@ class SignalView:
 
 @dataclass(frozen=True, slots=True)
 class ZoneOutline:
-    """An outline in the local plane, exactly as it is signed: a circle by its centre and the square of its radius, or
-    else rings, outer ones counter-clockwise and holes clockwise.
+    """An outline in the local plane, exactly as signed: a circle with its centre and the square of its radius, or
+    rings, outer ones counter-clockwise and holes clockwise.
     """
 
     rings: tuple[tuple[tuple[int, int], ...], ...] = ()
@@ -152,7 +152,7 @@ class ZoneOutline:
 
 @dataclass(frozen=True, slots=True)
 class PlaceView:
-    """A place that a zone is written by: what it is, WGS 84, and where that is in the local plane."""
+    """A place in the declaration of a zone: its description, WGS 84, and its coordinates in the local plane."""
 
     what: str
     latitude: str
@@ -163,8 +163,8 @@ class PlaceView:
 
 @dataclass(frozen=True, slots=True)
 class ZoneView:
-    """A zone. `use` says what the airspace makes of it: `allowed`, `forbidden` or empty; `floor` and `ceiling` are mm
-    above home, None where there is none; `derived` is one that a rule grows out of another.
+    """A zone. `use` is its use in the airspace: `allowed`, `forbidden` or empty; `floor` and `ceiling` are in mm above
+    home, or None; `derived` means that a rule grows it from another zone.
     """
 
     name: str
@@ -184,8 +184,8 @@ class ZoneView:
 
 @dataclass(frozen=True, slots=True)
 class StepView:
-    """One step of a mission, and the way that it takes: local places, the last of which is where it ends. `tighter` is
-    what it is held to beyond its skill's contract.
+    """A step of a mission, and its path of local places, which ends at the last one. `tighter` are the limits that
+    tighten its skill's contract.
     """
 
     number: int
@@ -199,7 +199,7 @@ class StepView:
 
 @dataclass(frozen=True, slots=True)
 class MissionView:
-    """A mission under the policy; `bounds` is what it takes at most."""
+    """A mission under the policy; `bounds` are its upper bounds."""
 
     name: str
     intent: str
@@ -211,7 +211,7 @@ class MissionView:
 
 @dataclass(frozen=True, slots=True)
 class CaseView:
-    """A test case: what is given, what is asked, what must be decided, and what was decided when the page was made."""
+    """A test case: its premises, its request, the expected decision, and the decision when the page was made."""
 
     name: str
     given: tuple[str, ...]
@@ -224,7 +224,7 @@ class CaseView:
 
 @dataclass(frozen=True, slots=True)
 class NominalView:
-    """What holds where tests begin, unless they say otherwise, and where that is written."""
+    """A nominal from which tests start, and its place."""
 
     name: str
     place: str
@@ -233,7 +233,7 @@ class NominalView:
 
 @dataclass(frozen=True, slots=True)
 class ScenarioView:
-    """A flight on which things go wrong, and what must come of it. It is told here, and flown by `rtshcua test`."""
+    """A scenario: a flight with faults, and its expectations. The report describes it; `rtshcua test` flies it."""
 
     name: str
     place: str
@@ -242,9 +242,9 @@ class ScenarioView:
 
 @dataclass(frozen=True, slots=True)
 class ChangeView:
-    """What is new or other than before, and its words then and now: none where there was, or is, no such thing.
+    """A change with its old and new texts, which are empty if there is no old or new part.
 
-    `direction`: `stricter`, `looser` or `cannot tell`, of this change by itself.
+    `direction` of this change alone: `stricter`, `looser` or `cannot tell`.
     """
 
     what: str
@@ -255,7 +255,7 @@ class ChangeView:
 
 @dataclass(frozen=True, slots=True)
 class Glance:
-    """A policy on one page: who may have what done, where, how high, how fast, what needs a person, what happens when
+    """A policy on one page: who may request what, where, how high and how fast, what needs a person, what happens if
     something goes wrong, and what the policy does not cover.
     """
 
@@ -270,7 +270,7 @@ class Glance:
 
 @dataclass(frozen=True, slots=True)
 class Chapter:
-    """A policy for a vehicle, with all that it rests on; `digest` names exactly what is signed."""
+    """A policy for a vehicle; `digest` identifies what is signed."""
 
     name: str
     version: int
@@ -315,7 +315,7 @@ class FindingView:
 
 @dataclass(frozen=True, slots=True)
 class PolicyReport:
-    """All chapters; `made_at` is given, never read from a clock."""
+    """All chapters; `made_at` is an argument, not read from a clock."""
 
     title: str
     made_at: str

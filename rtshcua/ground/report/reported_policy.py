@@ -1,4 +1,4 @@
-"""A policy to report on, with its program, and what the parts of its chapter ask of both."""
+"""The subject of a chapter: a policy with its program, and helpers for names, places and comments."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from rtshcua.model.ir.policies import RuleDecl
 
 @dataclass(frozen=True)
 class ReportedPolicy:
-    """A program, and one of its policies in the form that is signed."""
+    """A program, and one of its policies in signed form."""
 
     program: Program
     lowered: LoweredPolicy
@@ -31,18 +31,18 @@ class ReportedPolicy:
 
     @cached_property
     def symbols(self) -> Symbols:
-        """The declarations as they are written."""
+        """The declarations of the sources."""
         return collect(self.program.units, self.program.broken)
 
     @cached_property
     def names(self) -> Vocabulary:
-        """What names stand for."""
+        """The vocabulary of the program."""
         return Vocabulary(frozenset(self.symbols.signals), frozenset(self.symbols.zones))
 
     @cached_property
     def rules(self) -> tuple[RuleDecl, ...]:
-        """The rules by the numbers that they are signed by. One that is written over skills which keep its arguments in
-        different places is signed as several, each about its own skills alone.
+        """The rules in signed order. A rule over skills with arguments in different cells is signed as several rules,
+        each with its own skills.
         """
         names = [contract.name for contract in self.policy.contracts]
         own = zip(self.policy.rules, self.lowered.rules, strict=True)
@@ -52,40 +52,40 @@ class ReportedPolicy:
         )
 
     def place(self, span: Span) -> str:
-        """File and line, the file as `file_of` calls it."""
+        """The file and line of a span, with the file name of `file_of`."""
         return place_of(self.program, span)
 
     @property
     def files(self) -> tuple[str, ...]:
-        """The files that the policy rests on, in the order in which they are signed, as `file_of` calls them.
+        """The source files of the policy in signed order, with the names of `file_of`.
 
-        They are signed by names as seen from the policy's own file (`lower/closure.py`).
+        The signed names are relative to the policy's own file (`pipeline/closure.py`).
         """
         stable, own = self.program.stable, self.lowered.declaration.name.span.file
         seen = {beside(name, stable.get(own, own)): file for file, name in stable.items()}
         return tuple(file_of(self.program, seen[name]) if name in seen else name for name in self.policy.sources)
 
     def note(self, node: Node) -> str:
-        """The comment of whole lines right above a declaration or a rule; empty where there is none."""
+        """The line comments directly above a declaration or a rule; empty if there are none."""
         return note_above(self.program.sources, node.span)
 
 
 def file_of(program: Program, file: str) -> str:
-    """A file of a program for whoever reads the page: by its name in its pack (`lib:skills/goto.rts`), else relative to
-    the folder that the command ran in.
+    """The displayed name of a file: its name in its pack (`lib:skills/goto.rts`), or else its path relative to the
+    working directory.
     """
     stable = program.stable.get(file, file)
     return stable if pack_of(stable) is not None else from_here(file)
 
 
 def place_of(program: Program, span: Span) -> str:
-    """File and line, the file as `file_of` calls it."""
+    """The file and line of a span, with the file name of `file_of`."""
     source, name = program.sources.get(span.file), file_of(program, span.file)
     return name if source is None else f"{name}:{source.position(span.start).line}"
 
 
 def note_above(sources: Mapping[str, Source], span: Span) -> str:
-    """The lines of `//` right above a place, in one paragraph."""
+    """The line comments directly above a span, as one paragraph."""
     source = sources.get(span.file)
     if source is None:
         return ""
@@ -98,7 +98,7 @@ def note_above(sources: Mapping[str, Source], span: Span) -> str:
 
 
 def within(node: Any) -> Iterator[Node]:
-    """A node and all nodes in it."""
+    """Yield a node and all nodes below it."""
     if isinstance(node, Node):
         yield node
         for field in type(node).__struct_fields__:

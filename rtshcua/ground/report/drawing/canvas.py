@@ -19,7 +19,7 @@ LEAST_EXTENT = 20_000
 
 @dataclass(frozen=True, slots=True)
 class DrawnExtent:
-    """West, south, east and north, in mm of the local plane."""
+    """West, south, east and north limits, in mm of the local plane."""
 
     west: int
     south: int
@@ -27,7 +27,7 @@ class DrawnExtent:
     north: int
 
     def around(self, other: "DrawnExtent") -> "DrawnExtent":
-        """What holds both."""
+        """The smallest extent that contains both."""
         return DrawnExtent(
             min(self.west, other.west),
             min(self.south, other.south),
@@ -43,7 +43,7 @@ class DrawnExtent:
 
 @dataclass(frozen=True, slots=True)
 class Canvas:
-    """A scale in px per mm, the size of the drawing, and where home would be on it."""
+    """The scale of a drawing in px per mm, its size, and the place of home on it."""
 
     scale: float
     width: int
@@ -52,21 +52,21 @@ class Canvas:
     y0: float
 
     def at(self, x: int, y: int) -> tuple[float, float]:
-        """Where a place lies on the page."""
+        """The point on the page of a place."""
         return self.x0 + x * self.scale, self.y0 - y * self.scale
 
     def place(self, x: float, y: float) -> tuple[int, int]:
-        """The place that lies somewhere on the page."""
+        """The place at a point on the page."""
         return round((x - self.x0) / self.scale), round((self.y0 - y) / self.scale)
 
     @property
     def matrix(self) -> str:
-        """From millimetres, y to the south, to the page."""
+        """The SVG transform from millimetres, y to the south, to the page."""
         return f"matrix({self.scale:.9g} 0 0 {self.scale:.9g} {number(self.x0)} {number(self.y0)})"
 
 
 def canvas(extent: DrawnExtent) -> Canvas:
-    """The drawing that shows an extent whole, with a margin around it."""
+    """The canvas that shows a whole extent with a margin."""
     across = max(extent.east - extent.west, LEAST_EXTENT)
     along = max(extent.north - extent.south, LEAST_EXTENT)
     scale = min((WIDTH - 2 * MARGIN) / across, (MOST_HEIGHT - 2 * MARGIN) / along)
@@ -82,7 +82,7 @@ def number(value: float) -> str:
 
 
 def extent_of(ground: ZoneOutline) -> DrawnExtent:
-    """What an outline reaches over."""
+    """The extent of an outline."""
     if ground.centre is not None:
         (x, y), r = ground.centre, radius(ground)
         return DrawnExtent(x - r, y - r, x + r, y + r)
@@ -90,13 +90,13 @@ def extent_of(ground: ZoneOutline) -> DrawnExtent:
 
 
 def extent_of_places(places: Iterable[tuple[int, int]]) -> DrawnExtent:
-    """What places reach over; there is at least one."""
+    """The extent of at least one place."""
     xs, ys = zip(*places, strict=True)
     return DrawnExtent(min(xs), min(ys), max(xs), max(ys))
 
 
 def radius(ground: ZoneOutline) -> int:
-    """The radius of a circle, mm; whole, for it is declared so."""
+    """The radius of a circle in mm, which is declared as a whole number."""
     return isqrt(ground.radius_squared)
 
 
@@ -109,7 +109,7 @@ def path(ground: ZoneOutline) -> str:
 
 
 def contains(ground: ZoneOutline, x: int, y: int) -> bool:
-    """Whether a place lies inside of an outline, by the parity of what a ray to the east crosses."""
+    """Whether a place is inside an outline, by the parity of the edges that a ray to the east crosses."""
     if ground.centre is not None:
         return (x - ground.centre[0]) ** 2 + (y - ground.centre[1]) ** 2 < ground.radius_squared
     odd = False
@@ -141,7 +141,7 @@ class LabelBox:
     height: float
 
     def meets(self, other: "LabelBox") -> bool:
-        """Whether both share a place, or come nearer than the gap."""
+        """Whether both overlap or are nearer than the gap."""
         return (
             self.x < other.x + other.width + GAP
             and other.x < self.x + self.width + GAP
@@ -150,7 +150,7 @@ class LabelBox:
         )
 
     def is_on_page(self, width: float, height: float) -> bool:
-        """Whether a part of it lies on a page of this size."""
+        """Whether a part of it is on a page of this size."""
         return self.x < width and self.x + self.width > 0 and self.y < height and self.y + self.height > 0
 
     def points(self) -> tuple[tuple[float, float], ...]:
@@ -166,13 +166,13 @@ class LabelBox:
         return self.x + self.width / 2, self.y + self.height / 2
 
     def nearest(self, x: float, y: float) -> tuple[float, float]:
-        """The point of the box that is nearest to one of the page."""
+        """The point of the box nearest to a point on the page."""
         return min(max(x, self.x), self.x + self.width), min(max(y, self.y), self.y + self.height)
 
 
 @dataclass(frozen=True, slots=True)
 class MapLabel:
-    """A text in its box, and a line to what it is about where that is not plain."""
+    """A text in its box, and a line to its subject if that is not adjacent."""
 
     text: str
     kind: str
@@ -182,7 +182,7 @@ class MapLabel:
 
 @dataclass(slots=True)
 class Labels:
-    """Gives out places on a page of some size."""
+    """Places labels on a page without overlaps."""
 
     width: int
     height: int
@@ -190,7 +190,7 @@ class Labels:
     placed: list[MapLabel] = field(default_factory=list)
 
     def reserve(self, box: LabelBox) -> None:
-        """Keep something free."""
+        """Keep a box free of labels."""
         self.taken.append(box)
 
     def place(
@@ -231,7 +231,7 @@ class Labels:
 def _leader(
     box: LabelBox, anchor: tuple[float, float], own: Callable[[float, float], bool] | None
 ) -> tuple[float, float, float, float] | None:
-    """From the label to the edge of what it is about; none where it lies in that, or next to it."""
+    """The line from a label to the edge of its subject; None if the label is in it or next to it."""
     if own is not None and all(own(*point) for point in box.points()):
         return None
     x, y = box.nearest(*anchor)
@@ -249,7 +249,7 @@ def _leader(
 
 
 def _around(x: float, y: float) -> Iterator[tuple[float, float]]:
-    """Points on growing circles around a point, from the point itself on."""
+    """Yield a point, and then points on growing circles around it."""
     yield x, y
     for ring in range(1, _FARTHEST // _STEP):
         for across, down in _CIRCLE:
@@ -261,7 +261,7 @@ _SPACING = 11
 
 
 def hatching(box: LabelBox, width: float, height: float) -> str:
-    """Lines that rise to the right, over what of a box lies on a page of some size, as the `d` of an SVG path."""
+    """Diagonal lines over the part of a box that is on the page, as the `d` of an SVG path."""
     left, right = max(box.x, 0.0), min(box.x + box.width, width)
     top, bottom = max(box.y, 0.0), min(box.y + box.height, height)
     if left >= right or top >= bottom:

@@ -1,4 +1,4 @@
-"""A side profile: from which height to which each zone reaches, above home."""
+"""A side profile: the floor and the ceiling of each zone, above home."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -9,13 +9,13 @@ from rtshcua.model.quantity import Dimension, display
 
 #: px
 _HEIGHT, _TOP, _LEFT, _LINE, _LEAST = 240, 34, 70, 15, 74
-#: what is shown above the highest limit, as a part of it
+#: the height of the drawing above the highest limit, as a share of it
 _ABOVE = 4
 
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One zone: its bar, whether that goes on beyond the drawing, and its name in lines."""
+    """A zone: its bar, whether it continues beyond the drawing, and its name in lines."""
 
     x: float
     width: float
@@ -42,7 +42,7 @@ class Profile:
 
 
 def profiles(chapter: Chapter) -> tuple[Profile, ...]:
-    """As many drawings as the zones need, all to one scale."""
+    """Draw the zones in as many drawings as necessary, all to the same scale."""
     zones = [zone for zone in chapter.zones if not zone.derived]
     limits = [limit for zone in zones for limit in (zone.floor, zone.ceiling) if limit is not None]
     limits.append(chapter.return_altitude)
@@ -89,7 +89,7 @@ def _column(zone: ZoneView, x: float, width: float, at: Callable[[int], float]) 
 
 
 def _lines(name: str, letters: int) -> tuple[str, ...]:
-    """A name in lines that fit, broken at `_` where that is possible."""
+    """Break a name into lines, at `_` if possible."""
     lines: list[str] = []
     for part in name.replace("_", "_\n").split("\n"):
         for start in range(0, len(part), letters):
@@ -102,5 +102,5 @@ def _lines(name: str, letters: int) -> tuple[str, ...]:
 
 
 def _step(span: int) -> int:
-    """A round height of which about six fit."""
+    """A round interval, about a sixth of the height."""
     return next(step for step in ROUND if step * 6 >= span)

@@ -1,4 +1,4 @@
-"""What each pattern of a survey flies, over an area that is there to show it: drawn by the planner that plans it."""
+"""Drawings of the survey patterns over a sample area, made with the real planner."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -10,7 +10,7 @@ from rtshcua.ground.geometry.shapes import SimplePolygon
 from rtshcua.ground.geometry.survey import survey
 from rtshcua.ground.report.drawing.canvas import number
 
-#: the area, mm, counter-clockwise; what is flown at, and kept from its edge; where it is entered
+#: the sample area in mm, counter-clockwise; the altitude and the distance to its edge; its entry
 _AREA: Final = ((0, 0), (120_000, 0), (150_000, 55_000), (120_000, 90_000), (0, 90_000))
 _HEIGHT, _INSET, _ENTRY = 20_000, 3_000, (5_000, 5_000)
 #: px
@@ -19,7 +19,7 @@ _WIDTH, _TALL, _MARGIN, _ARROW = 320, 208, 14, 7.0
 
 @dataclass(frozen=True, slots=True)
 class Pattern:
-    """A drawing: the outline of the area and the way as points, where it begins, and arrows along it as SVG paths."""
+    """A drawing: the outline of the area and the path as points, its begin, and arrows as SVG paths."""
 
     width: int
     height: int
@@ -31,7 +31,7 @@ class Pattern:
 
 @cache
 def drawn(name: str) -> Pattern:
-    """The drawing of a pattern by its name."""
+    """Draw a pattern by its name."""
     way = survey(SimplePolygon(_AREA), name, _HEIGHT, _INSET, _ENTRY)
     assert way is not None
     scale = (_WIDTH - 2 * _MARGIN) / max(x for x, _ in _AREA)
@@ -57,7 +57,7 @@ def _line(points: list[tuple[float, float]]) -> str:
 
 
 def _arrow(start: tuple[float, float], end: tuple[float, float]) -> str:
-    """A triangle in the middle of a leg that points along it."""
+    """An arrow head in the middle of a leg, as an SVG path."""
     along = hypot(end[0] - start[0], end[1] - start[1])
     dx, dy = (end[0] - start[0]) / along * _ARROW, (end[1] - start[1]) / along * _ARROW
     x, y = (start[0] + end[0]) / 2, (start[1] + end[1]) / 2

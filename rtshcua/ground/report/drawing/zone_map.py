@@ -1,4 +1,4 @@
-"""Maps: the zones around home with their labels, what the airspace makes of them, and the path of a mission."""
+"""Maps: the zones around home with their labels and their use in the airspace, and the path of a mission."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -22,23 +22,23 @@ from rtshcua.ground.report.drawing.canvas import (
 from rtshcua.ground.report.report_model import Chapter, MissionView, ZoneOutline, ZoneView
 from rtshcua.model.quantity import Dimension, display
 
-#: a zone below this size on the page is kept free of other zones' labels, px
+#: px: zones smaller than this are kept free of other zones' labels
 _SMALL = 130
-#: a zone that fills so much of the drawing is labelled at its edge
+#: the share of the drawing from which a zone is labelled at its edge
 _LARGE = 0.45
-#: of more zones than these, and of those alone that a detail shows, nobody could read the labels
+#: the most zones that are labelled, without those that a detail shows
 MOST_LABELS = 60
-#: by so many corners of a zone its label is placed
+#: the most corners of a zone that are used to place its label
 _CORNERS = 200
 
 
 def by_size(zones: Sequence[ZoneView]) -> list[ZoneView]:
-    """The largest first, so that the others lie over it; what is forbidden over all."""
+    """The drawing order: the largest zones first, forbidden zones last."""
     return sorted(zones, key=lambda zone: (zone.use == "forbidden", -extent_of(zone.ground).size))
 
 
 def label_zones(on: Canvas, labels: Labels, zones: Sequence[ZoneView], beneath: Sequence[LabelBox]) -> tuple[str, ...]:
-    """Labels for the zones that are seen, the smallest first, for it has the least room."""
+    """Place the labels of the visible zones, the smallest zone first, because it has the least room."""
     boxes = {zone.name: box_of(on, zone.ground) for zone in zones}
     small = {name: box for name, box in boxes.items() if max(box.width, box.height) < _SMALL}
     lost = []
@@ -60,13 +60,13 @@ def label_zones(on: Canvas, labels: Labels, zones: Sequence[ZoneView], beneath: 
 
 
 def _thinned(ground: ZoneOutline) -> ZoneOutline:
-    """An outline with fewer corners, where it has very many: good enough to say where a label goes."""
+    """An outline with fewer corners, exact enough to place a label."""
     step = sum(map(len, ground.rings)) // _CORNERS + 1
     return replace(ground, rings=tuple(ring[::step] if len(ring) > 3 * step else ring for ring in ground.rings))
 
 
 def _short(zone: ZoneView) -> str:
-    """What a zone is called on a map: `school + 20 m` for one that a rule grows."""
+    """The label of a zone: `school + 20 m` for one that a rule grows."""
     if not zone.derived:
         return zone.name
     base, _, margin = zone.name.removeprefix("grow(").removesuffix(")").partition(", ")
@@ -74,7 +74,7 @@ def _short(zone: ZoneView) -> str:
 
 
 def fills(on: Canvas, ground: ZoneOutline) -> bool:
-    """Whether no edge of a zone is seen, for the whole map lies in it."""
+    """Whether the whole map is inside a zone, so that none of its edges is visible."""
     ground = _thinned(ground)
     across = [on.width * part / 16 for part in range(17)]
     down = [on.height * part / 16 for part in range(17)]
@@ -83,14 +83,14 @@ def fills(on: Canvas, ground: ZoneOutline) -> bool:
 
 
 def box_of(on: Canvas, ground: ZoneOutline) -> LabelBox:
-    """What an outline fills of the page."""
+    """The box of an outline on the page."""
     extent = extent_of(ground)
     x, y = on.at(extent.west, extent.north)
     return LabelBox(x, y, (extent.east - extent.west) * on.scale, (extent.north - extent.south) * on.scale)
 
 
 def _anchor(on: Canvas, ground: ZoneOutline, box: LabelBox) -> tuple[float, float]:
-    """A point inside of the outline, and on the page: in its middle, or at its northern edge if it is large."""
+    """A point inside the outline and on the page: its middle, or near its northern edge if it is large."""
     extent = extent_of(ground)
     large = box.width > _LARGE * on.width or box.height > _LARGE * on.height
     shares = (1, 2, 3, 8) if large else (8, 6, 10, 4, 12)
@@ -110,7 +110,7 @@ def _anchor(on: Canvas, ground: ZoneOutline, box: LabelBox) -> tuple[float, floa
 
 
 def _chords(ground: ZoneOutline, y: int) -> Iterator[tuple[int, int]]:
-    """From where to where the line at some height lies inside of the outline."""
+    """The interval of a horizontal line that is inside the outline."""
     if ground.centre is not None:
         squared = ground.radius_squared - (y - ground.centre[1]) ** 2
         if squared > 0:
@@ -126,7 +126,7 @@ def _chords(ground: ZoneOutline, y: int) -> Iterator[tuple[int, int]]:
     yield from zip(crossed[::2], crossed[1::2], strict=False)
 
 
-#: a detail is drawn of zones that are smaller than this on the whole map, px
+#: px: zones smaller than this on the whole map get a detail map
 _TINY = 30
 
 
@@ -159,16 +159,16 @@ class ZoneMap:
     labels: tuple[MapLabel, ...]
     bar: tuple[float, str]
     unlabelled: tuple[str, ...]
-    around: tuple[str, ...]  # zones that the whole map lies in
-    on: Canvas  # how the plane lies on the page
+    around: tuple[str, ...]  # zones that contain the whole map
+    on: Canvas
 
     def at(self, x: int, y: int) -> tuple[float, float]:
-        """Where a place lies on the page."""
+        """The point on the page of a place."""
         return self.on.at(x, y)
 
 
 def zone_maps(chapter: Chapter) -> tuple[ZoneMap, ...]:
-    """The map of all zones, and one of the small ones where they would be lost on it."""
+    """The map of all zones, and a detail map of the small ones if necessary."""
     home = _home(chapter)
     whole = home
     for zone in chapter.zones:
@@ -186,7 +186,7 @@ def zone_maps(chapter: Chapter) -> tuple[ZoneMap, ...]:
 
 
 def mission_map(chapter: Chapter, mission: MissionView) -> ZoneMap:
-    """The map of a mission's way, with the zones that it comes near."""
+    """The map of a mission's path, with the zones near it."""
     places = [chapter.home, *(place for step in mission.steps for place in step.path)]
     extent = extent_of_places(places)
     extent = extent.around(_home(chapter))
@@ -251,7 +251,7 @@ def _way(on: Canvas, chapter: Chapter, mission: MissionView) -> list[tuple[float
 
 
 def _boxes(way: Sequence[tuple[float, float]]) -> Iterator[LabelBox]:
-    """Small boxes along a way, so that labels can keep off it."""
+    """Small boxes along a path, which labels avoid."""
     for (ax, ay), (bx, by) in pairwise(way):
         count = int(max(abs(bx - ax), abs(by - ay)) / 6) + 1
         for part in range(count + 1):
@@ -259,7 +259,7 @@ def _boxes(way: Sequence[tuple[float, float]]) -> Iterator[LabelBox]:
 
 
 def _stops(on: Canvas, mission: MissionView | None) -> dict[tuple[float, float], list[int]]:
-    """Where steps end, and which do there; a step without a way of its own ends where the one before did."""
+    """The places where steps end, with their numbers. A step without a path ends where the previous one did."""
     found: dict[tuple[float, float], list[int]] = {}
     at: tuple[int, int] | None = None
     for step in () if mission is None else mission.steps:
@@ -275,7 +275,7 @@ def _numbers(numbers: Sequence[int]) -> str:
 
 
 def _bar(on: Canvas) -> tuple[float, str]:
-    """A round length of at most a fifth of the drawing: 1, 2 or 5 of a power of ten."""
+    """A round length of at most a fifth of the drawing: 1, 2 or 5 times a power of ten."""
     most = on.width / 5 / on.scale
     length = max((step for step in ROUND if step <= most), default=1)
     return length * on.scale, display(length, Dimension.LENGTH)

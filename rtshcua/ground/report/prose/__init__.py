@@ -1,5 +1,5 @@
-"""Every construct of the language in plain English: the one place where that is done.
+"""Describes every construct of the language in plain English.
 
-Names of the sources stand between backticks, as in messages; a page may turn these into links. Sentences begin with a
-capital and end in a full stop; what stands within a sentence does neither.
+Names of the sources are in backticks, as in messages; a page may turn them into links. Sentences begin with a capital
+letter and end with a full stop; parts of sentences do not.
 """

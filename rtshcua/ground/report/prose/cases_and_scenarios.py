@@ -1,4 +1,4 @@
-"""Tests, the nominals that they start from, and scenarios in words."""
+"""Describes tests, their nominals, and scenarios."""
 
 from collections.abc import Iterator, Sequence
 from typing import Final, assert_never
@@ -51,7 +51,7 @@ _OUTCOMES: Final = {
 
 
 def describe_premises(premises: Premises, names: Vocabulary) -> Iterator[str]:
-    """What holds when the request is decided on, one line each."""
+    """Yield the premises of a decision, one line each."""
     for each in premises.given:
         yield describe_given(each.subject, each.cell, names)
     if premises.instant is not None:
@@ -72,11 +72,11 @@ def describe_premises(premises: Premises, names: Vocabulary) -> Iterator[str]:
     if premises.replayed is not None:
         yield "the request was used before"
     if premises.tampered is not None:
-        yield "what was presented is not what was signed"
+        yield "the presented request differs from the signed one"
 
 
 def describe_nominal(nominal: NominalDecl, names: Vocabulary) -> Iterator[str]:
-    """Where tests start from."""
+    """Yield the premises of a nominal, one line each."""
     yield f"under the policy {name(nominal.policy.text)}"
     yield f"on the vehicle {name(nominal.vehicle.text)}"
     if nominal.asker is not None:
@@ -85,7 +85,7 @@ def describe_nominal(nominal: NominalDecl, names: Vocabulary) -> Iterator[str]:
 
 
 def describe_given(subject: Subject, cell: TableCell, names: Vocabulary) -> str:
-    """What is given of a signal, a parameter, or a condition over time: `battery` is 20 %."""
+    """Describe the value of a signal, a parameter, or a condition over time: `battery` is 20 %."""
     words = _cell(cell, names)
     if isinstance(subject, Named):
         known = subject.name.text in names.signals
@@ -125,14 +125,14 @@ def _ago(one: Quantity) -> str:
 
 
 def describe_asker(asker: Asker) -> str:
-    """Who asks."""
+    """Describe the requester."""
     role = "" if asker.role is None else f"the role {name(asker.role.text)}"
     source = "" if asker.source is None else f"through {name(asker.source.text)}"
     return f"asked {' '.join(part for part in (f'by {role}' if role else '', source) if part)}"
 
 
 def describe_request(request: RequestDecl | None, names: Vocabulary) -> str:
-    """What is asked for, and by whom."""
+    """Describe a request and its requester."""
     if request is None:
         return ""
     given = listed([describe_argument(each, names) for each in request.arguments])
@@ -141,7 +141,7 @@ def describe_request(request: RequestDecl | None, names: Vocabulary) -> str:
 
 
 def describe_expectation(expectation: Expectation | None) -> str:
-    """What must be decided, and why."""
+    """Describe an expected decision."""
     if expectation is None:
         return ""
     words = _OUTCOMES[expectation.outcome]
@@ -155,7 +155,7 @@ def describe_expectation(expectation: Expectation | None) -> str:
 
 
 def describe_decision(decision: Decision, skills: Sequence[str]) -> str:
-    """What was decided, and why; `skills` are the names of the policy's, by number."""
+    """Describe a decision; `skills` are the names of the policy's skills by number."""
     words = _OUTCOMES[decision.outcome.name.lower()]
     if decision.target is not None:
         words = f"{name(skills[decision.target.skill])} is flown instead"
@@ -168,7 +168,7 @@ def describe_decision(decision: Decision, skills: Sequence[str]) -> str:
 
 
 def describe_scenario(scenario: ScenarioDecl, names: Vocabulary) -> Iterator[str]:
-    """What is flown, what goes wrong and what must come of it, one line each."""
+    """Yield the mission, the faults and the expectations of a scenario, one line each."""
     yield f"the mission {name(scenario.mission.text)} is flown on the simulated vehicle"
     if scenario.flavours:
         yield f"with the autopilot {named([each.text for each in scenario.flavours])}"

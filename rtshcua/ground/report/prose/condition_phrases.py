@@ -1,4 +1,4 @@
-"""Conditions in words. `docs/language.md` gives the meaning of each form, from section "Conditions" on."""
+"""Describes conditions. `docs/language.md` gives the meaning of each form, from section "Conditions" on."""
 
 from typing import Final, assert_never
 
@@ -47,7 +47,7 @@ _TIMES: Final = _RELATIONS | {"<": "before", "<=": "not after", ">": "after", ">
 
 
 def describe_condition(condition: Condition, names: Vocabulary) -> str:
-    """A condition as a clause of a sentence: `battery` is above 35 %."""
+    """Describe a condition as a clause of a sentence: `battery` is above 35 %."""
     match condition:
         case Comparison():
             return _comparison(condition, names)
@@ -80,7 +80,7 @@ def describe_condition(condition: Condition, names: Vocabulary) -> str:
 
 
 def conjuncts(condition: Condition | None) -> tuple[Condition, ...]:
-    """The parts of a condition that must all hold, so that each can stand on a line of its own."""
+    """The parts of a condition that must all hold."""
     if condition is None:
         return ()
     if isinstance(condition, Junction) and condition.operator == "and":
@@ -89,13 +89,14 @@ def conjuncts(condition: Condition | None) -> tuple[Condition, ...]:
 
 
 def describe_clauses(condition: Condition | None, names: Vocabulary) -> tuple[str, ...]:
-    """The parts of a condition that must all hold, in words."""
+    """Describe the parts of a condition that must all hold."""
     return tuple(describe_condition(each, names) for each in conjuncts(condition))
 
 
 def _operand(condition: Condition, names: Vocabulary) -> str:
-    """A condition within another one: in brackets, unless it cannot be misread. So at each depth of brackets there is
-    one kind of list alone, of `and` or of `or`, and a sentence can be read back in one way only.
+    """Describe a condition within another one, in brackets unless it is unambiguous.
+
+    At each depth of brackets there is only one kind of list, of `and` or of `or`, so a sentence has one meaning only.
     """
     words = describe_condition(condition, names)
     simple = isinstance(condition, Comparison | Within | OneOf | Inside | Known)
@@ -103,7 +104,7 @@ def _operand(condition: Condition, names: Vocabulary) -> str:
 
 
 def _inside(one: Inside, names: Vocabulary) -> str:
-    """Where something is. Of a place that is asked for only the ground plan of a zone counts (`ARGUMENT_POINT_IN`)."""
+    """Describe where something is. A requested place only needs the ground plan of a zone (`ARGUMENT_POINT_IN`)."""
     side = "outside" if one.negated else "inside"
     asked = isinstance(one.subject, Reference) and one.subject.name in names.places
     height = " (on the ground, at whatever height)" if asked else ""
@@ -114,7 +115,7 @@ def _comparison(one: Comparison, names: Vocabulary) -> str:
     timed = any(_is_time(side) for side in (one.left, one.right))
     words = (_TIMES if timed else _RELATIONS)[one.operator]
     plain = one.operator in ("==", "!=") and any(_is_member(side, names) for side in (one.left, one.right))
-    if plain:  # of an enumeration or a phase, which has no more and less
+    if plain:  # an enumeration or a phase has no order
         words = "" if one.operator == "==" else "not"
     return " ".join(f"{describe_value(one.left, names)} is {words} {describe_value(one.right, names)}".split())
 
@@ -135,7 +136,7 @@ def _is_time(value: Value) -> bool:
 
 
 def _is_member(value: Value, names: Vocabulary) -> bool:
-    """Whether a value is a state or a phase by its name."""
+    """Whether a value is the name of a state or a phase."""
     return (
         isinstance(value, Reference)
         and value.name not in names.signals

@@ -1,4 +1,4 @@
-"""The steps of a mission in words, from their bound form: every argument, those that a default gave too."""
+"""Describes the steps of a mission from their bound form, with all arguments, including defaults."""
 
 from collections.abc import Iterator
 
@@ -13,34 +13,34 @@ _DIMENSIONS = {dimension.value: dimension for dimension in Dimension}
 _OTHERWISE = {
     OnInadmissible.ABORT: "the mission ends: its fallback flies",
     OnInadmissible.HOLD: "it is waited for",
-    OnInadmissible.SKIP: "it is left out",
-    OnInadmissible.REPLAN: "it is waited for, and whoever proposed it is asked for another step in its place",
+    OnInadmissible.SKIP: "it is skipped",
+    OnInadmissible.REPLAN: "it is waited for, and its proposer is asked for a replacement",
 }
 
 
 def describe_step(step: Invocation, policy: Policy) -> str:
-    """The skill of a step with all its arguments."""
+    """Describe the skill of a step with all its arguments."""
     contract = step.contract
-    given = [f"{name(each.name)} {describe_cells(each, step.arguments, policy)}" for each in contract.parameters]
-    return name(contract.name) + (f" with {listed(given)}" if given else "")
+    arguments = [f"{name(each.name)} {describe_cells(each, step.arguments, policy)}" for each in contract.parameters]
+    return name(contract.name) + (f" with {listed(arguments)}" if arguments else "")
 
 
 def describe_otherwise(step: Invocation) -> str:
-    """What follows where a step may not begin when its turn comes."""
+    """Describe what happens if a step may not begin."""
     return _OTHERWISE[OnInadmissible(step.on_inadmissible)]
 
 
 def describe_asker(step: Invocation, policy: Policy) -> str:
-    """In which role and through which source a step is asked for."""
+    """Describe the role and the source of a step."""
     return f"for the role {name(policy.roles[step.role])} through {name(SourceKind(step.source).name.lower())}"
 
 
 def describe_tighter(step: Invocation, policy: Policy) -> Iterator[str]:
-    """What a step is held to beyond its skill's contract; conditions as they are written."""
+    """Yield the limits of a step that tighten its skill's contract, with conditions as written."""
     own, skill = step.contract, policy.contracts[step.skill]
     for words, mine, theirs in (
         ("it begins within {} of its turn", own.deadline_us, skill.deadline_us),
-        ("the request is good for {}", own.validity_us, skill.validity_us),
+        ("the request is valid for {}", own.validity_us, skill.validity_us),
         ("it lasts at most {}", own.duration_us, skill.duration_us),
         ("what must hold may be unknown for at most {}", own.grace_us, skill.grace_us),
     ):

@@ -1,4 +1,4 @@
-"""Values, names and lists of them in words."""
+"""Describes values, names and lists."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -18,16 +18,14 @@ from rtshcua.model.ir.expression import (
 )
 from rtshcua.model.quantity import Datum, Dimension, display
 
-#: what is closed in itself: a name, or brackets with none in them
+#: a name, or a pair of brackets without brackets in it
 _CLOSED: Final = re.compile(r"`[^`]*`|\([^()`]*\)")
 _LISTS: Final = re.compile(r"[,;:]| and | or ")
 
 
 @dataclass(frozen=True, slots=True)
 class Vocabulary:
-    """The names of signals and zones, and the arguments of what is being told of; `places` are those of them that are
-    a place on the ground.
-    """
+    """The names of signals, zones and arguments in a description; `places` are the arguments that are places."""
 
     signals: frozenset[str] = frozenset()
     zones: frozenset[str] = frozenset()
@@ -35,12 +33,12 @@ class Vocabulary:
     places: frozenset[str] = frozenset()
 
     def asked(self, arguments: Iterable[str], places: Iterable[str] = ()) -> "Vocabulary":
-        """The same, within something that has these arguments, of which some are places on the ground."""
+        """The vocabulary with these arguments, of which some are places."""
         return replace(self, arguments=frozenset(arguments), places=frozenset(places))
 
 
 def name(text: str) -> str:
-    """A name of the sources."""
+    """A name of the sources, in backticks."""
     return f"`{text}`"
 
 
@@ -50,12 +48,12 @@ def listed(words: Sequence[str], last: str = "and") -> str:
 
 
 def named(names: Iterable[str], last: str = "and") -> str:
-    """Several names."""
+    """A list of names."""
     return listed([name(each) for each in names], last)
 
 
 def bracketed(words: str) -> str:
-    """Words that stand within others: in brackets where they list something, and could be read on into what follows."""
+    """Put words in brackets if they contain a list that could merge with the text around it."""
     left, before = _CLOSED.sub("", words), words
     while left != before:
         left, before = _CLOSED.sub("", left), left
@@ -63,20 +61,20 @@ def bracketed(words: str) -> str:
 
 
 def sentence(words: str) -> str:
-    """A capital at the beginning and a full stop at the end; a name keeps its letters."""
+    """Add a capital letter and a full stop; names keep their case."""
     return f"{words[:1].upper()}{words[1:]}."
 
 
 _OPERATORS: Final = {"+": "plus", "-": "minus", "*": "times", "/": "divided by"}
 _FUNCTIONS: Final = {"abs": "the magnitude of", "min": "the least of", "max": "the greatest of"}
-#: the references that are no names
+#: the references that are keywords
 LOCAL_TIME: Final = "local time"
 PHASE: Final = "phase"
 _MINUTE: Final = 60_000_000
 
 
 def describe_value(value: Value, names: Vocabulary) -> str:
-    """A value, as it stands within a sentence."""
+    """Describe a value within a sentence."""
     match value:
         case Quantity():
             return quantity(value)
@@ -94,13 +92,13 @@ def describe_value(value: Value, names: Vocabulary) -> str:
 
 
 def _part(value: Value, names: Vocabulary) -> str:
-    """An operand: in brackets where it is an operation itself."""
+    """Describe an operand, in brackets if it is an operation itself."""
     words = describe_value(value, names)
     return f"({words})" if isinstance(value, Arithmetic | Function) else words
 
 
 def quantity(one: Quantity) -> str:
-    """A number with its unit, and what an altitude is measured from."""
+    """A number with its unit, and the datum of an altitude."""
     words = display(one.value, one.dimension)
     if one.datum is None:
         return f"{words} above home" if one.dimension is Dimension.ALTITUDE else words
@@ -113,7 +111,7 @@ def coordinates(place: Coordinates) -> str:
 
 
 def degrees(value: int, positive: str, negative: str) -> str:
-    """1e-7 degree with all seven decimals, so that columns of them line up."""
+    """Write 1e-7 degrees with all seven decimals, so that columns are aligned."""
     whole, part = divmod(abs(value), 10_000_000)
     return f"{whole}.{part:07d} {negative if value < 0 else positive}"
 
@@ -129,7 +127,7 @@ _DAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Su
 
 
 def whole_day(start: int, end: int) -> bool:
-    """Whether these are the first and the last moment of a day."""
+    """Whether these are the first and the last microsecond of a day."""
     return (start, end) == (0, _LAST_US)
 
 
@@ -141,11 +139,11 @@ def on_days(days: Sequence[int]) -> str:
             runs[-1].append(day)
         else:
             runs.append([day])
-    told: list[str] = []
+    parts: list[str] = []
     for run in runs:
         names = [_DAYS[day] for day in run]
-        told += [f"{names[0]} to {names[-1]}"] if len(run) > 2 else names
-    return f"on {listed(told)}"
+        parts += [f"{names[0]} to {names[-1]}"] if len(run) > 2 else names
+    return f"on {listed(parts)}"
 
 
 def time_of_week(us: int) -> str:
@@ -155,7 +153,7 @@ def time_of_week(us: int) -> str:
 
 
 def reference(text: str, names: Vocabulary) -> str:
-    """What a name in a condition or a value stands for."""
+    """Describe a name in a condition or a value."""
     if text in names.arguments:
         return f"the {name(text)} asked for"
     if text == LOCAL_TIME:
@@ -172,7 +170,7 @@ def reference(text: str, names: Vocabulary) -> str:
 
 
 def region(one: Reference | Grow, names: Vocabulary) -> str:
-    """A zone as the place of a condition, with the margin that is put around it."""
+    """Describe the zone of a condition, with its margin."""
     if isinstance(one, Reference):
         return reference(one.name, names)
     inner = reference(one.zone.name, names)
@@ -184,5 +182,5 @@ def region(one: Reference | Grow, names: Vocabulary) -> str:
 
 
 def between(one: Range, names: Vocabulary) -> str:
-    """The two ends of a range, which belong to it."""
+    """Describe the two ends of a range, which belong to it."""
     return f"{describe_value(one.low, names)} and {describe_value(one.high, names)}"

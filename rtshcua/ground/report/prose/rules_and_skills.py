@@ -31,18 +31,18 @@ _CLASSES: Final = {
     "tactical": "Tactical: it begins within seconds, or not at all.",
     "reflex": "Reflex: it begins at once, and only the vehicle itself may ask for it.",
 }
-#: of a skill that a chain ends in (decision/fallbacks.py and decision/decide.py)
+#: about a skill at the end of a chain (decision/fallbacks.py and decision/decide.py)
 AS_LINK: Final = (
-    "As the last link of a chain it needs nothing: neither rules nor charge are asked. Asked for as a step, it is held "
-    "against the rules (`degrade` too) and the charge as any other."
+    "As the last link of a chain it flies without any check of rules or charge. Requested as a step, it is checked "
+    "against the rules (`degrade` too) and the charge like any other skill."
 )
-#: when a clause of each kind counts
+#: when a clause of each kind is checked
 _PARTS: Final = {
     "require": "before it begins",
     "assume": "before it begins, and all the while it runs",
     "maintain": "for the whole planned path, and all the while it runs",
 }
-#: what a survey flies (ground/geometry/survey.py)
+#: the path of each survey pattern (ground/geometry/survey.py)
 PATTERNS: Final = {
     "grid": "back and forth on parallel lines along the longest edge, evenly spaced and no further apart than it flies "
     "high, or 5 m where it flies lower, in at most 256 lines; the first and the last are half a spacing inside. It "
@@ -62,9 +62,9 @@ _DURABLE: Final = {
 
 
 def describe_motion(motion: MotionDecl | None) -> str:
-    """Where a skill takes the vehicle."""
+    """Describe where a skill takes the vehicle."""
     if motion is None:
-        return "It does not say where it takes the vehicle."
+        return "Its motion is not declared."
     target, altitude = _given(motion.target), _given(motion.altitude)
     match motion.kind:
         case "climb":
@@ -89,7 +89,7 @@ def describe_motion(motion: MotionDecl | None) -> str:
 
 
 def describe_patterns(skill: SkillDecl) -> Iterator[tuple[str, str]]:
-    """The patterns that a survey may be flown in, each with what it flies; none where the skill flies no survey."""
+    """Yield the patterns of a survey skill with their descriptions; nothing for other skills."""
     motion = skill.motion
     if motion is None or motion.kind != "cover":
         return
@@ -105,7 +105,7 @@ def _given(parameter: object) -> str:
 
 
 def describe_parameter(parameter: ParameterDecl, names: Vocabulary) -> tuple[str, str, str]:
-    """What may be asked of a parameter, its limits, and what holds where nothing is said."""
+    """Describe the type, the limits and the default of a parameter."""
     kind = parameter.type.text
     what = "a choice" if parameter.choices else _TYPES.get(kind, f"a value of {name(kind)}")
     limits = ""
@@ -118,14 +118,14 @@ def describe_parameter(parameter: ParameterDecl, names: Vocabulary) -> tuple[str
 
 
 def describe_timing(skill: SkillDecl) -> Iterator[str]:
-    """When a skill may begin, how long a request for it is good, and how long it may last."""
+    """Describe when a skill may begin, how long a request is valid, and how long it may last."""
     if skill.timing_class is not None:
         yield _CLASSES.get(skill.timing_class.text, sentence(f"of the class {name(skill.timing_class.text)}"))
     if skill.deadline is not None:
         yield f"It begins within {_duration(skill.deadline.value)} of its turn, or not at all."
     if skill.validity is not None:
         during = f", and only in the phase {named([each.text for each in skill.phases], 'or')}" if skill.phases else ""
-        yield f"A request for it is good for {_duration(skill.validity.value)} after it was issued{during}."
+        yield f"A request for it is valid for {_duration(skill.validity.value)} after it was issued{during}."
     if skill.duration is not None:
         yield f"It lasts at most {_duration(skill.duration.value)}."
     if skill.grace is not None:
@@ -135,7 +135,7 @@ def describe_timing(skill: SkillDecl) -> Iterator[str]:
 
 
 def describe_record(skill: SkillDecl) -> str:
-    """What of it is recorded, and how durably."""
+    """Describe the recorded evidence and its durability."""
     kinds = [each.text for each in skill.record if each.text not in DURABILITIES]
     durable = [_DURABLE[each.text] for each in skill.record if each.text in DURABILITIES]
     words = f"Recorded are {listed([name(each) for each in kinds])}" if kinds else "Everything about it is recorded"
@@ -143,38 +143,38 @@ def describe_record(skill: SkillDecl) -> str:
 
 
 def describe_clause(clause: ClauseDecl, names: Vocabulary) -> str:
-    """One condition of a contract."""
+    """Describe a clause of a contract."""
     words = describe_condition(clause.condition, names)
     return f"{words} (where the vehicle has the sensors for it)" if clause.where_fitted else words
 
 
 def describe_left_out(part: str, clause: ClauseDecl, names: Vocabulary) -> str:
-    """A condition that does not count for the vehicle, and when it would count for another."""
+    """Describe a clause that does not apply to the vehicle, and when it would be checked."""
     return f"{describe_condition(clause.condition, names)} ({_PARTS[part]})"
 
 
 def describe_link(link: LinkDecl, names: Vocabulary) -> str:
-    """One link of a chain."""
-    given = f" with {listed([describe_argument(each, names) for each in link.arguments])}" if link.arguments else ""
+    """Describe a link of a chain."""
+    arguments = f" with {listed([describe_argument(each, names) for each in link.arguments])}" if link.arguments else ""
     limit = "" if link.limit is None else f" for at most {_duration(link.limit.value)}"
-    return f"{name(link.skill.text)}{given}{limit}"
+    return f"{name(link.skill.text)}{arguments}{limit}"
 
 
 def describe_argument(argument: ArgumentValue, names: Vocabulary) -> str:
-    """A value, and the parameter that it is for where that is written."""
+    """Describe an argument, with the name of its parameter if it is written."""
     value = describe_value(argument.value, names)
     return value if argument.name is None else f"{name(argument.name.text)} {value}"
 
 
 def describe_chain(links: tuple[LinkDecl, ...], names: Vocabulary) -> tuple[str, ...]:
-    """What happens, in order: the first that can begin flies, then the next."""
-    told = []
+    """Describe the links of a chain in order."""
+    sentences = []
     for number, link in enumerate(links):
         words = describe_link(link, names)
         before = "First" if number == 0 else "If that cannot begin, fails or its time is over"
         last = "; this needs nothing and always ends" if number == len(links) - 1 and number else ""
-        told.append(f"{before}: {words}{last}.")
-    return tuple(told)
+        sentences.append(f"{before}: {words}{last}.")
+    return tuple(sentences)
 
 
 def _duration(us: int) -> str:
@@ -182,12 +182,12 @@ def _duration(us: int) -> str:
 
 
 def describe_type(signal: SignalDecl) -> str:
-    """What a signal measures."""
+    """Describe the type of a signal."""
     return _TYPES.get(signal.type.text, f"one of the states of {name(signal.type.text)}")
 
 
 def describe_sources(signal: SignalDecl) -> str:
-    """The MAVLink fields that it is read from."""
+    """Describe the MAVLink fields of a signal."""
     words = listed([_source(each) for each in signal.sources], "or")
     return words if len(signal.sources) == 1 else f"{words}, whichever is newer"
 
@@ -199,7 +199,7 @@ def _source(source: SourceDecl) -> str:
 
 
 def describe_unknown(signal: SignalDecl) -> str:
-    """When its value counts as not known."""
+    """Describe when a signal is unknown."""
     stale = f"when older than {display(signal.stale_after.value, Dimension.DURATION)}"
     if not signal.unknown_at:
         return stale
@@ -207,13 +207,13 @@ def describe_unknown(signal: SignalDecl) -> str:
 
 
 def describe_members(enum: EnumDecl) -> str:
-    """The states of an enumeration in their order, with the numbers that stand for them."""
+    """Describe the states of an enumeration in order, with their numbers."""
     return ", ".join(
         f"{name(each.name.text)} ({each.value})" for each in sorted(enum.members, key=lambda one: one.value)
     )
 
 
-#: how each source that may speak for a role is told
+#: the descriptions of the sources of requests
 SOURCES: Final = {
     "agent": "an agent",
     "operator": "a person at the controls",
@@ -223,7 +223,7 @@ SOURCES: Final = {
 
 
 def sources_of(rule: RuleDecl) -> tuple[str, ...]:
-    """The sources that a rule is about: those written, or what leaving them out means."""
+    """The sources of a rule: the written ones, or the default."""
     if rule.through:
         return tuple(source.text for source in rule.through)
     narrow = rule.kind == "permit" and rule.roles
@@ -231,14 +231,14 @@ def sources_of(rule: RuleDecl) -> tuple[str, ...]:
 
 
 def through(sources: Sequence[str]) -> str:
-    """The sources, in words."""
+    """Describe sources."""
     if set(SOURCES) <= set(sources):
         return "any source"
     return listed([SOURCES.get(source, name(source)) for source in sources], "or")
 
 
 def describe_rule(rule: RuleDecl, names: Vocabulary) -> str:
-    """A rule as a sentence of its own; one that a template or a delegation brought about says so."""
+    """Describe a rule in a sentence, with the template or delegation that made it."""
     words = _rule(rule, names)
     if rule.where_fitted:
         words = f"{words} (where the vehicle has the sensors for it)"
@@ -266,7 +266,7 @@ def _rule(rule: RuleDecl, names: Vocabulary) -> str:
 
 
 def approver(rule: RuleDecl) -> str:
-    """Who confirms, and how long is waited."""
+    """Describe who confirms, and the time limit."""
     who = "somebody" if rule.approver is None else f"a person of the role {name(rule.approver.text)}"
     if rule.another is not None:
         who += f" and by another person of the role {name(rule.another.text)}"
@@ -276,12 +276,12 @@ def approver(rule: RuleDecl) -> str:
 
 
 def skills_of(skills: Sequence[Name]) -> str:
-    """The skills of a rule; none stand for all of them."""
+    """Describe the skills of a rule; an empty list means all skills."""
     return named(_texts(skills), "or") if skills else "any skill"
 
 
 def _replaced(rule: RuleDecl) -> str:
-    """The skills that a `degrade` is about: never what it flies itself (`decision/prepare.py`)."""
+    """Describe the skills that a `degrade` replaces, which never include its own target (`decision/prepare.py`)."""
     target = "" if rule.target is None else rule.target.skill.text
     left = [skill for skill in rule.skills if skill.text != target]
     if not rule.skills:
@@ -290,16 +290,16 @@ def _replaced(rule: RuleDecl) -> str:
 
 
 def describe_airspace(airspace: AirspaceDecl | None) -> str:
-    """Where the vehicle may be at all."""
+    """Describe the airspace of a policy."""
     if airspace is None:
         return describe_limits((), ())
     return describe_limits(_texts(airspace.inside), _texts(airspace.outside))
 
 
 def describe_limits(inside: Sequence[str], outside: Sequence[str]) -> str:
-    """Where the vehicle may be at all, by the names of zones."""
+    """Describe an airspace by the names of its zones."""
     if not inside and not outside:
-        return "This policy sets no limits to where the vehicle may be, beyond those of its rules and skills."
+        return "This policy does not limit where the vehicle may be, except by its rules and skills."
     parts = []
     if inside:
         parts.append(f"inside of {_all(inside)}")
@@ -313,19 +313,19 @@ def _all(zones: Sequence[str]) -> str:
 
 
 def describe_evidence(without: str) -> str:
-    """What becomes of a flight whose records are not kept."""
+    """Describe what happens if the records of a flight cannot be kept."""
     if without == "refuse":
-        return "If the records of a flight cannot be kept, what runs may finish, and no further step begins."
-    return "If the records of a flight cannot be kept, the mission is given up and the vehicle comes down."
+        return "If the records of a flight cannot be kept, the running step may finish, and no further step begins."
+    return "If the records of a flight cannot be kept, the mission is aborted and the vehicle comes down."
 
 
 def describe_silence(limit_us: int, then: str) -> str:
-    """What follows after a long silence of the vehicle."""
+    """Describe what happens after a long silence of the vehicle."""
     again = "when it is heard again and its state is fresh"
     if then == "continue":
         follows = f"the step goes on {again}, as long as all that it needs holds"
     else:
-        follows = f"the mission is given up {again}, and the contingency flies"
+        follows = f"the mission is aborted {again}, and the contingency flies"
     limit = display(limit_us, Dimension.DURATION)
     return f"If the vehicle was silent for longer than {limit}, {follows}. A shorter silence ends nothing."
 
@@ -345,7 +345,7 @@ def _origin(origin: Node, names: Vocabulary) -> str:
 
 
 def describe_delegation(one: Delegation, names: Vocabulary) -> str:
-    """A delegation, as it stands before what it brings about."""
+    """Describe a delegation, as a prefix of the rule that it makes."""
     asked = f" through {through(_texts(one.through))}" if one.through else ""
     when = "" if one.when is None else f" (if {describe_condition(one.when, names)})"
     grantor, grantee = name(one.grantor.text), name(one.grantee.text)

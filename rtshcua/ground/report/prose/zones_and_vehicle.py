@@ -1,4 +1,4 @@
-"""Zones and the vehicle in words."""
+"""Describes zones and the vehicle."""
 
 from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
@@ -32,7 +32,7 @@ from rtshcua.model.quantity import Dimension, display
 
 
 def describe_shape(shape: Shape) -> str:
-    """The ground plan of a zone."""
+    """Describe the ground plan of a zone."""
     match shape:
         case Circle():
             return f"a circle of {quantity(shape.radius)} around {coordinates(shape.center)}"
@@ -55,13 +55,13 @@ def describe_shape(shape: Shape) -> str:
 
 
 def _part(shape: Shape) -> str:
-    """A ground plan within another one: in brackets where it is put together itself, so that it can be read back."""
+    """Describe a ground plan within another one, in brackets if it is a combination, to be unambiguous."""
     words = describe_shape(shape)
     return f"({words})" if isinstance(shape, Combination) else words
 
 
 def places_of(shape: Shape) -> Iterator[tuple[str, Coordinates]]:
-    """The places that a shape is written by, and what each of them is."""
+    """Yield the places in the declaration of a shape with their descriptions."""
     match shape:
         case Circle():
             yield f"centre, radius {quantity(shape.radius)}", shape.center
@@ -83,7 +83,7 @@ def places_of(shape: Shape) -> Iterator[tuple[str, Coordinates]]:
 
 
 def describe_band(zone: ZoneDecl) -> str:
-    """From which height to which a zone reaches."""
+    """Describe the floor and the ceiling of a zone."""
     floor = "no floor" if zone.floor is None else f"from {quantity(zone.floor)}"
     ceiling = "no ceiling" if zone.ceiling is None else f"up to {quantity(zone.ceiling)}"
     if zone.floor is None and zone.ceiling is None:
@@ -92,7 +92,7 @@ def describe_band(zone: ZoneDecl) -> str:
 
 
 def describe_times(zone: ZoneDecl) -> str:
-    """When a zone exists."""
+    """Describe when a zone is active."""
     parts = []
     if zone.daily is not None:
         start, end = zone.daily.start.value, zone.daily.end.value
@@ -109,7 +109,7 @@ def describe_times(zone: ZoneDecl) -> str:
 
 
 def utc(us: int) -> str:
-    """A moment, as far as it is written: `2026-05-01 08:00 UTC`."""
+    """Write a UTC time without trailing zero parts: `2026-05-01 08:00 UTC`."""
     moment = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=us)
     seconds = "" if us % 60_000_000 == 0 else f"{moment:%S}"
     fraction = f".{us % 1_000_000:06d}".rstrip("0") if us % 1_000_000 else ""
@@ -117,14 +117,14 @@ def utc(us: int) -> str:
 
 
 def describe_fitted(signal: str, fitted: bool) -> str:
-    """Whether the sensor of a signal is on the vehicle, and what follows."""
+    """Describe whether the vehicle has the sensor of a signal, and the consequence."""
     if fitted:
-        return f"The vehicle reports {name(signal)}, and every clause on it counts."
-    return f"The vehicle does not report {name(signal)}: clauses that count only where it is fitted are left out."
+        return f"The vehicle reports {name(signal)}, and every clause on it applies."
+    return f"The vehicle does not report {name(signal)}: its clauses `where fitted` do not apply."
 
 
 def describe_vehicle(vehicle: VehicleDecl) -> Iterator[tuple[str, str]]:
-    """The figures of a vehicle, each with what it is."""
+    """Yield the properties of a vehicle, each with its label."""
     yield "Identity", vehicle.identity
     yield "Name in the sources", name(vehicle.name.text)
     yield "Home", f"{coordinates(vehicle.home)}; the real one lies within {quantity(vehicle.within)}"

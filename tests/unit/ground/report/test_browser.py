@@ -1,4 +1,4 @@
-"""What a browser makes of the page, where one is installed: it fits, it is quiet, and it fetches nothing."""
+"""The page in a browser, if one is installed: it fits, it reports no errors, and it fetches nothing."""
 
 import json
 import re
@@ -14,10 +14,10 @@ from rtshcua.ground.report.html_page import page
 from rtshcua.ground.report.report_model import PolicyReport
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-#: a window is never narrower: a telephone's is a frame in one
+#: the least width of a window; a phone is emulated by a frame
 NARROWEST = 500
 WIDTHS = [390, 820, 1280]
-#: it measures what is drawn, in a copy of the page that lets it run
+#: a script that measures the drawings, in a copy of the page that permits it
 PROBE = """
 const box = each => each.getBoundingClientRect();
 const wide = [...document.querySelectorAll('body *')].filter(each =>
@@ -43,7 +43,7 @@ pytestmark = [
 
 
 def dumped(tmp_path: Path, text: str, width: int) -> tuple[str, str]:
-    """The page after it was laid out, and what the browser said of it."""
+    """The page after layout, and the messages of the browser."""
     file = tmp_path / "page.html"
     if width < NARROWEST:
         text = f'<body><iframe srcdoc="{escape(text)}" style="width:{width}px;height:800px;border:0"></iframe></body>'
@@ -64,7 +64,7 @@ def dumped(tmp_path: Path, text: str, width: int) -> tuple[str, str]:
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_the_page_fits_and_no_label_lies_over_another(tmp_path: Path, everything: PolicyReport, width: int) -> None:
+def test_page_fits_and_labels_do_not_overlap(tmp_path: Path, everything: PolicyReport, width: int) -> None:
     text = re.sub(r"<meta http-equiv.*?>", "", page(everything)).replace("</body>", f"<script>{PROBE}</script></body>")
     dom, _ = dumped(tmp_path, text, width)
     found = re.search(r'data-found="(.*?)"', dom)
@@ -79,7 +79,7 @@ def test_the_page_fits_and_no_label_lies_over_another(tmp_path: Path, everything
 
 
 @pytest.mark.parametrize("width", WIDTHS)
-def test_the_map_of_a_refused_mission_fits(tmp_path: Path, width: int) -> None:
+def test_map_of_a_refused_mission_fits(tmp_path: Path, width: int) -> None:
     mission = """import "lib:policies/bridge_inspection.rts"
     mission past under bridge_inspection@7 on quad {
       proposed by agent openclaw for role operator
@@ -100,6 +100,6 @@ def test_the_map_of_a_refused_mission_fits(tmp_path: Path, width: int) -> None:
     assert "CONSOLE" not in dumped(tmp_path, made, width)[1]
 
 
-def test_the_browser_has_nothing_to_complain_of(tmp_path: Path, everything: PolicyReport) -> None:
+def test_browser_reports_no_errors(tmp_path: Path, everything: PolicyReport) -> None:
     _, said = dumped(tmp_path, page(everything), 1200)
     assert "CONSOLE" not in said

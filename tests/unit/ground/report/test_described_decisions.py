@@ -1,4 +1,4 @@
-"""What the page says of decisions: rights in short, what is not known, and tests under the policy they are under."""
+"""Decisions on the page: short answers of rights, unknown signals, and tests under their policy."""
 
 import re
 from dataclasses import replace
@@ -30,7 +30,7 @@ nominal NAME { under POLICY on quad by role operator through agent at "2026-06-0
 
 
 def book(**files: str) -> PolicyReport:
-    """The handbook of the first file, with its tests decided."""
+    """The policy report of the first file, with its tests decided."""
 
     def read(path: str) -> bytes:
         return files[path[:-4]].encode() if path[:-4] in files else Path(path).read_bytes()
@@ -70,13 +70,13 @@ def chapter(rules: str) -> Chapter:
         ("permit goto by role operator\ndegrade goto to return_home", "something else"),
     ],
 )
-def test_a_right_in_short_is_what_the_rules_come_to(rules: str, answer: str) -> None:
+def test_short_answer_of_a_right_follows_from_the_rules(rules: str, answer: str) -> None:
     (operator,) = [each for each in chapter(rules).rights if each.role == "operator"]
     assert [right.answer for right in operator.rights if right.skill == "goto"] == [answer]
 
 
-def test_a_rule_that_is_signed_as_several_is_told_of_each_skill_once() -> None:
-    """`altitude` stands in different cells of the arguments of the two skills."""
+def test_rule_signed_as_several_is_listed_once_for_each_skill() -> None:
+    """`altitude` is in different argument cells of the two skills."""
     found = book(
         p='import "lib:skills/takeoff.rts"\n' + BEFORE + "role chief policy p version 1 {\n"
         "permit goto, takeoff by role operator\n"
@@ -89,12 +89,12 @@ def test_a_rule_that_is_signed_as_several_is_told_of_each_skill_once() -> None:
         assert len(right.confirmations) == (right.skill in ("goto", "takeoff"))
 
 
-def test_what_flies_instead_is_told_of_others_than_itself() -> None:
+def test_degrade_is_described_without_its_own_target() -> None:
     told = [rule.told for rule in chapter("permit hover by any\ndegrade any when battery < 25 % to hover").rules]
     assert "`hover` is flown instead of any other skill, if `battery` is below 25 %." in told
 
 
-def test_brackets_of_what_is_flown_instead_are_kept(everything: PolicyReport) -> None:
+def test_degrade_keeps_the_brackets_of_its_condition(everything: PolicyReport) -> None:
     rule = "degrade goto when (battery < 40 % or gps.accuracy > 5 m) and height > 50 m to return_home"
     made = chapter(f"permit goto by role operator\n{rule}")
     text = page(replace(everything, chapters=(made,)))
@@ -103,8 +103,8 @@ def test_brackets_of_what_is_flown_instead_are_kept(everything: PolicyReport) ->
     assert words in re.sub("<[^>]*>", "", section)
 
 
-def test_the_page_says_what_becomes_of_what_is_not_known(everything: PolicyReport) -> None:
-    """As `decide` has it: a permit does not hold, a prohibition waits, an approval is asked for, a `degrade` waits."""
+def test_page_describes_the_effect_of_unknown_signals(everything: PolicyReport) -> None:
+    """As in `decide`: a permit does not hold, a prohibition waits, an approval is required, a `degrade` waits."""
     text = page(everything)
     for words in (
         "a permission (“only if”) counts only if its condition is true",
@@ -115,7 +115,7 @@ def test_the_page_says_what_becomes_of_what_is_not_known(everything: PolicyRepor
         assert words in text
 
 
-def test_of_a_place_that_is_asked_for_the_height_is_said_not_to_count() -> None:
+def test_requested_place_is_described_without_height() -> None:
     zone = "zone tall = circle(47.3990 N, 8.5470 E, 30 m) floor 10 m ceiling 40 m above home\n"
     rules = (
         "permit goto by role operator when target inside tall\npermit hover by role operator when position inside tall"
@@ -136,13 +136,13 @@ ASKED = (
 )
 
 
-def test_a_test_stands_under_its_own_policy_and_those_of_imports_nowhere() -> None:
+def test_test_is_listed_under_its_policy_and_imported_tests_are_not() -> None:
     chapters = book(b=f'{ASKED}test "hover" {{ when hover(10 s) expect allow }}\n', a=IMPORTED).chapters
     assert {each.name: [case.name for case in each.cases] for each in chapters} == {"lax": ["hover"], "strict": []}
     assert {each.name: [start.name for start in each.starts] for each in chapters} == {"lax": ["n"], "strict": []}
 
 
-def test_a_case_says_what_was_decided_and_whether_that_was_asked() -> None:
+def test_case_shows_its_decision_and_whether_it_was_expected() -> None:
     tests = 'test "t" { when hover(10 s) table battery { 80 % expect allow\n 60 % expect deny } }\n'
     made = book(b=ASKED + tests, a=IMPORTED)
     (lax,) = [each for each in made.chapters if each.name == "lax"]

@@ -1,4 +1,4 @@
-"""The page: well formed, complete in itself, closed to whatever a source may say, and the same every time."""
+"""The page is well formed, self-contained, safe against hostile sources, and reproducible."""
 
 import re
 from base64 import b64decode
@@ -18,12 +18,12 @@ from rtshcua.ground.report.report_model import PolicyReport
 from rtshcua.wire.bundle import policy_digest, policy_payload
 
 VOID = {"meta", "link", "br", "hr", "img", "input"}
-#: what closes a paragraph that it stands in, so that a browser shows something else than is written
+#: elements that end an open paragraph, so that a browser changes the structure
 BLOCKS = {"p", "ul", "ol", "dl", "div", "table", "section", "figure", "pre", "h1", "h2", "h3", "h4"}
 
 
 class Outline(HTMLParser):
-    """The elements of a page, and what is wrong with how they are nested."""
+    """The elements of a page, and errors of their nesting."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
@@ -66,7 +66,7 @@ def test_elements_are_nested_and_closed(outline: Outline) -> None:
     assert outline.open == []
 
 
-def test_every_id_is_unique_and_every_link_leads_somewhere(outline: Outline) -> None:
+def test_ids_are_unique_and_every_link_has_a_target(outline: Outline) -> None:
     ids = [attributes["id"] for _, attributes in outline.elements if "id" in attributes]
     assert len(ids) == len(set(ids))
     links = [attributes["href"] for attributes in outline.of("a")]
@@ -79,7 +79,7 @@ def test_every_id_is_unique_and_every_link_leads_somewhere(outline: Outline) -> 
     assert not inner - set(ids)
 
 
-def test_nothing_is_loaded_and_nothing_runs(outline: Outline, text: str) -> None:
+def test_page_loads_nothing_and_has_no_script(outline: Outline, text: str) -> None:
     assert not {tag for tag, _ in outline.elements} & {"script", "link", "img", "iframe", "object", "form", "base"}
     for _, attributes in outline.elements:
         assert not {name for name in attributes if name.startswith("on") or name in ("src", "style", "srcset")}
@@ -87,7 +87,7 @@ def test_nothing_is_loaded_and_nothing_runs(outline: Outline, text: str) -> None
     assert "url(http" not in text
 
 
-def test_the_policy_of_the_page_allows_its_own_style_alone(outline: Outline, text: str) -> None:
+def test_content_security_policy_allows_only_the_own_style(outline: Outline, text: str) -> None:
     (policy,) = (each["content"] for each in outline.of("meta") if each.get("http-equiv") == "Content-Security-Policy")
     (style,) = re.findall(r"<style>(.*?)</style>", text, re.DOTALL)
     digest = re.search(r"style-src 'sha256-([^']+)'", policy)
@@ -97,7 +97,7 @@ def test_the_policy_of_the_page_allows_its_own_style_alone(outline: Outline, tex
     assert "unsafe" not in policy
 
 
-def test_tables_and_drawings_say_what_they_are(outline: Outline) -> None:
+def test_tables_and_drawings_have_captions(outline: Outline) -> None:
     tags = [tag for tag, _ in outline.elements]
     assert tags.count("table") == tags.count("caption") > 10
     assert all(attributes.get("scope") in ("col", "row", "rowgroup") for attributes in outline.of("th"))
@@ -108,15 +108,15 @@ def test_tables_and_drawings_say_what_they_are(outline: Outline) -> None:
     assert all(after <= before + 1 for before, after in pairwise(levels))
 
 
-def test_what_a_source_says_is_text(text: str) -> None:
-    """The identity, a comment and the intent of the sample hold markup."""
+def test_markup_in_a_source_is_escaped(text: str) -> None:
+    """The identity, a comment and the intent of the sample contain markup."""
     for hostile in ("<i>01</i>", '<script>alert("a comment is text")</script>', "<b>everything</b> & come home"):
         assert hostile not in text
         assert hostile in unescape(text)
 
 
 @pytest.mark.parametrize("hostile", ['"><svg onload=alert(1)>', "</style><script>1</script>", "{{ 7 * 7 }}", "`<b>`"])
-def test_a_hostile_title_is_text(everything: PolicyReport, hostile: str) -> None:
+def test_hostile_title_is_escaped(everything: PolicyReport, hostile: str) -> None:
     text = page(replace(everything, title=hostile, made_by=hostile))
     outline = Outline(text)
     assert outline.wrong == []
@@ -125,13 +125,13 @@ def test_a_hostile_title_is_text(everything: PolicyReport, hostile: str) -> None
 
 
 @pytest.mark.parametrize("hidden", ["\u202e", "\u200b", "\ufeff", "\x07", "\r", "\u2066"])
-def test_what_would_hide_or_turn_text_is_shown(everything: PolicyReport, hidden: str) -> None:
+def test_invisible_and_reordering_characters_are_shown(everything: PolicyReport, hidden: str) -> None:
     text = page(replace(everything, title=f"look{hidden}here"))
     assert hidden not in text
     assert f"look&lt;U+{ord(hidden):04X}&gt;here" in text
 
 
-def test_the_same_sources_make_the_same_bytes(part: Callable[[Path], ReportPart], standard: PolicyReport) -> None:
+def test_same_sources_give_the_same_bytes(part: Callable[[Path], ReportPart], standard: PolicyReport) -> None:
     path = Path(__file__).resolve().parents[4] / "missions" / "standard.rts"
     again = policy_report([part(path)], made_at_us=1_769_846_400_000_000, made_by="rtshcua")
     assert again == standard
@@ -139,7 +139,7 @@ def test_the_same_sources_make_the_same_bytes(part: Callable[[Path], ReportPart]
     assert "2026-01-31 08:00 UTC" in page(again)
 
 
-def test_the_digest_is_of_what_is_signed(part: Callable[[Path], ReportPart], standard: PolicyReport) -> None:
+def test_digest_is_that_of_the_signed_policy(part: Callable[[Path], ReportPart], standard: PolicyReport) -> None:
     path = Path(__file__).resolve().parents[4] / "missions" / "standard.rts"
     signed = policy_digest(policy_payload(part(path).missions[0].policy)).hex()
     assert [chapter.digest for chapter in standard.chapters] == [signed]
@@ -147,7 +147,7 @@ def test_the_digest_is_of_what_is_signed(part: Callable[[Path], ReportPart], sta
     assert sum(re.sub(r"<[^>]*>|\s", "", each) == signed for each in shown) == 3
 
 
-def test_a_policy_that_two_programs_have_is_one_chapter(part: Callable[[Path], ReportPart]) -> None:
+def test_policy_of_two_programs_is_one_chapter(part: Callable[[Path], ReportPart]) -> None:
     """With the missions of both."""
     missions = Path(__file__).resolve().parents[4] / "missions"
     book = policy_report([part(missions / "standard.rts"), part(missions / "extended.rts")], made_at_us=0, made_by="x")
@@ -155,7 +155,7 @@ def test_a_policy_that_two_programs_have_is_one_chapter(part: Callable[[Path], R
     assert [mission.name for mission in chapter.missions] == ["standard", "extended"]
 
 
-def test_changes_are_told_and_marked(part: Callable[[Path], ReportPart]) -> None:
+def test_changes_are_listed_and_marked(part: Callable[[Path], ReportPart]) -> None:
     everything = part(Path(__file__).with_name("everything.rts"))
     new = everything.policies[0].policy
     old = type(new)(**{**{name: getattr(new, name) for name in new.__struct_fields__}, "rules": new.rules[1:]})
@@ -170,7 +170,7 @@ def test_changes_are_told_and_marked(part: Callable[[Path], ReportPart]) -> None
     assert "It means the same" in page(same)
 
 
-def test_tests_and_missions_are_in_the_page(everything: PolicyReport, text: str) -> None:
+def test_page_has_tests_and_missions(everything: PolicyReport, text: str) -> None:
     (chapter,) = everything.chapters
     assert [case.name for case in chapter.cases] == [
         'an approval is "waited" for', "charge decides", "charge decides", "another policy", "too windy",
@@ -194,7 +194,7 @@ def luminance(colour: str) -> float:
     return 0.2126 * red + 0.7152 * green + 0.0722 * blue
 
 
-def test_text_stands_out_by_day_and_by_night(text: str) -> None:
+def test_text_has_sufficient_contrast_in_light_and_dark(text: str) -> None:
     """At least 4.5 to 1 (WCAG 2.2, AA) on the page and in the heads of tables, 3 to 1 for the lines of a map."""
     faces = re.findall(r":root \{(.*?)\}", text, re.DOTALL)
     assert len(faces) == 3  # light, dark, paper

@@ -1,4 +1,4 @@
-"""Maps: what is drawn is what is signed, and nothing lies over anything else."""
+"""Maps show the signed outlines, and their labels do not overlap."""
 
 import re
 from dataclasses import replace
@@ -18,7 +18,7 @@ NUMBER = r"-?\d+"
 
 
 def drawn(d: str, x: int, y: int) -> bool:
-    """Whether a place of the map, y to the south, lies inside of a path, by how often the path goes around it."""
+    """Whether a place of the map, y to the south, is inside a path, by its winding number."""
     arc = re.fullmatch(rf"M({NUMBER}) ({NUMBER})(A(\d+) \4 0 1 0 ({NUMBER}) ({NUMBER}))(A\4 \4 0 1 0 \1 \2)Z", d)
     if arc is not None:
         west, south, r, east = int(arc[1]), int(arc[2]), int(arc[4]), int(arc[5])
@@ -45,7 +45,7 @@ def signed(ground: ZoneOutline, x: int, y: int) -> bool:
 
 
 @given(data=st.data())
-def test_what_is_inside_of_a_zone_is_inside_of_its_drawing(everything: PolicyReport, data: st.DataObject) -> None:
+def test_place_inside_a_zone_is_inside_its_drawing(everything: PolicyReport, data: st.DataObject) -> None:
     zone = data.draw(st.sampled_from([zone.ground for zone in everything.chapters[0].zones]))
     extent = extent_of(zone)
     x = data.draw(st.integers(extent.west - 1000, extent.east + 1000))
@@ -59,7 +59,7 @@ def test_what_is_inside_of_a_zone_is_inside_of_its_drawing(everything: PolicyRep
 
 
 def touches(zone: ZoneOutline, x: int, y: int) -> bool:
-    """Whether a place lies on the boundary, of which a drawing need not tell to which side it belongs."""
+    """Whether a place is on the boundary, where the drawing may differ."""
     if zone.centre is not None:
         return (x - zone.centre[0]) ** 2 + (y - zone.centre[1]) ** 2 == zone.radius_squared
     for ring in zone.rings:
@@ -75,7 +75,7 @@ def maps(book: PolicyReport) -> list[ZoneMap]:
     return found + [mission_map(chapter, mission) for chapter in book.chapters for mission in chapter.missions]
 
 
-def test_labels_lie_on_the_map_and_over_nothing(everything: PolicyReport, standard: PolicyReport) -> None:
+def test_labels_are_on_the_map_and_do_not_overlap(everything: PolicyReport, standard: PolicyReport) -> None:
     for plan in (*maps(everything), *maps(standard)):
         boxes = [label.box for label in plan.labels]
         assert len(boxes) > 3
@@ -89,7 +89,7 @@ def test_labels_lie_on_the_map_and_over_nothing(everything: PolicyReport, standa
 
 
 def crowded(chapter: Chapter, count: int) -> Chapter:
-    """A chapter with many zones, some of them over each other."""
+    """A chapter with many zones, some of them overlapping."""
     one = ZoneView("", "", "", "", "", "", ZoneOutline(), None, None, (), "", changed=False)
     zones = tuple(
         replace(
@@ -103,14 +103,14 @@ def crowded(chapter: Chapter, count: int) -> Chapter:
     return replace(chapter, zones=zones)
 
 
-def test_of_too_many_zones_the_labels_that_find_no_room_are_named(everything: PolicyReport) -> None:
+def test_labels_without_room_are_listed(everything: PolicyReport) -> None:
     for plan in zone_maps(crowded(everything.chapters[0], 120)):
         boxes = [label.box for label in plan.labels]
         assert not [pair for pair in combinations(boxes, 2) if pair[0].meets(pair[1])]
         assert len(boxes) + len(plan.unlabelled) >= 121
 
 
-def test_columns_of_a_profile_stand_side_by_side_with_their_names_beneath(everything: PolicyReport) -> None:
+def test_columns_of_a_profile_are_side_by_side_above_their_names(everything: PolicyReport) -> None:
     for profile in profiles(crowded(everything.chapters[0], 40)):
         for one, other in zip(profile.columns, profile.columns[1:], strict=False):
             assert one.x + one.width < other.x
@@ -119,9 +119,7 @@ def test_columns_of_a_profile_stand_side_by_side_with_their_names_beneath(everyt
 
 
 @pytest.mark.parametrize(("floor", "ceiling"), [(None, 60_000), (20_000, None), (92_000, 192_000), (None, None)])
-def test_a_column_reaches_from_floor_to_ceiling(
-    everything: PolicyReport, floor: int | None, ceiling: int | None
-) -> None:
+def test_column_reaches_from_floor_to_ceiling(everything: PolicyReport, floor: int | None, ceiling: int | None) -> None:
     (chapter,) = everything.chapters
     zone = replace(chapter.zones[0], floor=floor, ceiling=ceiling)
     (profile,) = profiles(replace(chapter, zones=(zone, replace(zone, name="next", floor=0, ceiling=200_000))))
@@ -133,14 +131,14 @@ def test_a_column_reaches_from_floor_to_ceiling(
 
 
 @given(x=st.integers(-400_000, 400_000), y=st.integers(-400_000, 400_000))
-def test_a_place_of_the_page_is_the_place_that_is_drawn_there(everything: PolicyReport, x: int, y: int) -> None:
+def test_point_on_the_page_converts_back_to_its_place(everything: PolicyReport, x: int, y: int) -> None:
     on: Canvas = canvas(extent_of(everything.chapters[0].zones[0].ground))
     back = on.place(*on.at(x, y))
     assert abs(back[0] - x) <= 1
     assert abs(back[1] - y) <= 1
 
 
-def test_hatching_covers_a_box_and_nothing_else() -> None:
+def test_hatching_covers_exactly_its_box() -> None:
     lines = re.findall(r"M(\S+) (\S+)L(\S+) ([^M]+)", hatching(LabelBox(10, 20, 50, 30), 1000, 1000))
     assert 5 <= len(lines) <= 10
     for line in lines:

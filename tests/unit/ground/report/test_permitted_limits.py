@@ -1,4 +1,4 @@
-"""The limits of the first page: what the rules permit at most, whoever asks, not what a skill takes."""
+"""The limits on the first page are the widest that the rules permit, not those of the skill."""
 
 from pathlib import Path
 
@@ -66,17 +66,17 @@ def limits(rules: str, require: str = "battery > 20 %") -> dict[str, PermittedLi
         ("permit go by role pilot when altitude == 30 m", "exactly 30 m above home", False),
     ],
 )  # fmt: skip
-def test_the_height_is_that_which_some_permit_allows(rules: str, altitude: str, conditions: bool) -> None:
+def test_height_limit_is_the_widest_of_the_permits(rules: str, altitude: str, conditions: bool) -> None:
     told = limits(rules)["altitude"]
     assert (told.limits, told.conditions) == (altitude, conditions)
 
 
-def test_what_a_skill_requires_of_its_arguments_bounds_them_too() -> None:
+def test_require_of_a_skill_limits_its_arguments_too() -> None:
     told = limits("permit go by role pilot", "battery > 20 % and altitude <= 35 m")
     assert told["altitude"].limits == "between 5 m and 35 m above home"
 
 
-def test_speeds_and_places_are_told_as_heights_are() -> None:
+def test_speeds_and_places_have_limits_too() -> None:
     told = limits("permit go by role pilot when target inside yard and speed <= 3 m/s  "
                   "forbid go by any when target inside pond")  # fmt: skip
     assert (told["speed"].limits, told["speed"].conditions) == ("between 1 m/s and 3 m/s", True)
@@ -89,6 +89,6 @@ def test_speeds_and_places_are_told_as_heights_are() -> None:
     assert limits("permit go by role pilot")["target"].limits == "wherever the airspace allows it"
 
 
-def test_of_what_nobody_may_have_done_no_limit_is_told() -> None:
+def test_skill_without_a_permit_has_no_limits() -> None:
     assert limits("permit go by role pilot  forbid go by any") == {}
     assert limits("") == {}

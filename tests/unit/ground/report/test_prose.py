@@ -1,4 +1,4 @@
-"""Every construct of the language in words: by hand, none forgotten, and nothing of it left unsaid."""
+"""Descriptions of every construct of the language: checked by hand, complete, and without omissions."""
 
 from collections.abc import Callable, Iterator
 from importlib import import_module
@@ -131,11 +131,11 @@ def condition(text: str) -> Condition:
         ),
     ],
 )
-def test_conditions_are_told_in_words(text: str, words: str) -> None:
+def test_condition_is_described(text: str, words: str) -> None:
     assert describe_condition(condition(text), NAMES) == words
 
 
-def test_every_node_of_the_language_is_in_the_sample(everything_program: Program) -> None:
+def test_sample_has_every_node_of_the_language(everything_program: Program) -> None:
     for module in iter_modules(ir.__path__):
         import_module(f"rtshcua.model.ir.{module.name}")
     seen = {type(node) for unit in everything_program.units for node in within(unit)}
@@ -149,7 +149,7 @@ def subclasses(kind: type) -> Iterator[type]:
 
 
 def tellers(unit: Any, names: Vocabulary) -> Iterator[tuple[Node, Callable[[Any], object]]]:
-    """Each declaration of a file, and all that is told of it."""
+    """Each declaration of a file with its description."""
     for signal in unit.signals:
         yield signal, lambda one: (one.name.text, describe_type(one), describe_sources(one), describe_unknown(one))
     for enum in unit.enums:
@@ -206,7 +206,7 @@ def tell_policy(policy: PolicyDecl, names: Vocabulary) -> object:
 
 
 def changed(node: Any) -> Iterator[tuple[str, Any]]:
-    """A node with one leaf of it changed, for each leaf, and which one that is."""
+    """A node with one changed leaf, for each leaf, and the name of the leaf."""
     for name, annotation in get_type_hints(type(node)).items():
         if (
             name not in type(node).__struct_fields__
@@ -234,7 +234,7 @@ def others(value: Any, annotation: Any) -> Iterator[tuple[str, Any]]:
                 yield f"[{number}]{where}", (*value[:number], other, *value[number + 1 :])
 
 
-def test_whatever_is_changed_in_a_declaration_changes_what_is_told_of_it(everything_program: Program) -> None:
+def test_every_change_of_a_declaration_changes_its_description(everything_program: Program) -> None:
     """So nothing that is signed is left unsaid. The `dialect` of an enumeration only the checker reads, and that a
     choice is of the type `choice` is no word of the source. Of a size its value is told where it stands; what else it
     might be is not signed.
@@ -272,13 +272,13 @@ def test_whatever_is_changed_in_a_declaration_changes_what_is_told_of_it(everyth
         ("active on saturday, sunday", "on Saturday and Sunday, local time"),
     ],
 )
-def test_a_zone_on_days_of_the_week(active: str, words: str) -> None:
+def test_zone_with_days_of_the_week_is_described(active: str, words: str) -> None:
     parsed = parse(Source("x.rts", f"zone z = circle(47.1 N, 8.1 E, 9 m) {active}"))
     assert parsed.diagnostics == ()
     assert describe_times(parsed.unit.zones[0]) == words
 
 
-def test_a_clock_by_the_name_of_a_time_zone() -> None:
+def test_clock_with_a_time_zone_is_described() -> None:
     text = (
         'vehicle v { identity "v" home 47.1 N, 8.1 E within 1 m speed at most 1 m/s climb at most 1 m/s '
         'position error 1 m energy 100 % = 9 min hover reserve 9 % clock "Asia/Kolkata" }'

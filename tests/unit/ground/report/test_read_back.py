@@ -1,4 +1,4 @@
-"""Conditions in words, read back by a reader of its own: two that differ never get the same words, in any place."""
+"""Descriptions of conditions are unambiguous: an independent reader parses them back."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -46,7 +46,7 @@ ATOMS = [
     "target outside grow(pond, 20 m)", "position inside pond", "altitude <= 30 m",
     "battery < 30 % within 5 s of wind.speed > 9 m/s",
 ]  # fmt: skip
-#: what a reader makes of words: the words of an atom, or what is said of others
+#: a parsed description: the text of an atom, or a node with operands
 Tree = Any
 
 texts = st.recursive(
@@ -79,7 +79,7 @@ def condition(text: str) -> Condition:
 
 
 def flat(tree: Tree) -> Tree:
-    """The same with `a and (b and c)` as `a and b and c`, for that means the same."""
+    """The tree with `a and (b and c)` as `a and b and c`, which is equivalent."""
     if isinstance(tree, str):
         return tree
     kind, *parts = tree[0], *map(flat, tree[1:])
@@ -89,7 +89,7 @@ def flat(tree: Tree) -> Tree:
 
 
 def tree_of(one: Condition, names: Vocabulary) -> Tree:
-    """What a condition is, without any of its words but those of what it is put together from."""
+    """The tree of a condition, with the texts of its atoms."""
     if isinstance(one, Junction):
         return flat((one.operator, *(tree_of(each, names) for each in one.operands)))
     if isinstance(one, Not):
@@ -100,7 +100,7 @@ def tree_of(one: Condition, names: Vocabulary) -> Tree:
 
 
 def split(words: str, between: str) -> list[str]:
-    """The parts of words between what stands outside of all brackets and names."""
+    """The parts of a text, split at separators outside brackets and names."""
     parts, depth, start, at = [], 0, 0, 0
     while at < len(words):
         if words[at] == "`":
@@ -117,7 +117,7 @@ def split(words: str, between: str) -> list[str]:
 
 
 def closed(words: str) -> bool:
-    """Whether one pair of brackets is around all of it."""
+    """Whether one pair of brackets encloses the whole text."""
     depth = 0
     for at, letter in enumerate(words):
         depth += (letter == "(") - (letter == ")")
@@ -127,7 +127,7 @@ def closed(words: str) -> bool:
 
 
 def read(words: str, atoms: frozenset[str]) -> Tree:
-    """The only way to read words. Fails where `and` and `or` stand beside each other."""
+    """Parse a description. Fails if `and` and `or` are mixed at one level."""
     if words in atoms:
         return ("atom", words)
     if closed(words):
@@ -153,7 +153,7 @@ def atoms_of(names: Vocabulary) -> frozenset[str]:
 
 @settings(max_examples=settings().max_examples * 2)
 @given(text=texts)
-def test_a_condition_reads_back_as_itself(text: str) -> None:
+def test_description_of_a_condition_parses_back(text: str) -> None:
     one = condition(text)
     assert read(describe_condition(one, NAMES), atoms_of(NAMES)) == tree_of(one, NAMES)
     clauses = [read(each, atoms_of(NAMES)) for each in describe_clauses(one, NAMES)]
@@ -161,7 +161,7 @@ def test_a_condition_reads_back_as_itself(text: str) -> None:
 
 
 @given(first=texts, second=texts)
-def test_rules_and_delegations_with_other_conditions_have_other_words(first: str, second: str) -> None:
+def test_rules_and_delegations_with_other_conditions_read_differently(first: str, second: str) -> None:
     one, other = (tree_of(condition(text), NAMES) for text in (first, second))
     kinds = (
         "permit goto by role operator when {}",
@@ -210,13 +210,13 @@ def shape_tree(shape: Shape) -> Tree:
 
 
 @given(text=shapes.filter(lambda text: "(" in text))
-def test_a_shape_reads_back_as_itself(text: str) -> None:
+def test_description_of_a_shape_parses_back(text: str) -> None:
     shape = unit(f"zone z = {text}").zones[0].shape
     assert read_shape(describe_shape(shape)) == shape_tree(shape)
 
 
 def conditions(count: int) -> Iterator[str]:
-    """Different conditions of two or three things, deep enough that brackets count."""
+    """Different conditions of two or three operands, deep enough to need brackets."""
     chance = Random(1)
     for _ in range(count):
         a, b, c = chance.sample(ATOMS, 3)
@@ -225,7 +225,7 @@ def conditions(count: int) -> Iterator[str]:
 
 
 def text_of(html: str) -> str:
-    """What a fragment says, with a list of what must hold at once as the conjunction that it is."""
+    """The text of a fragment, with a list of conditions as a conjunction."""
     html = re.sub(r"</?code>", "`", html)
     found = re.search(r'all of these at once:(?:</span>|</p>)<ul class="all">(.*?)</ul>', html, re.DOTALL)
     if found is not None:
@@ -236,14 +236,14 @@ def text_of(html: str) -> str:
 
 
 def listed(words: str, names: Vocabulary) -> Tree:
-    """Words whose outermost conjunction may be a list of more than two."""
+    """A text whose outermost conjunction may have more than two operands."""
     parts = split(words, r"(?<=\)) and (?=\()")
     atoms = atoms_of(names)
     return flat(("and", *(read(part, atoms) for part in parts))) if len(parts) > 1 else read(words, atoms)
 
 
 @pytest.mark.slow
-def test_every_place_of_the_page_tells_conditions_apart(
+def test_different_conditions_read_differently_everywhere_on_the_page(
     everything: PolicyReport, part: Callable[[Path], ReportPart]
 ) -> None:
     lowered = part(Path(__file__).with_name("everything.rts")).policies[0]

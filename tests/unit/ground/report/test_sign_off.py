@@ -1,4 +1,4 @@
-"""What is agreed to at the end of a page, and the words that a reader needs for it: reasons, links, changes."""
+"""The sign-off of a page, and the explanations that its reader needs: reasons, links, changes."""
 
 import re
 from collections.abc import Callable
@@ -23,12 +23,12 @@ EVERYTHING = Path(__file__).with_name("everything.rts")
 
 
 def words(markup: str) -> str:
-    """What a reader sees."""
+    """The visible text of a page."""
     return " ".join(unescape(re.sub(r"<[^>]*>", "", markup)).split())
 
 
 @pytest.mark.slow
-def test_the_page_begins_with_what_is_signed_on_one_page(everything: PolicyReport) -> None:
+def test_page_begins_with_a_summary(everything: PolicyReport) -> None:
     text = page(everything)
     (chapter,) = everything.chapters
     glance, sign, contents = (text.index(f'id="{each}"') for each in ("p1-glance", "p1-sign", "contents"))
@@ -44,7 +44,7 @@ def test_the_page_begins_with_what_is_signed_on_one_page(everything: PolicyRepor
     assert "these missions, as it lists them, fly under it: look." in box
 
 
-def test_the_first_page_says_what_the_chapter_says(standard: PolicyReport) -> None:
+def test_summary_agrees_with_the_chapter(standard: PolicyReport) -> None:
     (chapter,) = standard.chapters
     first = glance(chapter)
     assert {fact.what for fact in first.who} == {"role `operator`", "role `supervisor`", "everybody else"}
@@ -62,10 +62,10 @@ def test_the_first_page_says_what_the_chapter_says(standard: PolicyReport) -> No
     assert told["Records cannot be kept"] == chapter.evidence
     assert told["A step is denied in the air"] == " ".join(chapter.contingency)
     assert any("`battery`" in each for each in first.beyond), "what is known"
-    assert any("without the sensor" in each for each in first.beyond)
+    assert any("does not have the sensor" in each for each in first.beyond)
 
 
-def test_what_a_policy_does_not_have_is_said(everything: PolicyReport) -> None:
+def test_summary_states_what_a_policy_does_not_have(everything: PolicyReport) -> None:
     (chapter,) = everything.chapters
     bare = replace(
         chapter, missions=(), cases=(), scenarios=(), zones=(), contingency=(), skills=(), signals=(),
@@ -73,15 +73,15 @@ def test_what_a_policy_does_not_have_is_said(everything: PolicyReport) -> None:
         permitted=(),
     )  # fmt: skip
     first = glance(bare)
-    assert first.person == ("Nothing: no rule asks a person to approve a step.",)
-    assert first.height == ("This policy sets no limit to the height.",)
+    assert first.person == ("Nothing: no rule requires a person to approve a step.",)
+    assert first.height == ("This policy does not limit the height.",)
     assert any("No mission is listed" in each for each in first.beyond)
-    assert any("No test of this policy" in each for each in first.beyond)
+    assert any("no test of this policy" in each for each in first.beyond)
     many = replace(chapter, rules=tuple(replace(chapter.rules[0], kind="confirm", number=each) for each in range(9)))
     assert glance(many).person[-1] == "3 more: see the rules"
 
 
-def test_generated_tests_fold_away_and_others_do_not(everything: PolicyReport) -> None:
+def test_only_generated_tests_are_folded(everything: PolicyReport) -> None:
     (chapter,) = everything.chapters
     cases = (*chapter.cases, *(replace(each, generated=True) for each in chapter.cases))
     text = page(replace(everything, chapters=(replace(chapter, cases=cases),)))
@@ -93,9 +93,7 @@ def test_generated_tests_fold_away_and_others_do_not(everything: PolicyReport) -
     assert "<details" not in page(everything)
 
 
-def test_cases_of_a_file_that_was_generated_are_known_by_its_head(
-    tmp_path: Path, part: Callable[[Path], ReportPart]
-) -> None:
+def test_generated_file_is_recognised_by_its_head(tmp_path: Path, part: Callable[[Path], ReportPart]) -> None:
     made = tmp_path / "limits.rts"
     policy = EVERYTHING.parents[4] / "policies" / "bridge_inspection.rts"
     assert main(["test", str(policy), "--generate", "--skill", "hover", "-o", str(made)]) == 0
@@ -105,25 +103,25 @@ def test_cases_of_a_file_that_was_generated_are_known_by_its_head(
     assert all(each.generated for each in chapter.cases)
 
 
-def test_without_missions_none_is_agreed_to(everything: PolicyReport) -> None:
+def test_sign_off_without_missions_lists_none(everything: PolicyReport) -> None:
     bare = replace(everything, chapters=(replace(everything.chapters[0], missions=()),))
     assert "no missions" in words(page(bare).partition('id="p1-sign"')[2])
 
 
-def test_each_policy_has_a_box(everything: PolicyReport) -> None:
+def test_each_policy_has_a_sign_off_box(everything: PolicyReport) -> None:
     text = page(replace(everything, chapters=everything.chapters * 2))
     assert text.index('id="p1-sign"') < text.index('id="p2-sign"') < text.index('id="contents"')
 
 
 @pytest.mark.parametrize(("count", "length"), [(1, 64), (4, 64), (5, 32)])
-def test_the_printed_foot_has_the_whole_digest_if_it_fits(everything: PolicyReport, count: int, length: int) -> None:
+def test_printed_footer_has_the_whole_digest_if_it_fits(everything: PolicyReport, count: int, length: int) -> None:
     (chapter,) = everything.chapters
     foot = re.search(r'@bottom-left \{ content: "(.*?)"', page(replace(everything, chapters=(chapter,) * count)))
     assert foot is not None
     assert re.findall(r"everything 3: ([0-9a-f]+)", foot[1]) == [chapter.digest[:length]] * count
 
 
-def test_every_reason_has_a_sentence_and_links_lead_to_it(everything: PolicyReport) -> None:
+def test_every_reason_has_an_explanation_with_links_to_it(everything: PolicyReport) -> None:
     text = page(everything)
     for reason in Reason:
         anchor = f"reason-{reason.value.replace('/', '-')}"
@@ -133,17 +131,15 @@ def test_every_reason_has_a_sentence_and_links_lead_to_it(everything: PolicyRepo
     assert '<a href="#reason-authority-forbidden"><code>authority/forbidden</code></a>' in text
 
 
-def test_of_a_last_link_it_is_said_that_as_a_step_it_is_checked(everything: PolicyReport) -> None:
+def test_last_link_is_described_as_checked_if_requested_as_a_step(everything: PolicyReport) -> None:
     (chapter,) = everything.chapters
     assert [skill.name for skill in chapter.skills if skill.as_link] == ["emergency_land"]
     text = words(page(everything))
-    assert (
-        text.count("Asked for as a step, it is held against the rules (degrade too) and the charge as any other") == 1
-    )
+    assert text.count("Requested as a step, it is checked against the rules (degrade too) and the charge like any") == 1
 
 
 def changes(part: ReportPart, **other: object) -> dict[str, ChangeView]:
-    """What is told of an earlier policy that has other fields."""
+    """The changes since an earlier policy with other fields."""
     new = part.policies[0].policy
     book = policy_report([part], made_at_us=0, made_by="x", earlier=[replaced(new, **other)], since="old")
     return {each.what: each for each in book.chapters[0].changes}
@@ -153,18 +149,18 @@ def replaced(flat: Any, **other: object) -> Any:
     return type(flat)(**{**{name: getattr(flat, name) for name in flat.__struct_fields__}, **other})
 
 
-def test_of_what_changed_old_and_new_words_are_told(part: Callable[[Path], ReportPart]) -> None:
+def test_change_has_old_and_new_text(part: Callable[[Path], ReportPart]) -> None:
     everything = part(EVERYTHING)
     policy = everything.policies[0].policy
     told = changes(everything, airspace=None, without_evidence=int(WithoutEvidence.LAND))
-    assert told["the airspace"].before[0].startswith("This policy sets no limits")
+    assert told["the airspace"].before[0].startswith("This policy does not limit where")
     assert told["the airspace"].after[0].startswith("The vehicle may only be inside of `yard` and outside of `works`")
     assert "comes down" in told["the action without evidence"].before[0]
     assert "may finish" in told["the action without evidence"].after[0]
     told = changes(everything, silence_us=30_000_000, after_silence=int(AfterSilence.CONTINGENCY))
     (silence,) = told.values()
     assert silence.what == "the action after a silence of the vehicle"
-    assert "longer than 30 s, the mission is given up" in silence.before[0]
+    assert "longer than 30 s, the mission is aborted" in silence.before[0]
     assert "longer than 45 s, the step goes on" in silence.after[0]
     told = changes(everything, contingency=policy.contingency[1:])
     assert told["the contingency"].before == ("`return_home`, then `emergency_land`",)
@@ -172,10 +168,10 @@ def test_of_what_changed_old_and_new_words_are_told(part: Callable[[Path], Repor
     book = policy_report(
         [everything], made_at_us=0, made_by="x", earlier=[replaced(policy, airspace=None)], since="old"
     )
-    assert "This policy sets no limits" in words(page(book))
+    assert "This policy does not limit where" in words(page(book))
 
 
-def test_figures_zones_and_skills_are_told_before_and_now(part: Callable[[Path], ReportPart]) -> None:
+def test_changed_vehicle_zone_and_skill_have_old_and_new_text(part: Callable[[Path], ReportPart]) -> None:
     everything = part(EVERYTHING)
     policy = everything.policies[0].policy
     slower = replaced(policy.vehicle, speed=5_000, return_altitude=0, braking=0, reaction_us=0)
@@ -205,8 +201,8 @@ def test_figures_zones_and_skills_are_told_before_and_now(part: Callable[[Path],
     assert told.before == ("stale: after 9 s",)
 
 
-def test_every_part_of_every_declaration_has_words(part: Callable[[Path], ReportPart]) -> None:
-    """Held against a policy that has none of its zones, skills and signals under the same names."""
+def test_every_part_of_every_declaration_is_described(part: Callable[[Path], ReportPart]) -> None:
+    """Compared with a policy that has no zones, skills and signals of the same names."""
     everything = part(EVERYTHING)
     policy = everything.policies[0].policy
     other = {

@@ -1,4 +1,4 @@
-"""What the page says of the patterns of a survey is what the planner plans."""
+"""The descriptions of the survey patterns agree with the planner."""
 
 from dataclasses import replace
 from itertools import pairwise
@@ -20,18 +20,18 @@ ROUND = RoundArea((0, 0), 50 * M)
 
 
 def turned(points: tuple[tuple[int, int], ...]) -> int:
-    """Twice the area that a closed way goes around: positive counter-clockwise."""
+    """Twice the area that a closed path encloses, positive if counter-clockwise."""
     return sum(ax * by - bx * ay for (ax, ay), (bx, by) in pairwise(points))
 
 
-def test_each_pattern_that_there_is_has_words_and_a_drawing() -> None:
+def test_each_pattern_has_a_description_and_a_drawing() -> None:
     assert set(PATTERNS) == set(KNOWN)
     for name in KNOWN:
         assert len(drawn(name).arrows) > 3
 
 
 @pytest.mark.parametrize(("height", "apart"), [(20 * M, 20 * M), (3 * M, 5 * M)])
-def test_a_grid_is_no_wider_than_it_flies_high(height: int, apart: int) -> None:
+def test_spacing_of_a_grid_is_at_most_its_altitude(height: int, apart: int) -> None:
     way = survey(HOUSE, "grid", height, 3 * M, (0, 0))
     other = survey(HOUSE, "grid", height, 3 * M, (150 * M, 90 * M))
     assert way is not None
@@ -43,7 +43,7 @@ def test_a_grid_is_no_wider_than_it_flies_high(height: int, apart: int) -> None:
     assert abs(lines[0] - 3 * M - max(spaces) / 2) < 10
 
 
-def test_a_line_of_a_grid_that_meets_a_corner_is_flown_like_any_other() -> None:
+def test_grid_line_through_a_corner_is_flown_like_any_other() -> None:
     pointed = SimplePolygon(((0, 0), (120 * M, 0), (150 * M, 45 * M), (120 * M, 90 * M), (0, 90 * M)))
     way = survey(pointed, "grid", 20 * M, 3 * M, (0, 0))
     assert way is not None
@@ -53,7 +53,7 @@ def test_a_line_of_a_grid_that_meets_a_corner_is_flown_like_any_other() -> None:
     assert min(abs(b - a) for a, b in lines) > 110 * M
 
 
-def test_a_perimeter_goes_around_counter_clockwise_from_the_west() -> None:
+def test_perimeter_goes_counter_clockwise_from_the_west() -> None:
     way = survey(HOUSE, "perimeter", 20 * M, 3 * M, (150 * M, 45 * M))
     assert way is not None
     assert way[0] == way[-1] == min(way)
@@ -65,7 +65,7 @@ def test_a_perimeter_goes_around_counter_clockwise_from_the_west() -> None:
     assert turned(around) > 0
 
 
-def test_an_orbit_is_the_largest_circle_in_the_area() -> None:
+def test_orbit_is_the_largest_circle_in_the_area() -> None:
     way = survey(HOUSE, "orbit", 20 * M, 3 * M, (0, 0))
     assert way is not None
     assert len(way) == 17
@@ -73,12 +73,12 @@ def test_an_orbit_is_the_largest_circle_in_the_area() -> None:
     assert turned(way) > 0
     x0, y0 = (way[0][0] + way[8][0]) // 2, way[0][1]
     assert all(abs(hypot(x - x0, y - y0) - (way[0][0] - x0)) < 10 for x, y in way)
-    # it touches the inset edge in the south or in the north, and leaves it nowhere
+    # it touches the inset edge in the south or north, and never crosses it
     assert min(y for _, y in way) >= 3 * M
     assert min(min(y for _, y in way) - 3 * M, 87 * M - max(y for _, y in way)) < 10
 
 
-def test_the_page_draws_the_patterns_of_surveys_alone(everything: PolicyReport) -> None:
+def test_page_draws_only_the_patterns_of_surveys(everything: PolicyReport) -> None:
     text = page(everything)
     surveys = [skill for chapter in everything.chapters for skill in chapter.skills if skill.patterns]
     assert surveys

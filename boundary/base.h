@@ -1,4 +1,5 @@
-/* What every part of the boundary rests on: views into bytes that stay where they are. Mirrors nothing in Python, which has bytes and tuples. */
+/* Basics for all parts of the boundary: views into bytes that stay in place. It has no Python counterpart, because Python has bytes and
+   tuples. */
 #ifndef RT_BASE_H
 #define RT_BASE_H
 
@@ -7,23 +8,24 @@
 #include <stdint.h>
 #include <string.h>
 
-/* So many bytes; `at` may be anything where `size` is 0. Text is UTF-8 and not ended by a NUL. */
+/* A view of bytes; `at` may be anything if `size` is 0. Text is UTF-8 and not terminated by a NUL. */
 typedef struct {
     const uint8_t *at;
     uint32_t size;
 } rt_bytes;
 
-/* The items of a CBOR array that was found well-formed: `at` is the first item, of `count`; `end` is behind the last. */
+/* The items of a well-formed CBOR array: `at` is the first of `count` items; `end` is after the last. */
 typedef struct {
     const uint8_t *at;
     const uint8_t *end;
     uint32_t count;
 } rt_list;
 
-/* An item of a table. The checks found every index within it; the remainder, which is the index itself, makes that evident here too. */
+/* An item of a table. The checks ensure that every index is within it; the remainder, which equals the index, makes that evident to the
+   proof. */
 #define RT_AT(table, index) ((table)[(uint64_t)(index) % (sizeof(table) / sizeof *(table))])
 
-/* Why something is refused, the slug of the Python refusal; NULL where all is well. */
+/* The slug of the Python refusal, or NULL if nothing is refused. */
 typedef const char *rt_refusal;
 
 /* The octets of a slug. */
@@ -37,13 +39,13 @@ static inline bool rt_same(rt_bytes one, rt_bytes other) {
     return one.size == other.size && (one.size == 0 || memcmp(one.at, other.at, one.size) == 0);
 }
 
-/* Below 0 where some bytes come before others, above 0 where they come after. */
+/* Negative if some bytes sort before others, positive if they sort after them. */
 static inline int rt_compare(rt_bytes one, rt_bytes other) {
     int found = one.size && other.size ? memcmp(one.at, other.at, one.size < other.size ? one.size : other.size) : 0;
     return found ? found : (one.size > other.size) - (one.size < other.size);
 }
 
-/* Whether two lists have the same items: each has one encoding. */
+/* Whether two lists have the same items, each of which has one encoding. */
 static inline bool rt_same_list(rt_list one, rt_list other) {
     return one.count == other.count &&
            rt_same((rt_bytes){one.at, (uint32_t)(one.end - one.at)}, (rt_bytes){other.at, (uint32_t)(other.end - other.at)});
@@ -53,7 +55,7 @@ static inline int64_t rt_min(int64_t a, int64_t b) { return a < b ? a : b; }
 static inline int64_t rt_max(int64_t a, int64_t b) { return a > b ? a : b; }
 static inline int64_t rt_abs(int64_t a) { return a < 0 ? -a : a; }
 static inline bool rt_within(int64_t value, int64_t low, int64_t high) { return low <= value && value <= high; }
-/* Division that rounds down, and its remainder, which is not negative; `by` is above 0. */
+/* Division that rounds down, and its non-negative remainder; `by` is positive. */
 static inline int64_t rt_floor(int64_t a, int64_t by) { return a / by - (a % by < 0); }
 static inline int64_t rt_modulo(int64_t a, int64_t by) {
     int64_t rest = a % by;

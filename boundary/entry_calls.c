@@ -1,4 +1,4 @@
-/* What the tests call of the whole boundary: begin one, and make a call. */
+/* The interface of the whole boundary for the tests: begin one, and make a call. */
 #include "enforcement/calls.h"
 
 #define EXPORT __attribute__((visibility("default")))
@@ -71,7 +71,7 @@ void rt_test_clock_hear(const uint8_t *frame, uint32_t size, uint8_t link, int64
     rt_clock_hear(&test_clock, (rt_bytes){frame, size}, link, vehicle_us, now_us);
 }
 
-/* Where it is from, the moment, and the number that is asked for. */
+/* Its source, the moment, and the expected number. */
 void rt_test_clock_now(int64_t now_us, int64_t *said) {
     rt_now now;
     rt_clock_now(&test_clock, now_us, &now);

@@ -1,9 +1,9 @@
-/* What the tests and the bench call of decision/: one policy, one mission, one step of it, and many situations at once. */
+/* The interface of decision/ for the tests and the bench: one policy, one mission, one step of it, and many situations at once. */
 #include "decision/parts.h"
 
 #define EXPORT __attribute__((visibility("default")))
 
-/* The numbers of a question, before its values, which of them are known, ages and monitors. */
+/* The numbers of a query, followed by its values, which of them are known, ages and monitors. */
 enum { SLOTS, MONITORS, MONOTONIC, UTC, ERROR, VERSION, CONSUMED, RELEASED, PHASE, REMAINING, BINDING, VEHICLE, APPROVALS, HEAD };
 enum { OUTCOME, REASON, STEP, CLAUSE, TARGET, VALID, DEGRADES, LINKS, ANSWER };
 
@@ -42,7 +42,7 @@ void rt_test_prepare_step(uint32_t step) { rt_prepare_invocation(&mission, step,
 
 uint32_t rt_test_candidates(void) { return invocation.rule_count; }
 
-/* Read one question; where the next begins. */
+/* Read one query; returns where the next begins. */
 static const int64_t *take(const int64_t *at, rt_state *state, rt_context *context, rt_now *now, rt_approval approvals[8]) {
     static const uint8_t wrong[32];
     *now = (rt_now){at[MONOTONIC], at[UTC], at[ERROR]};
@@ -67,8 +67,8 @@ static const int64_t *take(const int64_t *at, rt_state *state, rt_context *conte
     return at;
 }
 
-/* Each answer: the decision, the target of a degrade rule, and the links of the step (bits 0..7) and of the contingency (8..15)
-   that may fly. */
+/* Each answer: the decision, the target of a degrade rule, and the links of the step (bits 0..7) and of the contingency (8..15) that
+   may fly. */
 void rt_test_decide(const int64_t *asked, uint32_t count, int64_t *answers) {
     rt_state state = {.slots = 0};
     rt_context context;
@@ -96,7 +96,7 @@ void rt_test_decide(const int64_t *asked, uint32_t count, int64_t *answers) {
     }
 }
 
-/* Decide the same so many times, from a place that moves by 1 mm each time, so that nothing is the same as before. */
+/* Decide repeatedly, from a place that moves by 1 mm each time, so that no cache applies. */
 void rt_test_again(const int64_t *asked, uint32_t times) {
     rt_state state = {.slots = 0};
     rt_context context;

@@ -1,4 +1,4 @@
-/* What the tests call of enforcement/ and mavlink/: one gate and one signed link. */
+/* The interface of enforcement/ and mavlink/ for the tests: one gate and one signed link. */
 #include "enforcement/frames.h"
 
 #define EXPORT __attribute__((visibility("default")))
@@ -18,7 +18,7 @@ EXPORT uint32_t rt_test_link_sign_ahead(uint8_t *frame, uint32_t size, int64_t n
 EXPORT int64_t rt_test_link_signed_up_to(void);
 
 static rt_gate gate;
-static rt_command last; /* that it was opened for */
+static rt_command last; /* the command that it was opened for */
 static rt_chain chain;
 static rt_signed_link link;
 

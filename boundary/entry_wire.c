@@ -1,4 +1,4 @@
-/* What the tests call of crypto/ and wire/: each function of the boundary's as it is, with bytes given by address and size. */
+/* The interface of crypto/ and wire/ for the tests: each function of the boundary, with bytes given by address and size. */
 #include "crypto/crypto.h"
 #include "wire/approval.h"
 #include "wire/cancellation.h"
@@ -106,7 +106,7 @@ static uint8_t test_missions[RT_MAX_REPLACEMENTS + 1][RT_DIGEST_BYTES];
 static rt_bytes test_replaced[256];
 static rt_flight test_flight;
 
-/* A flight of the bundle that was opened last. */
+/* A flight of the last opened bundle. */
 void rt_test_begin(const uint8_t *vehicle, uint32_t vehicle_size, const uint8_t *flight) {
     test_flight = (rt_flight){&test_root, {vehicle, vehicle_size}, {flight, RT_FLIGHT_BYTES}, {0, 0, 0}, &test_bundle, (const uint8_t(*)[RT_DIGEST_BYTES])test_missions, 1, test_replaced, 0};
     memcpy(test_missions[0], test_bundle.mission_digest, RT_DIGEST_BYTES);
@@ -175,7 +175,7 @@ uint32_t rt_test_receipt(const int64_t numbers[5], const uint8_t *slug, uint32_t
     return rt_write_receipt(&receipt, out);
 }
 
-/* What is opened is sealed again, so that every field of it shows. */
+/* An opened permit is sealed again, so that every field is compared. */
 uint32_t rt_test_preparation(const uint8_t *data, uint32_t size, const uint8_t *key, uint8_t *out) {
     rt_preparation preparation;
     return rt_open_preparation((rt_bytes){data, size}, key, &preparation) ? rt_seal_preparation(&preparation, key, out) : 0;

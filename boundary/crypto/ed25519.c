@@ -1,5 +1,5 @@
-/* Ed25519 from the parts that Monocypher has for it. Its own check multiplies by the cofactor, which OpenSSL does not; so the
-   last steps are made here, of its functions that nobody else sees. */
+/* Ed25519 from Monocypher's building blocks. Monocypher's own check multiplies by the cofactor, and OpenSSL does not; the last steps
+   are therefore made here, from its internal functions. */
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wconversion"
 #pragma GCC diagnostic ignored "-Wshadow"
@@ -82,7 +82,7 @@ bool rt_ed25519_verify(const uint8_t key[RT_KEY_BYTES], const uint8_t signature[
     return memcmp(encoded, signature, sizeof encoded) == 0;
 }
 
-/* The secret scalar of a seed, and behind it what makes the nonces. */
+/* The secret scalar of a seed, followed by the input of the nonces. */
 static void expand(const uint8_t seed[RT_KEY_BYTES], uint8_t expanded[64]) {
     crypto_hash_sha512_state hash;
     crypto_hash_sha512_init(&hash);

@@ -37,7 +37,7 @@ void rt_hmac_sha256(rt_bytes key, const rt_bytes *parts, uint32_t count, uint8_t
 }
 
 bool rt_equal(const uint8_t *one, const uint8_t *other, size_t size) {
-    volatile uint8_t differ = 0; /* volatile: no compiler leaves the loop early */
+    volatile uint8_t differ = 0; /* volatile: no compiler ends the loop early */
     for (size_t i = 0; i < size; i++) differ = (uint8_t)(differ | (one[i] ^ other[i]));
     return differ == 0;
 }
@@ -47,5 +47,5 @@ void rt_wipe(void *secret, size_t size) {
     for (size_t i = 0; i < size; i++) octets[i] = 0;
 }
 
-/* What libsodium's SHA-2 wipes its own state by. */
+/* libsodium's SHA-2 wipes its own state with this function. */
 void sodium_memzero(void *const secret, const size_t size) { rt_wipe(secret, size); }

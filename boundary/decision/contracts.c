@@ -8,7 +8,8 @@ uint32_t rt_cells(const rt_contract *contract) {
     return cells;
 }
 
-/* Whether every argument is in its parameter's range; a place has no range but that of all coordinates. As many as there are. */
+/* Whether every argument is in its parameter's range; a place is only bounded by the range of coordinates. The number of arguments is
+   right. */
 bool rt_fits(rt_list arguments, const rt_contract *contract) {
     rt_list left = contract->parameters;
     rt_parameter parameter;
@@ -35,7 +36,7 @@ int64_t rt_longest(const rt_contract *contract, const rt_vehicle *vehicle, int64
     return limit_us ? limit_us : contract->duration_us ? contract->duration_us : vehicle->endurance_us;
 }
 
-/* Whether the battery holds what is needed to finish, to come home and the reserve. */
+/* Whether the battery holds the charge to finish, to return and the reserve. */
 rt_truth rt_charge_suffices(const rt_contract *contract, const rt_vehicle *vehicle, int64_t asked, rt_value battery,
                             rt_value drain, const rt_volume *volume) {
     bool stays = contract->motion.kind != RT_HOME && contract->motion.kind != RT_LAND;

@@ -27,7 +27,7 @@ static bool same_rule(const rt_rule *one, const rt_rule *other) {
            one->source == other->source && one->start == other->start && one->end == other->end && one->second == other->second;
 }
 
-/* Rules that are the same are candidates alike. */
+/* Equal rules have equal candidates. */
 int64_t rt_rule_number(const rt_prepared_invocation *invocation, uint32_t rule) {
     const rt_rule *rules = invocation->policy->policy->rules;
     uint32_t at = invocation->rule_count;
@@ -35,7 +35,7 @@ int64_t rt_rule_number(const rt_prepared_invocation *invocation, uint32_t rule) 
     return at > 0 ? invocation->rules[at - 1] : rule;
 }
 
-/* The number of the rule whose target flies: that of the first rule with this very target. */
+/* The number of the rule whose target flies: the first rule with this target. */
 int64_t rt_degrade_number(const rt_prepared_invocation *invocation, uint32_t rule) {
     const rt_rule *rules = invocation->policy->policy->rules;
     for (uint32_t at = 0; at < invocation->rule_count; at++) {
@@ -49,7 +49,7 @@ int64_t rt_degrade_number(const rt_prepared_invocation *invocation, uint32_t rul
 void rt_begin_case(rt_prepared_invocation *invocation, const rt_state *state, const rt_context *context, const rt_now *now,
                    rt_case *one) {
     one->invocation = invocation;
-    invocation->planner.along = invocation->along; /* here, for it may have been copied */
+    invocation->planner.along = invocation->along; /* here, because it may have been copied */
     one->policy = invocation->policy->policy;
     one->context = context;
     one->state = state;
@@ -59,7 +59,7 @@ void rt_begin_case(rt_prepared_invocation *invocation, const rt_state *state, co
     one->released_us = context ? context->released_us : 0;
 }
 
-/* The steps of design 4.1; one that does not pass says so. */
+/* The steps of design 4.1; each returns whether it passes. */
 
 static bool step_integrity(rt_case *one, rt_decision *decision) {
     const rt_context *context = one->context;
@@ -70,7 +70,7 @@ static bool step_integrity(rt_case *one, rt_decision *decision) {
     return !one->invocation->misfit || rt_found(decision, RT_ARGUMENT_RANGE, RT_NO_CLAUSE);
 }
 
-/* Valid from the moment of issue to its end, both included. */
+/* Checks the validity, from the moment of issue to its end, both included. */
 static bool step_freshness(rt_case *one, rt_decision *decision) {
     const rt_invocation *invocation = &one->invocation->invocation;
     int64_t issued = invocation->issued_at_us, end = issued + invocation->contract.validity_us, utc = one->now.utc_us,
@@ -81,7 +81,7 @@ static bool step_freshness(rt_case *one, rt_decision *decision) {
     return rt_found(decision, utc - error > end ? RT_EXPIRED : RT_CLOCK_UNCERTAIN, RT_NO_CLAUSE);
 }
 
-/* The timing classes that a source may use: an agent never reacts, a reflex does nothing else. */
+/* The timing classes that a source may use: an agent may not request reflexes, and a reflex may only react. */
 static bool may_use(int64_t source, int64_t timing_class) {
     if (source == RT_SOURCE_REFLEX) return timing_class == RT_REFLEX;
     return timing_class == RT_TACTICAL || (timing_class == RT_SEMANTIC && source != RT_SOURCE_ONBOARD);
@@ -116,7 +116,7 @@ static bool in_time(const rt_approval *answer, uint16_t rule, int64_t role, int6
     return is_about(answer, rule) && answer->role == role && answer->monotonic_us <= end;
 }
 
-/* When grants that came by `end` were enough, of one role or of two people: the earliest moment; false where none were. */
+/* When enough grants had arrived by `end`, of one role or of two people: the earliest moment; false if there are not enough. */
 static bool granted(const rt_context *context, const rt_rule *rule, uint16_t number, int64_t end, int64_t *when) {
     bool found = false;
     for (uint32_t i = 0; i < context->approval_count; i++) {
@@ -154,26 +154,26 @@ static bool step_confirmation(rt_case *one, rt_decision *decision) {
     return doubt == RT_NO_CLAUSE || rt_found(decision, RT_AWAITING_APPROVAL, rt_rule_number(one->invocation, (uint32_t)doubt));
 }
 
-/* Deferred while one of its phases is still to come, denied when none is. Before the first, all are to come. */
+/* Deferred while one of the invocation's phases is still to come, denied when none is left. Before the first phase, all are to come. */
 static bool step_phase(rt_case *one, rt_decision *decision) {
     int64_t current = rt_max(one->context->phase, -1) + 1;
     uint64_t coming = current > 63 ? 0 : (uint64_t)one->invocation->invocation.phases << 1 >> current;
     return (coming & 1) || rt_found(decision, coming ? RT_PHASE_NOT_REACHED : RT_PHASE_PASSED, RT_NO_CLAUSE);
 }
 
-/* A release still to come gains nothing. */
+/* A later release does not help. */
 static bool step_timing(rt_case *one, rt_decision *decision) {
     int64_t spare = one->invocation->invocation.contract.deadline_us - one->context->remaining_us;
     return rt_max(one->now.monotonic_us - one->released_us, 0) <= spare || rt_found(decision, RT_NO_SLACK, RT_NO_CLAUSE);
 }
 
-/* The first clause of a list that is not true everywhere: the first that is false fails, else the first unknown one is told. */
+/* The first clause of a list that is not true everywhere: the first false one fails, else the first unknown one is reported. */
 typedef struct {
     int64_t reason, clause; /* of the first that is unknown */
     bool doubt;
 } tally;
 
-/* Count a condition; false where it surely fails. */
+/* Count a condition; false if it certainly fails. */
 static bool holds(tally *of, rt_truth truth, int64_t clause) {
     truth = rt_everywhere(truth);
     if (truth == RT_UNKNOWN && !of->doubt) {
@@ -183,7 +183,7 @@ static bool holds(tally *of, rt_truth truth, int64_t clause) {
     return truth != RT_FALSE;
 }
 
-/* The number of a contract's own clause, `at` of its list; where several are the same, that of the last. */
+/* The number of a contract's own clause, `at` of its list; of equal clauses, that of the last. */
 static int64_t own_number(const rt_case *one, const rt_clause *clause) {
     const rt_contract *contract = &one->invocation->invocation.contract;
     const rt_list lists[3] = {contract->require, contract->assume, contract->maintain};
@@ -197,7 +197,7 @@ static int64_t own_number(const rt_case *one, const rt_clause *clause) {
     return found;
 }
 
-/* Whether no clause of a list is false; the first unknown one is told. */
+/* Whether no clause of a list is false; the first unknown one is reported. */
 static bool all_hold(const rt_case *one, rt_list clauses, const rt_environment *at, tally *of, int64_t reason,
                      rt_decision *decision) {
     rt_clause clause;
@@ -245,7 +245,7 @@ static bool step_safety(rt_case *one, rt_decision *decision) {
     return told(&of, decision);
 }
 
-/* The earliest of deadline, end of validity and the moment when something that was read is stale. */
+/* The earliest of deadline, end of validity and the moment when a value that was read becomes stale. */
 static int64_t valid_until(const rt_case *one) {
     const rt_prepared_invocation *invocation = one->invocation;
     const rt_contract *contract = &invocation->invocation.contract;

@@ -26,11 +26,11 @@ typedef struct {
     int32_t x0, y0, x1, y1;
 } rt_edge;
 
-/* Where the edges of a zone are, by horizontal bands (outline.py, `Bands`). A circle has no edges. */
+/* The edges of a zone, by horizontal bands (outline.py, `Bands`). A circle has no edges. */
 typedef struct {
     uint32_t first, count; /* in `edges` */
-    uint32_t bands, starts; /* how many, and where their first entries are told in `starts` */
-    int64_t south, height; /* of the lowest band, and of each */
+    uint32_t bands, starts; /* their number, and the index of their first entries in `starts` */
+    int64_t south, height; /* the lowest band, and the height of each */
     int64_t x, y, square, radius; /* of a circle; the radius is rounded up */
 } rt_prepared_zone;
 
@@ -39,7 +39,7 @@ typedef struct {
 /* A zone with n > 16 edges has at most isqrt(n) <= n / 4 bands, any other has one; each zone has one start more than bands. */
 #define RT_MAX_STARTS (RT_MAX_TOTAL_VERTICES / 4 + 2 * RT_MAX_ZONES)
 
-/* What loading needs for a while. */
+/* Working memory for loading. */
 typedef struct {
     uint16_t order[RT_MAX_TOTAL_VERTICES], before[RT_MAX_TOTAL_VERTICES], crossed[RT_MAX_TOTAL_VERTICES],
         moved[RT_MAX_TOTAL_VERTICES];
@@ -48,10 +48,10 @@ typedef struct {
 
 typedef struct {
     const rt_policy *policy;
-    int64_t stale_us[RT_MAX_SLOTS], most[RT_MAX_SLOTS]; /* what a slot may hold */
+    int64_t stale_us[RT_MAX_SLOTS], most[RT_MAX_SLOTS]; /* the limits of a slot */
     uint8_t kinds[RT_MAX_SLOTS];
     uint8_t cells[RT_MAX_CONTRACTS][RT_MAX_CELLS]; /* the parameter kind at each first cell, RT_NO_KIND elsewhere */
-    rt_slots monitor_reads[RT_MAX_MONITORS]; /* what a monitor reads, itself or through those before it */
+    rt_slots monitor_reads[RT_MAX_MONITORS]; /* the slots that a monitor reads, directly or through earlier ones */
     rt_prepared_zone zones[RT_MAX_ZONES];
     rt_edge edges[RT_MAX_TOTAL_VERTICES];
     uint16_t entries[RT_MAX_ENTRIES]; /* edges of a band, counted from the first of their zone */
@@ -60,7 +60,7 @@ typedef struct {
     rt_scratch scratch;
 } rt_prepared_policy;
 
-/* Where something flies (volume.py): along a path of so many points, at an altitude if it has one. */
+/* Where a skill flies (volume.py): along a path of points, at an altitude if it has one. */
 typedef struct {
     int64_t kind, altitude;
     bool has_altitude;
@@ -68,7 +68,7 @@ typedef struct {
     int64_t x, y; /* the first point */
     rt_list path; /* all of them, where there are more than one */
     int64_t farthest; /* the greatest square of a distance from home on it */
-    uint8_t *along; /* what is remembered of the path, by zone: 0 where it was not asked; NULL where nothing is */
+    uint8_t *along; /* cached results of the path, by zone: 0 if there is none; NULL without a cache */
 } rt_planner;
 
 typedef struct {
@@ -80,19 +80,19 @@ typedef struct {
     uint32_t rule_count;
     rt_planner planner;
     uint8_t along[RT_MAX_ZONES];
-    rt_slots reads; /* what a decision may read */
+    rt_slots reads; /* the slots that a decision may read */
     int64_t phase; /* its number among the policy's phase names, RT_NO_PHASE */
     int64_t rests_us, lasts_us;
-    int64_t asked; /* the slowest speed that it and the steps before it ask for, mm/s; 0 if none does */
+    int64_t asked; /* the slowest speed that this step and earlier ones request, mm/s; 0 if none does */
 } rt_prepared_invocation;
 
 #define RT_NO_PHASE (-1)
-#define RT_START (-2) /* nothing was tried yet */
+#define RT_START (-2) /* no link was tried yet */
 
 /* prepare.c: `malformed`, or NULL */
 rt_refusal rt_prepare(const rt_policy *policy, rt_prepared_policy *prepared);
 rt_refusal rt_prepare_mission(const rt_mission *mission, rt_prepared_policy *policy);
-/* Only for a mission that rt_prepare_mission found well-formed. */
+/* Only for a mission that rt_prepare_mission accepted. */
 void rt_prepare_invocation(const rt_mission *mission, uint32_t step, const rt_prepared_policy *policy,
                            rt_prepared_invocation *invocation);
 
@@ -100,8 +100,8 @@ void rt_prepare_invocation(const rt_mission *mission, uint32_t step, const rt_pr
 void rt_decide(rt_prepared_invocation *invocation, const rt_state *state, const rt_context *context, const rt_now *now,
                rt_decision *decision);
 
-/* fallbacks.c. The target of a `degrade` rule that matches: `-1 - rule`, or RT_NO_TARGET. (session.py: a link DEGRADE is asked for;
-   the link that flies is `policy->rules[rule].target`.) */
+/* fallbacks.c. The target of a matching `degrade` rule: `-1 - rule`, or RT_NO_TARGET. (session.py: a link DEGRADE is requested; the
+   link that flies is `policy->rules[rule].target`.) */
 int64_t rt_choose_degrade(rt_prepared_invocation *invocation, const rt_state *state, const rt_now *now);
 /* Whether a link of a chain may fly now; `phase` is that of the invocation whose chain it is, RT_NO_PHASE for the contingency. */
 bool rt_link_admissible(const rt_link *link, const rt_prepared_policy *policy, const rt_state *state, const rt_now *now,

@@ -5,7 +5,7 @@
 
 typedef struct {
     int64_t number, factor;
-    rt_truth truth; /* of a truth value; of a number RT_UNKNOWN where a part of it is missing, else 0 */
+    rt_truth truth; /* of a truth value; of a number RT_UNKNOWN if a part of it is missing, else 0 */
 } cell;
 
 /* Whether left - right is at most `bound`, or, for RT_OP_EQ, is 0. */
@@ -28,7 +28,7 @@ static cell signal(int64_t slot, const rt_environment *at) {
 
 static int64_t argument(int64_t number, const rt_environment *at) { return at->arguments[(uint64_t)number % RT_MAX_CELLS]; }
 
-/* Conditions that ask neither for numbers nor for other conditions. */
+/* Conditions that read neither numbers nor other conditions. */
 static rt_truth atom(int64_t op, int64_t a, int64_t b, const rt_environment *at) {
     const rt_situation *now = at->now;
     const rt_policy *policy = now->policy->policy;
@@ -51,7 +51,7 @@ static rt_truth atom(int64_t op, int64_t a, int64_t b, const rt_environment *at)
         zone = argument(a, at);
         table = RT_AT(policy->tables, b);
         if (!rt_within(zone, 0, (int64_t)table.count - 1))
-            return RT_UNKNOWN; /* an argument out of range is no zone */
+            return RT_UNKNOWN; /* an argument out of range does not name a zone */
         return rt_zone_holds(now, (uint32_t)rt_int_at(table, (uint32_t)zone), at->volume, at->through_us);
     case RT_OP_ARGUMENT_POINT_IN:
         truth = rt_zone_contains(now->policy, (uint32_t)b, argument(a, at), argument(a + 1, at)) ? RT_TRUE : RT_FALSE;
@@ -70,11 +70,11 @@ static rt_truth atom(int64_t op, int64_t a, int64_t b, const rt_environment *at)
 
 rt_truth rt_evaluate(rt_list code, const rt_environment *at) {
     cell stack[2 * RT_MAX_STACK] = {{0, 0, 0}};
-    uint32_t top = 0; /* the last value; the first of the stack is none */
+    uint32_t top = 0; /* the last value; the stack is never empty here */
     int64_t op = 0, a = 0, b = 0;
     while (rt_next_int(&code, &op) && rt_next_int(&code, &a) && rt_next_int(&code, &b)) {
         top += (uint32_t)rt_pushes(op);
-        cell *to = &RT_AT(stack, top), *right = &RT_AT(stack, top + 1); /* `right` where there are two operands */
+        cell *to = &RT_AT(stack, top), *right = &RT_AT(stack, top + 1); /* `right` if there are two operands */
         switch (op) {
         case RT_OP_CONST:
             *to = (cell){a, 0, 0};

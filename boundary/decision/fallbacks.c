@@ -1,7 +1,7 @@
-/* Which link flies when something is refused. */
+/* Selects the link that flies after a refusal. */
 #include "parts.h"
 
-/* Whether a link that moves stays in the airspace, or goes home from where the vehicle should not be. */
+/* Whether a link that moves the vehicle stays in the airspace, or returns it home from outside. */
 static rt_truth deepens_no_breach(const rt_link *link, const rt_situation *now, const rt_contract *contract) {
     const rt_policy *policy = now->policy->policy;
     rt_planner planner;

@@ -18,7 +18,7 @@ static uint32_t last_band(const rt_prepared_zone *zone, const rt_edge *edge) {
     return (uint32_t)band_of(zone, rt_max(edge->y0, edge->y1));
 }
 
-/* Build the bands of a zone whose edges are there; `entries` and `starts` are how many are used, of all zones. */
+/* Build the bands of a zone from its edges; `entries` and `starts` are the numbers in use, of all zones. */
 void rt_prepare_zone(rt_prepared_policy *prepared, uint32_t number, uint32_t *entries, uint32_t *starts) {
     rt_prepared_zone *zone = &prepared->zones[number];
     const rt_edge *edges = &prepared->edges[zone->first];
@@ -36,7 +36,7 @@ void rt_prepare_zone(rt_prepared_policy *prepared, uint32_t number, uint32_t *en
         total = 0;
         for (uint32_t at = 0; at < zone->count; at++) total += last_band(zone, &edges[at]) - first_band(zone, &edges[at]) + 1;
     } while (total > (uint64_t)RT_REPEATS * zone->count);
-    /* count, sum up, and fill from behind: then each start is where its band begins */
+    /* count, sum up, and fill from the end: then each start is the beginning of its band */
     uint32_t *start = &prepared->starts[*starts];
     zone->starts = *starts;
     *starts += zone->bands + 1;
@@ -68,7 +68,7 @@ static bool in_rings(const rt_prepared_policy *policy, const rt_prepared_zone *z
     return inside;
 }
 
-/* Whether a line in the direction (x, y) parts an edge from a leg that is widened by `error` on all sides. */
+/* Whether a line in the direction (x, y) separates an edge from a leg that is widened by `error` on all sides. */
 static bool parted(int64_t x, int64_t y, const rt_edge *edge, int64_t x0, int64_t y0, int64_t x1, int64_t y1, int64_t error) {
     int64_t a = x * edge->y0 - y * edge->x0, b = x * edge->y1 - y * edge->x1, c = x * y0 - y * x0, d = x * y1 - y * x1;
     int64_t reach = (rt_abs(x) + rt_abs(y)) * error;
@@ -90,7 +90,7 @@ static bool clear_of_rings(const rt_prepared_policy *policy, const rt_prepared_z
     int64_t first = rt_max(band_of(zone, south), 0), last = rt_min(band_of(zone, north), zone->bands - 1);
     if (first > last) return true;
     const uint32_t start = RT_AT(policy->starts, zone->starts + (uint32_t)first), end = RT_AT(policy->starts, zone->starts + (uint32_t)last + 1);
-    for (uint32_t at = start; at < end; at++) { /* an edge that spans bands comes once for each */
+    for (uint32_t at = start; at < end; at++) { /* an edge that spans several bands appears once in each */
         const rt_edge *edge = &RT_AT(policy->edges, zone->first + RT_AT(policy->entries, at));
         if (rt_max(edge->x0, edge->x1) < west || rt_min(edge->x0, edge->x1) > east) continue;
         if (rt_max(edge->y0, edge->y1) < south || rt_min(edge->y0, edge->y1) > north) continue;
@@ -109,7 +109,7 @@ static bool in_circle(const rt_prepared_zone *zone, int64_t x, int64_t y, int64_
     return dx * dx + dy * dy < zone->square;
 }
 
-/* Whether a leg keeps further than `radius` from the centre; its length is rounded up, for safety. */
+/* Whether a leg stays farther than `radius` from the centre; its length is rounded up, for safety. */
 static bool outside_circle(const rt_prepared_zone *zone, int64_t x0, int64_t y0, int64_t x1, int64_t y1, int64_t radius) {
     int64_t ux = x1 - x0, uy = y1 - y0, vx = zone->x - x0, vy = zone->y - y0, wx = zone->x - x1, wy = zone->y - y1;
     int64_t along = ux * vx + uy * vy, square = ux * ux + uy * uy;
@@ -129,7 +129,7 @@ bool rt_zone_contains(const rt_prepared_policy *policy, uint32_t number, int64_t
     return zone->count ? in_rings(policy, zone, x, y) : in_circle(zone, x, y, 0);
 }
 
-/* Whether a leg, widened by `error`, is wholly inside or wholly outside. Its ends are within RT_MAX_COORDINATE, so that
+/* Whether a leg, widened by `error`, is completely inside or completely outside. Its ends are within RT_MAX_COORDINATE, so that
    differences are within 2**30, cross products within 2**61 and their sums with the error's within 2**62. */
 bool rt_zone_clear(const rt_prepared_policy *policy, uint32_t number, int64_t x0, int64_t y0, int64_t x1, int64_t y1,
                    int64_t error) {

@@ -1,4 +1,4 @@
-/* What the files of this folder ask of each other; each group is a Python module's. */
+/* The interfaces between the files of this folder; each group belongs to one Python module. */
 #ifndef RT_DECISION_PARTS_H
 #define RT_DECISION_PARTS_H
 
@@ -20,11 +20,11 @@ static inline rt_truth rt_or(rt_truth a, rt_truth b) { return rt_not(rt_and(rt_n
 static inline rt_truth rt_everywhere(rt_truth a) { return a & RT_FALSE ? RT_FALSE : a & RT_UNKNOWN ? RT_UNKNOWN : a; }
 
 typedef struct {
-    int64_t value; /* 0 where it is missing */
+    int64_t value; /* 0 if it is missing */
     bool known;
 } rt_value;
 
-/* situation.py: one situation; what is missing, stale or beyond all sense is not known */
+/* situation.py: one situation; missing, stale and out-of-range values are unknown */
 typedef struct {
     const rt_prepared_policy *policy;
     rt_value slots[RT_MAX_SLOTS];
@@ -33,31 +33,31 @@ typedef struct {
 } rt_situation;
 
 void rt_situate(const rt_prepared_policy *policy, const rt_state *state, const rt_now *now, rt_situation *situation);
-/* The value of a slot; -1 is one that no signal owns. */
+/* The value of a slot; -1 means a slot without a signal. */
 rt_value rt_slot(const rt_situation *situation, int64_t slot);
 
 /* volume.py: from a place, along the first leg to the planner's path and along it, all widened by the position error */
 typedef struct {
-    const rt_planner *planner; /* NULL: where it is, and no more */
+    const rt_planner *planner; /* NULL: only the present place */
     int64_t x, y, error;
-    bool located, level; /* whether it is known where it begins, and how high */
-    bool climbs; /* where it begins, before the leg: heights start_low..high */
+    bool located, level; /* whether its start and its height are known */
+    bool climbs; /* the start, before the leg: heights start_low..high */
     int64_t start_low, leg_low, low, high; /* heights on the leg: leg_low..high; on the path: low..high */
 } rt_volume;
 
 void rt_plan_link(const rt_policy *policy, const rt_link *link, rt_planner *planner);
 void rt_plan_step(const rt_policy *policy, const rt_invocation *invocation, rt_planner *planner);
 rt_volume rt_here(const rt_situation *situation);
-/* `planner` is NULL for what stays where it is */
+/* `planner` is NULL for a skill without motion */
 rt_volume rt_plan_volume(const rt_situation *situation, const rt_planner *planner);
-/* How far from home the farthest place is, mm rounded up, position error aside; of a volume that is located. */
+/* The distance of the farthest place from home, mm rounded up, without the position error; for a volume with a known place. */
 int64_t rt_farthest(const rt_volume *volume);
 
 /* flying.py, contracts.py */
 uint32_t rt_root(uint64_t square); /* rounded down */
 static inline int64_t rt_root_up(int64_t square) { return square > 0 ? (int64_t)rt_root((uint64_t)square - 1) + 1 : 0; }
-/* Whether a charge is enough for the way home from so far and between two heights, rounded up, by what is declared and by
-   what is measured to be taken in a minute (0: nothing is). */
+/* Whether a charge is enough for the way home from this distance and between two heights, rounded up, with the declared and with the
+   measured drain per minute (0: not measured). */
 bool rt_brings_home(const rt_vehicle *vehicle, int64_t charge, int64_t distance, int64_t low, int64_t high, int64_t asked,
                     int64_t drain);
 uint32_t rt_cells(const rt_contract *contract);
@@ -70,17 +70,17 @@ rt_truth rt_charge_suffices(const rt_contract *contract, const rt_vehicle *vehic
 /* outline.py, zones.py */
 void rt_prepare_zone(rt_prepared_policy *prepared, uint32_t zone, uint32_t *entries, uint32_t *starts);
 bool rt_zone_contains(const rt_prepared_policy *policy, uint32_t zone, int64_t x, int64_t y);
-/* Whether a leg, widened by an error on all sides, is wholly inside or wholly outside, by a margin of at most 3 mm. */
+/* Whether a leg, widened by an error on all sides, is completely inside or completely outside, by a margin of at most 3 mm. */
 bool rt_zone_clear(const rt_prepared_policy *policy, uint32_t zone, int64_t x0, int64_t y0, int64_t x1, int64_t y1,
                    int64_t error);
-/* How many edges are compared with a leg between these heights at most. */
+/* The greatest number of edges that are compared with a leg between these heights. */
 uint32_t rt_zone_compared(const rt_prepared_policy *policy, uint32_t zone, int64_t y0, int64_t y1, int64_t error);
-/* Whether the places along a path are inside a zone, whatever their height; there is at least one. */
+/* Whether the places along a path are inside a zone at any height; there is at least one place. */
 rt_truth rt_zone_along(const rt_prepared_policy *policy, uint32_t zone, rt_list path, int64_t error);
-/* Whether a volume is inside a zone, at any moment from now to `through_us` from now. */
+/* Whether a volume is inside a zone, at some moment from now to `through_us` from now. */
 rt_truth rt_zone_holds(const rt_situation *situation, uint32_t zone, const rt_volume *volume, int64_t through_us);
 
-/* Whether a volume is in the airspace, of which there is one. */
+/* Whether a volume is in the airspace, if there is one. */
 rt_truth rt_airspace_keeps(const rt_situation *situation, const rt_volume *volume, int64_t through_us);
 
 /* times.py: over the moments low..high of UTC */
@@ -94,12 +94,12 @@ typedef struct {
     const rt_situation *now;
     const int64_t *arguments;
     int64_t phase;
-    const rt_volume *volume; /* where position (and `ranging`, height) may be */
+    const rt_volume *volume; /* where position (and with `ranging`, height) may be */
     bool ranging;
-    int64_t through_us; /* zones are asked about all moments until then */
+    int64_t through_us; /* zones are evaluated at all moments until then */
 } rt_environment;
 
-/* By how many values an instruction changes the stack. */
+/* The change of the stack's size by an instruction. */
 static inline int rt_pushes(int64_t op) {
     if (op == RT_OP_SCALE || op == RT_OP_NOT) return 0;
     return (op >= RT_OP_ADD && op <= RT_OP_NE) || op == RT_OP_AND || op == RT_OP_OR ? -1 : 1;
@@ -119,24 +119,24 @@ typedef struct {
     int64_t released_us; /* moved by an approval */
 } rt_case;
 
-/* The decision is for this reason, and says which clause (RT_NO_CLAUSE); false, for a step to return */
+/* The decision for this reason, with its clause (RT_NO_CLAUSE); returns false, for use as a step's result */
 bool rt_found(rt_decision *decision, int64_t reason, int64_t clause);
-/* The number of a rule that decides: where several are the same, that of the last. */
+/* The number of a deciding rule: of equal rules, the last. */
 int64_t rt_rule_number(const rt_prepared_invocation *invocation, uint32_t rule);
 int64_t rt_degrade_number(const rt_prepared_invocation *invocation, uint32_t rule);
 bool rt_same_clause(const rt_clause *one, const rt_clause *other);
-/* `context` is NULL where only links are asked for */
+/* `context` is NULL for decisions about links only */
 void rt_begin_case(rt_prepared_invocation *invocation, const rt_state *state, const rt_context *context, const rt_now *now,
                    rt_case *one);
 
 /* links.py */
-int64_t rt_fallback(const rt_case *one); /* a target, as rt_decision has it */
+int64_t rt_fallback(const rt_case *one); /* a target, as in rt_decision */
 
 /* tree.py */
 typedef struct {
     const rt_prepared_policy *policy;
     rt_list skills; /* code may name arguments that all of these have */
-    const uint8_t *own; /* in place of `skills`: the kind at each cell of one contract */
+    const uint8_t *own; /* instead of `skills`: the kind of each cell of one contract */
     uint32_t monitors;
     bool phased;
 } rt_scope;
@@ -148,7 +148,7 @@ void rt_read_where(const rt_vehicle *vehicle, rt_slots *slots);
 static inline bool rt_reads(const rt_slots *slots, int64_t slot) { return slots->bits[slot >> 6] >> (slot & 63) & 1; }
 static inline void rt_add_slot(rt_slots *slots, int64_t slot) { slots->bits[slot >> 6] |= (uint64_t)1 << (slot & 63); }
 
-/* checks: true where all is well */
+/* checks: true if there is no problem */
 bool rt_check_signals(const rt_policy *policy);
 bool rt_check_policy(const rt_policy *policy, rt_prepared_policy *prepared);
 bool rt_check_zones(const rt_policy *policy, rt_prepared_policy *prepared);
@@ -157,9 +157,9 @@ bool rt_check_contract(const rt_contract *contract, const rt_prepared_policy *po
 bool rt_check_chain(rt_list links, const rt_policy *policy);
 bool rt_check_link(const rt_link *link, const rt_policy *policy);
 bool rt_tightens(const rt_contract *mine, const rt_contract *policys);
-int rt_compare_words(rt_bytes one, rt_bytes other); /* as words that single spaces part, below, at or above 0 */
+int rt_compare_words(rt_bytes one, rt_bytes other); /* compared as words separated by single spaces: negative, 0 or positive */
 bool rt_check_mission(const rt_mission *mission, rt_prepared_policy *policy);
-/* Sorts numbers by heap; `after` says whether one comes after another. */
+/* Heap sort of numbers; `after` compares two of them. */
 void rt_sort(uint16_t *numbers, uint32_t count, bool (*after)(const void *of, uint16_t one, uint16_t other), const void *of);
 
 #endif

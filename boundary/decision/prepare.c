@@ -36,7 +36,7 @@ static bool speaks_of(rt_list list, int64_t value) {
     return list.count == 0 || rt_holds(list, value);
 }
 
-/* What a clause reads: see _reads and rests_us in prepare.py. */
+/* The slots that a clause reads: see _reads and rests_us in prepare.py. */
 static void read_clauses(rt_list clauses, const rt_prepared_policy *policy, rt_slots *reads, bool *monitored) {
     rt_clause clause;
     while (rt_next_clause(&clauses, &clause)) rt_read_code(policy, clause.code, reads, monitored);
@@ -63,7 +63,7 @@ void rt_prepare_invocation(const rt_mission *mission, uint32_t step, const rt_pr
         if (!speaks_of(rule->skills, invocation->skill) || !speaks_of(rule->roles, invocation->role) ||
             !speaks_of(rule->sources, invocation->source))
             continue;
-        if (rule->kind == RT_DEGRADE && rule->target.skill == invocation->skill) continue; /* it would refuse what it asks for */
+        if (rule->kind == RT_DEGRADE && rule->target.skill == invocation->skill) continue; /* it would refuse its own target */
         made->rules[made->rule_count++] = (uint16_t)at;
         if (rule->has_when) rt_read_code(prepared, rule->when.code, &made->reads, &monitored);
     }

@@ -3,7 +3,7 @@
 #include "wire/cancellation.h"
 #include "wire/recall.h"
 
-/* numbers of section 4.1: the last step that a request must pass for its id to be used up, and others */
+/* numbers of section 4.1: the last step that a request must pass for its id to be used, and others */
 enum { INTEGRITY = 1, AUTHORITY = 3, STATE = 6, ADMITTED = 8 };
 enum { HOLD = 1, REPLAN = 3 }; /* OnInadmissible */
 
@@ -53,7 +53,7 @@ static void consume(rt_session *session, int64_t step) {
     session->consumed[step / 8] = (uint8_t)(session->consumed[step / 8] | 1 << step % 8);
 }
 
-/* The steps from `first` on are others now, and were never used. */
+/* The steps from `first` on are new, and unused. */
 static void forget_steps(rt_session *session, int64_t first) {
     for (int64_t step = first; step < RT_MAX_INVOCATIONS; step++)
         session->consumed[step / 8] = (uint8_t)(session->consumed[step / 8] & ~(1 << step % 8));
@@ -91,8 +91,8 @@ rt_status rt_turn_of(const rt_session *session, int64_t kind, int64_t step, int6
     return rt_called_off(session) || passed_over || step > session->latest + 1 ? RT_NOT_CURRENT : RT_DECIDED;
 }
 
-/* Whether an answer leaves the id unused: a deferred step is asked for again, and so is one that its mission holds for, until its
-   deadline. */
+/* Whether an answer leaves the id unused. A deferred step may be requested again until its deadline, and so may a step whose mission
+   says to hold. */
 static bool may_ask_again(const rt_invocation *invocation, const rt_decision *decision) {
     bool waits = invocation->on_inadmissible == HOLD || invocation->on_inadmissible == REPLAN;
     if (decision->outcome == RT_FALLBACK) return waits && decision->reason != RT_NO_SLACK;
@@ -118,7 +118,7 @@ bool rt_session_give_back(rt_session *session, int64_t step) {
     return true;
 }
 
-/* The link of a chain of this number; there is one. */
+/* The link of a chain of this number, which exists. */
 static rt_link link_at(rt_list chain, int64_t number) {
     rt_link link;
     do
@@ -182,13 +182,13 @@ static rt_refusal take_replacement(rt_in_force *in_force, const rt_flight *fligh
     rt_refusal refused = rt_open_replacement(flight, document, found);
     if (refused == NULL) refused = rt_fit_replacement(found, bundle, released);
     if (refused != NULL) return refused;
-    uint32_t kept = (uint32_t)found->kept; /* at most as many as either mission has: it fits */
+    uint32_t kept = (uint32_t)found->kept; /* at most as many as either mission has, so they fit */
     for (uint32_t step = kept; step < new->invocation_count; step++) {
         rt_invocation_at(new, step, &invocation);
         if (is_known(in_force, invocation.invocation_id)) return "id-seen";
     }
     if (rt_prepare_mission(new, &in_force->prepared) != NULL) return "malformed";
-    /* no flight comes near these: a document of 256 KiB has no 2,048 steps, and their number is bounded */
+    /* no flight reaches these limits: a document of 256 KiB cannot contain 2,048 steps, and the number of documents is bounded */
     if (in_force->known_count + new->invocation_count - kept > RT_MAX_KNOWN) return "too-many";
     for (uint32_t step = kept; step < old->invocation_count; step++) {
         rt_invocation_at(old, step, &invocation);
@@ -204,7 +204,7 @@ static rt_refusal take_replacement(rt_in_force *in_force, const rt_flight *fligh
     return NULL;
 }
 
-/* Whether the last step that was asked for may still be replaced: nothing of it was sent, nor is it used up. */
+/* Whether the last requested step may still be replaced: no frame of it was sent, and its id is not used. */
 static bool is_replaceable(const rt_session *session) {
     const rt_mission *mission = &session->in_force.bundle.mission;
     rt_invocation invocation;

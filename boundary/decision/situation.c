@@ -1,6 +1,6 @@
 #include "parts.h"
 
-/* A state or monitors of the wrong size are a fault of whoever made them; nothing of them is believed. */
+/* A state or monitors of the wrong size are a fault of their producer, and none of their values are used. */
 void rt_situate(const rt_prepared_policy *policy, const rt_state *state, const rt_now *now, rt_situation *situation) {
     int64_t slots = policy->policy->slots;
     uint32_t monitors = policy->policy->monitor_count;

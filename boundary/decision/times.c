@@ -1,11 +1,11 @@
-/* Windows of the local day or week, and when a zone exists. A moment t with an error e is somewhere in t - e..t + e: a window
-   holds when all of that is inside it, fails when all of it is outside, and is unknown otherwise. Moments and errors are within
-   2**53, windows and offsets within a week. */
+/* Windows of the local day or week, and the existence of zones. A moment t with an error e is somewhere in t - e..t + e: a window holds
+   when all of that range is inside it, fails when all of it is outside, and is unknown otherwise. Moments and errors are within 2**53,
+   windows and offsets within a week. */
 #include "parts.h"
 
 #define RT_MONDAY (3 * RT_DAY) /* 1970 began on a Thursday; weeks begin with Monday */
 
-/* What is asked, and the stretch of windows that may go on: from..to. */
+/* The queried range, and the run of windows that may continue: from..to. */
 typedef struct {
     int64_t low, high, error, first, from, to;
     bool begun;
@@ -24,15 +24,15 @@ static bool next_offset(rt_list *left, int64_t *moment, int64_t *offset) {
     return rt_next_int(left, moment) && rt_next_int(left, offset);
 }
 
-/* The next of some windows, which are in a list or, where it is empty, in a table. */
+/* The next of some windows, from a list or, if that is empty, from a table. */
 static void take(rt_list *left, const int64_t fixed[4], uint32_t pair, int64_t *start, int64_t *over) {
     *start = fixed[2 * pair % 4];
     *over = fixed[2 * pair % 4 + 1];
     if (rt_next_int(left, start)) rt_next_int(left, over);
 }
 
-/* Windows from the first of `windows` until before the second, and so on; where there are none, of `fixed`. Local time is known
-   from the first moment of `offsets` until before the last. */
+/* Windows from the first of `windows` to before the second, and so on; if there are none, of `fixed`. Local time is known from the
+   first moment of `offsets` to before the last. */
 static rt_truth in_windows(const rt_vehicle *vehicle, rt_list windows, const int64_t fixed[4], uint32_t pairs, int64_t period,
                            int64_t low, int64_t high, int64_t error) {
     rt_list offsets = vehicle->offsets;
@@ -40,8 +40,8 @@ static rt_truth in_windows(const rt_vehicle *vehicle, rt_list windows, const int
     asked of = {.low = low, .high = high, .error = error, .first = low - error};
     int64_t at = of.first, end = high + error + 1, last = end, start, over, begins = 0, ends = 0;
     const rt_truth all = error ? RT_TRUE | RT_FALSE | RT_UNKNOWN : RT_MIXED;
-    /* no stretch of windows, or without, lasts longer than this: a period, and at each change of the offset another and two days;
-       with a greater error nothing but UNKNOWN comes of a window that begins or ends */
+    /* no run of windows or gap lasts longer than this: a period, and at each change of the offset another period and two days; with a
+       greater error, a window that begins or ends is always UNKNOWN */
     const int64_t longest = zoned ? (int64_t)1 << 48 : RT_WEEK;
     rt_list left = windows;
     take(&left, fixed, 0, &start, &over);

@@ -1,6 +1,6 @@
-/* Is postfix code well-formed? The bundle's is never trusted to be. Every number is a sum of state slots and argument cells times
-   factors, plus a constant; what is merged there may cancel out, so the bound on what it can be is on the merged sum. By that bound
-   all factors together are at most 2**62 / RT_MAX_VALUE = 512. */
+/* Checks that postfix code is well-formed. The bundle's code is untrusted. Every number is a sum of state slots and argument cells
+   times factors, plus a constant; terms of a merged sum may cancel, so the bound applies to the merged sum. By that bound all factors
+   together are at most 2**62 / RT_MAX_VALUE = 512. */
 #include "parts.h"
 
 #define RT_MOST_FACTORS (RT_MAX_MAGNITUDE / RT_MAX_VALUE)
@@ -17,8 +17,8 @@ static bool bounded(const sum *of) {
     return all <= RT_MOST_FACTORS && rt_abs(of->constant) + all * RT_MAX_VALUE <= RT_MAX_MAGNITUDE;
 }
 
-/* Whether one sum plus or minus (`sign`) another is bounded; it then takes the place of the first. Both are bounded: a factor of
-   the result is within 1,024 whatever comes of it. */
+/* Whether one sum plus or minus (`sign`) another is bounded; the result replaces the first. Both are bounded, so a factor of the result
+   is within 1,024. */
 static bool add(sum *one, const sum *other, int sign) {
     int64_t constant = sign * other->constant;
     if (constant > 0 ? one->constant > RT_MAX_MAGNITUDE - constant : one->constant < -RT_MAX_MAGNITUDE - constant) return false;
@@ -42,7 +42,7 @@ static bool scale(sum *of, int64_t factor) {
     return bounded(of);
 }
 
-/* Whether the parameter at an argument cell is of one of two kinds in every skill, of which there is one at least. */
+/* Whether the parameter at an argument cell is of one of two kinds in every skill, of which there is at least one. */
 static bool argument(const rt_scope *scope, int64_t cell, uint8_t kind, uint8_t other) {
     rt_list left = scope->skills;
     int64_t skill;
@@ -55,7 +55,7 @@ static bool argument(const rt_scope *scope, int64_t cell, uint8_t kind, uint8_t 
     return scope->skills.count > 0;
 }
 
-/* Windows of a week begin and end within it, one after the other. */
+/* Windows of a week lie within it, one after the other. */
 bool rt_windows_fit(rt_list windows) {
     int64_t before = -1, moment;
     if (windows.count == 0 || windows.count % 2) return false;
@@ -73,7 +73,7 @@ static bool phases(const rt_scope *scope, rt_list set) {
     return scope->phased;
 }
 
-/* What asks neither for numbers nor for other conditions. */
+/* Code that reads neither numbers nor other conditions. */
 static bool atom(int64_t op, int64_t a, int64_t b, const rt_scope *scope) {
     const rt_policy *policy = scope->policy->policy;
     bool slot = rt_within(a, 0, policy->slots - 1), set = rt_within(b, 0, (int64_t)policy->set_count - 1);
@@ -103,7 +103,7 @@ static bool atom(int64_t op, int64_t a, int64_t b, const rt_scope *scope) {
     }
 }
 
-/* Do one instruction; false where it is malformed. `top` is above the last value. */
+/* Execute one instruction; false if it is malformed. `top` is above the last value. */
 static bool step(sum *stack, uint32_t *top, int64_t op, int64_t a, int64_t b, const rt_scope *scope) {
     const int pushes = rt_pushes(op);
     const bool truths = op >= RT_OP_AND;
@@ -170,7 +170,7 @@ void rt_read_where(const rt_vehicle *vehicle, rt_slots *slots) {
     if (vehicle->height != -1) rt_add_slot(slots, vehicle->height);
 }
 
-/* Add the slots that well-formed code reads, itself or through temporal monitors, and whether it asks one. */
+/* Add the slots that well-formed code reads, directly or through temporal monitors, and whether it reads a monitor. */
 void rt_read_code(const rt_prepared_policy *policy, rt_list code, rt_slots *slots, bool *monitored) {
     int64_t op, a, b;
     while (rt_next_int(&code, &op) && rt_next_int(&code, &a) && rt_next_int(&code, &b)) {

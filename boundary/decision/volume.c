@@ -1,7 +1,7 @@
 #include "parts.h"
 
-/* So much below the height that it returns at, mm, a vehicle sets off for home; from no further away than NEAR, or than a third of
-   the height, it may be flown lower. */
+/* A vehicle starts the way home this far below its return altitude, mm; within NEAR, or within a third of the height, the return may be
+   lower. */
 #define SHORT 2000
 #define NEAR 10000
 #define STEEP 3

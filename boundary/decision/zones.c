@@ -14,7 +14,7 @@ rt_truth rt_zone_along(const rt_prepared_policy *policy, uint32_t zone, rt_list 
     return truth;
 }
 
-/* The same of the leg to a planner's path. */
+/* The same for the leg to a planner's path. */
 static rt_truth along_leg(const rt_prepared_policy *policy, uint32_t zone, const rt_volume *volume) {
     bool leads = volume->planner && volume->planner->points;
     int64_t x = volume->x, y = volume->y, to_x = leads ? volume->planner->x : x, to_y = leads ? volume->planner->y : y;
@@ -22,7 +22,7 @@ static rt_truth along_leg(const rt_prepared_policy *policy, uint32_t zone, const
     return rt_zone_contains(policy, zone, x, y) ? RT_TRUE : RT_FALSE;
 }
 
-/* The same of the path, which is remembered: it depends on nothing else. */
+/* The same for the path; cached, because it depends on nothing else. */
 static rt_truth along_path(const rt_prepared_policy *policy, uint32_t zone, const rt_volume *volume) {
     const rt_planner *planner = volume->planner;
     rt_truth truth;
@@ -41,7 +41,7 @@ static rt_truth along_path(const rt_prepared_policy *policy, uint32_t zone, cons
     return truth;
 }
 
-/* Whether the heights low..high lie between floor and ceiling. A zone with neither does not ask for the height. */
+/* Whether the heights low..high lie between floor and ceiling. A zone with neither does not read the height. */
 static rt_truth between(const rt_zone *zone, int64_t low, int64_t high, bool known) {
     if (zone->floor == RT_LOWEST && zone->ceiling == RT_HIGHEST) return RT_TRUE;
     if (!known) return RT_UNKNOWN;

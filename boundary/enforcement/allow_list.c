@@ -19,7 +19,7 @@ static bool is_own(const rt_frame *frame) {
            frame->payload[RT_HEARTBEAT_AUTOPILOT] == RT_MAV_AUTOPILOT_INVALID && frame->payload[RT_HEARTBEAT_BASE_MODE] == 0;
 }
 
-/* Whether the parameters of a COMMAND_LONG from number `first`, counted from 1, on are 0. */
+/* Whether the parameters of a COMMAND_LONG from number `first` (from 1) on are 0. */
 static bool are_zero(const rt_frame *frame, uint32_t first) {
     for (uint32_t at = first - 1; at < 7; at++)
         if (!rt_is_zero(rt_u32(frame, parameters[at])))
@@ -81,7 +81,7 @@ bool rt_is_of_fence(const rt_frame *frame, bool types_known, uint32_t types) {
         return payload[RT_MISSION_COUNT_MISSION_TYPE] == RT_MAV_MISSION_TYPE_FENCE;
     case RT_MSG_MISSION_CLEAR_ALL:
         return payload[RT_MISSION_CLEAR_ALL_MISSION_TYPE] == RT_MAV_MISSION_TYPE_FENCE;
-    case RT_MSG_MISSION_ITEM_INT: /* not `current`: 2 and 3 there are ArduPilot's way to say "go there now" */
+    case RT_MSG_MISSION_ITEM_INT: /* `current` must be 0: 2 and 3 are ArduPilot's encodings of "go there now" */
         number = rt_u16(frame, RT_MISSION_ITEM_INT_COMMAND);
         return payload[RT_MISSION_ITEM_INT_MISSION_TYPE] == RT_MAV_MISSION_TYPE_FENCE &&
                payload[RT_MISSION_ITEM_INT_CURRENT] == 0 && number >= RT_MAV_CMD_NAV_FENCE_RETURN_POINT &&
@@ -139,7 +139,7 @@ static bool is_point(rt_point there, const rt_command *command) {
     return false;
 }
 
-/* Parameters 2 and 3 of DO_SET_MODE that a kind of motion is made with; -1 where there are none. */
+/* Parameters 2 and 3 of DO_SET_MODE for a kind of motion; -1 if there are none. */
 static void mode_of(uint8_t autopilot, int64_t kind, int64_t mode[2]) {
     static const int8_t px4[][2] = {
         [RT_HOLD] = {-1, -1}, [RT_CLIMB] = RT_PX4_HOLD, [RT_FLY] = {-1, -1}, [RT_COVER] = {-1, -1},
@@ -185,7 +185,7 @@ static bool is_long(const rt_frame *frame, const rt_command *command, uint8_t au
     }
 }
 
-/* To Hold, or in Hold alone, where nothing is taken from a pilot who chose another mode. */
+/* Change to Hold, or only act in Hold, which overrides no pilot who chose another mode. */
 static bool is_reposition(const rt_frame *frame) {
     uint32_t flags = rt_u32(frame, RT_COMMAND_INT_PARAM2);
     return rt_u16(frame, RT_COMMAND_INT_COMMAND) == RT_MAV_CMD_DO_REPOSITION &&
@@ -193,7 +193,7 @@ static bool is_reposition(const rt_frame *frame) {
            (rt_is_whole(flags, RT_MAV_DO_REPOSITION_FLAGS_CHANGE_MODE) || rt_is_zero(flags));
 }
 
-/* DO_REPOSITION to no place, height or heading: PX4 brakes, and stays where it comes to stand. */
+/* DO_REPOSITION without place, height and heading: PX4 brakes, and stays where it stops. */
 static bool is_stop(const rt_frame *frame) {
     return is_reposition(frame) && rt_i32(frame, RT_COMMAND_INT_X) == RT_NO_PLACE &&
            rt_i32(frame, RT_COMMAND_INT_Y) == RT_NO_PLACE && rt_is_nan(rt_u32(frame, RT_COMMAND_INT_Z)) &&
@@ -211,7 +211,7 @@ static bool repositions(const rt_frame *frame, const rt_command *command, bool h
            (command->speed != 0 ? is_speed(speed, command) : rt_is_whole(speed, -1)) && is_point(there, command);
 }
 
-/* What the mask tells the autopilot to ignore may be anything. */
+/* Fields that the mask excludes may have any value. */
 static bool targets(const rt_frame *frame, const rt_command *command) {
     rt_point there = {
         rt_i32(frame, RT_SET_POSITION_TARGET_GLOBAL_INT_LAT_INT), rt_i32(frame, RT_SET_POSITION_TARGET_GLOBAL_INT_LON_INT)};

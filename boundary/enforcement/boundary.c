@@ -18,7 +18,7 @@ int64_t rt_own_now(const rt_boundary *boundary, const rt_now *named, int64_t own
     return boundary->clock.source;
 }
 
-/* Why a time of day that is named is not decided by: RT_DECIDED where it is. */
+/* Why a claimed time of day is not used for a decision: RT_DECIDED if it is. */
 static uint8_t disowned(const rt_boundary *boundary, const rt_now *named, int64_t own_us) {
     rt_now own;
     int64_t source = rt_own_now(boundary, named, own_us, &own);
@@ -26,7 +26,7 @@ static uint8_t disowned(const rt_boundary *boundary, const rt_now *named, int64_
     return source == RT_UTC_UNKNOWN ? RT_CLOCK_UNKNOWN : RT_CLOCK_APART;
 }
 
-/* Once it is known what time it is, keys that were taken for good by a clock that nobody vouched for are looked at by it. */
+/* Once the time is known, keys that were accepted by an unverified clock are checked again. */
 static bool is_dated(rt_boundary *boundary, int64_t own_us) {
     const rt_bundle *bundle = &boundary->session.in_force.bundle;
     rt_now own;
@@ -37,10 +37,10 @@ static bool is_dated(rt_boundary *boundary, int64_t own_us) {
     return boundary->dated;
 }
 
-/* Where its caller's clock is the only one. */
+/* For a boundary with only the caller's clock. */
 static bool keeps_time(rt_boundary *boundary, const rt_now *now) {
     if (now->utc_error_us > CLOCKS_PART_US)
-        return true; /* by a clock that does not know the time, nothing is granted anyway */
+        return true; /* a clock that does not know the time grants nothing in any case */
     int64_t ahead = now->utc_us - now->monotonic_us;
     if (!boundary->ahead_known) {
         boundary->ahead_known = true;
@@ -50,7 +50,7 @@ static bool keeps_time(rt_boundary *boundary, const rt_now *now) {
     return parted <= CLOCKS_PART_US && parted >= -CLOCKS_PART_US;
 }
 
-/* A request that was refused a decision. */
+/* A request that was refused without a decision. */
 static uint32_t undecided(rt_boundary *boundary, uint8_t status, rt_bytes request, uint8_t *out) {
     uint8_t digest[RT_DIGEST_BYTES];
     rt_sha256 hash;
@@ -61,7 +61,7 @@ static uint32_t undecided(rt_boundary *boundary, uint8_t status, rt_bytes reques
     return rt_write_refusal(status, boundary->chain.digest, out);
 }
 
-/* An answer about a step that equals the one before is counted, and no entry of its own. */
+/* An answer about a step that equals the previous one is counted and makes no entry. */
 static void chain_decided(rt_boundary *boundary, rt_bytes request, const rt_decision *decision, int64_t consumed, bool permitted) {
     const rt_request *asked = &boundary->asked;
     const int64_t said[5] = {asked->step, decision->outcome, decision->reason, decision->clause, decision->target};
@@ -129,7 +129,7 @@ uint32_t rt_enforce(rt_boundary *boundary, rt_bytes request, int64_t own_us, uin
     if (!rt_read_request(request, policy->slots, policy->monitor_count, asked) || rt_is_apart(asked->now.monotonic_us, own_us))
         return undecided(boundary, RT_MALFORMED, request, out);
     int64_t now_us = asked->now.monotonic_us;
-    /* a release to come would move the deadline */
+    /* a later release would move the deadline */
     if (now_us < boundary->now_us || now_us < asked->released_us || (own_us < 0 && !keeps_time(boundary, &asked->now)))
         return undecided(boundary, RT_MALFORMED, request, out);
     uint8_t clock = disowned(boundary, &asked->now, own_us);
@@ -141,14 +141,14 @@ uint32_t rt_enforce(rt_boundary *boundary, rt_bytes request, int64_t own_us, uin
         return undecided(boundary, (uint8_t)turn, request, out);
     if (asked->kind != RT_STEP)
         return answer_link(boundary, request, out);
-    /* nor was anything released before it was here */
+    /* nor could anything be released before it was received */
     if (asked->released_us < boundary->session.in_force.received_us[asked->step])
         return undecided(boundary, RT_MALFORMED, request, out);
     return answer_step(boundary, request, out);
 }
 
 rt_refusal rt_boundary_begin(rt_boundary *boundary, const rt_setup *setup) {
-    /* not the whole: of what a bundle may fill most is never touched, and needs no memory */
+    /* not all of it: most of a bundle's memory is never touched, and so needs none */
     boundary->loaded = boundary->opened = boundary->to_keep = false;
     boundary->bundle_size = boundary->document_size = boundary->document_count = 0;
     boundary->flights = boundary->challenges = 0;
@@ -182,7 +182,7 @@ static void policy_name(const rt_boundary *boundary, uint8_t name[RT_DIGEST_BYTE
 }
 
 rt_refusal rt_load(rt_boundary *boundary, const uint8_t flight[RT_FLIGHT_BYTES], const rt_now *named, int64_t own_us) {
-    rt_now by_us; /* by our own time of day, whatever is named: by what this machine has where that is not known */
+    rt_now by_us; /* by our own time of day, whatever is claimed: by this machine's clock if it is not known */
     const int64_t source = rt_own_now(boundary, named, own_us, &by_us);
     const rt_now *now = &by_us;
     by_us.monotonic_us = named->monotonic_us;
@@ -207,7 +207,7 @@ rt_refusal rt_load(rt_boundary *boundary, const uint8_t flight[RT_FLIGHT_BYTES],
     if (!boundary->opened) {
         uint8_t name[RT_DIGEST_BYTES];
         policy_name(boundary, name);
-        const int64_t earliest_us = now->utc_us - now->utc_error_us; /* nothing is forgotten that may not have expired yet */
+        const int64_t earliest_us = now->utc_us - now->utc_error_us; /* missions that may not have expired yet are not forgotten */
         refused = rt_may_open(boundary->kept, bundle->mission_digest, session->in_force.issued_at_us, boundary->expires_us, name, bundle->policy.version, earliest_us);
         if (refused != NULL) return refused;
         rt_open_mission(boundary->kept, bundle->mission_digest, boundary->expires_us, name, bundle->policy.version, earliest_us);
@@ -220,7 +220,7 @@ rt_refusal rt_load(rt_boundary *boundary, const uint8_t flight[RT_FLIGHT_BYTES],
     boundary->now_us = 0;
     boundary->document_count = 0;
     boundary->loaded = true;
-    /* what was opened before is brought down by the contingency, and no step of it begins again */
+    /* a mission that was opened before is brought down by the contingency, and no step of it begins again */
     executor->called_off = session->in_force.recalled = boundary->opened;
     return NULL;
 }
@@ -269,7 +269,7 @@ uint32_t rt_present(rt_boundary *boundary, const rt_now *now, int64_t released, 
         rt_chain_decline(&boundary->chain, document);
     }
     boundary->document_size = 0;
-    /* texts are for who shows them: the slug says all */
+    /* the caller makes the text from the slug */
     const char *slug = taken.refused == NULL ? "accepted" : taken.refused;
     const rt_bytes text = rt_words(slug);
     const rt_receipt receipt = {taken.kind, text, text, taken.step, taken.role, taken.granted, taken.expires_us,
@@ -277,7 +277,7 @@ uint32_t rt_present(rt_boundary *boundary, const rt_now *now, int64_t released, 
     return rt_write_receipt(&receipt, out);
 }
 
-/* What the session after this one begins with. One that has no number is not kept. */
+/* The digest that the next session begins with. A session without a number is not stored. */
 static void keep_session(rt_boundary *boundary) {
     if (boundary->attestation == 0) return;
     boundary->kept->session = boundary->attestation;

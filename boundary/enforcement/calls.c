@@ -2,10 +2,10 @@
 
 #include "wire/octets.h"
 
-/* What of a call is still to be read. */
+/* The unread rest of a call. */
 typedef struct {
     const uint8_t *at, *end;
-    bool short_; /* more was asked for than came */
+    bool short_; /* more was read than available */
 } reader;
 
 static rt_bytes rest_of(const reader *call) { return (rt_bytes){call->at, (uint32_t)(call->end - call->at)}; }
@@ -22,7 +22,7 @@ static uint32_t refuse(rt_refusal slug, uint8_t *out) {
     return 1 + words.size;
 }
 
-/* A time that a request may have: what is computed from it stays within 64 bits. */
+/* A time that a request may contain: computed values stay within 64 bits. */
 static bool is_time(int64_t time) { return time >= 0 && time <= RT_MAX_VALUE; }
 
 static uint32_t permitted(rt_refusal refused, const rt_permit *permit, uint8_t *out) {
@@ -68,7 +68,7 @@ static uint32_t observe(rt_boundary *boundary, rt_bytes frame, int64_t now_us, i
     return 2;
 }
 
-/* A part goes behind those before it; the first one begins anew. */
+/* A part follows the previous ones; the first one begins anew. */
 static rt_refusal stage(rt_boundary *boundary, int64_t what, int64_t at, rt_bytes part) {
     bool document = what == RT_CALL_PRESENT;
     uint32_t *size = document ? &boundary->document_size : &boundary->bundle_size;
@@ -76,7 +76,8 @@ static rt_refusal stage(rt_boundary *boundary, int64_t what, int64_t at, rt_byte
     if (!document && what != RT_CALL_LOAD) return "malformed";
     if (document ? !boundary->loaded : boundary->loaded && boundary->executor.flies) return document ? "not-loaded" : "flies";
     if (!document) {
-        if (rt_give_back(boundary)) boundary->to_keep = true; /* what nothing was sent of may be loaded again, after a crash too */
+        if (rt_give_back(boundary)) boundary->to_keep = true; /* a bundle of which nothing was sent may be loaded again, after a crash
+                                                                 too */
         boundary->loaded = false;
     }
     if (at == 0) *size = 0;
@@ -88,7 +89,7 @@ static rt_refusal stage(rt_boundary *boundary, int64_t what, int64_t at, rt_byte
     return NULL;
 }
 
-/* What nobody guesses: the keyed digest of a word and a count. */
+/* An unpredictable value: the keyed digest of a word and a count. */
 static void draw(const rt_boundary *boundary, rt_bytes domain, uint64_t number, uint8_t digest[RT_DIGEST_BYTES]) {
     uint8_t count[8];
     for (uint32_t octet = 0; octet < 8; octet++) count[octet] = (uint8_t)(number >> 8 * octet & 0xFF);
@@ -96,7 +97,7 @@ static void draw(const rt_boundary *boundary, rt_bytes domain, uint64_t number, 
     rt_hmac_sha256((rt_bytes){boundary->keys->session, RT_KEY_BYTES}, parts, 2, digest);
 }
 
-/* The id of the flight that begins next: nobody gives it one that was flown before. */
+/* The id of the next flight, which cannot be chosen to equal an earlier one. */
 static void next_flight(const rt_boundary *boundary, uint8_t flight[RT_FLIGHT_BYTES]) {
     static const uint8_t domain[] = "rtshcua/flight";
     uint8_t digest[RT_DIGEST_BYTES];
@@ -104,7 +105,7 @@ static void next_flight(const rt_boundary *boundary, uint8_t flight[RT_FLIGHT_BY
     memcpy(flight, digest, RT_FLIGHT_BYTES);
 }
 
-/* TIME: what time it is, and what the vehicle is asked where that is not known and its link has a key. */
+/* TIME: the time, and the challenge for the vehicle if the time is not known and its link has a key. */
 static uint32_t answer_time(rt_boundary *boundary, bool settle, int64_t own_us, uint8_t *out) {
     static const uint8_t domain[] = "rtshcua/challenge";
     static const rt_now nobody = {0, 0, RT_UTC_UNKNOWN_US};
@@ -139,7 +140,7 @@ static uint32_t load(rt_boundary *boundary, const rt_now *now, int64_t own_us, u
     return 2 + RT_FLIGHT_BYTES;
 }
 
-/* LOAD and PRESENT: about what was handed over in parts. */
+/* LOAD and PRESENT: for data that was transferred in parts. */
 static uint32_t answer_staged(rt_boundary *boundary, int64_t kind, reader *left, int64_t own_us, uint8_t *out) {
     rt_now now;
     const bool timed = take_now(left, &now);
@@ -155,7 +156,7 @@ static uint32_t answer_staged(rt_boundary *boundary, int64_t kind, reader *left,
     return 1 + rt_present(boundary, &now, released, own_us, out + 1);
 }
 
-/* What is set of the vehicle before a flight, and put back after it. */
+/* Parameters that are set before a flight, and restored after it. */
 static uint32_t answer_preparation(rt_boundary *boundary, int64_t kind, reader *left, int64_t own_us, uint8_t *out) {
     uint32_t size = 0;
     rt_refusal refused = NULL;
@@ -172,7 +173,7 @@ static uint32_t answer_preparation(rt_boundary *boundary, int64_t kind, reader *
     return 1 + size;
 }
 
-/* What the flight's executor is told, of a permit or of how a command ended. */
+/* Calls for the flight's executor, about a permit or the end of a command. */
 static uint32_t answer_executor(rt_boundary *boundary, int64_t kind, reader *left, int64_t own_us, uint8_t *out) {
     rt_executor *executor = &boundary->executor;
     rt_permit permit;
@@ -259,7 +260,7 @@ uint32_t rt_answer(rt_boundary *boundary, rt_bytes call, int64_t own_us, uint8_t
     case RT_CALL_PREPARED:
         return boundary->loaded ? answer_preparation(boundary, kind, &left, own_us, out) : refuse("not-loaded", out);
     case RT_CALL_STANDS:
-    case RT_CALL_OBSERVE: /* and what leaves always leaves, before a bundle is in force too */
+    case RT_CALL_OBSERVE: /* and frames that always pass do so before a bundle is in force too */
     case RT_CALL_SEAL:
         now_us = take(&left, 8);
         if (left.short_ || !is_time(now_us)) break;

@@ -1,8 +1,6 @@
-/* The calls that cross to a boundary outside the runtime, and their answers: octets in, octets out, whatever carries them. The other
-   end is rtshcua/onboard/enforcement/isolated.py.
-
-   A call is an octet that says which, and what follows it, big-endian; an answer is 0 and what is given back, or 1 and the slug of a
-   refusal. Nothing that a caller says is believed but by its seal: whatever comes, it is answered. */
+/* The calls to a boundary outside of the runtime, and their answers: octets in, octets out, over any transport. The other end is
+   rtshcua/onboard/enforcement/isolated.py. A call is one octet for its kind, followed by its data, big-endian; an answer is 0 and the
+   result, or 1 and the slug of a refusal. Data of a caller is only trusted by its seal, and every call is answered. */
 #ifndef RT_ENFORCEMENT_CALLS_H
 #define RT_ENFORCEMENT_CALLS_H
 
@@ -18,21 +16,21 @@ enum {
     RT_CALL_ENDED = 7,    /* token (8) or nothing */
     RT_CALL_LANDED = 8,
     RT_CALL_RELEASE = 9,
-    RT_CALL_OBSERVE = 10, /* now (8), a frame as it came -> what was made of it (1): rt_heard */
+    RT_CALL_OBSERVE = 10, /* now (8), a frame as received -> its verdict (1): rt_heard */
     RT_CALL_SEAL = 11,    /* now (8), a frame -> the octets to send */
-    RT_CALL_BEGIN = 12,     /* session (8), the digest of the one before (32): what is proposed -> those that it is */
+    RT_CALL_BEGIN = 12,     /* the proposed session (8) and digest of the previous one (32) -> the accepted ones */
     RT_CALL_STATEMENT = 13, /* whether it is the last (1), now (24) -> a signed statement of the boundary's own evidence */
     RT_CALL_DIGEST = 14,    /* -> the digest of that (32) */
-    RT_CALL_PERMIT = 15,    /* now (8), what is to be set -> its preparation permit */
+    RT_CALL_PERMIT = 15,    /* now (8), the parameters to set -> their preparation permit */
     RT_CALL_PREPARE = 16,   /* now (8), a preparation permit */
     RT_CALL_PREPARED = 17,  /* nothing more is set */
-    RT_CALL_STANDS = 18,    /* now (8) -> whether the vehicle is known to stand on the ground (1) */
+    RT_CALL_STANDS = 18,    /* now (8) -> whether the vehicle is known to be on the ground (1) */
     RT_CALL_AHEAD = 19, /* now (8), kind (1), link (1), the standing permit (56), then each frame of the link: size (2), octets
                            -> the serial of the link's permit (8), then the signature of each frame (13) if the link has a key */
     RT_CALL_FLIGHT = 20, /* -> the id of the flight that the next bundle begins (16) */
     RT_CALL_LOG = 21,    /* the checkpoint that begins the log of the flight -> its signature by the log's key (64) */
-    RT_CALL_TIME = 22,   /* whether no more is waited for (1) -> where the time of day is from (1), now by it (24), and the number that
-                            the vehicle is to send back in TIMESYNC (8), 0 for none */
+    RT_CALL_TIME = 22,   /* whether to stop waiting for a better source (1) -> the source of the time of day (1), now by it (24), and
+                            the number that the vehicle must return in TIMESYNC (8), 0 for none */
     RT_CALL_WITHDRAW = 23 /* now (8), the permit of a step, of which nothing was sent: it may be decided again */
 };
 
@@ -41,11 +39,11 @@ enum {
 #define RT_MAX_CALL (RT_MAX_PART + 64)
 #define RT_MAX_RESULT (RT_MAX_STATEMENT + 64)
 
-/* Answer one call into `out` of RT_MAX_RESULT octets; the size of the answer. `own_us` is our own monotonic time, -1 where the
-   caller's is the only one. */
+/* Answer one call into `out` of RT_MAX_RESULT octets; returns the size of the answer. `own_us` is our own monotonic time, -1 if there
+   is only the caller's. */
 uint32_t rt_answer(rt_boundary *boundary, rt_bytes call, int64_t own_us, uint8_t *out);
 
-/* What was answered last must not count, for it could not be kept: nothing more leaves, and the answer in `out` is a refusal now. */
+/* Revoke the last answer, because it could not be stored: nothing more is sent, and the answer in `out` becomes a refusal. */
 uint32_t rt_take_back(rt_boundary *boundary, uint8_t *out);
 
 #endif

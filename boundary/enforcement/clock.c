@@ -5,7 +5,7 @@
 
 #define SECOND_US 1000000
 #define CHALLENGE_US 5000000LL
-#define TIMES 16 /* octets of a payload that are looked at */
+#define TIMES 16 /* the octets of a payload that are read */
 
 static void take(rt_clock *clock, int64_t source, int64_t ahead_us, int64_t error_us, int64_t since_us) {
     clock->source = source;
@@ -57,7 +57,7 @@ static uint64_t le64(const uint8_t *at) {
     return value;
 }
 
-/* Message and first octets of a whole frame of an autopilot, with the zeros that are not sent; false for another. */
+/* Message and first octets of a complete frame of an autopilot, including trailing zeros that are not sent; false for another. */
 static bool of_autopilot(rt_bytes frame, uint32_t *message, uint8_t body[TIMES]) {
     if (frame.size < RT_HEADER || frame.at[0] != RT_MARKER || frame.at[6] != RT_MAV_COMP_ID_AUTOPILOT1) return false;
     const uint32_t length = frame.at[1];
@@ -90,7 +90,7 @@ void rt_clock_hear(rt_clock *clock, rt_bytes frame, uint8_t link, int64_t vehicl
 }
 
 bool rt_bears_out(const rt_now *own, const rt_now *named) {
-    if (own->utc_error_us >= RT_UTC_UNKNOWN_US) /* such an error, around such a time, has every year from 1970 to 2112 in it */
+    if (own->utc_error_us >= RT_UTC_UNKNOWN_US) /* an error that is so large covers every year from 1970 to 2112 */
         return named->utc_error_us >= RT_UTC_UNKNOWN_US && named->utc_us <= RT_UTC_UNKNOWN_US;
     return rt_abs(named->utc_us - own->utc_us) + own->utc_error_us <= named->utc_error_us + RT_APART_US;
 }

@@ -1,10 +1,10 @@
-/* One bounded manoeuvre, as the bundle has it: `Command` of onboard/ports.py. It exists only beside a permit. */
+/* One bounded manoeuvre from the bundle: `Command` of onboard/ports.py. It only exists with a permit. */
 #ifndef RT_ENFORCEMENT_COMMAND_H
 #define RT_ENFORCEMENT_COMMAND_H
 
 #include "model/flat.h"
 
-/* `path` is x0, y0, ... in local mm. Where `has_place` it is the one point `place`. Altitude mm above home, speed mm/s. */
+/* `path` is x0, y0, ... in local mm. If `has_place`, it is the single point `place`. Altitude mm above home, speed mm/s. */
 typedef struct {
     uint64_t token;
     int64_t kind, altitude, speed;
@@ -17,10 +17,10 @@ typedef struct {
 /* A local place in 1e-7 degree: `unproject` of model/flat/zone.py. */
 void rt_unproject(const rt_projection *projection, int64_t x, int64_t y, int64_t *latitude, int64_t *longitude);
 
-/* How far east a longitude is of another, at most 180 degrees: `meridian` of model/flat/zone.py, less the other. */
+/* The longitude relative to another one, at most 180 degrees: `meridian` of model/flat/zone.py, minus the other. */
 int64_t rt_east_of(int64_t longitude, int64_t other);
 
-/* A point of the path, in 1e-7 degree; false where there is none of this number. */
+/* A point of the path, in 1e-7 degree; false if there is none of this number. */
 bool rt_point_at(const rt_command *command, int64_t number, int64_t *latitude, int64_t *longitude);
 
 #endif

@@ -44,7 +44,7 @@ static void of_link(const rt_policy *policy, const rt_link *link, rt_command *co
         }
 }
 
-/* The command of a step or a link; false for one that the bundle does not have. */
+/* The command of a step or a link; false for one that is not in the bundle. */
 static bool command_of(const rt_executor *executor, const rt_permit *permit, rt_command *command) {
     const rt_policy *policy = executor->policy;
     rt_invocation invocation;
@@ -84,7 +84,7 @@ static bool command_of(const rt_executor *executor, const rt_permit *permit, rt_
     return false;
 }
 
-/* Where a serial stands among the used ones, or would. */
+/* The place of a serial among the used ones, present or not. */
 static uint32_t place_of(const rt_executor *executor, uint64_t serial) {
     uint32_t low = 0, high = executor->used_count;
     while (low < high) {
@@ -109,7 +109,7 @@ static void use(rt_executor *executor, uint64_t serial) {
     executor->used[at] = serial;
 }
 
-/* Where in its chain a fallback permit stands: a degrade rule's target comes before the first link. */
+/* The position of a fallback permit in its chain: a degrade rule's target comes before the first link. */
 static int64_t position(const rt_permit *permit) {
     return permit->link > RT_DEGRADE_LINK ? permit->link : RT_DEGRADE_LINK;
 }
@@ -123,7 +123,8 @@ static rt_refusal refuse_step(const rt_executor *executor, const rt_permit *perm
 }
 
 static rt_refusal refuse_link(const rt_executor *executor, const rt_permit *permit) {
-    if (permit->kind == RT_CONTINGENCY_LINK) /* holds may come and go; from what brings it home or down it goes on */
+    if (permit->kind == RT_CONTINGENCY_LINK) /* holds may be repeated; once a link brings the vehicle home or down, the chain continues
+                                                from there */
         return executor->final && permit->link < executor->contingency ? "permit/backwards" : NULL;
     if (permit->step < executor->step)
         return "permit/lapsed";
@@ -145,7 +146,7 @@ static void follow(rt_executor *executor, const rt_permit *permit, int64_t motio
     }
 }
 
-/* Why nothing is sent for a permit at a monotonic time; NULL where its command may be. */
+/* Why a permit is refused at a monotonic time; NULL if its command may be sent. */
 static rt_refusal refuse(const rt_executor *executor, const rt_permit *permit, int64_t now_us, rt_command *command) {
     if (executor->gate.chain->over)
         return "permit/session-over";
@@ -192,7 +193,7 @@ static rt_refusal dispatch(rt_executor *executor, const rt_permit *permit, int64
     return NULL;
 }
 
-/* A permit by which nothing is sent: why, at a monotonic time. */
+/* A refused permit: why, at a monotonic time. */
 static rt_refusal chained(rt_executor *executor, rt_refusal refused, int64_t now_us) {
     uint8_t time[8], *at = time;
     if (refused == NULL) return NULL;
@@ -211,7 +212,7 @@ rt_refusal rt_dispatch(rt_executor *executor, rt_bytes sealed, int64_t now_us, r
     return chained(executor, ours ? dispatch(executor, permit, now_us) : "permit/forged", now_us);
 }
 
-/* What the standing permit of a step that was sent permits of a link; or why it does not. */
+/* The command that a standing permit covers for a link; or why it is refused. */
 static rt_refusal standing_for(const rt_executor *executor, rt_bytes sealed, int64_t kind, int64_t link, rt_permit *permit) {
     rt_permit standing;
     if (!is_ours(executor, sealed, &standing))

@@ -45,7 +45,7 @@ void rt_gate_observe(rt_gate *gate, rt_bytes octets, int64_t now_us) {
     if (heard.message == RT_MSG_HEARTBEAT) {
         uint8_t autopilot = heard.payload[RT_HEARTBEAT_AUTOPILOT], kind = heard.payload[RT_HEARTBEAT_TYPE];
         bool known = autopilot == RT_MAV_AUTOPILOT_PX4 || autopilot == RT_MAV_AUTOPILOT_ARDUPILOTMEGA;
-        bool vehicle = kind < 64 && (RT_VEHICLES >> kind & 1) != 0; /* no ground station, gimbal or companion */
+        bool vehicle = kind < 64 && (RT_VEHICLES >> kind & 1) != 0; /* not a ground station, gimbal or companion */
         if (gate->system == 0 && known && vehicle) {
             gate->system = heard.system;
             gate->autopilot = autopilot;
@@ -75,7 +75,7 @@ void rt_gate_observe(rt_gate *gate, rt_bytes octets, int64_t now_us) {
         static const uint8_t fence_type[RT_NAME_OCTETS] = "FENCE_TYPE";
         if (memcmp(told.name, fence_type, RT_NAME_OCTETS) == 0) {
             gate->types_known = true;
-            gate->types = told.value; /* 0 where it is no number */
+            gate->types = told.value; /* 0 if it is not a number */
         }
     }
 }
@@ -102,7 +102,7 @@ static rt_refusal refuse_motion(rt_gate *gate, const rt_frame *frame, int64_t no
         bool there = !has_last || (gate->here_known && rt_is_near(gate->here, last)); /* else it would cut the corner */
         bool has_next = rt_point_at(&gate->command, gate->leg + 1, &next.latitude, &next.longitude);
         if (has_last && last.latitude == point.latitude && last.longitude == point.longitude) {
-            /* once more to where it flies already */
+            /* or once more to the present target */
         } else if (there && has_next && next.latitude == point.latitude && next.longitude == point.longitude) {
             gate->leg++;
         } else {
@@ -113,7 +113,7 @@ static rt_refusal refuse_motion(rt_gate *gate, const rt_frame *frame, int64_t no
     return NULL;
 }
 
-/* What no frame may be, whatever is permitted. */
+/* Why no permit could allow a frame. */
 static rt_refusal refuse_always(const rt_gate *gate, const rt_frame *frame) {
     if (frame->system != gate->system || frame->component != RT_MAV_COMP_ID_ONBOARD_COMPUTER)
         return "frame/not-ours";
@@ -123,16 +123,16 @@ static rt_refusal refuse_always(const rt_gate *gate, const rt_frame *frame) {
     return rt_is_forced_arming(frame) ? "frame/forced-arming" : NULL;
 }
 
-/* Why a frame does not leave; `*carries` where it does, and carries out a command. */
+/* Why a frame is refused; `*carries` if it passes and carries out a command. */
 static rt_refusal refuse(rt_gate *gate, rt_bytes octets, int64_t now_us, bool *carries) {
     rt_frame frame;
     rt_setting setting;
-    /* 1. it is what it will be taken for: one frame, from us, to the autopilot that was heard, and to nobody else */
+    /* 1. exactly one frame, from us, to the autopilot that was heard, and to nobody else */
     if (!rt_read_frame(octets, &frame))
         return "frame/not-one-frame";
-    if (gate->system == 0) /* a vehicle may wait to be spoken to; what we are is all that it is told then */
+    if (gate->system == 0) /* a vehicle may wait for a first message; it only learns our ids */
         return rt_is_greeting(&frame) && frame.component == RT_MAV_COMP_ID_ONBOARD_COMPUTER ? NULL : "frame/no-vehicle";
-    /* 2. never, whatever is permitted */
+    /* 2. never, even with a permit */
     rt_refusal refused = refuse_always(gate, &frame);
     if (refused != NULL)
         return refused;
@@ -168,7 +168,7 @@ rt_refusal rt_gate_seal(rt_gate *gate, rt_bytes frame, int64_t now_us, uint8_t *
     return NULL;
 }
 
-/* Why a frame is not signed ahead for a command: as at the gate, if that were open for it. */
+/* Why a frame is not signed ahead for a command: the rules of the gate, as if it were open for the command. */
 static rt_refusal refuse_ahead(const rt_gate *gate, const rt_command *command, rt_bytes octets) {
     rt_frame frame;
     rt_point point = {0, 0}, first = {0, 0};

@@ -21,7 +21,7 @@ rt_refusal rt_may_open(const rt_kept *kept, const uint8_t digest[RT_DIGEST_BYTES
             if (version < kept->versions[at].version)
                 return "old-policy";
         }
-    uint64_t lasting = 0; /* the others give up their places */
+    uint64_t lasting = 0; /* the others are dropped */
     for (uint64_t at = 0; at < kept->opened_count; at++) lasting += kept->opened[at].expires_us >= now_us ? 1 : 0;
     bool room = lasting < RT_MOST_OPENED && (known || kept->version_count < RT_MOST_POLICIES);
     return room ? NULL : "full";
@@ -66,7 +66,7 @@ void rt_seal_kept(rt_kept *kept) {
     check_of(kept, kept->check);
 }
 
-/* How many missions a layout has room for; 0 for one that there is not. */
+/* The number of missions of a layout; 0 for an unknown one. */
 static uint64_t most_opened(uint64_t layout) {
     return layout == RT_KEPT_LAYOUT ? RT_MOST_OPENED : layout == RT_KEPT_LAYOUT_2 ? RT_MOST_OPENED + 1 : layout == RT_KEPT_LAYOUT_1 ? RT_MOST_OPENED + 2 : 0;
 }
@@ -80,12 +80,12 @@ bool rt_is_whole_kept(const rt_kept *kept) {
     return memcmp(check, kept->check, RT_DIGEST_BYTES) == 0;
 }
 
-/* What is new lies where the layouts before have their last missions. */
+/* New fields are where the older layouts have their last missions. */
 _Static_assert(offsetof(rt_kept, instance) == offsetof(rt_kept, opened) + RT_MOST_OPENED * sizeof(rt_opened), "no gap");
 _Static_assert(offsetof(rt_kept, session_digest) == offsetof(rt_kept, instance) + sizeof(rt_opened), "no gap");
 _Static_assert(offsetof(rt_kept, versions) == offsetof(rt_kept, session_digest) + sizeof(rt_opened), "no gap");
 
-/* The mission of this number, also where it lies behind those that there is room for now. */
+/* The mission of this number, including those beyond the present room. */
 static rt_opened opened_at(const rt_kept *kept, uint64_t number) {
     rt_opened found;
     memcpy(&found, (const uint8_t *)kept + offsetof(rt_kept, opened) + number * sizeof found, sizeof found);
@@ -94,7 +94,7 @@ static rt_opened opened_at(const rt_kept *kept, uint64_t number) {
 
 void rt_upgrade_kept(rt_kept *kept) {
     if (kept->layout == RT_KEPT_LAYOUT) return;
-    while (kept->opened_count > RT_MOST_OPENED) { /* one has no room any more: the first to expire, which is not opened again either */
+    while (kept->opened_count > RT_MOST_OPENED) { /* one does not fit any more: the first to expire, which cannot be opened again */
         rt_opened first = opened_at(kept, --kept->opened_count);
         for (uint64_t each = 0; each < RT_MOST_OPENED; each++)
             if (kept->opened[each].expires_us < first.expires_us) {

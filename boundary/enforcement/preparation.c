@@ -4,7 +4,7 @@
 
 #define VALID_US 30000000LL /* us */
 
-/* A parameter that may be set: to what lies from `first` to `last`, or to one of `count` values. */
+/* A parameter that may be set: to a value from `first` to `last`, or to one of `count` values. */
 typedef struct {
     uint8_t name[RT_PARAMETER_NAME];
     int32_t first, last;
@@ -65,7 +65,7 @@ static rt_refusal restoring(rt_issuer *issuer, const rt_preparation *asked) {
     return NULL;
 }
 
-/* What was set already, and is set to something else, is put back to what it was before all that. */
+/* A parameter that was set already and is set again is restored to its first value. */
 static rt_refusal setting(rt_issuer *issuer, const rt_preparation *asked) {
     for (uint32_t at = 0; at < asked->count; at++) {
         const rt_write *each = &asked->writes[at], *meant = named(issuer->settings.writes, issuer->settings.count, each->name);
@@ -76,7 +76,7 @@ static rt_refusal setting(rt_issuer *issuer, const rt_preparation *asked) {
         rt_write *owed = named(issuer->owed, issuer->owed_count, each->name);
         const bool first = owed == NULL || owed->value != each->before;
         const uint32_t before = first ? each->before : owed->before;
-        if (owed == NULL) owed = &issuer->owed[issuer->owed_count++]; /* no more than were configured besides those at the start */
+        if (owed == NULL) owed = &issuer->owed[issuer->owed_count++]; /* at most as many as were configured, besides those at the start */
         *owed = *each;
         owed->before = before;
     }

@@ -2,7 +2,7 @@
 
 #define ENCODED 44 /* characters of 32 octets in base64 */
 
-/* What of a text is still to be read; nothing once something else stood there. */
+/* The unread rest of a text; empty after a mismatch. */
 typedef struct {
     rt_bytes left;
     bool fits;
@@ -30,7 +30,7 @@ static void expect_quoted(reader *text, rt_bytes words) {
     }
 }
 
-/* 0 to 63, or 64 for a character that is none of base64. */
+/* 0 to 63, or 64 for a character that is not base64. */
 static uint32_t sextet(uint8_t octet) {
     static const uint8_t alphabet[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     for (uint32_t at = 0; at < 64; at++)
@@ -57,7 +57,7 @@ bool rt_begins_log(rt_bytes text, rt_bytes vehicle, const uint8_t flight[RT_FLIG
         const uint8_t octet[] = {digits[flight[at] >> 4], digits[flight[at] & 15]};
         expect(&left, octet, sizeof octet);
     }
-    EXPECT(&left, "\n0\n47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU=\nrecord "); /* of no records: SHA-256 of nothing */
+    EXPECT(&left, "\n0\n47DEQpj8HBSa+/TImW+5JCeuQeRkm5NMpJWZG3hSuFU=\nrecord "); /* without records: SHA-256 of nothing */
     expect_digest(&left);
     EXPECT(&left, "\nkey ");
     expect_digest(&left);

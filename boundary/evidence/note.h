@@ -4,8 +4,8 @@
 
 #include "../base.h"
 
-/* Whether a text is that of the checkpoint which begins the log of this flight on this vehicle, and of nothing else: no record comes
-   before it, and the key of the first epoch follows. */
+/* Whether a text is exactly the checkpoint that begins the log of this flight on this vehicle: no record precedes it, and the key of
+   the first epoch follows. */
 bool rt_begins_log(rt_bytes text, rt_bytes vehicle, const uint8_t flight[RT_FLIGHT_BYTES]);
 
 #endif

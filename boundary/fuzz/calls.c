@@ -1,5 +1,4 @@
-/* What libFuzzer calls: calls to a boundary that has a bundle in force, one after another. The first octet says whether its link is
-   signed. */
+/* libFuzzer target: calls to a boundary that has a bundle in force, one after another. The first octet says whether its link is signed. */
 #include "world.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {

@@ -1,5 +1,5 @@
-/* What libFuzzer calls: requests to a boundary that has a bundle in force, one after another. What is permitted is dispatched where
-   the first octet says so, so that links are asked for in flight too. */
+/* libFuzzer target: requests to a boundary that has a bundle in force, one after another. Permits are dispatched if the first octet
+   says so, so that links are requested in flight too. */
 #include "world.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {

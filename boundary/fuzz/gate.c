@@ -1,5 +1,5 @@
-/* What libFuzzer calls: frames to a gate, from either side, and commands that are permitted. The first octet says whether the link is
-   signed; each record begins with one that says what it is. */
+/* libFuzzer target: frames to a gate, from either side, and permitted commands. The first octet says whether the link is signed; the
+   first octet of each record is its kind. */
 #include "world.h"
 
 #include "wire/octets.h"
@@ -9,7 +9,7 @@
 static rt_gate gate;
 static rt_chain chain;
 
-/* Within what the checks of a policy and a mission leave of each number. */
+/* Within the bounds that the checks of a policy and a mission ensure for each number. */
 static int64_t bounded(const uint8_t **at, int64_t low, int64_t high) { return low + (int64_t)(rt_take(at, 4) % (uint64_t)(high - low + 1)); }
 
 static void permit(rt_bytes record, int64_t now_us) {

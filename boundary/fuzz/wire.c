@@ -1,4 +1,4 @@
-/* What libFuzzer calls: the first octet says what the others are. */
+/* libFuzzer target: the first octet is the kind of the others. */
 #include "world.h"
 
 #include "wire/approval.h"

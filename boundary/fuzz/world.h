@@ -1,5 +1,6 @@
-/* What the fuzz targets share: every signature and every seal counts as good here, so that what is behind it is reached; the real
-   check is fuzzed by itself, and compared with Python in tests/boundary. And a boundary under the root and the bundle of `seeds`. */
+/* Shared code of the fuzz targets. Every signature and every seal is valid here, so that the code behind the check is reached; the
+   check itself is fuzzed separately, and compared with Python in tests/boundary. The boundary runs under the root and the bundle of
+   `seeds`. */
 #ifndef RT_FUZZ_WORLD_H
 #define RT_FUZZ_WORLD_H
 
@@ -36,7 +37,7 @@ bool rt_equal(const uint8_t *one, const uint8_t *other, size_t size) {
     return (uint8_t)(read_all((rt_bytes){one, (uint32_t)size}) + read_all((rt_bytes){other, (uint32_t)size})) < 255;
 }
 
-/* The next record off some octets: a size of two octets, and as many of them as there are. */
+/* Take the next record off some octets: a size of two octets, followed by that many octets. */
 static bool next_record(rt_bytes *left, rt_bytes *record) {
     if (left->size < 2) return false;
     uint32_t size = (uint32_t)left->at[0] << 8 | left->at[1];
@@ -53,7 +54,7 @@ static rt_bytes world_root, world_bundle, world_flight;
 static rt_now world_now;
 static const rt_preparation settings = {0, false, 0, {{"FENCE_ENABLE", 0, 0x3F800000}, {"RTL_ALT", 0x45000000, 0x45800000}}, 2};
 
-/* Every call is made of octets of its own, so that what is read behind them shows. */
+/* Every call has its own allocation, so that an access beyond its end is detected. */
 static uint32_t call_with(rt_bytes call, uint8_t *result) {
     uint8_t *exact = malloc(call.size > 0 ? call.size : 1), *out = malloc(RT_MAX_RESULT);
     if (call.size > 0) memcpy(exact, call.at, call.size);

@@ -94,7 +94,7 @@ static int few_calls(void) {
     return syscall(SYS_seccomp, SECCOMP_SET_MODE_FILTER, SECCOMP_FILTER_FLAG_TSYNC, &program) == 0;
 }
 
-/* Whether the network namespace has nothing but its loopback, as systemd makes one: two lines of head, and one of `lo`. */
+/* Whether the network namespace has only its loopback, as systemd makes one: two header lines, and one for `lo`. */
 static int no_network(void) {
     char text[1024];
     int file = open("/proc/self/net/dev", O_RDONLY | O_CLOEXEC);
@@ -116,7 +116,7 @@ uint32_t rt_isolate(uint32_t user, uint32_t group) {
     if (user != 0 && setgroups(0, NULL) == 0 && setresgid(group, group, group) == 0 && setresuid(user, user, user) == 0)
         measures |= RT_OWN_USER;
     (void)setrlimit(RLIMIT_CORE, &none);
-    if (prctl(PR_SET_DUMPABLE, 0, 0, 0, 0) == 0) /* a change of user makes it dumpable again: after it */
+    if (prctl(PR_SET_DUMPABLE, 0, 0, 0, 0) == 0) /* after a change of user, which makes it dumpable again */
         measures |= RT_NOT_DUMPABLE;
     if (prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) != 0)
         return measures;

@@ -49,7 +49,7 @@
 #include <unistd.h>
 
 enum { FINE = 0, USAGE = 64, UNTRUSTED = 65, NO_KEY = 66, MISSING = 72, IO = 74, IN_USE = 75, DAMAGED = 78 };
-/* how far ahead of what was used the link's timestamp is kept, in its units of 10 us, and how often: signing.py */
+/* how far ahead of its use the link's timestamp is stored, in its units of 10 us, and how often: signing.py */
 #define RESERVE 300000LL
 #define EVERY_US 1000000LL
 /* how long a call may take, and the beginning or loading a bundle, in s: the runtime waits for 1.2 s and 20 s (boundary_process.py),
@@ -77,7 +77,7 @@ static int number(const char *text, uint32_t *value) {
     return *text != 0 && *end == 0 && found <= 0x7FFFFFFF;
 }
 
-/* A time in us, for which such an error may be stated. */
+/* A time in us for which an error may be stated. */
 static int number_of_us(const char *text, int64_t *value) {
     char *end;
     errno = 0;
@@ -133,7 +133,7 @@ static int read_options(int count, char **words, options *given) {
     return given->socket >= 0 && (given->measures || given->folder != NULL || handed);
 }
 
-/* A regular file of a folder, to be read; -1 where there is none, and `errno` is ENOENT where nothing at all has that name. */
+/* A regular file of a folder, for reading; -1 if there is none, and `errno` is ENOENT if nothing has that name. */
 static int open_file(int folder, const char *name) {
     struct stat found;
     int file = openat(folder, name, O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
@@ -145,7 +145,7 @@ static int open_file(int folder, const char *name) {
     return file;
 }
 
-/* The same of one that may be missing. False where it is there and cannot be read: nobody goes on as if there were no such key. */
+/* The same for an optional file. False if it exists but cannot be read: a boundary never continues as if there were no such key. */
 static int open_if_there(int folder, const char *name, int *file) {
     *file = open_file(folder, name);
     return *file >= 0 || errno == ENOENT;
@@ -160,7 +160,7 @@ static size_t read_all(int file, void *into, size_t most) {
     return got < 0 ? 0 : done;
 }
 
-/* What the folder of the vehicle holds; the socket is named after the vehicle. Whoever connected chose nothing of it. */
+/* The contents of the vehicle's folder; the socket is named after the vehicle. The connected user chooses none of it. */
 static int open_folder(options *given) {
     static struct sockaddr_un address;
     static char pin[2 * RT_KEY_BYTES + 2];
@@ -188,8 +188,7 @@ static int open_folder(options *given) {
     return flock(given->kept, LOCK_EX | LOCK_NB) == 0 ? FINE : errno == EWOULDBLOCK ? IN_USE : IO;
 }
 
-/* Where another user connected, nobody puts an end to what hangs: the kernel does, also to what is stopped, once so many seconds
-   have passed that were not given anew. */
+/* If another user connected, the kernel ends a process that hangs or is stopped, once the time that is renewed regularly has passed. */
 static timer_t patience;
 static int is_timed;
 
@@ -220,13 +219,13 @@ static int write_kept(int file, rt_kept *kept) {
     return fdatasync(file) == 0;
 }
 
-/* A disk may take its time: another thread waits for it, so that what is asked meanwhile is answered. */
+/* A disk may be slow: another thread waits for it, so that calls are answered meanwhile. */
 static struct {
     pthread_mutex_t lock;
     pthread_cond_t turn;
     int file, running;
     rt_kept next;
-    uint64_t given, done, failed; /* how many writes were given, are over, and which of them was the last that failed */
+    uint64_t given, done, failed; /* how many writes were started and finished, and the last one that failed */
 } keeper = {.lock = PTHREAD_MUTEX_INITIALIZER, .turn = PTHREAD_COND_INITIALIZER};
 
 static void *keep(void *nothing) {
@@ -250,7 +249,7 @@ static void *keep(void *nothing) {
     return nothing;
 }
 
-/* Have it written; where it must be, wait for it. False where it could not be. */
+/* Start a write; wait for it if required. False if it failed. */
 static int give(const rt_kept *kept, int must) {
     pthread_mutex_lock(&keeper.lock);
     keeper.next = *kept;
@@ -272,7 +271,7 @@ static int start_keeper(int file) {
     return 1;
 }
 
-/* The newer slot that is whole; or a beginning, where the file says that nothing was kept, or was half written after that. */
+/* The newer intact slot; or a beginning, if the file says that it has no state, or was half written after that. */
 static rt_kept *read_kept(int file) {
     off_t size = 0;
     rt_kept_first first;
@@ -292,25 +291,25 @@ static rt_kept *read_kept(int file) {
 
 static int64_t own_time_us(clockid_t clock) {
     struct timespec now;
-    /* monotonic time goes on while the machine is suspended, as the runtime's does (adapters/clock.py) */
+    /* monotonic time continues while the machine is suspended, as the runtime's does (adapters/clock.py) */
     clock_gettime(clock == CLOCK_MONOTONIC ? CLOCK_BOOTTIME : clock, &now);
     return (int64_t)now.tv_sec * 1000000 + now.tv_nsec / 1000;
 }
 
-/* The machine's clock, with the error that the kernel vouches for: `kernel_error_us` of adapters/utc.py. */
+/* The machine's clock, with the error reported by the kernel: `kernel_error_us` of adapters/utc.py. */
 static rt_now machine_now(void) {
     struct timex asked;
     rt_now now = {own_time_us(CLOCK_MONOTONIC), own_time_us(CLOCK_REALTIME), RT_UTC_UNKNOWN_US};
-    memset(&asked, 0, sizeof asked); /* no mode: nothing is set */
+    memset(&asked, 0, sizeof asked); /* no mode: reads only */
     long state = syscall(SYS_adjtimex, &asked);
     if (state >= 0 && state != TIME_ERROR && (asked.status & STA_UNSYNC) == 0 && asked.maxerror >= 0) now.utc_error_us = asked.maxerror;
     return now;
 }
 
-/* The link's timestamps: our own so many ahead of what was used, each peer's as it was last heard (signing.py says why). */
+/* The link's timestamps: our own are ahead of their use, each peer's is the last received one (signing.py says why). */
 static void gather(rt_kept *kept, int64_t ahead) {
     rt_signed_link *link = &boundary.executor.gate.signer;
-    if (!boundary.executor.gate.signs) return; /* what was kept of the link stays, for a start that has its key */
+    if (!boundary.executor.gate.signs) return; /* the stored state of the link stays, for a start with its key */
     kept->link_timestamp = rt_signed_up_to(link) + ahead;
     kept->stream_count = link->stream_count;
     memcpy(kept->streams, link->streams, sizeof kept->streams);
@@ -323,7 +322,7 @@ static int digit(uint8_t sign) {
     return sign >= 'a' && sign <= 'f' ? sign - 'a' + 10 : -1;
 }
 
-/* How many octets are said by pairs of digits, with spaces between them at most; 0 for anything else, and for more than `most`. */
+/* The number of octets in pairs of digits, with spaces between them at most; 0 for anything else, and for more than `most`. */
 static uint32_t from_hex(const uint8_t *text, size_t size, uint8_t *into, uint32_t most) {
     uint32_t found = 0;
     for (size_t at = 0; at < size; at++) {
@@ -336,7 +335,7 @@ static uint32_t from_hex(const uint8_t *text, size_t size, uint8_t *into, uint32
     return found;
 }
 
-/* A key in a file: 32 octets or 64 hexadecimal digits, not all 0, as `read_link_key` of adapters/store/signing.py has it. */
+/* A key in a file: 32 octets or 64 hexadecimal digits, not all 0, as in `read_link_key` of adapters/store/signing.py. */
 static int read_key(int file, uint8_t key[RT_KEY_BYTES]) {
     uint8_t data[1024], any = 0;
     size_t size = read_all(file, data, sizeof data);
@@ -348,7 +347,7 @@ static int read_key(int file, uint8_t key[RT_KEY_BYTES]) {
     return found == RT_KEY_BYTES && any != 0;
 }
 
-/* Parameters in a file; `*listed` is NULL where there is none. 0 for one that lists none. */
+/* Parameters in a file; `*listed` is NULL without a file. 0 for a file that lists none. */
 static int read_writes(int file, rt_preparation *into, const rt_preparation **listed) {
     static uint8_t data[RT_MAX_PREPARATION];
     *listed = NULL;
@@ -359,7 +358,7 @@ static int read_writes(int file, rt_preparation *into, const rt_preparation **li
 
 #define LINK_NAME 8
 
-/* A name for a key that gives nothing of it away: `fingerprint` of adapters/store/signing.py. */
+/* A name for a key that discloses nothing of it: `fingerprint` of adapters/store/signing.py. */
 static void name_link(const uint8_t key[RT_KEY_BYTES], uint8_t *name) {
     static const uint8_t domain[] = "rtshcua/link-key";
     uint8_t digest[RT_DIGEST_BYTES];
@@ -371,7 +370,8 @@ static void name_link(const uint8_t key[RT_KEY_BYTES], uint8_t *name) {
     memcpy(name, digest, LINK_NAME);
 }
 
-/* The first message: the measures in force, the name of the link's key, the public halves of the two that sign, whose clock counts. */
+/* The first message: the measures in force, the name of the link's key, the public halves of the two signing keys, and whose clock is
+   used. */
 static int greet(const options *given, uint32_t measures, const rt_keys *keys) {
     uint8_t greeting[4 + LINK_NAME + 2 * RT_KEY_BYTES + 1] = {0};
     for (int octet = 0; octet < 4; octet++) greeting[octet] = (uint8_t)(measures >> 8 * octet & 0xFF);
@@ -420,7 +420,7 @@ static int begin(options *given, rt_keys *keys, uint32_t *measures) {
     const uint32_t pinned =
         given->pin == NULL ? 0 : from_hex((const uint8_t *)given->pin, strlen(given->pin), pin, sizeof pin);
     if (given->folder != NULL && pinned == 0)
-        return UNTRUSTED; /* without a pin any development root would do */
+        return UNTRUSTED; /* without a pin any development root would be accepted */
     const rt_setup setup = {
         keys, kept, root_bytes, {pin, pinned},
         {(const uint8_t *)given->vehicle, (uint32_t)strlen(given->vehicle)}, given->link_key >= 0, given->boundary_key >= 0,
@@ -467,7 +467,7 @@ int main(int count, char **words) {
             rt_clock_look(&boundary.clock, &machine);
         }
         uint32_t answered = rt_answer(&boundary, (rt_bytes){call, (uint32_t)size}, given.paced ? -1 : now_us, result);
-        /* what must outlive us is on the disk before anybody acts on the answer */
+        /* state that must survive this process is on the disk before the answer is sent */
         const rt_gate *gate = &boundary.executor.gate;
         if (boundary.to_keep || (gate->signs && (now_us - kept_us > EVERY_US || gate->signer.news))) {
             bool must = boundary.to_keep;
@@ -478,13 +478,13 @@ int main(int count, char **words) {
             kept_us = now_us;
         }
         if (given.folder == NULL && !flies && rt_may_fly(&boundary)) {
-            flies = true; /* nothing is to be given back any more, and a restart must not find the vehicle held by us */
+            flies = true; /* nothing is released any more, and a restart must not find the vehicle locked by this process */
             if (!rt_end_with(runtime))
                 return IO;
         }
         if (!give_time(CALL_S))
             return IO;
-        /* where nobody is there any more, the next `recv` says so */
+        /* if the peer is gone, the next `recv` reports it */
         if (send(given.socket, result, answered, MSG_NOSIGNAL) != (ssize_t)answered && errno != EPIPE && errno != ECONNRESET)
             return IO;
     }

@@ -39,7 +39,7 @@ int32_t rt_i32(const rt_frame *frame, uint32_t at) {
     return bits <= INT32_MAX ? (int32_t)bits : (int32_t)((int64_t)bits - (1LL << 32));
 }
 
-/* CRC-16/MCRF4XX, an octet on. */
+/* One octet of CRC-16/MCRF4XX. */
 static uint16_t crc_on(uint16_t crc, uint8_t octet) {
     uint8_t mixed = (uint8_t)(octet ^ (crc & 0xFF));
     mixed = (uint8_t)(mixed ^ (uint8_t)(mixed << 4));
@@ -47,8 +47,8 @@ static uint16_t crc_on(uint16_t crc, uint8_t octet) {
 }
 
 void rt_set_flags(uint8_t *frame, uint8_t flags) {
-    /* The checksum is linear: what one changed octet does to it depends on that octet and on where it stands alone.
-       From behind the marker to the message's extra octet there are `end` octets; of these the second changes. */
+    /* The checksum is linear: the effect of a changed octet depends only on that octet and its place. There are `end` octets from after
+       the marker to the message's extra octet, and the second of them changes. */
     uint32_t end = RT_HEADER + (uint32_t)frame[1];
     uint16_t change = crc_on(0, 0);
     change = crc_on(change, (uint8_t)(frame[RT_FLAGS] ^ flags));

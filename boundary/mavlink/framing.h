@@ -1,4 +1,4 @@
-/* The shape of a MAVLink 2 frame on the wire: https://mavlink.io/en/guide/serialization.html. `framing.py`, `layouts.py`. */
+/* The layout of a MAVLink 2 frame on the wire: https://mavlink.io/en/guide/serialization.html. `framing.py`, `layouts.py`. */
 #ifndef RT_MAVLINK_FRAMING_H
 #define RT_MAVLINK_FRAMING_H
 
@@ -13,7 +13,7 @@
 #define RT_FLAG_SIGNED 1
 #define RT_LARGEST_FRAME (RT_HEADER + 255 + RT_CHECKSUM + RT_SIGNATURE)
 
-/* One whole unsigned frame of a message in `rt_layouts`; the payload with the zeros that are not sent. */
+/* One complete unsigned frame of a message in `rt_layouts`; the payload includes the trailing zeros that are not sent. */
 typedef struct {
     uint8_t system, component;
     uint32_t message;
@@ -22,14 +22,14 @@ typedef struct {
     uint8_t target_system, target_component;
 } rt_frame;
 
-/* The frame that these octets are; false unless they are one. The checksum is the receiver's to check. */
+/* The frame in these octets; false for anything else. The receiver checks the checksum. */
 bool rt_read_frame(rt_bytes octets, rt_frame *frame);
 
 uint16_t rt_u16(const rt_frame *frame, uint32_t at);
 uint32_t rt_u32(const rt_frame *frame, uint32_t at); /* the bits of a float, too */
 int32_t rt_i32(const rt_frame *frame, uint32_t at);
 
-/* Give a frame other incompatibility flags and the checksum that belongs to them, in place. It has no signature. */
+/* Give a frame other incompatibility flags and the matching checksum, in place. It has no signature. */
 void rt_set_flags(uint8_t *frame, uint8_t flags);
 
 #endif

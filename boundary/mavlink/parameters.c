@@ -80,7 +80,7 @@ static uint32_t nearest(int64_t value) {
     return sign | exponent << 23 | ((uint32_t)mantissa & FRACTION);
 }
 
-/* A number that orders finite floats as they are ordered; -0 is 0. */
+/* A number with the same order as finite floats; -0 is 0. */
 static int64_t order_of(uint32_t bits) { return with_sign(bits, bits & 0x7FFFFFFFU); }
 
 bool rt_lies_within(uint32_t bits, int32_t first, int32_t last) {

@@ -5,9 +5,9 @@
 #define UNIT_US 10
 #define MINUTE 6000000LL
 #define SECOND 100000LL
-#define LAST ((1LL << 48) - 366LL * 24 * 60 * MINUTE) /* what claims the last year of the 48 bits is believed no more */
-#define LEADS_EVERY_US 1000000LL /* so an attacker who sends what is signed ahead raises time by RT_LEAD + MOST_AHEAD a second */
-#define MOST_AHEAD SECOND /* how far what is signed ahead may reach above RT_LEAD, in timestamps: a batch needs some hundreds */
+#define LAST ((1LL << 48) - 366LL * 24 * 60 * MINUTE) /* timestamps of the last year of the 48 bits are refused */
+#define LEADS_EVERY_US 1000000LL /* so an attacker who sends frames signed ahead raises time by RT_LEAD + MOST_AHEAD a second */
+#define MOST_AHEAD SECOND /* the greatest distance of frames signed ahead above RT_LEAD, in timestamps: a batch needs some hundreds */
 #define STAMP 6
 #define TAG 6
 
@@ -52,7 +52,7 @@ void rt_signed_link_begin(rt_signed_link *link, const uint8_t key[RT_KEY_BYTES],
     }
 }
 
-/* Put a signature of this timestamp behind a frame; its new size. */
+/* Append a signature of this timestamp to a frame; returns its new size. */
 static uint32_t signed_at(rt_signed_link *link, uint8_t *frame, uint32_t size, int64_t timestamp) {
     rt_set_flags(frame, RT_FLAG_SIGNED);
     frame[size++] = link->link;
@@ -87,7 +87,7 @@ uint32_t rt_sign_ahead(rt_signed_link *link, uint8_t *frame, uint32_t size, int6
 
 int64_t rt_signed_up_to(const rt_signed_link *link) { return link->promised > link->ahead ? link->promised : link->ahead; }
 
-/* How many of so many streams are left without those whose last frame is over a minute old. */
+/* The number of streams without those whose last frame is over a minute old. */
 static uint32_t prune(rt_stream *streams, uint32_t count, int64_t local) {
     uint32_t left = 0;
     for (uint32_t at = 0; at < count; at++) {
@@ -98,7 +98,7 @@ static uint32_t prune(rt_stream *streams, uint32_t count, int64_t local) {
     return left;
 }
 
-/* What is over a minute old needs no memory: its time alone refuses all that it would refuse. */
+/* A stream over a minute old needs no memory: its time alone refuses the same frames. */
 static bool make_room(rt_signed_link *link, bool new_stream, bool new_sender, int64_t local) {
     if (new_stream && link->stream_count == RT_MOST_STREAMS)
         link->stream_count = prune(link->streams, link->stream_count, local);
@@ -111,7 +111,7 @@ rt_heard rt_accept_frame(rt_signed_link *link, rt_bytes frame, int64_t now_us) {
     /* 1. it is signed */
     if (frame.size < RT_HEADER + RT_CHECKSUM + RT_SIGNATURE || (frame.at[RT_FLAGS] & RT_FLAG_SIGNED) == 0)
         return RT_UNSIGNED;
-    /* 2. "Computed 48 bit signature does not match": before anything that it says is believed */
+    /* 2. "Computed 48 bit signature does not match": checked before any of its fields is used */
     uint8_t tag[TAG];
     tag_of(link, frame.at, frame.size - TAG, tag);
     if (!rt_equal(tag, frame.at + frame.size - TAG, TAG))

@@ -89,7 +89,7 @@ typedef struct {
 /* signal.py */
 enum { RT_NUMBER = 0, RT_ENUMERATION = 1, RT_POSITION = 2 };
 
-/* What `decision/checks` asks of a source; its message, sentinels and `where` are for the runtime. */
+/* The fields of a source that `decision/checks` reads; its message, sentinels and `where` are for the runtime. */
 typedef struct {
     rt_list fields; /* texts */
     int64_t numerator, denominator;
@@ -141,7 +141,7 @@ typedef struct {
     int64_t position, height, battery; /* slots, -1: none */
     int64_t return_altitude, braking, reaction_us;
     int64_t north, east, down; /* slots */
-    int64_t drain;             /* the slot of the signal of that name, -1: none; no field of the artefact */
+    int64_t drain;             /* the slot of the signal of that name, -1: none; not a field of the artefact */
     rt_list without; /* texts */
     bool has_speeds;
     rt_speeds speeds;
@@ -149,14 +149,13 @@ typedef struct {
     rt_list offsets; /* integers */
 } rt_vehicle;
 
-/* What `decision/checks` asks of what was left out. */
+/* The fields of a left-out clause that `decision/checks` reads. */
 typedef struct {
     int64_t skill;
     rt_bytes part;
 } rt_left_out;
 
-/* Tables are filled once by `rt_read_policy`; a count beyond its limit is refused there as `malformed`, which is what
-   `decision/checks` says of it in Python. */
+/* `rt_read_policy` fills the tables once; a count beyond its limit is refused as `malformed`, as by `decision/checks` in Python. */
 typedef struct {
     rt_bytes payload; /* the artefact, as it was signed */
     rt_bytes name;
@@ -201,7 +200,7 @@ typedef struct {
 
 typedef struct {
     rt_bytes raw;     /* the whole invocation as it was signed, */
-    rt_bytes content; /* and what of it stands between its id and its binding */
+    rt_bytes content; /* and its part between the id and the binding */
     rt_bytes invocation_id;
     int64_t step, phase, skill, source, role;
     rt_list arguments; /* integers */
@@ -215,7 +214,7 @@ typedef struct {
 
 typedef struct {
     rt_bytes payload;
-    rt_bytes before, behind; /* what of the mission stands before its invocations, and behind them */
+    rt_bytes before, behind; /* the parts of the mission before and after its invocations */
     rt_bytes name, intent, proposer, vehicle, policy;
     int64_t policy_version;
     rt_bytes policy_digest;
@@ -226,7 +225,7 @@ typedef struct {
     rt_list sources, source_digests;
 } rt_mission;
 
-/* wire/flat.c: read a payload that was verified. They answer `malformed` (or `unknown-format`, `unknown-version`) for whatever
+/* wire/flat.c: read a verified payload. They return `malformed` (or `unknown-format`, `unknown-version`) for everything that
    `artefact.unpack` refuses. */
 rt_refusal rt_read_policy(rt_bytes payload, rt_policy *policy);
 rt_refusal rt_read_mission(rt_bytes payload, rt_mission *mission);
@@ -243,7 +242,7 @@ bool rt_next_parameter(rt_list *list, rt_parameter *parameter);
 bool rt_next_source(rt_list *list, rt_signal_source *source);
 bool rt_next_left_out(rt_list *list, rt_left_out *left_out);
 
-/* The integer at an index: walks there, for short lists. -1 is no answer: the index is below `count`. */
+/* The integer at an index, by a walk through the list, for short lists. -1 is never returned: the index is below `count`. */
 int64_t rt_int_at(rt_list list, uint32_t index);
 bool rt_holds(rt_list list, int64_t value); /* whether it is among the integers */
 bool rt_names(rt_list texts, rt_bytes text); /* likewise */
@@ -261,7 +260,7 @@ typedef struct {
     int64_t monotonic_us, utc_us, utc_error_us;
 } rt_now;
 
-/* An answer to one rule, or to each that asks its role (Python has an entry for each, and there may be 16,384 of them). */
+/* An answer to one rule, or to each rule that requires its role (Python has an entry for each, up to 16,384 of them). */
 #define RT_EVERY_RULE (-1)
 typedef struct {
     int64_t rule, role, granted, monotonic_us, person;

@@ -1,4 +1,4 @@
-/* What the programs of proof/ begin with: values of which nothing is known but their range. */
+/* Definitions of the programs in proof/: values of which only the range is known. */
 #ifndef RT_PROOF_ANY_H
 #define RT_PROOF_ANY_H
 
@@ -11,7 +11,7 @@
 #define SIZE(most) ((uint32_t)Frama_C_unsigned_int_interval(0, most))
 #define EITHER() (Frama_C_interval(0, 1) != 0)
 
-/* The first item of a table, as all of it. */
+/* The first item of a table, standing for all of it. */
 static void fill(void *table, size_t size, size_t whole) {
     //@ loop unroll 20;
     for (; 2 * size <= whole; size *= 2) memcpy((char *)table + size, table, size);

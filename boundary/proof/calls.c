@@ -1,5 +1,5 @@
-/* What Frama-C's Eva runs: calls of any octets to a boundary in any state. What they call reads all that it is given, writes as much
-   as it says that it may, and answers anything. A call that signs ahead has up to EXACT octets, of each length by itself. */
+/* Frama-C's Eva runs this: calls of any octets to a boundary in any state. The called functions read all their input, write as much as
+   their headers allow, and return anything. A call that signs ahead has up to EXACT octets, each length separately. */
 #include "seal.h"
 #include "enforcement/calls.h"
 

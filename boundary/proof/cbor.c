@@ -1,4 +1,4 @@
-/* What Frama-C's Eva runs: cbor.c on any bytes, up to BYTES of them (`make -C boundary proof`). */
+/* Frama-C's Eva runs this: cbor.c on any bytes, up to BYTES of them (`make -C boundary proof`). */
 #include "__fc_builtin.h"
 #include "wire/cbor.h"
 

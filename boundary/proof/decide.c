@@ -1,5 +1,5 @@
-/* What Frama-C's Eva runs: every question of decision/decide.h, for any code, in any situation, under any policy and step with numbers
-   as decision/checks and wire/request leave them. Of rules and contracts there are two. */
+/* Frama-C's Eva runs this: every function of decision/decide.h, for any code, in any situation, under any policy and step with numbers
+   as decision/checks and wire/request ensure them. There are two rules and two contracts. */
 #include "any.h"
 #include "decision/parts.h"
 
@@ -21,7 +21,7 @@ static rt_list list_at(const uint8_t *at) { return (rt_list){at, at + sizeof oct
 
 static rt_bytes text(void) { return (rt_bytes){octets, SIZE(sizeof octets)}; }
 
-/* The readers of wire/flat.c, which proof/flat.c is about, on what the checks left. */
+/* The readers of wire/flat.c, which proof/flat.c covers, on checked data. */
 bool rt_next_int(rt_list *list, int64_t *value) {
     if (list->count == 0) return false;
     list->count--;

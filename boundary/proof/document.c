@@ -1,5 +1,5 @@
-/* What Frama-C's Eva runs: every signed document of any octets, whatever the trust root and the bundle in force say. What
-   wire/flat.c reads is anything, as views that it found well-formed. */
+/* Frama-C's Eva runs this: every signed document of any octets, with any trust root and bundle in force. The results of wire/flat.c are
+   any well-formed views. */
 #include "reader.h"
 #include "seal.h"
 #include "wire/approval.h"
@@ -41,7 +41,7 @@ static void mission_of(rt_mission *mission) {
     mission->invocation_count = SIZE(RT_MAX_INVOCATIONS);
 }
 
-/* What proof/flat.c is about. */
+/* Covered by proof/flat.c. */
 bool rt_take_mission(rt_cursor *cursor, rt_bytes payload, rt_mission *mission) {
     mission_of(mission);
     return taken(cursor);

@@ -1,4 +1,4 @@
-/* What Frama-C's Eva runs: the tables of a policy, a mission, and the items of their lists, whatever there is to be read. */
+/* Frama-C's Eva runs this: the tables of a policy, a mission, and the items of their lists, for any input. */
 #include "reader.h"
 #include "wire/flat.h"
 

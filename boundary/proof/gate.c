@@ -1,4 +1,4 @@
-/* What Frama-C's Eva runs: the gate on any frame from either side, in any state, whatever command is permitted; and the signed link. */
+/* Frama-C's Eva runs this: the gate on any frame from either side, in any state, under any permitted command; and the signed link. */
 #include "seal.h"
 #include "enforcement/frames.h"
 
@@ -7,7 +7,7 @@ static rt_gate gate;
 static rt_chain chain;
 static rt_preparation preparation;
 
-/* Every coordinate of a path was found within these bounds (decision/checks). */
+/* The checks ensure these bounds for every coordinate of a path (decision/checks). */
 bool rt_next_int(rt_list *list, int64_t *value) {
     if (list->count == 0) return false;
     list->count--;

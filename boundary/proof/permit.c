@@ -1,4 +1,4 @@
-/* What Frama-C's Eva runs: permits of any octets of any size, and of any permit its octets. */
+/* Frama-C's Eva runs this: permits of any octets of any size, and the octets of any permit. */
 #include "seal.h"
 #include "wire/permit.h"
 

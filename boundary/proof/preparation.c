@@ -1,4 +1,4 @@
-/* What Frama-C's Eva runs: preparation.c on any bytes, for as many parameters as there may be. */
+/* Frama-C's Eva runs this: preparation.c on any bytes, for every possible number of parameters. */
 #include "__fc_builtin.h"
 #include "wire/preparation.h"
 

@@ -1,5 +1,5 @@
-/* In place of wire/cbor.c, which proof/cbor.c is about: a reader that takes off anything whatever, whether the bytes begin with it or
-   not. A string that it gives is a view of any octets, of which all may be read. */
+/* A substitute for wire/cbor.c, which proof/cbor.c covers: a reader that returns anything, whatever the bytes. A string that it returns
+   is a view of any octets, all of which may be read. */
 #ifndef RT_PROOF_READER_H
 #define RT_PROOF_READER_H
 

@@ -1,4 +1,4 @@
-/* What Frama-C's Eva runs: request.c on any bytes of any size, for the smallest state, a middling and the largest. */
+/* Frama-C's Eva runs this: request.c on any bytes of any size, for the smallest, a middling and the largest state. */
 #include "__fc_builtin.h"
 #include "wire/request.h"
 

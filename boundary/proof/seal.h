@@ -1,4 +1,4 @@
-/* In place of crypto/: it reads all that it is given and makes any digest or signature. Comparing seals says either. */
+/* A substitute for crypto/: it reads all its input and makes any digest or signature. A comparison of seals returns either result. */
 #ifndef RT_PROOF_SEAL_H
 #define RT_PROOF_SEAL_H
 
@@ -6,7 +6,7 @@
 #include "crypto/crypto.h"
 
 static void read_all(rt_bytes data) {
-    if (data.size > 0) (void)memcmp(data.at, data.at, data.size); /* which asks that all of it may be read, and was written */
+    if (data.size > 0) (void)memcmp(data.at, data.at, data.size); /* which requires that all of it may be read, and was written */
 }
 
 static void read_parts(const rt_bytes *parts, uint32_t count) {

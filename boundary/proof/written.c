@@ -1,11 +1,11 @@
-/* What Frama-C's Eva runs: what the boundary writes: responses, receipts, and statements of its own evidence, with any numbers. */
+/* Frama-C's Eva runs this: the writers of responses, receipts, and statements of the boundary's own evidence, with any numbers. */
 #include "seal.h"
 #include "wire/boundary_chain.h"
 #include "wire/receipt.h"
 #include "wire/response.h"
 
 #define MOST 96
-#define MOST_WORDS 48 /* octets of a slug: what calls for a receipt has room for 256 */
+#define MOST_WORDS 48 /* octets of a slug: callers have room for 256 */
 
 static uint8_t octets[MOST], out[RT_MAX_STATEMENT], receipt_out[256], response[RT_MAX_RESPONSE];
 static rt_chain chain;

@@ -2,7 +2,7 @@
 
 #include "digest.h"
 
-/* Whether a rule may ask this role about an invocation, whatever its condition says. */
+/* Whether a rule may require this role's approval of an invocation, ignoring its condition. */
 static bool confirms(const rt_rule *rule, const rt_invocation *invocation, int64_t role) {
     return rule->kind == RT_CONFIRM && (role == rule->approver || role == rule->second) &&
            (rule->skills.count == 0 || rt_holds(rule->skills, invocation->skill)) &&
@@ -57,7 +57,7 @@ rt_refusal rt_open_approval(const rt_flight *flight, rt_bytes document, rt_answe
     about = named;
     if (!there) {
         if (granted || !find(flight->replaced, flight->replaced_count, id, &named)) return "unknown-invocation";
-        /* the last one that asks for the same: those before it may be decided */
+        /* the last one that requests the same, because earlier ones may be decided already */
         uint8_t asked[RT_DIGEST_BYTES], asks[RT_DIGEST_BYTES];
         subject_of(&named, 0, asked);
         for (uint32_t step = force->invocation_count; step > 0 && !there; step--) {

@@ -17,7 +17,7 @@ rt_refusal rt_unwrap(const rt_artefact *artefact, rt_bytes data, rt_cursor *body
     rt_bytes name;
     int64_t version;
     *body = (rt_cursor){data.at, data.at + data.size};
-    /* before anything below is looked at */
+    /* before the rest is read */
     if (!rt_take_struct(body, 3) || !rt_take_text(body, &name) || !rt_take_int(body, &version)) return "malformed";
     if (!rt_same(name, artefact->name)) return "unknown-format";
     if (version != artefact->version) return "unknown-version";

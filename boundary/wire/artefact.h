@@ -5,12 +5,12 @@
 #include "cbor.h"
 #include "names.h"
 
-/* The body of what must be this very artefact in this very version: `malformed`, `unknown-format`, `unknown-version`. */
+/* The body of this artefact in this version: `malformed`, `unknown-format`, `unknown-version`. */
 rt_refusal rt_unwrap(const rt_artefact *artefact, rt_bytes data, rt_cursor *body);
 
 #define RT_FRAME_BYTES 32
 
-/* What stands before a body; how many bytes it has. */
+/* The bytes before a body; returns their number. */
 uint32_t rt_wrap(uint8_t out[RT_FRAME_BYTES], const rt_artefact *artefact);
 
 #endif

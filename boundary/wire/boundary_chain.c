@@ -64,7 +64,7 @@ void rt_chain_leave(rt_chain *chain, rt_bytes frame) {
 
 uint32_t rt_sign_statement(rt_chain *chain, const uint8_t seed[RT_KEY_BYTES], const uint8_t *flight, int64_t session,
                            const uint8_t before[RT_DIGEST_BYTES], int64_t source, const rt_now *now, bool final, uint8_t *out) {
-    static uint8_t payload[RT_MAX_STATEMENT]; /* the marks make most of it */
+    static uint8_t payload[RT_MAX_STATEMENT]; /* the marks are most of its size */
     uint8_t protected[64], public[RT_KEY_BYTES], kid[RT_KID_BYTES], signature[RT_SIGNATURE_BYTES];
     uint32_t at = rt_wrap(payload, &RT_STATEMENT);
     at += rt_cbor_head(payload + at, RT_MAJOR_ARRAY, 18);

@@ -18,13 +18,13 @@ typedef struct {
 /* Verify a bundle under a trust root for a vehicle, at a UTC time; then read it: see `open_bundle`. */
 rt_refusal rt_open_bundle(rt_bytes data, const rt_root *root, rt_bytes vehicle, int64_t now_us, rt_bundle *bundle);
 
-/* Whether a mission belongs to a bundle's policy, and the keys of both may speak for them on this vehicle; `after` is as for
-   `rt_all_named`. See `check_bundle`. */
+/* Check that a mission belongs to a bundle's policy, and that the keys of both are authorised for them on this vehicle; `after` is as
+   for `rt_all_named`. See `check_bundle`. */
 rt_refusal rt_check_bundle(const rt_bundle *bundle, const rt_mission *mission, const rt_key *key, rt_bytes vehicle, int64_t now_us,
                            const rt_after *after);
 
-/* Whether a mission key may sign the steps of a mission from `first` on under a policy; `in_person`: as though an operator had
-   proposed them. See `check_proposer`. */
+/* Check that a mission key may sign the steps of a mission from `first` on under a policy; `in_person`: as if an operator had proposed
+   them. See `check_proposer`. */
 rt_refusal rt_check_proposer(const rt_key *key, const rt_policy *policy, const rt_mission *mission, uint32_t first, bool in_person,
                              int64_t now_us);
 

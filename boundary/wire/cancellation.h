@@ -1,10 +1,10 @@
-/* Cancellations: a proposer's signed word that its mission is not to go on, which brings the vehicle home. */
+/* Cancellations: a proposer's signed order to stop its mission, after which the vehicle returns by the contingency. */
 #ifndef RT_WIRE_CANCELLATION_H
 #define RT_WIRE_CANCELLATION_H
 
 #include "document.h"
 
-/* A cancellation that is to be trusted here and now; the steps from `current` on are set aside. See `open_cancellation`. */
+/* The cancellation in a document, if it is trusted now; it cancels the steps from `current` on. See `open_cancellation`. */
 rt_refusal rt_open_cancellation(const rt_flight *flight, rt_bytes document, uint32_t current);
 
 #endif

@@ -1,6 +1,6 @@
 #include "cbor.h"
 
-/* The annotations `split` are for Frama-C (proof/cbor.c): it then follows each length by itself. */
+/* The annotations `split` make Frama-C (proof/cbor.c) analyse each length separately. */
 
 static bool head(rt_cursor *cursor, uint8_t *major, uint64_t *argument) {
     if (cursor->at >= cursor->end) return false;
@@ -44,7 +44,7 @@ typedef struct {
     rt_bytes key; /* the one before, in a map */
 } level;
 
-/* What a head of a string, an array or a map announces fits into what follows; a string's bytes are taken. */
+/* The size in the head of a string, an array or a map fits into the remaining bytes; a string's bytes are taken. */
 static bool content(rt_cursor *cursor, uint8_t major, uint64_t argument) {
     uint64_t room = (uint64_t)(cursor->end - cursor->at);
     if (argument > room || (major == 5 && 2 * argument > room)) return false;

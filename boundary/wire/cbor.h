@@ -1,4 +1,4 @@
-/* Deterministic CBOR (RFC 8949, section 4.2.1): the strict check of whole items, and taking apart what was checked. */
+/* Deterministic CBOR (RFC 8949, section 4.2.1): the strict check of whole items, and readers of checked items. */
 #ifndef RT_WIRE_CBOR_H
 #define RT_WIRE_CBOR_H
 
@@ -7,16 +7,16 @@
 #define RT_CBOR_LIMIT (16u << 20)
 #define RT_CBOR_DEPTH 32
 
-/* Where reading stands. What is taken off is never beyond `end`, whatever the bytes. */
+/* The position of a reader. It never passes `end`, whatever the bytes. */
 typedef struct {
     const uint8_t *at;
     const uint8_t *end;
 } rt_cursor;
 
-/* Whether the bytes are one item, in the one encoding that it has, of at most so many items in all (`cbor.decode`). */
+/* Whether the bytes are one item, in its only encoding, with at most so many items in all (`cbor.decode`). */
 bool rt_cbor_valid(rt_bytes data, uint32_t items);
 
-/* Take the next item off, if it is of that kind; else nothing is said of where the cursor stands then. */
+/* Take the next item if it is of that kind; otherwise the position of the cursor is undefined. */
 bool rt_take_int(rt_cursor *cursor, int64_t *value);
 bool rt_take_octets(rt_cursor *cursor, rt_bytes *octets);
 bool rt_take_text(rt_cursor *cursor, rt_bytes *text);
@@ -25,16 +25,16 @@ bool rt_take_map(rt_cursor *cursor, uint32_t *count);
 bool rt_take_bool(rt_cursor *cursor, bool *value);
 bool rt_take_null(rt_cursor *cursor); /* leaves the cursor where it is if the next item is another */
 
-/* An array of just so many items. */
+/* An array of exactly this many items. */
 bool rt_take_struct(rt_cursor *cursor, uint32_t fields);
 
 #define RT_HEAD_BYTES 9
 enum { RT_MAJOR_INT = 0, RT_MAJOR_OCTETS = 2, RT_MAJOR_TEXT = 3, RT_MAJOR_ARRAY = 4 };
 
-/* The shortest head; how many bytes it has. */
+/* The shortest head; returns its size in bytes. */
 uint32_t rt_cbor_head(uint8_t out[RT_HEAD_BYTES], uint8_t major, uint64_t argument);
 uint32_t rt_cbor_int(uint8_t out[RT_HEAD_BYTES], int64_t value);
-/* A string of octets or text, with its head; how many bytes it has. */
+/* A string of octets or text, with its head; returns its size in bytes. */
 uint32_t rt_cbor_string(uint8_t *out, uint8_t major, rt_bytes string);
 
 #endif

@@ -1,15 +1,15 @@
-/* Signed envelopes: COSE_Sign1 (RFC 9052, sections 4.2 and 4.4) with Ed25519, and nothing optional. */
+/* Signed envelopes: COSE_Sign1 (RFC 9052, sections 4.2 and 4.4) with Ed25519, without optional features. */
 #ifndef RT_WIRE_COSE_H
 #define RT_WIRE_COSE_H
 
 #include "keys.h"
 
-/* What an envelope claims. Nothing of it is to be trusted. */
+/* The unverified claims of an envelope. Do not trust them. */
 typedef struct {
     rt_bytes protected, content_type, kid, payload, signature;
 } rt_envelope;
 
-/* Take an envelope apart without trusting it: `malformed` unless it is canonical. */
+/* Parse an envelope without verifying it: `malformed` unless it is canonical. */
 rt_refusal rt_take_apart(rt_bytes envelope, uint32_t limit, rt_envelope *claimed);
 
 /* Whether a public key signed it for a duty. */

@@ -24,7 +24,7 @@ rt_refusal rt_open_document(const rt_flight *flight, rt_bytes document, const rt
 rt_refusal rt_check_times(const rt_flight *flight, int64_t issued_at_us, int64_t expires_at_us) {
     if (issued_at_us > rt_latest_utc_us(flight)) return "issued-in-future";
     if (rt_latest_utc_us(flight) >= expires_at_us) return "expired";
-    /* both may be any number of 64 bits; as it was issued before it expires, the difference is right without a sign */
+    /* both may be any number of 64 bits; the issue is before the expiry, so the unsigned difference is right */
     bool lives = issued_at_us < expires_at_us && (uint64_t)expires_at_us - (uint64_t)issued_at_us <= RT_MAX_LIFE_US;
     return lives ? NULL : "too-long-lived";
 }

@@ -7,7 +7,7 @@
 #define OCTETS(field) rt_take_octets(cursor, &(field))
 #define STRUCT(fields) rt_take_struct(cursor, fields)
 
-/* A list of items, each of which `take` finds well-formed. */
+/* A list of items, each of which `take` accepts. */
 #define LIST(name, type, take)                                                        \
     bool name(rt_cursor *cursor, rt_list *list) {                                     \
         if (!rt_take_array(cursor, &list->count)) return false;                       \
@@ -19,7 +19,7 @@
         return true;                                                                  \
     }
 
-/* A table of at most so many. */
+/* A table with a limit. */
 #define TABLE(name, type, most, take)                                                 \
     static bool name(rt_cursor *cursor, type table[most], uint32_t *count) {          \
         if (!rt_take_array(cursor, count) || *count > (most)) return false;           \
@@ -73,7 +73,7 @@ typedef struct {
     int64_t number;
     rt_bytes text;
     rt_list list;
-} ignored; /* what the boundary looks at the shape of only */
+} ignored; /* only the shape is checked here */
 
 static bool label(rt_cursor *cursor, ignored *into) { return STRUCT(2) && INT(into->number) && TEXT(into->text); }
 
@@ -168,7 +168,7 @@ static bool policy(rt_cursor *cursor, rt_policy *into) {
            INT(into->without_evidence) && INT(into->silence_us) && INT(into->after_silence) && omissions(cursor, &into->left_out);
 }
 
-/* The slot of the number of this name, which tells what is taken of the battery in a minute; the first, of several. */
+/* The slot of the signal of this name, the measured drain; the first, if there are several. */
 static int64_t drain_slot(const rt_policy *policy) {
     static const uint8_t name[] = "battery.drain";
     for (uint32_t at = 0; at < policy->signal_count; at++) {
@@ -240,7 +240,7 @@ void rt_read_invocation(rt_bytes raw, rt_invocation *into) {
 
 void rt_invocation_at(const rt_mission *mission, uint32_t step, rt_invocation *into) { rt_read_invocation(mission->invocations[step], into); }
 
-/* Most of what a decision does: so it reads what was found well-formed, without `rt_take_int`. */
+/* Most of the time of a decision is spent here, so checked code is read without `rt_take_int`. */
 bool rt_next_int(rt_list *list, int64_t *value) {
     const uint8_t *at = list->at;
     if (list->count == 0 || at >= list->end) return false;

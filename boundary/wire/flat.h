@@ -1,4 +1,4 @@
-/* How the flat form is read, for what is inside other artefacts. */
+/* Readers of the flat form for other artefacts. */
 #ifndef RT_WIRE_FLAT_H
 #define RT_WIRE_FLAT_H
 

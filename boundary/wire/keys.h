@@ -20,7 +20,7 @@ typedef struct {
 
 rt_bytes rt_duty_name(int64_t duty);
 
-/* The name of a key: it depends on the duty too. */
+/* The name of a key, which depends on the duty too. */
 void rt_key_id(int64_t duty, rt_bytes public, uint8_t kid[RT_KID_BYTES]);
 
 #endif

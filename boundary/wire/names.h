@@ -1,4 +1,4 @@
-/* The formats, as `wire/names.py` has them; a test compares. */
+/* The formats, as in `wire/names.py`; a test compares them. */
 #ifndef RT_WIRE_NAMES_H
 #define RT_WIRE_NAMES_H
 
@@ -8,7 +8,7 @@ typedef struct {
     rt_bytes name;
     int64_t version;
     rt_bytes content_type;
-    uint32_t items; /* the most CBOR items that one has; more are refused */
+    uint32_t items; /* the limit of CBOR items, beyond which the data is refused */
 } rt_artefact;
 
 #define RT_TEXT(literal) {(const uint8_t *)(literal), sizeof(literal) - 1}

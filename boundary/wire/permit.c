@@ -5,7 +5,7 @@
 #define VERSION 1
 
 static void mac_of(const uint8_t *body, const uint8_t key[RT_KEY_BYTES], uint8_t mac[RT_DIGEST_BYTES]) {
-    static const uint8_t domain[] = "rtshcua/permit"; /* its NUL belongs to it */
+    static const uint8_t domain[] = "rtshcua/permit"; /* including its NUL */
     const rt_bytes parts[] = {{domain, sizeof domain}, {body, RT_PERMIT_BODY}};
     rt_hmac_sha256((rt_bytes){key, RT_KEY_BYTES}, parts, 2, mac);
 }

@@ -1,4 +1,4 @@
-/* Permits: what `enforce` hands out and the executor checks before anything is sent. `permit.py`. */
+/* Permits: `enforce` issues them, and the executor checks them before anything is sent. `permit.py`. */
 #ifndef RT_WIRE_PERMIT_H
 #define RT_WIRE_PERMIT_H
 
@@ -9,7 +9,7 @@
 #define RT_LINK_VALID_US 1000000LL
 #define RT_AGAIN 16
 
-/* what may be asked for, and permitted */
+/* the kinds of requests and permits */
 enum { RT_STEP = 0, RT_FALLBACK_LINK = 1, RT_CONTINGENCY_LINK = 2 };
 
 typedef struct {

@@ -7,7 +7,7 @@
 #define HEAD (1 + 1 + 8 + 8 + 1)
 #define WRITE (RT_PARAMETER_NAME + 4 + 4)
 
-/* ASCII, and no NUL but those at its end. */
+/* ASCII, without NULs except at its end. */
 static bool is_name(const uint8_t name[RT_PARAMETER_NAME]) {
     bool ended = false;
     for (uint32_t i = 0; i < RT_PARAMETER_NAME; i++) {
@@ -38,7 +38,7 @@ bool rt_read_preparation(rt_bytes body, rt_preparation *preparation) {
 }
 
 static void mac_of(rt_bytes body, const uint8_t key[RT_KEY_BYTES], uint8_t mac[RT_DIGEST_BYTES]) {
-    static const uint8_t domain[] = "rtshcua/preparation"; /* its NUL belongs to it */
+    static const uint8_t domain[] = "rtshcua/preparation"; /* including its NUL */
     const rt_bytes parts[] = {{domain, sizeof domain}, body};
     rt_hmac_sha256((rt_bytes){key, RT_KEY_BYTES}, parts, 2, mac);
 }

@@ -23,7 +23,7 @@ rt_refusal rt_open_replacement(const rt_flight *flight, rt_bytes document, rt_re
     return found->mission.invocation_count == 0 ? "no-step" : NULL;
 }
 
-/* The same conditions, wherever in a source they stand. */
+/* The same conditions, independent of their source position. */
 static bool same_clauses(rt_list a, rt_list b) {
     rt_clause one, other;
     if (a.count != b.count) return false;
@@ -50,8 +50,8 @@ static bool same_contract(const rt_contract *a, const rt_contract *b) {
            same_links(a->fallback, b->fallback) && a->energy == b->energy && rt_same_list(a->record, b->record) && rt_same_list(a->reads, b->reads);
 }
 
-/* All that an invocation says, without what names it, when it was issued, and where in its source it stood; `phases` masks those
-   in which it means something. */
+/* The content of an invocation without its name, its time of issue and its source position; `phases` masks the phases in which it is
+   valid. */
 static bool same_step(const rt_invocation *a, const rt_invocation *b, uint64_t phases) {
     return a->step == b->step && a->phase == b->phase && a->skill == b->skill && a->source == b->source && a->role == b->role &&
            rt_same_list(a->arguments, b->arguments) && ((uint64_t)a->phases & phases) == ((uint64_t)b->phases & phases) &&
@@ -63,7 +63,7 @@ static bool same_step(const rt_invocation *a, const rt_invocation *b, uint64_t p
 /* The first `kept` steps are the same, in phases of the same names. */
 static rt_refusal check_kept(const rt_mission *old, const rt_mission *new, int64_t kept) {
     rt_invocation before, after;
-    int64_t phases = 0; /* how many there are up to the last of the steps that stay */
+    int64_t phases = 0; /* the size up to the last kept step */
     if (kept < 0 || kept > old->invocation_count || kept > new->invocation_count) return "other-steps";
     for (uint32_t step = 0; step < kept; step++) {
         rt_invocation_at(old, step, &before);

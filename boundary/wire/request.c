@@ -33,7 +33,7 @@ bool rt_read_request(rt_bytes data, int64_t slots, uint32_t monitors, rt_request
     state->monitor_count = monitors;
     for (uint32_t slot = 0; slot < count; slot++) {
         uint64_t bits = rt_take(&at, 8), half = 1ULL << 63;
-        state->known[slot] = bits != half; /* the least integer stands for a value that is not known */
+        state->known[slot] = bits != half; /* the least integer means an unknown value */
         if (bits > RT_MAX_VALUE && bits < half + (half - RT_MAX_VALUE) && bits != half)
             return false;
         state->values[slot] = bits == half ? 0 : bits < half ? (int64_t)bits : -1 - (int64_t)(half - 1 - (bits - half));

@@ -15,7 +15,7 @@ typedef struct {
     rt_state state;
 } rt_request;
 
-/* False for what is no request for a state of so many slots and temporal monitors. */
+/* False for octets that are not a request for a state of so many slots and temporal monitors. */
 bool rt_read_request(rt_bytes data, int64_t slots, uint32_t monitors, rt_request *request);
 
 #endif

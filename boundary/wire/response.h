@@ -7,8 +7,8 @@
 
 #define RT_MAX_RESPONSE 192
 
-/* Write a decision into `out` of RT_MAX_RESPONSE octets; `permit` has RT_PERMIT_BYTES, or is NULL; `evidence` is
-   the digest of the boundary's own evidence after it. Answers the size. */
+/* Write a decision into `out` of RT_MAX_RESPONSE octets; `permit` has RT_PERMIT_BYTES, or is NULL; `evidence` is the new digest of the
+   boundary's own evidence. Returns the size. */
 uint32_t rt_write_answer(const rt_decision *decision, int64_t consumed, const uint8_t *permit, const uint8_t *evidence, uint8_t *out);
 
 /* Write a refusal to decide: its status is not 0. */

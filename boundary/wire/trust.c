@@ -7,7 +7,7 @@ static const rt_bytes any = RT_TEXT("*");
 
 #define LINK_ID_BYTES 8
 
-/* Take a map's next key, if it is this one: the fields of a struct come in the order of their encodings. */
+/* Take a map's next key if it is this one: the fields of a struct are in the order of their encodings. */
 static bool field(rt_cursor *cursor, rt_bytes name) {
     rt_bytes key;
     rt_cursor again = *cursor;
@@ -49,7 +49,7 @@ static bool key_of(rt_cursor *cursor, rt_key *key) {
 static bool thresholds(rt_cursor *cursor, int64_t of[RT_DUTIES]) {
     static const int64_t order[] = {RT_DUTY_LOG, RT_DUTY_ROOT, RT_DUTY_POLICY, RT_DUTY_MISSION, RT_DUTY_WITNESS, RT_DUTY_APPROVAL};
     uint32_t count, read = 0;
-    of[RT_DUTY_WITNESS] = 1; /* the one that may be left out */
+    of[RT_DUTY_WITNESS] = 1; /* the optional one */
     if (!rt_take_map(cursor, &count)) return false;
     for (size_t i = 0; i < sizeof order / sizeof order[0]; i++) {
         if (!field(cursor, rt_duty_name(order[i]))) {
@@ -85,7 +85,7 @@ static bool is_name(rt_bytes person) {
     return true;
 }
 
-/* An approval is one person's, in one role and in person. */
+/* An approval key belongs to one person, in one role and in person. */
 static rt_refusal check_bound(const rt_key *key) {
     if ((key->person.size > 0 && key->duty != RT_DUTY_APPROVAL) || (key->policies.count > 0 && key->duty != RT_DUTY_MISSION)) return "malformed";
     if (key->duty != RT_DUTY_APPROVAL) return NULL;
@@ -109,7 +109,7 @@ static rt_refusal check_revoked(const rt_root *root) {
 static rt_refusal check_thresholds(const rt_root *root) {
     uint32_t witnesses = 0;
     for (uint32_t i = 0; i < root->key_count; i++) witnesses += root->keys[i].duty == RT_DUTY_WITNESS;
-    for (int64_t duty = 0; duty < RT_DUTY_BOUNDARY; duty++) { /* one boundary speaks for itself */
+    for (int64_t duty = 0; duty < RT_DUTY_BOUNDARY; duty++) { /* a vehicle has one boundary */
         int64_t threshold = root->thresholds[duty];
         if (threshold > 1 && duty != RT_DUTY_WITNESS) return "unsupported-threshold";
         if (threshold > 1 && threshold > witnesses) return "unreachable-threshold";
@@ -118,7 +118,7 @@ static rt_refusal check_thresholds(const rt_root *root) {
     return NULL;
 }
 
-/* Refuse a root that contradicts itself, whoever signed it. */
+/* Refuse a root that contradicts itself, independent of its signature. */
 static rt_refusal check(const rt_root *root) {
     if (root->revoked.count > RT_MAX_REVOKED || root->version < 1 || root->expires_at_us <= root->issued_at_us) return "malformed";
     rt_refusal refusal = check_thresholds(root);
@@ -148,7 +148,7 @@ static const rt_key *find(const rt_root *root, rt_bytes kid) {
 rt_refusal rt_open_root(rt_bytes data, rt_bytes pinned, int64_t now_us, rt_root *root) {
     rt_envelope claimed;
     rt_refusal refusal = rt_take_apart(data, RT_MAX_ROOT, &claimed);
-    bool whole = pinned.size == RT_KEY_BYTES; /* else only the root itself holds the key: it is parsed first */
+    bool whole = pinned.size == RT_KEY_BYTES; /* else only the root itself contains the key, so it is parsed first */
     if (refusal == NULL && !whole) refusal = decode(claimed.payload, root);
     if (refusal != NULL) return refusal;
     if (pinned.size == 0 && !root->development) return "unpinned";
@@ -191,7 +191,8 @@ rt_refusal rt_open_envelope(rt_bytes envelope, const rt_root *root, int64_t duty
 
 uint32_t rt_person(const rt_root *root, const rt_key *key) {
     uint32_t number = 0;
-    while (number < root->key_count && !rt_same(root->keys[number].person, key->person)) number++; /* it is found: at the latest it is the key itself */
+    while (number < root->key_count && !rt_same(root->keys[number].person, key->person)) number++; /* it is found, at the latest as the
+                                                                                                      key itself */
     return number;
 }
 

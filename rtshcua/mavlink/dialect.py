@@ -1,8 +1,8 @@
-"""What the MAVLink dialect says of each message and enumeration, as a plain value.
+"""The messages and enumerations of the MAVLink dialect, as a plain value.
 
-The value is read from `dialect.json`, a table that `rtshcua.codec.build_dialect` derives from pymavlink's generated
-module `ardupilotmega` (which includes `common`). Reading it takes some milliseconds; importing pymavlink takes tens,
-which the checker would pay on every start.
+The value is read from `dialect.json`, a table that `rtshcua.codec.build_dialect` generates from pymavlink's module
+`ardupilotmega` (which includes `common`). Reading it takes some milliseconds; importing pymavlink takes tens,
+which would delay every start of the checker.
 """
 
 import json
@@ -17,7 +17,7 @@ from rtshcua.model.quantity import Datum
 
 TABLE = Path(__file__).with_name("dialect.json")
 
-#: what an altitude in a field is measured from, by message and field (common.xml, in its descriptions)
+#: : the datum of the altitudes, by message and field (common.xml, in its descriptions)
 DATUM: Mapping[tuple[str, str], Datum] = MappingProxyType(
     {
         ("GLOBAL_POSITION_INT", "relative_alt"): Datum.HOME,
@@ -42,11 +42,11 @@ class Field:
     type: str
     """The element's type as in the XML, without a length: `int8_t`, `float`, `char`, ..."""
     length: int
-    """How many elements an array has; 0 for a field that is no array."""
+    "The number of elements of an array; 0 for other fields."
     unit: str
     """The unit as in the XML: `mm`, `cm/s`, `degE7`, `%`, ...; empty if it has none."""
     enum: str | None
-    """The enumeration that names the field's values, if there is one."""
+    "The enumeration of the field's values, if there is one."
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +66,7 @@ class Dialect:
 
 
 def from_table(table: Mapping[str, Any]) -> Dialect:
-    """The dialect that a table as in `dialect.json` describes."""
+    """The dialect in a table as in `dialect.json`."""
     messages = {
         name: Message(number, {field: Field(*row) for field, row in fields.items()})
         for name, (number, fields) in table["messages"].items()
@@ -77,5 +77,5 @@ def from_table(table: Mapping[str, Any]) -> Dialect:
 
 @cache
 def load() -> Dialect:
-    """The dialect from the table that ships with the package; read once in a process."""
+    """The dialect from the shipped table; read once in a process."""
     return from_table(json.loads(TABLE.read_bytes()))

@@ -1,7 +1,7 @@
-"""Numbers of the dialect that more than one part of this package means, under the dialect's own names.
+"""Numbers of the dialect that several parts of this package use, under the dialect's own names.
 
-Commands, modes' flags, frames of reference, components (https://mavlink.io/en/messages/common.html). Whoever needs
-others, and may import pymavlink, has them there.
+Commands, flags of modes, frames of reference, components (https://mavlink.io/en/messages/common.html). Modules
+that may import pymavlink find the others there.
 """
 
 from typing import Final
@@ -10,15 +10,15 @@ MAV_TYPE_GCS: Final = 6
 #: quadrotor, coaxial, hexarotor, octorotor, tricopter, dodecarotor, decarotor
 MULTIROTORS: Final = frozenset({2, 3, 13, 14, 15, 29, 35})
 MAV_TYPE_ONBOARD_CONTROLLER: Final = 18
-#: what carries itself: of the others (ground stations, trackers, gimbals, cameras, ...) none is a vehicle
+#: : vehicles; the other types (ground stations, trackers, gimbals, cameras, ...) are not vehicles
 VEHICLES: Final = frozenset({*range(5), *range(7, 18), *range(19, 26), 28, 29, 35, 43, 45, 46, 47})
 
-#: a battery that feeds no motor
+#: : a battery that does not supply a motor
 MAV_BATTERY_FUNCTION_AVIONICS: Final = 3
 MAV_BATTERY_FUNCTION_PAYLOAD: Final = 4
 
 MAV_AUTOPILOT_ARDUPILOTMEGA: Final = 3
-MAV_AUTOPILOT_INVALID: Final = 8  # of a component that is none
+MAV_AUTOPILOT_INVALID: Final = 8  # the autopilot field of a component without an autopilot
 MAV_AUTOPILOT_PX4: Final = 12
 
 MAV_COMP_ID_AUTOPILOT1: Final = 1
@@ -52,7 +52,7 @@ MAV_CMD_DO_REPOSITION: Final = 192
 MAV_CMD_DO_PAUSE_CONTINUE: Final = 193
 MAV_CMD_MISSION_START: Final = 300
 MAV_CMD_COMPONENT_ARM_DISARM: Final = 400
-MAV_CMD_RUN_PREARM_CHECKS: Final = 401  # says why it would not arm, and does nothing else
+MAV_CMD_RUN_PREARM_CHECKS: Final = 401  # reports why it would not arm, without an effect
 MAV_CMD_SET_MESSAGE_INTERVAL: Final = 511
 MAV_CMD_REQUEST_MESSAGE: Final = 512
 MAV_CMD_NAV_FENCE_RETURN_POINT: Final = 5_000
@@ -68,5 +68,5 @@ MAV_MISSION_TYPE_RALLY: Final = 2
 
 #: POSITION_TARGET_TYPEMASK: velocity, acceleration, yaw and yaw rate are ignored
 POSITION_ONLY: Final = 0x0DF8
-#: INT32_MAX: in x and y of COMMAND_INT what NaN is in a float
+#: : INT32_MAX: in x and y of COMMAND_INT the equivalent of NaN in a float
 NO_PLACE: Final = (1 << 31) - 1

@@ -1,7 +1,7 @@
-"""How the payloads of messages are laid out that leave for a vehicle, and of those that tell the gate where
-it is, whether it flies, and what its parameters are.
+"""The payload layouts of the messages that are sent to a vehicle, and of those that show the gate the vehicle's
+position, flight state and parameters.
 
-Fields stand by falling size, extensions behind them (https://mavlink.io/en/guide/serialization.html).
+Fields are ordered by falling size, followed by extensions (https://mavlink.io/en/guide/serialization.html).
 """
 
 from collections.abc import Callable
@@ -38,7 +38,7 @@ TEXT_OCTETS: Final = 50  # in one STATUSTEXT
 class Layout(NamedTuple):
     """A message's fields, in the order of the wire.
 
-    `extra` is the octet that the frame's checksum takes in behind the payload, a digest of all this.
+    `extra` is the octet that the frame's checksum includes after the payload, a digest of the layout.
     """
 
     extra: int
@@ -46,19 +46,19 @@ class Layout(NamedTuple):
     names: tuple[str, ...]
 
     def at(self, name: str) -> int:
-        """Where a field stands among the fields; -1 if the message has none of this name."""
+        """The index of a field; -1 if the message has none of this name."""
         return self.names.index(name) if name in self.names else -1
 
     def getter(self, names: str) -> Callable[[tuple[Any, ...]], Any]:
-        """What takes these out of the fields: one as it is, several as a tuple."""
+        """A function that selects these fields: one as it is, several as a tuple."""
         return itemgetter(*map(self.names.index, names.split()))
 
     def read(self, frame: bytes) -> tuple[Any, ...]:
-        """The fields of a whole frame whose payload is no longer than the layout."""
+        """The fields of a complete frame whose payload is no longer than the layout."""
         length, fields = frame[1], self.fields
         if length == fields.size:
             return fields.unpack_from(frame, HEADER)
-        return fields.unpack(frame[HEADER : HEADER + length].ljust(fields.size, b"\0"))  # zeros at the end are not sent
+        return fields.unpack(frame[HEADER : HEADER + length].ljust(fields.size, b"\0"))  # trailing zeros are not sent
 
 
 def _layout(extra: int, fields: str, names: str) -> Layout:
@@ -96,7 +96,7 @@ LAYOUTS: Final = {
     STATUSTEXT: _layout(83, f"<B{TEXT_OCTETS}sHB", "severity text id chunk_seq"),
 }  # fmt: skip
 
-#: what is read of the commands: the numbers that an autopilot acts on
+#: : the fields of commands that an autopilot acts on
 of_command_long: Final = LAYOUTS[COMMAND_LONG].getter("param1 param2 param3 param4 param5 param6 param7 command")
 of_command_int: Final = LAYOUTS[COMMAND_INT].getter("param1 param2 param3 param4 x y z command frame")
 of_position_target: Final = LAYOUTS[SET_POSITION_TARGET_GLOBAL_INT].getter(

@@ -1,4 +1,4 @@
-"""The autopilots that are known, and their flight modes: `custom_mode` of HEARTBEAT, and how DO_SET_MODE says it."""
+"""The supported autopilots and their flight modes: `custom_mode` of HEARTBEAT, and the parameters of DO_SET_MODE."""
 
 from collections.abc import Mapping
 from enum import IntEnum
@@ -12,20 +12,20 @@ KNOWN: Final = (PX4, ARDUPILOT)
 
 
 def is_vehicle(kind: int, autopilot: int) -> bool:
-    """Whether a HEARTBEAT of this MAV_TYPE and MAV_AUTOPILOT is of a vehicle whose autopilot is known.
+    """Whether a HEARTBEAT of this MAV_TYPE and MAV_AUTOPILOT is from a vehicle with a supported autopilot.
 
-    A ground station, a gimbal or a companion computer is none, whatever autopilot it names.
+    A ground station, a gimbal or a companion computer is not, whatever autopilot it reports.
     """
     return autopilot in KNOWN and kind in enums.VEHICLES
 
 
 def is_another(kind: int, autopilot: int) -> bool:
-    """Whether a HEARTBEAT is of some vehicle, whatever its autopilot."""
+    """Whether a HEARTBEAT is from a vehicle, with any autopilot."""
     return autopilot != enums.MAV_AUTOPILOT_INVALID and kind in enums.VEHICLES
 
 
 class Px4Mode(IntEnum):
-    """PX4's (`px4_custom_mode.h`), named as it tells them to people: `main << 16 | sub << 24`."""
+    """PX4's modes (`px4_custom_mode.h`), with the names shown to people: `main << 16 | sub << 24`."""
 
     MANUAL = 1 << 16
     ALTITUDE = 2 << 16
@@ -49,7 +49,7 @@ class Px4Mode(IntEnum):
 
 
 class CopterMode(IntEnum):
-    """ArduCopter's (`mode.h`, COPTER_MODE of the dialect)."""
+    """ArduCopter's modes (`mode.h`, COPTER_MODE of the dialect)."""
 
     STABILIZE = 0
     ACRO = 1
@@ -75,10 +75,10 @@ class CopterMode(IntEnum):
 
     @property
     def parameters(self) -> tuple[int, int]:
-        """Parameters 2 and 3 of DO_SET_MODE: the number, and nothing."""
+        """Parameters 2 and 3 of DO_SET_MODE: the number, and 0."""
         return self.value, 0
 
 
-#: what the autopilots call them
+#: : the names that the autopilots display
 PX4_NAMES: Final[Mapping[int, str]] = {mode: mode.name.replace("_", " ").title() for mode in Px4Mode}
 COPTER_NAMES: Final[Mapping[int, str]] = {mode: mode.name for mode in CopterMode}

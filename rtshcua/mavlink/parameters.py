@@ -1,6 +1,6 @@
-"""How the value of an autopilot's parameter stands in PARAM_SET and PARAM_VALUE, and how it is written as text.
+"""The encoding of an autopilot's parameter in PARAM_SET and PARAM_VALUE, and its text.
 
-Both messages have a 32-bit float for it. PX4 puts the octets of an integer there, ArduPilot its number
+Both messages contain a 32-bit float. PX4 stores the octets of an integer there, ArduPilot its number
 (https://mavlink.io/en/services/parameter.html, "Parameter encoding").
 """
 
@@ -14,12 +14,12 @@ from rtshcua.mavlink.modes import PX4
 #: octets of a parameter's name
 NAME_OCTETS: Final = 16
 
-#: MAV_PARAM_TYPE of integers, and the bytes that they are in a float's place
+#: : MAV_PARAM_TYPE of integers, and their format in place of a float
 _INTEGERS: Final = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}
 
 
 def is_bytewise(autopilot: int) -> bool:
-    """Whether this MAV_AUTOPILOT has integers as their bytes."""
+    """Whether this MAV_AUTOPILOT sends integers as their bytes."""
     return autopilot == PX4
 
 
@@ -30,7 +30,7 @@ def decode(raw: float, kind: int, *, bytewise: bool) -> float:
 
 
 def fits(value: float, kind: int) -> bool:
-    """Whether a parameter of this MAV_PARAM_TYPE keeps the value as it is."""
+    """Whether a parameter of this MAV_PARAM_TYPE can represent the value exactly."""
     shape = _INTEGERS.get(kind)
     if shape is None:
         return True
@@ -44,7 +44,7 @@ def fits(value: float, kind: int) -> bool:
 
 
 def encode(value: float, kind: int, *, bytewise: bool) -> float | None:
-    """What stands in a message for a value; None for one that does not fit into its octets."""
+    """The encoded value; None if it does not fit."""
     shape = _INTEGERS.get(kind) if bytewise else None
     if shape is None:
         return value
@@ -52,7 +52,7 @@ def encode(value: float, kind: int, *, bytewise: bool) -> float | None:
 
 
 def bits_of(value: float) -> int | None:
-    """A value as the 32 bits of the float that is nearest to it; None for what is no number, or too large for one."""
+    """A value as the 32 bits of the nearest float; None for a value that is not a number or too large."""
     if not isfinite(value):
         return None
     try:
@@ -63,12 +63,12 @@ def bits_of(value: float) -> int | None:
 
 
 def value_of(bits: int) -> float:
-    """The number that 32 bits are."""
+    """The value of 32 bits as a float."""
     return float(unpack("<f", pack("<I", bits))[0])
 
 
 def shown(bits: int) -> str:
-    """The number that 32 bits are, in as few digits as tell it from all others: 0.1, and not 0.100000001."""
+    """The value of 32 bits as a float in the fewest digits that identify it: 0.1, and not 0.100000001."""
     value = value_of(bits)
     for digits in range(6, 9):
         text = f"{value:.{digits}g}"

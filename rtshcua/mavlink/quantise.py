@@ -1,4 +1,4 @@
-"""Telemetry becomes integers here, once, where frames arrive; no float goes further.
+"""Converts telemetry to integers where frames arrive; no float goes further.
 
 Canonical units: length mm, speed mm/s, duration us, angle (latitude and longitude too) 1e-7 degree, ratio 1/10000,
 voltage mV, count 1.
@@ -10,8 +10,8 @@ from types import MappingProxyType
 
 from rtshcua.model.quantity import Dimension
 
-#: by dimension: the units of the dialect that a signal may have, by their spelling in the XML, each with numerator and
-#: denominator of the canonical units in one of it
+#: : by dimension: the units of the dialect that a signal may have, as spelled in the XML, with their size in
+#: canonical units as numerator and denominator
 UNITS: Mapping[Dimension, Mapping[str, tuple[int, int]]] = MappingProxyType(
     {
         Dimension.LENGTH: {"mm": (1, 1), "cm": (10, 1), "dm": (100, 1), "m": (1000, 1), "dam": (10_000, 1)},
@@ -49,9 +49,9 @@ UNITS: Mapping[Dimension, Mapping[str, tuple[int, int]]] = MappingProxyType(
 def quantise(raw: int | float, numerator: int, denominator: int, unknown: Container[int] = ()) -> int | None:
     """`raw * numerator / denominator`, rounded to the nearest integer, halves away from zero.
 
-    `denominator` is positive. A float is taken for exactly the fraction it stands for, so the result is the same on
-    every machine. None, meaning unknown, for NaN, for an infinity and for a value in `unknown` (the message's own
-    marks: battery -1, voltage 65535).
+    `denominator` is positive. A float counts as the exact fraction that it represents, so the result is the same
+    on every machine. None, meaning unknown, for NaN, for an infinity and for a value in `unknown` (the message's
+    own marks: battery -1, voltage 65535).
     """
     if raw in unknown:
         return None

@@ -1,7 +1,8 @@
-"""RADIO_STATUS on a link with a key: radios do not sign, so what they tell can be forged, and may only tighten.
+"""RADIO_STATUS on a link with a key: radios do not sign, so their reports can be forged, and may only make the state
+worse.
 
-Of all that was told in the last seconds the worst counts, field by field, so that a forged frame beside the radio's own
-can make the link look worse, never better. It is let in only where the operator says that there is a radio.
+The worst value of the last seconds counts, field by field, so that a forged frame can make the link look worse but
+never better. It is only accepted if the operator states that there is a radio.
 """
 
 from typing import Any, Final
@@ -10,7 +11,7 @@ from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, message_id
 from rtshcua.mavlink.signing import Counts, FrameVerifier
 
 RADIO_STATUS: Final = 109
-#: who a SiK radio says that it is: `RADIO_SOURCE_SYSTEM` '3' and `RADIO_SOURCE_COMPONENT` 'D' of ArduPilot/SiK,
+#: : the ids of a SiK radio: `RADIO_SOURCE_SYSTEM` '3' and `RADIO_SOURCE_COMPONENT` 'D' of ArduPilot/SiK,
 #: Firmware/radio/mavlink.c
 RADIO_SYSTEM, RADIO = 51, 68
 #: us; radios report each second
@@ -22,7 +23,7 @@ _NOT_KNOWN: Final = 255
 
 
 class UnsignedRadio:
-    """Accepts what `link` accepts, and RADIO_STATUS without a signature, tempered."""
+    """Accepts the frames that `link` accepts, and unsigned RADIO_STATUS with the worst recent values."""
 
     def __init__(self, link: FrameVerifier) -> None:
         self._link = link
@@ -35,13 +36,13 @@ class UnsignedRadio:
         return self._link.counts
 
     def accept(self, frame: bytes, now_us: int) -> bool:
-        """Whether a frame may come in."""
+        """Whether a frame is accepted."""
         if not frame[FLAGS] & FLAG_SIGNED and message_id(frame, 0) == RADIO_STATUS:
             return True
         return self._link.accept(frame, now_us)
 
     def temper(self, message: Any, now_us: int) -> None:
-        """Change an unsigned RADIO_STATUS to the worst that was told within `SPAN_US`, at least."""
+        """Replace the values of an unsigned RADIO_STATUS by the worst within the last `SPAN_US`."""
         since_us = self._since_us
         if since_us is None or now_us - since_us >= SPAN_US:
             recent = since_us is not None and now_us - since_us < 2 * SPAN_US
@@ -54,5 +55,5 @@ class UnsignedRadio:
 
 
 def _lower(one: int, other: int) -> int:
-    """Not known is worse than anything."""
+    """The worse of two values; unknown is the worst."""
     return _NOT_KNOWN if _NOT_KNOWN in (one, other) else min(one, other)

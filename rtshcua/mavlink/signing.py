@@ -1,11 +1,11 @@
 """MAVLink 2 message signing, both ends, pure: https://mavlink.io/en/guide/message_signing.html ("the guide").
 
-A signed frame has the bit `FLAG_SIGNED`, and 13 octets behind its checksum: link id, timestamp, and the first 48 bits
-of SHA-256 over key, header, payload, checksum, link id and timestamp (guide, "Signature").
+A signed frame has the bit `FLAG_SIGNED`, and 13 octets after its checksum: link id, timestamp, and the first 48
+bits of SHA-256 over key, header, payload, checksum, link id and timestamp (guide, "Signature").
 
-Two things are stricter here than in pymavlink's own signing. It remembers a timestamp before it checks the signature,
-so that a forged frame can lock out a stream for ever; and it keeps nothing over a restart, so that what was sent before
-can be sent again. `SigningState` is what has to be kept; `rtshcua.adapters.store.signing` keeps it.
+This module is stricter than pymavlink's own signing in two ways. Pymavlink stores a timestamp before it checks the
+signature, so that a forged frame can lock out a stream for ever; and it stores nothing across a restart, so that
+old frames can be replayed. `SigningState` is the stored state; `rtshcua.adapters.store.signing` stores it.
 """
 
 import hashlib
@@ -21,16 +21,17 @@ EPOCH_US: Final = 1_420_070_400_000_000  # 1 January 2015 in UTC us (guide, "Tim
 UNIT_US: Final = 10
 MINUTE: Final = 6_000_000
 _SECOND: Final = 100_000
-#: What is signed ahead begins so far, in timestamps, above what is signed now: as long as normal frames go on, it is
-#: good for that long.
+#: : The distance, in timestamps, of frames signed ahead from those signed now: they stay valid for that long while
+#: normal frames continue.
 LEAD: Final = 3_000_000
-#: It begins anew no more often than this, in us: an attacker who sends it raises time by `LEAD + MOST_AHEAD` a second.
+#: : The least interval between two batches, in us: an attacker who sends them raises time by `LEAD + MOST_AHEAD` a
+#: second.
 _LEADS_EVERY_US: Final = 1_000_000
-#: The most timestamps reserved above `LEAD`, one per frame. A batch needs some hundreds.
+#: : The most timestamps reserved above `LEAD`, one per frame. A batch needs some hundreds.
 MOST_AHEAD: Final = _SECOND
-#: as many as the C library keeps (MAVLINK_MAX_SIGNING_STREAMS)
+#: : the same number as in the C library (MAVLINK_MAX_SIGNING_STREAMS)
 MOST_STREAMS: Final = 16
-#: Timestamps have 48 bits, until 2104; what claims the last year is believed no more, so that ours never run out.
+#: : Timestamps have 48 bits, until 2104; timestamps of the last year are refused, so that ours cannot run out.
 LAST: Final = (1 << 48) - 366 * 24 * 60 * MINUTE
 
 _TAG: Final = 6
@@ -46,7 +47,7 @@ def timestamp_of(utc_us: int) -> int:
 
 
 class SigningState(NamedTuple):
-    """What must outlive a restart: the local timestamp, and the last one of each stream that was heard."""
+    """The state that must survive a restart: the local timestamp, and the last one of each received stream."""
 
     timestamp: int
     streams: Mapping[Stream, int]
@@ -54,37 +55,37 @@ class SigningState(NamedTuple):
 
 @dataclass(slots=True)
 class Counts:
-    """How many frames were let in, and why others were not."""
+    """How many frames were accepted, and the reasons of the refusals."""
 
     accepted: int = 0
     unsigned: int = 0
     forged: int = 0
-    strayed: int = 0  # our own, or sent by its sender on another link than the one that we hear it by
+    strayed: int = 0  # our own, or sent by its sender on another link than this one
     stale: int = 0
-    crowded: int = 0  # rightly signed, of a stream for which there is no room
-    unverified: int = 0  # taken in when nobody was there to verify them
+    crowded: int = 0  # correctly signed, of a stream for which there is no room
+    unverified: int = 0  # accepted while nothing could verify them
 
 
 class FrameVerifier(Protocol):
-    """Says whether a frame proves where it comes from. `counts`: what became of those that came."""
+    """Verifies the origin of frames."""
 
     @property
     def counts(self) -> Counts:
-        """How many were accepted, and why others were not."""
+        """How many frames were accepted, and the reasons of the refusals."""
         ...
 
     def accept(self, frame: bytes, now_us: int) -> bool:
-        """Whether a frame with a right checksum may be taken in at a monotonic time."""
+        """Whether a frame with a correct checksum is accepted at a monotonic time."""
         ...
 
 
 class SignedLink:
-    """One link with a key: signs what leaves as `link`, and says what of the rest may come in.
+    """One link with a key: signs outgoing frames as `link`, and verifies incoming ones.
 
-    `stored` is the state of the run before. `utc_us` and `monotonic_us` are the present; from here on only monotonic
-    time counts, so that setting a clock back opens nothing. `as_library`: as in the C library that both autopilots have
-    (`mavlink_signature_check`), of a stream that is known no frame is too old that is newer than the one before, a
-    sender may sign on several links, and no stream is ever forgotten for another one.
+    `stored` is the state of the previous run. `utc_us` and `monotonic_us` are the present; after that only
+    monotonic time counts, so that setting a clock back has no effect. `as_library`: behave as the C library of
+    both autopilots (`mavlink_signature_check`): of a known stream every frame newer than the last one is accepted,
+    a sender may sign on several links, and no stream is forgotten in favour of another.
     """
 
     def __init__(
@@ -98,7 +99,7 @@ class SignedLink:
         as_library: bool = False,
     ) -> None:
         if len(key) != KEY_OCTETS:
-            raise ValueError(f"a link key has {KEY_OCTETS} octets, not {len(key)}")
+            raise ValueError(f"a link key must have {KEY_OCTETS} octets, not {len(key)}")
         self._key = key
         self._link = link
         self._as_library = as_library
@@ -108,14 +109,15 @@ class SignedLink:
         self._since_us = monotonic_us - self._ahead * UNIT_US
         self._streams = dict(stored.streams)
         self._promised = 0  # the last timestamp of a frame that was signed ahead,
-        self._promised_us = 0  # and when these last began anew
+        self._promised_us = 0  # and when the batch began
         self._own: Stream | None = None
         recent = [stream for stream, last in stored.streams.items() if last >= self._ahead - MINUTE]
         self._heard_by = {stream[:2]: stream[2] for stream in sorted(recent, key=stored.streams.__getitem__)}
         self._counts = Counts()
-        #: called when there is more to keep than time going by: a stream that is new, or a leap of the local time
+        #: : called when the stored state changes by more than the passing of time: a new stream, or a leap of the
+        #: local time
         self.on_news: Callable[[], object] = lambda: None
-        #: called with the stream and the timestamp of each frame that is accepted
+        #: : called with the stream and the timestamp of each frame that is accepted
         self.on_heard: Callable[[Stream, int], object] = lambda stream, timestamp: None
 
     @property
@@ -124,7 +126,7 @@ class SignedLink:
 
     @property
     def state(self) -> SigningState:
-        """What to keep. May be asked for by another thread than the one that signs."""
+        """The state to store. May be called by another thread than the one that signs."""
         return SigningState(max(self._ahead, self._promised), self._streams.copy())
 
     def sign(self, frame: bytes, now_us: int) -> bytes:
@@ -134,9 +136,9 @@ class SignedLink:
         return self._signed_at(frame, self._ahead)
 
     def sign_ahead(self, frame: bytes, now_us: int) -> bytes | None:
-        """The same for a frame that is to be sent only when nothing more is signed: its timestamp is above all that
-        were promised before, and `LEAD` to `LEAD + MOST_AHEAD` above what is signed now. Whatever leaves once that time
-        has come voids it. None where too many were signed so.
+        """The signed frame for use only when nothing more is signed: its timestamp is above all earlier ones, and
+        `LEAD` to `LEAD + MOST_AHEAD` above those signed now. A later regular frame with a greater timestamp voids
+        it. None if too many were signed ahead.
         """
         begins = max(self._ahead, self._clock(now_us)) + LEAD
         if self._promised >= begins + MOST_AHEAD:
@@ -154,17 +156,19 @@ class SignedLink:
         return signed + self._tag(signed)
 
     def accept(self, frame: bytes, now_us: int) -> bool:
-        """Whether a whole frame with a right checksum may come in at a monotonic time; only then is it remembered."""
+        """Whether a complete frame with a correct checksum is accepted at a monotonic time; only then is it
+        remembered.
+        """
         # 1. it is signed
         if not frame[FLAGS] & FLAG_SIGNED:
             self._counts.unsigned += 1
             return False
-        # 2. "Computed 48 bit signature does not match": before anything that it says is believed
+        # 2. "Computed 48 bit signature does not match": checked before any of its fields is used
         if not hmac.compare_digest(self._tag(frame[:-_TAG]), frame[-_TAG:]):
             self._counts.forged += 1
             return False
         # 3. it is not one of ours, sent back to us, nor one that its sender sent on another link: it signs there too,
-        #    and what was overheard there would be news here for a minute
+        # and a frame overheard there would be accepted here for a minute
         stream = stream_of(frame)
         astray = not self._as_library and self._heard_by.get(stream[:2], stream[2]) != stream[2]
         if stream == self._own or astray:
@@ -200,8 +204,8 @@ class SignedLink:
         return hashlib.sha256(self._key + octets).digest()[:_TAG]
 
     def _has_room(self, stream: Stream, local: int) -> bool:
-        """A stream whose last frame is over a minute old needs no memory: step 4 refuses all that it would refuse. As
-        many senders are remembered as streams.
+        """A stream whose last frame is over a minute old needs no memory, because step 4 refuses the same frames
+        without it. The number of senders is limited to that of streams.
         """
         streams, heard_by, sender = self._streams, self._heard_by, stream[:2]
         if self._as_library:
@@ -216,7 +220,7 @@ class SignedLink:
 
 
 def stream_of(frame: bytes) -> Stream:
-    """Which stream a signed frame belongs to."""
+    """The stream of a signed frame."""
     return frame[5], frame[6], frame[-SIGNATURE]
 
 

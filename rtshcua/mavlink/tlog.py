@@ -19,10 +19,10 @@ class TlogEntry:
 
 
 class DamagedTlog(ValueError):
-    """What begins at `offset` is no whole entry: the file was cut there, or is no tlog."""
+    """The data at `offset` is not a complete entry: the file was truncated, or is not a tlog."""
 
     def __init__(self, offset: int) -> None:
-        super().__init__(f"no whole tlog entry at byte {offset}")
+        super().__init__(f"no complete tlog entry at byte {offset}")
         self.offset = offset
 
 
@@ -32,9 +32,9 @@ def encode(at_us: int, frame: bytes) -> bytes:
 
 
 def read(data: bytes) -> Iterator[TlogEntry]:
-    """The entries of a tlog, in order. Frames are not checked, only measured.
+    """The entries of a tlog, in order. Frames are measured but not checked.
 
-    Raises `DamagedTlog` when it comes to bytes that are no whole entry, after yielding all before them.
+    Raises `DamagedTlog` at the first incomplete entry, after yielding all entries before it.
     """
     yield from stream(BytesIO(data))
 

@@ -1,4 +1,4 @@
-"""What is decided and why: the one form of it for the decision, the boundary, the log and the audit."""
+"""The result of a decision, in one form for the decision, the boundary, the log and the audit."""
 
 from typing import TypeAlias
 
@@ -9,19 +9,20 @@ from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.policy import Airspace, Rule
 from rtshcua.model.outcome import Outcome, Reason
 
-#: what can decide; None where it is a field of the contract itself, or of the request
+#: : the deciding clause; None where a field of the contract or of the request decided
 Decisive: TypeAlias = Clause | Rule | Airspace | None
 
 
 class Decision(msgspec.Struct, frozen=True, gc=False):
-    """What is decided, about a step or a link, and why.
+    """The decision about a step or a link, with its reason.
 
-    `step` is the number in design 4.1. `clause` decided, None where it was a field of the contract or the request.
-    `target` is what flies on FALLBACK, `link` its index in the chain (`links.DEGRADE` for a degrade rule's); None when
-    no link may fly, and for the other outcomes: a denied request must not steer the vehicle through its fallback. Where
-    a link is asked for and may fly, it is the `target` of the ALLOW. `valid_until_us` (monotonic) bounds the permit of
-    an ALLOW; for the others it is the moment of the decision. `consumed` is whether the step's id was used up before,
-    as `Context` has it. `permit`, if not empty, is what the boundary grants by the decision.
+    `step` is the number in design 4.1. `clause` decided, None where a field of the contract or the request did.
+    `target` is the link that flies on FALLBACK, `link` its index in the chain (`links.DEGRADE` for a degrade
+    rule's). Both are None when no link may fly, and for the other outcomes: a denied request must not steer the
+    vehicle through its fallback. In a decision about a link that may fly, it is the `target` of the ALLOW.
+    `valid_until_us` (monotonic) limits the permit of an ALLOW; for the others it is the moment of the decision.
+    `consumed` says whether the step's id was used before, as in `Context`. `permit`, if not empty, is the permit
+    that the boundary issues.
     """
 
     outcome: Outcome

@@ -1,9 +1,9 @@
-"""What can be made to go wrong in a flight on the simulated vehicle.
+"""The faults that can be injected into a simulated flight.
 
-With the vehicle, its link, its surroundings, the pilot, the computer that we run on, and whoever sends documents.
+They concern the vehicle, its link, its surroundings, the pilot, the onboard computer, and senders of documents.
 
-`at_us` is the simulation's time, from its start; `for_us` None means for good. How a field's name ends tells its unit.
-Sources name a kind as `KINDS` does, with `_` for `-`, and a field by its name without the unit.
+`at_us` is the time since the start of the simulation; `for_us` None means permanently. The end of a field's name
+is its unit. Sources name a kind as in `KINDS`, with `_` for `-`, and a field by its name without the unit.
 """
 
 from collections.abc import Mapping
@@ -15,22 +15,22 @@ from rtshcua.model.quantity import Dimension
 
 
 class FlightMode(StrEnum):
-    """A flight mode by what it does."""
+    """A flight mode by its behaviour."""
 
     MANUAL = "manual"
-    """The pilot's sticks alone (MANUAL, STABILIZE)."""
+    "Flown by the pilot's sticks alone (MANUAL, STABILIZE)."
     ALTITUDE = "altitude"
-    """The pilot's sticks, height held (ALTCTL, ALT_HOLD)."""
+    "Flown by the pilot's sticks, height held (ALTCTL, ALT_HOLD)."
     POSITION = "position"
-    """The pilot's sticks, place held (POSCTL, POSHOLD)."""
+    "Flown by the pilot's sticks, position held (POSCTL, POSHOLD)."
     LOITER = "loiter"
-    """Stays where it is (AUTO.LOITER, LOITER)."""
+    "Holds its position (AUTO.LOITER, LOITER)."
     TAKEOFF = "takeoff"
     """Climbs, then loiters (AUTO.TAKEOFF; ArduCopter takes off in GUIDED)."""
     GUIDED = "guided"
-    """Flies to position targets as they come (OFFBOARD, GUIDED)."""
+    "Flies to streamed position targets (OFFBOARD, GUIDED)."
     MISSION = "mission"
-    """Flies the mission that was uploaded (AUTO.MISSION, AUTO)."""
+    "Flies the uploaded mission (AUTO.MISSION, AUTO)."
     ORBIT = "orbit"
     """Circles a place (PX4 only)."""
     BRAKE = "brake"
@@ -38,55 +38,55 @@ class FlightMode(StrEnum):
     RETURN = "return"
     """Climbs, flies home and lands (AUTO.RTL, RTL)."""
     LAND = "land"
-    """Lands where it is (AUTO.LAND, LAND)."""
+    "Lands at its position (AUTO.LAND, LAND)."
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """What goes wrong at a time."""
+    """A fault at a given time."""
 
     at_us: int
 
 
 class LinkFault(Fault):
-    """Of the link, in one direction or both; or what the radio tells of it."""
+    """A fault of the link, in one direction or both, or of the radio's status reports."""
 
     __slots__ = ()
 
 
 class ReceiverFault(Fault):
-    """Of the receiver of positions."""
+    """A fault of the GPS receiver."""
 
     __slots__ = ()
 
 
 class AutopilotFault(Fault):
-    """Of the autopilot itself."""
+    """A fault of the autopilot itself."""
 
     __slots__ = ()
 
 
 class PilotFault(Fault):
-    """Somebody takes over, past the link."""
+    """An intervention by a pilot who does not use our link."""
 
     __slots__ = ()
 
 
 class HostFault(Fault):
-    """Of the computer that we run on; the simulated vehicle knows nothing of it."""
+    """A fault of the onboard computer; the simulated vehicle does not see it."""
 
     __slots__ = ()
 
 
 class AgentFault(Fault):
-    """Somebody hands over documents, signed or not; the simulated vehicle knows nothing of it."""
+    """Documents that somebody hands over, signed or not; the simulated vehicle does not see them."""
 
     __slots__ = ()
 
 
 @dataclass(frozen=True, slots=True)
 class BatteryLevel(Fault):
-    """The battery is found to hold no more than this, in 1/10000."""
+    """The battery level drops to this value, in 1/10000."""
 
     level: int
 
@@ -100,7 +100,7 @@ class GpsLoss(ReceiverFault):
 
 @dataclass(frozen=True, slots=True)
 class GpsJump(ReceiverFault):
-    """The receiver is off by this much more from now on."""
+    """The receiver's position is off by this much from now on."""
 
     north_mm: int
     east_mm: int
@@ -108,7 +108,7 @@ class GpsJump(ReceiverFault):
 
 @dataclass(frozen=True, slots=True)
 class GpsGlitch(ReceiverFault):
-    """The receiver alone is off by this; the estimator does not believe it, and gives up after a while."""
+    """Only the receiver is off by this; the estimator does not accept the position, and fails after a while."""
 
     north_mm: int
     east_mm: int
@@ -117,7 +117,7 @@ class GpsGlitch(ReceiverFault):
 
 @dataclass(frozen=True, slots=True)
 class GpsDrift(ReceiverFault):
-    """The receiver strays at this speed from now on, slowly enough to be believed; what it strayed by stays."""
+    """The receiver's position drifts at this speed, slowly enough to be accepted; the offset stays."""
 
     north_mm_s: int
     east_mm_s: int
@@ -126,28 +126,28 @@ class GpsDrift(ReceiverFault):
 
 @dataclass(frozen=True, slots=True)
 class EstimatorUnhealthy(AutopilotFault):
-    """The estimator says that it cannot be trusted (flags of its status, health bits of SYS_STATUS), and goes on."""
+    """The estimator reports that it is unhealthy (flags of its status, health bits of SYS_STATUS), and continues."""
 
     for_us: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class BatteryCell(Fault):
-    """A cell fails: the pack has lost this voltage, and sags the more under load; the level says nothing of it."""
+    """A cell fails: the pack loses this voltage and sags more under load; the reported level does not show it."""
 
     drop_mv: int = 1_200
 
 
 @dataclass(frozen=True, slots=True)
 class BatteryVoltage(Fault):
-    """This voltage is measured from now on, whatever the battery holds."""
+    """The measured voltage is this value from now on, whatever the battery holds."""
 
     voltage_mv: int
 
 
 @dataclass(frozen=True, slots=True)
 class WindStep(Fault):
-    """The mean wind changes to this speed, from this direction; gusts end unless given."""
+    """The mean wind changes to this speed and direction; gusts end unless given."""
 
     speed_mm_s: int
     from_deg: int = 0
@@ -166,7 +166,7 @@ class Direction(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class LinkDelay(LinkFault):
-    """Every datagram takes this much longer."""
+    """Every datagram is delayed by this much more."""
 
     delay_us: int
     for_us: int | None = None
@@ -175,7 +175,7 @@ class LinkDelay(LinkFault):
 
 @dataclass(frozen=True, slots=True)
 class LinkJitter(LinkFault):
-    """Every datagram takes up to this much longer, each another time; none overtakes another."""
+    """Every datagram is delayed by a random time up to this; the order is kept."""
 
     jitter_us: int
     for_us: int | None = None
@@ -184,7 +184,7 @@ class LinkJitter(LinkFault):
 
 @dataclass(frozen=True, slots=True)
 class LinkReorder(LinkFault):
-    """This part of the datagrams, in 1/10000, is overtaken by those that are sent in the 60 ms after."""
+    """This fraction of the datagrams, in 1/10000, is overtaken by those sent in the following 60 ms."""
 
     part: int
     for_us: int | None = None
@@ -193,7 +193,7 @@ class LinkReorder(LinkFault):
 
 @dataclass(frozen=True, slots=True)
 class LinkLoss(LinkFault):
-    """This part of the datagrams, in 1/10000, is lost; RADIO_STATUS tells."""
+    """This fraction of the datagrams, in 1/10000, is lost; RADIO_STATUS reports it."""
 
     loss: int
     for_us: int | None = None
@@ -202,7 +202,7 @@ class LinkLoss(LinkFault):
 
 @dataclass(frozen=True, slots=True)
 class LinkSilence(LinkFault):
-    """Nothing gets through: it is lost, or `held` back until the silence is over and comes in one burst."""
+    """Nothing gets through: datagrams are lost, or `held` back and delivered in one burst at the end."""
 
     for_us: int | None = None
     way: Direction = Direction.BOTH
@@ -210,21 +210,21 @@ class LinkSilence(LinkFault):
 
 
 class Voice(StrEnum):
-    """What somebody says under the vehicle's own ids."""
+    """The message that a second sender fakes under the vehicle's own ids."""
 
     GIMBAL = "gimbal"
-    """A heartbeat of a component that is no autopilot: disarmed, in mode 0."""
+    "A heartbeat of a component that is not an autopilot: disarmed, in mode 0."
     DISARMED = "disarmed"
     """The autopilot's own heartbeat, but disarmed."""
     STRAYED = "strayed"
     """The autopilot's own heartbeat, but in another mode (LAND)."""
     ANSWERS = "answers"
-    """That commands were denied and a fence was refused, to another system."""
+    "Replies to another system: denied commands and a refused fence."
 
 
 @dataclass(frozen=True, slots=True)
 class SecondVoice(LinkFault):
-    """Somebody else speaks on the link under the vehicle's own ids, so often, beside the vehicle that goes on."""
+    """A second sender uses the vehicle's own ids on the link, at this rate, while the vehicle continues."""
 
     says: Voice = Voice.GIMBAL
     each_us: int = 250_000
@@ -233,10 +233,10 @@ class SecondVoice(LinkFault):
 
 @dataclass(frozen=True, slots=True)
 class Stall(AutopilotFault):
-    """The autopilot's loop halts: its time and its flight stand still, as recorded (arducopter-dropout).
+    """The autopilot's loop halts: its time and its flight stop, as recorded (arducopter-dropout).
 
-    What was sent meanwhile waits and is answered in one burst. With a `shuffle` other than 0, what it says in the first
-    200 ms after comes at once at their end, in an order that is drawn from that seed.
+    Messages sent to it meanwhile wait and are answered in one burst. With a `shuffle` other than 0, its messages
+    of the following 200 ms arrive together at their end, in an order drawn from that seed.
     """
 
     for_us: int
@@ -245,14 +245,14 @@ class Stall(AutopilotFault):
 
 @dataclass(frozen=True, slots=True)
 class Freeze(AutopilotFault):
-    """The measurements stand still at their source: messages go on with old values and old time stamps."""
+    """Measurements freeze at their source: messages continue with old values and old time stamps."""
 
     for_us: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class MessageSilence(AutopilotFault):
-    """One message of the autopilot, by its MAVLink name, does not come any more."""
+    """One message of the autopilot, by its MAVLink name, is no longer sent."""
 
     message: str
     for_us: int | None = None
@@ -260,7 +260,7 @@ class MessageSilence(AutopilotFault):
 
 @dataclass(frozen=True, slots=True)
 class MessageStuck(AutopilotFault):
-    """One message of the autopilot, by its MAVLink name, goes on with its last values and new time stamps."""
+    """One message of the autopilot, by its MAVLink name, continues with its last values and new time stamps."""
 
     message: str
     for_us: int | None = None
@@ -268,7 +268,7 @@ class MessageStuck(AutopilotFault):
 
 @dataclass(frozen=True, slots=True)
 class StaleSource(AutopilotFault):
-    """The measurements are old at their source by this much more, and their time stamps say so."""
+    """Measurements are older at their source by this much, and their time stamps show it."""
 
     delay_us: int
     for_us: int | None = None
@@ -276,19 +276,19 @@ class StaleSource(AutopilotFault):
 
 @dataclass(frozen=True, slots=True)
 class Reboot(AutopilotFault):
-    """The autopilot starts again: its motors stop meanwhile, it says nothing, and its clock begins at 0."""
+    """The autopilot restarts: its motors stop meanwhile, it is silent, and its clock restarts at 0."""
 
 
 @dataclass(frozen=True, slots=True)
 class LinkQuality(LinkFault):
-    """RADIO_STATUS tells of this quality, in 1/10000, though nothing is lost yet."""
+    """RADIO_STATUS reports this quality, in 1/10000, without any loss."""
 
     quality: int
 
 
 @dataclass(frozen=True, slots=True)
 class Obstacle(Fault):
-    """The sensor sees something ahead at this distance, and goes on seeing it there wherever the vehicle goes."""
+    """The sensor reports an obstacle ahead at this distance, wherever the vehicle goes."""
 
     distance_mm: int
     for_us: int | None = None
@@ -296,10 +296,10 @@ class Obstacle(Fault):
 
 @dataclass(frozen=True, slots=True)
 class Pillar(Fault):
-    """A round thing stands in the world, from the ground up: what is seen of it depends on where the vehicle is.
+    """A cylinder stands in the world, from the ground up; the sensor sees it depending on the vehicle's position.
 
-    The place of its middle, and its height, are from home. Who flies into it crashes.
-    With a speed it moves, in a direction clockwise from north.
+    The position of its centre, and its height, are relative to home. A vehicle that flies into it crashes. With a
+    speed it moves, in a direction clockwise from north.
     """
 
     north_mm: int
@@ -320,15 +320,16 @@ class PilotMode(PilotFault):
 
 @dataclass(frozen=True, slots=True)
 class PilotPause(PilotFault):
-    """The pilot stops it from a ground station, and the mode does not change.
+    """The pilot stops the vehicle from a ground station, without a mode change.
 
-    PX4: DO_REPOSITION without a place. ArduCopter: DO_PAUSE_CONTINUE, which has an effect in GUIDED only.
+    PX4: DO_REPOSITION without a position. ArduCopter: DO_PAUSE_CONTINUE, which has an effect in GUIDED only.
     """
 
 
 @dataclass(frozen=True, slots=True)
 class PilotGoto(PilotFault):
-    """The pilot sends it elsewhere from a ground station, with DO_REPOSITION; the place and height are from home.
+    """The pilot sends the vehicle elsewhere from a ground station, with DO_REPOSITION; position and height are from
+    home.
 
     PX4: the mode is Hold, as for a target of ours. ArduCopter: GUIDED, likewise.
     """
@@ -340,9 +341,10 @@ class PilotGoto(PilotFault):
 
 @dataclass(frozen=True, slots=True)
 class PilotVelocity(PilotFault):
-    """The pilot steers it from a ground station, by velocities ten times a second for a while; the mode stays.
+    """The pilot steers from a ground station, by velocities ten times a second for a while; the mode stays.
 
-    ArduCopter obeys in GUIDED, and names no target from then on; PX4 would in OFFBOARD only, and does not mind.
+    ArduCopter obeys in GUIDED, and reports no target from then on. PX4 would obey in OFFBOARD only, and ignores
+    it.
     """
 
     north_mm_s: int
@@ -352,18 +354,18 @@ class PilotVelocity(PilotFault):
 
 @dataclass(frozen=True, slots=True)
 class PilotSpeed(PilotFault):
-    """The pilot has it fly at another speed from a ground station (DO_CHANGE_SPEED): it goes where it goes."""
+    """The pilot changes the speed from a ground station (DO_CHANGE_SPEED); the target stays."""
 
     speed_mm_s: int
 
 
 @dataclass(frozen=True, slots=True)
 class PilotSticks(PilotFault):
-    """The pilot moves the sticks of the remote control for a while, to steer it east.
+    """The pilot moves the sticks of the remote control for a while, to steer east.
 
-    PX4 leaves every automatic mode for Position (COM_RC_OVERRIDE, bit 0, on by default; bit 1, for OFFBOARD, is off).
-    ArduCopter does not mind in GUIDED, AUTO and BRAKE; while it lands it is moved aside at up to 1.25 m/s
-    (LAND_REPOSITION, on by default; `land_run_horizontal_control`), and in LOITER and POSHOLD too.
+    PX4 leaves every automatic mode for Position (COM_RC_OVERRIDE, bit 0, on by default; bit 1, for OFFBOARD, is
+    off). ArduCopter ignores the sticks in GUIDED, AUTO and BRAKE; during a landing they move it aside at up to
+    1.25 m/s (LAND_REPOSITION, on by default; `land_run_horizontal_control`), and in LOITER and POSHOLD too.
     """
 
     for_us: int = 2_000_000
@@ -371,24 +373,24 @@ class PilotSticks(PilotFault):
 
 @dataclass(frozen=True, slots=True)
 class Kill(PilotFault):
-    """The motors stop, wherever it is: disarmed by force. In the air it falls."""
+    """The motors stop immediately: disarmed by force. In the air the vehicle falls."""
 
 
 @dataclass(frozen=True, slots=True)
 class RuntimeKilled(HostFault):
-    """The process of the runtime dies, and is started again after this long, as `run` does after a crash."""
+    """The process of the runtime dies, and is restarted after this time, as `run` does after a crash."""
 
     for_us: int
 
 
 @dataclass(frozen=True, slots=True)
 class BoundaryKilled(HostFault):
-    """The boundary, a process of its own (`run --mode process`), dies; another begins with the next run."""
+    """The boundary, in a process of its own (`run --mode process`), dies; the next run starts another one."""
 
 
 @dataclass(frozen=True, slots=True)
 class HostStall(HostFault):
-    """The process of the runtime does not get to run for this long: nothing is read and nothing sent."""
+    """The process of the runtime does not run for this time: nothing is read and nothing is sent."""
 
     for_us: int
 
@@ -402,8 +404,8 @@ class DiskFull(HostFault):
 
 @dataclass(frozen=True, slots=True)
 class DiskStall(HostFault):
-    """The disk takes records and does not get on with them, as a memory card may for seconds: none is kept before it is
-    over.
+    """The disk accepts records but makes no progress, as a memory card may for seconds: none is stored before the
+    end.
     """
 
     for_us: int
@@ -418,7 +420,7 @@ class ClockStep(HostFault):
 
 @dataclass(frozen=True, slots=True)
 class Approval(AgentFault):
-    """Somebody of a role grants every approval that the mission asks for; `copies` times."""
+    """Somebody in a role grants every approval that the mission requires; `copies` times."""
 
     role: str
     copies: int = 1
@@ -426,7 +428,7 @@ class Approval(AgentFault):
 
 @dataclass(frozen=True, slots=True)
 class Disapproval(AgentFault):
-    """Somebody of a role refuses every step that the mission asks approval for; `copies` times."""
+    """Somebody in a role refuses every step that requires an approval; `copies` times."""
 
     role: str
     copies: int = 1
@@ -434,21 +436,21 @@ class Disapproval(AgentFault):
 
 @dataclass(frozen=True, slots=True)
 class Recall(AgentFault):
-    """The mission is called back; `copies` times."""
+    """The mission is recalled; `copies` times."""
 
     copies: int = 1
 
 
 @dataclass(frozen=True, slots=True)
 class Replacement(AgentFault):
-    """The steps that were not yet released are replaced by themselves, under new ids; `copies` times."""
+    """The unreleased steps are replaced by the same steps under new ids; `copies` times."""
 
     copies: int = 1
 
 
 @dataclass(frozen=True, slots=True)
 class Babble(AgentFault):
-    """So many documents that nobody signed, or that were damaged on their way, one a tick."""
+    """So many documents in each tick that are unsigned or damaged."""
 
     copies: int = 20
 
@@ -501,10 +503,10 @@ KINDS: Mapping[str, type[Fault]] = {
 
 
 class FieldUnit(NamedTuple):
-    """How numbers of a field are written: on a command line with a unit, in a source as a quantity.
+    """The unit of a field: written as a suffix on a command line, and as a quantity in a source.
 
-    `suffix` ends the field's name; `words` says how many of the field's unit each written one is. `dimension` None: a
-    source writes a plain number. One of the field's unit is `canonical` of the dimension's.
+    `suffix` ends the field's name; `words` has the size of each written unit in the field's unit. `dimension`
+    None: a source writes a plain number. One of the field's unit is `canonical` of the dimension's.
     """
 
     suffix: str
@@ -513,7 +515,7 @@ class FieldUnit(NamedTuple):
     canonical: int = 1
 
 
-#: the first that fits a field's name
+#: : the first one that matches a field's name
 UNITS: tuple[FieldUnit, ...] = (
     FieldUnit("_us", {"us": 1, "ms": 1000, "s": 1_000_000, "min": 60_000_000}, Dimension.DURATION),
     FieldUnit("_mv", {"mV": 1, "V": 1000}, None),
@@ -522,40 +524,40 @@ UNITS: tuple[FieldUnit, ...] = (
     FieldUnit("_deg", {"deg": 1}, Dimension.ANGLE, 10_000_000),
     FieldUnit("", {"%": 100}, Dimension.RATIO),
 )
-#: fields that are one of some words
+#: : fields with an enumerated value
 WORDS: Mapping[str, tuple[str, ...]] = {
     "mode": tuple(FlightMode),
     "way": tuple(Direction),
     "held": ("yes", "no"),
     "says": tuple(Voice),
 }
-#: and what their words are members of
+#: : and the types of their values
 WORD_TYPES: Mapping[str, type[FlightMode | Direction | Voice]] = {"mode": FlightMode, "way": Direction, "says": Voice}
-#: fields that are a plain number
+#: : fields that are a plain number
 COUNTS = frozenset({"copies", "shuffle"})
-#: fields that may be below zero: south and west, down, and back in time
+#: : fields that may be negative: south and west, down, and back in time
 SIGNED = frozenset({"north", "east", "up", "by"})
-#: fields that name something
+#: : fields that are a name
 NAMES = frozenset({"message", "role"})
 
 
 class FaultField(NamedTuple):
-    """A field of a kind of fault. Exactly one of `unit`, `words`, `is_count`, `is_name` tells what it takes."""
+    """A field of a kind of fault. Exactly one of `unit`, `words`, `is_count`, `is_name` gives its type."""
 
     name: str
-    """As it is written."""
+    "The name in sources and on command lines."
     field: str
-    """As the kind calls it."""
+    "The name in the class."
     unit: FieldUnit | None
     words: tuple[str, ...]
     is_count: bool
     is_name: bool
     needed: bool
-    """Whether it must be given."""
+    "Whether the field is required."
 
 
 def parameters(kind: type[Fault]) -> tuple[FaultField, ...]:
-    """What may be said of a fault of this kind, but for its time."""
+    """The fields of a fault of this kind, without its time."""
     return tuple(_parameter(field) for field in fields(kind) if field.name != "at_us")
 
 

@@ -4,7 +4,7 @@ from enum import IntEnum, StrEnum
 
 
 class Outcome(IntEnum):
-    """What a decision is."""
+    """The outcome of a decision."""
 
     ALLOW = 0
     DENY = 1
@@ -13,8 +13,8 @@ class Outcome(IntEnum):
 
 
 class Reason(StrEnum):
-    """Why; stable, one namespace a step of section 4.1. `WIRE_REASONS` numbers them in order of definition: append
-    only.
+    """The reason of a decision; stable, one namespace for each step of section 4.1. `WIRE_REASONS` numbers them in
+    order of definition: append only.
     """
 
     ADMITTED = "admitted"
@@ -83,7 +83,7 @@ _FALLS_BACK = frozenset(
 
 
 def outcome_of(reason: Reason) -> Outcome:
-    """The one outcome that a decision for this reason has (design 4.1)."""
+    """The outcome of a decision with this reason (design 4.1)."""
     if reason is Reason.ADMITTED:
         return Outcome.ALLOW
     if reason in _DEFERS:

@@ -1,14 +1,14 @@
-"""Dimensions, units and datum. Every quantity is an integer in the one canonical unit of its dimension."""
+"""Dimensions, units and datum. Every quantity is an integer in the canonical unit of its dimension."""
 
 from enum import Enum
 from typing import NamedTuple
 
 
 class Dimension(Enum):
-    """What a number measures, and its canonical unit.
+    """The dimension of a number, with its canonical unit.
 
     An altitude is a length with a datum; the datum is part of the type (`Datum`), so two altitudes of different
-    datum never meet in one expression.
+    datum cannot be combined.
     """
 
     LENGTH = "length"  # mm
@@ -22,21 +22,21 @@ class Dimension(Enum):
 
 
 class Datum(Enum):
-    """What an altitude is measured from. `HOME` is the vehicle's home position, `SEA` mean sea level (AMSL)."""
+    """The reference of an altitude. `HOME` is the vehicle's home position, `SEA` mean sea level (AMSL)."""
 
     HOME = "home"
     SEA = "sea"
 
 
 class UnitOfMeasure(NamedTuple):
-    """`value * numerator / denominator` is the canonical integer; a literal that is not integral there is refused."""
+    """`value * numerator / denominator` is the canonical integer; a literal without an integral result is refused."""
 
     dimension: Dimension
     numerator: int
     denominator: int = 1
 
 
-#: Units that a source may write. `m` is a length; where an altitude is asked it is one above home.
+#: : Units in sources. `m` is a length; where an altitude is expected it means metres above home.
 UNITS: dict[str, UnitOfMeasure] = {
     "mm": UnitOfMeasure(Dimension.LENGTH, 1),
     "cm": UnitOfMeasure(Dimension.LENGTH, 10),
@@ -57,7 +57,7 @@ UNITS: dict[str, UnitOfMeasure] = {
     "V": UnitOfMeasure(Dimension.VOLTAGE, 1_000),
 }
 
-#: The units in which a person reads a canonical value of each dimension, largest first.
+#: : The units for display of each dimension, largest first.
 DISPLAY: dict[Dimension, tuple[str, ...]] = {
     Dimension.LENGTH: ("m", "mm"),
     Dimension.ALTITUDE: ("m", "mm"),
@@ -67,13 +67,13 @@ DISPLAY: dict[Dimension, tuple[str, ...]] = {
     Dimension.RATIO: ("%",),
     Dimension.VOLTAGE: ("V", "mV"),
 }
-#: the least of a unit that is written with decimals, in tenths; else it is one whole
+#: : the smallest value that is displayed in a unit with decimals, in tenths; else one whole unit
 _LEAST_TENTHS: dict[str, int] = {"m": 1, "m/s": 1}
 
 
 def display(value: int, dimension: Dimension) -> str:
-    """A canonical value as a person writes it, exactly: `20000` of LENGTH is `20 m`, 1500 `1.5 m`, 20 `20 mm`; 2550 of
-    RATIO is `25.5 %`.
+    """A canonical value for display, exactly: `20000` of LENGTH is `20 m`, 1500 `1.5 m`, 20 `20 mm`; 2550 of RATIO is
+    `25.5 %`.
     """
     names = DISPLAY.get(dimension)
     if names is None:
@@ -83,7 +83,7 @@ def display(value: int, dimension: Dimension) -> str:
         scaled = value * unit.denominator
         if scaled % unit.numerator == 0 and (value or name != "min"):
             return f"{scaled // unit.numerator} {name}"
-        decimal = str(unit.numerator).strip("0") == "1"  # so seconds have exact decimals, and minutes none
+        decimal = str(unit.numerator).strip("0") == "1"  # seconds have exact decimals, minutes have none
         if decimal and 10 * abs(scaled) >= _LEAST_TENTHS.get(name, 10) * unit.numerator:
             return f"{_decimal(scaled, unit.numerator)} {name}"
     unit = UNITS[names[-1]]

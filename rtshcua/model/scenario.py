@@ -1,6 +1,7 @@
-"""A scenario, lowered: which flight, what goes wrong in it and when, and what must come of it.
+"""A lowered scenario: the flight, its faults with their times, and the expected results.
 
-`ground` makes it of a `scenario` declaration, a campaign draws it by chance, `virtual` flies it. All times are in us.
+`ground` lowers it from a `scenario` declaration, a campaign draws it at random, `virtual` flies it. All times are
+in us.
 """
 
 from dataclasses import dataclass
@@ -8,7 +9,7 @@ from dataclasses import dataclass
 from rtshcua.model.faults import Fault
 from rtshcua.model.flat.code import Clause
 
-#: the kinds of autopilot that there are to fly on
+#: : the available autopilots
 FLAVOURS = ("px4", "ardupilot")
 #: the ways in which a run ends (`onboard.ports.Ending`); sources write `_` for `-`
 ENDINGS = (
@@ -29,7 +30,7 @@ MAX_SEEDS = 100_000
 
 @dataclass(frozen=True, slots=True)
 class AtTime:
-    """So long after the start of the run; between the two, drawn by the seed, where they differ."""
+    """A time after the start of the run; drawn from the seed between the two bounds if they differ."""
 
     from_us: int
     to_us: int
@@ -37,7 +38,7 @@ class AtTime:
 
 @dataclass(frozen=True, slots=True)
 class AfterStep:
-    """So long after step `step` of the mission was sent to the vehicle; if it never is, never."""
+    """A time after step `step` of the mission was sent to the vehicle; never, if it is not sent."""
 
     step: int
     from_us: int
@@ -46,7 +47,7 @@ class AfterStep:
 
 @dataclass(frozen=True, slots=True)
 class OnCondition:
-    """So long after a condition over the signals, as the runtime knows them, was true for the first time."""
+    """A time after a condition over the signals, as the runtime knows them, was first true."""
 
     condition: Clause
     from_us: int
@@ -58,7 +59,7 @@ When = AtTime | AfterStep | OnCondition
 
 @dataclass(frozen=True, slots=True)
 class Incident:
-    """Something goes wrong. `text` is as it was written; the fault's `at_us` is 0, and set when its time has come."""
+    """A fault with its time. `text` is as written; the fault's `at_us` is 0, and set when its time has come."""
 
     when: When
     fault: Fault
@@ -67,8 +68,8 @@ class Incident:
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """How the vehicle, the air and the time are at the start; None: as the simulated vehicle comes, and a minute after
-    the mission was issued. 1/10000, mm/s, degrees, us since the epoch.
+    """The vehicle, the air and the time at the start; None: the default of the simulated vehicle, and a minute after
+    the issue of the mission. 1/10000, mm/s, degrees, us since the epoch.
     """
 
     battery: int | None = None
@@ -97,7 +98,7 @@ class Decides:
 
 @dataclass(frozen=True, slots=True)
 class Flies:
-    """This skill was sent to the vehicle, or was `never`."""
+    """This skill was sent to the vehicle, or `never`."""
 
     skill: str
     never: bool = False
@@ -105,14 +106,16 @@ class Flies:
 
 @dataclass(frozen=True, slots=True)
 class ReactsWithin:
-    """From the frame that broke a watched clause to the first frame of the fallback never longer than this."""
+    """The reaction, from the frame that broke a watched clause to the first frame of the fallback, never takes
+    longer.
+    """
 
     most_us: int
 
 
 @dataclass(frozen=True, slots=True)
 class KeepsAway:
-    """The vehicle is really never nearer than this to a zone of the policy, or to what stands around (`zone` None)."""
+    """The true distance of the vehicle from a zone of the policy, or from obstacles (`zone` None), is never smaller."""
 
     zone: int | None
     least_mm: int
@@ -120,7 +123,7 @@ class KeepsAway:
 
 @dataclass(frozen=True, slots=True)
 class EndsInside:
-    """Where the vehicle really is at the end is inside this zone of the policy, seen from above."""
+    """The true position of the vehicle at the end is inside this zone of the policy, seen from above."""
 
     zone: int
 
@@ -130,7 +133,7 @@ Expected = EndsWith | Decides | Flies | ReactsWithin | KeepsAway | EndsInside
 
 @dataclass(frozen=True, slots=True)
 class ScenarioExpectation:
-    """What must come of it; `text` is as it was written, `start` and `end` where, in file `source`."""
+    """An expected result; `text` is as written, `start` and `end` its position in file `source`."""
 
     what: Expected
     text: str
@@ -141,7 +144,7 @@ class ScenarioExpectation:
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """Flights of one mission, one a seed and kind of autopilot (`px4`, `ardupilot`)."""
+    """Flights of one mission, one for each seed and kind of autopilot (`px4`, `ardupilot`)."""
 
     name: str
     flavours: tuple[str, ...]

@@ -1,7 +1,7 @@
-"""The number of a step, as people and agents know it: the first step of a mission is step 1.
+"""The number of a step for people and agents: the first step of a mission is step 1.
 
-Wire formats and records of logs hold the index of a step, from 0 (`step`). Whatever a person or an agent reads or types
-is its number, from 1: in texts, on command lines, and as `step_number` in JSON.
+Wire formats and records of logs contain the index of a step, from 0 (`step`). Texts, command lines, and
+`step_number` in JSON use its number, from 1.
 """
 
 
@@ -16,5 +16,5 @@ def index_of(number: int) -> int:
 
 
 def step_words(index: int) -> str:
-    """The step of this index in words: `step 1` for index 0."""
+    """The text `step 1` for index 0."""
     return f"step {number_of(index)}"

@@ -1,1 +1,3 @@
-"""What runs on the vehicle: admission, supervision, dispatch. No parser, no compiler, no key that signs a mission."""
+"""The software on the vehicle: admission, supervision, dispatch. It contains no parser, no compiler, and no key that
+signs a mission.
+"""

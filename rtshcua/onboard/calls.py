@@ -1,7 +1,7 @@
-"""A step in words: its skill and arguments as they are bound, and as a source would write them.
+"""Formats a step as source text from its bound skill and arguments.
 
-The text that a mission carries is whoever's who signed it, and nothing holds it against what is bound: it is shown
-nowhere as what flies.
+The text in a mission comes from its signer and is not compared with the bound values, so it is never displayed as
+the step that flies.
 """
 
 from collections.abc import Sequence
@@ -19,20 +19,20 @@ _DIMENSIONS = {dimension.value: dimension for dimension in Dimension}
 
 
 def call(policy: Policy, one: Invocation) -> str:
-    """A step: `takeoff(altitude = 9 m)`. The policy is well-formed; of the step that need not be known."""
+    """The text of a step: `takeoff(altitude = 9 m)`. The policy must be well-formed; the step need not be."""
     if not 0 <= one.skill < len(policy.contracts) or len(one.arguments) != cells(policy.contracts[one.skill]):
-        return "no call of a skill of the policy"
+        return "not a call of a skill of the policy"
     contract = policy.contracts[one.skill]
     return f"{contract.name}({arguments(policy, contract.parameters, one.arguments)})"
 
 
 def arguments(policy: Policy, parameters: Sequence[Parameter], cells: Sequence[int]) -> str:
-    """Every argument by name, those that the compiler filled in too."""
+    """Every argument by name, including those that the compiler filled in."""
     return ", ".join(f"{parameter.name} = {argument(policy, parameter, cells)}" for parameter in parameters)
 
 
 def argument(policy: Policy, parameter: Parameter, cells: Sequence[int]) -> str:
-    """One argument; one that no policy has a name for by its number."""
+    """The text of one argument; an argument for which the policy has no name is shown by its number."""
     value = cells[parameter.cell]
     if parameter.kind in (CHOICE, ZONE) and not parameter.low <= value <= parameter.high:
         return f"{value}, out of range"
@@ -46,8 +46,8 @@ def argument(policy: Policy, parameter: Parameter, cells: Sequence[int]) -> str:
 
 
 def is_own(policy: Policy, one: Invocation, clause: Decisive) -> bool:
-    """Whether a clause is the step's own, not its skill's: then its text is of whoever signed the mission, who may word
-    it as they like. What it says by its code only tightens.
+    """Whether a clause is the step's own and not its skill's. Its text then comes from the signer of the mission; its
+    code can only tighten the contract.
     """
     if not isinstance(clause, Clause):
         return False
@@ -57,18 +57,18 @@ def is_own(policy: Policy, one: Invocation, clause: Decisive) -> bool:
 
 
 def quantity(value: int, dimension: str) -> str:
-    """A value of a named dimension; a number alone where the name is of an enumeration."""
+    """The text of a value of a named dimension; a plain number where the name is that of an enumeration."""
     known = _DIMENSIONS.get(dimension)
     return str(value) if known is None else display(value, known)
 
 
 def place(policy: Policy, x: int, y: int) -> str:
-    """A place in local mm."""
+    """The text of a place in local mm."""
     return geographic(*unproject(policy.projection, x, y))
 
 
 def geographic(latitude: int, longitude: int) -> str:
-    """A place in 1e-7 degree."""
+    """The text of a place in 1e-7 degree."""
     return f"{_degrees(latitude, 'N', 'S')}, {_degrees(longitude, 'E', 'W')}"
 
 

@@ -1,9 +1,9 @@
-"""What a run that broke off may have left its vehicle doing, by the log that it left.
+"""Finds out from its log what an interrupted run may have left its vehicle doing.
 
-A run that is begun again in the air has to know whether somebody took the vehicle over while there was no process.
-What the vehicle does may be ours if some command that may still be in force makes it do so. The log tells when a
-command was allowed, when it was dispatched, and when the vehicle was seen to obey it: until then, those before it may
-be in force.
+A run that starts in the air has to know whether somebody took the vehicle over while no process ran. The vehicle's
+motion may be ours if a command that may still be in force explains it. The log shows when a command was allowed,
+when it was dispatched, and when the vehicle was observed to obey it: until then, the earlier commands may be in
+force.
 """
 
 from base64 import b64decode
@@ -25,10 +25,10 @@ _HOMEWARD: Final = (MotionKind.HOME, MotionKind.LAND)
 
 
 class CommandInForce(NamedTuple):
-    """A command that the vehicle may be carrying out. Its token means nothing.
+    """A command that the vehicle may be carrying out. Its token has no meaning.
 
-    `named`: where the vehicle last said that it flies to, told so by it: latitude and longitude in 1e-7 degree, mm
-    above mean sea level; None where it said nothing.
+    `named` is the last target that the vehicle reported for this command: latitude and longitude in 1e-7 degree,
+    mm above mean sea level; None if it reported none.
     """
 
     command: Command
@@ -36,9 +36,9 @@ class CommandInForce(NamedTuple):
 
 
 class Left(NamedTuple):
-    """What the vehicle may be doing if nobody touched it since: any of these; where there is none, it had landed.
+    """What the vehicle may be doing if nobody intervened since: any of these commands; with none, it had landed.
 
-    `taken`: what showed that somebody took it over while that run went on; empty where nothing did.
+    `taken` is the sign of a takeover during that run; empty if there was none.
     """
 
     in_force: tuple[CommandInForce, ...]
@@ -46,10 +46,10 @@ class Left(NamedTuple):
 
 
 def left_by(lines: Iterable[bytes], bundle: bytes, policy: Policy, mission: Mission) -> Left | None:
-    """What a run of this bundle, of this policy and mission, left, by the lines of its log as recovery ended it.
+    """What a run of this bundle, of this policy and mission, left, from the lines of its recovered log.
 
-    None where that is not known: the log is of another bundle, or cannot be read; nothing was allowed; steps were
-    replaced; or it went on from a run before it, and was not seen to be obeyed itself.
+    None if unknown: the log is of another bundle, or cannot be read; nothing was allowed; steps were replaced; or
+    the run continued an earlier one and was not observed to be obeyed itself.
     """
     following = _Following(Commands(policy, mission), policy)
     try:
@@ -60,13 +60,13 @@ def left_by(lines: Iterable[bytes], bundle: bytes, policy: Policy, mission: Miss
             if number == 0 and not (isinstance(record, Genesis) and b64decode(record.bundle) == bundle):
                 return None
             following.take(record)
-    except (LookupError, ValueError):  # a step or a link that the bundle does not have, or a target that is none
+    except (LookupError, ValueError):  # a step, a link or a target that is not in the bundle
         return None
     return following.left()
 
 
 class _Told(NamedTuple):
-    """Something that was allowed, as `ref`, and all that it may have been; `sent`: it was dispatched too."""
+    """An allowed request, as `ref`, and all commands that it may have been; `sent`: it was dispatched too."""
 
     ref: Ref
     commands: tuple[Command, ...]
@@ -80,20 +80,20 @@ class _Following:
     def __init__(self, commands: Commands, policy: Policy) -> None:
         self._commands = commands
         self._policy = policy
-        self._told: list[_Told] = []  # what may be in force, the last one last,
+        self._told: list[_Told] = []  # what may be in force, the latest last,
         self._known = False  # and whether nothing else may be
         self._replaced = False
         self._taken = ""
 
     def left(self) -> Left | None:
-        """What is left, once the log is over."""
+        """The result, after the last record."""
         if self._replaced or not self._known:
             return None
         in_force = [CommandInForce(command, told.named) for told in self._told for command in told.commands]
         return Left(tuple(in_force), self._taken)
 
     def take(self, record: AnyRecord) -> None:
-        """The next record."""
+        """Process the next record."""
         if isinstance(record, DecisionRecord) and record.outcome == "allow":
             self._add(Ref(record.kind, record.step, record.link), None, sent=False)
         elif isinstance(record, Effect):
@@ -103,7 +103,7 @@ class _Following:
         match record.event:
             case "ready":
                 self._known = True
-            case "resumed":  # what the run before it had sent is in force
+            case "resumed":  # the command of the run before it is in force
                 self._known = False
             case "replacement":
                 self._replaced = True
@@ -125,7 +125,7 @@ class _Following:
         self._told.append(_Told(ref, tuple(self._of(ref, skill)), sent))
 
     def _obeyed(self, ref: Ref, named: tuple[int, int, int] | None, *, over: bool = False) -> None:
-        """Nothing is in force any more that was told before; nor is what brought it down."""
+        """No earlier command is in force any more, nor the descent that it caused."""
         numbers = [number for number, told in enumerate(self._told) if told.sent and told.ref == ref]
         if not numbers:
             return
@@ -135,7 +135,9 @@ class _Following:
         self._known = True
 
     def _of(self, ref: Ref, skill: str | None) -> Iterator[Command]:
-        """What a step or link does. The target of a degrade rule is recorded by its skill, and only once it is sent."""
+        """The command of a step or a link. The target of a degrade rule is recorded by its skill, and only once it is
+        sent.
+        """
         if ref.kind != FALLBACK_LINK or ref.link != DEGRADE:
             yield self._commands.command(*ref, 0)
             return
@@ -149,6 +151,6 @@ class _Following:
 
 
 def _target(detail: str) -> tuple[int, int, int] | None:
-    """The target in the record of what was obeyed."""
+    """The target in the record of the obeyed command."""
     numbers = [int(each) for each in detail.split()]
     return (numbers[0], numbers[1], numbers[2]) if numbers else None

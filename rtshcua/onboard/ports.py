@@ -1,7 +1,8 @@
-"""The ports of the onboard wing: what the pure runtime exchanges with the world, and who it expects on the other side.
+"""The ports of the onboard software: what the pure runtime exchanges with its environment, and the interfaces of the
+other side.
 
-Events come in, actions go out; `adapters` (a real link) and `simulation` in virtual time drive the same runtime. All
-times are in us; `at_us` is monotonic.
+Events come in, actions go out; `adapters` (a real link) and `simulation` in virtual time drive the same runtime.
+All times are in us; `at_us` is monotonic.
 """
 
 from collections.abc import Sequence
@@ -17,22 +18,22 @@ from rtshcua.wire.keys import SigningKey
 
 @dataclass_transform(frozen_default=True)
 class Frozen(msgspec.Struct, frozen=True):
-    """The base of events, actions and commands: they do not change."""
+    """The immutable base of events, actions and commands."""
 
 
 # ---------------------------------------------------------------- events
 
 
 class Event(Frozen, frozen=True):
-    """Something that happened, and when."""
+    """An event with its time."""
 
     at_us: int
 
 
 class Readings(Event, frozen=True):
-    """Signals that one frame carried: (state slot, canonical integer or None for "reported as not known").
+    """Signals in one frame: (state slot, canonical integer or None for "reported as unknown").
 
-    `at_us` is when the vehicle measured them, on our monotonic clock, as early as it may have been.
+    `at_us` is the earliest time, on our monotonic clock, at which the vehicle may have measured them.
     """
 
     values: tuple[tuple[int, int | None], ...]
@@ -41,37 +42,37 @@ class Readings(Event, frozen=True):
 class Ready(Event, frozen=True):
     """The vehicle is connected, its estimator has a position and it would accept arming, or it flies already.
 
-    `others`: it flies, and in a way that nothing of ours makes it fly (the name of a mode, `landing`, `another
-    target`, or what an earlier run told).
+    `others`: it flies in a way that no command of ours explains (the name of a mode, `landing`, `another target`,
+    or the report of an earlier run).
     """
 
     others: str = ""
 
 
 class VehicleUnfit(Event, frozen=True):
-    """The vehicle will not be ready for this mission, however long it is waited for: `why`, in words."""
+    """The vehicle cannot become ready for this mission: `why`, as text."""
 
     why: str
 
 
 class AirState(Event, frozen=True):
-    """What the vehicle says of itself: armed, and in the air (EXTENDED_SYS_STATE, or the flavour's equivalent)."""
+    """The vehicle's report that it is armed, and in the air (EXTENDED_SYS_STATE, or the equivalent)."""
 
     armed: bool
     airborne: bool
 
 
 class Sent(Event, frozen=True):
-    """The first frame of command `token` went out at `at_us`: what admission and dispatch took is measured with it."""
+    """The first frame of command `token` was sent at `at_us`; admission and dispatch time is measured with it."""
 
     token: int
 
 
 class Obeyed(Event, frozen=True):
-    """The vehicle was seen to do command `token`, or another leg of it: its mode shows, and its target where it names
-    one. What it was told before is in force no more.
+    """The vehicle was observed to carry out command `token`, or another leg of it: its mode matches, and its target
+    if it reports one. No earlier command is in force any more.
 
-    `target` is what it says that it flies to: latitude and longitude in 1e-7 degree, mm above mean sea level.
+    `target` is the reported target: latitude and longitude in 1e-7 degree, mm above mean sea level.
     """
 
     token: int
@@ -84,12 +85,13 @@ class Succeeded(Event, frozen=True):
     token: int
 
 
-#: the reason of a `CommandFailed` command that was not sent because its record could not be kept
+#: : the reason of a `CommandFailed` for a command that was not sent because its record could not be stored
 WITHHELD: Final = "withheld"
 
 
 class CommandFailed(Event, frozen=True):
-    """Command `token` was refused by the vehicle, or its effect did not come; or it was not sent (`late`, `withheld`).
+    """Command `token` was refused by the vehicle, or its effect was not observed; or it was not sent (`late`,
+    `withheld`).
 
     `text` is the vehicle's own, untrusted.
     """
@@ -100,21 +102,22 @@ class CommandFailed(Event, frozen=True):
 
 
 class Hindered(Event, frozen=True):
-    """What keeps command `token` from getting on as it was told, in words; it decides nothing, but names a cause."""
+    """What slows command `token` down, as text. It is recorded as a cause and decides nothing."""
 
     token: int
     text: str
 
 
-#: what showed a takeover: it stands still far from its target, and nothing else tells who flies it
+#: : how a takeover was detected: the vehicle stands still far from its target, and nothing else shows who flies it
 PAUSED: Final = "paused"
 
 
 class TakenOver(Event, frozen=True):
-    """Someone else flies the vehicle now: the pilot, a ground station, or the autopilot's own failsafe. They win.
+    """Somebody else flies the vehicle now: the pilot, a ground station, or the autopilot's own failsafe. They have
+    priority.
 
-    `how` says what showed it: the name of the mode, or another target, a landing or a disarming that nobody here
-    commanded. `failsafe`: it said that its state is critical, so it is a failsafe of its own that flies it.
+    `how` is the evidence: the name of the mode, or another target, a landing or a disarming that this run did not
+    command. `failsafe`: it reported a critical state, so its own failsafe flies it.
     """
 
     how: str
@@ -122,15 +125,15 @@ class TakenOver(Event, frozen=True):
 
 
 class Crashed(Event, frozen=True):
-    """The vehicle came down as no landing does. `how` says what showed it."""
+    """The vehicle came down, but not by a landing. `how` is the evidence."""
 
     how: str
 
 
 class LinkLost(Event, frozen=True):
-    """Nothing came from the vehicle for longer than the link's limit; `heard_us` is when it was last heard.
+    """The vehicle was silent for longer than the link's limit; `heard_us` is when it was last heard.
 
-    With 0 it was heard just now.
+    0 means that it was heard just now.
     """
 
     why: str = ""
@@ -138,12 +141,12 @@ class LinkLost(Event, frozen=True):
 
 
 class LinkBack(Event, frozen=True):
-    """The vehicle is heard again, and answers, after `LinkLost`. Its state is not fresh yet."""
+    """The vehicle is heard again and answers, after `LinkLost`. Its state is not fresh yet."""
 
 
 class VehicleAnswers(Event, frozen=True):
-    """Whether the vehicle answers, each time that this changes: one that is heard, and has answered nothing for longer
-    than the link's limit, seems not to hear us. It may be silent meanwhile, too.
+    """Whether the vehicle answers, sent when that changes: a vehicle that is heard but has answered nothing for
+    longer than the link's limit seems not to receive our frames. It may be silent meanwhile, too.
     """
 
     answers: bool
@@ -154,36 +157,35 @@ class Interrupted(Event, frozen=True):
 
 
 class EvidenceFailed(Event, frozen=True):
-    """The evidence sink cannot take records any more (disk full, I/O error), or not in time."""
+    """The evidence sink cannot store records any more (disk full, I/O error), or not in time."""
 
     reason: str
 
 
 class EvidenceKept(Event, frozen=True):
-    """After `EvidenceFailed`, the sink took everything again. All that was given to it is written, and what
-    was given up to the failure is on the disk.
+    """After `EvidenceFailed`, the sink works again. All records since are written, and those before the failure was
+    reported are on the disk.
     """
 
 
 class ClockStepped(Event, frozen=True):
-    """The machine's time of day was set, `by_us` ahead (or back). Records go on by the time of day they began with."""
+    """The machine's time of day was set, `by_us` ahead (or back). Records continue with the original time of day."""
 
     by_us: int
 
 
 class StatusText(Event, frozen=True):
-    """The vehicle said something to people (STATUSTEXT). `text` is its own, untrusted; `severity` is MAV_SEVERITY."""
+    """A message of the vehicle for people (STATUSTEXT). `text` is its own, untrusted; `severity` is MAV_SEVERITY."""
 
     severity: int
     text: str
 
 
 class Presented(Event, frozen=True):
-    """Somebody handed over a signed document, as yet unverified: an approval, a recall, a replacement, a
-    cancellation.
+    """Somebody presented a signed document, not verified yet: an approval, a recall, a replacement, a cancellation.
 
-    `sender` numbers who gets the answer. `refused` is why it is refused, as a slug and a text, where that was found out
-    before: then it is not looked at again. `envelope` is the document in base64, where that was made before.
+    `sender` identifies who receives the answer. `refused` is the slug and text of a refusal that was found before;
+    then it is not verified again. `envelope` is the document in base64, if it was encoded before.
     """
 
     document: bytes
@@ -199,7 +201,7 @@ class Anchored(Event, frozen=True):
 
 
 class Noted(Event, frozen=True):
-    """The vehicle's adapter found something that an operator should know; it decides nothing."""
+    """A note of the vehicle's adapter for an operator; it decides nothing."""
 
     text: str
 
@@ -207,21 +209,21 @@ class Noted(Event, frozen=True):
 # ---------------------------------------------------------------- commands and actions
 
 
-#: the `not_after_us` of what is never too late
+#: : the `not_after_us` of a command without a time limit
 ALWAYS: Final = (1 << 63) - 1
 
 
 class Command(Frozen, frozen=True):
-    """One bounded manoeuvre for the vehicle adapter, to be sent: the executor checked its permit in the same step.
+    """One bounded manoeuvre for the vehicle adapter to send; the executor checked its permit in the same step.
 
     `kind` is a `MotionKind`. `path` is x0, y0, ... in local mm (east, north of declared home) with `geo` the same
     points as latitude, longitude in 1e-7 degree; `altitude` in mm above home, `speed` in mm/s (0: the vehicle's
-    own default). A HOLD succeeds after `hold_us` of observed holding; with 0 it goes on until another command
+    own default). A HOLD succeeds after `hold_us` of observed holding; with 0 it continues until another command
     replaces it.
 
-    `needs_record`: it is held until every `Append` before it is kept, and not sent when one cannot be written
-    (`withheld`), or another command replaces it; a fallback goes out at once, and even then. Whoever sends it looks at
-    the clock again: after `not_after_us` it is not sent, and `CommandFailed` with reason `late` says so.
+    `needs_record`: it is held until every earlier `Append` is stored, and not sent if one cannot be stored
+    (`withheld`), or if another command replaces it. A fallback is sent at once in any case. The sender checks the
+    clock again: after `not_after_us` the command is not sent, and `CommandFailed` with reason `late` reports it.
     """
 
     token: int
@@ -239,16 +241,16 @@ class Command(Frozen, frozen=True):
 class Ending(StrEnum):
     """How a mission run ended; each has its exit code in `diagnostics.exits`."""
 
-    COMPLETED = "completed"  # all steps observed done, landed
-    ABORTED = "aborted"  # a fallback or the contingency brought it down, or home
-    REFUSED = "refused"  # nothing ever flew: refused on the ground
-    RECALLED = "recalled"  # an operator called it back; it fell back first
-    CANCELLED = "cancelled"  # who proposed it called it off; it fell back first
+    COMPLETED = "completed"  # all steps completed, landed
+    ABORTED = "aborted"  # a fallback or the contingency brought the vehicle down or home
+    REFUSED = "refused"  # nothing flew: refused on the ground
+    RECALLED = "recalled"  # recalled by an operator, after a fallback
+    CANCELLED = "cancelled"  # cancelled by the proposer, after a fallback
     STOOD_DOWN = "stood-down"  # the pilot or the autopilot took over
-    CRASHED = "crashed"  # the vehicle came down as no landing does; nothing more is sent
-    LINK_LOST = "link-lost"  # the vehicle went silent, or answered nothing
-    INTERRUPTED = "interrupted"  # the operator stopped it; it fell back first
-    EVIDENCE_LOST = "evidence-lost"  # nothing could be recorded any more
+    CRASHED = "crashed"  # the vehicle came down, but not by a landing; nothing more is sent
+    LINK_LOST = "link-lost"  # the vehicle was silent, or answered nothing
+    INTERRUPTED = "interrupted"  # stopped by the operator, after a fallback
+    EVIDENCE_LOST = "evidence-lost"  # records could not be stored any more
 
 
 class Release(Frozen, frozen=True):
@@ -256,9 +258,9 @@ class Release(Frozen, frozen=True):
 
 
 class Append(Frozen, frozen=True):
-    """Append one evidence line (with its newline), of a class of `model.durability`. Stands before every action that
-    depends on it. A `Command` is held for those before it in its step that are `awaited`: for buffered ones not at
-    all, for written and synced ones until they are written, for those that are synced first until they are on the disk.
+    """Append one evidence line (with its newline), of a class of `model.durability`, before every action that depends
+    on it. A `Command` is held for earlier lines of its step that are `awaited`: not for buffered ones, for written
+    and synced ones until they are written, for those that are synced first until they are on the disk.
     """
 
     line: bytes
@@ -267,20 +269,20 @@ class Append(Frozen, frozen=True):
 
 
 class Announce(Frozen, frozen=True):
-    """Tell any ground station, as STATUSTEXT; never needed for the flight, and the first to be left out."""
+    """A text for all ground stations, as STATUSTEXT. The flight never needs it, and it is dropped first."""
 
     severity: int
     text: str
 
 
 class Expect(Frozen, frozen=True):
-    """From now on these are the mission's steps: reports are to come as often as they need them."""
+    """Set the mission's steps: reports must come as often as these need them."""
 
     steps: tuple[Invocation, ...]
 
 
 class Reply(Frozen, frozen=True):
-    """The answer to what `sender` presented: a stable slug, and a text for a person."""
+    """The answer to the document of `sender`: a stable slug, and a text for a person."""
 
     sender: int
     slug: str
@@ -300,8 +302,8 @@ Action = Command | Release | Append | Announce | Expect | Reply | End
 
 
 class BoundaryKey(NamedTuple):
-    """What a boundary signs its evidence with (None: it has that itself), the number of its session (0: it does not
-    know), and the digest that it kept of the one before; 32 zero octets where there was none.
+    """The key with which a boundary signs its evidence (None: it has its own), the number of its session (0:
+    unknown), and the last digest of the previous session; 32 zero octets if there was none.
     """
 
     key: SigningKey | None
@@ -325,7 +327,7 @@ class Vehicle(Protocol):
         ...
 
     def begin(self, command: Command, now_us: int) -> None:
-        """Start the manoeuvre; a command under way is replaced. Its outcome comes as an event with its token."""
+        """Start the manoeuvre, replacing a command under way. The result comes as an event with its token."""
         ...
 
     def release(self) -> None:
@@ -333,16 +335,16 @@ class Vehicle(Protocol):
         ...
 
     def announce(self, severity: int, text: str) -> None:
-        """Tell any ground station, as STATUSTEXT; left out when the link is busy."""
+        """Send a text to all ground stations, as STATUSTEXT; dropped when the link is busy."""
         ...
 
     def expect(self, steps: Sequence[Invocation]) -> None:
-        """From now on these are the mission's steps: ask for reports as often as they need them."""
+        """Set the mission's steps: request reports as often as they need them."""
         ...
 
 
 class EvidenceSink(Protocol):
-    """Where evidence lines go, in their order. It takes them over and never makes the caller wait for the disk."""
+    """Stores evidence lines in order. It never makes the caller wait for the disk."""
 
     @property
     def kept(self) -> int:
@@ -355,31 +357,31 @@ class EvidenceSink(Protocol):
         ...
 
     def append(self, line: bytes, durability: int) -> int:
-        """Take one line over, of a class of `model.durability`; it is written, or on the disk, once `kept`, or
-        `synced`, reaches the number that is given back.
+        """Accept one line, of a class of `model.durability`; it is written, or on the disk, once `kept`, or `synced`,
+        reaches the returned number.
 
-        Raises OSError when the line could not be written at once, or when more wait than may. It is not lost by that:
-        the chain needs it, and it is written as soon as the disk takes it.
+        Raises OSError if the line could not be written at once, or if too many lines wait. It is not lost then:
+        the chain needs it, and it is written as soon as the disk accepts it.
         """
         ...
 
     def trouble(self) -> str | None:
-        """Why lines that were taken over are not kept, each failure told once; None while nothing went wrong."""
+        """Why accepted lines are not stored, once for each failure; None while there is no failure."""
         ...
 
     def late(self) -> str | None:
-        """That a line was not on the disk within the time promised for its class, told once; None while all are."""
+        """The report that a line was not on the disk within the time promised for its class, once; None if all were."""
         ...
 
     def close(self) -> None:
-        """Flush and close. Waits for the disk, but not for ever."""
+        """Flush and close. Waits for the disk, with a time limit."""
         ...
 
 
 class MissionOpening(StrEnum):
-    """What became of opening a mission on a vehicle."""
+    """The result of opening a mission on a vehicle."""
 
     OPENED = "opened"
-    REPLAYED = "replayed"  # opened before, also by a run that crashed; or it might have been
-    OLD_POLICY = "old-policy"  # a higher version of its policy was in force there
-    DAMAGED = "damaged"  # what was kept about it is there, and says nothing: nobody knows
+    REPLAYED = "replayed"  # opened before, also by a run that crashed; or possibly opened
+    OLD_POLICY = "old-policy"  # a higher version of its policy was in force before
+    DAMAGED = "damaged"  # the stored state cannot be read, so the answer is unknown

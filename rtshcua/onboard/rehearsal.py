@@ -1,15 +1,15 @@
-"""What can be said of a mission before it flies. Nothing is sent or used up.
+"""A dry run of a mission before its flight. Nothing is sent or used.
 
-`rehearse` decides every step of a loaded bundle against the present state. The first step is decided as it would be
-now. A later one is decided as if those before it had flown: position and height are where their plans end, everything
-else is as it is now. Each is taken to be released at this moment, in its own phase, under the conservative `L_rem`,
-with no approval given.
+`rehearse` decides every step of a loaded bundle in the present state. The first step is decided as it would be
+now. A later one is decided as if the earlier ones had flown: position and height are those at the end of their
+plans, everything else is as it is now. Each is assumed to be released at this moment, in its own phase, under the
+conservative `L_rem`, with no approval given.
 
-What a condition over time says is unknown until it was observed for as long as it looks back, and observation begins
-with the run. A step that waits for that is decided once more, as if the state had been the same for so long.
+A condition over time is unknown until it was observed for as long as it looks back, and observation begins with
+the run. A step that waits for that is decided once more, as if the state had been the same for so long.
 
-`unheard` are the signals that cannot come on a link, and `stranded` the steps that a mission would wait at for ever for
-want of them, or break off at.
+`unheard` are the signals that cannot arrive on a link, and `stranded` the steps at which a mission would wait for
+ever or abort because of them.
 """
 
 from collections.abc import Container
@@ -29,16 +29,17 @@ from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US
 
-#: a deferral that ends by itself once the mission is under way,
+#: : a deferral that ends by itself once the mission is under way,
 _COMES: Final = frozenset({Reason.AWAITING_APPROVAL, Reason.PHASE_NOT_REACHED})
-#: and in a later step also what is not known before the vehicle flies
+#: : and in a later step also a value that is unknown before the vehicle flies
 _COMES_LATER: Final = _COMES | {Reason.STATE_UNKNOWN, Reason.SAFETY_UNKNOWN}
 
 
 class Rehearsed(NamedTuple):
-    """One step, what is decided on it, and what would have passed. `hopeful`: admitted, or waits for what will come.
+    """One step, its decision, and the change with which it would have passed. `hopeful`: admitted, or waits for
+    something that will come.
 
-    `observing`: it waits until something was observed for long enough.
+    `observing`: it waits until a condition was observed for long enough.
     """
 
     step: int
@@ -82,12 +83,12 @@ def rehearse(loaded: Loaded, state: State, now: Now, unheard: frozenset[int] = f
 
 
 def _flies(decision: Decision, comes: Container[Reason]) -> bool:
-    """Whether a step is admitted, or waits for what comes by itself."""
+    """Whether a step is admitted, or waits for something that comes by itself."""
     return decision.outcome is Outcome.ALLOW or (decision.outcome is Outcome.DEFER and decision.reason in comes)
 
 
 def flown(state: State, plan: Plan, vehicle: VehicleLimits) -> State:
-    """The state with position and height where a plan ends, fresh; what was never reported stays unknown."""
+    """The state with position and height at the end of a plan, fresh; values that were never reported stay unknown."""
     there: dict[int, int] = {}
     match plan.kind:
         case MotionKind.CLIMB:
@@ -110,7 +111,7 @@ def _at(vehicle: VehicleLimits, x: int, y: int, height: int) -> dict[int, int]:
 
 
 def unheard(policy: Policy, messages: Container[str]) -> frozenset[int]:
-    """The state slots of the signals that nothing but these messages carries."""
+    """The state slots of the signals that only these messages carry."""
     slots: set[int] = set()
     for signal in policy.signals:
         if signal.sources and all(source.message in messages for source in signal.sources):
@@ -119,8 +120,8 @@ def unheard(policy: Policy, messages: Container[str]) -> frozenset[int]:
 
 
 def needed(policy: Policy, invocation: Invocation) -> frozenset[int]:
-    """The slots without which a step is held up: those of its contract, of the rules that it may meet, and those that
-    each permit asks about which may cover it.
+    """The slots without which a step is held up: those of its contract, of the rules that may apply to it, and those
+    that every permit which may cover it reads.
     """
     contract = invocation.contract
     clauses = [*contract.require, *contract.assume, *contract.maintain]
@@ -138,5 +139,5 @@ def needed(policy: Policy, invocation: Invocation) -> frozenset[int]:
 
 
 def stranded(policy: Policy, mission: Mission, slots: frozenset[int]) -> tuple[Invocation, ...]:
-    """The steps of a mission that need a slot of these."""
+    """The steps of a mission that need one of these slots."""
     return tuple(each for each in mission.invocations if slots and not slots.isdisjoint(needed(policy, each)))

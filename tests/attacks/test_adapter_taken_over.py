@@ -27,7 +27,7 @@ def by_force(message: Any) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("change", "reason"), [(higher, "not-covered"), (by_force, "forced-arming")])
-def test_what_it_changed_does_not_leave_and_it_comes_home(change: Change, reason: str) -> None:
+def test_altered_frames_are_blocked_and_vehicle_returns(change: Change, reason: str) -> None:
     def changed(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
         stages = px4.stages(command, seen, system)
         for stage in stages:

@@ -75,7 +75,7 @@ def by(source: str, role: str = "operator") -> dict[str, object]:
 UNDER = ("--policy", "bridge_inspection")
 
 
-def test_what_an_agent_proposes_is_signed_as_the_agents(compiles: Compile) -> None:
+def test_agent_proposal_is_signed_with_source_agent(compiles: Compile) -> None:
     assert compiles(PROPOSAL, *UNDER) == (ExitCode.OK, [], "agent")
 
 
@@ -83,14 +83,14 @@ def test_a_specification_does_not_make_itself_operator(compiles: Compile) -> Non
     assert compiles(by("operator"), *UNDER) == (ExitCode.DIAGNOSTICS, ["E0905"], "")
 
 
-def test_whoever_compiles_may_say_that_it_is_a_persons(compiles: Compile) -> None:
+def test_compile_option_marks_mission_as_a_persons(compiles: Compile) -> None:
     code, found, key = compiles(by("operator"), *UNDER, "--source", "operator")
     assert "E0905" not in found
     assert (code, key) in ((ExitCode.OK, "operator"), (ExitCode.DIAGNOSTICS, ""))
     assert compiles(PROPOSAL, *UNDER, "--source", "operator")[1] == ["E0905"]
 
 
-def test_a_specification_takes_no_other_role_than_it_is_compiled_for(compiles: Compile) -> None:
+def test_specification_cannot_claim_another_role(compiles: Compile) -> None:
     assert compiles(PROPOSAL, *UNDER, "--role", "trainee")[1] == ["E0905"]
     assert compiles(PROPOSAL, *UNDER, "--role", "operator")[0] == ExitCode.OK
 
@@ -99,7 +99,7 @@ def test_a_specification_does_not_choose_its_policy(compiles: Compile) -> None:
     assert compiles(PROPOSAL)[:2] == (ExitCode.DIAGNOSTICS, ["E0906"])
 
 
-def test_a_laxer_policy_of_the_library_takes_no_place_of_the_one_handed_in(compiles: Compile) -> None:
+def test_laxer_library_policy_does_not_replace_given_one(compiles: Compile) -> None:
     assert compiles(PROPOSAL, "--with", "strict.rts")[1] == ["E0905"]
     assert compiles(PROPOSAL, "--with", "strict.rts", "--policy", "strict")[1] == ["E0905"]
 
@@ -116,14 +116,14 @@ def test_a_mission_of_the_library_is_pinned_as_well(compiles: Compile) -> None:
     assert set(found[1]) == {"E0905"}
 
 
-def test_each_proposer_has_a_key_that_signs_nothing_of_the_other(compiles: Compile, tmp_path: Path) -> None:
+def test_proposer_key_cannot_sign_for_another_proposer(compiles: Compile, tmp_path: Path) -> None:
     store = KeyStore(tmp_path / "data")
     root = open_root(store.root(), pinned=store.pin(), now_us=0)
     bound = {key.sources: key.roles for key in root.keys_for(Duty.MISSION).values()}
     assert bound == {("agent",): ("operator",), ("operator",): ("operator",)}
 
 
-def test_the_compiler_signs_nothing_that_the_root_would_not_take(compiles: Compile, tmp_path: Path) -> None:
+def test_compiler_refuses_to_sign_what_root_forbids(compiles: Compile, tmp_path: Path) -> None:
     assert compiles(PROPOSAL, *UNDER)[0] == ExitCode.OK
     KeyStore(tmp_path / "data").folder.rename(tmp_path / "old")
     assert app.main(["keys", "init", "--policy", "strict"]) == ExitCode.OK
@@ -152,7 +152,7 @@ def through(source: SourceKind) -> Mission:
     return replace(MISSION, invocations=steps)
 
 
-def test_the_boundary_holds_a_mission_key_to_its_source_role_and_policy() -> None:
+def test_boundary_restricts_mission_key_to_source_role_and_policy() -> None:
     assert opened(ROOT) == ""
     assert opened(rooted(sources=("agent",)), through(SourceKind.OPERATOR)) == "wrong-source"
     assert opened(rooted(roles=("trainee",))) == "wrong-role"
@@ -169,7 +169,7 @@ def test_the_boundary_holds_a_mission_key_to_its_source_role_and_policy() -> Non
         ({"sources": ("onboard",)}, "trust/bundle-wrong-source"),
     ],
 )
-def test_the_audit_holds_it_to_them_too(bound: dict[str, tuple[str, ...]], slug: str) -> None:
+def test_audit_restricts_mission_key_too(bound: dict[str, tuple[str, ...]], slug: str) -> None:
     """The log of a flight whose boundary looked away."""
     made, _ = case.root()
     keys = tuple(replace(key, **bound) if key.duty is Duty.MISSION else key for key in made.keys)
@@ -178,7 +178,7 @@ def test_the_audit_holds_it_to_them_too(bound: dict[str, tuple[str, ...]], slug:
     assert expect(signed([edit(first, root=b64encode(root).decode()), *rest])) == (slug, 0)
 
 
-def test_an_agent_does_not_set_aside_what_a_person_proposed() -> None:
+def test_agent_cannot_replace_steps_of_a_person() -> None:
     """Its key signs a mission of its own in the place of an operator's, before that has begun."""
     flying = world.loaded(POLICY, through(SourceKind.OPERATOR))
     taken = world.renewed(flying, rooted(sources=("agent",)))

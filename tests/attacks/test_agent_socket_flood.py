@@ -54,7 +54,7 @@ class Endless:
         return -1
 
 
-def test_the_flight_goes_on_however_many_connect(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_flight_continues_under_connection_flood(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     agents = AgentSocket(path, lambda: b"{}\n")
     endless: Any = Endless()
     with monkeypatch.context() as patched:
@@ -65,7 +65,7 @@ def test_the_flight_goes_on_however_many_connect(path: Path, monkeypatch: pytest
     agents.close()
 
 
-def test_one_turn_greets_few_and_sends_little_to_each(path: Path) -> None:
+def test_one_turn_limits_greetings_and_output(path: Path) -> None:
     """A greeting tells of a mission of any size, and whoever hangs up and comes again is sent it each time."""
     greeting, greeted = b"x" * 150_000 + b"\n", list[int]()
 
@@ -100,9 +100,7 @@ def _now(link: socket.socket) -> bytes:
         return b""
 
 
-def test_a_process_that_connects_all_the_time_is_welcomed_once_in_a_while(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_repeated_connections_are_rate_limited(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The others do not wait until all of its connections were greeted."""
     agents = AgentSocket(path, lambda: b"{}\n")
     peers, welcomed = chain(repeat(7, 3 * MOST_TAKEN), repeat(8)), list[int]()
@@ -120,7 +118,7 @@ def test_a_process_that_connects_all_the_time_is_welcomed_once_in_a_while(
     agents.close()
 
 
-def test_a_listener_that_answers_nobody_holds_no_start_up(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_silent_listener_does_not_delay_start(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its queue is full, so a connection would be waited for, for ever."""
     monkeypatch.setattr(agent_socket, "_PATIENCE_S", 0.01)
     with socket.socket(socket.AF_UNIX) as listener, socket.socket(socket.AF_UNIX) as first:
@@ -133,9 +131,7 @@ def test_a_listener_that_answers_nobody_holds_no_start_up(path: Path, monkeypatc
 
 
 @pytest.mark.parametrize("most", [MOST_OF_A_PEER, MOST_READERS])
-def test_a_recall_finds_a_place_among_readers_that_only_stay(
-    path: Path, monkeypatch: pytest.MonkeyPatch, most: int
-) -> None:
+def test_recall_gets_a_slot_among_idle_readers(path: Path, monkeypatch: pytest.MonkeyPatch, most: int) -> None:
     """Whether they are all of one process, or each of another."""
     processes = repeat(1) if most == MOST_OF_A_PEER else count(1)
     monkeypatch.setattr(agent_socket, "peer_of", lambda _: Peer(next(processes), None))

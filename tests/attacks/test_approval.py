@@ -54,7 +54,7 @@ def later(us: int) -> Now:
     return Now(START.monotonic_us + us, START.utc_us + us, START.utc_error_us)
 
 
-def test_without_one_the_step_waits_and_then_is_denied() -> None:
+def test_step_without_approval_waits_then_is_denied() -> None:
     run = Run(fresh()).until_over()
     assert (0, ASKED, -1, "defer", "approval/awaited") in run.decisions
     assert (0, ASKED, -1, "deny", "approval/timed-out") in run.decisions
@@ -63,7 +63,7 @@ def test_without_one_the_step_waits_and_then_is_denied() -> None:
     assert_audited(run)
 
 
-def test_with_one_it_flies_and_the_log_proves_why() -> None:
+def test_approved_step_flies_and_log_proves_it() -> None:
     run = Run(fresh()).until(lambda run: (0, ASKED, -1, "defer", "approval/awaited") in run.decisions)
     assert hand(run, approval(run.loaded, now=run.clock.now())) == "accepted"
     run.until_over()
@@ -74,7 +74,7 @@ def test_with_one_it_flies_and_the_log_proves_why() -> None:
     assert record["outcome"] == "allow"
 
 
-def test_one_that_came_before_the_step_was_released_counts() -> None:
+def test_approval_before_release_counts() -> None:
     run = Run(fresh())
     assert hand(run, approval(run.loaded)) == "accepted"
     run.until_over()
@@ -83,7 +83,7 @@ def test_one_that_came_before_the_step_was_released_counts() -> None:
     assert_audited(run)
 
 
-def test_a_refusal_denies_and_no_later_approval_undoes_it() -> None:
+def test_later_approval_does_not_undo_refusal() -> None:
     of = fresh()
     assert presented(of, approval(of, granted=0)).accepted
     assert presented(of, approval(of)).accepted, "it is taken in, and changes nothing"
@@ -99,7 +99,7 @@ def test_a_refusal_does_not_expire() -> None:
     assert asked(of, now=now, released_us=now.monotonic_us).reason is Reason.APPROVAL_REFUSED
 
 
-def test_no_bit_of_it_may_change() -> None:
+def test_flipped_bit_is_refused() -> None:
     of = fresh()
     document = approval(of)
     for at in range(len(document)):
@@ -112,12 +112,12 @@ def test_no_bit_of_it_may_change() -> None:
 STRANGER = SigningKey.from_seed(bytes([99]) * 32, duty=Duty.APPROVAL, development=True)
 
 
-def test_a_key_that_nobody_trusts() -> None:
+def test_unknown_key_is_refused() -> None:
     assert presented(fresh(), approval(OF, key=STRANGER)).slug == "unknown-key"
 
 
 @pytest.mark.parametrize("key", [ROOT_KEY, POLICY_KEY, MISSION_KEY, LOG_KEY])
-def test_a_trusted_key_of_another_duty(key: SigningKey) -> None:
+def test_key_of_another_duty_is_refused(key: SigningKey) -> None:
     payload = cose.unverified(approval(OF)).payload
     document = cose.sign1(payload, key=key, duty=key.duty, content_type=names.APPROVAL.content_type)
     assert presented(fresh(), document).slug == "wrong-duty"
@@ -146,13 +146,13 @@ def entitled(**fields: object) -> Loaded:
         ({"roles": (ANY,), "vehicles": (ANY,)}, "accepted"),
     ],
 )
-def test_a_key_that_the_root_does_not_let_speak_for_this(fields: dict[str, object], slug: str) -> None:
+def test_unauthorised_key_is_refused(fields: dict[str, object], slug: str) -> None:
     """Above all: a key that an agent's host holds answers nothing in a person's place."""
     of = entitled(**fields)
     assert presented(of, approval(of)).slug == slug
 
 
-def test_a_root_that_has_expired_meanwhile() -> None:
+def test_expired_root_is_refused() -> None:
     root = replace(ROOT, expires_at_us=START.utc_us + START.utc_error_us)
     of = renewed(OF, root)
     assert presented(of, approval(of)).slug == "root-expired"
@@ -176,25 +176,25 @@ def test_a_root_that_has_expired_meanwhile() -> None:
         ({"issued_at_us": START.utc_us + 5, "expires_at_us": START.utc_us + 5}, "expired"),
     ],
 )
-def test_what_it_says_must_fit(changed: dict[str, object], slug: str) -> None:
+def test_inconsistent_content_is_refused(changed: dict[str, object], slug: str) -> None:
     of = fresh()
     assert presented(of, approval(of, **changed)).slug == slug
     assert (asked(of).outcome is Outcome.ALLOW) == (slug == "accepted")
 
 
 @pytest.mark.parametrize("step", [0, 1, 3])
-def test_a_step_that_asks_nobody(step: int) -> None:
+def test_approval_of_unconfirmed_step_is_refused(step: int) -> None:
     of = fresh()
     assert presented(of, approval(of, step)).slug == "not-asked"
 
 
-def test_a_role_that_the_policy_does_not_ask() -> None:
+def test_approval_by_other_role_is_refused() -> None:
     of = entitled(roles=(ANY,))
     for role in ("operator", "harbour master"):
         assert presented(of, approval(of, role=role)).slug == "not-asked"
 
 
-def test_the_approval_of_another_step_does_not_serve() -> None:
+def test_approval_of_another_step_is_refused() -> None:
     """Id of one step, binding of another: neither is approved."""
     of = fresh()
     other = of.bundle.mission.invocations[1]
@@ -203,14 +203,14 @@ def test_the_approval_of_another_step_does_not_serve() -> None:
     assert asked(of).reason is Reason.AWAITING_APPROVAL
 
 
-def test_the_approval_of_an_earlier_flight_does_not_serve() -> None:
+def test_approval_of_earlier_flight_is_refused() -> None:
     """The same mission, compiled again: other ids."""
     earlier = approval(OF)
     again = loaded(mission=replace(low_mission(), issued_at_us=ISSUED + S))
     assert presented(again, earlier).slug == "other-mission"
 
 
-def test_one_that_is_replayed_changes_nothing() -> None:
+def test_replayed_document_changes_nothing() -> None:
     of = fresh()
     document = approval(of)
     assert presented(of, document).accepted
@@ -219,7 +219,7 @@ def test_one_that_is_replayed_changes_nothing() -> None:
     assert presented(of, document, later(6 * MIN)).slug == "expired"
 
 
-def test_a_new_one_may_follow_one_that_expired() -> None:
+def test_new_approval_may_follow_expired_one() -> None:
     of = fresh()
     assert presented(of, approval(of, expires_at_us=START.utc_us + S)).accepted
     now = later(2 * S)
@@ -230,14 +230,14 @@ def test_a_new_one_may_follow_one_that_expired() -> None:
     assert answer.outcome is Outcome.ALLOW
 
 
-def test_one_for_a_step_that_was_decided_is_too_late() -> None:
+def test_approval_of_decided_step_is_too_late() -> None:
     of = fresh()
     assert presented(of, approval(of)).accepted
     assert asked(of).outcome is Outcome.ALLOW
     assert presented(of, approval(of, granted=0)).slug == "already-decided"
 
 
-def test_one_that_comes_after_the_time_to_answer_does_not_count() -> None:
+def test_late_approval_does_not_count() -> None:
     of = fresh()
     released_us = START.monotonic_us
     now = later(31 * S)
@@ -262,7 +262,7 @@ def awaited() -> Run:
     return run.until_over()
 
 
-def test_a_log_cannot_make_one_up() -> None:
+def test_log_with_invented_document_fails() -> None:
     """Whoever holds the log's key invents an approval in the inputs of a decision, or in an effect."""
     run = awaited()
     lines = [*run.lines, run.recorder.close(run.clock.now(), ending=str(run.ending), tlog=None)]
@@ -293,7 +293,7 @@ def test_a_log_cannot_make_one_up() -> None:
     assert forged(first, context=elsewhere) == ("decision/approvals", first)
 
 
-def test_a_flood_of_forged_ones_leaves_few_records_and_delays_nothing() -> None:
+def test_flood_of_forged_approvals_is_bounded() -> None:
     run = Run(fresh())
     forged = approval(run.loaded, key=STRANGER)
     for _ in range(40):

@@ -49,7 +49,7 @@ def another_mission() -> Loaded:
 
 
 @pytest.mark.parametrize("document", [approval, recall, replacement])
-def test_a_document_serves_one_flight(document: Callable[[Loaded], bytes]) -> None:
+def test_document_is_valid_for_one_flight(document: Callable[[Loaded], bytes]) -> None:
     signed = document(renewed(OF))
     assert presented(in_another_flight(), signed).slug == "other-flight"
     assert presented(renewed(OF), signed).accepted
@@ -58,7 +58,7 @@ def test_a_document_serves_one_flight(document: Callable[[Loaded], bytes]) -> No
 @pytest.mark.parametrize(
     ("document", "slug"), [(approval, "other-mission"), (recall, "other-mission"), (replacement, "superseded")]
 )
-def test_a_document_serves_one_mission(document: Callable[[Loaded], bytes], slug: str) -> None:
+def test_document_is_valid_for_one_mission(document: Callable[[Loaded], bytes], slug: str) -> None:
     assert presented(another_mission(), document(renewed(OF))).slug == slug
 
 
@@ -81,13 +81,13 @@ def test_an_approval_names_the_mission_that_is_in_force() -> None:
 
 
 @pytest.mark.parametrize("changed", [{"flight": OTHER}, {"flight": b""}, {"mission": bytes(32)}, {"mission": b""}])
-def test_no_approval_leaves_out_what_it_is_for(changed: dict[str, bytes]) -> None:
+def test_approval_without_subject_is_refused(changed: dict[str, bytes]) -> None:
     of = renewed(OF)
     assert presented(of, approval(of, **changed)).slug in ("other-flight", "other-mission")
 
 
 @pytest.mark.parametrize("changed", [{"flight": b""}, {"policy": bytes(32)}, {"mission": b""}])
-def test_no_recall_of_a_mission_is_without_its_flight(changed: dict[str, bytes]) -> None:
+def test_recall_of_mission_requires_flight(changed: dict[str, bytes]) -> None:
     of = renewed(OF)
     assert presented(of, recall(of, **changed)).slug == "malformed"
 

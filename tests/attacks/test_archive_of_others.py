@@ -120,7 +120,7 @@ def test_a_pipe_is_not_waited_for(filled: Path, where: str, capsys: pytest.Captu
 @pytest.mark.parametrize(
     ("column", "value"), [("part", "../../../victim/x"), ("part", "*"), ("log", "/etc/passwd"), ("log", "x" * 64)]
 )
-def test_an_index_that_names_files_elsewhere_is_not_gone_by(
+def test_index_with_outside_paths_is_ignored(
     filled: Path, column: str, value: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     shutil.copytree(filled, "archive")
@@ -136,7 +136,7 @@ def test_an_index_that_names_files_elsewhere_is_not_gone_by(
     assert all(len(list(Path("archive/index", table).iterdir())) == 2 for table in TABLES)
 
 
-def test_a_copy_is_read_by_nobody_who_may_not_read_the_log(log: bytes) -> None:
+def test_copy_has_permissions_of_its_log(log: bytes) -> None:
     Path("run").mkdir()
     for name, mode in (("log.jsonl", 0o600), ("log.anchors", 0o640)):
         Path("run", name).write_bytes(log if name == "log.jsonl" else b"a/b/c\n1\nAAAA\n\n\xe2\x80\x94 x AAAA\n\n")
@@ -148,7 +148,7 @@ def test_a_copy_is_read_by_nobody_who_may_not_read_the_log(log: bytes) -> None:
         assert anchors.stat().st_mode & 0o037 == 0
 
 
-def test_what_is_no_file_of_anchors_is_not_copied(log: bytes) -> None:
+def test_invalid_anchor_file_is_not_copied(log: bytes) -> None:
     Path("run").mkdir()
     Path("run/log.jsonl").write_bytes(log)
     Path("run/private.anchors").write_text("-----BEGIN PRIVATE KEY-----\n")
@@ -156,7 +156,7 @@ def test_what_is_no_file_of_anchors_is_not_copied(log: bytes) -> None:
     assert not list(Path("archive").rglob("*.anchors"))
 
 
-def test_a_file_that_is_changed_before_it_is_copied_is_looked_at_again(
+def test_file_changed_before_copy_is_checked_again(
     log: bytes, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("run").mkdir()

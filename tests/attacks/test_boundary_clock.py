@@ -119,7 +119,7 @@ def held(tmp_path: Path) -> Iterator[Held]:
 
 @pytest.mark.parametrize("by_us", [3 * S_US, -3 * S_US, 5 * HOUR_US, -5 * HOUR_US])
 @pytest.mark.parametrize("which", ["monotonic", "utc", "both"])
-def test_no_step_is_decided_by_a_time_that_is_not_the_boundarys(held: Held, which: str, by_us: int) -> None:
+def test_step_with_foreign_time_is_not_decided(held: Held, which: str, by_us: int) -> None:
     here = machine()
     at = replace(
         here,
@@ -131,7 +131,7 @@ def test_no_step_is_decided_by_a_time_that_is_not_the_boundarys(held: Held, whic
 
 
 @pytest.mark.parametrize("by_us", [5 * HOUR_US, -5 * HOUR_US])
-def test_an_error_that_is_claimed_too_large_or_too_small_does_not_help(held: Held, by_us: int) -> None:
+def test_wrong_clock_error_is_refused(held: Held, by_us: int) -> None:
     """As large as it takes, everything that asks for the time of day is in doubt by itself."""
     here = machine()
     assert held.ask(replace(here, utc_us=here.utc_us + by_us, utc_error_us=abs(by_us) - APART_US - S_US)) is (
@@ -142,7 +142,7 @@ def test_an_error_that_is_claimed_too_large_or_too_small_does_not_help(held: Hel
     assert (wide.outcome, wide.reason) == (Outcome.DEFER, Reason.CLOCK_UNCERTAIN)
 
 
-def test_a_bundle_that_has_expired_is_not_flown_by_naming_the_time_before(tmp_path: Path) -> None:
+def test_expired_bundle_is_refused_despite_claimed_time(tmp_path: Path) -> None:
     """Five hours after its issue; by the true time it is refused, and by no other it is decided."""
     held = Held(tmp_path, issued_us=machine().utc_us - 5 * HOUR_US, utc_error_us=1_000)
     held.own(settle=True)
@@ -156,13 +156,13 @@ def test_a_bundle_that_has_expired_is_not_flown_by_naming_the_time_before(tmp_pa
 
 
 @pytest.mark.parametrize("by_us", [3 * S_US, -3 * S_US, HOUR_US, -HOUR_US])
-def test_an_answer_is_taken_in_by_the_boundarys_time_alone(held: Held, by_us: int) -> None:
+def test_approval_is_judged_by_boundary_time(held: Held, by_us: int) -> None:
     here = machine()
     assert held.show(replace(here, utc_us=here.utc_us + by_us)) == "clock-apart"
     assert held.show(machine()) != "clock-apart"
 
 
-def test_keys_that_have_expired_open_nothing_by_naming_the_time_before(tmp_path: Path) -> None:
+def test_expired_keys_are_refused_despite_claimed_time(tmp_path: Path) -> None:
     held = Held(tmp_path, utc_error_us=1_000, expires_us=machine().utc_us + 2 * S_US)
     held.own(settle=True)
     while machine().utc_us < held.root.expires_at_us:
@@ -176,7 +176,7 @@ def test_keys_that_have_expired_open_nothing_by_naming_the_time_before(tmp_path:
 # ---------------------------------------------------------------------------------- none that is known
 
 
-def test_where_the_boundary_knows_no_time_of_day_none_may_be_claimed(tmp_path: Path) -> None:
+def test_claimed_time_is_refused_without_boundary_time(tmp_path: Path) -> None:
     held = Held(tmp_path)
     if held.own().source is not ClockSource.UNKNOWN:
         pytest.skip("this machine's clock is synchronised")
@@ -231,7 +231,7 @@ def keyed(tmp_path: Path) -> Iterator[Keyed]:
     made.process.close()
 
 
-def test_the_vehicles_time_is_taken_from_frames_that_the_boundary_verified(keyed: Keyed) -> None:
+def test_boundary_time_comes_from_verified_frames(keyed: Keyed) -> None:
     utc_us = machine().utc_us + 20 * S_US
     keyed.hear(keyed.answers(), keyed.tells(utc_us))
     own = keyed.own()
@@ -246,9 +246,7 @@ def test_the_vehicles_time_is_taken_from_frames_that_the_boundary_verified(keyed
 
 
 @pytest.mark.parametrize(("autopilot", "least_us"), [(None, 6_000_000), (12, 6_000_000), (3, 1_000_000)])
-def test_its_error_is_what_the_autopilot_lets_its_clock_be_off(
-    keyed: Keyed, autopilot: int | None, least_us: int
-) -> None:
+def test_clock_error_is_autopilot_tolerance(keyed: Keyed, autopilot: int | None, least_us: int) -> None:
     """As its HEARTBEAT says, which was verified too; the worse of both where none was heard."""
     if autopilot is not None:
         keyed.hear(keyed.said(m.MAVLink_heartbeat_message(2, autopilot, 0, 0, 4, 3)))
@@ -256,7 +254,7 @@ def test_its_error_is_what_the_autopilot_lets_its_clock_be_off(
     assert least_us < keyed.own().now.utc_error_us < least_us + 5 * S_US
 
 
-def test_frames_that_were_held_back_tell_no_time(keyed: Keyed) -> None:
+def test_delayed_frames_do_not_set_time(keyed: Keyed) -> None:
     """The hour that is past was signed before the boundary drew its number, or the answer to another."""
     past = keyed.tells(machine().utc_us - 5 * HOUR_US)
     keyed.hear(past, keyed.answers())
@@ -266,7 +264,7 @@ def test_frames_that_were_held_back_tell_no_time(keyed: Keyed) -> None:
     assert keyed.own().source is ClockSource.VEHICLE
 
 
-def test_an_answer_to_another_boundary_is_none_to_this_one(keyed: Keyed, tmp_path: Path) -> None:
+def test_timesync_answer_to_another_boundary_is_ignored(keyed: Keyed, tmp_path: Path) -> None:
     other = tmp_path / "other"
     other.mkdir()
     before = Keyed(other)
@@ -277,7 +275,7 @@ def test_an_answer_to_another_boundary_is_none_to_this_one(keyed: Keyed, tmp_pat
     assert keyed.own().source is ClockSource.UNKNOWN
 
 
-def test_neither_another_component_nor_an_unsigned_frame_tells_the_time(keyed: Keyed) -> None:
+def test_time_of_other_component_or_unsigned_frame_is_ignored(keyed: Keyed) -> None:
     keyed.hear(keyed.answers())
     bare = AUTOPILOT.pack(m.MAVLink_system_time_message(machine().utc_us, 5))
     assert keyed.caller(OBSERVE, machine().monotonic_us.to_bytes(8), bare) != b"\0"
@@ -285,7 +283,7 @@ def test_neither_another_component_nor_an_unsigned_frame_tells_the_time(keyed: K
     assert keyed.own().source is ClockSource.UNKNOWN, "and one that knows no UTC does not either"
 
 
-def test_keys_are_looked_at_again_once_the_time_is_known(tmp_path: Path) -> None:
+def test_keys_are_checked_again_once_time_is_known(tmp_path: Path) -> None:
     """The bundle was opened while nobody knew; by the vehicle's time its root has expired."""
     keyed = Keyed(tmp_path, expires_us=machine().utc_us + HOUR_US)
     assert isinstance(keyed.load(), Loaded)
@@ -298,7 +296,7 @@ def test_keys_are_looked_at_again_once_the_time_is_known(tmp_path: Path) -> None
 # ---------------------------------------------------------------------------------- what it signs, and the audit
 
 
-def test_each_statement_says_the_boundarys_own_time(held: Held) -> None:
+def test_statement_contains_boundary_time(held: Held) -> None:
     """Whatever time the runtime asks for it at."""
     held.loaded.attestation.begin(BoundaryKey(case.BOUNDARY_KEY, 1, bytes(32)))
     data = held.loaded.attestation.statement(Now(1, 1, 0))
@@ -324,7 +322,7 @@ def open_statement_of(detail: str) -> Any:
 
 
 @pytest.mark.parametrize("ahead_us", [5 * HOUR_US, -5 * HOUR_US, 4 * S_US, -4 * S_US])
-def test_a_log_that_claims_another_time_than_the_boundarys_is_found_out(ahead_us: int) -> None:
+def test_log_with_other_time_than_boundary_fails(ahead_us: int) -> None:
     for number in STATEMENTS:
         lines = signed([*LINES[:number], of_own_clock(number, ClockSource.KERNEL, ahead_us), *LINES[number + 1 :]])
         slug, record = expect(lines)
@@ -332,7 +330,7 @@ def test_a_log_that_claims_another_time_than_the_boundarys_is_found_out(ahead_us
         assert record <= number
 
 
-def test_a_log_that_claims_a_time_that_the_boundary_did_not_know_is_found_out() -> None:
+def test_log_with_time_unknown_to_boundary_fails() -> None:
     number = STATEMENTS[1]
     line = of_own_clock(number, ClockSource.UNKNOWN, 0, UTC_UNKNOWN_US)
     assert expect(signed([*LINES[:number], line, *LINES[number + 1 :]]))[0] == "boundary/clock"

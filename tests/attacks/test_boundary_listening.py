@@ -83,7 +83,7 @@ def provisioned(monkeypatch: pytest.MonkeyPatch) -> Iterator[Provisioned]:
         yield Provisioned(made)
 
 
-def test_it_serves_with_the_keys_of_its_folder(provisioned: Provisioned) -> None:
+def test_listening_boundary_uses_keys_of_its_folder(provisioned: Provisioned) -> None:
     process = ListeningBoundary(provisioned.socket)
     assert process.log_public == case.KEYS[Duty.LOG].public
     assert process.own_public == case.BOUNDARY_KEY.public
@@ -110,7 +110,7 @@ def as_user(user: int, act: Callable[[], int]) -> int:
 
 
 @OTHER_USER
-def test_the_runs_user_reads_and_signals_nothing_of_it(provisioned: Provisioned) -> None:
+def test_user_of_run_cannot_read_or_signal_boundary(provisioned: Provisioned) -> None:
     def connects() -> int:
         with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as made:
             made.connect(str(provisioned.socket))
@@ -154,7 +154,7 @@ def test_a_second_connection_is_turned_away(provisioned: Provisioned) -> None:
 
 
 @pytest.mark.parametrize("pending", [False, True])
-def test_one_that_is_halted_ends(provisioned: Provisioned, pending: bool) -> None:
+def test_halted_boundary_ends(provisioned: Provisioned, pending: bool) -> None:
     """Whoever connected may not kill it: the kernel does, and the next one begins no step of the bundle again."""
     process = ListeningBoundary(provisioned.socket)
     provisioned.load(process)
@@ -171,7 +171,7 @@ def test_one_that_is_halted_ends(provisioned: Provisioned, pending: bool) -> Non
     process.close()
 
 
-def test_descriptors_that_are_sent_along_are_not_taken(provisioned: Provisioned) -> None:
+def test_passed_descriptors_are_closed(provisioned: Provisioned) -> None:
     process = ListeningBoundary(provisioned.socket)
     (pid,) = provisioned.made.boundaries()
     given, other = os.pipe()
@@ -191,7 +191,7 @@ def test_descriptors_that_are_sent_along_are_not_taken(provisioned: Provisioned)
     process.close()
 
 
-def test_a_runtime_that_reads_no_answer_ends_it(provisioned: Provisioned) -> None:
+def test_unread_answer_ends_session(provisioned: Provisioned) -> None:
     """Whoever fills the socket harms the boundary that it has, and the next one serves."""
     process = ListeningBoundary(provisioned.socket)
     process._socket.settimeout(0.5)
@@ -203,7 +203,7 @@ def test_a_runtime_that_reads_no_answer_ends_it(provisioned: Provisioned) -> Non
     ListeningBoundary(provisioned.socket).close()
 
 
-def test_one_that_hangs_is_waited_for(provisioned: Provisioned, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_hanging_boundary_is_awaited(provisioned: Provisioned, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run that is begun again at once finds it serving: on a link with a key nothing else brings the vehicle down."""
     monkeypatch.undo()
     process = ListeningBoundary(provisioned.socket)
@@ -213,7 +213,7 @@ def test_one_that_hangs_is_waited_for(provisioned: Provisioned, monkeypatch: pyt
     ListeningBoundary(provisioned.socket).close()
 
 
-def test_it_does_not_believe_a_time_that_is_made_up(provisioned: Provisioned) -> None:
+def test_invented_time_is_refused(provisioned: Provisioned) -> None:
     """And no run may ask it to: `--speed` needs one that was started so."""
     process = ListeningBoundary(provisioned.socket)
     provisioned.load(process)
@@ -227,7 +227,7 @@ def test_it_does_not_believe_a_time_that_is_made_up(provisioned: Provisioned) ->
 
 
 @pytest.mark.parametrize("name", ["root.trust", "root.pin", "log.seed"])
-def test_a_missing_file(provisioned: Provisioned, name: str) -> None:
+def test_missing_file_is_reported(provisioned: Provisioned, name: str) -> None:
     """It is named among what to look at."""
     (provisioned.made.own / name).unlink()
     with pytest.raises(BoundaryError) as refused:
@@ -237,7 +237,7 @@ def test_a_missing_file(provisioned: Provisioned, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["root.trust", "root.pin", "log.seed", "boundary.seed", "link.key"])
-def test_a_file_that_is_there_and_cannot_be_read(provisioned: Provisioned, name: str) -> None:
+def test_unreadable_file_is_reported(provisioned: Provisioned, name: str) -> None:
     """A link key that is not read would leave the vehicle with one that signs nothing."""
     place = provisioned.made.own / name
     kept = place.read_bytes()
@@ -255,13 +255,13 @@ def test_a_file_that_is_there_and_cannot_be_read(provisioned: Provisioned, name:
 
 
 @pytest.mark.parametrize("octets", [b"", b"\n", b"no key\n", b"5a" * 600, b" " * 200])
-def test_a_pin_that_is_none(provisioned: Provisioned, octets: bytes) -> None:
+def test_invalid_pin_is_reported(provisioned: Provisioned, octets: bytes) -> None:
     """A development root is not trusted for want of one."""
     provisioned.put("root.pin", octets)
     assert provisioned.why_not() == "untrusted"
 
 
-def test_a_runtime_that_is_gone_before_it_is_answered(provisioned: Provisioned) -> None:
+def test_runtime_gone_before_answer_is_handled(provisioned: Provisioned) -> None:
     """The bundle is given back, for nothing was sent of it."""
     process = ListeningBoundary(provisioned.socket)
     (halted,) = provisioned.made.boundaries()
@@ -284,7 +284,7 @@ def test_a_runtime_that_is_gone_before_it_is_answered(provisioned: Provisioned) 
     again.close()
 
 
-def test_files_that_do_not_serve(provisioned: Provisioned) -> None:
+def test_invalid_files_are_reported(provisioned: Provisioned) -> None:
     own, put = provisioned.made.own, provisioned.put
     pin = (own / "root.pin").read_bytes()
     put("root.pin", case.KEYS[Duty.LOG].kid.hex().encode())
@@ -318,13 +318,13 @@ def test_files_that_do_not_serve(provisioned: Provisioned) -> None:
     assert provisioned.why_not() == "not-begun", "other users have access to the folder"
 
 
-def test_no_vehicle_but_that_of_its_socket(provisioned: Provisioned) -> None:
+def test_boundary_serves_only_its_vehicle(provisioned: Provisioned) -> None:
     """A runtime that says another one changes nothing: there is no folder of it."""
     provisioned.made.own.rename(provisioned.made.folder / "quad-08")
     assert provisioned.why_not() == "not-begun"
 
 
-def test_one_of_another_release(tmp_path: Path) -> None:
+def test_boundary_of_another_release_is_refused(tmp_path: Path) -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
         listener.bind(str(tmp_path / "s"))
         listener.listen()
@@ -342,7 +342,7 @@ def test_one_of_another_release(tmp_path: Path) -> None:
     assert refused.value.slug == "not-begun"
 
 
-def test_nobody_listens(tmp_path: Path) -> None:
+def test_missing_listener_is_reported(tmp_path: Path) -> None:
     with pytest.raises(BoundaryError, match="no boundary listens") as refused:
         ListeningBoundary(tmp_path / "none")
     assert refused.value.slug == "missing"

@@ -115,7 +115,7 @@ def armed_frame() -> bytes:
 
 
 @ROOT_USER
-def test_another_user_reads_nothing_of_it(tmp_path: Path) -> None:
+def test_another_user_cannot_read_boundary(tmp_path: Path) -> None:
     """As the runtime's user: not its memory, nor by ptrace, nor a core dump of it; and it may do next to nothing."""
     held = Held(tmp_path, (65_534, 65_534))
     try:
@@ -158,13 +158,13 @@ def as_user(user: int, pid: int) -> int:
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
 
 
-def test_a_second_runtime_finds_it_held(held: Held, tmp_path: Path) -> None:
+def test_second_runtime_finds_boundary_in_use(held: Held, tmp_path: Path) -> None:
     with pytest.raises(BoundaryError, match="another run") as refused:
         Held(tmp_path)
     assert refused.value.slug == "in-use"
 
 
-def test_no_permit_is_made_or_taken_over(held: Held, tmp_path: Path) -> None:
+def test_permit_cannot_be_forged_or_reused(held: Held, tmp_path: Path) -> None:
     """One that the runtime seals, with any key that it has; and one of another session of the same bundle."""
     at = struct.pack(">q", now().monotonic_us)
     step = Permit(STEP, 0, -1, 1, 0, 0, 1 << 62)
@@ -176,14 +176,14 @@ def test_no_permit_is_made_or_taken_over(held: Held, tmp_path: Path) -> None:
     assert isinstance(frame, Refusal)
 
 
-def test_steps_have_their_turns(held: Held) -> None:
+def test_step_out_of_turn_is_refused_by_process(held: Held) -> None:
     assert held.ask(2) is Status.NOT_CURRENT
     first = held.ask(0)
     assert isinstance(first, Decision)
     assert not first.permit, "nothing is known of the vehicle"
 
 
-def test_no_time_is_made_up(held: Held) -> None:
+def test_invented_time_is_refused_by_process(held: Held) -> None:
     """Nothing is decided ahead of its time, nor by a time that is long past: it has a clock of its own."""
     here = now()
     for by_us in (10_000_000, -10_000_000):
@@ -194,7 +194,7 @@ def test_no_time_is_made_up(held: Held) -> None:
         assert answer.slug == "time-apart"
 
 
-def test_a_bundle_flies_once_whatever_the_runtime_says(tmp_path: Path) -> None:
+def test_bundle_flies_once_despite_runtime(tmp_path: Path) -> None:
     """Its marks are the boundary's own. A restart of it takes the bundle, and lets no step of it begin."""
     first = Held(tmp_path)
     first.load()
@@ -207,7 +207,7 @@ def test_a_bundle_flies_once_whatever_the_runtime_says(tmp_path: Path) -> None:
     again.process.close()
 
 
-def test_what_leaves_while_nothing_is_in_force_is_the_same_process(tmp_path: Path) -> None:
+def test_frames_without_bundle_are_equal_in_both_processes(tmp_path: Path) -> None:
     """It lets out a greeting, and the id of its next flight is known; a bundle that it refuses changes neither."""
     made = Held(tmp_path)
     at = struct.pack(">q", now().monotonic_us)
@@ -237,7 +237,7 @@ def test_a_bundle_of_which_nothing_was_sent_may_be_loaded_again(tmp_path: Path) 
 
 
 @pytest.mark.parametrize("emptied", [b"", b"\0", first_kept()[:-1], bytes(len(first_kept()))])
-def test_a_file_that_was_emptied_is_damage_and_no_first_start(emptied: bytes, tmp_path: Path) -> None:
+def test_emptied_state_file_is_damage(emptied: bytes, tmp_path: Path) -> None:
     """Else what was opened before flies again. The first start finds what says that nothing was kept."""
     held = Held(tmp_path)
     held.load()
@@ -249,7 +249,7 @@ def test_a_file_that_was_emptied_is_damage_and_no_first_start(emptied: bytes, tm
     assert path.read_bytes() == emptied, "and it stays for somebody to look at"
 
 
-def test_a_first_start_that_broke_off_while_it_wrote_is_one_still(tmp_path: Path) -> None:
+def test_interrupted_first_start_counts_as_first_start(tmp_path: Path) -> None:
     Held(tmp_path).process.close()
     path = kept_file(tmp_path, VEHICLE)
     slot = path.stat().st_size // 2
@@ -263,7 +263,7 @@ def test_a_first_start_that_broke_off_while_it_wrote_is_one_still(tmp_path: Path
         Held(tmp_path)
 
 
-def test_no_mission_from_before_it_was_provisioned_is_opened(tmp_path: Path) -> None:
+def test_mission_issued_before_provisioning_is_refused(tmp_path: Path) -> None:
     """Whatever an earlier folder opened, this one does not know of."""
     (tmp_path / "boundary").mkdir()
     path = kept_file(tmp_path, VEHICLE)
@@ -288,7 +288,7 @@ def test_a_file_of_another_boundary_is_damage(tmp_path: Path) -> None:
         Held(tmp_path)
 
 
-def test_what_it_kept_is_not_read_where_it_is_damaged(tmp_path: Path) -> None:
+def test_damaged_stored_state_is_not_read(tmp_path: Path) -> None:
     Held(tmp_path).process.close()
     path = kept_file(tmp_path, VEHICLE)
     path.write_bytes(bytes(len(path.read_bytes())))
@@ -305,7 +305,7 @@ LINK_KEYS = {
 
 
 @pytest.mark.parametrize("what", LINK_KEYS)
-def test_it_takes_the_key_files_that_a_run_without_it_takes(what: str, tmp_path: Path) -> None:
+def test_boundary_accepts_key_files_of_run(what: str, tmp_path: Path) -> None:
     key = tmp_path / "link.key"
     key.write_bytes(LINK_KEYS[what])
     key.chmod(0o600)
@@ -324,7 +324,7 @@ def test_it_takes_the_key_files_that_a_run_without_it_takes(what: str, tmp_path:
         held.process.close()
 
 
-def test_a_key_file_that_others_may_read_is_not_taken(tmp_path: Path) -> None:
+def test_key_file_readable_by_others_is_refused(tmp_path: Path) -> None:
     key = tmp_path / "link.key"
     key.write_bytes(LINK_KEYS["digits"])
     key.chmod(0o640)
@@ -332,7 +332,7 @@ def test_a_key_file_that_others_may_read_is_not_taken(tmp_path: Path) -> None:
         Held(tmp_path, link_key=key)
 
 
-def test_nonsense_is_answered_and_changes_nothing(held: Held) -> None:
+def test_malformed_call_is_answered_without_effect(held: Held) -> None:
     random = Random(5)
     request = encode(
         Request(
@@ -363,7 +363,7 @@ def test_nonsense_is_answered_and_changes_nothing(held: Held) -> None:
     assert isinstance(held.ask(0), (Decision, Status))
 
 
-def test_the_longest_statement_comes_whole(tmp_path: Path) -> None:
+def test_longest_statement_is_transferred_completely(tmp_path: Path) -> None:
     """Whoever floods it with requests must not make its evidence unreadable: all marks that one statement may hold."""
     held = Held(tmp_path, own_seed=case.BOUNDARY_KEY.private.private_bytes_raw())
     held.load()
@@ -378,7 +378,7 @@ def test_the_longest_statement_comes_whole(tmp_path: Path) -> None:
     assert len(said.marks) == MARK_BYTES * MOST_MARKS
 
 
-def test_one_that_stands_still_is_as_good_as_gone(held: Held) -> None:
+def test_unresponsive_boundary_counts_as_lost(held: Held) -> None:
     os.kill(held.process.pid, signal.SIGSTOP)
     begun_s = time.monotonic()
     assert held.caller(ENFORCE, b"anything") is LOST
@@ -388,7 +388,7 @@ def test_one_that_stands_still_is_as_good_as_gone(held: Held) -> None:
     assert held.caller(ENFORCE, b"anything") is LOST, "an answer that comes late is not taken for another's"
 
 
-def test_a_machine_that_stands_still_as_a_whole_loses_nothing(held: Held, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_stall_of_whole_machine_loses_nothing(held: Held, monkeypatch: pytest.MonkeyPatch) -> None:
     """The runtime goes on first, and its patience is over; the answer comes right after."""
     monkeypatch.setattr(boundary_process, "AGAIN_S", PATIENCE_S)  # right after, on a busy machine too
     os.kill(held.process.pid, signal.SIGSTOP)
@@ -400,7 +400,7 @@ def test_a_machine_that_stands_still_as_a_whole_loses_nothing(held: Held, monkey
     assert held.ask(0) is not Status.MALFORMED, "answers belong to their calls"
 
 
-def test_when_it_dies_nothing_leaves_that_was_not_signed_ahead(held: Held) -> None:
+def test_dead_boundary_sends_only_frames_signed_ahead(held: Held) -> None:
     os.kill(held.process.pid, signal.SIGKILL)
     gate = held.loaded.executor.frames
     assert gate.seal(armed_frame(), now().monotonic_us) is NO_COPY
@@ -449,7 +449,7 @@ def test_each_reason_not_to_begin_has_a_slug_and_an_exit_code(tmp_path: Path, mo
     assert why_not(tmp_path) == (ExitCode.REFUSED, "boundary-missing")
 
 
-def test_a_boundary_that_is_still_ending_is_waited_for(tmp_path: Path) -> None:
+def test_ending_boundary_is_awaited(tmp_path: Path) -> None:
     begun(tmp_path).close()
     held = lock(kept_file(tmp_path, VEHICLE))
     ends = threading.Timer(0.3, os.close, (held,))
@@ -459,7 +459,7 @@ def test_a_boundary_that_is_still_ending_is_waited_for(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root may mount a disk that is small")
-def test_a_disk_that_is_full_at_the_first_start_is_no_damage(tmp_path: Path) -> None:
+def test_full_disk_at_first_start_is_not_damage(tmp_path: Path) -> None:
     """What was half written is not there afterwards."""
     mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(tmp_path)]
     if subprocess.run(mount, check=False, capture_output=True).returncode != 0:

@@ -94,7 +94,7 @@ def held(tmp_path: Path) -> Iterator[Held]:
 # -------------------------------------------------------------------------------------------- sessions and turns
 
 
-def test_a_permit_of_another_session_sends_nothing(tmp_path: Path) -> None:
+def test_permit_of_another_session_is_refused(tmp_path: Path) -> None:
     """The same bundle, in the process before: its permits were sealed with a key that is gone."""
     first = Held(tmp_path)
     permit = allowed(first.loaded())
@@ -106,7 +106,7 @@ def test_a_permit_of_another_session_sends_nothing(tmp_path: Path) -> None:
     second.process.close()
 
 
-def test_steps_are_sent_in_their_turn_alone(held: Held) -> None:
+def test_step_out_of_turn_is_refused(held: Held) -> None:
     of = held.loaded()
     assert answer_to(of, request_for(of, step=2)) is Status.NOT_CURRENT
     first = allowed(of)
@@ -148,7 +148,7 @@ def test_a_call_that_is_too_long_is_not_read_beyond_its_end(held: Held) -> None:
     assert isinstance(answer_to(of, request_for(of)), Decision)
 
 
-def test_half_a_bundle_is_none(held: Held) -> None:
+def test_partial_bundle_is_refused(held: Held) -> None:
     """Cut anywhere, in whatever parts it comes, and with the size of the whole claimed for it."""
     bundle, times = sealed(), struct.pack(">qqq", AT_US, START.utc_us, START.utc_error_us)
     for size in (0, 1, len(bundle) // 2, len(bundle) - 1):
@@ -163,7 +163,7 @@ def test_half_a_bundle_is_none(held: Held) -> None:
     assert isinstance(held.load(), Loaded)
 
 
-def test_parts_of_two_things_do_not_mix(held: Held) -> None:
+def test_parts_of_two_objects_do_not_combine(held: Held) -> None:
     """A part that does not go on where the last one ended is refused, whatever came between."""
     bundle, random = sealed(), Random(3)
     for _ in range(30):
@@ -195,7 +195,7 @@ def long_ways(legs: int) -> tuple[Policy, Mission]:
     return policy, replace(flat.MISSION, invocations=tuple(steps))
 
 
-def test_no_path_keeps_an_answer_from_coming_in_time(tmp_path: Path) -> None:
+def test_longest_path_is_answered_in_time(tmp_path: Path) -> None:
     """What a path answers about each zone is found when its step is asked for, in the air: there a boundary that takes
     longer than a second is given up. A mission with such a path is refused, and so is a replacement.
     """
@@ -244,7 +244,7 @@ def up_to(held: Held, point: str) -> Loaded | None:
 
 
 @pytest.mark.parametrize("point", POINTS)
-def test_killed_at_any_point_it_lets_nothing_out_and_has_what_it_kept(point: str, tmp_path: Path) -> None:
+def test_killed_boundary_passes_nothing_and_keeps_state(point: str, tmp_path: Path) -> None:
     """From when the bundle is in force, no step of it begins after a restart; before, all of it may be flown."""
     first = Held(tmp_path)
     of = up_to(first, point)
@@ -263,7 +263,7 @@ def test_killed_at_any_point_it_lets_nothing_out_and_has_what_it_kept(point: str
     second.process.close()
 
 
-def test_killed_while_it_writes_its_file_is_whole(tmp_path: Path) -> None:
+def test_state_file_is_intact_after_kill_during_write(tmp_path: Path) -> None:
     """Whatever moment the write is broken off at, the place before it is left."""
     random = Random(7)
     for _ in range(25):
@@ -292,7 +292,7 @@ sys.stdin.read()
 
 @pytest.mark.slow
 @pytest.mark.parametrize("point", ["begun", "half a bundle", "in force", "sent"])
-def test_when_the_runtime_is_killed_it_ends_and_gives_up_the_vehicle(point: str, tmp_path: Path) -> None:
+def test_boundary_ends_when_runtime_is_killed(point: str, tmp_path: Path) -> None:
     code = RUNTIME.format(path=sys.path, state=str(tmp_path), point=point)
     runtime = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     assert runtime.stdout is not None
@@ -316,7 +316,7 @@ def test_when_the_runtime_is_killed_it_ends_and_gives_up_the_vehicle(point: str,
 # ----------------------------------------------------------------------------------------- what it keeps, and where
 
 
-def test_where_no_more_missions_can_be_remembered_none_is_opened(tmp_path: Path) -> None:
+def test_mission_beyond_memory_limit_is_refused(tmp_path: Path) -> None:
     """Its file says that as many were opened as it remembers, and that none of them has expired yet."""
     Held(tmp_path).process.close()
     path = kept_file(tmp_path, VEHICLE)
@@ -342,7 +342,7 @@ def test_where_no_more_missions_can_be_remembered_none_is_opened(tmp_path: Path)
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root may mount a disk that is small")
-def test_a_full_disk_lets_nothing_begin(tmp_path: Path) -> None:
+def test_full_disk_prevents_start(tmp_path: Path) -> None:
     """What cannot be kept is not opened; with room again it is, and what was kept before is whole."""
     mounted = subprocess.run(
         ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(tmp_path)], check=False, capture_output=True
@@ -369,7 +369,7 @@ def test_a_full_disk_lets_nothing_begin(tmp_path: Path) -> None:
         subprocess.run(["umount", "-l", str(tmp_path)], check=True, capture_output=True)
 
 
-def test_put_back_to_what_it_was_its_file_forgets_what_was_opened(tmp_path: Path) -> None:
+def test_restored_state_file_forgets_opened_missions(tmp_path: Path) -> None:
     """The limit, stated: whoever may write the state folder can put it back, and the boundary cannot tell. Permits that
     it sealed are not good again, nor is the flight's id the same; the logs of both flights are there for a witness.
     """
@@ -422,7 +422,7 @@ def rewritten(path: Path, layout: int, opened: int) -> None:
 
 
 @pytest.mark.parametrize(("before", "opened"), [(1, 0), (1, 3), (1, MOST_OPENED + 1), (2, 3), (2, MOST_OPENED + 2)])
-def test_a_file_of_a_layout_before_goes_on(before: int, opened: int, tmp_path: Path) -> None:
+def test_state_file_of_older_layout_is_accepted(before: int, opened: int, tmp_path: Path) -> None:
     """It has no sessions; where it is full, the mission that has no room any more is not opened again either."""
     Held(tmp_path, own=True).process.close()
     path = kept_file(tmp_path, VEHICLE)
@@ -442,7 +442,7 @@ def test_a_file_of_a_layout_before_goes_on(before: int, opened: int, tmp_path: P
         Held(tmp_path)
 
 
-def test_it_counts_its_sessions_itself(tmp_path: Path) -> None:
+def test_boundary_counts_its_sessions(tmp_path: Path) -> None:
     """A state folder that was put back does not make it begin to count anew; one that is ahead counts."""
     digests = []
     for proposed, found in ((1, 1), (1, 2), (0, 3), (3, 4), (9, 9), (1, 10)):
@@ -464,7 +464,7 @@ def test_it_counts_its_sessions_itself(tmp_path: Path) -> None:
 # --------------------------------------------------------------------------------------------------- its keys
 
 
-def test_its_keys_are_in_no_file_and_no_core(tmp_path: Path) -> None:
+def test_boundary_keys_are_not_in_files_or_core_dumps(tmp_path: Path) -> None:
     """Crashed, it leaves no core; what it keeps, and its command line, have no octets of the keys that it was given."""
     key, seed = tmp_path / "link.key", b"the seed of its own signing key."
     key.write_bytes(b"the key of the link, 32 octets..")

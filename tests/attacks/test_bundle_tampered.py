@@ -25,17 +25,17 @@ def flipped(at: int, bit: int) -> bytes:
     return SEALED[:at] + bytes([SEALED[at] ^ 1 << bit]) + SEALED[at + 1 :]
 
 
-def test_no_byte_with_a_flipped_bit_passes() -> None:
+def test_bundle_with_flipped_bit_in_any_byte_is_refused() -> None:
     """In each byte another bit; all of them in soak."""
     assert [at for at in range(len(SEALED)) if opens(flipped(at, at % 8))] == []
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize("bit", range(8))
-def test_no_flipped_bit_passes(bit: int) -> None:
+def test_bundle_with_flipped_bit_is_refused(bit: int) -> None:
     assert [at for at in range(len(SEALED)) if opens(flipped(at, bit))] == []
 
 
-def test_no_cut_and_no_addition_passes() -> None:
+def test_truncated_or_extended_bundle_is_refused() -> None:
     assert not any(opens(SEALED[:length]) for length in range(len(SEALED)))
     assert not opens(SEALED + b"\0")

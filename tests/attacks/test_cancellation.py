@@ -75,7 +75,7 @@ def ordered(first: int) -> Mission:
 
 
 @pytest.mark.parametrize("skill", ["takeoff", "goto"])
-def test_in_the_air_the_contingency_flies_and_nothing_of_the_mission(skill: str) -> None:
+def test_contingency_flies_after_cancellation_in_the_air(skill: str) -> None:
     run = Run(fresh()).until_flies(skill)
     run.tick()
     if skill == "takeoff":
@@ -88,7 +88,7 @@ def test_in_the_air_the_contingency_flies_and_nothing_of_the_mission(skill: str)
     assert_audited(run)
 
 
-def test_on_the_ground_nothing_begins_and_the_bundle_is_used_up() -> None:
+def test_cancellation_on_ground_uses_up_bundle() -> None:
     run = Run(fresh(), ready=False)
     assert hand(run, cancellation(run.loaded)) == "accepted"
     assert run.ending is Ending.CANCELLED
@@ -96,7 +96,7 @@ def test_on_the_ground_nothing_begins_and_the_bundle_is_used_up() -> None:
     assert run.runtime.used_up
 
 
-def test_what_is_on_its_way_home_goes_on() -> None:
+def test_return_under_way_continues() -> None:
     run = Run(loaded()).until_flies("return_home")
     assert hand(run, cancellation(run.loaded, now=run.clock.now())) == "accepted"
     run.until_over()
@@ -104,7 +104,7 @@ def test_what_is_on_its_way_home_goes_on() -> None:
     assert run.ending is Ending.CANCELLED
 
 
-def test_a_chain_that_flies_is_not_touched() -> None:
+def test_flying_chain_continues_after_cancellation() -> None:
     run = Run(fresh()).until_flies("goto")
     run.vehicle.fails.add("goto")
     run.until_flies("hover")
@@ -113,7 +113,7 @@ def test_a_chain_that_flies_is_not_touched() -> None:
     assert run.ending is Ending.ABORTED
 
 
-def test_while_the_link_is_lost_it_waits_for_the_link() -> None:
+def test_document_waits_while_link_is_lost() -> None:
     run = Run(fresh()).until_flies("goto")
     run.tick(LinkLost(0))
     assert hand(run, cancellation(run.loaded, now=run.clock.now())) == "accepted"
@@ -122,7 +122,7 @@ def test_while_the_link_is_lost_it_waits_for_the_link() -> None:
     assert run.ending is Ending.CANCELLED
 
 
-def test_a_person_who_recalls_after_it_is_heard() -> None:
+def test_recall_after_cancellation_is_accepted() -> None:
     run = Run(fresh()).until_flies("goto")
     assert hand(run, cancellation(run.loaded, now=run.clock.now())) == "accepted"
     assert hand(run, recall(run.loaded, now=run.clock.now())) == "accepted"
@@ -131,7 +131,7 @@ def test_a_person_who_recalls_after_it_is_heard() -> None:
     assert_audited(run)
 
 
-def test_after_it_the_boundary_decides_no_step_and_the_executor_sends_none() -> None:
+def test_no_step_is_decided_or_sent_afterwards() -> None:
     """Also for a runtime that was taken over and acts as if it had not come."""
     of = fresh()
     permit = allowed(of)
@@ -143,7 +143,7 @@ def test_after_it_the_boundary_decides_no_step_and_the_executor_sends_none() -> 
     assert [presented(of, each).slug for each in (approval(of), replacement(of))] == ["cancelled"] * 2
 
 
-def test_no_bit_of_it_may_change() -> None:
+def test_flipped_bit_is_refused() -> None:
     of = fresh()
     document = cancellation(of)
     for at in range(len(document)):
@@ -153,7 +153,7 @@ def test_no_bit_of_it_may_change() -> None:
     allowed(of)
 
 
-def test_keys_of_no_duty_for_it() -> None:
+def test_keys_of_other_duties_are_refused() -> None:
     payload = cose.unverified(cancellation(OF)).payload
     kind = names.CANCELLATION.content_type
     for key, slug in ((APPROVAL_KEY, "wrong-duty"), (LOG_KEY, "wrong-duty"), (AS_APPROVER, "unknown-key")):
@@ -163,13 +163,13 @@ def test_keys_of_no_duty_for_it() -> None:
 
 
 @pytest.mark.parametrize("kind", [names.RECALL, names.REPLACEMENT])
-def test_it_passes_for_no_other_document(kind: names.Artefact) -> None:
+def test_document_is_refused_as_another_kind(kind: names.Artefact) -> None:
     payload = cose.unverified(cancellation(OF)).payload
     disguised = cose.sign1(payload, key=MISSION_KEY, duty=Duty.MISSION, content_type=kind.content_type)
     assert presented(fresh(), disguised).slug in ("unknown-format", "wrong-duty")
 
 
-def test_an_agent_ends_what_agents_proposed_and_nothing_that_a_person_ordered() -> None:
+def test_agent_can_only_cancel_missions_of_agents() -> None:
     for mission, slug in ((MISSION, "accepted"), (ordered(0), "wrong-source"), (ordered(3), "wrong-source")):
         of = with_agent(mission)
         assert presented(of, cancellation(of, AGENT)).slug == slug
@@ -187,13 +187,13 @@ def test_an_agent_ends_what_agents_proposed_and_nothing_that_a_person_ordered() 
         ({"expires_us": START.utc_us}, "key-expired"),
     ],
 )
-def test_a_key_that_may_not_propose_it_does_not_end_it(rights: dict[str, object], slug: str) -> None:
+def test_key_that_may_not_propose_cannot_cancel(rights: dict[str, object], slug: str) -> None:
     of = with_agent(MISSION, **rights)
     assert presented(of, cancellation(of, AGENT)).slug == slug
     assert not of.in_force.called_off
 
 
-def test_the_cancellation_of_another_flight_or_mission_does_not_serve() -> None:
+def test_cancellation_of_other_flight_or_mission_is_refused() -> None:
     of = fresh()
     assert presented(of, cancellation(OF, flight=bytes([7]) * 16)).slug == "other-flight"
     assert presented(of, cancellation(OF, mission=bytes(32))).slug == "other-mission"
@@ -202,7 +202,7 @@ def test_the_cancellation_of_another_flight_or_mission_does_not_serve() -> None:
     assert not of.in_force.called_off
 
 
-def test_it_reaches_a_mission_that_was_replaced_since_if_the_key_may_propose_the_rest() -> None:
+def test_cancellation_reaches_replacement_with_authorised_key() -> None:
     """Who cancels and who replaces need not agree on which came first."""
     of = with_agent(low_mission())
     first = cancellation(of, AGENT)
@@ -217,7 +217,7 @@ def cancelled() -> list[bytes]:
     return [*run.lines, run.recorder.close(run.clock.now(), ending=str(run.ending), tlog=None)]
 
 
-def test_a_log_in_which_a_step_is_sent_after_it_is_false() -> None:
+def test_log_with_step_sent_afterwards_fails() -> None:
     lines = cancelled()
     records = [json.loads(line) for line in lines]
     begun = next(n for n, each in enumerate(records) if each.get("event") == "dispatched" and each["kind"] == 2)
@@ -225,7 +225,7 @@ def test_a_log_in_which_a_step_is_sent_after_it_is_false() -> None:
     assert expect(signed(forged, LOG_KEY), ROOT_KEY.public) == ("dispatch/cancelled", begun)
 
 
-def test_a_log_in_which_a_step_is_decided_after_it_is_false() -> None:
+def test_log_with_step_decided_afterwards_fails() -> None:
     run = Run(fresh()).until_flies("goto")
     lines = [*run.lines]
     early = Run(renewed(OF), ready=False)

@@ -56,7 +56,7 @@ def said(words: list[str], capsys: pytest.CaptureFixture[str]) -> tuple[int, str
         ('zone yard from "link.geojson"\n', "E0108"),
     ],
 )
-def test_an_import_leads_to_no_file_of_others(
+def test_import_outside_checkout_is_refused(
     here: Path, command: list[str], text: str, code: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (here / "a.rts").write_text(text)
@@ -72,7 +72,7 @@ def test_an_import_leads_to_no_file_of_others(
         assert "it is outside of the project" in text
 
 
-def test_what_the_user_allows_is_imported(
+def test_import_allowed_by_user_is_resolved(
     here: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (here / "a.rts").write_text('import "../mine.rts"\n')
@@ -84,7 +84,7 @@ def test_what_the_user_allows_is_imported(
 
 
 @pytest.mark.parametrize("command", [["check"], ["lint"], ["test"], ["fmt"], ["docs"]], ids=" ".join)
-def test_a_link_in_a_folder_is_not_followed_out_of_it(
+def test_symlink_out_of_folder_is_not_followed(
     here: Path, command: list[str], capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     (tmp_path / "mine.rts").write_text("zone  hunter2 {}\n")
@@ -98,7 +98,7 @@ def test_a_link_in_a_folder_is_not_followed_out_of_it(
 
 
 @pytest.mark.parametrize("words", [["fmt"], ["lint", "--fix"], ["check"]], ids=" ".join)
-def test_a_link_that_is_named_is_not_followed_out_of_the_checkout(
+def test_named_symlink_out_of_checkout_is_not_followed(
     here: Path, words: list[str], capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     (tmp_path / "mine.rts").write_text("zone  hunter2 {}\n")
@@ -156,7 +156,7 @@ def test_a_report_is_not_written_to_a_device_nor_to_a_pipe(here: Path, capsys: p
 
 
 @pytest.mark.parametrize("change", ["rewrite", "write_out", "replace_inside"])
-def test_a_link_that_comes_after_the_question_is_not_followed(
+def test_symlink_created_after_check_is_not_followed(
     here: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: str
 ) -> None:
     (tmp_path / "home").mkdir()
@@ -214,7 +214,7 @@ def test_which_folder_is_a_checkout(here: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_folders_in_folders_are_gone_into_however_deep(
+def test_deeply_nested_folders_are_read(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], request: pytest.FixtureRequest
 ) -> None:
     # pytest would go into itself as often, and leave them

@@ -36,13 +36,13 @@ def held_to(text: str, step: int = 0) -> Mission:
 
 
 @pytest.mark.parametrize("text", [CALM.text, f"  {ENOUGH_CHARGE.text}\n", POLICY.rules[0].text])
-def test_a_clause_that_borrows_the_policys_words_is_not_loaded(text: str) -> None:
+def test_clause_with_text_of_policy_clause_is_refused(text: str) -> None:
     found = try_load(sealed(POLICY, held_to(text)))
     assert isinstance(found, Refusal)
     assert "has the text of a policy clause but different code" in found.text
 
 
-def test_what_refused_a_step_in_the_missions_own_words_is_told_so() -> None:
+def test_refusal_by_missions_own_clause_is_marked_as_such() -> None:
     run = Run(loaded(POLICY, held_to("wind.speed < 9 m/s"))).until_over()
     assert_audited(run)
     page = TextPage(bold=False)
@@ -51,7 +51,7 @@ def test_what_refused_a_step_in_the_missions_own_words_is_told_so() -> None:
     assert why.startswith("`wind.speed < 9 m/s`, in the mission's own words")
 
 
-def test_what_is_the_policys_is_told_as_it_is() -> None:
+def test_policy_clause_is_shown_as_policys() -> None:
     step = held_to("wind.speed < 9 m/s").invocations[0]
     own: list[Clause] = [*step.contract.require, *step.contract.assume, *step.contract.maintain]
     assert [is_own(POLICY, step, each) for each in own].count(True) == 1
@@ -69,7 +69,7 @@ mission m under bridge_inspection@7 on quad {
 """
 
 
-def test_why_tells_whose_words_they_are_and_what_they_read(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_why_shows_owner_of_clause_and_its_values(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     source = tmp_path / "m.rts"
     source.write_text(HELD)
     command = ["why", str(source), "--step", "1", "--at", "2026-05-01T10:00:00Z", "--state", "battery=50 %"]

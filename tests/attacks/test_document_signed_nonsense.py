@@ -99,10 +99,10 @@ def nonsense(seed: int) -> None:
 
 
 @given(SEEDS)
-def test_nonsense_is_refused_and_nothing_is_raised(seed: int) -> None:
+def test_malformed_signed_document_is_refused(seed: int) -> None:
     nonsense(seed)
 
 
 @given(st.sampled_from(list(KINDS)), st.binary(max_size=200))
-def test_bytes_that_are_no_payload(kind: Artefact, payload: bytes) -> None:
+def test_signed_garbage_payload_is_refused(kind: Artefact, payload: bytes) -> None:
     assert not presented(renewed(OF), signed(kind, payload)).accepted

@@ -150,7 +150,7 @@ def elsewhere() -> tuple[Loaded, list[int]]:
 
 @pytest.mark.parametrize("operators", [False, True], ids=["agents", "operators"])
 @pytest.mark.parametrize("mode", [EnforcementMode.SOFTWARE, EnforcementMode.PROCESS])
-def test_what_a_replacement_needs_is_made_in_another_thread(
+def test_replacement_is_prepared_in_another_thread(
     mode: EnforcementMode, operators: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """All that takes as long as it has steps; what is left is to put it in force, and to record it."""
@@ -169,7 +169,7 @@ def test_what_a_replacement_needs_is_made_in_another_thread(
         assert any(b'"event":"replacement"' in line and b64encode(document) in line for line in run.lines)
 
 
-def test_a_boundary_elsewhere_is_asked_nothing_about_what_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_refused_document_is_not_sent_to_other_boundary(monkeypatch: pytest.MonkeyPatch) -> None:
     of, kinds = elsewhere()
     with flooded(of, monkeypatch, operators=True) as run:
         kinds.clear()
@@ -180,7 +180,7 @@ def test_a_boundary_elsewhere_is_asked_nothing_about_what_is_refused(monkeypatch
         assert run.busy["decoded"] == 0
 
 
-def test_a_boundary_elsewhere_is_asked_nothing_about_what_does_not_fit(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_misfitting_document_is_not_sent_to_other_boundary(monkeypatch: pytest.MonkeyPatch) -> None:
     """Rightly signed, each other octets: it would verify each, while the flight waits."""
     of, kinds = elsewhere()
     with flooded(of, monkeypatch) as run:
@@ -193,7 +193,7 @@ def test_a_boundary_elsewhere_is_asked_nothing_about_what_does_not_fit(monkeypat
 
 
 @pytest.mark.parametrize("name", HOSTILE)
-def test_the_flights_thread_decodes_little_of_whatever_is_handed_in(run: Flooded, name: str) -> None:
+def test_flight_thread_decodes_little_of_any_document(run: Flooded, name: str) -> None:
     document, slug = HOSTILE[name]
     assert run.hand(document) == slug
     assert run.hand(document) == slug
@@ -201,7 +201,7 @@ def test_the_flights_thread_decodes_little_of_whatever_is_handed_in(run: Flooded
     assert len(run.looked_at) <= 1, "its refusal is remembered"
 
 
-def test_a_replacement_that_is_handed_in_twice_is_looked_at_once(run: Flooded) -> None:
+def test_duplicate_replacement_is_verified_once(run: Flooded) -> None:
     document = replacement(run.loaded)
     assert run.hand(document) == "accepted"
     assert run.hand(document) == "superseded"
@@ -209,7 +209,7 @@ def test_a_replacement_that_is_handed_in_twice_is_looked_at_once(run: Flooded) -
     assert run.most <= ITEMS
 
 
-def test_while_it_falls_back_and_after_the_mission_nothing_is_decoded_either(run: Flooded) -> None:
+def test_nothing_is_decoded_during_fallback_or_after_mission(run: Flooded) -> None:
     run.until_flies("goto")
     assert run.hand(recall(run.loaded, now=run.clock.now())) == "accepted"
     run.most = 0
@@ -227,7 +227,7 @@ def test_a_protected_header_is_malformed_by_its_length() -> None:
         assert (error.value.slug, "bytes; the limit is" in str(error.value)) == ("malformed", size > MAX_PROTECTED)
 
 
-def test_a_user_has_a_budget_and_what_is_short_counts_for_nothing() -> None:
+def test_user_budget_ignores_short_documents() -> None:
     long, short = (json.dumps({"document": "A" * size}).encode() + b"\n" for size in (349_000, SHORT // 4 * 4 - 400))
     with tempfile.TemporaryDirectory(dir="/tmp") as name:
         listening = AgentSocket(Path(name) / "s", bytes)
@@ -251,9 +251,7 @@ def test_a_user_has_a_budget_and_what_is_short_counts_for_nothing() -> None:
     assert shorts >= seconds - 2
 
 
-def test_what_failed_to_be_looked_at_is_refused_and_never_looked_at_here(
-    run: Flooded, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_failed_verification_ahead_refuses_document(run: Flooded, monkeypatch: pytest.MonkeyPatch) -> None:
     def fails(document: bytes, now: Now) -> None:
         raise MemoryError
 

@@ -15,7 +15,7 @@ class Breaking(EvidenceFile):
         super().append(line, durability)
 
 
-def test_it_is_told_and_no_line_after_it_counts_as_kept(tmp_path: Path) -> None:
+def test_thread_death_is_reported_and_later_lines_are_not_kept(tmp_path: Path) -> None:
     writer = EvidenceWriter(Breaking(tmp_path / "log"))
     for line in (b"good\n", b"bad\n", b"lost\n"):
         writer.append(line, WRITTEN)

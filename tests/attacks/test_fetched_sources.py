@@ -80,7 +80,7 @@ def fetched(tmp_path_factory: pytest.TempPathFactory, files: Any) -> Fetched:
 
 
 @pytest.mark.slow
-def test_no_set_up_of_what_is_fetched_runs(fetched: Fetched, tmp_path: Path) -> None:
+def test_setup_code_of_fetched_package_is_not_run(fetched: Fetched, tmp_path: Path) -> None:
     place, links, pins, mark = fetched
     assert not mark.exists()
     unpacked = place / "build" / "boundary" / "fetched"
@@ -95,7 +95,7 @@ def test_no_set_up_of_what_is_fetched_runs(fetched: Fetched, tmp_path: Path) -> 
 
 
 @pytest.mark.slow
-def test_what_is_missing_is_fetched_again(fetched: Fetched, tmp_path: Path) -> None:
+def test_missing_source_is_fetched_again(fetched: Fetched, tmp_path: Path) -> None:
     place = tmp_path / "another"
     shutil.copytree(fetched.place, place)
     unpacked = place / "build" / "boundary" / "fetched"

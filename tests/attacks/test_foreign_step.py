@@ -17,18 +17,18 @@ AT = START.monotonic_us
 
 
 @pytest.mark.parametrize("step", [1, 2, 3])
-def test_a_step_whose_turn_has_not_come_is_not_decided(step: int) -> None:
+def test_step_before_its_turn_is_not_decided(step: int) -> None:
     of = loaded()
     assert answer_to(of, request_for(of, step=step)) is Status.NOT_CURRENT
 
 
 @pytest.mark.parametrize(("kind", "step", "link"), [(1, 0, 0), (1, 1, 0), (1, 0, -1)])
-def test_the_fallback_of_a_step_that_was_not_asked_for_is_not_decided(kind: int, step: int, link: int) -> None:
+def test_fallback_of_unrequested_step_is_not_decided(kind: int, step: int, link: int) -> None:
     of = loaded()
     assert answer_to(of, request_for(of, kind, step, link)) is Status.NOT_CURRENT
 
 
-def test_a_deferred_step_that_was_passed_over_is_not_decided_any_more() -> None:
+def test_skipped_deferred_step_is_not_decided() -> None:
     of = loaded()
     blind = State((None,) * of.bundle.policy.slots, (0,) * of.bundle.policy.slots)
     deferred = answer_to(of, request_for(of, state=blind))
@@ -49,7 +49,7 @@ def test_the_fallback_of_an_earlier_step_is_not_decided() -> None:
     ("kind", "step", "link"),
     [(0, 4, -1), (0, -1, -1), (0, 0, 0), (1, 0, 9), (1, 4, 0), (1, -1, 0), (2, 0, 0), (2, -1, 3), (2, -1, -1)],
 )
-def test_steps_and_links_that_the_bundle_does_not_have(kind: int, step: int, link: int) -> None:
+def test_step_or_link_outside_bundle_is_refused(kind: int, step: int, link: int) -> None:
     of = loaded()
     allowed(of)
     assert answer_to(of, request_for(of, kind, step, link)) is Status.UNKNOWN_STEP
@@ -117,12 +117,12 @@ ONE = loaded()
 
 
 @given(st.binary(max_size=1200))
-def test_hostile_bytes_are_refused_and_remembered_nowhere(data: bytes) -> None:
+def test_malformed_request_is_refused_and_forgotten(data: bytes) -> None:
     assert read_answer(ONE, data, ONE.boundary.enforce(data)) is Status.MALFORMED
 
 
 @given(st.data())
-def test_a_changed_request_never_gets_more_than_an_answer(data: st.DataObject) -> None:
+def test_altered_request_gets_no_permit(data: st.DataObject) -> None:
     of = ONE
     request = bytearray(request_for(of, *data.draw(st.sampled_from([(0, 0, -1), (1, 0, 0), (2, -1, 0)]))))
     for _ in range(data.draw(st.integers(1, 4))):

@@ -108,7 +108,7 @@ def test_nothing_is_signed_before_a_step_was_sent(thief: Thief) -> None:
             )
 
 
-def test_nothing_is_signed_but_the_frames_of_a_link_that_stands(thief: Thief) -> None:
+def test_only_frames_of_standing_links_are_signed_ahead(thief: Thief) -> None:
     thief.until(2)
     before, now = thief.permits[-2:]
     land, hold = pack(messages.set_mode(1, Px4Mode.LAND)), pack(messages.stop_here(1))
@@ -138,7 +138,7 @@ def test_nothing_is_signed_but_the_frames_of_a_link_that_stands(thief: Thief) ->
         assert thief.ask(now, FALLBACK_LINK, 0, hold, frame) == why, "all of a link, or none"
 
 
-def test_the_gate_stays_shut_for_what_is_signed_ahead(thief: Thief) -> None:
+def test_gate_stays_closed_for_frames_signed_ahead(thief: Thief) -> None:
     thief.until(2)
     frame = pack(RETURN)
     assert isinstance(thief.ask(thief.permits[-1], FALLBACK_LINK, 1, frame), bytes)
@@ -146,7 +146,7 @@ def test_the_gate_stays_shut_for_what_is_signed_ahead(thief: Thief) -> None:
     assert answer[1:].decode() == "frame/not-covered"
 
 
-def test_what_is_asked_a_moment_ahead_or_after_is_refused_as_anything_is(thief: Thief) -> None:
+def test_request_at_wrong_moment_is_refused(thief: Thief) -> None:
     thief.until(2)
     call = bytes([AHEAD]) + struct.pack(">qBb", -5, FALLBACK_LINK, 1) + thief.permits[-1]
     assert thief.of._answer(call)[1:].decode() == "malformed"
@@ -155,7 +155,7 @@ def test_what_is_asked_a_moment_ahead_or_after_is_refused_as_anything_is(thief: 
 
 
 @pytest.mark.slow
-def test_a_frame_that_is_held_back_is_void_half_a_minute_later(thief: Thief) -> None:
+def test_delayed_frame_signed_ahead_expires(thief: Thief) -> None:
     """Kept from the first leg, for another: while normal frames went on the vehicle does not take it any more."""
     thief.until(1)
     kept = thief.signed(thief.permits[-1], FALLBACK_LINK, 1, pack(RETURN))
@@ -168,7 +168,7 @@ def test_a_frame_that_is_held_back_is_void_half_a_minute_later(thief: Thief) -> 
     assert thief.mode is mode
 
 
-def test_a_frame_may_be_sent_while_the_boundary_lives_and_then_nothing_that_was_signed_before(thief: Thief) -> None:
+def test_early_use_of_frame_voids_frames_signed_before(thief: Thief) -> None:
     """No more than standing in for the link; the other frames that are held by then are lost."""
     thief.until(2)
     permit = thief.permits[-1]
@@ -187,7 +187,7 @@ def test_a_frame_may_be_sent_while_the_boundary_lives_and_then_nothing_that_was_
     assert timestamp_in(normal[1:]) < timestamp_in(home), "nor does the vehicle take what the boundary signs now"
 
 
-def test_links_that_are_flown_while_the_boundary_lives_leave_no_trace_but_a_count(thief: Thief) -> None:
+def test_links_flown_with_boundary_are_only_counted(thief: Thief) -> None:
     """No entry tells of them. Its statement says how many frames it signed ahead, and has a digest over them."""
     thief.until(2)
     permit, frames = thief.permits[-1], [pack(RETURN), pack(messages.set_mode(1, Px4Mode.LAND))]
@@ -203,7 +203,7 @@ def test_links_that_are_flown_while_the_boundary_lives_leave_no_trace_but_a_coun
     assert (after.ahead, after.aside) == (before.ahead + len(frames), expected.aside)
 
 
-def test_a_flood_does_not_make_frames_good_for_longer(thief: Thief) -> None:
+def test_flood_does_not_extend_frames_signed_ahead(thief: Thief) -> None:
     thief.until(2)
     permit, land = thief.permits[-1], pack(messages.set_mode(1, Px4Mode.LAND))
     call, kept = [land] * MOST, b""
@@ -219,7 +219,7 @@ def test_a_flood_does_not_make_frames_good_for_longer(thief: Thief) -> None:
     assert LEAD < timestamp_in(kept) - timestamp_in(normal[1:]) <= LEAD + MOST_AHEAD
 
 
-def test_a_frame_that_is_refused_is_no_frame_that_was_stopped(thief: Thief) -> None:
+def test_frame_refused_ahead_is_not_counted_as_stopped(thief: Thief) -> None:
     thief.until(2)
     before = thief.stated()
     assert thief.ask(thief.permits[-1], CONTINGENCY_LINK, 2, b"no frame") == "frame/not-one-frame"
@@ -271,7 +271,7 @@ def told(of: Apart, message: Any, link: int = 0, timestamp: int | None = None, k
     return signer.sign(Codec(1, 1).pack(message), 0)
 
 
-def test_what_was_recorded_is_not_believed_nor_another_stream(apart: Make) -> None:
+def test_replayed_frames_and_other_streams_are_refused(apart: Make) -> None:
     """Nor what claims to come a long time from now. What goes on where the vehicle left off is, for nobody can tell."""
     of = apart("px4")
     Thief(of).until(1)
@@ -291,7 +291,7 @@ def test_what_was_recorded_is_not_believed_nor_another_stream(apart: Make) -> No
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-def test_who_forges_the_vehicle_s_words_chooses_among_the_links(flavour: str, apart: Make) -> None:
+def test_forged_telemetry_can_only_select_a_link(flavour: str, apart: Make) -> None:
     """That it landed, that somebody took over, that it is elsewhere: what leaves is a link, or nothing."""
     of = apart(flavour)
     sent: list[bytes] = []

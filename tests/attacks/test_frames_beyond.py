@@ -50,7 +50,7 @@ def target(autopilot: int, point: tuple[int, int]) -> bytes:
     )
 
 
-def test_a_lie_about_home_in_flight_moves_no_height() -> None:
+def test_forged_home_in_flight_changes_no_height() -> None:
     """PX4 is told heights above sea: who says that home lies a kilometre higher would send it there."""
     opened = gate(PX4, MotionKind.CLIMB)
     for home in (HOME + 1_000_000, HOME - 1_000_000, HOME + HOME_MOVES + 1):
@@ -59,14 +59,14 @@ def test_a_lie_about_home_in_flight_moves_no_height() -> None:
         assert isinstance(opened.seal(takeoff(508.0), AT), bytes), "and what was true is true still"
 
 
-def test_home_does_not_creep_away_by_small_lies() -> None:
+def test_small_forged_changes_do_not_move_home() -> None:
     opened = gate(PX4, MotionKind.CLIMB)
     for home in range(HOME, HOME + 5 * HOME_MOVES, HOME_MOVES // 4):
         opened.observe(at(*A, home=home))
     assert opened.seal(takeoff((HOME + 20_000 + 2 * HOME_MOVES) / 1_000), AT) is NOT_COVERED
 
 
-def test_home_may_drift_a_little_and_be_settled_anew_by_the_next_takeoff() -> None:
+def test_home_may_drift_until_next_takeoff() -> None:
     opened = gate(PX4, MotionKind.CLIMB)
     for times in (1, 2):
         home = HOME + times * HOME_MOVES
@@ -76,7 +76,7 @@ def test_home_may_drift_a_little_and_be_settled_anew_by_the_next_takeoff() -> No
 
 
 @pytest.mark.parametrize("autopilot", [ARDUPILOT, PX4])
-def test_no_corner_is_cut_by_sending_the_whole_path_at_once(autopilot: int) -> None:
+def test_path_points_are_sent_one_by_one(autopilot: int) -> None:
     """From where it is straight to the last point is a leg that nobody checked."""
     opened = gate(autopilot, MotionKind.COVER, A, B, C)
     opened.observe(at(*C))
@@ -90,7 +90,7 @@ def test_no_corner_is_cut_by_sending_the_whole_path_at_once(autopilot: int) -> N
     assert opened.seal(third, AT) == third
 
 
-def test_who_never_says_where_it_is_is_sent_to_the_first_point_alone() -> None:
+def test_vehicle_without_position_is_sent_to_first_point_only() -> None:
     opened = FrameSession()
     opened.observe(says(mavlink.MAVLink_heartbeat_message(2, ARDUPILOT, 0, 0, 0, 3)))
     opened.open(Command(7, "skill", MotionKind.COVER, (), (*A, *B), 20_000, 0, not_after_us=2 * AT))
@@ -99,7 +99,7 @@ def test_who_never_says_where_it_is_is_sent_to_the_first_point_alone() -> None:
 
 
 @pytest.mark.parametrize("current", [1, 2, 3])
-def test_no_item_of_a_fence_is_an_order_to_go_there(current: int) -> None:
+def test_fence_item_cannot_command_motion(current: int) -> None:
     """ArduPilot flies to an item whose `current` is 2 at once, and takes its height for 3."""
     opened = FrameSession()
     opened.observe(says(mavlink.MAVLink_heartbeat_message(2, ARDUPILOT, 0, 0, 0, 3)))

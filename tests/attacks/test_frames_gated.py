@@ -53,13 +53,13 @@ def statement(at_us: int) -> int:
     return next(r["seq"] for r in records if r.get("event") == "boundary" and r["utc_us"] >= at_us)
 
 
-def test_the_true_frames_are_those_that_passed() -> None:
+def test_genuine_frames_match_gate_digest() -> None:
     assert len(commands()) > 3
     assert found(flown()[1]) is None
 
 
 @pytest.mark.parametrize("which", [0, 1, -1])
-def test_a_command_is_left_out(which: int) -> None:
+def test_omitted_command_frame_is_detected(which: int) -> None:
     lines, entries = flown()
     number = commands()[which]
     finding = found([*entries[:number], *entries[number + 1 :]])
@@ -69,7 +69,7 @@ def test_a_command_is_left_out(which: int) -> None:
     assert finding.record < len(lines)
 
 
-def test_a_command_is_there_twice() -> None:
+def test_duplicated_command_frame_is_detected() -> None:
     entries = flown()[1]
     number = commands()[1]
     finding = found([*entries[: number + 1], entries[number], *entries[number + 1 :]])
@@ -77,7 +77,7 @@ def test_a_command_is_there_twice() -> None:
     assert (finding.slug, finding.record) == ("boundary/frames", statement(entries[number][0]))
 
 
-def test_a_command_is_there_once_more_at_the_end() -> None:
+def test_repeated_command_frame_at_end_is_detected() -> None:
     entries = flown()[1]
     number = commands()[-1]
     finding = found([*entries[: number + 1], entries[number], *entries[number + 1 :]])
@@ -85,7 +85,7 @@ def test_a_command_is_there_once_more_at_the_end() -> None:
     assert finding.slug == "boundary/frames"
 
 
-def test_a_command_is_altered_where_that_does_not_matter() -> None:
+def test_harmless_alteration_of_frame_is_detected() -> None:
     """Its sequence number: nothing else would tell."""
     entries = list(flown()[1])
     number = commands()[0]
@@ -96,7 +96,7 @@ def test_a_command_is_altered_where_that_does_not_matter() -> None:
     assert (finding.slug, finding.record) == ("boundary/frames", statement(at_us))
 
 
-def test_all_commands_are_left_out() -> None:
+def test_omission_of_all_command_frames_is_detected() -> None:
     entries = flown()[1]
     gone = set(commands())
     finding = found(entry for number, entry in enumerate(entries) if number not in gone)

@@ -120,14 +120,14 @@ BEFORE = [name for name in COMMANDS if "in flight" not in name]
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["px4", "ardupilot"])
-def test_what_was_sent_is_what_was_recorded(kind: str) -> None:
+def test_recorded_frames_match_sent_frames(kind: str) -> None:
     lines, entries = flown(kind)
     assert judged(lines, list(entries)) is None
 
 
 @rows("kind", ["px4", "ardupilot"])
 @rows("name", BEFORE)
-def test_a_command_before_anything_was_permitted(kind: str, name: str) -> None:
+def test_command_before_first_permit_is_detected(kind: str, name: str) -> None:
     frame = COMMANDS[name]
     assert beside(kind, frame, before_takeoff) in ("frames/unrecorded", "frames/early")
     assert beside(kind, frame, at_the_end) == "frames/unrecorded"
@@ -135,13 +135,13 @@ def test_a_command_before_anything_was_permitted(kind: str, name: str) -> None:
 
 @rows("kind", ["px4", "ardupilot"])
 @rows("name", COMMANDS)
-def test_another_command_than_the_one_that_is_permitted(kind: str, name: str) -> None:
+def test_command_other_than_permitted_is_detected(kind: str, name: str) -> None:
     later = name == "return" and kind == "px4"  # which the last step permits, but not yet
     assert beside(kind, COMMANDS[name], on_the_way) == ("frames/early" if later else "frames/other-command")
 
 
 @pytest.mark.parametrize("kind", ["px4", "ardupilot"])
-def test_a_command_just_before_its_record(kind: str) -> None:
+def test_command_before_its_record_is_detected(kind: str) -> None:
     lines, kept_entries = told(kind)
     at_us = moment(lines, "dispatched", 0)
     sent_us = next(at for at, frame in kept_entries if at >= at_us and is_command(frame))  # once the mode was told
@@ -160,7 +160,7 @@ def is_command(octets: bytes) -> bool:
 
 @pytest.mark.parametrize("kind", ["px4", "ardupilot"])
 @pytest.mark.parametrize("what", ["the whole last step", "its dispatch alone"])
-def test_a_dispatch_that_the_log_no_longer_has(kind: str, what: str) -> None:
+def test_command_without_dispatch_record_is_detected(kind: str, what: str) -> None:
     lines, entries = flown(kind)
     last = [
         number
@@ -187,7 +187,7 @@ def test_a_dispatch_that_the_log_no_longer_has(kind: str, what: str) -> None:
         b"\xfe" + bytes(20),
     ],
 )
-def test_what_others_send_and_what_moves_nothing_does_not_count(frame: bytes) -> None:
+def test_foreign_and_harmless_frames_are_ignored(frame: bytes) -> None:
     for when in (before_takeoff, on_the_way, at_the_end):
         assert beside("px4", frame, when) is None
 
@@ -196,7 +196,7 @@ def test_a_fence_may_be_handed_over_before_the_flight_begins() -> None:
     assert beside("ardupilot", COMMANDS["a fence in flight"], before_takeoff) is None
 
 
-def test_before_any_vehicle_was_heard_every_system_counts_as_ours() -> None:
+def test_all_systems_count_as_ours_before_first_heartbeat() -> None:
     lines, entries = flown("px4")
     found = judged(lines, [(entries[0][0] - 1, COMMANDS["land"]), *entries])
     assert found is not None
@@ -206,7 +206,7 @@ def test_before_any_vehicle_was_heard_every_system_counts_as_ours() -> None:
 @rows("kind", ["px4", "ardupilot"])
 @rows("late", [False, True])
 @rows("autopilot", [3, 12])
-def test_the_heartbeat_of_another_system_makes_nobody_blind(kind: str, late: bool, autopilot: int) -> None:
+def test_heartbeat_of_another_system_hides_nothing(kind: str, late: bool, autopilot: int) -> None:
     """Whoever reaches the link can send one: our frames are still held against the log."""
     lines, entries = told(kind)
     heartbeat = Codec(77, 1).pack(mavlink.MAVLink_heartbeat_message(2, autopilot, 0, 0, 0, 3))
@@ -226,7 +226,7 @@ def test_the_heartbeat_of_another_system_makes_nobody_blind(kind: str, late: boo
 
 @rows("kind", ["px4", "ardupilot"])
 @rows("name", SETTINGS)
-def test_a_parameter_that_no_record_lists(kind: str, name: str) -> None:
+def test_unlisted_parameter_write_is_detected(kind: str, name: str) -> None:
     for when in (before_takeoff, on_the_way, at_the_end):
         unheard = "kinds" in name and kind == "px4" and when is before_takeoff  # it has no such parameter to lose from
         assert beside(kind, SETTINGS[name], when) == (None if unheard else "frames/unlisted-parameter")
@@ -238,7 +238,7 @@ def test_a_fence_is_switched_on_before_the_flight_alone(kind: str) -> None:
     assert beside(kind, FENCE_ON, on_the_way) == "frames/unlisted-parameter"
 
 
-def test_what_may_be_sent_before_the_flight_may_be_until_the_very_moment_of_its_first_command() -> None:
+def test_preflight_frames_pass_until_first_command() -> None:
     """A simulated vehicle's clock stood still from the one to the other."""
 
     def at(after_us: int) -> Callable[[tuple[bytes, ...]], int]:

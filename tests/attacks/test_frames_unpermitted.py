@@ -43,7 +43,7 @@ def test_nothing_moves_before_the_first_permit() -> None:
 
 
 @rows("bit", range(0, 8 * 56, 7))
-def test_a_forged_permit_lets_nothing_out(bit: int) -> None:
+def test_forged_permit_passes_no_frame(bit: int) -> None:
     of = heard()
     permit = bytearray(allowed(of))
     permit[bit // 8] ^= 1 << bit % 8
@@ -51,7 +51,7 @@ def test_a_forged_permit_lets_nothing_out(bit: int) -> None:
     assert out(of) == set()
 
 
-def test_a_permit_lets_out_its_own_command() -> None:
+def test_permit_passes_only_its_command() -> None:
     of = heard()
     assert isinstance(of.executor.dispatch(allowed(of), AT), Command)
     assert out(of) == {ARM, GUIDED}, "a take-off"
@@ -63,7 +63,7 @@ def test_arming_by_force_is_refused_under_any_permit() -> None:
     assert of.executor.frames.seal(FORCE, AT) is FORCED_ARMING
 
 
-def test_a_late_or_used_permit_lets_nothing_more_out() -> None:
+def test_late_or_used_permit_passes_no_frame() -> None:
     of = heard()
     permit = allowed(of)
     opened = open_permit(permit, SESSION_KEY)
@@ -76,7 +76,7 @@ def test_a_late_or_used_permit_lets_nothing_more_out() -> None:
     assert out(of) == set()
 
 
-def test_a_command_that_was_held_back_too_long_does_not_begin() -> None:
+def test_delayed_command_does_not_begin() -> None:
     of = heard()
     permit = allowed(of)
     opened = open_permit(permit, SESSION_KEY)
@@ -85,7 +85,7 @@ def test_a_command_that_was_held_back_too_long_does_not_begin() -> None:
     assert out(of, opened.not_after_us + 1) == set()
 
 
-def test_a_standing_permit_lets_out_its_link_and_not_the_step_any_more() -> None:
+def test_standing_permit_passes_its_link_but_not_the_step() -> None:
     of = heard()
     step = allowed(of)
     of.executor.dispatch(step, AT)
@@ -93,7 +93,7 @@ def test_a_standing_permit_lets_out_its_link_and_not_the_step_any_more() -> None
     assert out(of, AT + S) == {LAND}
 
 
-def test_what_ended_lets_nothing_out_and_what_was_replaced_ends_nothing() -> None:
+def test_ended_command_passes_no_frame_and_replaced_ends_nothing() -> None:
     of = heard()
     step = allowed(of)
     first = of.executor.dispatch(step, AT)
@@ -109,7 +109,7 @@ def test_what_ended_lets_nothing_out_and_what_was_replaced_ends_nothing() -> Non
 
 
 @pytest.mark.parametrize("how", ["landed", "release"])
-def test_landing_and_standing_down_let_nothing_out(how: str) -> None:
+def test_landing_and_standing_down_close_the_gate(how: str) -> None:
     of = heard()
     of.executor.dispatch(allowed(of), AT)
     getattr(of.executor, how)()

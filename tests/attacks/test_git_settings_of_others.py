@@ -103,7 +103,7 @@ def test_the_environment_names_no_program_and_no_other_repository(
     assert not (here.parent / "owned").exists()
 
 
-def test_a_repository_of_somebody_else_is_not_looked_into(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_repository_of_another_user_is_not_read(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GIT_TEST_ASSUME_DIFFERENT_OWNER", "1")
     assert changed_files([Path()]).files  # not even this of git's environment counts
     if os.geteuid() == 0:

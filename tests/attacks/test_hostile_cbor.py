@@ -108,9 +108,7 @@ ENTRIES: dict[str, tuple[Callable[[Any], object], Callable[[str], object]]] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("entry", "kind"), each_once(ENTRIES, KINDS))
-def test_what_a_stranger_wrote_is_refused_before_it_is_decoded(
-    entry: str, kind: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_unsigned_cbor_is_refused_before_decoding(entry: str, kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     takes, make = ENTRIES[entry]
     data = make(kind)
     decoded = 0
@@ -137,7 +135,7 @@ def test_what_a_stranger_wrote_is_refused_before_it_is_decoded(
 
 
 @pytest.mark.parametrize("entry", ["a bundle", "the vehicle of a bundle", "a root"])
-def test_show_says_what_is_wrong(entry: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_show_reports_hostile_cbor(entry: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "given"
     data = ENTRIES[entry][1]("arrays")
     assert isinstance(data, bytes)
@@ -157,7 +155,7 @@ _PART = 8
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", JSON)
-def test_geojson_of_tiny_values_is_refused_before_any_is_built(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_geojson_with_too_many_values_is_refused_early(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(geojson, "MAX_VALUES", geojson.MAX_VALUES // _PART)
     item = JSON[kind] + b","
     data = b'{"type":"FeatureCollection","features":[' + item * (MAX_SIZE // _PART // len(item) - 20) + b"1]}"

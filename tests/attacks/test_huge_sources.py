@@ -41,7 +41,7 @@ LIBRARY = str(Path(__file__).resolve().parents[2])
 
 
 @pytest.mark.parametrize("token", ["{", "(", "foo ", '"\n', '"x" ', "1\n"])
-def test_more_words_and_marks_than_are_read(monkeypatch: pytest.MonkeyPatch, token: str) -> None:
+def test_source_with_too_many_tokens_is_refused(monkeypatch: pytest.MonkeyPatch, token: str) -> None:
     monkeypatch.setattr(parsing, "MAX_TOKENS", MOST)
     assert TOO_LARGE not in [each.code for each in parse(Source("a.rts", token * MOST)).diagnostics]
     found = parse(Source("a.rts", token * (MOST + 1))).diagnostics
@@ -49,13 +49,13 @@ def test_more_words_and_marks_than_are_read(monkeypatch: pytest.MonkeyPatch, tok
     assert f"{MAX_TOKENS:,} tokens" in found[0].message
 
 
-def test_comments_and_blanks_count_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_comments_and_blanks_do_not_count_as_tokens(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parsing, "MAX_TOKENS", MOST)
     for filling in ("// a b c\n", "/* a b c */", " \n", "// /* a\n"):
         assert parse(Source("a.rts", "enum e { a = 1 }\n" + filling * MOST)).diagnostics == ()
 
 
-def test_more_files_than_a_program_has(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_program_with_too_many_files_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(loading, "MAX_FILES", 3)
     asked: list[str] = []
 
@@ -72,7 +72,7 @@ def test_more_files_than_a_program_has(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("of_templates", [False, True])
-def test_more_rules_than_fit_are_not_looked_at(monkeypatch: pytest.MonkeyPatch, of_templates: bool) -> None:
+def test_policy_with_too_many_rules_is_not_checked_further(monkeypatch: pytest.MonkeyPatch, of_templates: bool) -> None:
     monkeypatch.setattr(elaborate, "MAX_RULES", 20)
     text = policy("apart", 10 if of_templates else 30)
     if of_templates:
@@ -98,7 +98,7 @@ def test_a_long_text_that_a_finding_quotes_is_cut_for_a_person() -> None:
     ['import "{}"\n', 'import "{}', '"{}"', "zone {} {{}}\n", "zone a = circle(47 N, 8 E, {} m)\n", "/*{}*/"],
 )
 @pytest.mark.parametrize("filling", ["x", "\U0001f600", '\\"', "1_", "a.", "* "])
-def test_a_word_of_a_source_takes_no_memory_for_each_of_its_characters(text: str, filling: str) -> None:
+def test_long_token_uses_bounded_memory(text: str, filling: str) -> None:
     source = Source("a.rts", text.format(filling * 50_000))
     parse(source)  # the table is read
     tracemalloc.start()
@@ -152,13 +152,13 @@ def written_patterns() -> Iterator[tuple[str, str, int]]:
                     yield file.name, each, re.VERBOSE if "VERBOSE" in ast.unparse(node) else 0
 
 
-def test_no_pattern_keeps_what_it_might_give_back() -> None:
+def test_regular_expressions_do_not_backtrack() -> None:
     assert list(given_back(patterns.parse(r'"(?:[^"]|\\.)*"')))
     found = [(name, each) for name, each, flags in written_patterns() if list(given_back(patterns.parse(each, flags)))]
     assert found == []
 
 
-def test_a_text_in_a_zone_that_is_not_closed_is_looked_through_once() -> None:
+def test_unclosed_text_is_scanned_once() -> None:
     text = b'"' + b'\\"' * 60_000  # from each quote to the end: minutes
     before = process_time()
     with pytest.raises(NoArea) as refused:
@@ -167,7 +167,7 @@ def test_a_text_in_a_zone_that_is_not_closed_is_looked_through_once() -> None:
     assert process_time() - before < 3
 
 
-def test_comments_on_one_line_are_put_together_once() -> None:
+def test_comments_on_one_line_are_joined_once() -> None:
     gap = gap_of("/*1*/ /*2*/\n/*3*/  // 4\n" + "/**/" * 300_000, at_start=True, at_end=True)
     assert [each.text[:11] for each in gap.comments] == ["/*1*/ /*2*/", "/*3*/ // 4", "/**/ /**/ /"]
     assert [(each.first, each.last) for each in gap.comments] == [(True, True)] * 3
@@ -178,7 +178,7 @@ def test_comments_on_one_line_are_put_together_once() -> None:
     "text",
     ["{word}{comment}" * 6_000, "{word}" * 6_000 + "{comment}" * 6_000, "{comment}" * 6_000 + "{word}" * 6_000],
 )
-def test_a_line_with_many_ignores_is_looked_through_once(text: str) -> None:
+def test_line_with_many_ignores_is_scanned_once(text: str) -> None:
     source = text.format(word='import "a.rts" ', comment="/* rtshcua: ignore E1303 because why */ ")
     before = process_time()
     made = format_text(source)
@@ -187,7 +187,7 @@ def test_a_line_with_many_ignores_is_looked_through_once(text: str) -> None:
     assert process_time() - before < 8  # a minute and more, when each walked all of it
 
 
-def test_more_comments_than_are_laid_out(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_too_many_comments_are_not_formatted(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(attempting, "MAX_TOKENS", 20)
     fits = "//\n" * 10 + "/**/" * 10 + 'import "//"' + "\n"
     assert isinstance(format_text(fits), str)
@@ -202,7 +202,7 @@ def test_more_comments_than_are_laid_out(monkeypatch: pytest.MonkeyPatch, tmp_pa
     assert many.read_text() == "//" * 50 + "\n" + fits
 
 
-def test_more_words_than_are_read_are_not_laid_out(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_too_many_tokens_are_not_formatted(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     for module in (attempting, parsing):
         monkeypatch.setattr(module, "MAX_TOKENS", 20)
     many = tmp_path / "many.rts"
@@ -212,7 +212,7 @@ def test_more_words_than_are_read_are_not_laid_out(monkeypatch: pytest.MonkeyPat
     assert laid.unreadable
 
 
-def test_ignores_of_codes_that_there_are_not_cost_little(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ignores_of_unknown_codes_are_cheap(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(ignoring, "MOST_GUESSES", 3)
     found = ignores(Source("a.rts", "// rtshcua: ignore E1333 because why\n" * 5)).faults
     assert [bool(each.fixes) for each in found] == [True] * 3 + [False] * 2

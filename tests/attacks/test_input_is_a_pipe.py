@@ -68,7 +68,7 @@ def test_a_zone_from_a_pipe_is_a_finding(commands: Forked, command: list[str], t
     assert "error[E0108]: cannot read `pipe.geojson`: not a regular file" in done.out + done.err
 
 
-def test_settings_that_are_a_pipe_count_for_nothing(commands: Forked, tmp_path: Path) -> None:
+def test_settings_from_a_pipe_are_ignored(commands: Forked, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "rtshcua.toml")
     (tmp_path / "a.rts").write_text("\n")
     for command in ("lint", "test", "fmt"):

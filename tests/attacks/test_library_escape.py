@@ -53,7 +53,7 @@ def test_no_source_leaves_the_library(path: str, what: str) -> None:
     assert read == ["a.rts"]
 
 
-def test_what_ships_is_imported() -> None:
+def test_shipped_library_is_imported() -> None:
     read: list[str] = []
     text = json.dumps(PROPOSAL).encode()
     program, _ = load_specification("proposal.json", [], reading(read, text), str(CHECKOUT))

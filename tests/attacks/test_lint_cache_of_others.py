@@ -57,7 +57,7 @@ def forge(result: object) -> int:
 
 
 @pytest.mark.parametrize("folder", ["/abs", "../sibling", "inside", ".", "true"])
-def test_no_configuration_says_where_it_lies(here: Path, lint: Lint, folder: str, tmp_path: Path) -> None:
+def test_configuration_cannot_move_the_cache(here: Path, lint: Lint, folder: str, tmp_path: Path) -> None:
     put({"rtshcua.toml": f'lint.cache = "{folder.replace("/abs", str(tmp_path / "abs"))}"'})
     before = sorted(tmp_path.rglob("*"))
     code, found = lint(".")
@@ -66,7 +66,7 @@ def test_no_configuration_says_where_it_lies(here: Path, lint: Lint, folder: str
     assert sorted(tmp_path.rglob("*")) == before
 
 
-def test_a_cache_in_a_checkout_is_not_looked_at(here: Path, lint: Lint) -> None:
+def test_cache_in_checkout_is_ignored(here: Path, lint: Lint) -> None:
     lint(".")
     assert forge([[], []]) == 3
     assert lint(".") == (ExitCode.OK, [])  # so it would be, if it were
@@ -77,7 +77,7 @@ def test_a_cache_in_a_checkout_is_not_looked_at(here: Path, lint: Lint) -> None:
 
 
 @pytest.mark.parametrize("above", [0, 1, 2, 3])
-def test_what_others_could_have_written_is_not_believed(here: Path, lint: Lint, above: int) -> None:
+def test_cache_writable_by_others_is_ignored(here: Path, lint: Lint, above: int) -> None:
     lint(".")
     forge([[], []])
     place = entries()[0].parent
@@ -101,7 +101,7 @@ def test_no_link_is_followed_below_it(here: Path, lint: Lint, above: int, tmp_pa
     assert sorted(tmp_path.rglob("*")) == before
 
 
-def test_a_link_or_a_pipe_in_the_place_of_an_entry_is_none(here: Path, lint: Lint, tmp_path: Path) -> None:
+def test_symlink_or_pipe_as_cache_entry_is_ignored(here: Path, lint: Lint, tmp_path: Path) -> None:
     lint(".")
     forge([[], []])
     first, second, third = entries()
@@ -114,7 +114,7 @@ def test_a_link_or_a_pipe_in_the_place_of_an_entry_is_none(here: Path, lint: Lin
     assert all(each.is_file() and not each.is_symlink() for each in entries())
 
 
-def test_fixes_are_of_a_fresh_examination_alone(here: Path, lint: Lint) -> None:
+def test_fixes_never_come_from_cache(here: Path, lint: Lint) -> None:
     lint(".")
     start = POLICY.index("by role operator through agent when")
     fix = [["policy.rts", start, start + 39], "by any when", "do it", "safe"]
@@ -133,7 +133,7 @@ def test_fixes_are_of_a_fresh_examination_alone(here: Path, lint: Lint) -> None:
         ["E1303", "x", ["policy.rts", 0, 1], None, [], [[["/etc/passwd", 0, 5], "", "x", "safe"]], None],
     ],
 )  # fmt: skip
-def test_what_is_remembered_is_about_what_was_read(here: Path, lint: Lint, found: list[object]) -> None:
+def test_cache_entry_belongs_to_content_that_was_read(here: Path, lint: Lint, found: list[object]) -> None:
     """Even of what we wrote, as an earlier fault of ours would."""
     lint(".")
     forge([[found], []])
@@ -143,7 +143,7 @@ def test_what_is_remembered_is_about_what_was_read(here: Path, lint: Lint, found
 @pytest.mark.parametrize(
     "harm", [{"members": 1}, {"members": [1]}, {"reads": []}, {"reads": {"a": 1}}, {"packs": {"a": 1}}, {"result": 1}]
 )
-def test_a_tree_of_another_shape_is_none(harm: dict[str, object]) -> None:
+def test_malformed_cache_entry_is_ignored(harm: dict[str, object]) -> None:
     tree: dict[str, object] = {"mark": "m", "members": ["a"], "reads": {"a": "d"}, "packs": {}, "asked": {"a": None}}
     tree["result"] = [[], []]
 

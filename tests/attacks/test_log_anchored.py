@@ -45,33 +45,33 @@ def test_an_honest_log() -> None:
 
 
 @pytest.mark.parametrize("number", [1, 3])
-def test_rewritten_by_who_holds_every_key(number: int) -> None:
+def test_log_rewritten_with_all_keys_is_detected(number: int) -> None:
     forged = signed([*LINES[:number], edit(LINES[number], detail="rewritten"), *LINES[number + 1 :]])
     assert judged(forged).verdict is LogVerdict.VERIFIED, "without a witness nobody can tell"
     assert found(forged, anchor(LINES[SEEN], [ONE, TWO])) == "anchor/root"
     assert found(forged, anchor(LINES[SEEN], [ONE])) == "anchor/root", "one that saw it is enough to contradict"
 
 
-def test_what_comes_after_may_be_rewritten_and_is_not_called_anchored() -> None:
+def test_records_after_anchor_are_not_reported_as_anchored() -> None:
     forged = signed([*LINES[:5], edit(LINES[5], detail="rewritten"), *LINES[6:]])
     report = judged(forged, anchor(LINES[SEEN], [ONE, TWO]))
     assert (report.verdict, report.anchored) == (LogVerdict.VERIFIED, SEEN + 1)
     assert any("unanchored tail: 2 records" in claim.text for claim in report.unproven)
 
 
-def test_cut_off_by_who_holds_every_key() -> None:
+def test_log_truncated_with_all_keys_is_detected() -> None:
     short = log(genesis(), effect(10), close(20))
     assert judged(short).verdict is LogVerdict.VERIFIED
     assert found(short, anchor(LINES[SEEN], [ONE, TWO])) in ("anchor/beyond", "anchor/root")
 
 
-def test_cut_off_without_any_key() -> None:
+def test_log_truncated_without_key_is_detected() -> None:
     assert judged(LINES[:3]).verdict is LogVerdict.INCOMPLETE
     assert found(LINES[:3], anchor(LINES[SEEN], [ONE, TWO])) == "anchor/beyond"
     assert judged(LINES[:6], anchor(LINES[SEEN], [ONE, TWO])).verdict is LogVerdict.INCOMPLETE
 
 
-def test_cut_off_right_before_what_was_seen() -> None:
+def test_log_truncated_before_anchor_is_detected() -> None:
     assert found(LINES[:SEEN], anchor(LINES[SEEN], [ONE, TWO])) == "anchor/beyond"
 
 

@@ -63,7 +63,7 @@ def entry_after(number: int) -> int:
     return next(each for each in range(number + 1, CLOSE) if each in (*DECISIONS, *SENT, APPROVAL))
 
 
-def test_the_true_log_is_whole_and_says_what_the_boundary_signed_for() -> None:
+def test_genuine_log_verifies_with_boundary_claims() -> None:
     report = sound(LINES).report
     (claim,) = [claim for claim in report.proven if claim.slug == "boundary"]
     assert claim.text.startswith("session 1 of the boundary signed for 10 decisions, documents and dispatches")
@@ -118,7 +118,7 @@ def test_a_dispatch_is_altered() -> None:
         assert expect(signed(changed(number, lie))) == ("boundary/differs", number)
 
 
-def test_what_no_boundary_makes() -> None:
+def test_decision_that_no_boundary_makes_is_rejected() -> None:
     number = DECISIONS[0]
     for lie in ({"binding": "00"}, {"reason": "of/mine"}, {"kind": -1}, {"valid_until_us": (1 << 53) - 1, "kind": 300}):
         assert expect(signed(changed(number, edit(LINES[number], **lie)))) == ("boundary/record", number)
@@ -219,13 +219,13 @@ def test_an_older_statement_is_replayed() -> None:
     assert expect(signed(changed(STATEMENTS[-1], idle))) == ("boundary/not-ended", CLOSE)
 
 
-def test_the_end_is_cut_off_and_closed() -> None:
+def test_truncated_and_closed_log_is_detected() -> None:
     for seal in SEALS:
         close = edit(LINES[CLOSE], **moment(seal))
         assert expect(signed([*LINES[:seal], close])) == ("boundary/not-ended", seal)
 
 
-def test_the_end_is_cut_off_and_the_true_end_put_behind_it() -> None:
+def test_log_with_missing_middle_is_detected() -> None:
     cut = SEALS[1]
     end = [edit(line, **moment(cut)) for line in LINES[STATEMENTS[-1] :]]
     assert expect(signed([*LINES[:cut], *end])) == ("boundary/missing", cut)  # it marks none of what was cut off
@@ -298,7 +298,7 @@ def test_a_loss_is_claimed_to_leave_out_what_follows(number: int) -> None:
     assert any("only the runtime vouches" in text for slug, text in report.unproven if slug == "boundary")
 
 
-def test_what_the_boundary_signed_is_not_left_out_by_a_loss() -> None:
+def test_recorded_loss_does_not_hide_signed_entries() -> None:
     """Its last statement speaks of entries that no record before the claim tells of."""
     statement = next(each for each in STATEMENTS if each > SENT[0])
     lines = [line for number, line in enumerate(LINES) if number != SENT[0]]
@@ -318,9 +318,9 @@ def test_nothing_that_a_boundary_makes_follows_its_loss(kind: list[int]) -> None
     assert expect(signed(lines)) == ("boundary/after-loss", number)
 
 
-def test_nobody_is_lost_before_it_spoke() -> None:
+def test_loss_before_first_entry_is_rejected() -> None:
     assert expect(signed(lost_at(STATEMENTS[0]))) == ("boundary/missing", STATEMENTS[0])
 
 
-def test_it_has_an_exit_code_of_its_own() -> None:
+def test_boundary_flaw_has_its_own_exit_code() -> None:
     assert finding_code("boundary/missing") is ExitCode.BOUNDARY == 15

@@ -48,7 +48,7 @@ def closed_at(number: int) -> bytes:
     return edit(LINES[-1], **{key: read(LINES[number])[key] for key in ("at_us", "utc_us")})
 
 
-def test_the_thief_signs_what_a_verifier_takes() -> None:
+def test_log_signed_with_stolen_key_verifies() -> None:
     """Else these attacks would fail for the wrong reason."""
     assert by_the_thief(list(LINES))[: TAKEN + 1] == list(LINES[: TAKEN + 1])
     assert prove(by_the_thief(list(LINES))).report.verdict is LogVerdict.VERIFIED
@@ -82,7 +82,7 @@ def test_the_present_epoch_can_be_rewritten_and_the_report_says_so(number: int) 
     assert any("unanchored tail" in claim.text for claim in audit.report.unproven)
 
 
-def test_the_end_cut_off_and_closed_by_the_thief() -> None:
+def test_truncation_with_stolen_key_is_reported() -> None:
     """The thief may end the log early, where it was taken. Only a witness that saw more can tell."""
     forged = by_the_thief([*LINES[: TAKEN + 1], closed_at(TAKEN)])
     report = prove(forged).report
@@ -116,7 +116,7 @@ def test_a_recover_by_the_key_of_the_epoch() -> None:
     assert expect(forged) == ("seal/key", TAKEN + 1)
 
 
-def test_the_log_key_alone_writes_all_of_it_anew() -> None:
+def test_log_key_can_rewrite_whole_log() -> None:
     """No epoch key is needed: who holds the log key names them. Where it lies aboard, only a witness tells."""
     own, secret = public_of(STRANGER).hex(), LOG_KEY.private.private_bytes_raw()
     named = [edit(line, next_key=own) if "next_key" in read(line) else line for line in edited(1)]
@@ -127,7 +127,7 @@ def test_the_log_key_alone_writes_all_of_it_anew() -> None:
 
 
 @pytest.mark.parametrize("number", [AFTER[0], SIGNED[1] + 1])
-def test_the_log_key_alone_cuts_the_log_anywhere_and_calls_it_a_crash(number: int) -> None:
+def test_log_key_can_truncate_and_claim_a_crash(number: int) -> None:
     own, secret = public_of(STRANGER).hex(), LOG_KEY.private.private_bytes_raw()
     close = read(closed_at(number - 1))
     recover = {name: value for name, value in close.items() if name not in ("ending", "tlog")}

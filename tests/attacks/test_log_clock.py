@@ -30,7 +30,7 @@ def test_utc_set_back_by_more_than_its_error() -> None:
     assert expect(signed(moved(EFFECT, "utc_us", -3_600_000_000))) == ("clock/utc-backwards", EFFECT)
 
 
-def test_utc_set_back_by_less_than_its_error_is_what_a_clock_may_do() -> None:
+def test_utc_set_back_within_its_error_is_accepted() -> None:
     """The clocks are in order, and so only the seal tells that the record was edited."""
     error = read(LINES[EFFECT])["utc_error_us"]
     seal = next(number for number in signers(LINES) if number > EFFECT)

@@ -117,7 +117,7 @@ def test_an_edited_question(fields: dict[str, object], slug: str) -> None:
     assert expect(rewritten(changed)) == ((slug, FIRST) if slug.startswith("record/") else sealed)
 
 
-def test_an_edited_state_shows_where_it_matters() -> None:
+def test_edited_state_that_changes_decision_is_detected() -> None:
     """The battery that sent the flight home is said to have been full: then no rule sends it home."""
     lines = other_flight()
     records = [read(line) for line in lines]
@@ -126,7 +126,7 @@ def test_an_edited_state_shows_where_it_matters() -> None:
     assert expect(signed(with_fields(number, lines, state=state))) == ("decision/outcome", number)
 
 
-def test_a_used_id_that_is_said_to_be_unused() -> None:
+def test_used_id_recorded_as_unused_is_detected() -> None:
     """The key holder lets a step be decided twice, and calls its id fresh each time."""
     number = FIRST
     again = [*LINES[: number + 1], LINES[number], *LINES[number + 1 :]]

@@ -81,7 +81,7 @@ def test_every_byte_of_a_whole_flight_under_audit() -> None:
         assert prove(changed).report.verdict is not LogVerdict.VERIFIED, at
 
 
-def test_what_the_flip_did_is_named() -> None:
+def test_flipped_bit_is_located() -> None:
     lines = flight()
     number = next(n for n, line in enumerate(lines) if read(line)["type"] == "decision")
     line = lines[number]

@@ -58,14 +58,14 @@ def later(lines: list[bytes], by_us: int) -> list[bytes]:
     return [edit(line, **{key: read(line)[key] + by_us for key in ("at_us", "utc_us")}) for line in lines]
 
 
-def test_a_gap_that_is_true_is_told_and_accuses_nobody() -> None:
+def test_genuine_gap_is_reported_without_a_flaw() -> None:
     report = prove(stalled()).report
     assert (report.verdict, report.failure) == (LogVerdict.VERIFIED, None)
     assert [claim.slug for claim in report.unproven].count("gap") == 1
 
 
 @rows("taken", [1, 2, 3])
-def test_without_a_key_records_cannot_be_taken_out_and_called_a_gap(taken: int) -> None:
+def test_records_cannot_be_replaced_by_a_gap_without_key(taken: int) -> None:
     for seal_at in SIGNED[1:3]:
         start = seal_at - taken
         if any(number in SIGNED for number in range(start, seal_at)):
@@ -77,19 +77,19 @@ def test_without_a_key_records_cannot_be_taken_out_and_called_a_gap(taken: int) 
 
 
 @rows("field", ["detail", "event"])
-def test_without_a_key_a_gap_cannot_be_altered(field: str) -> None:
+def test_gap_cannot_be_altered_without_key(field: str) -> None:
     lines, number = stalled(), gap_in(stalled())
     value = {"detail": "1 us", "event": "noted"}[field]
     found = expect(rewritten([*lines[:number], edit(lines[number], **{field: value}), *lines[number + 1 :]]))
     assert found == {"detail": ("seal/gap", number), "event": ("seal/missing", number)}[field]
 
 
-def test_without_a_key_a_gap_cannot_be_taken_out() -> None:
+def test_gap_cannot_be_removed_without_key() -> None:
     lines, number = stalled(), gap_in(stalled())
     assert expect(rewritten([*lines[:number], *lines[number + 1 :]]))[0] in ("seal/size", "seal/root")
 
 
-def test_the_thief_of_an_epochs_key_calls_what_it_leaves_out_a_gap_and_that_is_told() -> None:
+def test_gap_made_with_stolen_epoch_key_is_reported() -> None:
     """Who took the vehicle can leave out what it recorded since the last seal, as ever; that it was silent is told."""
     taken = SIGNED[2]
     gap = line_of(gap_after(LINES[taken], 40 * S))
@@ -103,7 +103,7 @@ def test_the_thief_of_an_epochs_key_calls_what_it_leaves_out_a_gap_and_that_is_t
     assert "anchor" in slugs
 
 
-def test_what_the_boundary_made_cannot_be_left_out_as_a_gap() -> None:
+def test_gap_cannot_hide_boundary_entries() -> None:
     """Not by who holds the log key and all epoch keys: only the boundary signs for that."""
     lines = list(attested())
     made = next(n for n, line in enumerate(lines) if read(line).get("event") == "dispatched")
@@ -115,7 +115,7 @@ def test_what_the_boundary_made_cannot_be_left_out_as_a_gap() -> None:
 
 
 @pytest.mark.parametrize("recovered", [False, True])
-def test_a_gap_before_an_older_statement_of_the_boundary_is_told(*, recovered: bool) -> None:
+def test_gap_before_older_boundary_statement_is_detected(*, recovered: bool) -> None:
     """Who holds the log's keys cuts the flight behind a statement, and has the boundary vouch that nothing came."""
     lines, by_us = list(attested()), 990 * S
     kinds = [read(line)["type"] for line in lines]
@@ -138,7 +138,7 @@ def test_a_gap_before_an_older_statement_of_the_boundary_is_told(*, recovered: b
     assert expect(signed(forged)) == ("boundary/gap", number + 1)
 
 
-def test_all_keys_leave_nothing_unsealed_by_gaps() -> None:
+def test_gaps_cannot_leave_records_unsealed_even_with_all_keys() -> None:
     """A gap for each silence, and no seal: one counts in an epoch, and only while nothing is recorded."""
     gaps = [effect(9_000 * number, event="stalled", detail=f"{9 * S} us") for number in range(1, 7)]
     assert expect(log(genesis(), *gaps, close(55_000))) == ("seal/gap", 2)
@@ -156,18 +156,18 @@ def test_all_keys_leave_nothing_unsealed_by_gaps() -> None:
     ],
     ids=["longer", "negative", "no-unit", "unsealed-after", "another-event", "after-it-is-late"],
 )
-def test_a_gap_that_is_none(records: list[Fields], found: tuple[str, int]) -> None:
+def test_invalid_gap_is_rejected(records: list[Fields], found: tuple[str, int]) -> None:
     assert expect(log(genesis(), *records, close(60_000))) == found
 
 
-def test_an_epoch_may_end_late_by_a_gap_and_by_no_more() -> None:
+def test_epoch_may_end_late_only_by_its_gap() -> None:
     gap = effect(40_000, event="stalled", detail=f"{30 * S} us")
     good = prove(log(genesis(), effect(10_000), gap, effect(50_000), seal(50_000, 1), close(50_001))).report
     assert (good.verdict, [each.us for each in good.gaps]) == (LogVerdict.VERIFIED, [30 * S])
     assert expect(log(genesis(), effect(10_000), gap, effect(50_001), close(50_002))) == ("seal/missing", 3)
 
 
-def test_a_log_cut_behind_a_gap_is_incomplete_and_nobody_vouches_for_it() -> None:
+def test_log_truncated_after_gap_is_incomplete() -> None:
     lines, number = stalled(), gap_in(stalled())
     report = prove(lines[: number + 1]).report
     assert report.verdict is LogVerdict.INCOMPLETE

@@ -15,7 +15,7 @@ def decisions() -> list[tuple[int, int, str, int]]:
     ]
 
 
-def test_what_arms_is_on_the_disk_first_and_the_rest_soon() -> None:
+def test_record_of_arming_is_synced_before_sending() -> None:
     assert [(step, outcome, durability) for _, step, outcome, durability in decisions()] == [
         (0, "allow", SYNCED_FIRST),
         (1, "allow", SYNCED),
@@ -26,7 +26,7 @@ def test_what_arms_is_on_the_disk_first_and_the_rest_soon() -> None:
 
 @rows("number", [0, 1, 2])
 @rows("claimed", [BUFFERED, WRITTEN, SYNCED, SYNCED_FIRST])
-def test_a_decision_that_was_kept_less_well_or_says_so(number: int, claimed: int) -> None:
+def test_decision_recorded_less_durably_is_detected(number: int, claimed: int) -> None:
     record, _, _, durability = decisions()[number]
     lines = list(flight())
     lines[record] = edit(lines[record], durability=claimed)

@@ -93,7 +93,7 @@ def test_the_chain_of_a_step_that_is_over() -> None:
         (FALLBACK, 1, -5, "hover"),
     ],
 )
-def test_what_the_bundle_does_not_have(link: tuple[int, int, int, str]) -> None:
+def test_step_or_link_not_in_bundle_is_refused(link: tuple[int, int, int, str]) -> None:
     at = number("succeeded", 1)
     assert found(sent_after(at, link)) == ("dispatch/other-skill", at + 1)
 

@@ -16,25 +16,25 @@ def changed(number: int, **fields: object) -> list[bytes]:
     return [*LINES[:number], write(read(LINES[number]) | fields), *LINES[number + 1 :]]
 
 
-def test_an_honest_one() -> None:
+def test_genuine_recovery_verifies() -> None:
     assert prove(LINES).report.verdict is LogVerdict.VERIFIED
     assert read(LINES[AT])["at_us"] < read(LINES[AT - 1])["at_us"], "monotonic time began anew"
 
 
 @pytest.mark.parametrize("fields", [{"discarded_bytes": 0}, {"discarded_digest": "00" * 32}, {"utc_error_us": 0}])
-def test_what_was_discarded_said_otherwise(fields: dict[str, object]) -> None:
+def test_wrong_discarded_digest_is_rejected(fields: dict[str, object]) -> None:
     assert expect(changed(AT, **fields)) == ("seal/self", AT)
     assert expect(rewritten(changed(AT, **fields))) == ("seal/self", AT)
 
 
-def test_taken_out() -> None:
+def test_removed_recovery_is_detected() -> None:
     """What was torn is then said never to have been."""
     without = [*LINES[:AT], *LINES[AT + 1 :]]
     assert expect(without)[0] in ("chain/sequence", "chain/broken")
     assert expect(rewritten(without))[0] in ("clock/backwards", "clock/utc-jump", "seal/key")
 
 
-def test_signed_by_the_epoch_or_by_nobody() -> None:
+def test_recovery_without_log_key_signature_is_rejected() -> None:
     epoch = seed_of(read(LINES[AT - 3])["next_key"])
     log_key = read(LINES[0])["log_key"]
     for secret in (epoch, STRANGER):
@@ -45,27 +45,27 @@ def test_signed_by_the_epoch_or_by_nobody() -> None:
         assert expect(forged) == ("seal/key", 0)
 
 
-def test_monotonic_time_begins_anew_nowhere_else() -> None:
+def test_monotonic_time_restarts_only_at_recovery() -> None:
     for restart in (effect(0), seal(0, 1), close(0)):
         early = restart | {"at_us": 1}
         tail = [] if early["type"] == "close" else [close(30)]
         assert expect(log(genesis(), effect(10), early, *tail)) == ("clock/backwards", 2)
 
 
-def test_utc_does_not_begin_anew() -> None:
+def test_utc_does_not_restart_at_recovery() -> None:
     """A recovery is no way to go back in the time of day."""
     fields = read(LINES[AT])
     back = [line_of(fields | {"utc_us": fields["utc_us"] - 3_600_000_000})]
     assert expect(resealed([*LINES[:AT], *back, *LINES[AT + 1 :]], seed_of)) == ("clock/utc-backwards", AT)
 
 
-def test_the_clocks_go_on_alike_after_it() -> None:
+def test_clocks_advance_alike_after_recovery() -> None:
     fields = read(LINES[AT + 1])
     late = write(fields | {"utc_us": fields["utc_us"] + 10_000_000})
     assert expect(resealed([*LINES[: AT + 1], late], seed_of)) == ("clock/utc-jump", AT + 1)
 
 
-def test_an_epoch_is_not_made_longer_by_it() -> None:
+def test_recovery_does_not_extend_epoch() -> None:
     """Recoveries are signed: the records between two are as many as between two seals."""
     recover = read(LINES[AT]) | {"at_us": MONOTONIC_US, "utc_us": read(LINES[0])["utc_us"] + 20_000}
     many = [genesis(), *(effect(10) for _ in range(2_048)), recover]
@@ -76,11 +76,11 @@ def test_an_epoch_is_not_made_longer_by_it() -> None:
     assert expect(log(*many[:-1], effect(10), recover)) == ("seal/missing", 2_049)
 
 
-def test_something_after_the_close_of_a_recovered_log() -> None:
+def test_data_after_close_of_recovered_log_is_rejected() -> None:
     assert expect([*LINES, LINES[AT]]) == ("close/junk-after", len(LINES))
 
 
-def test_what_nobody_had_signed_is_excepted_from_what_is_claimed() -> None:
+def test_unsigned_records_are_excluded_from_claims() -> None:
     """Records of the last epoch, written anew while the log had no end: the recovery signs what it finds."""
     claims = {claim.slug: claim.text for claim in prove(LINES).report.proven}
     last = max(number for number in range(AT) if read(LINES[number])["type"] in ("genesis", "seal"))

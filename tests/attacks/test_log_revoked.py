@@ -104,7 +104,7 @@ APPROVED = next(number for number, line in enumerate(flown()) if read(line).get(
         (APPROVAL_KEY, "document/revoked-key", APPROVED),
     ],
 )
-def test_what_a_key_signed_after_it_was_revoked_is_not_trusted(key: SigningKey, slug: str, record: int) -> None:
+def test_signature_after_revocation_is_not_trusted(key: SigningKey, slug: str, record: int) -> None:
     report = judged(newer(BEFORE, key))
     assert found(report) == ("failed", slug, record)
     assert report.failure is not None
@@ -113,21 +113,21 @@ def test_what_a_key_signed_after_it_was_revoked_is_not_trusted(key: SigningKey, 
 
 
 @rows("key", [POLICY_KEY, MISSION_KEY, APPROVAL_KEY])
-def test_what_a_key_signed_before_it_was_revoked_counts_as_it_did(key: SigningKey) -> None:
+def test_signature_before_revocation_stays_valid(key: SigningKey) -> None:
     """The log key vouches for when it was; that it was revoked since is told."""
     report = judged(newer(AFTER, key))
     assert found(report) == ("verified", "", -1)
     assert told(report) == {"revoked"}
 
 
-def test_the_log_key_vouches_for_no_time_once_it_was_revoked() -> None:
+def test_revoked_log_key_does_not_prove_time() -> None:
     assert found(judged(newer(AFTER, LOG_KEY))) == ("incomplete", "trust/revoked-log-key", 0)
     report = judged(newer(AFTER, LOG_KEY, MISSION_KEY))
     assert found(report) == ("incomplete", "trust/revoked-log-key", 0)
     assert told(report) == {"revoked"}
 
 
-def test_where_a_root_between_is_missing_nobody_knows_when() -> None:
+def test_missing_root_leaves_time_of_revocation_unknown() -> None:
     """Version 3 names what version 2 may have revoked long before."""
     third = newer(AFTER + S, MISSION_KEY, APPROVAL_KEY, version=3)
     report = judged(third)
@@ -149,7 +149,7 @@ def test_a_boundary_key_that_was_revoked() -> None:
         assert slug or told(report) == {"revoked"}
 
 
-def test_what_was_signed_as_it_was_revoked_may_be_either() -> None:
+def test_signature_at_time_of_revocation_is_undecided() -> None:
     for off, what in ((0, "incomplete"), (START.utc_error_us + 1, "verified"), (-START.utc_error_us, "failed")):
         assert judged(newer(START.utc_us + off, MISSION_KEY)).verdict.value == what
 
@@ -159,7 +159,7 @@ def vectors_root(*keys: SigningKey, issued_us: int = AFTER) -> bytes:
     return newer(issued_us, *keys, of=own, by=case.KEYS[Duty.ROOT])
 
 
-def test_witnesses_outside_tell_what_the_log_key_signed_before() -> None:
+def test_witnesses_prove_signatures_before_revocation() -> None:
     """A log is whole where they saw it to its end before the key was revoked; what came later may be anybody's."""
     key = case.KEYS[Duty.LOG]
 
@@ -196,14 +196,14 @@ def test_a_root_of_a_revoked_root_key_counts_where_it_is_given_itself() -> None:
     assert told(report) == {"+revocations"}
 
 
-def test_a_root_that_is_no_older_should_have_known() -> None:
+def test_root_of_same_time_must_contain_revocation() -> None:
     """Whoever has the root key signs a later version that leaves out what was revoked."""
     forged = vectors.b64encode(newer(BEFORE - S, version=5)).decode()
     lines = tuple(signed([edit(flown()[0], root=forged), *flown()[1:]], LOG_KEY))
     assert found(judged(newer(AFTER, MISSION_KEY), lines=lines)) == ("failed", "trust/revoked-key", 0)
 
 
-def test_what_the_newest_root_leaves_as_it_was_is_told() -> None:
+def test_unaffected_log_is_reported_under_newest_root() -> None:
     assert told(judged()) == told(judged(_signed_root())) == set()
     assert told(judged(newer(AFTER))) == {"+revocations"}
     stranger = newer(AFTER, of=replace(ROOT, keys=(NEW_ROOT_KEY.verification(),)), by=NEW_ROOT_KEY)
@@ -212,7 +212,7 @@ def test_what_the_newest_root_leaves_as_it_was_is_told() -> None:
     assert told(judged(newer(AFTER, version=9))) == {"revocations"}
 
 
-def test_a_log_that_fails_fails_as_it_did() -> None:
+def test_failing_log_fails_independent_of_root() -> None:
     lines = (*flown()[:-2], flown()[-1])
     assert judged(newer(BEFORE, LOG_KEY), lines=lines).failure == judged(lines=lines).failure
     cut = flown()[:-1]
@@ -220,7 +220,7 @@ def test_a_log_that_fails_fails_as_it_did() -> None:
     assert told(judged(newer(AFTER, LOG_KEY), lines=cut)) == {"trust/revoked-log-key"}
 
 
-def test_what_is_no_trust_root_is_refused() -> None:
+def test_invalid_trust_root_is_refused() -> None:
     with pytest.raises(Untrusted):
         RevokedKeys([b"nothing"])
 

@@ -43,7 +43,7 @@ def claiming(of: Loaded, *monitors: int) -> bytes:
 
 
 @rows("monitors", [(), (1, 1), (1,) * 13, (0,), (3,), (5,), (7,), (255,)])
-def test_what_is_no_truth_of_each_monitor_is_no_request(monitors: tuple[int, ...]) -> None:
+def test_request_without_truth_for_each_monitor_is_refused(monitors: tuple[int, ...]) -> None:
     of = armed()
     assert answer_to(of, claiming(of, *monitors)) is Status.MALFORMED
     assert isinstance(answer_to(of, claiming(of, 1)), Decision), "nothing is remembered of it"
@@ -64,7 +64,7 @@ def test_each_truth_is_decided_on(truth: int, outcome: Outcome, reason: Reason) 
     assert (answer.outcome, answer.reason) == (outcome, reason)
 
 
-def test_what_a_monitor_says_now_cannot_be_used_later() -> None:
+def test_monitor_truth_cannot_be_used_later() -> None:
     """The permit ends a second after the observation at the latest, however fresh the wind is."""
     of = armed()
     answer = answer_to(of, claiming(of, 1))

@@ -11,7 +11,7 @@ NAME = "ev\x1b]0;il\x07\u202e\n::error::no.rts"
 WORDS = (("check", "."), ("check", NAME), ("fmt", "--check", "."), ("lint", "."), ("docs", ".", "-o", "page.html"))
 
 
-def test_names_are_shown_harmlessly(
+def test_file_names_are_displayed_escaped(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)

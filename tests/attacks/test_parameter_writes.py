@@ -91,11 +91,11 @@ def test_a_configuration_cannot_name_what_is_never_set(name: str, value: float) 
 
 
 @rows("ask", [b"", b"\1" * 40, asks(), asks(("FENCE_RADIUS", 1, 300.0), ("FENCE_RADIUS", 2, 300.0)), RADIUS[:-1]])
-def test_what_makes_no_sense_gets_no_permit(ask: bytes) -> None:
+def test_malformed_preparation_gets_no_permit(ask: bytes) -> None:
     assert prepares({"FENCE_RADIUS": 300.0}).preparation.permit(ask, AT) is MALFORMED
 
 
-def test_a_permit_lets_out_its_parameter_with_its_value_alone() -> None:
+def test_preparation_permit_passes_only_its_parameters() -> None:
     of = prepares({"FENCE_RADIUS": 300.0})
     opened = of.executor.prepare(permit(of), AT)
     assert isinstance(opened, Preparation)
@@ -126,7 +126,7 @@ def test_a_permit_is_good_for_its_time() -> None:
 
 
 @rows("bit", range(0, 8 * 80, 13))
-def test_a_forged_permit_lets_nothing_out(bit: int) -> None:
+def test_forged_permit_passes_no_frame(bit: int) -> None:
     of = prepares({"FENCE_RADIUS": 300.0})
     forged = bytearray(permit(of))
     forged[bit // 8 % len(forged)] ^= 1 << bit % 8
@@ -134,7 +134,7 @@ def test_a_forged_permit_lets_nothing_out(bit: int) -> None:
     assert sent(of, 300.0) is NOT_LISTED
 
 
-def test_a_permit_of_another_session_lets_nothing_out() -> None:
+def test_permit_of_another_session_passes_no_frame() -> None:
     of = prepares({"FENCE_RADIUS": 300.0})
     opened = open_preparation(permit(of), SESSION_KEY)
     assert opened is not None
@@ -163,7 +163,7 @@ def test_nothing_is_set_while_a_command_is_under_way() -> None:
     assert of.executor.prepare(permit(of), AT) is NOT_DOWN, "though it has not left the ground yet"
 
 
-def test_it_is_put_back_to_what_it_was_and_to_nothing_else() -> None:
+def test_parameter_is_restored_only_to_previous_value() -> None:
     of = prepares({"FENCE_RADIUS": 300.0})
     assert of.preparation.permit(BACK, AT) is NOT_AS_BEFORE, "nothing was set yet"
     of.executor.prepare(permit(of), AT)
@@ -175,19 +175,19 @@ def test_it_is_put_back_to_what_it_was_and_to_nothing_else() -> None:
     assert sent(of, 300.0) is NOT_LISTED
 
 
-def test_what_an_earlier_run_left_is_put_back_to_what_that_recorded() -> None:
+def test_owed_parameter_is_restored_to_recorded_value() -> None:
     of = prepares({}, {"FENCE_RADIUS": Owed(bits(50.0), bits(300.0))})
     assert of.preparation.permit(asks(("FENCE_RADIUS", 300.0, 60.0), restoring=True), AT) is NOT_AS_BEFORE
     of.executor.prepare(permit(of, BACK), AT)
     assert sent(of, 50.0) is True
 
 
-def test_what_is_never_set_is_not_put_back_whatever_was_recorded() -> None:
+def test_unsettable_parameter_is_never_restored() -> None:
     of = prepares({}, {"ARMING_CHECK": Owed(bits(0.0), bits(1.0))})
     assert of.preparation.permit(asks(("ARMING_CHECK", 1.0, 0.0), restoring=True), AT) is NOT_AS_BEFORE
 
 
-def test_what_is_set_again_is_put_back_to_what_it_was_at_first() -> None:
+def test_parameter_set_twice_is_restored_to_first_value() -> None:
     of = prepares({"FENCE_RADIUS": 400.0}, {"FENCE_RADIUS": Owed(bits(50.0), bits(300.0))})
     permit(of, asks(("FENCE_RADIUS", 300.0, 400.0)))
     permit(of, asks(("FENCE_RADIUS", 400.0, 50.0), restoring=True))

@@ -65,36 +65,36 @@ def moment(event: str, number: int = 0) -> int:
     return times[number]
 
 
-def test_what_was_set_was_recorded_and_put_back() -> None:
+def test_set_parameters_are_recorded_and_restored() -> None:
     lines, entries = flown()
     assert len(writes()) >= 2
     assert found(lines, entries) is None
 
 
-def test_a_write_before_its_record() -> None:
+def test_write_before_its_record_is_detected() -> None:
     assert beside(setting(80.0), moment("preparation") - 1) == "frames/unlisted-parameter"
 
 
-def test_a_write_that_is_sent_again_when_it_is_done() -> None:
+def test_write_repeated_after_its_end_is_detected() -> None:
     (_, first), *_ = writes()
     for at_us in (moment("prepared") + 1, moment("dispatched") + 1_000_000, moment("preparation", 1) + 1):
         assert beside(first, at_us) == "frames/unlisted-parameter"
 
 
-def test_a_write_at_the_very_moment_at_which_it_is_done() -> None:
+def test_write_at_end_of_preparation_is_accepted() -> None:
     (_, first), *_ = writes()
     assert beside(first, moment("prepared")) is None
 
 
 @rows(("octets"), [setting(81.0), setting(80.0, b"FENCE_RADIUS"), setting(15.0), setting(0.0, b"ARMING_CHECK")])
-def test_a_write_of_something_else_than_the_record_lists(octets: bytes) -> None:
+def test_write_of_unlisted_parameter_is_detected(octets: bytes) -> None:
     assert beside(octets, moment("preparation") + 1) == "frames/unlisted-parameter"
 
 
 @pytest.mark.parametrize("message", [
     m.MAVLink_heartbeat_message(2, 3, 128, 0, 4, 3), m.MAVLink_extended_sys_state_message(0, 2),
 ], ids=["armed", "in the air"])  # fmt: skip
-def test_a_write_to_a_vehicle_that_flies(message: Any) -> None:
+def test_write_in_flight_is_detected(message: Any) -> None:
     lines, entries = flown()
     first = entries.index(writes()[0])
     flies = (entries[first][0], Codec(1, 1).pack(message))
@@ -140,7 +140,7 @@ def changed(number: int, detail: str) -> str | None:
     (1, "restore FENCE_ALT_MAX from 80 to 16", "preparation/other-value"),
     (1, "restore FENCE_ALT_MAX from 80 to 15, FENCE_TYPE from 7 to 7", "preparation/other-permit"),
 ])  # fmt: skip
-def test_what_a_record_lists_makes_sense(number: int, detail: str, slug: str | None) -> None:
+def test_inconsistent_parameter_record_is_rejected(number: int, detail: str, slug: str | None) -> None:
     assert changed(number, detail) == slug
 
 

@@ -64,7 +64,7 @@ def near_the_entry(one: Invocation, _: Policy) -> Invocation:
     return replace(one, plan=replace(one.plan, path=one.plan.path[:2] * 40))
 
 
-def test_another_path_is_not_approved_by_a_plain_yes(sign: Sign, capsys: pytest.CaptureFixture[str]) -> None:
+def test_changed_path_is_not_approved_by_plain_yes(sign: Sign, capsys: pytest.CaptureFixture[str]) -> None:
     sign(near_the_entry)
     for words in ((), ("--yes",)):
         assert main([*APPROVE, *words]) == ExitCode.REFUSED
@@ -78,9 +78,7 @@ def test_another_path_is_not_approved_by_a_plain_yes(sign: Sign, capsys: pytest.
 
 
 @pytest.mark.parametrize("words", ["--refuse", "--other-path"])
-def test_another_path_is_refused_or_agreed_to_in_words_of_its_own(
-    words: str, sign: Sign, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_changed_path_needs_explicit_confirmation(words: str, sign: Sign, capsys: pytest.CaptureFixture[str]) -> None:
     sign(near_the_entry)
     assert main([*APPROVE, words]) == ExitCode.OK
     said = capsys.readouterr()
@@ -89,14 +87,14 @@ def test_another_path_is_refused_or_agreed_to_in_words_of_its_own(
     assert Path("yes").exists()
 
 
-def test_the_planners_own_path_is_approved_without_a_word_of_it(sign: Sign, capsys: pytest.CaptureFixture[str]) -> None:
+def test_planner_path_needs_no_extra_confirmation(sign: Sign, capsys: pytest.CaptureFixture[str]) -> None:
     sign(lambda one, _: one)
     assert main([*APPROVE]) == ExitCode.OK
     said = capsys.readouterr()
     assert "planner" not in said.out + said.err
 
 
-def test_where_the_planner_finds_none_any_path_is_another(sign: Sign, capsys: pytest.CaptureFixture[str]) -> None:
+def test_any_path_counts_as_changed_without_planner_path(sign: Sign, capsys: pytest.CaptureFixture[str]) -> None:
     sign(lambda one, _: replace(one, arguments=(*one.arguments[:2], 7, *one.arguments[3:])))
     assert main([*APPROVE]) == ExitCode.REFUSED
     assert "it finds none there" in capsys.readouterr().err
@@ -108,7 +106,7 @@ def unknown_skill(one: Invocation, policy: Policy) -> Invocation:
     return replace(one, arguments=one.arguments[:1])
 
 
-def test_what_the_vehicle_would_refuse_to_load_is_not_approved(sign: Sign, capsys: pytest.CaptureFixture[str]) -> None:
+def test_unloadable_bundle_is_not_approved(sign: Sign, capsys: pytest.CaptureFixture[str]) -> None:
     """Whoever signs what makes no sense gets no traceback out of it, and no yes."""
     for change in (unknown_skill, lambda one, _: replace(one, plan=replace(one.plan, altitude=50_000))):
         sign(change)

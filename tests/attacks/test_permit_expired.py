@@ -24,7 +24,7 @@ def test_a_late_step_is_not_sent() -> None:
     assert dispatch.not_after_us == opened.not_after_us, "whoever sends looks at the clock again"
 
 
-def test_a_permit_for_a_link_that_was_just_decided_lasts_a_second() -> None:
+def test_link_permit_is_valid_for_a_second() -> None:
     of = loaded()
     allowed(of)
     permit = allowed(of, kind=2, step=-1, link=0)
@@ -42,7 +42,7 @@ def test_the_fallback_of_a_step_that_is_over_has_lapsed() -> None:
     assert isinstance(of.executor.stand_in(following, FALLBACK_LINK, 0, AT), Command)
 
 
-def test_nothing_stands_behind_a_step_that_was_not_sent() -> None:
+def test_unsent_step_covers_no_links() -> None:
     of = loaded()
     step = allowed(of)
     assert of.executor.stand_in(step, FALLBACK_LINK, 0, AT) is LAPSED
@@ -50,21 +50,21 @@ def test_nothing_stands_behind_a_step_that_was_not_sent() -> None:
 
 
 @pytest.mark.parametrize(("kind", "link"), [(1, 1), (1, -1), (2, 3), (2, -1), (0, 3)])
-def test_a_permit_stands_for_its_own_links_alone(kind: int, link: int) -> None:
+def test_permit_covers_only_its_own_links(kind: int, link: int) -> None:
     of = loaded()
     step = allowed(of)
     of.executor.dispatch(step, AT)
     assert of.executor.stand_in(step, kind, link, AT) is NOT_COVERED
 
 
-def test_nothing_stands_behind_the_permit_of_a_link() -> None:
+def test_link_permit_covers_no_links() -> None:
     of = loaded()
     of.executor.dispatch(allowed(of), AT)
     hold = allowed(of, kind=2, step=-1, link=0)
     assert of.executor.stand_in(hold, FALLBACK_LINK, 0, AT) is NOT_COVERED
 
 
-def test_landing_ends_what_stands() -> None:
+def test_landing_ends_standing_permits() -> None:
     of = loaded()
     step = allowed(of)
     of.executor.dispatch(step, AT)
@@ -85,7 +85,7 @@ def test_the_contingency_stands_through_all_steps_of_a_flight() -> None:
     assert isinstance(of.executor.stand_in(step, CONTINGENCY_LINK, 0, AT + 3_600 * S), Command)
 
 
-def test_a_forged_permit_stands_for_nothing() -> None:
+def test_forged_permit_covers_no_links() -> None:
     of = loaded()
     of.executor.dispatch(allowed(of), AT)
     assert of.executor.stand_in(bytes(56), CONTINGENCY_LINK, 0, AT) is FORGED

@@ -20,17 +20,17 @@ def test_no_bit_may_change() -> None:
 
 
 @given(st.binary(max_size=100))
-def test_no_bytes_are_a_permit(data: bytes) -> None:
+def test_random_bytes_are_not_a_permit(data: bytes) -> None:
     assert loaded_once.executor.dispatch(data, AT) is FORGED
 
 
-def test_a_permit_under_another_key_is_forged() -> None:
+def test_permit_under_another_key_is_refused() -> None:
     sealed = seal(Permit(0, 0, -1, 99, 1, 3, 1 << 60), bytes(32))
     assert bytes(32) != SESSION_KEY
     assert loaded().executor.dispatch(sealed, AT) is FORGED
 
 
-def test_parts_of_two_permits_do_not_make_a_third() -> None:
+def test_combined_parts_of_permits_are_refused() -> None:
     of = loaded()
     first, second = allowed(of), allowed(of, step=1)
     assert of.executor.dispatch(first[:24] + second[24:], AT) is FORGED

@@ -16,7 +16,7 @@ def opens(store: FileReplayStore, version: int) -> MissionOpening:
     return store.open_once(of.bundle.mission_digest, of.expires_us, START.utc_us, policy.name, policy.version)
 
 
-def test_an_older_policy_does_not_come_back(tmp_path: Path) -> None:
+def test_older_policy_is_refused(tmp_path: Path) -> None:
     store = FileReplayStore(tmp_path, VEHICLE)
     assert opens(store, 7) is MissionOpening.OPENED
     assert opens(store, 6) is MissionOpening.OLD_POLICY

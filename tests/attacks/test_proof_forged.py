@@ -16,7 +16,7 @@ from rtshcua.wire import cbor
 from virtual.rows import rows
 
 
-def test_what_is_put_together_again_is_believed() -> None:
+def test_reassembled_proof_verifies() -> None:
     for parts in (inclusion(3), inclusion(18), consistency(6)):
         assert parts.slug() == "believed"
 
@@ -41,7 +41,7 @@ def test_the_place_is_another() -> None:
     assert parts.slug() == "proof/record"
 
 
-def test_a_record_is_not_in_its_one_form() -> None:
+def test_noncanonical_record_is_rejected() -> None:
     parts = inclusion(3)
     parts.extra["record"] = parts.extra["record"].replace(b'"seq":3', b'"seq": 3')
     assert parts.slug() == "proof/record"
@@ -49,14 +49,14 @@ def test_a_record_is_not_in_its_one_form() -> None:
     assert parts.slug() == "proof/record"
 
 
-def test_a_node_of_the_tree_passes_for_a_record() -> None:
+def test_tree_node_is_not_accepted_as_record() -> None:
     """A second preimage: leaves and nodes are hashed with different prefixes, and a record is JSON."""
     parts = inclusion(3)
     parts.extra["record"] = b64decode(parts.path[0]) * 2
     assert parts.slug() == "proof/record"
 
 
-def test_a_hash_of_the_path_is_none() -> None:
+def test_invalid_hash_in_path_is_rejected() -> None:
     for wrong in ("AAAA", "junk!", parts_of_path(31), parts_of_path(33), parts_of_path(32).replace("=", "")):
         parts = inclusion(3)
         parts.path[1] = wrong
@@ -93,7 +93,7 @@ def test_an_older_checkpoint_that_does_not_have_the_record() -> None:
     assert parts.slug() == "proof/path"
 
 
-def test_junk_is_no_proof_and_no_receipt() -> None:
+def test_garbage_is_rejected_as_proof_and_receipt() -> None:
     for data in (
         b"",
         b"\xd2",
@@ -118,7 +118,7 @@ def test_a_file_that_is_too_long_is_not_read() -> None:
     assert checked.slug == "proof/too-long"
 
 
-def test_what_it_carries_is_none() -> None:
+def test_proof_with_invalid_record_is_rejected() -> None:
     for extra in (b"", b"\x80", cbor.encode(("rtshcua/proof", 2, {})), cbor.encode(("rtshcua/proof", 1, {})),
                   cbor.encode(("rtshcua/proof", 1, {**inclusion(3).extra, "fields": ()}))):  # fmt: skip
         parts = inclusion(3)

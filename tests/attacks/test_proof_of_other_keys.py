@@ -133,7 +133,7 @@ def test_a_log_key_that_had_expired_or_is_for_other_vehicles() -> None:
         assert slug_of_receipt(data) == "trust/log-key"
 
 
-def test_the_origin_is_of_no_log() -> None:
+def test_invalid_origin_is_rejected() -> None:
     for name in ("rtshcua/log/quad+7/z", "rtshcua/log/quad 07/" + "0" * 32, "rtshcua/log/x", "other/log/quad/0"):
         parts = inclusion(3)
         parts.extra["chain"] = (signed(f"{name}\n0\n{parts.note.split(chr(10), 2)[2]}", LOG_KEY, name),)
@@ -196,7 +196,7 @@ def test_a_consistency_proof_of_other_sizes() -> None:
     assert parts.slug() == "proof/consistency"
 
 
-def test_one_kind_passes_for_another() -> None:
+def test_proof_of_another_kind_is_rejected() -> None:
     kinds = [inclusion(3), consistency(6), inclusion(18)]
     for parts in kinds:
         for other in kinds:

@@ -42,12 +42,12 @@ def test_findings_are_capped_with_a_count(data: bytes, count: int) -> None:
 
 
 @pytest.mark.parametrize("item", [b"[]", b"{}", b"1", b'""', b'{"a":1}'])
-def test_more_values_than_a_mission_has_are_refused_before_any_is_built(item: bytes) -> None:
+def test_proposal_with_too_many_values_is_refused_early(item: bytes) -> None:
     data = listed(item, MAX_BYTES // (len(item) + 1) - 2)
     specification = parse_specification("proposal.json", data)
     assert [each.code for each in specification.diagnostics] == [codes.SPECIFICATION_SIZE]
     assert specification.tree is None
 
 
-def test_a_few_findings_are_all_told() -> None:
+def test_few_findings_are_all_reported() -> None:
     assert len(found(b'{"imports":' + listed(b"1", 90) + b"}")) == 98

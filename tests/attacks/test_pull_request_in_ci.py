@@ -63,7 +63,7 @@ def test_a_text_of_the_checkout_gives_the_runner_no_commands(hostile: Path, tmp_
     assert ended.printed.count("::stop-commands::") == 2
 
 
-def test_a_path_is_no_option_and_a_name_is_one_output(hostile: Path, tmp_path: Path, commands: Forked) -> None:
+def test_path_and_name_cannot_inject_options_or_outputs(hostile: Path, tmp_path: Path, commands: Forked) -> None:
     (hostile / "--fix.rts").write_text("zone  a = circle(47 N, 8 E, 10 m)\n", encoding="utf-8")
     ended = runner(tmp_path, commands)(
         hostile, paths="--fix.rts", format="false", sarif="a\nsecret=b.sarif", junit="c\nd=e.xml"
@@ -73,7 +73,7 @@ def test_a_path_is_no_option_and_a_name_is_one_output(hostile: Path, tmp_path: P
     assert ended.outputs == {"sarif": "", "junit": ""}
 
 
-def test_a_report_that_was_not_written_is_no_output(hostile: Path, tmp_path: Path, commands: Forked) -> None:
+def test_missing_report_is_not_an_output(hostile: Path, tmp_path: Path, commands: Forked) -> None:
     (tmp_path / "mine.json").write_text('{"runs": [{"results": [{"suppressions": [1]}]}]}', encoding="utf-8")
     (hostile / "rtshcua.sarif").symlink_to(tmp_path / "mine.json")
     ended = runner(tmp_path, commands)(hostile, tests="false", format="false")

@@ -73,7 +73,7 @@ def test_on_the_ground_nothing_begins() -> None:
     assert run.runtime.used_up, "what an operator called back does not fly later"
 
 
-def test_what_is_on_its_way_home_goes_on() -> None:
+def test_return_under_way_continues() -> None:
     run = Run(loaded()).until_flies("return_home")
     assert hand(run, recall(run.loaded, now=run.clock.now())) == "accepted"
     run.until_over()
@@ -82,7 +82,7 @@ def test_what_is_on_its_way_home_goes_on() -> None:
     assert run.ending is Ending.RECALLED
 
 
-def test_a_chain_that_flies_goes_on_and_the_run_was_recalled() -> None:
+def test_flying_chain_continues_and_run_ends_recalled() -> None:
     run = Run(fresh()).until_flies("goto")
     run.vehicle.fails.add("goto")
     run.until_flies("hover")
@@ -94,7 +94,7 @@ def test_a_chain_that_flies_goes_on_and_the_run_was_recalled() -> None:
     assert_audited(run)
 
 
-def test_while_the_link_is_lost_it_waits_for_the_link() -> None:
+def test_document_waits_while_link_is_lost() -> None:
     run = Run(fresh()).until_flies("goto")
     run.tick(LinkLost(0))
     assert hand(run, recall(run.loaded, now=run.clock.now())) == "accepted"
@@ -103,7 +103,7 @@ def test_while_the_link_is_lost_it_waits_for_the_link() -> None:
     assert run.ending is Ending.RECALLED
 
 
-def test_after_it_the_boundary_decides_no_step_and_the_executor_sends_none() -> None:
+def test_no_step_is_decided_or_sent_afterwards() -> None:
     """Also for a runtime that was taken over and acts as if it had not come."""
     of = fresh()
     permit = allowed(of)
@@ -132,7 +132,7 @@ def test_while_it_falls_back_approvals_and_replacements_are_refused() -> None:
     assert run.ending is Ending.ABORTED
 
 
-def test_no_bit_of_it_may_change() -> None:
+def test_flipped_bit_is_refused() -> None:
     of = fresh()
     document = recall(of)
     for at in range(len(document)):
@@ -142,12 +142,12 @@ def test_no_bit_of_it_may_change() -> None:
     allowed(of)
 
 
-def test_a_key_that_nobody_trusts() -> None:
+def test_unknown_key_is_refused() -> None:
     assert presented(fresh(), recall(OF, key=STRANGER)).slug == "unknown-key"
 
 
 @pytest.mark.parametrize("kind", [names.APPROVAL, names.REPLACEMENT])
-def test_it_passes_for_no_other_document(kind: names.Artefact) -> None:
+def test_document_is_refused_as_another_kind(kind: names.Artefact) -> None:
     payload = cose.unverified(recall(OF)).payload
     disguised = cose.sign1(payload, key=APPROVAL_KEY, duty=Duty.APPROVAL, content_type=kind.content_type)
     assert presented(fresh(), disguised).slug in ("unknown-format", "wrong-duty")
@@ -194,12 +194,12 @@ def issued(mission_us: int, steps_us: int) -> Mission:
         ({"expires_at_us": START.utc_us + 61 * MIN}, "too-long-lived"),
     ],
 )
-def test_what_it_says_must_fit(changed: dict[str, object], slug: str) -> None:
+def test_inconsistent_content_is_refused(changed: dict[str, object], slug: str) -> None:
     of = fresh()
     assert presented(of, recall(of, **changed)).slug == slug
 
 
-def test_the_recall_of_an_earlier_flight_does_not_serve() -> None:
+def test_recall_of_earlier_flight_is_refused() -> None:
     earlier = recall(OF)
     again = loaded(mission=issued(ISSUED + S, ISSUED + S))
     assert presented(again, earlier).slug == "other-mission"
@@ -207,7 +207,7 @@ def test_the_recall_of_an_earlier_flight_does_not_serve() -> None:
     assert presented(again, under_policy).slug == "before-mission"
 
 
-def test_who_dates_a_mission_later_than_its_steps_is_recalled_all_the_same() -> None:
+def test_postdated_mission_is_recalled() -> None:
     """An agent chooses what its mission says of itself: one of today, by its steps, that says it is of next year."""
     of = loaded(mission=issued(ISSUED + YEAR, ISSUED))
     under_policy = recall(OF, flight=b"", mission=b"", policy=POLICY_DIGEST)
@@ -215,7 +215,7 @@ def test_who_dates_a_mission_later_than_its_steps_is_recalled_all_the_same() -> 
     assert presented(of, under_policy).accepted
 
 
-def test_it_reaches_a_mission_that_was_replaced_since() -> None:
+def test_recall_reaches_replaced_mission() -> None:
     of = fresh()
     first = recall(of)
     assert presented(of, replacement(of)).accepted
@@ -236,14 +236,14 @@ def number_of(lines: list[bytes], which: Callable[[dict[str, object]], bool]) ->
     return next(n for n, line in enumerate(lines) if which(json.loads(line)))
 
 
-def test_a_log_in_which_a_step_is_sent_after_it_is_false() -> None:
+def test_log_with_step_sent_afterwards_fails() -> None:
     _, lines = recalled()
     begun = number_of(lines, lambda record: record.get("event") == "dispatched" and record["kind"] == 2)
     forged = [*lines[:begun], edit(lines[begun], kind=0, step=1, link=-1), *lines[begun + 1 :]]
     assert expect(signed(forged, LOG_KEY), ROOT_KEY.public) == ("dispatch/recalled", begun)
 
 
-def test_a_log_in_which_a_step_is_decided_after_it_is_false() -> None:
+def test_log_with_step_decided_afterwards_fails() -> None:
     run = Run(fresh())
     of = run.loaded
     hand(run, replacement(of, kept=2))

@@ -15,7 +15,7 @@ from rtshcua.wire import cbor
 from virtual.rows import rows
 
 
-def test_receipts_that_are_forged() -> None:
+def test_forged_receipt_is_rejected() -> None:
     assert slug_of_receipt(receipt()) == "believed"
     assert slug_of_receipt(receipt(sign_it=True)) == "believed"
     path = cbor.decode(cbor.decode(receipt_of_record(3)[1:])[1][396][-1][0])[2]  # type: ignore[index,arg-type,call-overload]
@@ -50,5 +50,5 @@ def test_receipts_that_are_forged() -> None:
         {"unprotected": {"rtshcua/root": 7}}, {"signature": 7},
     ],
 )  # fmt: skip
-def test_receipts_that_are_none(fields: dict[str, Any]) -> None:
+def test_malformed_receipt_is_rejected(fields: dict[str, Any]) -> None:
     assert slug_of_receipt(receipt(**fields)) == "proof/malformed"

@@ -96,7 +96,7 @@ def test_a_refusal_stays_with_what_was_refused_wherever_it_stands_now(kept: int)
 
 
 @pytest.mark.parametrize("kept", [0, ASKED, ASKED + 1])
-def test_nobody_outruns_a_refusal_by_replacing(kept: int) -> None:
+def test_replacement_does_not_evade_refusal(kept: int) -> None:
     """A person said yes, and now no. Meanwhile the mission is replaced by itself: the yes would outlive it."""
     of = flown_to_the_inspection() if kept else renewed(OF)
     grant, refusal = approval(of), approval(of, granted=0)
@@ -112,7 +112,7 @@ def test_nobody_outruns_a_refusal_by_replacing(kept: int) -> None:
     assert asked(of) == (Outcome.DENY, Reason.APPROVAL_REFUSED)
 
 
-def test_a_refusal_of_what_nothing_asks_for_any_more_is_told_so() -> None:
+def test_refusal_of_removed_step_is_reported() -> None:
     of = renewed(OF)
     refusal, other = approval(of, granted=0), approval(of, granted=0, binding=bytes(32))
     assert presented(of, replacement(of)).accepted
@@ -123,7 +123,7 @@ def test_a_refusal_of_what_nothing_asks_for_any_more_is_told_so() -> None:
     assert presented(of, approval(of, granted=0, mission=bytes(32))).slug == "other-mission"
 
 
-def test_the_step_behind_another_stays_refused() -> None:
+def test_later_step_stays_refused() -> None:
     """It has another index now."""
     of = flown_to_the_inspection()
     assert presented(of, approval(of, granted=0)).accepted
@@ -138,7 +138,7 @@ def test_the_step_behind_another_stays_refused() -> None:
     assert (answer.outcome, answer.reason) == (Outcome.DENY, Reason.APPROVAL_REFUSED)
 
 
-def test_another_step_is_another_question() -> None:
+def test_refusal_does_not_apply_to_different_step() -> None:
     """What was refused is a skill with its arguments: at another height it is asked about anew."""
     of = flown_to_the_inspection()
     assert presented(of, approval(of, granted=0)).accepted
@@ -153,7 +153,7 @@ def test_another_step_is_another_question() -> None:
     assert asked(of)[0] is Outcome.ALLOW
 
 
-def test_a_bundle_with_ids_of_its_own_making_is_not_loaded() -> None:
+def test_bundle_with_chosen_ids_is_refused() -> None:
     policy = OF.bundle.policy
     payload = bundles.policy_payload(policy)
     bound = bind(low_mission(), bundles.policy_digest(payload))

@@ -58,7 +58,7 @@ def forged(
     return sign_document(names.REPLACEMENT, ReplacementDocument(FLIGHT, over, kept, whole), MISSION_KEY, Duty.MISSION)
 
 
-def test_the_steps_that_were_not_released_are_others() -> None:
+def test_replacement_changes_unreleased_steps() -> None:
     run = Run(fresh()).until_flies("goto")
     assert hand(run, replacement(run.loaded)) == "accepted"
     run.until_over()
@@ -84,14 +84,14 @@ def test_a_mission_may_grow_and_be_replaced_again() -> None:
     assert_audited(run)
 
 
-def test_before_the_vehicle_is_ready_every_step_may_be_another() -> None:
+def test_every_step_may_be_replaced_before_ready() -> None:
     run = Run(fresh(), ready=False)
     mission = MISSION
     assert hand(run, replacement(run.loaded, 0, mission)) == "accepted"
     assert run.loaded.bundle.mission.invocations[1].arguments == mission.invocations[1].arguments
 
 
-def test_what_stays_is_what_was_signed_first() -> None:
+def test_kept_steps_stay_as_first_signed() -> None:
     """The bytes that are in force for a step that stays are the old ones, id and binding included."""
     of = fresh()
     before = of.bundle.mission.invocations
@@ -102,7 +102,7 @@ def test_what_stays_is_what_was_signed_first() -> None:
     assert permit
 
 
-def test_no_byte_of_it_may_change() -> None:
+def test_flipped_byte_is_refused() -> None:
     of = fresh()
     document = replacement(of)
     for at in range(0, len(document), 7):
@@ -112,19 +112,19 @@ def test_no_byte_of_it_may_change() -> None:
     assert of.bundle is OF.bundle
 
 
-def test_a_key_that_nobody_trusts() -> None:
+def test_unknown_key_is_refused() -> None:
     assert presented(fresh(), replacement(OF, key=STRANGER)).slug == "unknown-key"
 
 
 @pytest.mark.parametrize("key", [POLICY_KEY, APPROVAL_KEY, LOG_KEY, ROOT_KEY])
-def test_a_trusted_key_of_another_duty(key: SigningKey) -> None:
+def test_key_of_another_duty_is_refused(key: SigningKey) -> None:
     payload = cose.unverified(replacement(OF)).payload
     document = cose.sign1(payload, key=key, duty=key.duty, content_type=names.REPLACEMENT.content_type)
     assert presented(fresh(), document).slug == "wrong-duty"
 
 
 @pytest.mark.parametrize("fields", [{"role": SUPERVISOR}, {"source": SourceKind.ONBOARD}, {"role": 99}, {"source": 9}])
-def test_steps_that_its_key_may_not_speak_for(fields: dict[str, int]) -> None:
+def test_replacement_by_unauthorised_key_is_refused(fields: dict[str, int]) -> None:
     first, second, last = shorter(OF).invocations
     mission = replace(shorter(OF), invocations=(first, second, replace(last, **fields)))
     assert presented(fresh(), forged(OF, mission)).slug in ("wrong-role", "wrong-source", "malformed")
@@ -139,17 +139,17 @@ def test_a_step_that_was_decided_is_not_replaced(released: int) -> None:
     assert presented(of, replacement(of, kept=released)).accepted
 
 
-def test_a_step_that_waits_is_released_already() -> None:
+def test_waiting_step_counts_as_released() -> None:
     run = Run(fresh()).until(lambda run: (0, ASKED, -1, "defer", "approval/awaited") in run.decisions)
     assert hand(run, replacement(run.loaded, kept=2)) == "already-released"
 
 
-def test_a_step_that_the_runtime_says_was_released() -> None:
+def test_step_released_by_runtime_is_not_replaced() -> None:
     of = fresh()
     assert presented(of, replacement(of, kept=2), released=3).slug == "already-released"
 
 
-def test_under_another_policy() -> None:
+def test_replacement_under_another_policy_is_refused() -> None:
     laxer = loaded(replace(POLICY, version=8), replace(OF.bundle.mission, policy_version=8))
     document = forged(laxer, shorter(laxer), supersedes=OF.bundle.mission_digest)
     assert presented(fresh(), document).slug == "wrong-policy"
@@ -157,18 +157,18 @@ def test_under_another_policy() -> None:
     assert presented(fresh(), forged(OF, renamed)).slug == "wrong-policy"
 
 
-def test_for_another_vehicle() -> None:
+def test_replacement_for_another_vehicle_is_refused() -> None:
     assert presented(fresh(), forged(OF, replace(shorter(OF), vehicle="quad-08"))).slug == "wrong-vehicle"
 
 
-def test_of_a_mission_that_is_not_in_force() -> None:
+def test_replacement_of_inactive_mission_is_refused() -> None:
     of = fresh()
     assert presented(of, forged(of, shorter(of), supersedes=bytes(32))).slug == "superseded"
     again = loaded(mission=replace(OF.bundle.mission, issued_at_us=ISSUED + S))
     assert presented(again, replacement(OF)).slug == "superseded", "that of an earlier flight"
 
 
-def test_one_that_is_replayed_changes_nothing() -> None:
+def test_replayed_document_changes_nothing() -> None:
     of = fresh()
     first = replacement(of)
     assert presented(of, first).accepted
@@ -178,19 +178,19 @@ def test_one_that_is_replayed_changes_nothing() -> None:
     assert presented(of, first).slug == "superseded"
 
 
-def test_a_bundle_is_no_replacement_and_a_replacement_no_bundle() -> None:
+def test_bundle_and_replacement_are_not_interchangeable() -> None:
     payload = cose.unverified(replacement(OF)).payload
     as_mission = cose.sign1(payload, key=MISSION_KEY, duty=Duty.MISSION, content_type=names.MISSION.content_type)
     assert presented(fresh(), as_mission).slug == "unknown-document"
 
 
-def test_that_will_be_issued_later() -> None:
+def test_replacement_issued_in_future_is_refused() -> None:
     late = START.utc_us + START.utc_error_us
     assert presented(fresh(), forged(OF, replace(shorter(OF), issued_at_us=late + 1))).slug == "issued-in-future"
     assert presented(fresh(), forged(OF, replace(shorter(OF), issued_at_us=late))).accepted
 
 
-def test_whose_binding_is_not_over_its_fields() -> None:
+def test_replacement_with_wrong_binding_is_refused() -> None:
     assert presented(fresh(), forged(OF, shorter(OF), bound=False)).slug in ("wrong-policy", "binding-mismatch")
     bound = bind(shorter(OF), OF.bundle.policy_digest)
     first, second, last = bound.invocations
@@ -215,7 +215,7 @@ STAYS = shorter(OF).invocations[1]
         replace(STAYS, text="what a person reads of it"),
     ],
 )
-def test_what_stays_may_not_be_touched(changed: object) -> None:
+def test_kept_steps_cannot_be_changed(changed: object) -> None:
     first, _, last = shorter(OF).invocations
     mission = replace(shorter(OF), invocations=(first, changed, last))
     of = fresh()
@@ -224,7 +224,7 @@ def test_what_stays_may_not_be_touched(changed: object) -> None:
         sign_replacement(mission, over=of.bundle, flight=FLIGHT, kept=2, key=MISSION_KEY)
 
 
-def test_what_stays_may_have_moved_in_its_source() -> None:
+def test_kept_steps_may_have_other_source_positions() -> None:
     first, second, last = shorter(OF).invocations
     clauses = tuple(replace(each, source=3, start=7, end=9) for each in second.contract.require)
     moved = replace(second, file=5, start=100, end=200, contract=replace(second.contract, require=clauses))
@@ -242,13 +242,13 @@ def test_what_stays_may_have_moved_in_its_source() -> None:
         (replace(shorter(OF), invocations=shorter(OF).invocations[:2] * 2), 2, "malformed"),
     ],
 )
-def test_numbers_and_names_that_do_not_fit(mission: Mission, kept: int, slug: str) -> None:
+def test_replacement_with_wrong_numbers_or_names_is_refused(mission: Mission, kept: int, slug: str) -> None:
     of = fresh()
     assert presented(of, forged(of, mission, kept)).slug == slug
     allowed(of)
 
 
-def test_a_new_step_with_the_id_of_one_that_stays() -> None:
+def test_new_step_with_id_of_kept_step_is_refused() -> None:
     of = fresh()
     bound = bind(shorter(of), of.bundle.policy_digest, after=b"")
     first, second, last = bound.invocations
@@ -259,7 +259,7 @@ def test_a_new_step_with_the_id_of_one_that_stays() -> None:
     )
 
 
-def test_what_a_step_was_approved_for_does_not_serve_what_takes_its_place() -> None:
+def test_approval_does_not_apply_to_replaced_step() -> None:
     of = fresh()
     assert presented(of, approval(of)).accepted
     mission = of.bundle.mission
@@ -276,7 +276,7 @@ def test_what_a_step_was_approved_for_does_not_serve_what_takes_its_place() -> N
     assert presented(of, approval(of)).accepted
 
 
-def test_what_was_approved_and_stays_is_approved() -> None:
+def test_kept_step_stays_approved() -> None:
     of = fresh()
     assert presented(of, approval(of)).accepted
     mission = of.bundle.mission
@@ -285,7 +285,7 @@ def test_what_was_approved_and_stays_is_approved() -> None:
         allowed(of, step=step)
 
 
-def test_the_binding_of_what_was_replaced_is_worth_nothing() -> None:
+def test_binding_of_replaced_step_is_refused() -> None:
     of = fresh()
     old = request_for(of, step=2)
     assert presented(of, replacement(of)).accepted
@@ -297,7 +297,7 @@ def test_the_binding_of_what_was_replaced_is_worth_nothing() -> None:
     assert answer_to(of, request_for(of, step=3)) is Status.UNKNOWN_STEP
 
 
-def test_a_denied_step_whose_id_was_used_up_may_be_another() -> None:
+def test_denied_step_with_used_id_may_be_replaced() -> None:
     of = fresh()
     allowed(of)
     late = request_for(of, step=1, phase=2)
@@ -309,14 +309,14 @@ def test_a_denied_step_whose_id_was_used_up_may_be_another() -> None:
     allowed(of, step=1)
 
 
-def test_one_flight_takes_so_many_and_no_more() -> None:
+def test_replacements_of_one_flight_are_limited() -> None:
     of = fresh()
     for number in range(MAX_REPLACEMENTS):
         assert presented(of, replacement(of, 2, replace(shorter(OF), issued_at_us=ISSUED + number))).accepted
     assert presented(of, replacement(of, 2, shorter(OF))).slug == "too-many"
 
 
-def test_what_was_considered_ahead_is_taken_the_same() -> None:
+def test_replacement_verified_ahead_is_accepted_alike() -> None:
     """Nothing but time comes of it, whoever had it considered, and when."""
     of = fresh()
     document, other = replacement(of), replacement(of, 1)
@@ -353,7 +353,7 @@ def test_few_are_kept_ahead() -> None:
 @pytest.mark.parametrize(
     ("keys", "root", "slug"), [(START.utc_us + S, 0, "key-expired"), (None, START.utc_us + S, "root-expired")]
 )
-def test_what_was_considered_in_time_may_have_expired(keys: int | None, root: int, slug: str) -> None:
+def test_replacement_verified_ahead_can_expire(keys: int | None, root: int, slug: str) -> None:
     keyring = tuple(replace(key, expires_us=keys) if key.duty is Duty.MISSION else key for key in ROOT.keys)
     trusted = replace(ROOT, keys=keyring, expires_at_us=root or ROOT.expires_at_us)
     of = renewed(OF, trusted)
@@ -380,7 +380,7 @@ def test_what_was_considered_in_time_may_have_expired(keys: int | None, root: in
         b"\xd2\x84\x40\xa0\x40\x40",
     ],
 )
-def test_garbage_is_refused_by_its_outline(document: bytes) -> None:
+def test_garbage_is_refused_without_decoding(document: bytes) -> None:
     assert presented(fresh(), document).slug == "malformed"
 
 
@@ -391,7 +391,7 @@ def test_a_document_that_is_too_large_is_not_read() -> None:
     assert presented(fresh(), large).slug == "too-large", "only a mission has a reason to be"
 
 
-def test_a_log_cannot_make_one_up() -> None:
+def test_log_with_invented_document_fails() -> None:
     run = Run(fresh()).until_flies("goto")
     hand(run, replacement(run.loaded))
     run.until_over()

@@ -17,14 +17,14 @@ def test_an_admitted_step_is_denied_the_second_time() -> None:
     assert answer.permit == b""
 
 
-def test_a_step_that_was_flown_does_not_come_back_later() -> None:
+def test_flown_step_is_denied_later() -> None:
     run = Run().until_flies("inspect_area")
     answer = answer_to(run.loaded, request_for(run.loaded, step=1, now=run.clock.now()))
     assert isinstance(answer, Decision)
     assert answer.reason is Reason.REPLAYED
 
 
-def test_a_deferred_step_is_no_replay() -> None:
+def test_deferred_step_is_not_a_replay() -> None:
     of = loaded()
     blind = answer_to(of, request_for(of, state=State((None,) * of.bundle.policy.slots, (0,) * of.bundle.policy.slots)))
     assert isinstance(blind, Decision)
@@ -32,7 +32,7 @@ def test_a_deferred_step_is_no_replay() -> None:
     allowed(of)
 
 
-def test_what_fails_authentication_uses_no_id_up() -> None:
+def test_unauthenticated_request_uses_no_id() -> None:
     """Else a forger could have the honest request refused."""
     of = loaded()
     forged = answer_to(of, request_for(of, binding=bytes(32)))
@@ -50,7 +50,7 @@ def test_a_permit_sends_one_command_once() -> None:
     assert of.executor.stand_in(permit, 1, 0, START.monotonic_us) is USED
 
 
-def test_a_permit_of_another_session_is_worth_nothing() -> None:
+def test_permit_of_another_session_is_rejected() -> None:
     of = loaded()
     later = Executor(bytes(32), Commands(of.bundle.policy, of.bundle.mission))
     assert later.dispatch(allowed(of), START.monotonic_us) is FORGED

@@ -25,7 +25,7 @@ def back() -> Run:
         (Presented(0, recall(OF)), Ending.RECALLED),
     ],
 )
-def test_what_ends_the_run_before_it_is_known_whether_it_flies(event: Event, ending: Ending) -> None:
+def test_run_can_end_before_air_state_is_known(event: Event, ending: Ending) -> None:
     run = back()
     run.tick(event)
     run.tick(AirState(0, True, True))
@@ -36,7 +36,7 @@ def test_what_ends_the_run_before_it_is_known_whether_it_flies(event: Event, end
 
 
 @pytest.mark.parametrize("known", [False, True])
-def test_one_that_never_counts_as_ready_comes_down_too(known: bool) -> None:
+def test_vehicle_that_is_never_ready_is_brought_down(known: bool) -> None:
     run = Run(
         renewed(OF), FakeVehicle(armed=True, airborne=True), limits=Limits(ready_us=2 * S), resumed=True, ready=False
     )
@@ -46,7 +46,7 @@ def test_one_that_never_counts_as_ready_comes_down_too(known: bool) -> None:
     assert run.flown[-1] in ("return_home", "emergency_land")
 
 
-def test_one_that_answers_nothing_is_not_told_what_to_do_before_it_does() -> None:
+def test_unresponsive_vehicle_gets_no_command() -> None:
     """What brings it home is chosen when it arrives; chosen before, on what was known then, it lands it on the spot."""
     run = back()
     run.tick(AirState(0, True, True), VehicleAnswers(0, answers=False))
@@ -61,7 +61,7 @@ def test_one_that_answers_nothing_is_not_told_what_to_do_before_it_does() -> Non
     assert_audited(run)
 
 
-def test_one_that_never_answers_is_given_up_when_it_cannot_fly_any_more() -> None:
+def test_unresponsive_vehicle_is_given_up_after_endurance() -> None:
     run = back()
     run.tick(AirState(0, True, True), VehicleAnswers(0, answers=False))
     flies_us = OF.bundle.policy.vehicle.endurance_us
@@ -70,7 +70,7 @@ def test_one_that_never_answers_is_given_up_when_it_cannot_fly_any_more() -> Non
     assert_audited(run)
 
 
-def test_one_that_is_armed_may_have_been_told_to_take_off_and_is_told_to_land() -> None:
+def test_armed_vehicle_is_told_to_land() -> None:
     """The program died between the takeoff and the lift-off: nothing else would keep it from going up unwatched."""
     run = Run(renewed(OF), FakeVehicle(armed=True), resumed=True, ready=False)
     run.tick(AirState(0, True, False))
@@ -82,21 +82,21 @@ def test_one_that_is_armed_may_have_been_told_to_take_off_and_is_told_to_land() 
     assert_audited(run)
 
 
-def test_one_that_somebody_else_armed_is_left_to_them() -> None:
+def test_vehicle_armed_by_another_is_left_alone() -> None:
     run = Run(renewed(OF), FakeVehicle(armed=True), resumed=True, ready=False)
     run.tick(AirState(0, True, False), Ready(0, "Position"))
     run.tick()
     assert (run.flown, run.ending) == ([], Ending.STOOD_DOWN)
 
 
-def test_one_that_is_armed_is_not_left_because_it_never_counts_as_ready() -> None:
+def test_armed_vehicle_that_is_never_ready_is_not_abandoned() -> None:
     run = Run(renewed(OF), FakeVehicle(armed=True), limits=Limits(ready_us=2 * S), resumed=True, ready=False)
     run.tick(AirState(0, True, False))
     run.until_over()
     assert run.flown == ["emergency_land"]
 
 
-def test_one_that_is_on_the_ground_is_left_there() -> None:
+def test_vehicle_on_ground_is_left_alone() -> None:
     run = Run(renewed(OF), resumed=True, ready=False)
     run.tick(AirState(0, False, False))
     run.tick(Interrupted(0))
@@ -104,7 +104,7 @@ def test_one_that_is_on_the_ground_is_left_there() -> None:
     assert run.flown == []
 
 
-def test_one_under_a_root_that_has_expired_comes_down_as_ever() -> None:
+def test_vehicle_under_expired_root_is_brought_down() -> None:
     expired = replace(ROOT, expires_at_us=START.utc_us - 1)
     run = Run(renewed(OF, expired), FakeVehicle(armed=True, airborne=True), resumed=True, ready=False)
     run.tick(AirState(0, True, True), Ready(0))

@@ -208,7 +208,7 @@ enforcing = pytest.mark.parametrize("taken_over", ENFORCE, ids=named, indirect=T
 
 
 @enforcing
-def test_nothing_that_no_permit_covers_is_obeyed(taken_over: TakenOver) -> None:
+def test_vehicle_obeys_nothing_without_permit(taken_over: TakenOver) -> None:
     before = taken_over.state()
     answers = taken_over.put(taken_over.housekeeping())
     assert "AUTOPILOT_VERSION" in [f.name for each in answers for f in Codec(255, 1).parse(each)], "its key is good"
@@ -222,7 +222,7 @@ def test_nothing_that_no_permit_covers_is_obeyed(taken_over: TakenOver) -> None:
 
 
 @enforcing
-def test_while_a_permit_is_in_force_what_it_covers_is_obeyed_alone(taken_over: TakenOver) -> None:
+def test_vehicle_obeys_only_permitted_command(taken_over: TakenOver) -> None:
     of = taken_over.loaded
     answer = answer_to(of, request_for(of, now=taken_over.now, released_us=taken_over.us))
     assert isinstance(answer, Decision)
@@ -267,7 +267,7 @@ def test_a_preparation_sets_what_was_configured_and_nothing_else(taken_over: Tak
 
 
 @pytest.mark.parametrize("vehicle", OBEY_ANYONE, ids=named)
-def test_a_vehicle_that_does_not_enforce_signing_obeys_whoever_speaks(vehicle: Vehicle) -> None:
+def test_vehicle_without_signing_obeys_anyone(vehicle: Vehicle) -> None:
     """The limit, stated: there the runtime needs no boundary."""
     simulation, codec = vehicle.simulated(EPOCH_US + 3_600 * S), Codec(1, 191)
     simulation.advance(3 * S)

@@ -56,7 +56,7 @@ def revoking(*keys: SigningKey) -> TrustRoot:
 @pytest.mark.parametrize(
     ("document", "key"), [(approval, APPROVAL_KEY), (recall, APPROVAL_KEY), (replacement, MISSION_KEY)]
 )
-def test_what_a_revoked_key_signs_is_refused_in_flight(document: Callable[..., bytes], key: SigningKey) -> None:
+def test_document_by_revoked_key_is_refused_in_flight(document: Callable[..., bytes], key: SigningKey) -> None:
     of = low()
     assert presented(of, document(of)).slug == "accepted"
     of = renewed(low(), revoking(key))
@@ -128,9 +128,7 @@ def accepts(settled: str | Refusal, text: str) -> bool:
     return text in settled
 
 
-def test_a_vehicle_that_missed_two_roots_takes_those_between_too(
-    fleet: KeyStore, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_vehicle_accepts_all_missed_roots(fleet: KeyStore, capsys: pytest.CaptureFixture[str]) -> None:
     for words in (["replace", "mission-agent"], ["rotate-root"]):
         assert main(["keys", *words]) == ExitCode.OK
     chain = [str(fleet.earlier_path(2)), str(fleet.earlier_path(3)), str(fleet.root_path)]
@@ -149,9 +147,7 @@ def test_a_vehicle_that_missed_two_roots_takes_those_between_too(
     assert version() == 4
 
 
-def test_a_bundle_of_before_is_refused_once_its_key_is_revoked(
-    fleet: KeyStore, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_older_bundle_is_refused_after_revocation(fleet: KeyStore, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["keys", "replace", "mission-agent"]) == ExitCode.OK
     assert refused(capsys, "run", "old.bundle") == "revoked-key"
     assert not Path("runs").exists()
@@ -165,7 +161,7 @@ def test_a_bundle_of_before_is_refused_once_its_key_is_revoked(
     assert version() == 2
 
 
-def test_what_the_vehicle_accepts_meanwhile_counts(fleet: KeyStore, capsys: pytest.CaptureFixture[str]) -> None:
+def test_roots_accepted_by_vehicle_meanwhile_count(fleet: KeyStore, capsys: pytest.CaptureFixture[str]) -> None:
     """A run waited, or was slow to begin, while a root came that revokes an agent's key: it takes nothing of that key
     any more, and does not put its own root in the place of the newer one.
     """
@@ -200,7 +196,7 @@ def test_two_roots_of_one_version_are_a_fork(fleet: KeyStore, capsys: pytest.Cap
     assert version() == 2
 
 
-def test_a_revoked_root_key_signs_no_root_that_is_taken(fleet: KeyStore, capsys: pytest.CaptureFixture[str]) -> None:
+def test_root_signed_by_revoked_root_key_is_refused(fleet: KeyStore, capsys: pytest.CaptureFixture[str]) -> None:
     stolen, first = fleet.signing_key(Duty.ROOT), opened_root(fleet.root())
     assert main(["keys", "rotate-root", "--days", "7"]) == ExitCode.OK
     chain = [str(fleet.earlier_path(2)), str(fleet.root_path)]
@@ -212,7 +208,7 @@ def test_a_revoked_root_key_signs_no_root_that_is_taken(fleet: KeyStore, capsys:
     assert version() == 3
 
 
-def test_the_log_key_that_was_revoked_signs_no_log_more(fleet: KeyStore, capsys: pytest.CaptureFixture[str]) -> None:
+def test_revoked_log_key_signs_no_log(fleet: KeyStore, capsys: pytest.CaptureFixture[str]) -> None:
     stolen = fleet.key_path(Duty.LOG).read_bytes()
     assert main(["keys", "replace", "log"]) == ExitCode.OK
     Path("stolen.key").touch(0o600)
@@ -245,7 +241,7 @@ def test_the_key_of_a_link_is_revoked_by_its_fingerprint(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("what", ["mission-agent", "policy", "log", "damaged", "set-back"])
-def test_what_flies_comes_down_whatever_was_revoked_meanwhile(fleet: KeyStore, what: str) -> None:
+def test_vehicle_in_flight_lands_after_revocation(fleet: KeyStore, what: str) -> None:
     """A run is killed in the air, a key of its bundle is revoked, and it is started again with the old command line."""
     of = launched(order())
     store = FileReplayStore(order().kept_in, QUAD)
@@ -273,7 +269,7 @@ def test_what_flies_comes_down_whatever_was_revoked_meanwhile(fleet: KeyStore, w
     unverified(again, "old.bundle")  # nothing of it is in the air
 
 
-def test_what_flies_comes_down_where_something_else_is_in_the_state_folders_place(fleet: KeyStore) -> None:
+def test_vehicle_in_flight_lands_without_state_folder(fleet: KeyStore) -> None:
     """Neither what was accepted nor what was opened can be read then: only the vehicle tells whether it flies."""
     of = launched(order())
     rmtree(state_folder())
@@ -286,7 +282,7 @@ def test_what_flies_comes_down_where_something_else_is_in_the_state_folders_plac
     assert refusal_of(trusted.settle(resumed=False)).code == ExitCode.INPUT
 
 
-def test_what_comes_down_keeps_its_evidence_elsewhere_where_no_run_can_lie(
+def test_landing_without_run_folder_keeps_evidence_elsewhere(
     fleet: KeyStore, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
@@ -322,7 +318,7 @@ def expiring(fleet: KeyStore, duty: Duty) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("accepted", [False, True])
 @pytest.mark.parametrize("duty", [Duty.ROOT, Duty.POLICY, Duty.MISSION, Duty.LOG])
-def test_what_flies_comes_down_whatever_has_expired_meanwhile(fleet: KeyStore, duty: Duty, accepted: bool) -> None:
+def test_vehicle_in_flight_lands_after_expiry(fleet: KeyStore, duty: Duty, accepted: bool) -> None:
     """A run is killed in the air, and started again after the root, or a key of its bundle or log, expired."""
     expiring(fleet, duty)
     bundle = Path("old.bundle").read_bytes()
@@ -346,9 +342,7 @@ def test_what_flies_comes_down_whatever_has_expired_meanwhile(fleet: KeyStore, d
     unverified(order(dry_run=True), "old.bundle", Late())
 
 
-def test_a_wait_brings_down_its_own_flight_and_none_of_somebody_else_long_after(
-    fleet: KeyStore, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_wait_brings_down_only_its_own_flight(fleet: KeyStore, monkeypatch: pytest.MonkeyPatch) -> None:
     """A run died, the vehicle came home otherwise, and later somebody flies it in a mode that is ours too."""
     monkeypatch.setattr(waiting, "BUNDLE", "old.bundle")
     base = launched(order())
@@ -377,7 +371,7 @@ def replace_mission(base: Loaded) -> Loaded:
     return cast("Loaded", SimpleNamespace(bundle=bundle, in_force=flight))
 
 
-def test_no_bundle_is_admitted_once_the_log_key_has_expired_that_the_wait_began_with(fleet: KeyStore) -> None:
+def test_bundle_is_refused_after_log_key_expired(fleet: KeyStore) -> None:
     expiring(fleet, Duty.LOG)
     bundle = Path("old.bundle").read_bytes()
     _, base, trusted, signer = verified(order(), "old.bundle")
@@ -402,7 +396,7 @@ def launched(of: FlightRequest) -> Loaded:
     return verified(of, str(of.bundle)).loaded
 
 
-def test_a_root_in_earnest_is_accepted_by_flying_under_it_and_one_for_development_is_not(tmp_path: Path) -> None:
+def test_flight_accepts_production_root_but_not_development_root(tmp_path: Path) -> None:
     key = SigningKey.from_seed(bytes([7]) * 32, duty=Duty.ROOT)
     earnest = TrustRoot(1, False, 0, 1 << 60, (key.verification(),))
     path = tmp_path / "earnest.trust"

@@ -24,7 +24,7 @@ def test_a_step_under_another_binding_is_denied(bit: int) -> None:
     assert answer.target is None
 
 
-def test_the_binding_of_another_step_is_not_this_ones() -> None:
+def test_binding_of_another_step_is_denied() -> None:
     of = loaded()
     answer = answer_to(of, request_for(of, binding=of.bundle.mission.invocations[1].binding))
     assert isinstance(answer, Decision)
@@ -43,7 +43,7 @@ def test_links_are_bound_too(kind: int, step: int, link: int) -> None:
 
 
 @pytest.mark.parametrize("field", ["require", "assume", "maintain", "fallback", "record"])
-def test_what_the_published_binding_leaves_out_is_bound(field: str) -> None:
+def test_binding_covers_fields_omitted_in_paper(field: str) -> None:
     """`pre`, `sc`, `inv`, `f_b`, `ev`: weakened after binding, the bundle does not load, whoever signed it."""
     payload = bundle.policy_payload(POLICY)
     bound = binding.bind(MISSION, bundle.policy_digest(payload))
@@ -56,7 +56,7 @@ def test_what_the_published_binding_leaves_out_is_bound(field: str) -> None:
 
 
 @pytest.mark.parametrize("field", ["require", "assume", "maintain", "fallback", "record"])
-def test_a_mission_that_weakens_its_policy_is_refused_even_when_bound(field: str) -> None:
+def test_bound_mission_that_weakens_policy_is_refused(field: str) -> None:
     weaker = replace(INVOCATIONS[2], contract=replace(INVOCATIONS[2].contract, **{field: ()}))
     refusal = try_load(sealed(mission=replace(MISSION, invocations=(*INVOCATIONS[:2], weaker, INVOCATIONS[3]))))
     assert isinstance(refusal, Refusal)
@@ -64,7 +64,7 @@ def test_a_mission_that_weakens_its_policy_is_refused_even_when_bound(field: str
 
 
 @pytest.mark.parametrize("hidden", [{"speed": 9_000}, {"altitude": 30_000}])
-def test_a_plan_says_nothing_that_no_argument_says(hidden: dict[str, int]) -> None:
+def test_plan_that_differs_from_arguments_is_refused(hidden: dict[str, int]) -> None:
     """Whoever approves a step sees its arguments: who signs the mission may not choose a speed beside them."""
     step = 0 if "speed" in hidden else 3  # a takeoff has no speed, a return no altitude
     odd = replace(INVOCATIONS[step], plan=replace(INVOCATIONS[step].plan, **hidden))

@@ -35,7 +35,7 @@ def met(of: Loaded = OF) -> Loaded:
 YEAR = 365 * 24 * 60 * MIN
 
 
-def test_what_has_expired_stays_expired() -> None:
+def test_expired_document_stays_expired_after_clock_change() -> None:
     answer = asked(met(), after(YEAR))
     assert isinstance(answer, Decision)
     assert answer.reason is Reason.EXPIRED
@@ -43,7 +43,7 @@ def test_what_has_expired_stays_expired() -> None:
 
 
 @pytest.mark.parametrize("said", [-MIN, CLOCKS_PART_US + S + 1, 60 * MIN, YEAR])
-def test_the_time_of_day_goes_on_as_time_does(said: int) -> None:
+def test_time_of_day_must_advance_with_monotonic_time(said: int) -> None:
     assert asked(met(), after(S, said=said)) is Status.MALFORMED
     answer = asked(met(), after(S))
     assert isinstance(answer, Decision)
@@ -58,7 +58,7 @@ def test_a_clock_may_be_off_a_little(said: int) -> None:
 
 
 @pytest.mark.parametrize("document", [approval, recall])
-def test_an_old_document_is_not_made_good(document: object) -> None:
+def test_clock_change_does_not_revalidate_old_document(document: object) -> None:
     assert callable(document)
     old = document(LOW)
     assert presented(met(LOW), old, now=after(60 * MIN)).slug == "expired"
@@ -66,7 +66,7 @@ def test_an_old_document_is_not_made_good(document: object) -> None:
     assert presented(met(LOW), old, now=after(MIN // 2)).accepted
 
 
-def test_by_a_clock_that_does_not_know_nothing_is_granted() -> None:
+def test_unknown_clock_grants_nothing() -> None:
     lost = replace(after(YEAR, said=0), utc_error_us=YEAR)
     answer = asked(met(), lost)
     assert isinstance(answer, Decision)

@@ -16,7 +16,7 @@ MANY = 1_000
 
 
 @pytest.mark.parametrize("command", ["check", "lint"])
-def test_so_many_are_shown_and_the_others_counted(
+def test_findings_beyond_limit_are_counted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -40,7 +40,7 @@ def test_errors_are_shown_before_the_rest() -> None:
     assert most_severe([*warnings, error], 6) == (*warnings, error)
 
 
-def test_of_one_finding_so_many_places_are_shown() -> None:
+def test_places_of_one_finding_are_limited() -> None:
     text = "x\n" * MANY
     labels = tuple(Label(Span("a", 2 * number, 2 * number + 1), "here") for number in range(1, MANY))
     told = render_one(Diagnostic(UNUSED, "x", Span("a", 0, 1), labels=labels), {"a": Source("a", text)})

@@ -77,14 +77,14 @@ def test_one_person_in_two_roles_is_one_person() -> None:
     assert asked(of) == ALLOWED
 
 
-def test_either_of_two_people_says_no() -> None:
+def test_refusal_by_either_person_denies() -> None:
     of = flying(SUPERVISOR)
     assert presented(of, approval(of, key=ADA)).accepted
     assert presented(of, approval(of, key=BOB, granted=0)).accepted
     assert asked(of) == (Outcome.DENY, Reason.APPROVAL_REFUSED)
 
 
-def test_a_person_speaks_for_no_other_role() -> None:
+def test_person_cannot_answer_for_another_role() -> None:
     of = flying(OPERATOR)
     assert presented(of, approval(of, key=BOB, role="operator")).slug == "wrong-role"
 

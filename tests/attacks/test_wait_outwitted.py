@@ -62,11 +62,11 @@ def hand_in(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[str], 
     return handed
 
 
-def test_what_an_agent_signed_itself_flies(hand_in: Callable[[str], str]) -> None:
+def test_mission_signed_by_agent_flies(hand_in: Callable[[str], str]) -> None:
     assert main(["compile", str(PROPOSAL), "--with", str(POLICY), "-o", "own.bundle"]) == ExitCode.OK
     assert hand_in("own.bundle") == "accepted"
 
 
-def test_the_mission_of_the_bundle_that_is_waited_with_does_not(hand_in: Callable[[str], str]) -> None:
+def test_waiting_mission_does_not_fly(hand_in: Callable[[str], str]) -> None:
     """A person may have signed it, for what no agent may ask."""
     assert hand_in("base.bundle") == "waited-with"

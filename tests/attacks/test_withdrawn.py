@@ -82,7 +82,7 @@ def test_a_takeoff_that_was_late_flies_where_frames_are_signed_ahead(
     assert flown.dispatched()[:2] == ["takeoff", "takeoff"]
 
 
-def test_what_stands_behind_a_step_is_signed_as_it_begins_though_it_needs_no_frame(apart: Callable[..., Apart]) -> None:
+def test_links_of_step_without_frames_are_signed_when_it_begins(apart: Callable[..., Apart]) -> None:
     of = apart("px4", legs=1)
     thief, signed = Thief(of), list[bytes]()
     answer = of._answer
@@ -141,7 +141,7 @@ def test_the_log_of_a_flight_whose_takeoff_was_late_is_sound(mode: EnforcementMo
 
 
 @pytest.mark.parametrize("attested", [False, True])
-def test_that_a_step_came_again_is_not_left_out(attested: bool) -> None:
+def test_log_without_repeated_decision_fails(attested: bool) -> None:
     lines, _ = tried_twice(attested)
     (unsent,) = where(lines, "refused")
     again = where(lines, "decision")[1]
@@ -193,7 +193,7 @@ def judged(lines: Lines, entries: Entries) -> str | None:
 
 
 @pytest.mark.parametrize("attested", [False, True])
-def test_a_frame_that_left_is_found_beside_a_log_that_says_that_nothing_did(attested: bool) -> None:
+def test_sent_frame_contradicts_log_without_dispatch(attested: bool) -> None:
     lines, entries = tried_twice(attested)
     assert judged(lines, list(entries)) is None
     (unsent,), first = where(lines, "refused"), where(lines, "dispatched")[0]
@@ -205,7 +205,7 @@ def test_a_frame_that_left_is_found_beside_a_log_that_says_that_nothing_did(atte
         assert judged(lines, beside) == "frames/was-sent", at_us
 
 
-def test_a_frame_of_the_microsecond_in_which_a_step_ended_is_found_too() -> None:
+def test_frame_at_end_of_step_is_detected() -> None:
     """It was allowed until then; the record which says that nothing was sent comes later."""
     lines, entries = tried_twice(False)
     (failed,), again = where(lines, "failed"), read(lines[where(lines, "dispatched")[1]])["utc_us"]
@@ -217,7 +217,7 @@ def test_a_frame_of_the_microsecond_in_which_a_step_ended_is_found_too() -> None
     assert judged(signed(earlier), beside) == "frames/was-sent"
 
 
-def test_a_frame_that_may_be_the_step_before_is_held_against_none() -> None:
+def test_frame_of_previous_step_is_not_a_flaw() -> None:
     """Two dispatches of one target in one microsecond, of which the first ended then: its frame may be either's."""
     lines, entries = tried_twice(False)
     up, (failed,), (unsent,) = where(lines, "dispatched")[0], where(lines, "failed"), where(lines, "refused")

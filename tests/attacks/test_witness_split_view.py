@@ -60,7 +60,7 @@ def futures() -> tuple[Log, Log]:
     return flown, told
 
 
-def test_each_future_to_another_witness(futures: tuple[Log, Log]) -> None:
+def test_split_view_to_two_witnesses_is_detected(futures: tuple[Log, Log]) -> None:
     """Each cosigns what it saw, for neither saw both; but no future has two, and both anchors together convict."""
     flown, told = futures
     marks = [anchored(flown, Judge()), anchored(told, Judge(WITNESSES[1]))]
@@ -69,7 +69,7 @@ def test_each_future_to_another_witness(futures: tuple[Log, Log]) -> None:
         assert slug(log, marks) == "anchor/root"
 
 
-def test_one_after_the_other_to_one_witness(futures: tuple[Log, Log]) -> None:
+def test_split_view_to_one_witness_is_refused(futures: tuple[Log, Log]) -> None:
     flown, told = futures
     witness = Judge()
     anchored(flown, witness)
@@ -84,7 +84,7 @@ def test_one_after_the_other_to_one_witness(futures: tuple[Log, Log]) -> None:
     assert refusal.status == INCONSISTENT
 
 
-def test_what_was_seen_is_taken_back(futures: tuple[Log, Log]) -> None:
+def test_retracted_history_is_refused(futures: tuple[Log, Log]) -> None:
     """Rollback: back to the fork, and on from there. The witness does not go back, and the anchor does not go away."""
     flown, _ = futures
     witness = Judge()
@@ -120,7 +120,7 @@ def test_one_of_two_witnesses_lies(futures: tuple[Log, Log]) -> None:
     assert f"rtshcua/witness/{liar.key.kid.hex()}" in found.text
 
 
-def test_a_liar_does_not_count_twice(futures: tuple[Log, Log]) -> None:
+def test_lying_witness_counts_once(futures: tuple[Log, Log]) -> None:
     flown, _ = futures
     liar = Judge(WITNESSES[1])
     assert records(flown, [liar.blindly(note) for note in flown.notes] * 2) == 0
@@ -147,7 +147,7 @@ def test_a_cosignature_by_a_key_of_the_vehicle(futures: tuple[Log, Log]) -> None
     assert records(flown, [f"{flown.notes[-1]}— {name} {own}"], 1) == 0
 
 
-def test_a_witness_that_was_made_to_forget(futures: tuple[Log, Log]) -> None:
+def test_witness_with_reset_state(futures: tuple[Log, Log]) -> None:
     """Who deletes its memory gets a second cosignature; the first is still out there."""
     flown, told = futures
     witness = Judge()

@@ -107,7 +107,7 @@ def test_a_genesis_that_follows_something() -> None:
     assert found.status == FORBIDDEN
 
 
-def test_who_names_the_checkpoint_that_was_cosigned_over_another_record() -> None:
+def test_cosigned_checkpoint_over_another_record_is_refused() -> None:
     """All keys are his: the later checkpoint names what the witness saw. Then it is the log that does not verify."""
     one, other = Log(), Log(bundle=b"another bundle")
     witness = Judge()
@@ -131,7 +131,7 @@ def test_who_names_the_checkpoint_that_was_cosigned_over_another_record() -> Non
 
 
 @pytest.mark.parametrize("number", [0, 3])
-def test_by_file_a_signed_record_is_the_one_that_was_signed(number: int) -> None:
+def test_survey_requires_signed_record_of_checkpoint(number: int) -> None:
     """A field of a signed record is edited, and its signature left: the tree of the lines before it is as it was."""
     log = grown(Log())
     fields = json.loads(log.lines[number])

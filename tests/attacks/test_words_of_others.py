@@ -56,7 +56,9 @@ def low(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
 
 
 @pytest.mark.parametrize("answer", [(), ("--refuse",), ("--json",)])
-def test_what_is_approved_is_told_by_us(low: Path, capsys: pytest.CaptureFixture[str], answer: tuple[str, ...]) -> None:
+def test_approval_prompt_uses_bound_values(
+    low: Path, capsys: pytest.CaptureFixture[str], answer: tuple[str, ...]
+) -> None:
     """A comment among the arguments is the proposer's, and what is signed is the skill with its arguments."""
     command = ["approve", "low.bundle", "--step", "3", "-o", "yes", "--flight", bytes(16).hex(), *answer]
     assert main(command) == ExitCode.OK
@@ -70,7 +72,7 @@ def test_what_is_approved_is_told_by_us(low: Path, capsys: pytest.CaptureFixture
 
 
 @pytest.mark.parametrize(("typed", "code"), [("y\n", ExitCode.OK), ("n\n", ExitCode.REFUSED), ("", ExitCode.INPUT)])
-def test_what_is_approved_is_told_before_it_is_signed(
+def test_approval_prompt_comes_before_signature(
     low: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, typed: str, code: ExitCode
 ) -> None:
     """A person at a terminal sees the step, and only then says whether to sign it."""
@@ -89,7 +91,7 @@ def test_what_is_approved_is_told_before_it_is_signed(
     assert (low / "yes").exists() == bool(seen) == (code is ExitCode.OK)
 
 
-def test_the_name_of_a_mission_says_nothing_of_what_is_signed(low: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_mission_name_cannot_imitate_signed_content(low: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Whoever has a mission key signs what no compiler would: a name that reads as the step, and pushes ours away."""
     store = KeyStore(data_folder())
     trusted, data = opened_root(store.root()), (low / "low.bundle").read_bytes()
@@ -109,7 +111,7 @@ def test_the_name_of_a_mission_says_nothing_of_what_is_signed(low: Path, capsys:
     assert len(capsys.readouterr().err.split("`inspect_area(")[0]) < 160
 
 
-def test_a_script_at_a_terminal_is_not_asked(
+def test_scripts_are_not_prompted(
     low: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rtshcua.front.cli.commands.approve.terminal", lambda: True)
@@ -118,16 +120,14 @@ def test_a_script_at_a_terminal_is_not_asked(
 
 
 @pytest.mark.parametrize("as_json", [False, True])
-def test_what_became_of_a_document_is_one_harmless_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], as_json: bool
-) -> None:
+def test_document_result_is_one_escaped_line(tmp_path: Path, capsys: pytest.CaptureFixture[str], as_json: bool) -> None:
     deliver(b"", f"recalled `{ESCAPES}`", to=None, output=tmp_path / "out", as_json=as_json)
     out = capsys.readouterr().out
     assert harmless(out)
     assert out.count("\n") == 1
 
 
-def test_an_error_is_one_harmless_line(capsys: pytest.CaptureFixture[str]) -> None:
+def test_error_is_one_escaped_line(capsys: pytest.CaptureFixture[str]) -> None:
     say(f"no such file: `{ESCAPES}`")
     assert main(["show", f"{ESCAPES}.bundle"]) == ExitCode.INPUT
     err = capsys.readouterr().err
@@ -165,7 +165,7 @@ OVER_NAMES = [
 ]  # fmt: skip
 
 
-def test_names_of_others_are_harmless_whatever_is_said_of_them(low: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_foreign_names_are_escaped_everywhere(low: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Over every command that takes a file: what it says at success, as JSON, as a report, and when it fails."""
     names = {"source": f"{NAME}.rts", "bundle": f"{NAME}.bundle", "untidy": f"{NAME} u.rts", "folder": f"{NAME}-site"}
     (low / names["source"]).write_text(LOW.replace("/* only hover(5 s), near home */ ", ""))
@@ -183,20 +183,20 @@ def test_names_of_others_are_harmless_whatever_is_said_of_them(low: Path, capsys
             json.loads(said.out)
 
 
-def test_a_program_is_told_a_name_as_it_is(low: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_output_keeps_names_unchanged(low: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (low / f"{NAME}.rts").write_text(LOW)
     assert main(["fmt", "--check", "--json", f"{NAME}.rts"]) == ExitCode.DIAGNOSTICS
     assert json.loads(capsys.readouterr().out)["files"][0]["file"] == f"{NAME}.rts"
 
 
-def test_the_header_of_a_run_is_one_harmless_line() -> None:
+def test_run_header_is_one_escaped_line() -> None:
     fields = dict.fromkeys(FlightPlanView.__struct_fields__, ESCAPES)
     (line,) = plain(FlightPlanView(**fields))  # type: ignore[arg-type]
     assert harmless(line)
     assert "\n" not in line
 
 
-def test_an_annotation_is_one_harmless_line() -> None:
+def test_annotation_is_one_escaped_line() -> None:
     name = f"{ESCAPES}.rts"
     found = Diagnostic(codes.SYNTAX, ESCAPES, Span(name, 0, 1), ESCAPES, pointer=ESCAPES)
     for sources in ({}, {name: Source(name, ESCAPES)}):
@@ -205,7 +205,7 @@ def test_an_annotation_is_one_harmless_line() -> None:
 
 
 @pytest.mark.parametrize("character", [*"\x1b\x9b\u202e\u2066\u200b\u00ad\ufe0f\u2028\u3164\x08\r\ufeff", "\U000e0041"])
-def test_a_source_that_reads_as_something_else_is_refused(character: str) -> None:
+def test_misleading_source_text_is_refused(character: str) -> None:
     """Also in a comment and in a text, where the grammar takes everything."""
     for source in (LOW.replace("only", character), LOW.replace("Low", character), f"x{character}"):
         found = parse(Source("low.rts", source)).diagnostics
@@ -237,6 +237,6 @@ def test_a_specification_holds_no_comment(comment: str) -> None:
     assert "comment" in found.message
 
 
-def test_what_is_made_harmless_is_told_apart() -> None:
+def test_escaped_texts_stay_distinct() -> None:
     assert visible("a b\u00e9\u6f22") == "a b\u00e9\u6f22"
     assert visible("a\u202eb\ufe0fc\u2800\n") == "a<U+202E>b<U+FE0F>c<U+2800><U+000A>"

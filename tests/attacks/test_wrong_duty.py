@@ -45,7 +45,7 @@ def refusal(envelope, duty, keys=TRUSTED):
 
 
 @rows("duty", list(Duty))
-def test_the_right_key_passes_and_so_does_the_forger_s_tool(duty):
+def test_control_envelopes_verify(duty):
     """The twin of all that follows: with nothing crossed, the same hand-made bytes are what we make and accept."""
     key, content_type = KEYS[duty], ARTEFACTS[duty].content_type
     envelope = forged(key, label=duty.label, content_type=content_type, kid=key.kid)
@@ -54,7 +54,7 @@ def test_the_right_key_passes_and_so_does_the_forger_s_tool(duty):
 
 
 @rows(("has", "wanted"), CROSSED)
-def test_our_own_tools_refuse(has, wanted):
+def test_tools_refuse_to_sign_for_wrong_duty(has, wanted):
     with pytest.raises(WrongDuty):
         KEYS[has].sign(PAYLOAD, duty=wanted)
     with pytest.raises(WrongDuty):
@@ -77,7 +77,7 @@ def test_forged_envelopes_are_refused(has, wanted):
 
 
 @rows(("has", "wanted"), CROSSED)
-def test_a_genuine_envelope_serves_no_other_duty(has, wanted):
+def test_envelope_is_refused_for_another_duty(has, wanted):
     genuine = cose.sign1(PAYLOAD, key=KEYS[has], duty=has, content_type=ARTEFACTS[has].content_type)
     assert refusal(genuine, wanted) == "wrong-content-type"
     # even if one content type were used for both, and one public key were trusted for both under a name that fits
@@ -91,7 +91,7 @@ def test_a_genuine_envelope_serves_no_other_duty(has, wanted):
 
 
 @pytest.mark.parametrize("duty", [duty for duty in Duty if duty is not Duty.ROOT])
-def test_no_other_key_makes_a_root(duty):
+def test_root_signed_by_other_key_is_refused(duty):
     """A root that names the attacker's key as root key, signed by that very key, is not the pinned one."""
     attacker = SigningKey(Duty.ROOT, True, KEYS[duty].private)
     mine = TrustRoot(2, True, 0, 1000, (attacker.verification(),)).sign(attacker)

@@ -50,7 +50,7 @@ def compare(c: Boundary, seed: int, count: int) -> Counter[str]:
     return found
 
 
-def test_what_python_opens_c_opens(c: Boundary) -> None:
+def test_bundle_opened_by_python_is_opened_by_c(c: Boundary) -> None:
     signed, pin, data, vehicle, now_us = rich()
     trust = agree_on_root(c, signed, pin, now_us)
     assert isinstance(trust, TrustRoot)

@@ -58,7 +58,7 @@ def some_frame(random: Random, number: int) -> bytes:
     return frame
 
 
-def test_both_hold_to_the_same_time_of_day(boundary: ctypes.CDLL) -> None:
+def test_both_check_the_same_time_of_day(boundary: ctypes.CDLL) -> None:
     boundary.rt_test_clock_asks.restype = boundary.rt_test_bears_out.restype = ctypes.c_bool
     random, taken = Random(31), Counter[ClockSource]()
     told = (ctypes.c_int64 * 5)()
@@ -100,7 +100,7 @@ def vars_of(now: Now) -> tuple[int, int, int]:
     return now.monotonic_us, now.utc_us, now.utc_error_us
 
 
-def test_both_bear_out_the_same(boundary: ctypes.CDLL) -> None:
+def test_both_accept_the_same_claimed_times(boundary: ctypes.CDLL) -> None:
     boundary.rt_test_bears_out.restype = ctypes.c_bool
     random, found = Random(32), Counter[bool]()
     for _ in range(3_000):
@@ -114,7 +114,7 @@ def test_both_bear_out_the_same(boundary: ctypes.CDLL) -> None:
 
 
 @pytest.mark.parametrize("stated", [-1, 1_000])
-def test_both_decide_and_take_in_by_their_own_clock_alone(boundary: ctypes.CDLL, stated: int) -> None:
+def test_both_use_only_their_own_clock(boundary: ctypes.CDLL, stated: int) -> None:
     """The same clock for both, and times that are named beside it, in every direction."""
     random = Random(33)
     moment, unknown = START.monotonic_us, replace(START, utc_error_us=UTC_UNKNOWN_US)

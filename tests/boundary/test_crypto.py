@@ -65,7 +65,7 @@ def test_hashes_and_macs_are_those_of_python(boundary: ctypes.CDLL, size: int) -
         assert out.raw == hmac.digest(key, data, "sha256")
 
 
-def test_bytes_are_compared_whole(boundary: ctypes.CDLL) -> None:
+def test_byte_strings_are_compared_completely(boundary: ctypes.CDLL) -> None:
     assert boundary.rt_test_equal(bytes(32), bytes(32), 32) & 1
     for at in (0, 15, 31):
         other = bytearray(32)
@@ -81,7 +81,7 @@ def test_examples_of_rfc_8032(boundary: ctypes.CDLL, seed: str, key: str, messag
     assert agreed(boundary, public.raw, made.raw, data)
 
 
-def test_no_altered_signature_counts(boundary: ctypes.CDLL) -> None:
+def test_altered_signature_is_refused(boundary: ctypes.CDLL) -> None:
     random = Random(1)
     for size in (0, 1, 100, 300):
         message, seed = random.randbytes(size), random.randbytes(32)
@@ -126,7 +126,7 @@ def test_points_of_small_order_and_other_encodings_are_refused(boundary: ctypes.
             assert not is_strong((y | sign << 255).to_bytes(32, "little"))
 
 
-def test_the_cofactor_is_left_alone(boundary: ctypes.CDLL) -> None:
+def test_verification_is_without_cofactor(boundary: ctypes.CDLL) -> None:
     """A key or an R with a part of small order counts only where the equation holds without the cofactor."""
     random, outcomes = Random(2), set()
     for weak in TORSION[1:]:
@@ -145,7 +145,7 @@ def test_the_cofactor_is_left_alone(boundary: ctypes.CDLL) -> None:
     assert {(0, True), (1, True), (1, False), (2, False)} <= outcomes
 
 
-def test_what_is_no_point_signs_nothing(boundary: ctypes.CDLL) -> None:
+def test_invalid_curve_point_verifies_nothing(boundary: ctypes.CDLL) -> None:
     random, signature = Random(3), bytes.fromhex(RFC_8032[0][3])
     for _ in range(64):
         assert not agreed(boundary, random.randbytes(32), signature, b"")

@@ -173,7 +173,7 @@ def mutated(native: Native, plain: PreparedPolicy, of: Random) -> tuple[bool, bo
 
 @pytest.mark.slow
 @pytest.mark.parametrize("count", [150, pytest.param(100_000, marks=pytest.mark.soak)])
-def test_what_was_altered_is_refused_alike(native: Native, count: int) -> None:
+def test_altered_input_is_refused_alike(native: Native, count: int) -> None:
     of, plain = Random(count), prepare(flat.POLICY)
     assert isinstance(plain, PreparedPolicy)
     accepted = [mutated(native, plain, of) for _ in range(count)]
@@ -263,7 +263,7 @@ def test_the_largest_coordinates(native: Native) -> None:
             assert native.along(number, path, error) == prepared.along(path, (-error, -error, error, error))
 
 
-def test_times_are_told_alike(native: Native) -> None:
+def test_local_times_are_equal(native: Native) -> None:
     of = Random(3)
     for _ in range(40):
         made = rich_worlds.vehicle(of, flat.POLICY.vehicle)
@@ -318,7 +318,7 @@ def test_the_way_home_takes_as_much(native: Native) -> None:
                     )
 
 
-def test_words_are_the_same_whatever_parts_them(native: Native) -> None:
+def test_texts_match_with_any_white_space(native: Native) -> None:
     of = Random(5)
     pieces = [
         "a",

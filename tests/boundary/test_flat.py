@@ -92,12 +92,12 @@ def same(c: ctypes.CDLL, data: bytes) -> bool:
 
 
 @pytest.mark.parametrize("example", [bytes.fromhex(encoded) for _, encoded in EXAMPLES])
-def test_what_is_canonical_is_so_in_c(c: ctypes.CDLL, example: bytes) -> None:
+def test_c_accepts_canonical_cbor(c: ctypes.CDLL, example: bytes) -> None:
     assert c.rt_test_cbor(example, len(example))
 
 
 @pytest.mark.parametrize("data", [bytes.fromhex(data) for data, *_ in REFUSED])
-def test_what_is_not_canonical_is_not_in_c(c: ctypes.CDLL, data: bytes) -> None:
+def test_c_refuses_noncanonical_cbor(c: ctypes.CDLL, data: bytes) -> None:
     assert not c.rt_test_cbor(data, len(data))
 
 
@@ -111,7 +111,7 @@ def test_depth_and_size_have_the_same_limits(c: ctypes.CDLL) -> None:
         assert c.rt_test_cbor(data, len(data)) is canonical(data) is (more == 0)
 
 
-def test_all_that_has_two_bytes_at_most(c: ctypes.CDLL) -> None:
+def test_every_input_of_two_bytes(c: ctypes.CDLL) -> None:
     for size in range(3):
         for number in range(256**size):
             data = number.to_bytes(size)

@@ -28,7 +28,7 @@ def link_after(state: Path, key: Path | None) -> keeping.LinkState:
     return keeping.read(kept_file(state, VEHICLE)).link
 
 
-def test_a_start_without_the_key_leaves_the_links_timestamps_as_they_were(tmp_path: Path) -> None:
+def test_start_without_link_key_keeps_timestamps(tmp_path: Path) -> None:
     """Else a frame that was recorded before counts as new where the clock was set back."""
     key = tmp_path / "link.key"
     key.write_bytes(bytes(range(32)))
@@ -38,7 +38,7 @@ def test_a_start_without_the_key_leaves_the_links_timestamps_as_they_were(tmp_pa
     assert link_after(tmp_path, None) == used
 
 
-def test_a_mission_that_another_bundle_gave_back_stays_given_back_when_it_is_killed(tmp_path: Path) -> None:
+def test_released_mission_stays_released_after_kill(tmp_path: Path) -> None:
     """Nothing was sent of it, and the other bundle is refused."""
     process = BoundaryProcess(SIGNED_ROOT, PIN, VEHICLE, tmp_path, paced=True)
     caller = Caller(process.call)
@@ -51,9 +51,7 @@ def test_a_mission_that_another_bundle_gave_back_stays_given_back_when_it_is_kil
 
 
 @pytest.mark.parametrize("heard", [1, 40])
-def test_after_a_kill_the_next_frame_of_a_vehicle_that_counts_its_frames_is_believed(
-    tmp_path: Path, heard: int
-) -> None:
+def test_next_frame_is_accepted_after_kill(tmp_path: Path, heard: int) -> None:
     """ArduPilot's timestamp rises by one a frame: what is kept of it must not be ahead of what was heard."""
     key = tmp_path / "link.key"
     key.write_bytes(bytes(range(32)))

@@ -38,7 +38,7 @@ def test_a_permit_of_the_bundle_before_sends_nothing(boundary: ctypes.CDLL) -> N
     assert isinstance(other.executor.dispatch(allowed(other), START.monotonic_us), Command)
 
 
-def test_what_nothing_was_sent_of_may_be_loaded_again(boundary: ctypes.CDLL) -> None:
+def test_unsent_bundle_can_be_loaded_again(boundary: ctypes.CDLL) -> None:
     caller = held(boundary)
     into(caller, sealed())
     into(caller, sealed(mission=replace(MISSION, name="other")))

@@ -177,7 +177,7 @@ def test_where_a_link_fails_the_next_one_flies(flavour: str, apart: Make) -> Non
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_what_brings_it_home_goes_on(flavour: str, apart: Make) -> None:
+def test_return_continues_after_boundary_loss(flavour: str, apart: Make) -> None:
     of = apart(flavour)
     flown = of.fly(flies(3))
     assert after_loss(flown) == []
@@ -185,7 +185,7 @@ def test_what_brings_it_home_goes_on(flavour: str, apart: Make) -> None:
 
 
 @pytest.mark.slow
-def test_it_is_signed_anew_all_the_way_and_told_of_nothing(apart: Make) -> None:
+def test_frames_ahead_are_renewed_silently_during_flight(apart: Make) -> None:
     """A long flight in which it is not lost: no note says that something could not be signed."""
     flown = apart("px4", legs=8).fly(lambda _: False)
     assert flown.ending is Ending.COMPLETED

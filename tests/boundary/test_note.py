@@ -109,13 +109,13 @@ def compare(boundary: ctypes.CDLL, seed: int) -> bool:
     return begun
 
 
-def test_what_is_damaged_is_read_alike(boundary: ctypes.CDLL) -> None:
+def test_damaged_note_is_read_alike(boundary: ctypes.CDLL) -> None:
     found = [compare(boundary, seed) for seed in range(SAMPLE)]
     assert 0 < sum(found) < SAMPLE
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize("first", range(SAMPLE, SOAK, 5_000))
-def test_what_is_damaged_is_read_alike_for_long(first: int, boundary: ctypes.CDLL) -> None:
+def test_damaged_note_is_read_alike_long(first: int, boundary: ctypes.CDLL) -> None:
     for seed in range(first, first + 5_000):
         compare(boundary, seed)

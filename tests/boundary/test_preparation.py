@@ -113,7 +113,7 @@ def test_both_permit_and_let_out_the_same(boundary: ctypes.CDLL) -> None:
     assert sum(walk(boundary, seed) for seed in range(SAMPLE)) > SAMPLE / 2, "else it compares little"
 
 
-def test_both_settle_alike_what_may_be_set_at_all(boundary: ctypes.CDLL) -> None:
+def test_both_allow_the_same_parameters(boundary: ctypes.CDLL) -> None:
     """Each parameter, to each of the values at a bound, configured so."""
     given = 0
     for value in [*(found for edge in EDGES if (found := bits_of(edge)) is not None), *WILD]:
@@ -149,9 +149,7 @@ def test_a_prepared_flight_is_the_same_under_both(
     assert shadow.counts["preparations"] == 2, "set, and put back"
 
 
-def test_what_an_earlier_run_left_is_put_back_under_both(
-    boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_owed_parameter_is_restored_by_both_boundaries(boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch) -> None:
     from boundary.test_both_boundaries import watched
 
     shadow = watched(boundary, monkeypatch)

@@ -31,7 +31,7 @@ def test_the_file_is_what_the_script_makes() -> None:
 @pytest.mark.parametrize(
     ("key", "signature", "message", "case"), [pytest.param(*each, id=f"{each[3]['tcId']}") for each in CASES]
 )
-def test_all_four_say_what_is_known_of_a_signature(
+def test_all_implementations_agree_on_signature_vectors(
     boundary: ctypes.CDLL, key: bytes, signature: bytes, message: bytes, case: dict[str, Any]
 ) -> None:
     good = case["result"] == "valid"
@@ -42,7 +42,7 @@ def test_all_four_say_what_is_known_of_a_signature(
         assert bool(boundary.rt_test_verify(key, signature, message, len(message)) & 1) is good, case["comment"]
 
 
-def test_some_of_those_that_do_not_count_satisfy_the_equation() -> None:
+def test_some_refused_signatures_satisfy_the_equation() -> None:
     """Else the refusal of points of small order, and of large s, would show nothing."""
     flags = {
         case["flags"][0] for key, signature, message, case in CASES
@@ -60,7 +60,7 @@ def test_the_page_lists_all_points_of_small_order() -> None:
     assert all(weak(encoded(point)) and not is_strong(encoded(point)) for point in torsion())
 
 
-def test_a_key_that_is_weak_is_none_of_a_trust_root() -> None:
+def test_weak_key_is_refused_in_trust_root() -> None:
     for group in GROUPS:
         key = bytes.fromhex(group["publicKey"]["pk"])
         flags = {flag for each in group["tests"] for flag in each["flags"]}

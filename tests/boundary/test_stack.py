@@ -34,7 +34,7 @@ def test_the_stack_is_bounded(boundary: ctypes.CDLL) -> None:
         ("8 bytes (dynamic)", "memcpy", "`rt_answer` has no fixed size"),
     ],
 )
-def test_what_has_no_bound_is_found(tmp_path: Path, frame: str, edge: str, found: str) -> None:
+def test_unbounded_recursion_is_found(tmp_path: Path, frame: str, edge: str, found: str) -> None:
     sizes = dict.fromkeys(ENTRIES, "8 bytes (static)") | {"rt_answer": frame}
     nodes = [f'node: {{ title: "{name}" label: "{name}\\nx.c:1:1\\n{size}" }}' for name, size in sizes.items()]
     (tmp_path / "objects").mkdir()

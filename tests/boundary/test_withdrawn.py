@@ -143,7 +143,7 @@ def test_when_the_id_of_a_step_is_given_back(
     assert (script.run(line).said, script.again(step)) == (said, reason)
 
 
-def test_nothing_stands_behind_a_permit_that_was_given_up(both: Callable[[], Loaded]) -> None:
+def test_withdrawn_permit_covers_no_links(both: Callable[[], Loaded]) -> None:
     of = both()
     script = Script(of).run("allow:0 send:0 withdraw:0")
     for kind in (FALLBACK_LINK, CONTINGENCY_LINK):
@@ -154,7 +154,7 @@ def test_nothing_stands_behind_a_permit_that_was_given_up(both: Callable[[], Loa
     assert isinstance(of.executor.stand_in(script.permits["0b"], FALLBACK_LINK, 0, AT), Command), "as before"
 
 
-def test_a_link_has_no_id_to_be_given_back(both: Callable[[], Loaded]) -> None:
+def test_link_permit_cannot_be_withdrawn(both: Callable[[], Loaded]) -> None:
     of = both()
     hold = allowed(of, kind=CONTINGENCY_LINK, step=-1, link=0)
     assert of.executor.withdraw(hold, AT).slug == SENT
@@ -163,7 +163,7 @@ def test_a_link_has_no_id_to_be_given_back(both: Callable[[], Loaded]) -> None:
 
 
 @pytest.mark.parametrize("kind", [DISPATCH, STAND_IN, WITHDRAW, PREPARE])
-def test_a_permit_at_another_time_than_the_boundarys_is_told_as_refused(boundary: ctypes.CDLL, kind: int) -> None:
+def test_permit_at_other_time_is_reported_as_refused(boundary: ctypes.CDLL, kind: int) -> None:
     """An honest process that stood still records it, and the boundary signs for the same."""
     clock = [AT]
     caller = begin(

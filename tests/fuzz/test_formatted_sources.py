@@ -42,7 +42,7 @@ def test_most_of_them_are_laid_out() -> None:
     assert sum(one(seed) for seed in range(40)) > 20
 
 
-def test_the_oracle_sees_what_it_must() -> None:
+def test_oracle_detects_required_changes() -> None:
     text = "skill s(a: b, /* c */ d: e) { // f\n}"
     same = "skill s(\n  a: b, /* c */\n  d: e,\n) {  // f\n}\n"
     assert pieces(text) == pieces(same)

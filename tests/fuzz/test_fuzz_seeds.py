@@ -23,7 +23,7 @@ def target_of(name: str) -> Any:
 
 
 @pytest.mark.parametrize(("target", "seed"), KEPT, ids=[f"{target}-{path.name}" for target, path in KEPT])
-def test_a_finding_does_not_come_back(target: str, seed: Path) -> None:
+def test_fuzz_finding_stays_fixed(target: str, seed: Path) -> None:
     begun = time.process_time()
     target_of(target).one(seed.read_bytes())
     assert time.process_time() - begun < LIMIT
@@ -31,7 +31,7 @@ def test_a_finding_does_not_come_back(target: str, seed: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TARGETS)
-def test_a_target_takes_what_fuzzing_begins_with(name: str) -> None:
+def test_fuzz_target_accepts_its_seeds(name: str) -> None:
     target = target_of(name)
     of = Random(name)
     seeds = [seed for seed in target.seeds() if len(seed) <= target.MAX_LENGTH]

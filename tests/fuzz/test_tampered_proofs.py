@@ -16,7 +16,7 @@ def campaign(seed: int, count: int) -> Counter[str]:
     return Counter(proof_mutations.check(proof_mutations.mutated(of)) for _ in range(count))
 
 
-def test_every_proof_that_is_begun_with_is_true() -> None:
+def test_every_seed_proof_verifies() -> None:
     assert {proof_mutations.check(proof) for proof in proof_mutations.proofs()} == {"true"}
 
 

@@ -152,7 +152,7 @@ def campaign(seed: int, count: int) -> list[Counter[str]]:
     return [Counter(way(of) for _ in range(count)) for way in ways]
 
 
-def test_some_that_were_tampered_with() -> None:
+def test_some_tampered_requests() -> None:
     requests, anchors, answers, frames = campaign(7, 500)
     assert {"400", "403", "409", "422", "cosigned"} <= set(requests)
     assert {"rejected", "unanchored"} <= set(anchors)
@@ -162,9 +162,9 @@ def test_some_that_were_tampered_with() -> None:
 
 @pytest.mark.soak
 @pytest.mark.parametrize("seed", range(100))
-def test_a_million_that_were_tampered_with(seed: int) -> None:
+def test_a_million_tampered_requests(seed: int) -> None:
     campaign(1_000 + seed, 2_500)
 
 
-def test_requests_decode_as_they_were() -> None:
+def test_requests_roundtrip() -> None:
     assert all(isinstance(request := decode(each), CosignRequest) and request.encode() == each for each in REQUESTS)

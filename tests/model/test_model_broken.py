@@ -107,7 +107,7 @@ NEVER: dict[str, tuple[type, str, Callable[[Any], Any], str, str]] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", NEVER)
-def test_what_must_never_be_is_seen(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_broken_safety_property_is_detected(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     owner, method, broken, words, event = NEVER[name]
     monkeypatch.setattr(owner, method, broken(getattr(owner, method)))
     with pytest.raises(Broken, match=words):
@@ -155,9 +155,7 @@ AFTER: dict[str, tuple[type, str, Callable[[Any], Any], str, Small]] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", AFTER)
-def test_what_must_follow_a_silence_a_takeover_and_a_failed_stop_is_seen(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_broken_liveness_property_is_detected(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     owner, method, broken, words, of = AFTER[name]
     monkeypatch.setattr(owner, method, broken(getattr(owner, method)))
     with pytest.raises(Broken, match=words):
@@ -187,7 +185,7 @@ ENDLESS: dict[str, tuple[type, str, Callable[[Any], Any], str]] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ENDLESS)
-def test_a_path_without_an_end_is_seen(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_endless_path_is_detected(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     owner, method, broken, event = ENDLESS[name]
     monkeypatch.setattr(owner, method, broken(getattr(owner, method)))
     # a circle in a part is one in the whole

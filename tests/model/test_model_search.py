@@ -73,7 +73,7 @@ def test_every_state_of_a_small_run(of: Small) -> None:
         ([[(1, 0)], [(1, 1)], [(0, 0)], []], [0, 0, 0, 0], [0, 1, 2]),
     ],
 )
-def test_the_longest_way(edges: list[list[tuple[int, int]]], times: list[int], endless: list[int]) -> None:
+def test_longest_path_is_within_bound(edges: list[list[tuple[int, int]]], times: list[int], endless: list[int]) -> None:
     found = longest(edges)
     assert found[1] == endless
     assert endless or found[0] == times

@@ -82,7 +82,7 @@ def check(lag_us: int, last: MotionKind, name: str, begun_ms: int) -> str:
 
 
 @pytest.mark.slow
-def test_a_mode_that_a_pilot_chose_is_not_taken_back_by_a_leg() -> None:
+def test_leg_does_not_override_pilots_mode() -> None:
     """3 of 25 aimed tries did, at the real one. What left meanwhile changed no mode, and is told."""
     ends = Counter(
         check(15 * MS, MotionKind.HOLD, "land", begun_ms) for begun_ms in range(BEGUN_MS.start, BEGUN_MS.stop, 2)
@@ -92,12 +92,12 @@ def test_a_mode_that_a_pilot_chose_is_not_taken_back_by_a_leg() -> None:
 
 
 @pytest.mark.soak
-def test_no_leg_takes_a_mode_back_in_any_order() -> None:
+def test_no_leg_overrides_pilots_mode_in_any_order() -> None:
     print(Counter(check(*each) for each in orders()))
 
 
 @pytest.mark.slow
-def test_a_stop_takes_no_mode_back() -> None:
+def test_stop_does_not_override_pilots_mode() -> None:
     """A fallback leaves on a mode report that may be 300 ms old: it asks for no mode where it is in Hold."""
     for begun_ms in range(2, 20, 3):
         one = taken_at(flying(15 * MS), FlightMode.LAND, begun_ms, MotionKind.HOLD)
@@ -150,7 +150,7 @@ def asks(frame: bytes) -> bool:
 
 
 @pytest.mark.parametrize("after_ms", [60, 100, 140])
-def test_a_question_that_is_lost_is_put_again_before_a_way_home_leaves(after_ms: int) -> None:
+def test_lost_request_is_repeated_before_return(after_ms: int) -> None:
     one = copied(flying(15 * MS))
     one.vehicle.simulation.inject(PilotMode(0, FlightMode.POSITION))
     one.vehicle.lose = asks
@@ -173,7 +173,7 @@ def far_away() -> Flyer:
 
 @pytest.mark.parametrize("kind", [MotionKind.HOME, MotionKind.LAND])
 @pytest.mark.parametrize("after_ms", range(180, 330, 50))
-def test_a_way_home_waits_for_the_round_trip_of_its_link(kind: MotionKind, after_ms: int) -> None:
+def test_return_waits_for_link_round_trip(kind: MotionKind, after_ms: int) -> None:
     """It left after 50 ms, on a report from before the pilot's, and undid what was chosen 320 ms before."""
     one = copied(far_away())
     one.vehicle.simulation.inject(PilotMode(0, FlightMode.POSITION))
@@ -187,7 +187,7 @@ def test_a_way_home_waits_for_the_round_trip_of_its_link(kind: MotionKind, after
 
 
 @pytest.mark.parametrize(("delay_ms", "most_ms"), [(0, 1), (20, 51), (75, 156)])
-def test_a_way_home_that_nobody_disputes_waits_for_one_round_trip_at_most(delay_ms: int, most_ms: int) -> None:
+def test_undisputed_return_waits_at_most_one_round_trip(delay_ms: int, most_ms: int) -> None:
     one = copied(far_away() if delay_ms == 75 else flying(15 * MS))
     if delay_ms == 20:
         one.vehicle.simulation.inject(LinkDelay(0, 20 * MS))
@@ -200,6 +200,6 @@ def test_a_way_home_that_nobody_disputes_waits_for_one_round_trip_at_most(delay_
 
 @pytest.mark.soak
 @pytest.mark.parametrize("kind", ANY_KIND)
-def test_no_command_takes_a_mode_back_that_was_chosen_in_a_leg(kind: MotionKind) -> None:
+def test_no_command_overrides_mode_chosen_during_leg(kind: MotionKind) -> None:
     for lag_us, phase_ms, after_ms in product((LAGS_US[0], LAGS_US[-1]), PHASES_MS, AFTER_MS):
         check_after(lag_us, phase_ms, after_ms, kind)

@@ -159,18 +159,18 @@ def papers(of: Random, found: Loaded) -> list[str]:
 
 
 @given(worlds.CHANCES)
-def test_no_agent_does_what_agents_may_not(of: Random) -> None:
+def test_agent_cannot_do_what_policy_forbids(of: Random) -> None:
     assert broken(of) == []
 
 
 @pytest.mark.soak
 @settings(max_examples=20_000)
 @given(worlds.CHANCES)
-def test_no_agent_at_all_does(of: Random) -> None:
+def test_no_agent_strategy_does_forbidden_actions(of: Random) -> None:
     assert broken(of) == []
 
 
-def test_it_does_not_set_aside_what_a_person_ordered() -> None:
+def test_agent_cannot_cancel_mission_of_a_person() -> None:
     """A person's mission, of the key for both, is replaced and cancelled by that person and not by the agent."""
     ordered = replace(
         MISSION, invocations=tuple(replace(each, source=SourceKind.OPERATOR) for each in MISSION.invocations)
@@ -199,7 +199,7 @@ def test_it_does_not_set_aside_what_a_person_ordered() -> None:
 
 
 @given(worlds.CHANCES)
-def test_what_it_cancels_flies_the_contingency_and_no_step(of: Random) -> None:
+def test_cancelled_mission_flies_only_contingency(of: Random) -> None:
     """Whatever it proposed, and after whichever step: the links of the policy are decided as ever."""
     found = opened(proposed(of))
     if isinstance(found, Refusal):
@@ -274,7 +274,7 @@ def met_its_end(run: Run) -> list[str]:
 @pytest.mark.slow
 @given(worlds.CHANCES)
 @settings(max_examples=20)
-def test_whatever_an_agent_does_or_does_not_do_the_flight_ends_as_the_policy_has_it(of: Random) -> None:
+def test_flight_ends_by_policy_for_any_agent_behaviour(of: Random) -> None:
     run = meddled(of)
     assert met_its_end(run) == []
     assert_audited(run)
@@ -283,13 +283,13 @@ def test_whatever_an_agent_does_or_does_not_do_the_flight_ends_as_the_policy_has
 @pytest.mark.soak
 @settings(max_examples=2_000)
 @given(worlds.CHANCES)
-def test_so_it_does_whatever_many_agents_do(of: Random) -> None:
+def test_flight_ends_by_policy_for_many_agents(of: Random) -> None:
     run = meddled(of)
     assert met_its_end(run) == []
     assert_audited(run)
 
 
-def test_what_agents_may_do_flies() -> None:
+def test_permitted_agent_mission_flies() -> None:
     """Else nothing could be broken."""
     found = opened(MISSION)
     assert isinstance(found, Loaded)
@@ -304,12 +304,12 @@ def breaks(what: str, most: int = 400) -> bool:
     return any(what in each for seed in range(most) for each in broken(Random(seed)))
 
 
-def test_a_key_that_is_bound_to_nothing_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_search_detects_unrestricted_key(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bundle, "check_proposer", lambda *_: None)
     assert breaks("it speaks as somebody else")
 
 
-def test_a_contract_that_may_be_loosened_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_search_detects_loosened_contract(monkeypatch: pytest.MonkeyPatch) -> None:
     first = MISSION.invocations[0]
     lax = replace(MISSION, invocations=(replace(first, contract=replace(first.contract, **LAX)),))
     assert isinstance(opened(lax), Refusal)
@@ -322,7 +322,7 @@ def test_a_contract_that_may_be_loosened_is_noticed(monkeypatch: pytest.MonkeyPa
     assert judged(found, step, state) != [], "it would fly, on an empty battery"
 
 
-def test_an_approval_that_anybody_may_sign_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_search_detects_approval_by_anybody(monkeypatch: pytest.MonkeyPatch) -> None:
     named = AS_APPROVER.verification(roles=("supervisor",), sources=("operator",), vehicles=(VEHICLE,), person="agent")
     monkeypatch.setitem(globals(), "TRUST", replace(TRUST, keys=(*TRUST.keys, named)))
     assert breaks("its word was taken for a person's", 5)

@@ -251,14 +251,14 @@ class TakenOver:
 
 
 @given(worlds.CHANCES)
-def test_no_history_dispatches_what_was_not_admitted(of: Random) -> None:
+def test_no_history_dispatches_unadmitted_step(of: Random) -> None:
     assert TakenOver(of).go(40) == []
 
 
 @pytest.mark.soak
 @settings(max_examples=20_000)
 @given(worlds.CHANCES)
-def test_no_longer_history_does_either(of: Random) -> None:
+def test_no_longer_history_dispatches_unadmitted_step(of: Random) -> None:
     assert TakenOver(of).go(120) == []
 
 
@@ -267,7 +267,7 @@ def breaks(what: str = "", template: Loaded = OF, most: int = 300) -> bool:
     return any(what in each for seed in range(most) for each in TakenOver(Random(seed), template).go(60))
 
 
-def test_the_histories_reach_what_the_theorem_speaks_of() -> None:
+def test_histories_reach_all_cases_of_theorem() -> None:
     """Steps are sent, also one that was confirmed, and some mission is recalled; else nothing could be broken."""
     reached: set[object] = set()
     for seed in range(300):
@@ -280,24 +280,24 @@ def test_the_histories_reach_what_the_theorem_speaks_of() -> None:
     raise AssertionError(reached)
 
 
-def test_without_enforcement_it_does_not_hold() -> None:
+def test_theorem_fails_without_enforcement() -> None:
     assert breaks("a permit for what is inadmissible", UNENFORCED)
 
 
 @pytest.mark.slow
 @pytest.mark.altered
 @pytest.mark.parametrize("step", [name for _, name in NAMES])
-def test_a_decision_that_forgets_a_step_is_noticed(step: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_search_detects_decision_without_a_step(step: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(decide, step, lambda *_: decide.PASSED)
     assert breaks("a permit for what is inadmissible")
 
 
-def test_an_executor_that_believes_any_permit_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_search_detects_executor_without_mac(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(permits, "compare_digest", lambda _, __: True)
     assert breaks("a permit that nobody made")
 
 
-def test_an_executor_that_does_not_look_at_the_time_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_search_detects_executor_without_time_check(monkeypatch: pytest.MonkeyPatch) -> None:
     dispatch = executors.Executor._dispatch
 
     def whenever(self: executors.Executor, permit: Permit, now_us: int) -> Command | Refusal:

@@ -134,7 +134,7 @@ def test_every_flight_in_trouble_falls_back_and_ends(of: Random) -> None:
 @pytest.mark.soak
 @settings(max_examples=5_000)
 @given(worlds.CHANCES)
-def test_every_flight_in_more_trouble_does_too(of: Random) -> None:
+def test_every_flight_with_more_faults_falls_back_and_ends(of: Random) -> None:
     assert broken(flown(of, 20)) == []
 
 
@@ -143,7 +143,7 @@ def breaks(what: str, most: int = 120) -> bool:
     return any(what in broken(flown(Random(seed))) for seed in range(most))
 
 
-def test_the_flights_fall_back_in_every_way() -> None:
+def test_flights_cover_all_fallbacks() -> None:
     kinds: set[tuple[object, bool]] = set()
     for seed in range(60):
         run = flown(Random(seed))
@@ -152,13 +152,13 @@ def test_the_flights_fall_back_in_every_way() -> None:
     assert kinds >= {(0, True), (1, False), (2, False)}
 
 
-def test_a_command_that_was_not_signed_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_search_detects_unsigned_command(monkeypatch: pytest.MonkeyPatch) -> None:
     made = Commands._of_link
     monkeypatch.setattr(Commands, "_of_link", lambda self, link: ("goto", *made(self, link)[1:]))
     assert breaks("another skill than the one that was signed")
 
 
-def test_a_chain_that_begins_anew_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_search_detects_restarted_chain(monkeypatch: pytest.MonkeyPatch) -> None:
     """Neither the executor nor the runtime remembers which link was flown."""
     monkeypatch.setattr(Executor, "_refuse_link", lambda *_: None)
     choose = Fallback._choose
@@ -171,6 +171,6 @@ def test_a_chain_that_begins_anew_is_noticed(monkeypatch: pytest.MonkeyPatch) ->
     assert breaks("a chain went backwards") or breaks("it did not end")
 
 
-def test_a_runtime_that_does_not_fall_back_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_search_detects_runtime_without_fallback(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Fallback, "turn", lambda *_: True)
     assert breaks("it did not end", 20)

@@ -114,19 +114,19 @@ def survives_captured(of: Random) -> bool:
 
 
 @given(worlds.CHANCES)
-def test_without_a_key_nothing_is_changed_unnoticed(of: Random) -> None:
+def test_every_change_without_key_is_detected(of: Random) -> None:
     assert not survives(of)
 
 
 @given(worlds.CHANCES)
-def test_with_the_last_epochs_key_nothing_is_changed_that_was_sealed(of: Random) -> None:
+def test_last_epoch_key_cannot_change_sealed_records(of: Random) -> None:
     assert not survives_captured(of)
 
 
 @pytest.mark.soak
 @settings(max_examples=20_000)
 @given(worlds.CHANCES)
-def test_many_more_changes_are_noticed(of: Random) -> None:
+def test_many_more_changes_are_detected(of: Random) -> None:
     assert not survives(of)
     assert not survives_captured(of)
 
@@ -153,7 +153,7 @@ def breaks(survivor: Callable[[Random], bool], most: int = 150) -> bool:
     return any(survivor(Random(seed)) for seed in range(most))
 
 
-def test_a_verifier_that_believes_any_signature_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_search_detects_verifier_without_signatures(monkeypatch: pytest.MonkeyPatch) -> None:
     """What the signatures are for: with them believed, a forged segment is found by no hash."""
     monkeypatch.setattr(seals, "open_note", lambda text, *_: note.parse(note.split(text)[0]))
     assert breaks(by_a_stranger)
@@ -167,11 +167,11 @@ def by_a_stranger(of: Random) -> bool:
 
 
 @given(worlds.CHANCES)
-def test_a_strangers_signatures_are_worth_nothing(of: Random) -> None:
+def test_signatures_of_strangers_are_refused(of: Random) -> None:
     assert not by_a_stranger(of)
 
 
-def test_an_auditor_that_does_not_derive_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_search_detects_auditor_without_derivation(monkeypatch: pytest.MonkeyPatch) -> None:
     """With all keys a decision can be signed that does not follow from what it read: only deriving finds it."""
     lines = flight()
     number = next(n for n, line in enumerate(lines) if read(line)["type"] == "decision")

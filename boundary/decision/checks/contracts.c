@@ -8,7 +8,7 @@ static bool check_parameter(const rt_parameter *parameter, const rt_policy *poli
     return (parameter->kind != RT_CHOICE && parameter->kind != RT_ZONE) || (parameter->low >= 0 && parameter->high < count);
 }
 
-/* Also tells the kind at each first cell. */
+/* Also returns the kind at each first cell. */
 static bool check_parameters(const rt_contract *contract, const rt_policy *policy, uint8_t cells[RT_MAX_CELLS]) {
     rt_list left = contract->parameters;
     rt_parameter parameter;
@@ -47,14 +47,14 @@ static bool is_text(rt_bytes text, const char *other) {
     return text.size == size && memcmp(text.at, other, size) == 0;
 }
 
-/* How durable a record is to be, by its number among the words; -1 where a text is none of them. */
+/* The durability class of a word, by its number; -1 for an unknown one. */
 static int durability(rt_bytes text) {
     for (int word = 0; word < 4; word++)
         if (is_text(text, words[word])) return word;
     return -1;
 }
 
-/* The greatest class that a record asks for, and how many it names. */
+/* The greatest class in a record clause, and how many it names. */
 static int recorded_as(rt_list record, int *named) {
     int found = -1;
     rt_bytes text;
@@ -78,7 +78,7 @@ static bool check_clauses(rt_list clauses, const rt_scope *scope, rt_slots *read
     return true;
 }
 
-/* What is in `reads`, ascending, is what the clauses read. */
+/* `reads` must be exactly what the clauses read, ascending. */
 static bool same_reads(rt_list reads, const rt_slots *slots) {
     int64_t slot;
     for (int64_t at = 0; at < RT_MAX_SLOTS; at++)
@@ -86,7 +86,7 @@ static bool same_reads(rt_list reads, const rt_slots *slots) {
     return reads.count == 0;
 }
 
-/* Its links are rt_check_chain's: they speak of other contracts. */
+/* rt_check_chain checks its links, because they refer to other contracts. */
 bool rt_check_contract(const rt_contract *contract, const rt_prepared_policy *policy, uint8_t cells[RT_MAX_CELLS]) {
     const int64_t durations[4] = {contract->deadline_us, contract->validity_us, contract->duration_us, contract->grace_us};
     rt_slots reads = {{0, 0}};
@@ -96,7 +96,7 @@ bool rt_check_contract(const rt_contract *contract, const rt_prepared_policy *po
     for (int at = 0; at < 4; at++)
         if (!rt_within(durations[at], 0, RT_MAX_DURATION)) return false;
     if (!rt_within(contract->energy, 0, RT_FULL)) return false;
-    /* a record may be lost with the process only of what has no time to wait for it */
+    /* only a reflex may lose its record with the process, because it has no time to wait */
     if (recorded_as(contract->record, &named) == 0 && contract->timing_class != RT_REFLEX) return false;
     if (named > 1) return false;
     const rt_scope scope = {policy, {NULL, NULL, 0}, cells, policy->policy->monitor_count, true};
@@ -104,7 +104,7 @@ bool rt_check_contract(const rt_contract *contract, const rt_prepared_policy *po
            check_clauses(contract->maintain, &scope, &reads) && same_reads(contract->reads, &reads);
 }
 
-/* A link is a complete call of a skill that needs no survey path. */
+/* A link must be a complete call of a skill that needs no survey path. */
 bool rt_check_link(const rt_link *link, const rt_policy *policy) {
     if (!rt_within(link->skill, 0, (int64_t)policy->contract_count - 1)) return false;
     const rt_contract *called = &policy->contracts[link->skill];
@@ -174,7 +174,7 @@ static uint32_t occurs(rt_list clauses, const rt_clause *wanted) {
     return count;
 }
 
-/* Whether each clause of the policy's is there as often as in the policy, told by code and text. */
+/* Whether each clause of the policy's appears as often as in the policy, compared by code and text. */
 static bool all_there(rt_list policys, rt_list mine) {
     rt_list left = policys;
     rt_clause clause;
@@ -183,7 +183,7 @@ static bool all_there(rt_list policys, rt_list mine) {
     return true;
 }
 
-/* Texts are UTF-8. What parts words is what `str.split` of Python takes for it: its size in bytes, 0 where there is none. */
+/* Texts are UTF-8. White space is that of Python's `str.split`: its size in bytes, 0 if there is none. */
 static uint32_t space(rt_bytes text, uint32_t at) {
     uint8_t byte = text.at[at];
     if ((byte >= 0x09 && byte <= 0x0D) || (byte >= 0x1C && byte <= 0x20)) return 1;
@@ -196,7 +196,7 @@ static uint32_t space(rt_bytes text, uint32_t at) {
                : 0;
 }
 
-/* The next byte of a text whose words single spaces part, -1 at its end. Between words, `at` stays behind the spaces. */
+/* The next byte of a text with its words separated by single spaces, -1 at its end. Between words, `at` stays after the spaces. */
 static int next_byte(rt_bytes text, uint32_t *at) {
     uint32_t start = *at, size;
     while (*at < text.size && (size = space(text, *at)) > 0) *at += size;
@@ -214,14 +214,14 @@ int rt_compare_words(rt_bytes one, rt_bytes other) {
     }
 }
 
-/* Whether a text is no more than the beginning of one, so that others may begin with it too. */
+/* Whether a text is an abbreviation, so that other texts may share its beginning. */
 static bool is_cut(rt_bytes text) {
     uint32_t characters = 0;
     for (uint32_t at = 0; at < text.size; at++) characters += (text.at[at] & 0xC0) != 0x80;
     return characters == RT_MAX_TEXT && memcmp(text.at + text.size - 3, "...", 3) == 0;
 }
 
-/* Whether a clause of a mission's own would be taken for the policy's: it has the words of some, and the code of none. */
+/* Whether a clause of the mission's own could be mistaken for one of the policy: it has the text of one, and the code of none. */
 static bool poses(const rt_clause *one, const rt_contract *policys) {
     const rt_list lists[3] = {policys->require, policys->assume, policys->maintain};
     bool worded = false;
@@ -244,7 +244,7 @@ static bool none_poses(rt_list mine, const rt_contract *policys) {
     return true;
 }
 
-/* No duration (0) is no limit, so looser than any. */
+/* A duration of 0 is unlimited, so it is looser than any other. */
 bool rt_tightens(const rt_contract *mine, const rt_contract *policys) {
     const rt_motion *a = &mine->motion, *b = &policys->motion;
     int named;

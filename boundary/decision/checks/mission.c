@@ -1,8 +1,8 @@
 #include "../parts.h"
 
-/* Whether a text is a name as sources have it. */
+/* Whether a text has the form of a name in the language. */
 static bool is_name(rt_bytes name) {
-    bool begins = true; /* a part begins: no digit may be there, and it may not end */
+    bool begins = true; /* the beginning of a part, where a digit or the end is not allowed */
     for (uint32_t at = 0; at < name.size; at++) {
         uint8_t c = name.at[at], letter = c | 0x20;
         bool digit = c >= '0' && c <= '9';
@@ -31,7 +31,7 @@ static bool check_phases(const rt_mission *mission) {
     return true;
 }
 
-/* Whether a clause is worded as a rule or the airspace is: a log says what decided by its text. */
+/* Whether a clause has the text of a rule or the airspace: a log identifies what decided by its text. */
 static bool worded(const rt_prepared_policy *prepared, rt_bytes text) {
     const rt_policy *policy = prepared->policy;
     uint32_t low = 0, high = policy->rule_count;
@@ -52,7 +52,7 @@ static bool none_worded(const rt_prepared_policy *prepared, rt_list clauses) {
     return true;
 }
 
-/* The plan is what the arguments say, so that what is checked is what will be flown. */
+/* The plan must match the arguments: the path that is checked is the path that is flown. */
 static bool check_plan(const rt_plan *plan, const rt_motion *motion, rt_list arguments, const rt_projection *projection) {
     rt_list path = plan->path;
     int64_t x, y, altitude = motion->altitude == -1 ? 0 : rt_int_at(arguments, (uint32_t)motion->altitude);
@@ -69,7 +69,7 @@ static bool check_plan(const rt_plan *plan, const rt_motion *motion, rt_list arg
     return true;
 }
 
-/* The path is where the arguments say: what rules and clauses are told about must be what is flown. */
+/* The path leads where the arguments say, because rules and clauses judge the arguments. */
 static bool leads_right(const rt_invocation *one, const rt_prepared_policy *policy) {
     rt_list path = one->plan.path;
     uint32_t cell;
@@ -77,7 +77,7 @@ static bool leads_right(const rt_invocation *one, const rt_prepared_policy *poli
     switch (one->plan.kind) {
     case RT_COVER:
         zone = rt_int_at(one->arguments, (uint32_t)rt_first_cell(&one->contract, RT_ZONE));
-        if (!rt_within(zone, 0, policy->policy->declared - 1)) return path.count > 0; /* for the decision to refuse */
+        if (!rt_within(zone, 0, policy->policy->declared - 1)) return path.count > 0; /* the decision refuses these */
         return path.count > 0 && rt_zone_along(policy, (uint32_t)zone, path, 0) == RT_TRUE;
     case RT_FLY:
         cell = (uint32_t)rt_first_cell(&one->contract, RT_PLACE);
@@ -90,7 +90,7 @@ static bool leads_right(const rt_invocation *one, const rt_prepared_policy *poli
     }
 }
 
-/* Whether the legs of a path are compared with no more edges than `*left`, of which they are taken. */
+/* Whether the legs of a path are compared with at most `*left` edges, from which they are subtracted. */
 static bool few_compared(const rt_prepared_policy *prepared, rt_list path, int64_t *left) {
     const rt_policy *policy = prepared->policy;
     int64_t x, y0, y1;
@@ -103,7 +103,7 @@ static bool few_compared(const rt_prepared_policy *prepared, rt_list path, int64
     return true;
 }
 
-/* Arguments out of range are for the decision to refuse, so that it is recorded. */
+/* The decision refuses arguments that are out of range, so that the refusal is recorded. */
 static bool check_invocation(const rt_invocation *one, const rt_prepared_policy *prepared, int64_t *compared) {
     const rt_policy *policy = prepared->policy;
     rt_list left = one->arguments;

@@ -14,7 +14,7 @@ static bool check_sources(const rt_signal *signal) {
     return true;
 }
 
-/* Every slot has exactly one owner. */
+/* Every slot must have exactly one owner. */
 bool rt_check_signals(const rt_policy *policy) {
     rt_slots owned = {{0, 0}};
     if (!rt_within(policy->slots, 0, RT_MAX_SLOTS)) return false;
@@ -51,7 +51,7 @@ static bool check_speeds(const rt_speeds *speeds) {
            rt_within(speeds->flight_us, 1, RT_MAX_DURATION);
 }
 
-/* The local time of a time zone is known from its first moment to its last, by the data that is named. */
+/* Local time is known from the first moment of a time zone to its last. */
 static bool check_offsets(const rt_vehicle *vehicle) {
     rt_list left = vehicle->offsets;
     const bool zoned = left.count > 0;
@@ -80,7 +80,7 @@ static bool is(rt_bytes text, const char *word, uint32_t size) {
     return text.size == size && memcmp(text.at, word, size) == 0;
 }
 
-/* The sensors that it lacks are named in order, and nothing reads them; without any, no clause is left out. */
+/* The signals in `without` are in order and nothing reads them; clauses are left out only because of them. */
 static bool check_without(const rt_policy *policy) {
     rt_list names = policy->vehicle.without, left = policy->left_out;
     rt_bytes before = {NULL, 0}, name;
@@ -109,7 +109,7 @@ static bool check_vehicle(const rt_policy *policy) {
            is_signal(policy, v->down, RT_NUMBER);
 }
 
-/* Each reads only those before it, so that one pass observes them all; also tells what each reads. */
+/* Each monitor reads only earlier ones, so that one pass evaluates all of them; also returns what each reads. */
 static bool check_monitors(const rt_policy *policy, rt_prepared_policy *prepared) {
     for (uint32_t at = 0; at < policy->monitor_count; at++) {
         const rt_monitor *monitor = &policy->monitors[at];
@@ -133,7 +133,7 @@ static bool check_phases(const rt_policy *policy) {
     return true;
 }
 
-/* Numbers are distinct indexes of `count` things, in order. */
+/* Whether numbers are distinct, ascending indexes of `count` things. */
 static bool ascending(rt_list list, int64_t count) {
     int64_t before = -1, value;
     while (rt_next_int(&list, &value)) {

@@ -12,16 +12,16 @@
 typedef struct {
     const rt_edge *edges;
     rt_scratch *scratch;
-    uint32_t crossed; /* how many edges the line crosses, from west to east */
+    uint32_t crossed; /* the number of crossed edges, from west to east */
 } sweep;
 
-/* An edge from the end that is further south, or further west at the same height. */
+/* An edge from its southern end; from its western end if both have the same height. */
 static rt_edge upward(const sweep *of, uint32_t number) {
     rt_edge e = of->edges[number];
     return e.y0 < e.y1 || (e.y0 == e.y1 && e.x0 < e.x1) ? e : (rt_edge){e.x1, e.y1, e.x0, e.y0};
 }
 
-/* Above 0 where an upward edge passes east of a place, below 0 where it passes west. */
+/* Positive where an upward edge passes east of a place, negative where it passes west. */
 static int64_t side(const rt_edge *edge, int64_t x, int64_t y) {
     return ((int64_t)edge->x1 - edge->x0) * (y - edge->y0) - ((int64_t)edge->y1 - edge->y0) * (x - edge->x0);
 }
@@ -31,7 +31,7 @@ static bool apart(const rt_edge *a, const rt_edge *b) {
     return (start > 0 && end > 0) || (start < 0 && end < 0);
 }
 
-/* Whether a crossed edge and the next have a common point, other than an end of both where they lead apart from there. */
+/* Whether a crossed edge and its neighbour share a point; a common end from which they lead apart does not count. */
 static bool meets(const sweep *of, int64_t at) {
     if (!rt_within(at, 0, (int64_t)of->crossed - 2)) return false;
     rt_edge a = upward(of, of->scratch->crossed[at]), b = upward(of, of->scratch->crossed[at + 1]);
@@ -40,7 +40,7 @@ static bool meets(const sweep *of, int64_t at) {
     return !apart(&a, &b) && !apart(&b, &a);
 }
 
-/* How many of the crossed edges are west of a corner. */
+/* The number of crossed edges west of a corner. */
 static uint32_t place(const sweep *of, int64_t x, int64_t y) {
     uint32_t low = 0, high = of->crossed;
     while (low < high) {
@@ -52,7 +52,7 @@ static uint32_t place(const sweep *of, int64_t x, int64_t y) {
     return low;
 }
 
-/* Put what is crossed from `from` on at `to`. */
+/* Move the crossed edges from `from` on to `at`. */
 static void move(sweep *of, uint32_t from, uint32_t to) {
     uint16_t *crossed = of->scratch->crossed, *moved = of->scratch->moved;
     size_t size = (of->crossed - from) * sizeof *crossed;
@@ -61,7 +61,7 @@ static void move(sweep *of, uint32_t from, uint32_t to) {
     of->crossed = of->crossed - from + to;
 }
 
-/* Two edges begin at a corner. The area is between them where an even number of edges lies west of them: to the left of each. */
+/* Two edges begin at a corner. The area lies between them if an even number of edges is west of them: to the left of each. */
 static bool begin(sweep *of, uint16_t incoming, uint16_t outgoing, int64_t x, int64_t y) {
     uint32_t at = place(of, x, y);
     rt_edge a = upward(of, incoming), b = upward(of, outgoing);
@@ -128,8 +128,8 @@ static bool on_earth(int64_t latitude, int64_t longitude) {
     return rt_within(latitude, -900000000, 900000000) && rt_within(longitude, -RT_HALF_TURN, RT_HALF_TURN);
 }
 
-/* A local place that may be flown to must have a latitude and a longitude, within half around the earth. Coordinates are within
-   2**30, factors within 2**25, so that nothing exceeds 2**56. */
+/* A local place that may be flown to must have a latitude and a longitude, within half around the earth. Coordinates are within 2**30,
+   factors within 2**25, so that no value exceeds 2**56. */
 bool rt_check_place(const rt_projection *projection, int64_t x, int64_t y) {
     int64_t east = projection->east, north = projection->north, one = 1 << RT_SHIFT;
     if (rt_abs(x) * one >= RT_HALF_TURN * east) return false;
@@ -138,14 +138,14 @@ bool rt_check_place(const rt_projection *projection, int64_t x, int64_t y) {
     return on_earth(projection->latitude + rt_floor(y * one + north / 2, north), longitude);
 }
 
-/* How many vertices there are at least, before anything else is known of a zone. */
+/* A lower bound of the number of vertices, computed before anything else about a zone is known. */
 static int64_t vertices(const rt_zone *zone) {
     int64_t counts =
         zone->shape == RT_AREA && zone->data.count ? 1 + rt_min(rt_max(rt_int_at(zone->data, 0), 0), RT_MAX_RINGS) : 0;
     return rt_max(zone->data.count - counts, 0) / 2;
 }
 
-/* Take the corners of a ring off a list, as edges from `first` on; false where a coordinate is beyond all bounds. */
+/* Take the corners of a ring off a list, as edges from `first` on; false for a coordinate out of range. */
 static bool take_ring(rt_list *data, uint32_t count, rt_edge *edges, uint32_t first, rt_scratch *scratch) {
     for (uint32_t at = first; at < first + count; at++) {
         int64_t x = 0, y = 0;
@@ -160,7 +160,7 @@ static bool take_ring(rt_list *data, uint32_t count, rt_edge *edges, uint32_t fi
     return true;
 }
 
-/* Read the edges of a zone into the table behind those of the others, of which there is room; tell how many. */
+/* Read the edges of a zone into the table after those of the others, if there is room; returns their number. */
 static bool take_edges(const rt_zone *zone, rt_edge *edges, uint32_t room, uint32_t *count, rt_scratch *scratch) {
     rt_list data = zone->data, counts = zone->data;
     int64_t rings = 1, corners = data.count / 2;
@@ -206,7 +206,7 @@ static bool check_circle(const rt_zone *zone, rt_prepared_zone *prepared) {
            rt_within(prepared->y, -RT_MAX_COORDINATE, RT_MAX_COORDINATE);
 }
 
-/* Whether the geometry of a policy is well-formed; also tells where the edges of each zone are. */
+/* Whether the geometry of a policy is well-formed; also returns where the edges of each zone are. */
 bool rt_check_zones(const rt_policy *policy, rt_prepared_policy *prepared) {
     const rt_projection *projection = &policy->projection;
     uint32_t first = 0, entries = 0, starts = 0;

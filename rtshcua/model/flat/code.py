@@ -1,7 +1,7 @@
-"""Conditions as postfix code: three integers an instruction (`op`, `a`, `b`), evaluated over one small stack.
+"""Conditions as postfix code: three integers for each instruction (`op`, `a`, `b`), evaluated on one small stack.
 
-Numbers and truth values never mix on the stack: the compiler proves it, `load` checks it again. A C evaluator needs a
-fixed stack of `MAX_STACK` cells and no allocation.
+Numbers and truth values never mix on the stack: the compiler ensures it, and `load` checks it again. A C evaluator
+needs a fixed stack of `MAX_STACK` cells and no allocation.
 """
 
 from enum import IntEnum
@@ -43,9 +43,9 @@ class Op(IntEnum):
 
 
 class Clause(Flat, frozen=True):
-    """A condition with the text and the place it was written, so that a refusal can be explained without the sources.
+    """A condition with its text and source position, so that a refusal can be explained without the sources.
 
-    `source` indexes the policy's table of file names, and after it the mission's, for what a step says of its own;
+    `source` indexes the policy's table of file names, continued by the mission's for a step's own clauses;
     `start`, `end` are character offsets.
     """
 

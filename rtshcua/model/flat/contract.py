@@ -7,7 +7,7 @@ from rtshcua.model.flat.struct import Flat
 
 
 class TimingClass(IntEnum):
-    """Paper symbol `cls`: how fast a decision of this skill must be, hence who may ask for it."""
+    """Paper symbol `cls`: the speed class of a decision, which limits who may request it."""
 
     SEMANTIC = 0
     TACTICAL = 1
@@ -15,7 +15,7 @@ class TimingClass(IntEnum):
 
 
 class SourceKind(IntEnum):
-    """Paper symbol `src`: where a decision comes from."""
+    """Paper symbol `src`: the source of a request."""
 
     AGENT = 0
     OPERATOR = 1
@@ -63,7 +63,7 @@ class Link(Flat, frozen=True):
 
 
 class Motion(Flat, frozen=True):
-    """Kind of motion, and the argument cells of its altitude, its speed and how long it holds (-1: none)."""
+    """The kind of motion, and the argument cells of its altitude, its speed and its holding time (-1: none)."""
 
     kind: int
     altitude: int
@@ -72,9 +72,10 @@ class Motion(Flat, frozen=True):
 
 
 class Contract(Flat, frozen=True):
-    """A skill contract (section 2: `op`, `pre`, `ddl`, `vw`, `sc`, `inv`, `f_b`, `ev`). Times in us, energy in 1/10000.
+    """A skill contract (section 2: `op`, `pre`, `ddl`, `vw`, `sc`, `inv`, `f_b`, `ev`). Times in us, energy in
+    1/10000.
 
-    `phases` are names; empty means any. `reads` are the slots that its clauses read, in ascending order.
+    `phases` are names; empty means any. `reads` are the slots that its clauses read, ascending.
     """
 
     name: str

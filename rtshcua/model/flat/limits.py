@@ -1,8 +1,8 @@
-"""What fits on board. A C evaluator sizes its tables by these; the compiler reports, `prepare` refuses what
-exceeds them.
+"""The limits of a bundle. A C evaluator sizes its tables by them; the compiler reports a violation, `prepare` refuses
+it.
 
-Values and times stay within `MAX_VALUE`, which every JSON reader holds exactly; what code computes from them stays
-within `MAX_MAGNITUDE`, hence within a signed 64-bit integer.
+Values and times stay within `MAX_VALUE`, which every JSON reader holds exactly. Computed values stay within
+`MAX_MAGNITUDE`, hence within a signed 64-bit integer.
 """
 
 MAX_VALUE = (1 << 53) - 1
@@ -15,7 +15,7 @@ WEEK = 7 * DAY
 
 MAX_OFFSETS = 256  # of the local time, in one policy
 MAX_SLOTS = 72  # with which no request is larger than 1 KiB
-MAX_SILENCE = 3_600_000_000  # us: after which silence of the vehicle a policy may decide at the latest
+MAX_SILENCE = 3_600_000_000  # us: the longest silence of the vehicle that a policy may set before it acts
 MAX_STALE = (1 << 32) - 2  # us, about 71 minutes: the ages of a request saturate just above
 MAX_ROLES = 64
 MAX_ZONES = 4_096  # declared and derived
@@ -27,19 +27,19 @@ MAX_CONTRACTS = 256
 MAX_PARAMETERS = 32
 MAX_CELLS = 64
 MAX_CLAUSES = 64  # of one kind in one contract
-MAX_TEXT = 400  # characters of the text of a clause, which is for a person; what is longer is cut
+MAX_TEXT = 400  # characters in the text of a clause, which is for a person; longer texts are cut
 MAX_LINKS = 8
 MAX_RULES = 16_384
 MAX_RULE_KEYS = 1 << 18  # entries of the rule index: skills times roles, summed over all rules
 MAX_INVOCATIONS = 16_384
 MAX_PHASES = 64
 MAX_PATH = 8_192  # points
-#: edges of zones that the legs of a mission's paths are compared with, and one for each leg and zone: a request waits
-#: for those of its step, and in flight the boundary has a second for an answer
+#: : edges of zones that the legs of a mission's paths are compared with, plus one for each leg and zone: a request
+#: waits for those of its step, and the boundary must answer within a second in flight
 MAX_COMPARED = 1 << 23
 MAX_MONITORS = 32
 MAX_WINDOW = 600_000_000  # us: how far back a temporal monitor looks
-MAX_GAP = 1_000_000  # us: when more time passes between two observations, what was in between is not known
+MAX_GAP = 1_000_000  # us: after a longer interval between two observations, the truth in between is unknown
 MAX_PHASE_NAMES = 64
 MAX_KEYS = 512  # in a trust root
 MAX_REVOKED = 4_096  # keys that a trust root revokes

@@ -12,14 +12,14 @@ class OnInadmissible(IntEnum):
     ABORT = 0
     HOLD = 1
     SKIP = 2
-    REPLAN = 3  # as HOLD, and whoever may replace the step is asked to
+    REPLAN = 3  # as HOLD, and a replacement of the step is requested
 
 
 class Plan(Flat, frozen=True):
-    """Where the skill will take the vehicle, after the leg from wherever it is then.
+    """Where the skill will take the vehicle, after the leg from its position at that time.
 
-    `path` is x0, y0, x1, y1, ... in local mm; `altitude` in mm above home (the height flown at; for LAND and HOLD the
-    height at dispatch counts), `speed` in mm/s, 0 where the skill leaves it to the vehicle.
+    `path` is x0, y0, x1, y1, ... in local mm; `altitude` in mm above home (for LAND and HOLD the height at
+    dispatch is used instead), `speed` in mm/s, 0 where the vehicle chooses it.
     """
 
     kind: int
@@ -31,10 +31,9 @@ class Plan(Flat, frozen=True):
 class Invocation(Flat, frozen=True):
     """The contract-bound invocation of section 2, `I = <sid, src, op, args, pre, ddl, vw, sc, auth, inv, f_b, ev>`.
 
-    `contract` holds the whole contract as it applies to this step, defaults resolved; `skill` is its index in the
-    policy. `phases` is the bit set of mission phase indexes in which the decision means something. `issued_at_us`
-    is UTC. `binding` is the digest over every other field, the policy's digest and version, the vehicle and the
-    mission.
+    `contract` holds the whole contract of this step, with defaults resolved; `skill` is its index in the policy.
+    `phases` is the bit set of mission phase indexes in which the invocation is valid. `issued_at_us` is UTC.
+    `binding` is the digest over every other field, the policy's digest and version, the vehicle and the mission.
     """
 
     invocation_id: bytes

@@ -1,4 +1,4 @@
-"""The payload of a policy envelope: everything that authority rests on, in one signed piece."""
+"""The payload of a policy envelope: all authority in one signed document."""
 
 from enum import IntEnum
 
@@ -22,8 +22,8 @@ class Rule(Flat, frozen=True):
     """A rule. `skills` are contract indexes and `roles` role indexes, ascending; empty means any.
 
     `sources` are `SourceKind` values, ascending; empty means any. `approver` is a role index (confirm, else -1),
-    `within_us` how long an approval is awaited, `target` what a degrade rule flies. `second` is the role index of
-    another person whose approval is needed too, -1 where one person is enough.
+    `within_us` how long an approval is awaited, `target` the link of a degrade rule. `second` is the role index of
+    a second person who must approve too, -1 if one person is enough.
     """
 
     kind: int
@@ -42,20 +42,20 @@ class Rule(Flat, frozen=True):
 
 
 class WithoutEvidence(IntEnum):
-    """What a flight does while its records are not kept."""
+    """What a flight does while its records cannot be stored."""
 
-    LAND = 0  # the mission is given up: what runs falls back, in the air the contingency flies
-    REFUSE = 1  # what runs may finish, and no further step begins
+    LAND = 0  # the mission is aborted: the running step falls back; in the air, the contingency flies
+    REFUSE = 1  # the running step may finish, and no further step begins
 
 
 class AfterSilence(IntEnum):
-    """What follows when the vehicle is heard again, its state is fresh, and it was silent for too long."""
+    """What follows a long silence of the vehicle, once it is heard again and its state is fresh."""
 
-    CONTINUE = 0  # the step goes on, as long as all that must hold holds
-    CONTINGENCY = 1  # the mission is given up: the contingency flies
+    CONTINUE = 0  # the step continues while its conditions hold
+    CONTINGENCY = 1  # the mission is aborted: the contingency flies
 
 
-#: the longest silence after which a flight simply goes on, where a policy does not say it, us
+#: : the longest silence after which a flight simply continues, if the policy sets none, us
 SILENCE_US = 30_000_000
 
 
@@ -69,7 +69,7 @@ class MonitorKind(IntEnum):
 
 
 class Monitor(Flat, frozen=True):
-    """A temporal monitor. `when` reads signals, zones, the time and monitors before this one; no argument, no phase.
+    """A temporal monitor. `when` reads signals, zones, the time and earlier monitors, but no argument and no phase.
 
     `window_us` is 0 for RISING and FALLING.
     """
@@ -91,11 +91,12 @@ class Airspace(Flat, frozen=True):
 
 
 class Speeds(Flat, frozen=True):
-    """What a vehicle keeps at least, by which durations and charges are proved. Speeds mm/s over ground.
+    """Lower bounds of a vehicle's speeds, from which durations and charges are proved. Speeds mm/s over ground.
 
-    `cruise` is flown across where a step says no speed, `homeward` on a return. `landing` is the descent below
-    `landing_below` (mm above home). `acceleration`, mm/s in a second, is what it gains and loses on a leg. `air` is its
-    speed through the air, `wind` the most that it is flown in. A full battery flies for `flight_us`, whatever it flies.
+    `cruise` is the horizontal speed where a step sets none, `homeward` that of a return. `landing` is the descent
+    below `landing_below` (mm above home). `acceleration`, in mm/s per second, applies to both ends of a leg. `air`
+    is the speed through the air, `wind` the greatest wind in which it flies. A full battery lasts for `flight_us`
+    of any flight.
     """
 
     cruise: int
@@ -111,18 +112,19 @@ class Speeds(Flat, frozen=True):
 
 
 class VehicleLimits(Flat, frozen=True):
-    """The one aircraft this policy is for. Lengths mm, speeds mm/s, times us, charge 1/10000.
+    """The one aircraft that this policy is for. Lengths mm, speeds mm/s, times us, charge 1/10000.
 
     `position`, `height`, `battery` are the state slots of the well-known signals (-1: the policy declares none).
-    `return_altitude` (mm above home) is the height that a return climbs to, if it is lower, before it flies home.
-    Told to stop, it goes on for at most `reaction_us` and then loses at least `braking` mm/s of its speed in a second;
-    with `braking` 0 that is not declared. `north`, `east`, `down` are the slots of the signals of its velocity over
-    ground, -1 each without `braking`. `without` are the names of the signals whose sensors are not fitted, ascending.
-    Without `speeds`, the way home is counted at the greatest `speed`; the compiler always writes them.
+    `return_altitude` (mm above home) is the height to which a return climbs, if it is lower, before it flies home.
+    Told to stop, the vehicle continues for at most `reaction_us` and then loses at least `braking` mm/s of its
+    speed in a second; 0 means that this is not declared. `north`, `east`, `down` are the slots of the signals of
+    its velocity over ground, -1 each without `braking`. `without` are the names of the signals whose sensors are
+    not fitted, ascending. Without `speeds`, the way home is computed with the greatest `speed`; the compiler
+    always writes them.
 
-    The local time is `utc_offset_us` from UTC. Where it is that of a time zone, by its IANA name, `time_zone_data` is
-    the version of the time-zone data that it was worked out by, and `offsets` are a moment (UTC, us) and the offset
-    from it on, again and again, and last the moment from which on nothing is known; `utc_offset_us` is 0.
+    Local time is `utc_offset_us` from UTC. If it is that of a time zone, given by its IANA name, `time_zone_data`
+    is the version of the time-zone data, `utc_offset_us` is 0, and `offsets` alternates between a moment (UTC, us)
+    and the offset from it on, and ends with the moment from which local time is unknown.
     """
 
     name: str
@@ -151,10 +153,10 @@ class VehicleLimits(Flat, frozen=True):
 
 
 class LeftOut(Flat, frozen=True):
-    """A clause, or a rule, `where fitted` that does not apply, for the vehicle is without a signal that it reads.
+    """A clause or a rule `where fitted` that does not apply, because the vehicle is without a signal that it reads.
 
-    `part` is `require`, `assume` or `maintain` of the contract `skill`; or, and `skill` is -1, a rule: `forbid`,
-    `confirm` or `degrade`. Nothing is decided by it; it is there to be read.
+    `part` is `require`, `assume` or `maintain` of the contract `skill`; or, with `skill` -1, a rule: `forbid`,
+    `confirm` or `degrade`. It decides nothing and is only for display.
     """
 
     skill: int
@@ -166,14 +168,14 @@ class LeftOut(Flat, frozen=True):
 
 
 class Policy(Flat, frozen=True):
-    """A whole policy. `zones` holds the declared zones first (`declared` of them), derived ones after.
+    """A whole policy. `zones` holds the declared zones first (`declared` of them), then the derived ones.
 
     `sets` are membership sets of enumeration values or zone indexes. `tables` map each declared zone's index to a
-    derived zone's index, for `grow(argument, margin)`. `monitors` are observed in order; `phases` are the names of
-    mission phases that conditions mention. `sources` are file names for spans, `source_digests` the
-    SHA-256 of each. `without_evidence` is a `WithoutEvidence`. After a silence of the vehicle longer than `silence_us`,
-    `after_silence` follows, an `AfterSilence`; a shorter one changes nothing. `left_out` are the clauses and
-    rules that do not apply to the vehicle.
+    derived zone's index, for `grow(argument, margin)`. `monitors` are evaluated in order; `phases` are the names
+    of mission phases that conditions mention. `sources` are file names for spans, `source_digests` the SHA-256 of
+    each. `without_evidence` is a `WithoutEvidence`. A silence of the vehicle longer than `silence_us` is followed
+    by `after_silence`, an `AfterSilence`; a shorter one has no effect. `left_out` are the clauses and rules that
+    do not apply to the vehicle.
     """
 
     name: str

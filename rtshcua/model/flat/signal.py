@@ -1,12 +1,12 @@
-"""Signals as the state monitor needs them: which MAVLink fields, how scaled, when unknown, when stale."""
+"""Signals for the state monitor: their MAVLink fields, their scale, and when a value is unknown or stale."""
 
 from rtshcua.model.flat.struct import Flat
 
 NUMBER, ENUMERATION, POSITION = 0, 1, 2
 
-#: The name of the signal whose value is not what its field holds, but what is taken of that in a minute, as measured.
+#: : The name of the signal whose value is the measured drain per minute of its field.
 DRAIN = "battery.drain"
-#: The name of the signal that is its field's value divided by the cells that the vehicle declares.
+#: : The name of the signal whose value is its field divided by the number of cells of the vehicle.
 CELL = "battery.cell"
 
 
@@ -41,5 +41,5 @@ class Signal(Flat, frozen=True):
 
     @property
     def slots(self) -> range:
-        """The state slots that it owns."""
+        """The state slots that the signal owns."""
         return range(self.slot, self.slot + (2 if self.kind == POSITION else 1))

@@ -37,7 +37,7 @@ HALF_TURN = TURN // 2
 
 
 def meridian(longitude: int, near: int) -> int:
-    """The number within 180 degrees of the longitude `near` that names the same meridian as `longitude`, which may be
+    """The number, within 180 degrees of the longitude `near`, of the same meridian as `longitude`, which may be
     beyond 180 degrees. In 1e-7 degree.
     """
     return near + (longitude - near + HALF_TURN) % TURN - HALF_TURN
@@ -52,8 +52,8 @@ def project(projection: Projection, latitude: int, longitude: int) -> tuple[int,
 
 
 def unproject(projection: Projection, x: int, y: int) -> tuple[int, int]:
-    """(latitude, longitude) in 1e-7 degree of a local place, to the nearest 1e-7 degree; the longitude from 180 W to
-    180 E, on whichever side of longitude 180 home is.
+    """(latitude, longitude) in 1e-7 degree of a local place, rounded to the nearest 1e-7 degree; the longitude is
+    from 180 W to 180 E, also across longitude 180.
     """
     east, north = projection.east, projection.north
     longitude = projection.longitude + ((x << SHIFT) + east // 2) // east
@@ -67,9 +67,9 @@ class Zone(Flat, frozen=True):
     """An open set: a point on its boundary, floor or ceiling is outside.
 
     `shape` is `CIRCLE` with `data` = (x, y, radius squared), or `POLYGON` with `data` = (x0, y0, x1, y1, ...),
-    simple and counter-clockwise, or `AREA` with `data` = (rings, corners of each ring ..., x0, y0, ...): outer rings
-    counter-clockwise, holes clockwise, all simple and without a common point. `floor`, `ceiling` in mm above home.
-    `name` is what a person wrote, `grow(...)` for a derived one.
+    simple and counter-clockwise, or `AREA` with `data` = (rings, corners of each ring ..., x0, y0, ...): outer
+    rings counter-clockwise, holes clockwise, all simple and without a common point. `floor`, `ceiling` in mm above
+    home. `name` is the name in the source, `grow(...)` for a derived zone.
     """
 
     name: str

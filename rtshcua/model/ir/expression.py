@@ -72,7 +72,7 @@ class Range(Node, kw_only=True):
     high: "Value"
 
 
-#: the values a comparison or an argument may have
+#: : the possible values of a comparison or an argument
 Value = Quantity | Coordinates | TimeOfDay | Reference | Arithmetic | Function
 
 
@@ -88,8 +88,8 @@ class Comparison(Node, kw_only=True):
 class Within(Node, kw_only=True):
     """`subject in low .. high`, or `local time in 22:00 .. 06:00` (wraps over midnight).
 
-    `days` are those of the week on which such a window begins (`on monday .. friday`), as of `Daily`; none stands for
-    all. `local time on saturday` is from the first to the last us of the day.
+    `days` are the days of the week on which such a window begins (`on monday .. friday`), as of `Daily`; empty
+    means all. `local time on saturday` is from the first to the last us of the day.
     """
 
     kind: Literal["within"] = "within"

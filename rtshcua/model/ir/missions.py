@@ -8,8 +8,8 @@ from rtshcua.model.ir.skills import ArgumentValue, ClauseDecl, ParameterDecl
 
 
 class Overrides(Node):
-    """The block after a step. It may only tighten the contract: shorter times, more energy kept ready, fewer phases,
-    further clauses and kinds of evidence. None or an empty tuple: as the skill says.
+    """The block after a step. It may only tighten the contract: shorter times, a larger energy reserve, fewer phases,
+    further clauses and kinds of evidence. None or an empty tuple: as in the skill.
     """
 
     deadline: Quantity | None = None
@@ -40,7 +40,7 @@ class Step(Node, kw_only=True):
 
 
 class Repeat(Node, kw_only=True):
-    """`repeat 3 { ... }`: its items in order, so many times. Elaboration unrolls it."""
+    """`repeat 3 { ... }`: its items in order, repeated. Elaboration unrolls it."""
 
     kind: Literal["repeat"] = "repeat"
     count: Quantity
@@ -70,9 +70,9 @@ class MissionDecl(Node):
     policy_version: int
     vehicle: Name
     intent: str | None
-    source: Name | None  # agent, operator
-    proposer: Name | None  # who: openclaw
-    role: Name | None  # on whose behalf
+    source: Name | None  # source: agent, operator
+    proposer: Name | None  # name of the proposer: openclaw
+    role: Name | None  # role on whose behalf it proposes
     phases: tuple[Phase, ...]
     parameters: tuple[
         ParameterDecl, ...

@@ -1,4 +1,4 @@
-"""The base of all IR nodes, and names with the place where they stand."""
+"""The base of all IR nodes, and names with their source position."""
 
 from typing import Any, Self, dataclass_transform
 
@@ -9,16 +9,16 @@ from rtshcua.diagnostics.span import Span
 
 @dataclass_transform(kw_only_default=True, frozen_default=True)
 class Node(msgspec.Struct, frozen=True, kw_only=True):
-    """A frozen piece of what a source says, its parts given by name; `span` is the exact text it came from.
+    """A frozen node of a source, whose parts are keyword arguments; `span` is the exact text that it came from.
 
-    Types are held by mypy, and by a test over everything that is parsed (`tests/unit/model`); ADR 29 says why not at
-    every construction. A node that has a part with a default before one without says `kw_only=True` again.
+    mypy checks the types, and so does a test over everything that is parsed (`tests/unit/model`); ADR 29 explains
+    why a constructor does not. A node that has a part with a default before one without repeats `kw_only=True`.
     """
 
     span: Span
 
     def copied(self, **changes: Any) -> Self:
-        """The same with some parts changed."""
+        """A copy with some parts changed."""
         return msgspec.structs.replace(self, **changes)
 
 

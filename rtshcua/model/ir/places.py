@@ -53,15 +53,16 @@ class Combination(Node, kw_only=True):
     shapes: tuple["Shape", ...]
 
 
-#: a reference names another zone, of which the ground plan counts
+#: a reference names another zone, whose ground plan is used
 Shape = Circle | Polygon | Corridor | GeoJson | Combination | Reference
 
 
 class Daily(Node):
     """`active 08:00 .. 18:00`: the zone exists between these local times of every day, over midnight if reversed.
 
-    `days` are those of the week on which these begin (`active 22:00 .. 06:00 on friday`), from 0, a Monday, on,
-    ascending; none stands for all. `active on saturday, sunday` is from the first to the last us of the days.
+    `days` are the days of the week on which these windows begin (`active 22:00 .. 06:00 on friday`), counted from
+    Monday, 0, and ascending; empty means all. `active on saturday, sunday` is from the first to the last us of the
+    days.
     """
 
     start: TimeOfDay
@@ -89,7 +90,9 @@ class ZoneDecl(Node):
 
 
 class Braking(Node):
-    """`brakes from 12 m/s in 6 s after 500 ms`: told to stop, it goes on for `reaction` and then loses speed evenly."""
+    """`brakes from 12 m/s in 6 s after 500 ms`: told to stop, the vehicle continues for `reaction` and then
+    decelerates evenly.
+    """
 
     speed: Quantity
     time: Quantity
@@ -97,8 +100,8 @@ class Braking(Node):
 
 
 class NamedSpeed(Node):
-    """`landing 0.5 m/s below 10 m`: a speed that a vehicle keeps at least; `below` is the height where the last part of
-    a landing begins, which no other speed has.
+    """`landing 0.5 m/s below 10 m`: a lower bound of one of the vehicle's speeds; `below` is the height of the last
+    part of a landing, for that speed only.
     """
 
     name: Name
@@ -107,21 +110,21 @@ class NamedSpeed(Node):
 
 
 class Acceleration(Node):
-    """`accelerates to 5 m/s in 5 s`: so it gains and loses speed, at least, on a leg from place to place."""
+    """`accelerates to 5 m/s in 5 s`: a lower bound of the acceleration and deceleration on a leg."""
 
     speed: Quantity
     time: Quantity
 
 
 class VehicleDecl(Node):
-    """What the checks, the simulation and "wrong vehicle" need to know of one aircraft; signed with the policy.
+    """One aircraft, as the checks, the simulation and "wrong vehicle" need it; signed with the policy.
 
     `endurance` is the hover time of a full battery, `reserve` the charge that must remain after landing at home,
-    `within` how far the real home may lie from the declared one, `utc_offset` the local time's distance from UTC, or
-    `time_zone` the IANA name of its time zone.
-    `elevation` (`elevation 408 m above sea within 5 m`) is what altitudes above sea are converted by. `without` are the
-    signals of sensors that are not fitted on it. `speeds`, `acceleration`, `wind` and `flight` are what durations and
-    charges are proved by; what is not written of them has a default (`rtshcua.ground.lower.vehicle`).
+    `within` how far the real home may lie from the declared one, `utc_offset` the local time's distance from UTC,
+    or `time_zone` the IANA name of its time zone. `elevation` (`elevation 408 m above sea within 5 m`) converts
+    altitudes above sea. `without` are the signals of sensors that are not fitted. `speeds`, `acceleration`, `wind`
+    and `flight` are the inputs of proofs about durations and charges; each has a default
+    (`rtshcua.ground.lower.vehicle`).
     """
 
     name: Name
@@ -141,7 +144,7 @@ class VehicleDecl(Node):
     without: tuple[Name, ...] = ()
     speeds: tuple[NamedSpeed, ...] = ()
     acceleration: Acceleration | None = None
-    wind: Quantity | None = None  # the most that it is flown in
-    flight: Quantity | None = None  # how long a full battery flies, whatever it flies
+    wind: Quantity | None = None  # the greatest wind in which it flies
+    flight: Quantity | None = None  # how long a full battery lasts, whatever the vehicle flies
     time_zone: Name | None = None  # `clock "Europe/Berlin"`
-    cells: Quantity | None = None  # `cells 4`: so many in series, by which `battery.cell` is counted
+    cells: Quantity | None = None  # `cells 4`: the number in series, by which `battery.cell` is divided

@@ -1,4 +1,4 @@
-"""Authority policies: who may have which skill done, where and when."""
+"""Authority policies: who may use which skill, where and when."""
 
 from typing import Literal
 
@@ -8,7 +8,7 @@ from rtshcua.model.ir.skills import ArgumentValue, LinkDecl, ParameterDecl
 
 
 class RoleDecl(Node):
-    """`role supervisor, trainee`: roles that rules may name. `operator` is one without being declared."""
+    """`role supervisor, trainee`: roles that rules may name. `operator` is a role without a declaration."""
 
     names: tuple[Name, ...]
 
@@ -16,9 +16,9 @@ class RoleDecl(Node):
 class RuleDecl(Node):
     """`permit`, `forbid`, `confirm` or `degrade`.
 
-    Empty `skills` is `any`. `roles` empty is `by any`. `through` are the sources that may speak for the role
+    Empty `skills` is `any`. `roles` empty is `by any`. `through` are the sources that may act for the role
     (`through agent`); empty means the role's own source, `operator`, except under `by any`, where it means every
-    source. `where_fitted` is that of a clause (`ir/skills.py`); a `permit` has none.
+    source. `where_fitted` is as for a clause (`ir/skills.py`); a `permit` has none.
     """
 
     kind: Literal["permit", "forbid", "confirm", "degrade"]
@@ -30,7 +30,8 @@ class RuleDecl(Node):
     another: Name | None  # confirm: `and another of role supervisor`, who is another person
     within: Quantity | None  # confirm: `within 30 s`
     target: LinkDecl | None  # degrade: `to return_home`
-    #: the `use` and `delegate` that brought an elaborated rule about, the outermost first; empty as written
+    #: : the `use` and `delegate` statements that produced an elaborated rule, the outermost first; empty for a
+    #: written rule
     origin: tuple[Node, ...] = ()
     where_fitted: bool = False
 
@@ -38,8 +39,8 @@ class RuleDecl(Node):
 class Delegation(Node):
     """`delegate goto, hover by role operator to role trainee through agent when altitude <= 10 m`.
 
-    Whatever the policy permits to `grantor` of these skills (none: of any), it permits to `grantee` too, under the
-    further condition and through no other source: so it only narrows.
+    Everything that the policy permits to `grantor` of these skills (empty: any), it permits to `grantee` too,
+    under the further condition and through no other source. Authority therefore only narrows.
     """
 
     skills: tuple[Name, ...]
@@ -65,14 +66,14 @@ class TemplateDecl(Node):
 
 
 class AirspaceDecl(Node):
-    """`airspace inside city outside school, hospital`: where the vehicle may be at all."""
+    """`airspace inside city outside school, hospital`: the places where the vehicle may be."""
 
     inside: tuple[Name, ...]
     outside: tuple[Name, ...]
 
 
 class Silence(Node):
-    """`without link for 30 s contingency`: what follows when the vehicle was silent for longer than `limit`."""
+    """`without link for 30 s contingency`: what follows a silence of the vehicle longer than `limit`."""
 
     limit: Quantity
     then: Literal["contingency", "continue"]
@@ -80,8 +81,8 @@ class Silence(Node):
 
 class PolicyDecl(Node):
     """`policy name version 7 { ... }`. `contingency` flies when a step is denied in the air, `without_evidence` says
-    what becomes of a flight while its records are not kept, and `without_link` after a long silence of the vehicle:
-    None means `SILENCE_US` in `model/flat/policy.py`, then the contingency.
+    what a flight does while its records cannot be stored, and `without_link` what follows a long silence of the
+    vehicle: None means `SILENCE_US` in `model/flat/policy.py`, then the contingency.
     """
 
     name: Name

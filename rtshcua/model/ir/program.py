@@ -1,4 +1,4 @@
-"""A parsed file and a program: the import closure of what was asked to be compiled."""
+"""A parsed file, and a program: a file and the closure of its imports."""
 
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Node

@@ -1,4 +1,4 @@
-"""Scenarios: a mission to fly on the simulated vehicle, what goes wrong on the way, and what must come of it."""
+"""Scenarios: a mission that flies on the simulated vehicle, its faults, and the expected results."""
 
 from typing import Literal
 
@@ -9,7 +9,7 @@ from rtshcua.model.ir.tests import Expectation, Quoted
 
 
 class Seeds(Node):
-    """`seeds 1 .. 20`; of one seed both ends are the same."""
+    """`seeds 1 .. 20`; a single seed is both ends."""
 
     first: Quantity
     last: Quantity
@@ -24,7 +24,7 @@ class FaultCall(Node, kw_only=True):
 
 
 class Charge(Node, kw_only=True):
-    """`battery = 80 %`: what the vehicle starts with."""
+    """`battery = 80 %`: the charge at the start."""
 
     kind: Literal["charge"] = "charge"
     name: Name
@@ -42,7 +42,7 @@ Beginning = Charge | FaultCall | Begins
 
 
 class Delay(Node):
-    """`30 s .. 40 s`: drawn by the seed; of one time both ends are the same."""
+    """`30 s .. 40 s`: drawn from the seed; a single time is both ends."""
 
     low: Quantity
     high: Quantity
@@ -83,7 +83,7 @@ class IncidentDecl(Node):
 
 
 class DecidesDecl(Node, kw_only=True):
-    """`expect fallback return_home because state/violated at "battery > 35 %"`: of some decision of the run."""
+    """`expect fallback return_home because state/violated at "battery > 35 %"`: a decision of the run is like this."""
 
     kind: Literal["decides"] = "decides"
     decision: Expectation
@@ -112,7 +112,7 @@ class Reacts(Node, kw_only=True):
 
 
 class Keeps(Node, kw_only=True):
-    """`expect distance to school >= 20 m`; to `obstacle`, whatever stands around."""
+    """`expect distance to school >= 20 m`; to `obstacle`, every obstacle."""
 
     kind: Literal["keeps"] = "keeps"
     place: Name
@@ -134,7 +134,7 @@ class ScenarioDecl(Node):
 
     name: Quoted
     mission: Name
-    flavours: tuple[Name, ...]  # none written: all that there are
+    flavours: tuple[Name, ...]  # all autopilots if empty
     seeds: Seeds | None
     start: tuple[Beginning, ...]
     incidents: tuple[IncidentDecl, ...]

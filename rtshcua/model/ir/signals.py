@@ -1,11 +1,11 @@
-"""Enumerations and signals: what the vehicle is known to report, and in which MAVLink field."""
+"""Enumerations and signals: the vehicle's reported values, and their MAVLink fields."""
 
 from rtshcua.model.ir.expression import Quantity
 from rtshcua.model.ir.node import Name, Node
 
 
 class Enumerator(Node):
-    """A name and the integer that stands for it on the wire."""
+    """A name and its integer on the wire."""
 
     name: Name
     value: int
@@ -29,10 +29,10 @@ class Selected(Node):
 
 
 class SourceDecl(Node):
-    """One MAVLink message and the field or fields that hold the signal.
+    """One MAVLink message and the field or fields of the signal.
 
-    Two fields are a pair: latitude and longitude for a `position`, two components for a `speed` (taken as the
-    length of the vector). `where` says which of the messages count: those whose fields have these values.
+    Two fields are a pair: latitude and longitude for a `position`, two components for a `speed` (the length of the
+    vector). `where` selects messages: those whose fields have these values.
     """
 
     message: Name
@@ -43,8 +43,8 @@ class SourceDecl(Node):
 class SignalDecl(Node):
     """`signal battery : ratio = BATTERY_STATUS.battery_remaining unknown at -1 stale after 5 s`.
 
-    `type` is a dimension's name, `position`, `altitude`, or an enumeration. `sources` are alternatives (`or`): the
-    newest of them counts. `unknown_at` are raw field values, or enumerators, that mean "not known".
+    `type` is a dimension's name, `position`, `altitude`, or an enumeration. `sources` are alternatives (`or`), of
+    which the newest counts. `unknown_at` are raw field values, or enumerators, that mean "unknown".
     """
 
     name: Name

@@ -19,10 +19,10 @@ class ParameterDecl(Node):
 
 
 class MotionDecl(Node):
-    """Where the skill takes the vehicle, so that its planned volume is known before it flies.
+    """Where the skill takes the vehicle, so that its planned volume is known before the flight.
 
-    `climb to altitude` straight up; `fly to target at altitude`; `cover area at altitude` by a survey path;
-    `fly home` and land there; `hold` position; `land` here.
+    `climb to altitude` straight up; `fly to target at altitude`; `cover area at altitude` by a survey path; `fly
+    home` and land there; `hold` position; `land` here.
     """
 
     kind: Literal["climb", "fly", "cover", "home", "hold", "land"]
@@ -51,8 +51,8 @@ class LinkDecl(Node):
 class ClauseDecl(Node):
     """One condition of `require`, `assume` or `maintain`; a top-level `and` is already split into clauses.
 
-    `where_fitted` (`assume obstacle.distance > 3 m where fitted`): for a vehicle without a signal that it reads, it is
-    left out.
+    With `where_fitted` (`assume obstacle.distance > 3 m where fitted`) the clause is left out for a vehicle
+    without a signal that it reads.
     """
 
     condition: Condition
@@ -60,17 +60,17 @@ class ClauseDecl(Node):
 
 
 class Sized(Node):
-    """`lasts at most longest`: a part of a contract whose amount is one of the skill's sizes."""
+    """`lasts at most longest`: a part of a contract whose value is one of the skill's sizes."""
 
     part: Literal["deadline", "validity", "duration", "grace", "energy"]
     size: Reference
 
 
 class SkillDecl(Node, kw_only=True):
-    """A skill contract. None or an empty tuple means: not written (the checker says which fields must be).
+    """A skill contract. None or an empty tuple means: not written (the checker reports the required fields).
 
-    `sizes` are numbers that a program may set for it (`SizesDecl`), each with a default; `sized` are the parts that
-    name one. As `checker/symbols.py` hands a skill out, the values stand in their places and `sized` is empty.
+    `sizes` are numbers that a program may set (`SizesDecl`), each with a default; `sized` are the parts that name
+    one. `checker/symbols.py` substitutes the values, and `sized` is then empty.
     """
 
     name: Name
@@ -100,7 +100,7 @@ class GivenSize(Node):
 
 
 class SizesDecl(Node):
-    """`sizes goto(highest = 120 m, longest = 6 min)`: what a program says of a skill's sizes."""
+    """`sizes goto(highest = 120 m, longest = 6 min)`: the values of a skill's sizes in a program."""
 
     skill: Name
     given: tuple[GivenSize, ...]

@@ -1,4 +1,4 @@
-"""Nominals and tests: a state to begin from, what is asked in it, what must be decided. Neither reaches a bundle."""
+"""Nominals and tests: an initial state, a request, and the expected decision. Neither is part of a bundle."""
 
 from typing import ClassVar, Literal
 
@@ -8,7 +8,7 @@ from rtshcua.model.ir.skills import ArgumentValue
 
 
 class Quoted(Node):
-    """A text: what a test is called, or a clause as it is written. The span has the quotes, `text` has not."""
+    """A quoted text: the name of a test, or a clause. The span includes the quotes, `text` does not."""
 
     text: str
 
@@ -21,7 +21,7 @@ class OverTime(Node, kw_only=True):
 
 
 class Named(Node, kw_only=True):
-    """`battery`: a signal, or in a table a parameter of the skill that is asked for."""
+    """`battery`: a signal, or in a table a parameter of the requested skill."""
 
     kind: Literal["named"] = "named"
     name: Name
@@ -34,7 +34,7 @@ class TableCell(Node):
     """`20 %`, `unknown` (`value` is None), `fix_3d measured 3 s ago`; `true` or `false` of a condition over time."""
 
     value: Value | None
-    measured: Quantity | None = None  # how long ago
+    measured: Quantity | None = None  # age of the measurement
 
 
 class Assignment(Node):
@@ -45,15 +45,15 @@ class Assignment(Node):
 
 
 class Instant(Node):
-    """`at "2026-06-01T08:00:00Z" within 2 s`: UTC of the decision in us since the epoch, and how wrong it may be."""
+    """`at "2026-06-01T08:00:00Z" within 2 s`: UTC of the decision in us since the epoch, and its error."""
 
     utc_us: int
     within: Quantity | None
 
 
 class InPhase(Node):
-    """`phase departure of departure, inspection, recovery`: the mission's phase, and all of its phases in order (none
-    written: this one alone, or as the nominal says).
+    """`phase departure of departure, inspection, recovery`: the mission's phase, and all of its phases in order
+    (empty: only this one, or those of the nominal).
     """
 
     phase: Name
@@ -76,25 +76,25 @@ class Issue(Node):
 
 
 class VersionInForce(Node):
-    """`version 8 in force`: of the policy aboard, where it is not the one that the request was made under."""
+    """`version 8 in force`: the version of the policy on board, if it differs from that of the request."""
 
     version: int
 
 
 class Identity(Node):
-    """`identity "quad-08"`: of the vehicle that the request came to, where it is not the one that it was made for."""
+    """`identity "quad-08"`: the vehicle that receives the request, if it differs from the one that it was made for."""
 
     text: str
 
 
 class Deed(Node):
-    """`replayed`: the request's id was used before. `tampered`: what was presented is not what was signed."""
+    """`replayed`: the request's id was used before. `tampered`: the request differs from what was signed."""
 
     kind: Literal["replayed", "tampered"]
 
 
 class Premises(Node):
-    """What holds when the request is decided on; None or an empty tuple: not written. Times are how long ago."""
+    """The situation of the request; None or an empty tuple: not written. Times are ages."""
 
     given: tuple[Assignment, ...] = ()
     instant: Instant | None = None
@@ -109,15 +109,15 @@ class Premises(Node):
 
 
 class Asker(Node):
-    """`by role operator through agent`: who asks, and the source that speaks for the role. Each may be left out."""
+    """`by role operator through agent`: the role of the request and its source. Each may be omitted."""
 
     role: Name | None
     source: Name | None
 
 
 class NominalDecl(Node):
-    """`nominal morning { under bridge_inspection on quad by role operator at "..." phase inspection given ... }`: where
-    tests start from.
+    """`nominal morning { under bridge_inspection on quad by role operator at "..." phase inspection given ... }`: the
+    initial situation of tests.
     """
 
     name: Name
@@ -136,8 +136,8 @@ class RequestDecl(Node):
 
 
 class Expectation(Node):
-    """`expect fallback return_home because state/violated at "battery > 35 %"`. What is not written may be anything;
-    `clause` is the text of the clause that must have decided.
+    """`expect fallback return_home because state/violated at "battery > 35 %"`. Omitted parts may have any value;
+    `clause` is the text of the expected deciding clause.
     """
 
     outcome: Literal["allow", "deny", "defer", "fallback"]
@@ -154,7 +154,7 @@ class TableRow(Node):
 
 
 class CaseTable(Node):
-    """`table battery, wind.speed { ... }`: a case a row."""
+    """`table battery, wind.speed { ... }`: each row is a case."""
 
     columns: tuple[Subject, ...]
     rows: tuple[TableRow, ...]
@@ -163,7 +163,7 @@ class CaseTable(Node):
 class TestDecl(Node):
     """`test "low battery turns an inspection into a return" from morning { given ... when ... expect ... }`."""
 
-    __test__: ClassVar[bool] = False  # for pytest: this is no test of ours
+    __test__: ClassVar[bool] = False  # tells pytest that this class is not a test
 
     name: Quoted
     nominal: Name | None

@@ -1,1 +1,3 @@
-"""The enforcement boundary: `load` once, `enforce` bytes for bytes, and the executor that nothing is sent without."""
+"""The enforcement boundary: `load` once, `enforce` bytes for bytes, and the executor through which everything is
+sent.
+"""

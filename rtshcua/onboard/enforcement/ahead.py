@@ -1,10 +1,10 @@
-"""What brings the vehicle down when the boundary is lost in flight: the frames of links that standing permits are good
-for, signed ahead while it was there (docs/adr/0075).
+"""Brings the vehicle down if the boundary is lost in flight, with frames of the links behind standing permits that
+were signed ahead (docs/adr/0075).
 
-The boundary signs them with timestamps half a minute above those of what it signs now, in the order of the links. An
-autopilot takes a frame only if its timestamp is above that of the one before: so what is signed ahead is good once
-nothing more is signed, in this order alone, and void as soon as what is signed has come that far. It is therefore
-signed anew before.
+The boundary signs them with timestamps half a minute above the present ones, in the order of the links. An
+autopilot accepts a frame only if its timestamp is above that of the previous one. So frames signed ahead are valid
+once nothing else is signed, in this order only, and void as soon as the present timestamps reach them. They are
+signed anew before that.
 """
 
 from collections.abc import Callable, Sequence
@@ -19,32 +19,31 @@ from rtshcua.onboard.enforcement.executor import Commands, SignedAhead
 from rtshcua.onboard.ports import Command
 from rtshcua.wire.request import FALLBACK_LINK
 
-#: how often frames are signed ahead, in us: half as long as they are good
+#: : how often frames are signed ahead, in us: half of their validity
 EVERY_US: Final = 15_000_000
-#: and after nothing could be signed
+#: : and after an attempt that failed
 _AGAIN_US: Final = 1_000_000
-#: how often the last link of the contingency is signed: as often as a run that is left alone meanwhile may send it
+#: : how often the last link of the contingency is signed: as often as an unattended run may send it
 LAST: Final = 12
-#: frames of one link at most (`RT_MOST_AHEAD` in boundary/enforcement/calls.h)
+#: : the most frames of one link (`RT_MOST_AHEAD` in boundary/enforcement/calls.h)
 MOST: Final = 128
 
 NOT_AHEAD: Final = Refusal("permit/not-ahead", "the boundary is lost, and this link was not signed ahead")
-NO_COPY: Final = Refusal("frame/not-ahead", "the boundary is lost, and no copy is left that was signed of this frame")
+NO_COPY: Final = Refusal("frame/not-ahead", "the boundary is lost, and all signed copies of this frame are used")
 
-#: makes the frames that a command is flown by, each as often as it may have to be sent
+#: : makes the frames of a command, each as often as it may have to be sent
 Encode = Callable[[Command], Sequence[bytes]]
-#: has the frames of a link signed: the standing permit, kind and number of the link, its frames, and the time
+#: : signs the frames of a link: the standing permit, kind and number of the link, its frames, and the time
 Sign = Callable[[bytes, int, int, Sequence[bytes], int], SignedAhead | Refusal]
 
-# what differs between two frames that do the same of one command: where home is taken to lie, how often one was sent,
-# and our time
+# the fields that differ between two equivalent frames of one command: the assumed home, the retry count, and our time
 _FREE: Final = {COMMAND_LONG: ("param7", "confirmation"), COMMAND_INT: ("z",)}
 _FREE[SET_POSITION_TARGET_GLOBAL_INT] = ("alt", "time_boot_ms")
 _BLANK: Final = {number: tuple(map(LAYOUTS[number].at, names)) for number, names in _FREE.items()}
 
 
 def _does(frame: Frame) -> bytes:
-    """What a frame does, of one command."""
+    """The fields of a frame that determine its effect, for one command."""
     fields = list(frame.fields)
     for at in _BLANK.get(frame.message, ()):
         fields[at] = 0
@@ -52,7 +51,7 @@ def _does(frame: Frame) -> bytes:
 
 
 class _Copy(NamedTuple):
-    """A frame as it may be sent once, what it does, and its timestamp; 0 on a link without a key."""
+    """A signed frame for a single use, its effect, and its timestamp; 0 on a link without a key."""
 
     does: bytes
     octets: bytes
@@ -60,7 +59,7 @@ class _Copy(NamedTuple):
 
 
 class _Link(NamedTuple):
-    """A link that was signed ahead: `step` whose chain it is of, -1 for the contingency, and its command's token."""
+    """A link that was signed ahead: `step` owns its chain, -1 for the contingency; and its command's token."""
 
     kind: int
     step: int
@@ -70,8 +69,8 @@ class _Link(NamedTuple):
 
 
 class FramesAhead:
-    """The frames that were signed ahead, of the step that was sent last. `sent` and `due` while the boundary is there,
-    `begin`, `take` and `close` when it is lost. They go forward only.
+    """The frames that were signed ahead for the last step that was sent. `sent` and `due` apply while the boundary is
+    there, `begin`, `take` and `close` after its loss. They only go forward.
     """
 
     def __init__(self, commands: Commands, sign: Sign) -> None:
@@ -79,47 +78,47 @@ class FramesAhead:
         self._sign = sign
         self._standing: tuple[bytes, int] | None = None  # the permit of the step, and its number
         self._links: list[_Link] = []
-        self._before: tuple[bytes, int] | None = None  # that of the step before it
+        self._before: tuple[bytes, int] | None = None  # those of the step before it
         self._due_us = 0
-        self._tried_us = 0  # when it was last tried to sign
-        self._begins = False  # nothing was signed yet of what stands behind the step
-        self._latest = 0  # timestamp of what was signed last for now
-        self._next = 0  # the first link that may be begun,
-        self._at = -1  # the last that was,
-        self._again = 0  # how often it was begun before,
+        self._tried_us = 0  # the last attempt to sign
+        self._begins = False  # no link behind the step was signed yet
+        self._latest = 0  # the last timestamp that was signed for immediate use
+        self._next = 0  # the first link that may begin,
+        self._at = -1  # the last one that did,
+        self._again = 0  # how often it began before,
         self._used = 0  # and how many of its copies were used
         self._open = False
 
-    # -------------------------------------------------------- while the boundary is there
+    # -------------------------------------------------------- with a boundary
 
     def stands(self, sealed: bytes, step: int) -> None:
-        """A step was sent by this permit: what stands behind it is signed when it begins. Not before, for a step that
-        comes too late is decided again only if nothing that may be sent was signed by then.
+        """A step was sent by this permit; the links behind it are signed when it begins. Not earlier, because a step
+        that comes too late is only decided again if nothing was signed that may be sent.
         """
         self._before = self._standing
         self._standing, self._due_us, self._begins = (sealed, step), 0, True
 
     def withdrawn(self, sealed: bytes) -> None:
-        """Nothing was sent of a step by this permit, and nothing will be: what stood before it stands."""
+        """Nothing of a step was or will be sent by this permit: the links of the previous step stay valid."""
         if self._standing is not None and self._standing[0] == sealed:
             self._standing, self._due_us, self._begins = self._before, 0, False
 
     def flown(self) -> None:
-        """A link was sent: those behind it are signed anew."""
+        """A link was sent: the links behind it are signed anew."""
         self._due_us, self._begins = 0, False
 
     def lapse(self) -> None:
-        """The vehicle landed: nothing stands any more."""
+        """The vehicle landed: all links lapse."""
         self._standing = None
         self._put([])
 
     def sent(self, octets: bytes) -> None:
-        """A signed frame leaves: what was signed ahead is void from its timestamp on."""
+        """A signed frame is sent: it voids the frames signed ahead with timestamps up to its own."""
         self._latest = timestamp_in(octets)
 
     def renew(self, encode: Encode, now_us: int, *, begins: bool = False) -> Sequence[str]:
-        """Have signed what is due; of links that could not be, why, in words. `begins`: a step is about to begin, and
-        nothing but what it needs is signed; else nothing before it did.
+        """Have the boundary sign what is due; return the reasons for links that could not be signed. `begins`: a step
+        is about to begin, and only the links that it needs are signed; else nothing before it did.
         """
         if self._standing is None or begins is not self._begins:
             return ()
@@ -136,10 +135,10 @@ class FramesAhead:
             command = self._commands.command(kind, its, number, 0)
             frames = encode(command)
             if not frames:
-                notes.append(f"`{command.skill}` cannot be signed ahead: how it is flown is not known")
+                notes.append(f"cannot sign `{command.skill}` ahead: its manoeuvre is unknown")
                 continue
             if len(frames) > MOST:
-                notes.append(f"`{command.skill}` cannot be signed ahead: {len(frames)} frames, {MOST} at most")
+                notes.append(f"cannot sign `{command.skill}` ahead: {len(frames)} frames; the limit is {MOST}")
                 continue
             if (kind, number) == of_step[-1]:
                 frames = [*frames] * min(LAST, MOST // len(frames))
@@ -148,7 +147,7 @@ class FramesAhead:
                 copies = tuple(map(_copied, frames, answer.signatures))
                 links.append(_Link(kind, its, number, answer.token, copies))
             elif answer.slug.startswith("frame/"):
-                notes.append(f"`{command.skill}` cannot be signed ahead: {answer.slug}")
+                notes.append(f"cannot sign `{command.skill}` ahead: {answer.slug}")
         self._due_us = now_us + (EVERY_US if links else _AGAIN_US)
         if links:
             self._put(links)
@@ -158,15 +157,15 @@ class FramesAhead:
         self._links, self._next, self._at, self._open = links, 0, -1, False
 
     def _is_short(self) -> bool:
-        """Whether what is signed now comes near what was signed ahead, for time ran faster than ours."""
+        """Whether the present timestamps approach those signed ahead, because time advanced faster than ours."""
         first = self._links[0].copies[0].timestamp if self._links else 0
         return bool(first) and first - self._latest < LEAD // 3
 
-    # -------------------------------------------------------- when it is lost
+    # -------------------------------------------------------- after its loss
 
     def begin(self, kind: int, number: int) -> Command | None:
-        """The command of a link that was signed ahead and not flown yet; None where there is none. The last link may be
-        flown again, as far as its copies go.
+        """The command of a link that was signed ahead and has not flown yet; None if there is none. The last link may
+        fly again while it has copies.
         """
         step = self._standing[1] if self._standing is not None and kind == FALLBACK_LINK else -1
         for at in range(self._next, len(self._links)):
@@ -178,7 +177,7 @@ class FramesAhead:
         return None
 
     def take(self, frame: Frame) -> bytes | Refusal:
-        """A copy of a frame of the link that flies, each once."""
+        """A copy of a frame of the link that flies; each is used once."""
         does = _does(frame)
         copies = self._links[self._at].copies if self._open else ()
         for number in range(self._used, len(copies)):
@@ -189,12 +188,12 @@ class FramesAhead:
         return NO_COPY
 
     def ended(self, token: int | None) -> None:
-        """The command of this token ended, or whatever flies."""
+        """The command of this token ended, or any command that flies."""
         if self._open and token in (None, self._token):
             self.close()
 
     def close(self) -> None:
-        """Nothing more leaves, unless another link is begun."""
+        """Send nothing more, unless another link begins."""
         self._open = False
 
     @property
@@ -203,9 +202,9 @@ class FramesAhead:
 
 
 def _copied(frame: bytes, signature: bytes) -> _Copy:
-    """A frame as it may be sent, once it was signed."""
+    """The frame after the boundary signed it."""
     read = read_frame(frame)
-    assert read is not None, "the boundary takes nothing else"
+    assert read is not None, "the boundary accepts nothing more"
     if not signature:
         return _Copy(_does(read), frame, 0)
     octets = with_flags(frame, FLAG_SIGNED) + signature

@@ -1,14 +1,14 @@
-"""The allow-list of frames: which ones may leave without a permit, and which carry out the command that is permitted.
+"""The allow-list of frames: which ones may be sent without a permit, and which carry out the permitted command.
 
-Housekeeping moves nothing. Questions, telemetry rates, texts and our own heartbeat pass always. A geofence may be
-handed over before the flight, never during it; so are the two parameters that switch ArduCopter's fence on, and nothing
-but on. What is not here is not housekeeping: no mission is uploaded, no signing key set, no file opened, no manual
-control given. Another parameter is set only as a preparation lists it (`written`, `frames.py`).
+Housekeeping moves nothing. Requests, telemetry rates, texts and our own heartbeat always pass. A geofence may be
+uploaded before the flight, never during it; the same applies to the two parameters that switch ArduCopter's fence
+on. Nothing else is housekeeping: no mission upload, signing key, file access or manual control. Other parameters
+are set only as listed in a preparation (`written`, `frames.py`).
 
-A frame carries out a command if every field that the autopilot acts on has the value that the command gives it: the
-number, each parameter, the frame of reference, the point, the height, the speed, the mode. Nothing is "about right" but
-for what a 32-bit float rounds off, and for the height of home, which the autopilot's own estimate moves. The rules are
-the same for every adapter, read next to what autopilots make of a frame.
+A frame carries out a command if every field that the autopilot acts on has the value in the command: the number,
+each parameter, the frame of reference, the point, the height, the speed, the mode. Values must be equal except for
+the rounding of a 32-bit float and the height of home, which the autopilot's own estimate moves. The rules are the
+same for every adapter, next to the documented behaviour of the autopilots.
 """
 
 from collections.abc import Callable, Mapping
@@ -28,7 +28,7 @@ _Fields = tuple[Any, ...]
 
 
 class Frame(NamedTuple):
-    """One whole frame. `fields` are in the order of the wire; `target` is (system, component) where it has one."""
+    """One complete frame. `fields` are in the order of the wire; `target` is (system, component) where it has one."""
 
     system: int
     component: int
@@ -41,10 +41,10 @@ _TARGETS = {number: layout.at("target_system") for number, layout in LAYOUTS.ite
 
 
 def read_frame(octets: bytes) -> Frame | None:
-    """The frame that these octets are; None unless they are one whole unsigned frame of a message in `LAYOUTS`.
+    """The frame in these octets; None unless they are one complete unsigned frame of a message in `LAYOUTS`.
 
-    The boundary reads frames itself: it shares no parser with the adapters that it checks. The checksum is the
-    receiver's to check: a frame whose checksum is wrong moves nothing.
+    The boundary shares no parser with the adapters that it checks. The receiver checks the checksum: a frame with
+    a wrong one moves nothing.
     """
     if len(octets) < HEADER or octets[0] != MARKER:
         return None
@@ -74,18 +74,18 @@ _item: Final = LAYOUTS[layouts.MISSION_ITEM_INT].getter("command current mission
 
 
 def is_housekeeping(frame: Frame) -> bool:
-    """Whether the frame moves nothing, and may leave at any time."""
+    """Whether the frame moves nothing and may be sent at any time."""
     rule = _AT_ANY_TIME.get(frame.message)
     return rule is not None and rule(frame.fields)
 
 
-#: the system id of a ground station, by custom and by `SYSID_MYGCS` as ArduPilot comes
+#: : the system id of a ground station, by convention and by ArduPilot's default of `SYSID_MYGCS`
 _GROUND_STATION: Final = 255
 
 
 def is_greeting(frame: Frame) -> bool:
-    """Whether the frame is our heartbeat, or asks for one, under an id that no ground station has: it may leave before
-    any came.
+    """Whether the frame is our heartbeat, or requests one, under an id that no ground station has: it may be sent
+    before any heartbeat was received.
     """
     if frame.system == _GROUND_STATION:
         return False
@@ -96,10 +96,9 @@ def is_greeting(frame: Frame) -> bool:
 
 
 def is_of_fence(frame: Frame, types: float | None) -> bool:
-    """Whether the frame is part of handing over a fence: it moves nothing, and may leave before the flight.
+    """Whether the frame is part of a fence upload: it moves nothing, and may be sent before the flight.
 
-    `types` is the FENCE_TYPE that was heard last, None before: it is set to the same with the areas, not without what
-    its owner has in it.
+    `types` is the last received FENCE_TYPE, None before: it is set to the same value with the areas added.
     """
     if frame.message == layouts.PARAM_SET:
         return _switches_fence_on(frame.fields, types)
@@ -108,12 +107,12 @@ def is_of_fence(frame: Frame, types: float | None) -> bool:
 
 
 def written(frame: Frame, *, bytewise: bool) -> tuple[str, int | None] | None:
-    """The parameter that a frame sets, and the 32 bits of the value that it gets; None if it sets none."""
+    """The parameter that a frame sets, and the 32 bits of its new value; None if it sets none."""
     return _named(_setting(frame.fields), bytewise=bytewise) if frame.message == layouts.PARAM_SET else None
 
 
 def told(frame: Frame, *, bytewise: bool) -> tuple[str, int | None]:
-    """The parameter that a PARAM_VALUE tells of, and the bits of its value."""
+    """The parameter in a PARAM_VALUE, and the bits of its value."""
     return _named(_told(frame.fields), bytewise=bytewise)
 
 
@@ -127,12 +126,14 @@ def _any(fields: _Fields) -> bool:
 
 
 def _is_own(fields: _Fields) -> bool:
-    """A heartbeat of ours: a ground station's would hide that the real one is gone (vehicles.md, 2)."""
+    """Whether it is our own heartbeat: that of a ground station would hide the loss of the real one (vehicles.md,
+    2).
+    """
     return bool(_identity(fields) == _OWN_HEARTBEAT)
 
 
 def _asks(fields: _Fields) -> bool:
-    """A command that asks for messages, or for the checks before arming."""
+    """Whether the command requests messages, or the checks before arming."""
     number = _command_number(fields)
     if number == enums.MAV_CMD_RUN_PREARM_CHECKS:
         return not any(_parameters(fields))
@@ -140,7 +141,7 @@ def _asks(fields: _Fields) -> bool:
 
 
 def _switches_fence_on(fields: _Fields, types: float | None) -> bool:
-    """FENCE_ENABLE on; the areas switched on in FENCE_TYPE, which stays as it is else."""
+    """Whether it sets FENCE_ENABLE, or adds the areas to FENCE_TYPE and changes nothing else of it."""
     name, value, _ = _setting(fields)
     match name.rstrip(b"\0"):
         case b"FENCE_ENABLE":
@@ -151,13 +152,15 @@ def _switches_fence_on(fields: _Fields, types: float | None) -> bool:
 
 
 def _about_fence(message: int) -> Callable[[_Fields], bool]:
-    """Whether such a message is about a fence, and not about a mission."""
+    """Whether the message is about a fence, and not about a mission."""
     kind = LAYOUTS[message].getter("mission_type")
     return lambda fields: bool(kind(fields) == enums.MAV_MISSION_TYPE_FENCE)
 
 
 def _is_fence_item(fields: _Fields) -> bool:
-    """Not `current`: 2 and 3 there are ArduPilot's way to say "go there now" and "climb to there now"."""
+    """Whether it is a fence item. `current` must be 0: 2 and 3 are ArduPilot's encodings of "go there now" and "climb
+    to there now".
+    """
     number, current, mission_type = _item(fields)
     return mission_type == enums.MAV_MISSION_TYPE_FENCE and current == 0 and number in _FENCE_ITEMS
 
@@ -182,17 +185,17 @@ _BEFORE_FLIGHT: Final[dict[int, Callable[[_Fields], bool]]] = {
 
 # ---------------------------------------------------------------- motion
 
-#: mm: how far home's height above sea may have moved between the frame that told it and the one that uses it; in the
-#: recorded flight of PX4 it moves by 0.7 m
+#: : mm: the greatest change of home's height above sea between the frame that reported it and the one that uses it;
+#: 0.7 m in the recorded flight of PX4
 DATUM_MOVES: Final = 2_000
 _ROUNDING: Final = 2  # mm, mm/s
-#: 1e-7 degree of latitude, 5 m: how near to a point of its path the vehicle must have been seen before it is sent to
-#: the next; the adapters count it as arrived within 2 m
+#: : 1e-7 degree of latitude, 5 m: the greatest distance to a point of its path at which the vehicle may be sent to
+#: the next one; the adapters count it as arrived within 2 m
 NEAR: Final = 449
 
-#: command and frame of reference (heights above mean sea level) of a DO_REPOSITION,
+#: : command and frame of reference (heights above mean sea level) of a DO_REPOSITION,
 _REPOSITION: Final = (enums.MAV_CMD_DO_REPOSITION, enums.MAV_FRAME_GLOBAL)
-#: and its flags: to Hold, or in Hold alone, where nothing is taken from a pilot who chose another mode
+#: : and its flags: change to Hold, or only act in Hold, which overrides no pilot who chose another mode
 _FLAGS: Final = (enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE, 0)
 _NOWHERE: Final = (enums.NO_PLACE, enums.NO_PLACE)
 
@@ -202,7 +205,7 @@ _places: Final = {
 }
 _armings: Final = {number: LAYOUTS[number].getter("command param2") for number in (COMMAND_LONG, COMMAND_INT)}
 
-#: parameters 2 and 3 of DO_SET_MODE that a kind of motion is made with
+#: : parameters 2 and 3 of DO_SET_MODE for a kind of motion
 _MODES: Final[Mapping[int, Mapping[int, tuple[int, int]]]] = {
     PX4: {
         MotionKind.CLIMB: Px4Mode.HOLD.parameters,  # it is armed in Hold
@@ -219,23 +222,23 @@ _MODES: Final[Mapping[int, Mapping[int, tuple[int, int]]]] = {
     },
 }
 _TRAVELS: Final = (MotionKind.FLY, MotionKind.COVER)
-#: what may carry out a command (`carries_out`): no parameter is set by it, and no fence handed over
+#: : frames that may carry out a command (`carries_out`); none sets a parameter or uploads a fence
 COMMANDS: Final = frozenset({COMMAND_LONG, COMMAND_INT, SET_POSITION_TARGET_GLOBAL_INT})
 
 
 def is_forced_arming(frame: Frame) -> bool:
     """Whether it would arm or disarm past the autopilot's own checks: parameter 2 of COMPONENT_ARM_DISARM is 21196.
 
-    Any value but 0 counts, for what an autopilot makes of another one is its own affair.
+    Any value but 0 counts, because an autopilot's interpretation of other values is unknown.
     """
     number, force = _armings[frame.message](frame.fields) if frame.message in _armings else (0, 0)
     return bool(number == enums.MAV_CMD_COMPONENT_ARM_DISARM and force != 0)
 
 
 def carries_out(frame: Frame, command: Command, autopilot: int, home_amsl: int | None) -> bool:
-    """Whether an autopilot that obeys the frame does what the command says, or a part of it.
+    """Whether an autopilot that obeys the frame carries out the command or a part of it.
 
-    `home_amsl` is how high home lies above mean sea level in mm, None where that is not known.
+    `home_amsl` is the height of home above mean sea level in mm, None if unknown.
     """
     match frame.message:
         case layouts.COMMAND_LONG:
@@ -250,14 +253,14 @@ def carries_out(frame: Frame, command: Command, autopilot: int, home_amsl: int |
 
 
 def point_of(frame: Frame) -> tuple[int, int] | None:
-    """Where a frame that carries out a command sends the vehicle, in 1e-7 degree; None if it leaves it where it is."""
+    """The target of a frame that carries out a command, in 1e-7 degree; None if the vehicle stays where it is."""
     place = _places.get(frame.message)
     point: tuple[int, int] | None = None if place is None else place(frame.fields)
     return None if point == _NOWHERE else point
 
 
 def is_near(here: tuple[int, int] | None, point: tuple[int, int]) -> bool:
-    """Whether a place that was reported is so near to a point of a path that the next leg may begin; 1e-7 degree."""
+    """Whether a reported place is close enough to a point of a path for the next leg to begin; 1e-7 degree."""
     if here is None:
         return False
     latitude, longitude = point
@@ -267,8 +270,8 @@ def is_near(here: tuple[int, int] | None, point: tuple[int, int]) -> bool:
 
 
 def _cosine(latitude: int) -> int:
-    """The cosine of a latitude in 1e-7 degree, times 2**SHIFT: by Bhaskara I, which is off by 0.0016 at most, and takes
-    no float.
+    """The cosine of a latitude in 1e-7 degree, times 2**SHIFT: by Bhaskara I, with an error of at most 0.0016 and
+    without floats.
     """
     square = (abs(latitude) // 10_000) ** 2  # 1e-3 degree
     return ((180_000**2 - 4 * square) << SHIFT) // (180_000**2 + square)
@@ -285,7 +288,7 @@ def _long(fields: _Fields, command: Command, autopilot: int, home_amsl: int | No
         case enums.MAV_CMD_NAV_TAKEOFF if command.kind == MotionKind.CLIMB:
             if autopilot == PX4:  # it climbs at a finite place, turned to a finite heading, to metres above sea
                 here = isnan(four) and isnan(five) and isnan(six)
-                pitch = isnan(one) or one == 0  # nothing to a multirotor
+                pitch = isnan(one) or one == 0  # no effect on a multirotor
                 return here and pitch and _zero(two, three) and _is_above_sea(seven, command, home_amsl)
             return _zero(one, two, three, four, five, six) and _is(seven, command.altitude)
         case enums.MAV_CMD_DO_CHANGE_SPEED if command.kind in _TRAVELS:
@@ -304,9 +307,9 @@ def _reposition(fields: _Fields, command: Command, home_amsl: int | None) -> boo
 
 
 def _stop(fields: _Fields) -> bool:
-    """DO_REPOSITION to no place, height or heading: PX4 brakes, and stays where it comes to stand.
+    """DO_REPOSITION without place, height and heading: PX4 brakes, and stays where it stops.
 
-    A finite one of them would make PX4 keep the target that it flies to.
+    A finite one of them would make PX4 keep its previous target.
     """
     speed, flags, radius, yaw, x, y, z, number, reference = layouts.of_command_int(fields)
     nowhere = (x, y) == _NOWHERE and isnan(z) and isnan(yaw)
@@ -315,7 +318,7 @@ def _stop(fields: _Fields) -> bool:
 
 
 def _position_target(fields: _Fields, command: Command) -> bool:
-    """SET_POSITION_TARGET_GLOBAL_INT; what the mask tells the autopilot to ignore may be anything."""
+    """SET_POSITION_TARGET_GLOBAL_INT; fields that the mask excludes may have any value."""
     x, y, z, mask, reference = layouts.of_position_target(fields)
     there = _is_point(x, y, command) and _is(z, command.altitude)
     above_home = (mask, reference) == (enums.POSITION_ONLY, enums.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT)

@@ -1,8 +1,10 @@
-"""The enforcement boundary in this process: `enforce` decides one request and issues what the decision grants.
+"""The enforcement boundary in this process: `enforce` decides one request and issues the permits that the decision
+grants.
 
-It holds what a runtime must not be trusted with: the verified bundle, the session (`decision.session`), and the key of
-the permits. Bytes go in and bytes come out, so that an isolated process or a trusted world can take its place. Whatever
-it answers it chains first (`wire.boundary_chain`); an answer about a step that equals the one before is counted there.
+It holds everything that the runtime is not trusted with: the verified bundle, the session (`decision.session`),
+and the key of the permits. Its interface is bytes in, bytes out, so that an isolated process or a trusted world
+can replace it. It chains each answer before it returns it (`wire.boundary_chain`); an answer about a step that
+equals the previous one is only counted.
 """
 
 from hashlib import sha256
@@ -32,20 +34,21 @@ from rtshcua.wire.request import FALLBACK_LINK, STEP, Ref, Request, decode
 from rtshcua.wire.response import NO_CLAUSE, NO_TARGET, Status, encode, encode_refusal
 from rtshcua.wire.untrusted import Untrusted
 
-#: how far UTC and monotonic time may part in a session, in us: more than a good clock is off, and less than matters
+#: : the greatest difference by which UTC and monotonic time may diverge in a session, in us: more than the error of a
+#: good clock, and less than matters
 CLOCKS_PART_US: Final = 3_000_000
 _Numbers = dict[Clause | Rule | Airspace, int]
 
 
 class PermitIssuer:
-    """Seals permits under the session key, each with a serial of its own. Only a boundary has one."""
+    """Seals permits under the session key, each with a serial of its own. Only a boundary has an issuer."""
 
     def __init__(self, key: bytes) -> None:
         self._key = key
         self._serial = 1
 
     def step(self, step: int, not_after_us: int, fallbacks: int, contingencies: int) -> bytes:
-        """A step's permit, which stands for so many links of its chain and of the contingency too."""
+        """A step's permit, which also stands for so many links of its chain and of the contingency."""
         serial = self._serial
         self._serial += 1 + fallbacks + contingencies + AGAIN
         return seal(Permit(STEP, step, -1, serial, fallbacks, contingencies, not_after_us), self._key)
@@ -58,8 +61,8 @@ class PermitIssuer:
 
 
 class _Ready(NamedTuple):
-    """What a mission needs that comes into force: its commands, the numbers of its steps' clauses, and SHA-256 of the
-    document that brings it.
+    """The prepared parts of a new mission: its commands, the numbers of its steps' clauses, and SHA-256 of the
+    document that contains it.
     """
 
     made: Made
@@ -70,10 +73,11 @@ class _Ready(NamedTuple):
 class SoftwareBoundary:
     """The boundary over a prepared bundle.
 
-    `enforced` false is mode `none`: it decides and answers as ever, and issues a step's permit whatever the decision.
+    `enforced` is false in mode `none`: it decides and answers as usual, but issues a step's permit whatever the
+    decision.
     """
 
-    #: it is there as long as the runtime
+    #: : it exists as long as the runtime does
     lost = None
 
     def __init__(
@@ -85,29 +89,31 @@ class SoftwareBoundary:
         self._commands = commands
         self._vehicle = in_force.vehicle
         self._contingencies = len(policy.contingency)
-        self._version = policy.policy.version  # latched: a newer policy comes with another bundle, after landing
+        self._version = policy.policy.version  # fixed: a newer policy comes with another bundle, after landing
         self._issuer = PermitIssuer(key)
         self._chain = chain
-        self._last: tuple[object, ...] = ()  # the last answer about a step, as far as one that equals it is counted
+        self._last: tuple[
+            object, ...
+        ] = ()  # the last answer about a step, without the fields that do not count in a comparison
         self._enforced = enforced
         self._slots = policy.policy.slots
         self._monitors = len(policy.monitors)
         self._shared: _Numbers = {clause: at for at, clause in enumerate(response.shared_clauses(policy.policy))}
         self._own = self._own_numbers(in_force.bundle.mission.invocations)
-        #: what was made ahead of a mission that may come into force, by the document that brings it
+        #: : the prepared parts of missions that may come into force, by the document that contains them
         self._ready: dict[bytes, _Ready] = {}
-        self._now_us = 0  # of the last request: time does not go back
-        self._ahead_us: int | None = None  # UTC less monotonic time, as it was first told
+        self._now_us = 0  # of the last request, because time must not go back
+        self._ahead_us: int | None = None  # UTC minus monotonic time at the first request
 
     def enforce(self, request: bytes, own: Now | None = None) -> bytes:
-        """Decide one request. Hostile bytes get a refusal; nothing is raised, and of them nothing but their digest is
-        remembered. `own` is the present moment by the boundary's own clock; without one the caller's time counts.
+        """Decide one request. Malformed bytes are refused without an exception, and only their digest is remembered.
+        `own` is the present moment by the boundary's own clock; without one the caller's time counts.
         """
         asked = decode(request, self._slots, self._monitors)
         if isinstance(asked, Refusal):
             return self._refuse(Status.MALFORMED, request)
         now_us = asked.now.monotonic_us
-        # a release to come would move the deadline
+        # a later release would move the deadline
         if not self._now_us <= now_us >= asked.released_us:
             return self._refuse(Status.MALFORMED, request)
         disowned = self._disowned(asked.now, own)
@@ -118,7 +124,7 @@ class SoftwareBoundary:
         refused = self._session.refusal(ref)
         if refused is not None:
             return self._refuse(refused, request)
-        # nor was anything released before it was here
+        # nor could anything be released before it was received
         if asked.kind == STEP and asked.released_us < self._in_force.received_us(asked.step):
             return self._refuse(Status.MALFORMED, request)
         if asked.kind == STEP:
@@ -134,7 +140,7 @@ class SoftwareBoundary:
         return encode_refusal(status, self._chain.add(Tag.UNDECIDED, payload))
 
     def _chained(self, request: bytes, asked: Request, decision: Decision, clause: int, target: int) -> bytes:
-        """The digest of the boundary's own evidence, with this answer in it."""
+        """The digest of the boundary's own evidence including this answer."""
         reason = REASON_NUMBERS[decision.reason]
         payload = boundary_chain.decided(
             request, decision.outcome, reason, decision.step, target, decision.valid_until_us, decision.consumed
@@ -146,13 +152,13 @@ class SoftwareBoundary:
         return self._chain.add(Tag.DECIDED, payload)
 
     def give_back(self, step: int) -> bool:
-        """For the executor, which knows that nothing was sent of a step: see `Session.give_back`."""
+        """Called by the executor, which knows that nothing of a step was sent: see `Session.give_back`."""
         return self._session.give_back(step)
 
     def consider(self, document: bytes, now: Now) -> Untrusted | None:
-        """Look at a document ahead, in whatever thread; nothing comes of it but that `present` is quick.
+        """Verify a document ahead, in any thread, so that `present` is fast. It has no other effect.
 
-        Gives why it is not to be trusted.
+        Returns why it is not trusted.
         """
         refused = self._in_force.consider(document, now)
         after = self._in_force.considered(document)
@@ -165,10 +171,10 @@ class SoftwareBoundary:
         return refused
 
     def present(self, document: bytes, now: Now, released: int, own: Now | None = None) -> bytes:
-        """Take in a signed document, if it is to be trusted. Nothing is raised, and nothing else is changed.
+        """Accept a signed document if it is trusted. Raises nothing, and changes nothing else.
 
-        `own` is as for `enforce`. `released` steps were released, as far as the runtime knows; more were if they were
-        asked for here. An answer about a step whose id is used up comes too late.
+        `own` is as for `enforce`. `released` is the runtime's count of released steps; more were if they were
+        requested here. An answer about a step whose id is used comes too late.
         """
         ready = self._ready.pop(document, None)
         receipt = self._taken(document, now, released, own, ready)
@@ -182,13 +188,13 @@ class SoftwareBoundary:
 
     def _taken(self, document: bytes, now: Now, released: int, own: Now | None, ready: _Ready | None) -> Receipt:
         if now.monotonic_us < self._now_us:
-            return Receipt(UNKNOWN, "time-went-back", "it came before the last request")
+            return Receipt(UNKNOWN, "time-went-back", "the document was presented before the time of the last request")
         disowned = self._disowned(now, own)
         if disowned is Status.MALFORMED:
-            return Receipt(UNKNOWN, "time-of-day-set", "its time of day is not that of requests before")
+            return Receipt(UNKNOWN, "time-of-day-set", "the time of day differs from that of earlier requests")
         if disowned is not None:
             slug = disowned.name.lower().replace("_", "-")
-            return Receipt(UNKNOWN, slug, "the boundary's own clock does not bear its time of day out")
+            return Receipt(UNKNOWN, slug, "the time of day disagrees with the boundary's own clock")
         self._now_us = now.monotonic_us
         receipt = self._session.take(document, now, released)
         self._commands.called_off = self._in_force.called_off
@@ -199,7 +205,7 @@ class SoftwareBoundary:
         return receipt
 
     def _disowned(self, named: Now, own: Now | None) -> Status | None:
-        """Why a time of day that is named is not decided by; None where it is."""
+        """Why a claimed time of day is not used for a decision; None if it is."""
         if own is None:
             return None if self._keeps_time(named) else Status.MALFORMED
         if bears_out(own, named):
@@ -207,8 +213,9 @@ class SoftwareBoundary:
         return Status.CLOCK_UNKNOWN if own.utc_error_us >= UTC_UNKNOWN_US else Status.CLOCK_APART
 
     def _keeps_time(self, now: Now) -> bool:
-        """Whether UTC went on as monotonic time did. What has expired would be good again for whoever sets it back, and
-        what is permitted at other hours, now. By a clock that does not know the time, nothing is granted anyway.
+        """Whether UTC advanced like monotonic time. Setting it back would make expired documents valid again, and
+        setting it ahead would reach other permitted hours. Nothing is granted by a clock that does not know the
+        time.
         """
         if now.utc_error_us > CLOCKS_PART_US:
             return True
@@ -253,7 +260,7 @@ class SoftwareBoundary:
         return replace(decision, permit=self._issuer.link(ref, decision.valid_until_us))
 
     def _clause(self, step: int, clause: Clause | Rule | Airspace) -> int:
-        """The number of the clause that decided, in a response; a rule has its index in the policy."""
+        """The number of the deciding clause in a response; a rule has its index in the policy."""
         number = self._own[step].get(clause)
         return self._shared[clause] if number is None else number
 
@@ -267,7 +274,7 @@ class SoftwareBoundary:
         raise LookupError("no degrade rule has this target")
 
     def _own_numbers(self, steps: tuple[Invocation, ...]) -> tuple[_Numbers, ...]:
-        """By step, the numbers of its contract's clauses, behind those of what all steps share."""
+        """For each step, the numbers of its contract's clauses, which follow those shared by all steps."""
         return tuple(
             {clause: at for at, clause in enumerate(response.own_clauses(each.contract), len(self._shared))}
             for each in steps

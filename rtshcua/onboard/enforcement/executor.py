@@ -1,12 +1,12 @@
-"""The executor: the only place that turns a permit into something to send (design section 4.5, mediated dispatch).
+"""The executor: the only place that turns a permit into a command to send (design section 4.5, mediated dispatch).
 
-What a permit's kind, step and link stand for is looked up in `Commands`, made from verified parts alone. The executor
-checks, in this order: the MAC; that the permit was not used; that it is not late; that a standing permit's step is
-still the one that flies; that a step waits for its turn, and never follows a recall, or a return or a landing that a
-fallback began; that chains go forward only; and that fewer than `MAX_DISPATCHED` were sent. A standing permit is good
-for each of its links once, and for the contingency's last `AGAIN` times more. What it sends, and what it refuses, it
-chains (`wire.boundary_chain`). A step of which no frame left may be withdrawn: then it may be decided again, and its
-permit is good for nothing any more.
+The command of a permit's kind, step and link is looked up in `Commands`, which are made from verified parts only.
+The executor checks, in this order: the MAC; that the permit was not used; that it is not late; that a standing
+permit's step is still the one that flies; that a step waits for its turn, and never follows a recall, or a return
+or a landing that a fallback began; that chains only go forward; and that fewer than `MAX_DISPATCHED` were sent. A
+standing permit is valid once for each of its links, and `AGAIN` times more for the last one of the contingency.
+The executor chains what it sends and what it refuses (`wire.boundary_chain`). The permit of a step of which no
+frame was sent may be withdrawn: it becomes invalid, and the step may be decided again.
 """
 
 from collections.abc import Callable, Sequence
@@ -26,7 +26,7 @@ from rtshcua.wire.permit import AGAIN, WITHDRAWN, Permit, open_permit
 from rtshcua.wire.preparation import Preparation, open_preparation
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
 
-#: a command but for its token, and until when it may be sent
+#: : a command without its token, and until when it may be sent
 _Made = tuple[str, int, tuple[int, ...], tuple[int, ...], int, int, int, bool]
 #: the commands of a mission, by kind, step and link
 Made = dict[tuple[int, int, int], _Made]
@@ -34,24 +34,24 @@ Made = dict[tuple[int, int, int], _Made]
 _HOMEWARD = (MotionKind.HOME, MotionKind.LAND)
 _UNTOUCHED = DEGRADE - 1
 
-# why a permit sends nothing
-FORGED: Final = Refusal("permit/forged", "it is not sealed with the key of this session")
-USED: Final = Refusal("permit/used", "it was dispatched before")
+# reasons why a permit is refused
+FORGED: Final = Refusal("permit/forged", "the permit is not sealed with the key of this session")
+USED: Final = Refusal("permit/used", "the permit was already used")
 SESSION_OVER: Final = Refusal("permit/session-over", "the boundary signed that its session ends here")
-LATE: Final = Refusal("permit/late", "its time is over")
-NOT_COVERED: Final = Refusal("permit/not-covered", "the link does not stand behind this permit")
-LAPSED: Final = Refusal("permit/lapsed", "it is standing, but its step is over or its flight has landed")
-OUT_OF_TURN: Final = Refusal("permit/out-of-turn", "it is for a step while another runs, or for one behind it")
+LATE: Final = Refusal("permit/late", "the permit has expired")
+NOT_COVERED: Final = Refusal("permit/not-covered", "the link is not covered by this permit")
+LAPSED: Final = Refusal("permit/lapsed", "the standing permit's step is over, or its flight has landed")
+OUT_OF_TURN: Final = Refusal("permit/out-of-turn", "the step is out of turn: another one runs, or a later one was sent")
 MISSION_OVER: Final = Refusal("permit/mission-over", "a return or a landing began, or the mission was called off")
-NOT_DOWN: Final = Refusal("permit/not-down", "the vehicle is not known to stand on the ground, disarmed")
-BACKWARDS: Final = Refusal("permit/backwards", "the link stands before the one that was flown")
-# what becomes of one that is given up
-UNSENT: Final = Refusal(WITHDRAWN, "nothing was sent by it, and nothing will be: its step may be decided again")
-SENT: Final = Refusal("permit/sent", "something may have been sent by it, or it is not the turn of its step any more")
+NOT_DOWN: Final = Refusal("permit/not-down", "the vehicle is not known to be on the ground and disarmed")
+BACKWARDS: Final = Refusal("permit/backwards", "the link precedes the one that was flown")
+# the results of a withdrawal
+UNSENT: Final = Refusal(WITHDRAWN, "nothing was sent by the permit and nothing will be: its step may be decided again")
+SENT: Final = Refusal("permit/sent", "something may have been sent by the permit, or its step is no longer current")
 
 
 class SignedAhead(NamedTuple):
-    """A link, signed ahead: the token of its command, and the signature of each frame, empty where there is no key."""
+    """A link that was signed ahead: the token of its command, and the signature of each frame, empty without a key."""
 
     token: int
     signatures: tuple[bytes, ...]
@@ -60,26 +60,26 @@ class SignedAhead(NamedTuple):
 class Commands:
     """Looks up the command of a step or a link.
 
-    `called_off` says that no step may be sent any more. Only the boundary changes it, and the steps.
+    `called_off` says that no further step may be sent. Only the boundary changes it, and the steps.
     """
 
     def __init__(self, policy: Policy, mission: Mission) -> None:
         self.called_off = False
         self._policy = policy
         self._contingency = policy.contingency
-        # one of each rule, not of each step: there may be thousands of both
+        # one for each rule and not for each step: there may be thousands of both
         rules = enumerate(policy.rules)
         self._targets = {-1 - rule: self._of_link(each.target) for rule, each in rules if each.target is not None}
         self._made = self.made(mission)
 
     def replace(self, mission: Mission, made: Made | None = None) -> None:
-        """From now on these are the steps. All commands are made now, for when a link must fly there is no time; or
-        they were `made` for this mission before.
+        """Set the steps. All commands are made now, because a fallback must not wait for it; or they were `made` for
+        this mission before.
         """
         self._made = self.made(mission) if made is None else made
 
     def made(self, mission: Mission) -> Made:
-        """The commands of a mission, in whatever thread."""
+        """Make the commands of a mission, in any thread."""
         made = {(CONTINGENCY_LINK, -1, number): self._of_link(link) for number, link in enumerate(self._contingency)}
         for step, invocation in enumerate(mission.invocations):
             made[STEP, step, -1] = self._of_step(invocation)
@@ -88,11 +88,10 @@ class Commands:
         return made
 
     def command(self, kind: int, step: int, link: int, token: int, not_after_us: int = ALWAYS) -> Command:
-        """The command, under the token of its permit, and until when that is good.
+        """The command with the token of its permit, and until when it is valid.
 
-        A `link` of `-1 - rule` is the target of that degrade rule.
-
-        Raises `LookupError` for one that the bundle does not have.
+        A `link` of `-1 - rule` is the target of that degrade rule. Raises `LookupError` for a command that is not
+        in the bundle.
         """
         if kind == STEP:
             return Command(token, *self._made[STEP, step, -1], not_after_us)
@@ -127,20 +126,21 @@ class Commands:
 
 
 def _hold_us(contract: Contract, arguments: tuple[int, ...]) -> int:
-    """How long a skill is to hold (`hold for time`), 0 where it does not say."""
+    """How long a skill holds (`hold for time`), 0 if not given."""
     return arguments[contract.motion.time] if contract.motion.time >= 0 else 0
 
 
 def never(_: int) -> bool:
-    """No id is given back."""
+    """The default `give_back`: no id is released."""
     return False
 
 
 class Executor:
     """Checks permits under the session key and remembers what was sent.
 
-    `frames` is the gate that the vehicle's adapter sends through: the frames of what was dispatched last may pass it.
-    `give_back` gives the id of a step back of which nothing was sent (`Session.give_back`); by default none is.
+    `frames` is the gate that the vehicle's adapter sends through: it lets the frames of the last dispatched
+    command pass. `give_back` releases the id of a step of which nothing was sent (`Session.give_back`); by default
+    none is released.
     """
 
     def __init__(
@@ -159,9 +159,9 @@ class Executor:
         self._serial = 0  # its permit,
         self._running = False  # and whether it still runs
         self._before = (-1, 0)  # the step that was sent before it, and its permit
-        self._last = 0  # the permit that was dispatched last, for a step or a link
+        self._last = 0  # the last dispatched permit, for a step or a link
         self._flight: int | None = None  # the first step permit of this flight
-        self._fallback = (-1, _UNTOUCHED)  # the step whose chain was last in use, and the last link sent
+        self._fallback = (-1, _UNTOUCHED)  # the step whose chain was last in use, and the last link that was sent
         self._contingency = _UNTOUCHED  # the last link of the contingency that was sent
         self._homeward = False  # a link began a return or a landing,
         self._final = False  # and it was one of the contingency
@@ -173,22 +173,22 @@ class Executor:
 
     @frames.setter
     def frames(self, frames: FrameSession) -> None:
-        """Another gate in its place: what it lets out is chained here."""
+        """Replace the gate; the frames that it lets pass are chained here."""
         frames.chain = self._chain
         self._frames = frames
 
     def dispatch(self, sealed: bytes, now_us: int) -> Command | Refusal:
-        """What to send for a permit at a monotonic time, or why nothing is sent."""
+        """The command of a permit at a monotonic time, or why it is refused."""
         permit = open_permit(sealed, self._key)
         return self._chained(FORGED if permit is None else self._dispatch(permit, now_us), now_us)
 
     def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Command | Refusal:
-        """What to send for a link by the standing permit of a step that was sent, or why nothing is sent."""
+        """The command of a link, by the standing permit of a step that was sent, or why it is refused."""
         return self._chained(self._stand_in(sealed, kind, link, now_us), now_us)
 
     def withdraw(self, sealed: bytes, now_us: int) -> Refusal:
-        """Give the permit of a step up: `UNSENT` where no frame left by it, nor may one have, else why it is not given
-        up. Its step may be decided again then, and nothing stands behind the permit.
+        """Withdraw the permit of a step. Returns `UNSENT` if no frame of it was or can have been sent, else why it is
+        not withdrawn. The step may then be decided again, and the permit covers no link any more.
         """
         permit = open_permit(sealed, self._key)
         refused = FORGED if permit is None else self._withdraw(permit)
@@ -225,7 +225,7 @@ class Executor:
         return permit if isinstance(permit, Refusal) else self._dispatch(permit, now_us)
 
     def _standing_for(self, sealed: bytes, kind: int, link: int) -> Permit | Refusal:
-        """What the standing permit of a step that was sent permits of a link; or why it does not."""
+        """The command that a standing permit covers for a link; or why it is refused."""
         permit = open_permit(sealed, self._key)
         if permit is None:
             return FORGED
@@ -242,8 +242,8 @@ class Executor:
         return Permit(kind, step, link, serial, 0, 0, ALWAYS)
 
     def ahead(self, sealed: bytes, kind: int, link: int, frames: Sequence[bytes], now_us: int) -> SignedAhead | Refusal:
-        """Sign the frames of a link ahead, to be sent when no boundary is there any more: as far as the standing permit
-        of a step that was sent would let the link be flown now, and each frame would pass. Nothing is sent or opened.
+        """Sign the frames of a link ahead, for use after the loss of the boundary, if the standing permit of a step
+        that was sent would let the link fly now and each frame would pass. Nothing is sent or opened.
         """
         permit = self._standing_for(sealed, kind, link)
         refused = permit if isinstance(permit, Refusal) else self._refuse(permit, now_us)
@@ -260,8 +260,8 @@ class Executor:
         return SignedAhead(permit.serial, tuple(signatures))
 
     def prepare(self, sealed: bytes, now_us: int) -> Preparation | Refusal:
-        """What may be set of the vehicle from now on, by a preparation permit, or why nothing may. It is good once, on
-        the ground, until `prepared`, a dispatch, or its time is over.
+        """The parameters that a preparation permit allows to be set, or why it is refused. The permit is valid once,
+        on the ground, until `prepared`, a dispatch, or the end of its time.
         """
         permit = open_preparation(sealed, self._key)
         refused = FORGED if permit is None else self._unprepared(permit, now_us)
@@ -284,11 +284,11 @@ class Executor:
         return None if self._frames.stands(now_us) else NOT_DOWN
 
     def prepared(self) -> None:
-        """What was to be set is set, or was given up."""
+        """The parameters are set, or setting them was given up."""
         self._frames.prepared()
 
     def _refuse(self, permit: Permit, now_us: int) -> Refusal | None:
-        """Why nothing is sent for a permit at a monotonic time."""
+        """Why a permit is refused at a monotonic time."""
         if self._chain.over:
             return SESSION_OVER
         if permit.serial in self._used:
@@ -320,9 +320,9 @@ class Executor:
         return command
 
     def ended(self, token: int | None = None) -> None:
-        """The running step ended, however it did: the next may be sent.
+        """The running step ended in any way: the next one may be sent.
 
-        With a token: that command ended, and if another one was dispatched since, the other one runs on.
+        With a token: that command ended; if another one was dispatched since, that one continues.
         """
         if token in (None, self._last):
             self._running = False
@@ -335,7 +335,7 @@ class Executor:
         self._frames.close()
 
     def release(self) -> None:
-        """Nothing more that moves the vehicle is to be sent, unless another permit is dispatched."""
+        """Send nothing more that moves the vehicle, unless another permit is dispatched."""
         self._frames.close()
 
     def _follow(self, permit: Permit, homeward: bool) -> None:
@@ -355,8 +355,8 @@ class Executor:
         return None
 
     def _lapsed(self, permit: Permit, *, fallback: bool) -> bool:
-        """Whether nothing stands behind a step's permit: not sent, or withdrawn, followed by another step, or landed
-        since.
+        """Whether a step's permit covers no link any more: not sent, or withdrawn, followed by another step, or
+        landed since.
         """
         if self._flight is None or permit.serial not in self._used:
             return True
@@ -364,7 +364,7 @@ class Executor:
 
     def _refuse_link(self, permit: Permit) -> Refusal | None:
         if permit.kind == CONTINGENCY_LINK:
-            # Holds may come and go; once the contingency brings it home or down, it goes on from there.
+            # Holds may be repeated; once the contingency brings the vehicle home or down, it continues from there.
             return BACKWARDS if self._final and permit.link < self._contingency else None
         if permit.step < self._step:
             return LAPSED
@@ -375,5 +375,5 @@ class Executor:
 
 
 def _position(permit: Permit) -> int:
-    """Where in its chain a fallback permit stands: a degrade rule's target comes before the first link."""
+    """The position of a fallback permit in its chain: a degrade rule's target comes before the first link."""
     return max(permit.link, DEGRADE)

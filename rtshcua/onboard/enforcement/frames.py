@@ -1,15 +1,16 @@
-"""The frame session: what of MAVLink 2 may leave for the vehicle, octet by octet (design 4.5, mediated dispatch).
+"""The frame session: which MAVLink 2 frames may be sent to the vehicle, octet by octet (design 4.5, mediated
+dispatch).
 
-Every frame that an adapter wants to send goes through `seal`, and only what `seal` gives back may be sent. A permit
-that the executor dispatches opens a session for its one command; until that command ends, frames that carry it out
-pass, no others. A preparation opens it for the parameters that it lists, each with its value, on the ground alone.
-Housekeeping passes always. Whatever is on neither list (`allow_list`) is refused. With a signer each
-frame that passes is signed; the key is the signer's, and nothing else can use it. Frames that carry out a command are
-chained as they pass, without their signature (`wire.boundary_chain`), and what is refused is counted there. The others
-are not: they move nothing, heartbeats and questions are most of what is sent, and parameters have a permit each.
+Every frame of an adapter goes through `seal`, and only the result of `seal` may be sent. A dispatched permit opens
+a session for its one command: until that command ends, only frames that carry it out pass. A preparation opens it
+for its listed parameters and values, on the ground only. Housekeeping always passes. A frame on neither list
+(`allow_list`) is refused. With a signer each passing frame is signed; only the signer has the key. Frames that
+carry out a command are chained as they pass, without their signature (`wire.boundary_chain`), and refused frames
+are counted there. The other frames are not chained: they move nothing, most of the traffic is heartbeats and
+requests, and parameters have permits of their own.
 
-A rule needs to know which autopilot it speaks to and how high its home lies. Both are read here from frames that came
-in (`observe`), never asked of the adapter that wants to send. With a key, those frames were verified first.
+Some rules depend on the autopilot and on the height of its home. Both are read from received frames (`observe`),
+not from the adapter that wants to send. With a key, those frames were verified first.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -30,15 +31,16 @@ from rtshcua.onboard.ports import Command
 from rtshcua.wire.boundary_chain import BoundaryChain
 from rtshcua.wire.preparation import ParameterWrite
 
-#: who we are, in the vehicle's own system, and whom we speak to
+#: : our ids, in the vehicle's own system, and those of the addressee
 OURS: Final = enums.MAV_COMP_ID_ONBOARD_COMPUTER
 AUTOPILOT: Final = enums.MAV_COMP_ID_AUTOPILOT1
-#: mm: how far home's height above sea may be reported from where it lay when the takeoff was permitted: arming sets
-#: home anew, and it moves by what GPS heights drift. A report further off counts for nothing, for every height that is
-#: sent above sea would move with it.
+#: : mm: the greatest difference of a reported height of home from the one when the takeoff was permitted: arming sets
+#: home anew, and GPS heights drift. A larger difference is ignored, because every transmitted height above sea would
+#: change with it.
 HOME_MOVES: Final = 10_000
 
-#: us: how old a heartbeat, and a word of the ground, may be of a vehicle that counts as standing there
+#: : us: the greatest age of a heartbeat, and of a report of the landed state, of a vehicle that counts as on the
+#: ground
 STANDS_US: Final = 3_000_000
 
 _LANDED: Final = LAYOUTS[EXTENDED_SYS_STATE].at("landed_state")
@@ -46,131 +48,134 @@ _identity: Final = LAYOUTS[HEARTBEAT].getter("type autopilot")
 _BASE_MODE: Final = LAYOUTS[HEARTBEAT].at("base_mode")
 _position: Final = LAYOUTS[GLOBAL_POSITION_INT].getter("lat lon alt relative_alt")
 
-# why a frame does not leave
-NOT_ONE_FRAME: Final = Refusal("frame/not-one-frame", "it is not exactly one whole, unsigned MAVLink 2 frame")
+# reasons why a frame is refused
+NOT_ONE_FRAME: Final = Refusal("frame/not-one-frame", "the frame is not exactly one complete, unsigned MAVLink 2 frame")
 NO_VEHICLE: Final = Refusal("frame/no-vehicle", "no autopilot was heard yet")
-NOT_OURS: Final = Refusal("frame/not-ours", "it claims another sender")
-WRONG_TARGET: Final = Refusal("frame/wrong-target", "it is to another system or component, or to everybody")
-FORCED_ARMING: Final = Refusal("frame/forced-arming", "it arms or disarms past the autopilot's own checks")
+NOT_OURS: Final = Refusal("frame/not-ours", "the frame has another sender id")
+WRONG_TARGET: Final = Refusal("frame/wrong-target", "the frame is for another system or component, or a broadcast")
+FORCED_ARMING: Final = Refusal("frame/forced-arming", "the frame arms or disarms past the autopilot's own checks")
 AFTER_START: Final = Refusal(
-    "frame/after-start", "it is about a fence, once anything flew or while the motors are armed"
+    "frame/after-start", "the frame changes a fence after takeoff or while the motors are armed"
 )
-NOT_LISTED: Final = Refusal("frame/not-listed", "it sets a parameter to what no preparation lists")
+NOT_LISTED: Final = Refusal("frame/not-listed", "the frame sets a parameter to a value that no preparation lists")
 NOT_DOWN: Final = Refusal(
-    "frame/not-down", "it sets a parameter of a vehicle that flies, is armed, or is not known to stand on the ground"
+    "frame/not-down",
+    "the frame sets a parameter while the vehicle flies, is armed, or is not known to be on the ground",
 )
 SESSION_OVER: Final = Refusal("frame/session-over", "the boundary signed that its session ends here")
-NO_SESSION: Final = Refusal("frame/no-session", "it moves the vehicle, and nothing that was permitted does so now")
-NOT_COVERED: Final = Refusal("frame/not-covered", "it is no part of the command that was permitted")
-#: the leg there was never checked
-OUT_OF_ORDER: Final = Refusal("frame/out-of-order", "it is to a point of the path before its turn")
-#: not sent, and nothing failed by that
-UNSIGNED: Final = Refusal("frame/unsigned", "it moves nothing, and nobody is there any more to sign it")
+NO_SESSION: Final = Refusal("frame/no-session", "the frame moves the vehicle without a permit")
+NOT_COVERED: Final = Refusal("frame/not-covered", "the frame is not part of the permitted command")
+#: : the leg to it was never checked
+OUT_OF_ORDER: Final = Refusal("frame/out-of-order", "the frame is for a point of the path before its turn")
+#: : not sent, without a failure
+UNSIGNED: Final = Refusal("frame/unsigned", "the frame moves nothing, and the boundary that would sign it is lost")
 TOO_MANY_AHEAD: Final = Refusal("frame/too-many-ahead", "more frames were signed ahead than any link needs")
-LATE: Final = Refusal("frame/late", "it is the command's first frame, after its permit's time")
+LATE: Final = Refusal("frame/late", "the first frame of the command comes after its permit's time")
 
 
 class Gate(Protocol):
-    """What an adapter gets of a `FrameSession`: it may ask, and tell what it heard. It opens nothing."""
+    """The interface of a `FrameSession` for an adapter: requests and reports. It cannot open the gate."""
 
     @property
     def may_be_lost(self) -> bool:
-        """Whether it may stop answering in a flight: only then is it ever mute, or signs anything ahead."""
+        """Whether it may stop answering in flight: only then is it ever mute, or signs frames ahead."""
         ...
 
     def observe(self, frame: bytes, now_us: int = 0) -> None:
-        """Take in one good frame from the link, at a monotonic time; without one, it is too old for what has to be
-        recent.
+        """Process a valid frame from the link, received at a monotonic time; without a time, it is too old for values
+        that must be recent.
         """
         ...
 
     def seal(self, frame: bytes, now_us: int) -> bytes | Refusal:
-        """The octets to send for a frame, or why it is not sent."""
+        """The octets to send for a frame, or why it is refused."""
         ...
 
     @property
     def is_mute(self) -> bool:
-        """Whether nothing leaves any more but what was signed ahead: no question is asked, so none is answered."""
+        """Whether only frames signed ahead can be sent: no request is sent, so no answer comes."""
         ...
 
     def renew_ahead(self, encode: Callable[[Command], Sequence[bytes]], now_us: int, *, begins: bool) -> Sequence[str]:
-        """Have signed ahead what is due, where there may be a need for it; why something is not, in words. `encode`
-        makes the frames that a command is flown by, each as often as it may have to be sent. `begins`: nothing but what
-        a step needs that is about to begin.
+        """Have the due frames signed ahead, if the gate may be lost; return the reasons for those that are not.
+        `encode` makes the frames of a command, each as often as it may have to be sent. `begins`: only those of a
+        step that is about to begin.
         """
         ...
 
 
 @dataclass(slots=True)
 class _Session:
-    """One permitted command, and how far it got."""
+    """One permitted command and its progress."""
 
     command: Command
-    begun: bool = False  # a frame of it left
+    begun: bool = False  # a frame of it was sent
     leg: int = -1  # the last point of its path that was sent
 
 
 class FrameSession:
-    """The gate that frames leave by. Opened and closed by the executor alone."""
+    """The gate for outgoing frames. Only the executor opens and closes it."""
 
-    #: this gate is there as long as who sends by it
+    #: : this gate exists as long as its adapter does
     may_be_lost = is_mute = False
 
     def __init__(self) -> None:
-        #: where what leaves is chained
+        #: : the chain of the frames that pass
         self.chain = BoundaryChain()
         self._signer: SignedLink | None = None
         self._session: _Session | None = None
-        #: whether a frame left, or was signed ahead, since a command was permitted last
+        #: : whether a frame was sent or signed ahead since the last permit
         self.let_out = False
         self._here: tuple[int, int] | None = None  # 1e-7 degree
-        self._started = False  # a session was opened: fences stay as they are
+        self._started = False  # a session was opened: fences are no longer changed
         self._system = 0
         self._autopilot = 0  # MAV_AUTOPILOT
         self._kind = 0  # MAV_TYPE
-        self._armed = False  # as its last heartbeat says,
-        self._armed_us = 0  # and when it came
-        self._stands_us = 0  # it last said that it is on the ground; 0 once it said otherwise
+        self._armed = False  # according to its last heartbeat,
+        self._armed_us = 0  # and the time of that
+        self._stands_us = 0  # the last report that it is on the ground; 0 after any other
         self._types: float | None = None  # FENCE_TYPE
-        self._prepared: frozenset[tuple[str, int | None]] = frozenset()  # parameters that may be set, and to what,
-        self._prepared_us = 0  # up to when
+        self._prepared: frozenset[tuple[str, int | None]] = (
+            frozenset()
+        )  # parameters that may be set, with their values,
+        self._prepared_us = 0  # and until when
         self._home_amsl: int | None = None  # mm
-        self._settled_amsl: int | None = None  # the same, when the takeoff was permitted
+        self._settled_amsl: int | None = None  # the same, at the time of the takeoff permit
 
     def sign_with(self, signer: SignedLink) -> None:
-        """Sign what leaves from now on. Raises RuntimeError if it is signed already: a key is not taken away."""
+        """Sign outgoing frames from now on. Raises RuntimeError if they are signed already: a key is never replaced."""
         if self._signer is not None:
             raise RuntimeError("this link is signed already")
         self._signer = signer
 
     def open(self, command: Command) -> None:
-        """Let out the frames of one command, in place of whatever was let out before."""
+        """Let the frames of one command pass, in place of those before."""
         self._session, self._started, self.let_out = _Session(command), True, False
         self.prepared()
         if self._settled_amsl is None or command.kind == MotionKind.CLIMB:
             self._settled_amsl = self._home_amsl
 
     def close(self) -> None:
-        """Let out nothing more that moves the vehicle."""
+        """Let nothing more pass that moves the vehicle."""
         self._session = None
 
     def prepare(self, writes: Iterable[ParameterWrite], not_after_us: int) -> None:
-        """Let these parameters be set, as long as the vehicle stands on the ground."""
+        """Allow these parameters to be set while the vehicle is on the ground."""
         self._prepared = frozenset((each.name, each.value) for each in writes)
         self._prepared_us = not_after_us
 
     def prepared(self) -> None:
-        """Let no parameter be set any more."""
+        """Allow no parameter to be set any more."""
         self._prepared = frozenset()
 
     def stands(self, now_us: int) -> bool:
-        """Whether it is known to be on the ground, disarmed, and nothing that was permitted is under way."""
+        """Whether the vehicle is known to be on the ground and disarmed, without a permitted command under way."""
         recent = min(self._armed_us, self._stands_us) > max(0, now_us - STANDS_US)
         return recent and not self._armed and self._session is None
 
     def observe(self, frame: bytes, now_us: int = 0) -> None:
-        """Take in one good frame from the link. The first heartbeat of a vehicle whose autopilot is known settles
-        whose; from then on one that names another kind of vehicle or autopilot, under the same ids, says nothing of it.
+        """Process a valid frame from the link. The first heartbeat of a vehicle with a supported autopilot fixes its
+        kind; later heartbeats of another kind of vehicle or autopilot, under the same ids, are ignored.
         """
         heard = read_frame(frame)
         if heard is None or heard.component != AUTOPILOT:
@@ -196,7 +201,7 @@ class FrameSession:
                 self._types = 0.0 if bits is None else value_of(bits)
 
     def seal(self, frame: bytes, now_us: int) -> bytes | Refusal:
-        """The octets to send for a frame at a monotonic time, or why it is not sent."""
+        """The octets to send for a frame at a monotonic time, or why it is refused."""
         judged = self._judge(frame, now_us)
         if isinstance(judged, Refusal):
             self.chain.stop(frame)
@@ -207,12 +212,12 @@ class FrameSession:
         return sealed
 
     def renew_ahead(self, encode: Callable[[Command], Sequence[bytes]], now_us: int, *, begins: bool) -> Sequence[str]:
-        """Nothing: see `may_be_lost`."""
+        """Nothing to do: see `may_be_lost`."""
         return ()
 
     def sign_ahead(self, frame: bytes, command: Command, now_us: int) -> bytes | Refusal:
-        """Sign a frame of a command ahead, to be sent only when no boundary is there any more: its signature,
-        none without a key; or why not. The gate stays as it is.
+        """Sign a frame of a command ahead, for use after the loss of the boundary. Returns its signature, empty
+        without a key; or why it is refused. The gate does not change.
         """
         refused = self._refuse_ahead(frame, command)
         if refused is not None:
@@ -227,14 +232,14 @@ class FrameSession:
         return signed[-SIGNATURE:]
 
     def _judge(self, octets: bytes, now_us: int) -> Refusal | bool:
-        """Why a frame does not leave, or else whether it carries out a command."""
-        # 1. it is what it will be taken for: one frame, from us, to the autopilot that was heard, and to nobody else
+        """Why a frame is refused, or else whether it carries out a command."""
+        # 1. exactly one frame, from us, to the autopilot that was heard, and to nobody else
         frame = read_frame(octets)
         if frame is None:
             return NOT_ONE_FRAME
-        if not self._system:  # a vehicle may wait to be spoken to; what we are is all that it is told then
+        if not self._system:  # a vehicle may wait for a first message; it only learns our ids
             return False if allow_list.is_greeting(frame) and frame.component == OURS else NO_VEHICLE
-        # 2. never, whatever is permitted
+        # 2. never, even with a permit
         refused = self._refuse_always(frame)
         if refused is not None:
             return refused
@@ -255,7 +260,7 @@ class FrameSession:
         return self._refuse_motion(frame, now_us) or True
 
     def _refuse_always(self, frame: Frame) -> Refusal | None:
-        """What no frame may be, whatever is permitted."""
+        """Why no permit could allow a frame; None if one could."""
         if (frame.system, frame.component) != (self._system, OURS):
             return NOT_OURS
         if frame.target is not None and frame.target != (self._system, AUTOPILOT):
@@ -263,7 +268,7 @@ class FrameSession:
         return FORCED_ARMING if allow_list.is_forced_arming(frame) else None
 
     def _refuse_ahead(self, octets: bytes, command: Command) -> Refusal | None:
-        """Why a frame is not signed ahead for a command: as at the gate, if that were open for it."""
+        """Why a frame is not signed ahead for a command: the rules of the gate, as if it were open for the command."""
         frame = read_frame(octets)
         if frame is None:
             return NOT_ONE_FRAME

@@ -1,9 +1,9 @@
-"""A boundary elsewhere: in another process, or in a trusted world. What the runtime has of it is a way to call it.
+"""A boundary in another process, or in a trusted world, which the runtime calls.
 
-The calls are those of boundary/enforcement/calls.h: an octet that says which, and what follows it, big-endian; an
-answer is 0 and what is given back, or 1 and a slug. The other end verified the bundle itself, holds the keys, decides,
-and lets frames out; whatever this end does wrong, nothing moves that it did not permit. So this end may keep what it
-needs to fly by its own reading of the same bundle.
+The calls are those of boundary/enforcement/calls.h: one octet for the kind of the call, followed by its data,
+big-endian; an answer is 0 and the result, or 1 and a slug. The other end verifies the bundle, holds the keys,
+decides, and lets frames pass; errors at this end can move nothing without its permit. This end may therefore use
+its own copy of the same bundle for the flight.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -33,14 +33,14 @@ from rtshcua.wire.request import STEP
 from rtshcua.wire.response import Status, encode_refusal
 from rtshcua.wire.untrusted import Untrusted
 
-#: makes one call, and gives its answer
+#: : makes one call, and returns its answer
 Call = Callable[[bytes], bytes]
 
 (
     PART, LOAD, ENFORCE, PRESENT, DISPATCH, STAND_IN, ENDED, LANDED, RELEASE, OBSERVE, SEAL, BEGIN, STATEMENT, DIGEST,
     PERMIT, PREPARE, PREPARED, STANDS, AHEAD, FLIGHT, LOG, TIME, WITHDRAW,
 ) = range(1, 24)  # fmt: skip
-#: octets of a bundle or a document that go in one call
+#: : octets of a bundle or a document in one call
 MAX_PART: Final = 60_000
 
 _FINE: Final = 0
@@ -52,13 +52,13 @@ _PERMITTED: Final = Struct(">BhhQq")
 _SERIAL_BYTES: Final = 8
 _TOLD: Final = Struct(">BqqqQ")
 
-#: what an answer that makes no sense, or none at all, comes to
-LOST: Final = Refusal("boundary-lost", "the boundary does not answer, or answers what makes no sense")
+#: : the result of a missing or malformed answer
+LOST: Final = Refusal("boundary-lost", "the boundary does not answer, or its answer is malformed")
 
 
 class OwnTime(NamedTuple):
-    """What the boundary's own clock says: where it has the time of day from, and the moment; and the number that it
-    wants back from the vehicle in TIMESYNC, 0 for none.
+    """The boundary's own clock: the source of its time of day, and the moment; and the number that it expects from
+    the vehicle in TIMESYNC, 0 for none.
     """
 
     source: ClockSource
@@ -71,24 +71,24 @@ def _known(*modules: object) -> dict[str, Refusal]:
     return {refusal.slug: refusal for refusal in found}
 
 
-#: why a permit or a frame is refused, by slug: the texts are those of the boundary in this process
+#: : the reasons of refusals, by slug, with the texts of the boundary in this process
 _REFUSALS: Final[Mapping[str, Refusal]] = MappingProxyType(_known(executor, frames, preparation))
 
 
 class Caller:
-    """Calls a boundary. Where nobody answers, or what makes no sense, that is `LOST`, and so is all from then on."""
+    """Calls a boundary. A missing or malformed answer gives `LOST`, as does every later call."""
 
     def __init__(self, call: Call, *, signs: bool = False) -> None:
-        """`signs`: it has the link's key."""
+        """`signs`: the boundary has the link's key."""
         self._call = call
         self.signs = signs
-        #: whether the boundary is gone
+        #: : whether the boundary is lost
         self.lost = False
-        #: whether the mission that was loaded last had been opened before: then no step of it may begin
+        #: : whether the last loaded mission had been opened before: then no step of it may begin
         self.reopened = False
 
     def __call__(self, kind: int, *parts: bytes) -> bytes | Refusal:
-        """What a call gives back, or why it is refused."""
+        """The result of a call, or why it is refused."""
         if self.lost:
             return LOST
         try:
@@ -100,15 +100,15 @@ class Caller:
         if answer[0] == _FINE:
             return answer[1:]
         slug = answer[1:].decode("ascii", "replace")
-        return _REFUSALS.get(slug) or Refusal(slug, "the boundary refuses it")
+        return _REFUSALS.get(slug) or Refusal(slug, "the boundary refuses the call")
 
     def lose(self) -> Refusal:
-        """Its answers make no sense: nothing more is asked."""
+        """Its answers are malformed: make no further call."""
         self.lost = True
         return LOST
 
     def put(self, what: int, octets: bytes) -> Refusal | None:
-        """Hand over what the next call of a kind is about, in parts."""
+        """Transfer the data of the next call of a kind, in parts."""
         for at in range(0, len(octets) or 1, MAX_PART):
             answer = self(PART, _AT.pack(what, at), octets[at : at + MAX_PART])
             if isinstance(answer, Refusal):
@@ -128,7 +128,7 @@ class Caller:
         return SignedAhead(int.from_bytes(answer[:_SERIAL_BYTES]), tuple(answer[at : at + each] for at in begins))
 
     def load(self, bundle: bytes, now: Now) -> bytes | Refusal:
-        """Hand a bundle over: the id of its flight, which the boundary draws."""
+        """Load a bundle; returns the id of its flight, which the boundary draws."""
         refused = self.put(LOAD, bundle)
         answer = refused or self(LOAD, _SIZED.pack(*_times(now), len(bundle)))
         if isinstance(answer, Refusal):
@@ -143,7 +143,9 @@ class Caller:
         return self(LOG, checkpoint)
 
     def time(self, *, settle: bool = False) -> OwnTime | Refusal:
-        """What its own clock says. `settle`: no more is waited for, so what an operator stated holds."""
+        """The time by its own clock. `settle`: stop waiting for a better source, so that the operator's statement
+        holds.
+        """
         answer = self(TIME, bytes([settle]))
         if isinstance(answer, Refusal):
             return answer
@@ -164,30 +166,30 @@ def _times(now: Now) -> tuple[int, int, int]:
 
 
 class IsolatedBoundary:
-    """`SoftwareBoundary` over calls. `in_force` and `commands` are this end's own reading of what is in force."""
+    """`SoftwareBoundary` over calls. `in_force` and `commands` are this end's own copy of what is in force."""
 
     def __init__(self, caller: Caller, in_force: InForce, commands: Commands) -> None:
         self._caller = caller
         self._in_force = in_force
         self._commands = commands
-        #: the commands of missions that may come into force, made ahead, by the document that brings them
+        #: : the commands of missions that may come into force, made ahead, by the document that contains them
         self._ready: dict[bytes, Made] = {}
 
     @property
     def lost(self) -> str | None:
-        """That it is gone, in words, and what that means; None while it is there."""
+        """The loss of the boundary and its consequences, as text; None while it works."""
         if not self._caller.lost:
             return None
-        unverified = ", and what comes from the vehicle is not verified" if self._caller.signs else ""
-        return f"nothing is decided any more{unverified}: links fly as they were signed ahead, and nothing else does"
+        unverified = ", and frames from the vehicle are not verified" if self._caller.signs else ""
+        return f"no further decisions are made{unverified}: only links that were signed ahead fly"
 
     def enforce(self, request: bytes) -> bytes:
-        """The boundary's response; of one that is gone, that nothing was decided."""
+        """The boundary's response; after its loss, a response that nothing was decided."""
         answer = self._caller(ENFORCE, request)
         return encode_refusal(Status.MALFORMED) if isinstance(answer, Refusal) else answer
 
     def consider(self, document: bytes, now: Now) -> Untrusted | None:
-        """Look at a document ahead, for what this end makes of it. Gives why it is not to be trusted."""
+        """Verify a document ahead, for this end's copy. Returns why it is not trusted."""
         refused = self._in_force.consider(document, now)
         after = self._in_force.considered(document)
         if after is not None:
@@ -197,9 +199,9 @@ class IsolatedBoundary:
         return refused
 
     def present(self, document: bytes, now: Now, released: int) -> bytes:
-        """The boundary's receipt; what it accepted is in force at this end too."""
+        """The boundary's receipt; an accepted document is in force at this end too."""
         if len(document) > MAX_DOCUMENT:
-            return encode_receipt(Receipt(UNKNOWN, "too-large", f"at most {MAX_DOCUMENT} bytes are read"))
+            return encode_receipt(Receipt(UNKNOWN, "too-large", f"the limit is {MAX_DOCUMENT} bytes"))
         misfit = self._in_force.misfit(document, released)
         if misfit is not None:  # the boundary would verify it first, and answer nothing meanwhile
             return encode_receipt(Receipt(REPLACEMENT, misfit.slug, str(misfit)))
@@ -215,7 +217,7 @@ class IsolatedBoundary:
         return answer
 
     def _follow(self, document: bytes, now: Now, receipt: Receipt) -> None:
-        """What the boundary found good is found good here, but for the steps that are decided, which it alone knows."""
+        """Apply an accepted document at this end, except for the decided steps, which only the boundary knows."""
         self._in_force.take(document, now, decided=0, released=receipt.step if receipt.kind == REPLACEMENT else 0)
         self._commands.called_off = self._in_force.called_off
         if receipt.kind == REPLACEMENT:
@@ -225,35 +227,35 @@ class IsolatedBoundary:
 class IsolatedGate:
     """The gate over calls: `frames.Gate`, and `mavlink.signing.Verifier` where the boundary has the link's key.
 
-    When it is lost, what was signed ahead leaves, and without a key housekeeping too. Nothing that comes can be
-    verified then: what looks as the vehicle's frames looked is taken in all the same, so that the way down is seen.
+    After its loss, frames signed ahead are sent, and without a key housekeeping too. Incoming frames cannot be
+    verified then: frames that look like the vehicle's are accepted all the same, so that the descent is observed.
     """
 
     may_be_lost = True
 
     def __init__(self, caller: Caller, commands: Commands) -> None:
         self._caller = caller
-        #: what leaves when it is lost
+        #: the frames that are sent after the loss
         self.ahead = FramesAhead(commands, caller.ahead)
         self._counts = Counts()
-        self._heard: dict[Stream, tuple[int, int]] = {}  # the last timestamp of what was verified, and when it came
+        self._heard: dict[Stream, tuple[int, int]] = {}  # the last timestamp of a verified frame, and its time
 
     @property
     def counts(self) -> Counts:
-        """What came, by what the boundary made of it."""
+        """The received frames, by the boundary's verdict."""
         return self._counts
 
     def stands(self, now_us: int) -> bool:
-        """Whether the vehicle is known to be on the ground, disarmed, and nothing permitted is under way."""
+        """Whether the vehicle is known to be on the ground and disarmed, without a permitted command under way."""
         return self._caller(STANDS, _TIME.pack(now_us)) == b"\1"
 
     def observe(self, frame: bytes, now_us: int = 0) -> None:
-        """Show it one good frame. With a key it has seen the frame when it verified it."""
+        """Show it a valid frame. With a key it has seen the frame when it verified it."""
         if not self._caller.signs:
             self._caller(OBSERVE, _TIME.pack(now_us), frame)
 
     def accept(self, frame: bytes, now_us: int) -> bool:
-        """Whether a frame proves where it comes from; one that does is observed at once."""
+        """Whether the origin of a frame is proven; such a frame is observed at once."""
         if not frame[FLAGS] & FLAG_SIGNED:
             self._counts.unsigned += 1
             return False
@@ -269,8 +271,8 @@ class IsolatedGate:
         return answer[0] == 0
 
     def _seems_to_be(self, frame: bytes, now_us: int) -> bool:
-        """Whether a frame goes on where a stream left off that was verified: nothing that was recorded does, and no
-        other stream. Who makes frames up can tell of another flight, and have it brought down in another way.
+        """Whether a frame continues a stream that was verified: replayed frames and other streams do not. A forger
+        could still simulate another flight, and cause another kind of descent.
         """
         stream, timestamp = stream_of(frame), timestamp_in(frame)
         last, heard_us = self._heard.get(stream, (None, 0))
@@ -282,7 +284,7 @@ class IsolatedGate:
         return True
 
     def seal(self, frame: bytes, now_us: int) -> bytes | Refusal:
-        """The octets to send for a frame, or why it is not sent."""
+        """The octets to send for a frame, or why it is refused."""
         answer = self._caller(SEAL, _TIME.pack(now_us), frame)
         if self._caller.lost:
             return self._seal_alone(frame)
@@ -300,17 +302,17 @@ class IsolatedGate:
 
     @property
     def is_mute(self) -> bool:
-        """Whether nobody is there any more to sign a question."""
+        """Whether nothing is left that could sign a request."""
         return self._caller.lost and self._caller.signs
 
     def renew_ahead(self, encode: Encode, now_us: int, *, begins: bool) -> Sequence[str]:
-        """Have signed ahead what is due; why something is not, in words."""
+        """Have the due frames signed ahead; return the reasons for those that are not."""
         return () if self._caller.lost else self.ahead.renew(encode, now_us, begins=begins)
 
 
 class IsolatedExecutor:
-    """`Executor` over calls. What is to be sent is looked up at this end; what may be is decided at the other, and when
-    that is lost was signed ahead there.
+    """`Executor` over calls. Commands are looked up at this end and permitted at the other; after its loss, those
+    signed ahead there.
     """
 
     def __init__(self, caller: Caller, commands: Commands, gate: IsolatedGate) -> None:
@@ -319,11 +321,11 @@ class IsolatedExecutor:
         self.frames = gate
 
     def dispatch(self, sealed: bytes, now_us: int) -> Command | Refusal:
-        """What to send for a permit at a monotonic time, or why nothing is sent."""
+        """The command of a permit at a monotonic time, or why it is refused."""
         return self._permitted(self._caller(DISPATCH, _TIME.pack(now_us), sealed), sealed)
 
     def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Command | Refusal:
-        """What to send for a link by the standing permit of a step that was sent, or why nothing is sent."""
+        """The command of a link, by the standing permit of a step that was sent, or why it is refused."""
         answer = self._caller(STAND_IN, _STANDING.pack(now_us, kind, link), sealed)
         if not self._caller.lost:
             return self._permitted(answer, sealed)
@@ -344,7 +346,7 @@ class IsolatedExecutor:
         return command
 
     def withdraw(self, sealed: bytes, now_us: int) -> Refusal:
-        """Give the permit of a step up: `UNSENT`, or why it is not given up."""
+        """Withdraw the permit of a step: `UNSENT`, or why it is not withdrawn."""
         refused = self._caller(WITHDRAW, _TIME.pack(now_us), sealed)
         if isinstance(refused, Refusal):
             return refused
@@ -352,14 +354,14 @@ class IsolatedExecutor:
         return executor.UNSENT
 
     def prepare(self, sealed: bytes, now_us: int) -> Preparation | Refusal:
-        """What may be set of the vehicle from now on, by a preparation permit, or why nothing may."""
+        """The parameters that a preparation permit allows to be set, or why it is refused."""
         refused = self._caller(PREPARE, _TIME.pack(now_us), sealed)
         if isinstance(refused, Refusal):
             return refused
         return decode_preparation(sealed[:-MAC_BYTES]) or self._caller.lose()
 
     def prepared(self) -> None:
-        """What was to be set is set, or was given up."""
+        """The parameters are set, or setting them was given up."""
         self._caller(PREPARED)
 
     def ended(self, token: int | None = None) -> None:
@@ -373,7 +375,7 @@ class IsolatedExecutor:
         self.frames.ahead.lapse()
 
     def release(self) -> None:
-        """Nothing more that moves the vehicle is to be sent."""
+        """Send nothing more that moves the vehicle."""
         self._caller(RELEASE)
         self.frames.ahead.close()
 
@@ -383,20 +385,22 @@ class IsolatedExecutor:
 
 
 class IsolatedIssuer:
-    """`PreparationIssuer` over calls: the other end was told what is configured, and what is owed, when it began."""
+    """`PreparationIssuer` over calls: the other end received the configuration, and the owed parameters, when it
+    began.
+    """
 
     def __init__(self, caller: Caller, settings: Mapping[str, int]) -> None:
         self._caller = caller
-        #: what is set before the flight
+        #: : the parameters to set before the flight
         self.settings = dict(settings)
 
     def permit(self, ask: bytes, now_us: int) -> bytes | Refusal:
-        """The permit for what is asked for, at a monotonic time."""
+        """The permit for a requested preparation, at a monotonic time."""
         return self._caller(PERMIT, _TIME.pack(now_us), ask)
 
 
 class IsolatedAttestation:
-    """`Attestation` over calls: the other end has the key, which the caller gave it when it began."""
+    """`Attestation` over calls: the other end has the key, which the caller passed when it began."""
 
     def __init__(self, caller: Caller) -> None:
         self._caller = caller
@@ -404,13 +408,13 @@ class IsolatedAttestation:
 
     @property
     def digest(self) -> bytes:
-        """The digest to keep for the next session, 32 octets; zero octets of a boundary that is gone."""
+        """The digest to store for the next session, 32 octets; zero octets of a lost boundary."""
         answer = self._caller(DIGEST)
         return START if isinstance(answer, Refusal) else answer
 
     def begin(self, key: BoundaryKey | None) -> int | None:
-        """The flight's log begins, with a session of this number, or of the next of those that the boundary kept, which
-        is the answer; None where none begins. Raises RuntimeError for a second time.
+        """Begin the flight's log, with a session of this number, or of the next one that the boundary counts. Returns
+        the number; None if none begins. Raises RuntimeError on a second call.
         """
         if self._begun:
             raise RuntimeError("the boundary's session has begun already")
@@ -419,6 +423,6 @@ class IsolatedAttestation:
         return None if isinstance(answer, Refusal) else int.from_bytes(answer[:8], "big")
 
     def statement(self, now: Now, *, final: bool = False) -> bytes | None:
-        """A signed statement, None without a key or after the final one. `now` counts where it has no own clock."""
+        """A signed statement, None without a key or after the final one. `now` counts if it has no clock of its own."""
         answer = self._caller(STATEMENT, bytes([final]), _NOW.pack(*_times(now))) if self._begun else LOST
         return None if isinstance(answer, Refusal) else answer

@@ -1,8 +1,9 @@
-"""`load`: from the bytes of a bundle to a boundary that may decide, once. All signatures are verified here.
+"""`load`: opens a bundle once and returns a boundary that may decide. All signatures are verified here.
 
-Checked, in this order: that the mode may be used with this peer; then by `open_bundle` the signatures, that each key
-may speak for its duty, vehicle, role and source, the format versions, and every binding; then by `prepare` that
-policy and mission make sense, and that the mission only tightens; last that the requests of this policy fit the wire.
+Checked in this order: that the mode may be used with this peer; by `open_bundle`, the signatures, the
+authorisation of each key for its duty, vehicle, role and source, the format versions, and every binding; by
+`prepare`, that policy and mission are well-formed and the mission only tightens; and last, that the requests of
+this policy fit the wire.
 """
 
 from collections.abc import Mapping
@@ -41,7 +42,7 @@ from rtshcua.wire.untrusted import Untrusted
 
 
 class Attestation:
-    """Signs how far one boundary's chain got. Nothing is signed before it has begun, or without a key."""
+    """Signs the state of one boundary's chain. Nothing is signed before it has begun, or without a key."""
 
     def __init__(self, chain: BoundaryChain, flight: bytes, bundle: bytes, *, enforced: bool) -> None:
         self._chain = chain
@@ -53,12 +54,12 @@ class Attestation:
 
     @property
     def digest(self) -> bytes:
-        """The digest to keep for the next session, 32 octets."""
+        """The digest to store for the next session, 32 octets."""
         return self._chain.digest
 
     def begin(self, key: BoundaryKey | None) -> int | None:
-        """The flight's log begins: the number of the session, None without a key. Raises RuntimeError for a second
-        time: a chain has one beginning.
+        """Begin the flight's log. Returns the number of the session, None without a key. Raises RuntimeError on a
+        second call, because a chain has one beginning.
         """
         if self._key is not None:
             raise RuntimeError("the boundary's session has begun already")
@@ -70,9 +71,9 @@ class Attestation:
         return key.session
 
     def statement(self, now: Now, *, final: bool = False) -> bytes | None:
-        """A signed statement at a moment, None without a key or after the final one. After that nothing is dispatched,
-        and no frame leaves that moves the vehicle: else an end could be signed before the end. The boundary shares the
-        runtime's clock.
+        """A signed statement at a moment, None without a key or after the final one. After the final one nothing is
+        dispatched, and no frame that moves the vehicle passes, so that the signed end is the end. The boundary
+        shares the runtime's clock.
         """
         key, chain = self._key, self._chain
         if key is None or self._signs is None or chain.over:
@@ -91,7 +92,7 @@ SESSION_KEY_BYTES: Final = 32
 
 
 class EnforcementMode(StrEnum):
-    """How `enforce` is kept apart from the runtime. `NONE` enforces nothing: for measuring, in simulation only."""
+    """How `enforce` is separated from the runtime. `NONE` enforces nothing: for measurements, in simulation only."""
 
     NONE = "none"
     SOFTWARE = "software"
@@ -114,12 +115,12 @@ class Loaded(msgspec.Struct, frozen=True):
 
     @property
     def bundle(self) -> Bundle:
-        """The bundle; after a replacement, with the mission that is in force."""
+        """The bundle; after a replacement, with the mission in force."""
         return self.in_force.bundle
 
     @property
     def invocations(self) -> tuple[PreparedInvocation, ...]:
-        """The invocations of the mission that is in force."""
+        """The invocations of the mission in force."""
         return self.in_force.invocations
 
     @property
@@ -129,7 +130,7 @@ class Loaded(msgspec.Struct, frozen=True):
 
     @property
     def expires_us(self) -> int:
-        """The UTC time in us after which no step of this bundle can be fresh: until then its replay must be refused."""
+        """The UTC time in us after which no step of this bundle is valid: until then its replay must be refused."""
         return max(
             prepared.invocation.issued_at_us + prepared.invocation.contract.validity_us for prepared in self.invocations
         )
@@ -149,28 +150,29 @@ def load(
     owed: Mapping[str, Owed] = MappingProxyType({}),
     caller: Caller | None = None,
 ) -> Loaded | Refusal:
-    """Open a bundle for the vehicle of this identity. `session_key` is 32 random bytes that are used for nothing else;
-    `flight`, 16 random bytes, is the id of the flight that begins, and goes into the genesis of its log. `settings` are
-    the parameters that an operator has set before it, `owed` those that earlier runs left to be put back.
+    """Open a bundle for the vehicle of this identity. `session_key` is 32 random bytes for this use only; `flight`,
+    16 random bytes, is the id of the flight, and is recorded in the genesis of its log. `settings` are the
+    parameters that the operator has set before the flight, `owed` those that earlier runs left to be restored.
 
-    `now` is when the bundle was received (paper symbol `t_r`). With a `caller` the boundary is elsewhere: it opens the
-    bundle itself, draws the id of the flight, and was told what is `owed` when it began.
+    `now` is when the bundle was received (paper symbol `t_r`). With a `caller` the boundary is elsewhere: it opens
+    the bundle itself, draws the id of the flight, and received `owed` when it began.
 
-    Raises ValueError for a session key or an id of another length; whatever is wrong with the bundle is a `Refusal`.
+    Raises ValueError for a session key or an id of another length; a problem of the bundle is returned as a
+    `Refusal`.
     """
     if len(session_key) != SESSION_KEY_BYTES:
-        raise ValueError(f"a session key has {SESSION_KEY_BYTES} bytes, not {len(session_key)}")
+        raise ValueError(f"a session key must have {SESSION_KEY_BYTES} bytes, not {len(session_key)}")
     if len(flight) != FLIGHT_BYTES:
-        raise ValueError(f"the id of a flight has {FLIGHT_BYTES} bytes, not {len(flight)}")
+        raise ValueError(f"the id of a flight must have {FLIGHT_BYTES} bytes, not {len(flight)}")
     if mode is EnforcementMode.NONE and not peer_is_own_simulator:
-        return Refusal("mode-refused", "mode `none` flies nothing but the simulated vehicle that this run started")
+        return Refusal("mode-refused", "mode `none` is only allowed with a simulated vehicle that this run started")
     try:
         opened = open_bundle(bundle, root=root, vehicle=vehicle, now_us=now.utc_us)
     except Untrusted as error:
         return Refusal(error.slug, str(error))
     policy = prepare(opened.policy)
     if isinstance(policy, Refusal):
-        return Refusal("malformed", f"the policy does not make sense: {policy.text}")
+        return Refusal("malformed", f"the policy is malformed: {policy.text}")
     invocations = prepare_mission(opened.mission, policy)
     if isinstance(invocations, Refusal):
         return Refusal("malformed", f"the mission is malformed: {invocations.text}")
@@ -201,8 +203,8 @@ def session(
     *,
     bundle: bytes = b"",
 ) -> Loaded:
-    """A session of a verified and prepared bundle, nothing of it decided yet. Without an `issuer` nothing is set, and
-    without the octets of the bundle nothing that it signs fits a log.
+    """A new session of a verified and prepared bundle. Without an `issuer` no parameter can be set, and without the
+    octets of the bundle its statements fit no log.
     """
     commands = Commands(in_force.bundle.policy, in_force.bundle.mission)
     enforced = mode is not EnforcementMode.NONE

@@ -1,8 +1,8 @@
-"""What may be set of an autopilot before a flight, who permits it, and to what it is put back.
+"""The parameters of an autopilot that may be set before a flight, their permits, and their restoration.
 
-An operator names parameters and values when the flight is loaded; nothing is named otherwise. Of those that are named a
-permit lists what the vehicle had and what it gets. To put something back, the value must be the one that a permit of
-this session, or the record that an earlier run left, says it was before.
+An operator names parameters and values when the flight is loaded, and no others can be set. A permit lists some of
+them with their previous and new values. A restored value must be the previous one according to a permit of this
+session, or to the record of an earlier run.
 """
 
 from collections.abc import Mapping
@@ -13,17 +13,20 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.parameters import shown, value_of
 from rtshcua.wire.preparation import Preparation, decode, seal
 
-#: how long a preparation permit may be used, in us: all of its parameters are asked for again several times
+#: : the validity of a preparation permit, in us: enough to read all of its parameters several times
 VALID_US: Final = 30_000_000
 
-#: how many permits one session seals: what remembers which were used has a fixed size elsewhere
+#: : the most permits of one session, because the record of used ones has a fixed size in the C boundary
 MOST_PERMITS: Final = 1_023
 
-#: what may be set at all, and to what: bounds of the autopilot's own fence, what it does there (hold, return, land),
-#: and the height of its return. Ranges are those of the parameter references of ArduCopter 4.7 and PX4 1.16.
+#: : the parameters that may be set, with their values: bounds of the autopilot's own fence, its reaction to a breach
+#: (hold, return, land), and the height of its return. Ranges are those of the parameter references of ArduCopter 4.7
+#: and PX4 1.16.
 SETTABLE: Final[Mapping[str, tuple[float, ...] | range]] = {
     "FENCE_ENABLE": (1.0,),
-    "FENCE_TYPE": tuple(float(bits) for bits in range(16) if bits & 4),  # areas always: they carry the airspace
+    "FENCE_TYPE": tuple(
+        float(bits) for bits in range(16) if bits & 4
+    ),  # always including the areas, which contain the airspace
     "FENCE_RADIUS": range(30, 10_001),
     "FENCE_ALT_MAX": range(10, 1_001),
     "FENCE_ALT_MIN": range(-100, 101),
@@ -36,56 +39,60 @@ SETTABLE: Final[Mapping[str, tuple[float, ...] | range]] = {
     "RTL_RETURN_ALT": range(1, 3_001),
 }
 
-# why nothing is permitted
-MALFORMED: Final = Refusal("preparation/malformed", "what is asked for is no preparation")
-NOT_CONFIGURED: Final = Refusal("preparation/not-configured", "a parameter, or its value, is not what was configured")
-TOO_MANY: Final = Refusal("preparation/too-many", f"a session permits {MOST_PERMITS} preparations at most")
-NOT_AS_BEFORE: Final = Refusal("preparation/not-as-before", "a value is not the one that the parameter had before")
+# reasons why a permit is refused
+MALFORMED: Final = Refusal("preparation/malformed", "malformed preparation request")
+NOT_CONFIGURED: Final = Refusal(
+    "preparation/not-configured", "a parameter, or its value, differs from the configuration"
+)
+TOO_MANY: Final = Refusal("preparation/too-many", f"a session permits at most {MOST_PERMITS} preparations")
+NOT_AS_BEFORE: Final = Refusal(
+    "preparation/not-as-before", "a value differs from the one that the parameter had before"
+)
 
 
 def unsettable(name: str, bits: int) -> str | None:
-    """Why a parameter is not set to this, in words; None where it may be, once it is configured."""
+    """Why a parameter may not be set to this value, as text; None if it may, once it is configured."""
     accepted = SETTABLE.get(name)
     if accepted is None:
-        return f"`{name}` is none of the parameters that are set for a flight: {', '.join(SETTABLE)}"
+        return f"`{name}` cannot be set for a flight; the parameters that can be are {', '.join(SETTABLE)}"
     value = value_of(bits)
     if isinstance(accepted, range):
         if accepted[0] <= value <= accepted[-1]:
             return None
-        return f"`{name}` is set from {accepted[0]} to {accepted[-1]}, and not to {shown(bits)}"
+        return f"`{name}` must be from {accepted[0]} to {accepted[-1]}, not {shown(bits)}"
     if value in accepted:
         return None
     words = ", ".join(f"{each:g}" for each in accepted)
-    return f"`{name}` is set to {words}, and not to {shown(bits)}"
+    return f"`{name}` must be {words}, not {shown(bits)}"
 
 
 class Owed(NamedTuple):
-    """What a parameter had before it was set for a flight, and what it was set to."""
+    """The value of a parameter before it was set for a flight, and the value that was set."""
 
     before: int
     value: int
 
 
 class PreparationIssuer:
-    """Seals preparation permits under the session key. `settings` is what was configured, by name;
-    `owed`, what earlier runs left to be put back.
+    """Seals preparation permits under the session key. `settings` is the configuration, by name; `owed`, the
+    parameters that earlier runs left to be restored.
     """
 
     def __init__(
         self, key: bytes, settings: Mapping[str, int], owed: Mapping[str, Owed] = MappingProxyType({})
     ) -> None:
-        #: what is set before the flight
+        #: : the parameters to set before the flight
         self.settings = dict(settings)
         self._key = key
         self._owed = dict(owed)
         self._serial = 0
 
     def owes(self, owed: Mapping[str, Owed]) -> None:
-        """This is what earlier runs left to be put back."""
+        """Set the parameters that earlier runs left to be restored."""
         self._owed = dict(owed)
 
     def permit(self, ask: bytes, now_us: int) -> bytes | Refusal:
-        """The permit for what is asked for, at a monotonic time."""
+        """The permit for a request, at a monotonic time."""
         asked = decode(ask)
         if asked is None or not asked.writes or len({each.name for each in asked.writes}) < len(asked.writes):
             return MALFORMED
@@ -105,7 +112,7 @@ class PreparationIssuer:
         return None
 
     def _setting(self, asked: Preparation) -> Refusal | None:
-        """What was set already, and is set to something else, is put back to what it was before all that."""
+        """A parameter that was set already and is set again is restored to its first value."""
         for name, _, value in asked.writes:
             if self.settings.get(name) != value or unsettable(name, value) is not None:
                 return NOT_CONFIGURED

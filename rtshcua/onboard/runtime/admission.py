@@ -1,4 +1,4 @@
-"""Admission: which step's turn it is, what the boundary answers, and the record of that before anyone acts on it."""
+"""Admission: the current step, the boundary's answers, and the record of each answer before it takes effect."""
 
 from collections import deque
 from collections.abc import Iterable
@@ -20,18 +20,18 @@ from rtshcua.onboard.runtime.view import Decided
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, STEP, Ref, Request, encode
 from rtshcua.wire.response import Status, decode
 
-#: how many decisions a display is shown
+#: : the number of decisions in the display
 SHOWN = 6
 _OUTCOMES = {outcome: outcome.name.lower() for outcome in Outcome}
-#: MAV_SEVERITY of what ground stations are told of a decision: info, warning, notice, warning
+#: : the MAV_SEVERITY with which ground stations are informed of a decision: info, warning, notice, warning
 _SEVERITIES = {Outcome.ALLOW: 6, Outcome.DENY: 4, Outcome.DEFER: 5, Outcome.FALLBACK: 4}
 
 
 class InvocationQueue:
     """`Q_onboard`, paper symbol: the mission's invocations, released one after the other, phase by phase.
 
-    Release (section 4.3): for the first step the moment the vehicle is ready, later the end of the predecessor. Times
-    are monotonic, in us.
+    Release (section 4.3): for the first step when the vehicle is ready, for later ones when the predecessor ends.
+    Times are monotonic, in us.
     """
 
     def __init__(self, mission: Mission) -> None:
@@ -51,7 +51,7 @@ class InvocationQueue:
 
     @property
     def released(self) -> int:
-        """How many steps were released; what they say does not change any more."""
+        """How many steps were released; these do not change any more."""
         return 0 if self.released_us is None else min(self._index + 1, len(self._steps))
 
     @property
@@ -60,14 +60,12 @@ class InvocationQueue:
         return self._steps[min(self._index, len(self._steps) - 1)].phase
 
     def release(self, now_us: int) -> None:
-        """Release the first step. A later call changes nothing: a vehicle is ready once."""
+        """Release the first step. Later calls have no effect, because a vehicle becomes ready once."""
         if self.released_us is None:
             self.released_us = now_us
 
     def replace(self, mission: Mission, first: int, now_us: int) -> None:
-        """From now on these are the steps, from `first` on others than before. Where the current one is among these, it
-        is released now.
-        """
+        """Set the steps, which differ from `first` on. If the current one is among these, it is released now."""
         self._steps = mission.invocations
         if first <= self._index and self.released_us is not None:
             self.released_us = now_us
@@ -79,10 +77,10 @@ class InvocationQueue:
 
 
 class Admission:
-    """Builds requests, reads answers, records them.
+    """Builds requests, decodes answers, records them.
 
-    An answer about a step that equals the one before is counted and not recorded again, so that a deferral does not
-    flood the log; `flush` records the count.
+    An answer about a step that equals the previous one is counted and not recorded again, so that a deferral does
+    not flood the log; `flush` records the count.
     """
 
     def __init__(self, loaded: Loaded, journal: Journal, queue: InvocationQueue, remaining: RemainingLatency) -> None:
@@ -97,7 +95,7 @@ class Admission:
         self._repeated = 0
 
     def ask(self, now: Now, state: State, ref: Ref) -> Decision | None:
-        """The boundary's answer about a step or link; None when it did not decide."""
+        """The boundary's answer about a step or link; None if it did not decide."""
         kind, step, link = ref
         released_us = self._queue.released_us or 0  # 0: nothing was released yet, and only the contingency may fly
         phase, remaining_us = self._queue.phase, self._remaining.us
@@ -127,7 +125,7 @@ class Admission:
         return answer
 
     def flush(self, now: Now) -> None:
-        """Record how often the last answer was given again."""
+        """Record how often the last answer was repeated."""
         if self._last is not None and self._repeated:
             self._journal.effect(now, "repeated", Ref(STEP, self._last[0], -1), detail=str(self._repeated))
         self._last = None
@@ -136,11 +134,11 @@ class Admission:
     def _told(
         self, asked: Request, ref: Ref, of: Invocation | None, answer: Decision, approvals: tuple[ConfirmAnswer, ...]
     ) -> Iterable[Action]:
-        """An answer as it is shown, announced and recorded; `of` is the step asked about, or whose link it is."""
+        """An answer for display, announcement and record; `of` is the step of the request, or of the requested link."""
         now, clause, subject = asked.now, answer.clause, self._subject(ref, of)
         outcome, reason = _OUTCOMES[answer.outcome], answer.reason.value
         self.recent.append(Decided(now.monotonic_us, subject, outcome, reason, "" if clause is None else clause.text))
-        why = "" if answer.outcome is Outcome.ALLOW else f"{reason}: "  # first, for what is long is cut
+        why = "" if answer.outcome is Outcome.ALLOW else f"{reason}: "  # first, because long texts are cut
         yield Announce(_SEVERITIES[answer.outcome], f"{outcome} {why}{subject}")
         identity = b"" if of is None else of.invocation_id
         context = Context(

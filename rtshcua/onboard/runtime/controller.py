@@ -1,13 +1,13 @@
-"""The mission controller: the stages of a run, and what leads from one to the next (design section 4.4).
+"""The mission controller: the stages of a run and their transitions (design section 4.4).
 
-What a step that is not admitted does: denied in the air, the contingency flies, and nothing that the step itself says
-is listened to. Deferred, it is asked for again until its deadline, in the air under a hold. Else `on inadmissible`
-counts: `skip` goes on with the next step, `hold` waits like a deferral, `replan` too and asks for another step in its
-place, `abort` flies the step's fallback and, when that is used up, the contingency. On the ground nothing is sent, and
-the run ends.
+A step that is denied in the air is followed by the contingency, whatever the step's own options say. A deferred
+step is requested again until its deadline, in the air while the vehicle holds. Otherwise `on inadmissible`
+applies: `skip` continues with the next step, `hold` waits as for a deferral, `replan` also waits and requests a
+replacement of the step, and `abort` flies the step's fallback and, when that is used up, the contingency. On the
+ground nothing is sent, and the run ends.
 
-While the link is down, or after this computer stood still, and until fresh state came or its time is over, there is no
-turn at all (`link`).
+While the link is down, or after this computer stood still, no turn is taken until fresh state has arrived or the
+time for that is over (`link`).
 """
 
 from collections.abc import Mapping
@@ -33,56 +33,62 @@ from rtshcua.onboard.runtime.supervisor import RetryPolicy, Supervisor
 from rtshcua.onboard.runtime.view import RunStage, RuntimeView
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref
 
-#: the effect that says it in the log
+#: : the effect that records it in the log
 MAY_FLY: Final = "may-fly"
 
-#: why this run does not go on watching
+#: : why this run stops watching
 _WHY: Mapping[Ending, str] = {
-    Ending.STOOD_DOWN: "somebody else flies it, so this run sends nothing more and stops watching",
-    Ending.LINK_LOST: "it is not heard or does not answer, so it can be neither watched nor told anything",
+    Ending.STOOD_DOWN: "somebody else flies the vehicle, so this run sends nothing more and stops watching",
+    Ending.LINK_LOST: "the vehicle is not heard or does not answer, so it can be neither watched nor commanded",
 }
-#: however the mission was given up: nothing is left that could be sent
+#: : after any abort: no command is left that could be sent
 _TRIED: Final = (
-    "the last link of the contingency was sent as often as it may be, and no landing was seen; this run may send "
-    "nothing else, so it ends and stops watching"
+    "the last link of the contingency was sent as often as allowed, and no landing was "
+    "observed; this run may send nothing else, so it ends and stops watching"
 )
-OWN_FAILSAFE: Final = "its own failsafe flies it, so this run sends nothing more and stops watching"
-#: for nothing else shows who it was
+OWN_FAILSAFE: Final = (
+    "the autopilot's own failsafe flies the vehicle, so this run sends nothing more and stops watching"
+)
+#: : nothing else shows who it was
 PAUSED: Final = (
-    "it stands far from its target as if somebody had paused it, who may fly it on at any time, so this run sends "
-    "nothing more and stops watching; if nobody did, nobody flies it: take it over"
+    "the vehicle stands far from its target as if somebody had paused it, who may resume the "
+    "flight at any time, so this run sends nothing more and stops watching; if nobody did, "
+    "nobody flies it: take it over"
 )
-RESTS: Final = "it says that it rests on the ground, and it obeyed a command and was not seen to land"
+RESTS: Final = "the vehicle reports that it rests on the ground, but it obeyed a command and no landing was observed"
 
 
 def may_fly(
     ending: Ending, last_seen: str, *, failsafe: bool = False, paused: bool = False, rests: bool = False
 ) -> str:
-    """That the vehicle may be flying, where it was last seen, and why nothing watches it. `failsafe`: its own flies it.
-    `paused`: that it stands is all that shows who flies it. `rests`: it says that it lies on the ground, disarmed.
+    """The warning that the vehicle may be flying, its last known state, and why nothing watches it. `failsafe`: its
+    own failsafe flies it. `paused`: the only sign of another pilot is that it stands still. `rests`: it reports
+    that it is on the ground, disarmed.
     """
     if rests:
-        return f"{RESTS}: approach it as one that may start"
+        return f"{RESTS}: approach it as if it may start"
     why = _WHY.get(ending, _TRIED)
     if ending is Ending.STOOD_DOWN and (failsafe or paused):
         why = OWN_FAILSAFE if failsafe else PAUSED
     return f"{last_seen}; the vehicle may be flying: {why}"
 
 
-#: what is recorded where another step is asked for, in place of one that is not admitted
+#: : the effect that records the request to replace a step that is not admitted
 REPLAN: Final = "replan"
-#: why a command was not sent that was `late`
-LATE: Final = "nothing was sent: this computer was too busy, or its disk too slow, to send it in its permit's time"
-#: what is `late`: the permit's time was over when it was to be sent, or when its first frame was
+#: : why a command was `late`
+LATE: Final = (
+    "nothing was sent: this computer was too busy, or its disk too slow, to send the command within its permit's time"
+)
+#: : `late`: the permit's time was over when the command was to be sent, or when its first frame was
 _LATE: Final = ("late", frames.LATE.slug)
-#: what ends a run matters more the further down it stands
+#: : reasons for the end of a run, the most important last
 _GRAVITY = (Ending.ABORTED, Ending.CANCELLED, Ending.RECALLED, Ending.INTERRUPTED, Ending.EVIDENCE_LOST)
 
 
 class MissionController:
-    """Owns where a run stands, and the parts that own the rest (the table in docs/runtime.md).
+    """Owns the stage of a run, and the parts that own the rest (the table in docs/runtime.md).
 
-    `stage` and `ending` are for reading; `ending` is None until the run ended.
+    `stage` and `ending` are for reading; `ending` is None until the run ends.
     """
 
     def __init__(self, loaded: Loaded, journal: Journal, limits: Limits, *, resumed: bool) -> None:
@@ -91,16 +97,16 @@ class MissionController:
         self._journal = journal
         self._limits = limits
         self._resumed = resumed
-        self._unfit = ""  # why it will never be ready, however long it is waited for
+        self._unfit = ""  # why the vehicle cannot become ready
         self.stage = RunStage.WAITING
         self.ending: Ending | None = None
-        #: that the vehicle may be flying when the run is over, and why it is not watched; empty where it does not
+        #: : the warning that the vehicle may be flying after the end of the run; empty if it does not
         self.may_fly = ""
-        self._cause: Ending | None = None  # why the mission was given up; None: it was not
+        self._cause: Ending | None = None  # why the mission was aborted; None: it was not
         self._began_us: int | None = None
-        self._recording = True  # records are kept, or the policy does not ask
+        self._recording = True  # records are stored, or the policy does not require it
         self._alone = False  # the boundary is lost
-        self._overdue = False  # the step that is waited for was admitted, and its permit came too late
+        self._overdue = False  # the current step was admitted, but its permit came too late
         self._stopping = False  # somebody asked this program to stop
         self.vehicle = VehicleStatus()
         self.monitor = StateMonitor(loaded.policy)
@@ -110,15 +116,15 @@ class MissionController:
         self.admission = Admission(loaded, journal, self.queue, remaining)
         self.dispatcher = Dispatcher(loaded.executor, journal, remaining)
         self.retry = RetryPolicy(limits)
-        self._supervisor: Supervisor | None = None  # of the step that runs
+        self._supervisor: Supervisor | None = None  # of the running step
         self._fallback = Fallback(loaded, self.admission, self.dispatcher, limits)
 
     @property
     def aloft(self) -> bool:
         """Whether a motion command may be needed: a command is under way, or a flight of this bundle is not at rest.
 
-        A flight that somebody else began is none of ours, whatever happens. After a restart of ours the vehicle counts
-        as in the air until it says that it rests: one that is armed may be about to take off, for it was told to.
+        A flight that somebody else began is not ours in any case. After a restart the vehicle counts as in the air
+        until it reports that it rests: an armed vehicle may be about to take off by an earlier command.
         """
         if self.dispatcher.active is not None:
             return True
@@ -126,7 +132,7 @@ class MissionController:
             return not self.vehicle.at_rest
         return self._resumed and not self.vehicle.at_rest
 
-    # -------------------------------------------------------- turns: what is to be done now, by stage
+    # -------------------------------------------------------- turns: the next action, by stage
 
     @property
     def ended(self) -> bool:
@@ -134,14 +140,14 @@ class MissionController:
         return self.stage is RunStage.ENDED
 
     def turn(self, now: Now) -> bool:
-        """Do one thing that can be done now; False when there is none left."""
+        """Take one action that is possible now; False if there is none."""
         if self._began_us is None:
             self._began_us = now.monotonic_us
         self.look_at_boundary(now)
         if self.ended or (self.link.state is not LinkState.UP and not self._judges(now)):
             return False
         if self.link.mute and self._is_gone(now.monotonic_us):
-            self._journal.effect(now, "link-lost", detail="it is heard, but answers nothing")
+            self._journal.effect(now, "link-lost", detail="the vehicle is heard, but answers nothing")
             self.stand_down(now, Ending.LINK_LOST)
             return False
         stage = self.stage
@@ -151,10 +157,10 @@ class MissionController:
             return self._fall(now)
         if stage is RunStage.DECIDING:
             return self._decide(now)
-        return stage is RunStage.WAITING and self._wait(now, self._began_us)  # to judge may have ended the run
+        return stage is RunStage.WAITING and self._wait(now, self._began_us)  # the judgement may have ended the run
 
     def _judges(self, now: Now) -> bool:
-        """Whether the vehicle is heard again, and what is known of it may be judged."""
+        """Whether the vehicle is heard again, and its state may be judged."""
         link = self.link
         if link.down:
             if self._is_gone(now.monotonic_us):
@@ -172,8 +178,8 @@ class MissionController:
         return True
 
     def _is_gone(self, now_us: int) -> bool:
-        """Whether it was waited out that the vehicle is silent, or answers nothing: in the air that may end as long as
-        it can fly, unless somebody waits for this program to stop.
+        """Whether the wait for a silent or unresponsive vehicle is over. In the air it lasts as long as the vehicle
+        can fly, unless somebody waits for this program to stop.
         """
         limit_us = self._limits.silent_us
         if self.aloft and not self._stopping:
@@ -181,7 +187,7 @@ class MissionController:
         return self.link.waited_us(now_us) > limit_us
 
     def _heard_again(self, now: Now, silence: EndedSilence) -> None:
-        """State is judged again after a silence. One that was too long ends the mission, if the policy says so."""
+        """Judge the state again after a silence. One that was too long ends the mission, if the policy says so."""
         policy, waited = self._policy, f"after {silence.awaited_us // 1_000} ms"
         if silence.missing:
             self._journal.effect(now, "not-fresh", detail=f"{waited} without {', '.join(silence.missing)}")
@@ -189,7 +195,7 @@ class MissionController:
             self._journal.effect(now, "fresh", detail=waited)
         if policy.after_silence != AfterSilence.CONTINGENCY or silence.lasted_us <= policy.silence_us:
             return
-        ends = self.dispatcher.homeward and self.queue.at_last  # then nothing is left to be given up
+        ends = self.dispatcher.homeward and self.queue.at_last  # then nothing is left to abort
         if self.aloft and self.stage in (RunStage.DECIDING, RunStage.RUNNING) and not ends:
             text = f"{silence.lasted_us // 1_000} ms, more than {policy.silence_us // 1_000} ms"
             self._journal.effect(now, "long-silence", detail=text)
@@ -208,13 +214,14 @@ class MissionController:
                 return self._come_down(now)
             return False
         self._journal.effect(now, "ready")
-        if self._resumed and vehicle.others:  # while this program was gone somebody took it
+        if self._resumed and vehicle.others:  # somebody took over while this program was not running
             self._journal.effect(now, "taken-over", detail=vehicle.others)
             self.stand_down(now, Ending.STOOD_DOWN)
             return False
         if self._resumed or vehicle.airborne:
-            # What an earlier run of this bundle left in the air, or armed and told to take off, is brought down, and a
-            # bundle flies once. Any other flight that this run did not begin is someone else's.
+            # A vehicle that an earlier run of this bundle left in the air, or armed and commanded to take off, is
+            # brought down, because a bundle flies once. Any other flight that this run did not begin is someone
+            # else's.
             self._journal.effect(now, "resumed" if self._resumed else "already-airborne")
             return self._come_down(now)
         self.queue.release(now.monotonic_us)
@@ -222,7 +229,7 @@ class MissionController:
         return True
 
     def _decide(self, now: Now) -> bool:
-        if self._cause is not None:  # given up while a step of the mission brought the vehicle down
+        if self._cause is not None:  # aborted while a step of the mission brought the vehicle down
             self.break_off(now, self._cause)
             return True
         invocation = self.queue.current
@@ -263,7 +270,7 @@ class MissionController:
         return True
 
     def _bide(self, now: Now, invocation: Invocation, state: State) -> bool:
-        """The step is not begun yet: in the air it is waited for under a hold, as long as what must hold does."""
+        """The step has not begun: in the air the vehicle holds meanwhile, as long as its conditions hold."""
         if not self.aloft:
             return False
         unkept = self.retry.unkept(self._loaded.invocations[invocation.step], state, self._loaded.policy, now)
@@ -300,11 +307,11 @@ class MissionController:
         return violated is not None and self._violated(now, violated)
 
     def _violated(self, now: Now, what: Detail) -> bool:
-        """Something that must hold for the current step does not."""
+        """A condition of the current step does not hold."""
         current = self.queue.current
         if self.dispatcher.active is not None:
             self.dispatcher.end(now, "violated", what)
-        elif current is not None:  # it waits for its step, and nothing flies that this would end
+        elif current is not None:  # it waits for its step, so this ends no flight
             self._journal.effect(now, "violated", Ref(STEP, current.step, -1), detail=what)
         self.fall_back(FALLBACK_LINK)
         return True
@@ -313,7 +320,7 @@ class MissionController:
         if self.dispatcher.active is None and self.vehicle.at_rest:
             self._rests(now)
         elif not self._fallback.turn(now, self.monitor.state(now.monotonic_us)):
-            if self.link.mute:  # nothing of it has arrived: it is tried until that is waited out
+            if self.link.mute:  # no command has arrived: it is repeated until the wait is over
                 self._fallback.land()
                 return False
             self._journal.effect(now, "stranded")
@@ -321,16 +328,16 @@ class MissionController:
         return False
 
     def prepare(self, now: Now) -> None:
-        """Look ahead at what the running step's fallback would need where the vehicle is now, if it moved."""
+        """Evaluate in advance the running step's fallback at the vehicle's present place, if it moved."""
         current = self.queue.current
         if self.stage is RunStage.RUNNING and current is not None and self.monitor.moved():
             prepared = self._loaded.invocations[current.step]
             look_ahead(prepared, self.monitor.state(now.monotonic_us), self._loaded.policy, now)
 
-    # -------------------------------------------------------- what the vehicle says of itself
+    # -------------------------------------------------------- reports of the vehicle
 
     def air_reported(self, now: Now, event: AirState) -> None:
-        """The vehicle says whether it is armed and in the air."""
+        """The vehicle reports whether it is armed and in the air."""
         self.link.air_reported()
         ours = self.dispatcher.dispatched
         came_down = self.vehicle.report(armed=event.armed, airborne=event.airborne, ours=ours)
@@ -346,7 +353,7 @@ class MissionController:
             self.down(now)
 
     def unfit(self, why: str) -> None:
-        """The vehicle will not be ready for this mission, however long it is waited for."""
+        """The vehicle cannot become ready for this mission."""
         self._unfit = why
 
     def succeeded(self, now: Now, token: int) -> None:
@@ -363,7 +370,7 @@ class MissionController:
             self.down(now)
 
     def failed(self, now: Now, event: CommandFailed) -> None:
-        """A command was refused, its effect did not come, or it was not sent."""
+        """A command was refused, its effect was not observed, or it was not sent."""
         if self.dispatcher.flying(event.token) is None:
             return
         self.dispatcher.end(now, "failed", self._why_failed(event))
@@ -374,7 +381,7 @@ class MissionController:
         elif event.reason in _LATE and self.stage is RunStage.FALLING:
             self._fallback.late()
         elif self.stage is RunStage.DECIDING and self.aloft:
-            # It was a hold: whatever the vehicle does, it does not wait where it should.
+            # It was a hold: the vehicle does not wait where it should, whatever it does.
             if event.reason not in _LATE or not self.retry.hold_again():
                 self.fall_back(FALLBACK_LINK, holds=False)
         elif self.stage is not RunStage.RUNNING:
@@ -387,8 +394,8 @@ class MissionController:
             self._end(now, self._ending_on_ground)
 
     def _rests(self, now: Now) -> None:
-        """The vehicle says that it rests on the ground. Where it was never seen in the air that is no landing: what it
-        obeyed may still lift it off.
+        """The vehicle reports that it rests on the ground. If it was never observed in the air, that is not a
+        landing: a command that it obeyed may still lift it off.
         """
         if self.vehicle.flown:
             self.down(now)
@@ -397,14 +404,14 @@ class MissionController:
             self._end(now, self._cause or Ending.ABORTED)
 
     def _why_failed(self, event: CommandFailed) -> str:
-        """As the log has it."""
+        """The reason of the failure, for the log."""
         text = LATE if event.reason in _LATE and not event.text else event.text
         why = f"{event.reason}: {text}" if text else event.reason
-        return f"{why}; the link is silent: what the vehicle does is not known" if self.link.down else why
+        return f"{why}; the link is silent: the state of the vehicle is unknown" if self.link.down else why
 
     def down(self, now: Now) -> None:
-        """The vehicle is on the ground again, told to or not: the flight is over, and the run with it. Nothing is sent
-        to a vehicle on the ground.
+        """The vehicle is on the ground again, by command or not: flight and run are over. Nothing is sent to a
+        vehicle on the ground.
         """
         self.dispatcher.end(now, "landed")
         self._landed()
@@ -422,7 +429,7 @@ class MissionController:
             self.retry.news()
 
     def stalled(self, now: Now, before_us: int) -> None:
-        """This computer stood still since `before_us`: what is known of the vehicle is of before."""
+        """This computer stood still since `before_us`: the known state of the vehicle is from before that."""
         takes_off = self.dispatcher.active is not None and self.vehicle.airborne is not True
         self.link.stalled(before_us, now.monotonic_us, takes_off=takes_off)
         self._journal.effect(now, STOOD_STILL, detail=f"for {(now.monotonic_us - before_us) // 1_000} ms")
@@ -435,13 +442,13 @@ class MissionController:
             self._journal.effect(now, "link-back", detail=f"after {down_us // 1_000} ms")
         self.retry.news()
 
-    # -------------------------------------------------------- what ends a run, or turns it homeward
+    # -------------------------------------------------------- aborts and the end of a run
 
     def break_off(self, now: Now, cause: Ending, kind: int = FALLBACK_LINK) -> None:
-        """Give the mission up: on the ground the run ends, in the air a running step falls back by its own chain, or
-        by the contingency if `kind` says so, and between steps the contingency flies.
+        """Abort the mission: on the ground the run ends, in the air a running step falls back by its own chain, or by
+        the contingency if `kind` says so, and between steps the contingency flies.
 
-        What already brings the vehicle home or down goes on.
+        A return or a descent under way continues.
         """
         self._blame(cause)
         if not self.aloft:
@@ -450,7 +457,7 @@ class MissionController:
             self.fall_back(kind if self.stage is RunStage.RUNNING else CONTINGENCY_LINK, cause)
 
     def look_at_boundary(self, now: Now) -> None:
-        """Where the boundary is lost nothing more is decided: the mission is given up."""
+        """If the boundary is lost no further decision is possible: abort the mission."""
         if self._alone or self.stage is RunStage.ENDED or not self._journal.look_at_boundary(now):
             return
         self._alone = True
@@ -471,24 +478,24 @@ class MissionController:
         self.break_off(now, Ending.RECALLED, CONTINGENCY_LINK)
 
     def cancel(self, now: Now) -> None:
-        """Who proposed the mission calls it off: what flies then is the policy's, as after a recall."""
+        """The proposer cancels the mission: the policy's contingency flies, as after a recall."""
         self.break_off(now, Ending.CANCELLED, CONTINGENCY_LINK)
 
     def evidence_failed(self, now: Now) -> None:
-        """Records are not kept: as the policy says, the mission is given up, or no further step begins."""
+        """Records cannot be stored: depending on the policy, abort the mission or begin no further step."""
         if self._policy.without_evidence == WithoutEvidence.REFUSE:
             self._recording = False
         else:
             self.break_off(now, Ending.EVIDENCE_LOST)
 
     def evidence_kept(self) -> None:
-        """Records are kept again."""
+        """Records are stored again."""
         self._recording = True
         self.retry.news()
 
     @property
     def released(self) -> int:
-        """How many steps do not change any more: those that were released, but for one that waits to be replaced."""
+        """How many steps do not change any more: those that were released, except one that waits to be replaced."""
         current = self.queue.current
         waits = (
             current is not None and current.on_inadmissible == OnInadmissible.REPLAN and self.stage is RunStage.DECIDING
@@ -496,7 +503,7 @@ class MissionController:
         return self.queue.released - (waits and self.queue.released > 0)
 
     def replaced(self, now: Now, first: int) -> None:
-        """A replacement is in force: the steps from `first` on are others now."""
+        """A replacement is in force: the steps from `first` on are new."""
         mission, current = self._loaded.bundle.mission, self.queue.current
         self.queue.replace(mission, first, now.monotonic_us)
         if current is not None and first <= current.step and self.stage is RunStage.DECIDING:
@@ -505,10 +512,10 @@ class MissionController:
 
     def fall_back(self, kind: int, cause: Ending = Ending.ABORTED, *, holds: bool = True) -> None:
         """Fly the current step's chain, or the contingency, down to the ground. Without `holds`, links that hold are
-        passed over: a hold has just failed.
+        skipped, because a hold has just failed.
 
-        A vehicle that has not left the ground is told to land and nothing else: a return or a hold makes no sense
-        there, and a take-off that is under way, not yet seen to have armed it, must not go on by itself.
+        A vehicle that has not left the ground is only told to land: a return or a hold makes no sense there, and a
+        take-off that is under way, not yet observed as armed, must not continue by itself.
         """
         self._blame(cause)
         current = self.queue.current
@@ -520,14 +527,14 @@ class MissionController:
         self.stage = RunStage.FALLING
 
     def leave(self) -> None:
-        """Nobody will watch any more: unless it is on its way home or down already, the last link flies."""
+        """Nobody will watch any more: unless the vehicle is on its way home or down already, the last link flies."""
         if self.stage is not RunStage.ENDED and self.aloft and not self.dispatcher.homeward:
             self._blame(Ending.INTERRUPTED)
             self._fallback.land()
             self.stage = RunStage.FALLING
 
     def stand_down(self, now: Now, ending: Ending, *, failsafe: bool = False, paused: bool = False) -> None:
-        """Send nothing more, whatever flies, and end. `failsafe`: the autopilot's own flies it. `paused`: it stands."""
+        """Send nothing more, and end. `failsafe`: the autopilot's own failsafe flies it. `paused`: it stands still."""
         flies = self.aloft or self.dispatcher.done
         self.dispatcher.release(now)
         if flies and ending is not Ending.CRASHED:
@@ -547,14 +554,14 @@ class MissionController:
 
     @property
     def _ending_on_ground(self) -> Ending:
-        """How a run ends that was given up on the ground for no other cause; refused if nothing ever flew."""
+        """The ending of a run that was aborted on the ground for no other cause; refused if nothing flew."""
         return Ending.ABORTED if self.vehicle.flown else Ending.REFUSED
 
     def _advance(self, now: Now) -> None:
         """The current step is done, or skipped."""
         self.queue.advance(now.monotonic_us)
         self._supervisor = None
-        # Where no step begins without records, the disk first gets a moment to say what became of those so far.
+        # If no step begins without records, the disk first gets a moment to report on those so far.
         at_once = self._policy.without_evidence != WithoutEvidence.REFUSE
         self.retry.renew(now.monotonic_us, at_once=at_once)
         self.stage = RunStage.DECIDING
@@ -574,10 +581,10 @@ class MissionController:
         if self._cause is None or _GRAVITY.index(cause) > _GRAVITY.index(self._cause):
             self._cause = cause
 
-    # -------------------------------------------------------- what a display may show
+    # -------------------------------------------------------- display
 
     def view(self, at_us: int) -> RuntimeView:
-        """The run as it is at a monotonic time."""
+        """The state of the run for display at a monotonic time."""
         mission, vehicle = self._loaded.bundle.mission, self.vehicle
         active, current = self.dispatcher.active, self.queue.current
         contract = current.contract.name if current is not None else ""

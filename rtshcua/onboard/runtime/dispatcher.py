@@ -1,4 +1,4 @@
-"""The dispatcher: hands permits to the executor, keeps the one command that flies, and measures how long that takes."""
+"""The dispatcher: passes permits to the executor, tracks the one flying command, and measures the latency."""
 
 from collections import deque
 from typing import Final, NamedTuple
@@ -14,24 +14,24 @@ from rtshcua.onboard.runtime.journal import Detail, Journal
 from rtshcua.wire.permit import WITHDRAWN
 from rtshcua.wire.request import FALLBACK_LINK, STEP, Ref
 
-#: Assumed until enough was measured, in us: an order above anything seen on the machines this was built on.
+#: : The default until enough was measured, in us: ten times more than measured on the development machines.
 CONSERVATIVE_US = 20_000
 WINDOW = 128
 _ENOUGH = 8
-#: that the vehicle was seen to do what was dispatched; the detail is the target that it named, if it did
+#: : the vehicle was observed to obey the dispatched command; the detail is its reported target, if any
 OBEYED: Final = "obeyed"
-#: what is recorded of a fallback that was sent home or down, and ended without word of a landing
-UNCONFIRMED: Final = "it was sent, and not confirmed: no landing was seen"
+#: : the record of a fallback that was sent to fly home or land, and ended without a report of a landing
+UNCONFIRMED: Final = "sent but not confirmed: no landing was observed"
 _UNCONFIRMED = ("time-over", "released")
-#: why no command came of a permit in time
+#: : why a permit was not turned into a command in time
 _OVERDUE: Final = (executor.LATE.slug, "time-apart")
 
 
 class RemainingLatency:
-    """`L_rem`, paper symbol: what validation and dispatch still take, as a measured high quantile.
+    """`L_rem`, paper symbol: the remaining time for validation and dispatch, as a measured high quantile.
 
     The 99th percentile of the last `WINDOW` measurements, integers only; conservative until there are a few. The
-    quantile is the nearest rank, so with few measurements it is their maximum. `us` is the latency to count with now.
+    quantile is the nearest rank, so with few measurements it is their maximum. `us` is the present latency.
     """
 
     def __init__(self) -> None:
@@ -39,7 +39,7 @@ class RemainingLatency:
         self.us = CONSERVATIVE_US
 
     def measured(self, took_us: int) -> None:
-        """Note how long one admission took, from the moment it was decided at to the moment its command was sent."""
+        """Add a measurement: the time from the decision to the sending of its command."""
         self._latest.append(max(took_us, 0))
         ordered = sorted(self._latest)
         high = ordered[-(-len(ordered) * 99 // 100) - 1]
@@ -47,7 +47,7 @@ class RemainingLatency:
 
 
 class Active(Frozen):
-    """A command that was dispatched and has not ended; `ref` is what its permit is for. A link's time is over at
+    """A command that was dispatched and has not ended; `ref` is the subject of its permit. A link's time is over at
     `until_us`; a step has None.
     """
 
@@ -63,7 +63,7 @@ class Active(Frozen):
 
 
 class _Tried(NamedTuple):
-    """A step's permit, and how it was before that was dispatched."""
+    """A step's permit, and the state before its dispatch."""
 
     ref: Ref
     permit: bytes
@@ -80,17 +80,17 @@ class Dispatcher:
         self._remaining = remaining
         self.active: Active | None = None
         self.dispatched = False  # something was sent in this flight,
-        self.done = False  # and was seen to be obeyed,
-        self.used = False  # and in this run, as its log tells: it stays after a landing
-        self.hindrance = ""  # what is known to keep the command that flies from getting on
+        self.done = False  # and was observed to be obeyed,
+        self.used = False  # and in this run, according to its log: it stays after a landing
+        self.hindrance = ""  # the known cause that slows the flying command down
         self._standing: tuple[int, bytes] | None = None  # the last step that was sent, and its permit
         self._tried: _Tried | None = None  # the last step that was to be sent
-        self.overdue = False  # nothing was sent by the last permit, for it came too late
+        self.overdue = False  # nothing was sent by the last permit, because it came too late
 
     def fly(self, now: Now, permit: bytes, ref: Ref, lasting_us: int | None) -> bool:
-        """Dispatch what the permit is for, for at most `lasting_us` (None: until it succeeds or fails).
+        """Dispatch the command of the permit, for at most `lasting_us` (None: until it succeeds or fails).
 
-        False if the executor refused, and then nothing is sent.
+        False if the executor refused; then nothing is sent.
         """
         if ref.kind == STEP:
             self._tried = _Tried(ref, permit, self._standing, self.dispatched)
@@ -100,8 +100,8 @@ class Dispatcher:
         return sent
 
     def withdraw(self, now: Now) -> bool:
-        """Give the permit of the last step up, which came too late: whether the boundary found that nothing was sent by
-        it. Then all is as before, and the step may be asked for again.
+        """Withdraw the permit of the last step, which came too late. True if the boundary confirmed that nothing was
+        sent by it: then the state is as before, and the step may be requested again.
         """
         tried, self._tried = self._tried, None
         if tried is None:
@@ -114,7 +114,7 @@ class Dispatcher:
         return True
 
     def stand_in(self, now: Now, ref: Ref, lasting_us: int) -> bool:
-        """As `fly`, for a link, by the permit of the last step that was sent, which stands for it."""
+        """As `fly`, for a link, by the standing permit of the last step that was sent."""
         if self._standing is None or (ref.kind == FALLBACK_LINK and self._standing[0] != ref.step):
             return False
         permit = self._standing[1]
@@ -135,15 +135,15 @@ class Dispatcher:
         return True
 
     def sent(self, token: int, at_us: int) -> None:
-        """The first frame of a command went out: one measurement of `L_rem`."""
+        """The first frame of a command was sent: one measurement of `L_rem`."""
         active = self.flying(token)
         if active is not None:
             self._remaining.measured(at_us - active.since_us)
 
     def obeyed(self, now: Now, event: Obeyed) -> None:
-        """A command was seen to be done: whoever goes on after this process knows that nothing before it is in force.
+        """A command was observed to be obeyed: a later process knows that no earlier one is in force.
 
-        The record names no token, for one that does says how a command ended.
+        The record contains no token, because one with a token reports how a command ended.
         """
         active = self.flying(event.token)
         if active is not None:
@@ -151,22 +151,22 @@ class Dispatcher:
             self._journal.effect(now, OBEYED, active.ref, detail=" ".join(map(str, event.target or ())))
 
     def hindered(self, now: Now, event: Hindered) -> None:
-        """Note what hinders the command that flies: where its time is over, that is why."""
+        """Record what slows the flying command down: the cause if its time runs out."""
         if self.flying(event.token) is not None:
             self._journal.note(now, event.text)
             self.hindrance = event.text
 
     def flying(self, token: int) -> Active | None:
-        """The command that flies, if it is this one: a late word about another one means nothing any more."""
+        """The flying command, if it is this one: a late report about another one is ignored."""
         return self.active if self.active is not None and self.active.command.token == token else None
 
     @property
     def homeward(self) -> bool:
-        """Whether what flies brings the vehicle home or down."""
+        """Whether the flying command brings the vehicle home or down."""
         return self.active is not None and self.active.homeward
 
     def end(self, now: Now, event: str, detail: Detail = "") -> None:
-        """The command that flies ended: record how."""
+        """The flying command ended: record how."""
         active = self.active
         if active is None:
             return

@@ -1,4 +1,4 @@
-"""Falling back: one chain, then the contingency, link after link and never backwards, until the vehicle is down."""
+"""Flies a fallback: one chain, then the contingency, link after link and never backwards, until the vehicle is down."""
 
 import msgspec
 
@@ -13,10 +13,10 @@ from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, Ref
 
 
 class _Chain(msgspec.Struct):
-    """A chain that is being flown: its kind, the step it belongs to (-1: the contingency), and the last link used.
+    """A chain in flight: its kind, the step that it belongs to (-1: the contingency), and the last link used.
 
-    `holds`: also those of its links fly that hold. The last link was tried `tried` times more, and is tried again at
-    `wait_until_us` (0: nothing is waited for). Links of it were too late `late` times, and tried again for that.
+    `holds`: its links that hold fly too. The last link was repeated `tried` times, and is repeated at
+    `wait_until_us` (0: no wait). Links of it were too late `late` times, and repeated for that.
     """
 
     kind: int
@@ -33,7 +33,7 @@ class _Chain(msgspec.Struct):
 
 
 class Fallback:
-    """Flies chains. Each link is asked for and recorded like a step.
+    """Flies chains. Each link is requested and recorded like a step.
 
     If the boundary does not answer, the standing permit of the link is used: a fallback never waits.
     """
@@ -45,20 +45,20 @@ class Fallback:
         self._dispatcher = dispatcher
         self._limits = limits
         self._chain = _Chain(CONTINGENCY_LINK, -1, START, True)
-        self._overdue = False  # what was to be flown last had a permit, which came too late
+        self._overdue = False  # the last link to fly had a permit, which came too late
 
     def begin(self, kind: int, step: int, *, holds: bool = True) -> None:
-        """Start a step's chain, or the contingency (`step` is -1); `holds`: also the links of it that hold."""
+        """Start a step's chain, or the contingency (`step` is -1); `holds`: including the links that hold."""
         self._chain = _Chain(kind, step, START, holds)
 
     def land(self) -> None:
-        """Start the contingency at its last link, which needs nothing and brings the vehicle down where it is."""
+        """Start the contingency at its last link, which has no condition and brings the vehicle down where it is."""
         self._chain = _Chain(CONTINGENCY_LINK, -1, len(self._policy.contingency) - 2, True)
 
     def late(self) -> None:
-        """This computer was too late to send the link that was dispatched last: it is asked for again, a bounded number
-        of times, for a link that brings the vehicle home must not be passed over because of that. The boundary lets no
-        link of a step's chain fly twice: the contingency flies in its place.
+        """This computer was too late to send the last dispatched link: it is requested again, a bounded number of
+        times, because a link that brings the vehicle home must not be skipped for that reason. The boundary lets
+        no link of a step's chain fly twice, so the contingency flies instead.
         """
         chain = self._chain
         if chain.late == self._limits.tries:
@@ -70,7 +70,8 @@ class Fallback:
         self._chain.late = chain.late + 1
 
     def hold(self, now: Now, state: State) -> bool:
-        """Fly the first hold of the contingency, which goes on until another command replaces it; if there is one.
+        """Fly the first hold of the contingency, if there is one, which continues until another command replaces it.
+
         False if its permit came too late: it may be tried again.
         """
         for index, link in enumerate(self._policy.contingency):
@@ -83,8 +84,8 @@ class Fallback:
         return True
 
     def turn(self, now: Now, state: State) -> bool:
-        """Fly the next link, unless one flies whose time is not over. False if there is nothing left to try: the last
-        link failed again and again.
+        """Fly the next link, unless one flies within its time. False if no attempt is left: the last link failed
+        repeatedly.
         """
         active, chain = self._dispatcher.active, self._chain
         if active is not None and active.ref == chain.ref(chain.after):
@@ -115,7 +116,7 @@ class Fallback:
         return choose_fallback(self._loaded.invocations[chain.step], state, policy, now, chain.after)
 
     def _insist(self, now: Now, state: State) -> bool:
-        """The chain is used up and the vehicle is not down: the last link again, a bounded number of times."""
+        """The chain is used up and the vehicle is not down: repeat the last link, a bounded number of times."""
         chain, limits = self._chain, self._limits
         if chain.tried == limits.tries:
             return False
@@ -129,7 +130,7 @@ class Fallback:
         return True
 
     def _fly(self, now: Now, state: State, index: int, link: Link, *, insist: bool) -> bool:
-        """Ask for a link and fly it. `insist` flies it by its standing permit even if it was not admitted."""
+        """Request a link and fly it. `insist` flies it by its standing permit even if it was not admitted."""
         ref, lasting_us = self._chain.ref(index), link_us(self._policy, link)
         answer = self._admission.ask(now, state, ref)
         self._overdue = False

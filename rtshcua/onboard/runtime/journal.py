@@ -1,4 +1,4 @@
-"""The journal: turns what the runtime does into actions, each outcome as an evidence line before what it covers."""
+"""The journal: turns the runtime's results into actions, each preceded by its evidence line."""
 
 from collections.abc import Callable, Iterable
 from functools import partial
@@ -11,71 +11,71 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Action, Append, Command
 from rtshcua.wire.request import NOTHING, Ref
 
-#: how often a note of the same text leaves a record, in us: those between are counted
+#: : the least interval between records of notes with the same text, in us: those between are counted
 REPEATED_EVERY_US: Final = 30_000_000
-#: so many texts are looked for; of more, each note is recorded
+#: : the most texts that are counted; with more, each note is recorded
 _MOST_TEXTS = 64
 
-#: makes what tells of something: its line, and what is announced of it
+#: : makes the line of a report, and its announcement
 Telling = Callable[[], Iterable[Action]]
-#: what is said of something that happened, or what says it once that is recorded
+#: : the text of a report, or a function that makes it when it is recorded
 Detail = str | Callable[[], str]
 
 
 def said(detail: Detail) -> str:
-    """The words of it."""
+    """The text of a report."""
     return detail if isinstance(detail, str) else detail()
 
 
 class Journal:
-    """Collects the actions of one `Runtime.step`, in order. All lines carry the moment of that step.
+    """Collects the actions of one `Runtime.step`, in order. All lines have the time of that step.
 
-    What only tells of something is made when the actions are taken: a fallback is sent before (`reflex`). An epoch that
-    should have been sealed long ago is sealed before anything else is recorded, unless the boundary is found lost: then
-    records of what it made come first.
+    Reports are made when the actions are taken, because a fallback is sent before them (`reflex`). An epoch that
+    is long overdue is sealed before anything else is recorded, unless the boundary is found lost: then the records
+    of its entries come first.
     """
 
     def __init__(self, recorder: Recorder) -> None:
         self.recorder = recorder
         self._alone = False  # the boundary is lost, which is recorded, or will be before anything else
         self._entries: list[Action | Telling] = []
-        self._first: Action | None = None  # of what is done, and not only told
+        self._first: Action | None = None  # actions other than reports
         self._noted: dict[str, int] = {}  # when a text was last recorded as a note,
         self._again: dict[str, int] = {}  # how often it was noted since,
         self._last: dict[str, int] = {}  # and when last
 
     @property
     def reflex(self) -> Command | None:
-        """The command that waits for no record, if it comes first of all that is done in this step: nothing that is
-        told could keep it back, so that it may be sent before.
+        """The command that needs no record, if it is the first action of this step: no report could prevent it, so it
+        may be sent before they are made.
         """
         first = self._first
         return first if isinstance(first, Command) and not first.needs_record else None
 
     def add(self, action: Action) -> None:
-        """Add something to be done."""
+        """Add an action."""
         if self._first is None:
             self._first = action
         self._entries.append(action)
 
     def tell(self, telling: Telling) -> None:
-        """Add what only tells of something, by how it is made. It is called once, in its turn."""
+        """Add a report by the function that makes it, which is called once, in order."""
         self._entries.append(telling)
 
     def record(self, line: Callable[[], bytes], now: Now, durability: int, *, awaited: bool) -> Iterable[Action]:
-        """One record, in the telling of something; `line` asks the recorder for it."""
+        """Make one record within a report; `line` requests it from the recorder."""
         if self.recorder.overdue(now):
             yield from self._seal(now, tells_loss=False)
         yield Append(line(), durability, awaited)
 
     def effect(self, now: Now, event: str, ref: Ref = NOTHING, *, token: int = -1, detail: Detail = "") -> None:
-        """Record something that happened. `detail` may be the world's own text."""
+        """Record an event. `detail` may be text from outside."""
         self.look_at_boundary(now)
         line = partial(self._effect, now, event, ref, token, detail)
         self._entries.append(partial(self.record, line, now, WRITTEN, awaited=False))
 
     def look_at_boundary(self, now: Now) -> bool:
-        """Record that the boundary is lost, once, and before what follows from that; whether it is."""
+        """Record the loss of the boundary, once, before its consequences; returns whether it is lost."""
         if not self._alone and self.recorder.lost() is not None:
             self._alone = True
             self._entries.append(partial(self._told_loss, now))
@@ -84,14 +84,14 @@ class Journal:
     def _told_loss(self, now: Now) -> Iterable[Action]:
         if self.recorder.overdue(now):
             yield from self._seal(now)
-        for line in self.recorder.loss(now):  # unless a seal told of it
+        for line in self.recorder.loss(now):  # unless a seal recorded it
             yield Append(line, WRITTEN, awaited=False)
 
     def _effect(self, now: Now, event: str, ref: Ref, token: int, detail: Detail) -> bytes:
         return self.recorder.effect(now, event, ref, token=token, detail=said(detail))
 
     def note(self, now: Now, text: str) -> None:
-        """Record a note, unless one of the same text was recorded a short while ago: then it is counted."""
+        """Record a note; if the same text was recorded recently, count it instead."""
         before_us = self._noted.get(text)
         if text in self._again or (before_us is not None and now.monotonic_us - before_us < REPEATED_EVERY_US):
             self._again[text] = self._again.get(text, 0) + 1
@@ -102,7 +102,7 @@ class Journal:
         self.effect(now, "noted", detail=text)
 
     def tell_counted(self, now: Now, *, ended: bool = False) -> None:
-        """Record how often notes were repeated, once their time is over or the run is."""
+        """Record how often notes were repeated, after their interval or at the end of the run."""
         due = [text for text in self._again if ended or now.monotonic_us - self._noted[text] >= REPEATED_EVERY_US]
         for text in due:
             count = self._again.pop(text)
@@ -115,7 +115,7 @@ class Journal:
             self.effect(now, "noted", detail=f"{text} ({more})")
 
     def take(self, now: Now, *, ended: bool) -> list[Action]:
-        """What was collected since the last call. An epoch that is over is sealed, unless something is sent; after the
+        """Take the actions since the last call. An epoch that is over is sealed, unless a command is sent; after the
         end of the run the close is the seal.
         """
         entries, self._entries, self._first = self._entries, [], None
@@ -130,6 +130,6 @@ class Journal:
         return actions
 
     def _seal(self, now: Now, *, tells_loss: bool = True) -> Iterable[Append]:
-        """End an epoch. Nothing waits for a seal, but it is on the disk soon: its checkpoint may be shown around."""
+        """End an epoch. Nothing waits for a seal, but it is stored soon, because its checkpoint may be published."""
         for line in self.recorder.sealing(now, tells_loss=tells_loss):
             yield Append(line, SYNCED_FIRST if is_signed(line) else WRITTEN, awaited=False)

@@ -1,10 +1,11 @@
-"""How long the runtime waits for the world, and how long a run may take at most, whatever happens.
+"""The runtime's time limits for its environment, and the greatest duration of a run.
 
-The bounds are computed from the policy, and held against every path of small runs by a search (docs/model-checking.md).
-Each wait of the runtime has a limit of its own. It is noticed at the next step of the loop, at most `period_us` later,
-and when the link was lost, or this computer stood still, only on fresh state, at most `flapping_us` after that was
-over. Time in which the vehicle is not heard, or answers nothing, or in which this computer stands still, is not counted
-here: a silence lasts no longer than the vehicle can fly and `silent_us`, then the run stands down.
+The bounds are computed from the policy, and a search compares them with every path of small runs
+(docs/model-checking.md). Each wait of the runtime has a limit of its own. Its end is noticed at the next step of
+the loop, at most `period_us` later, and, if the link was lost or this computer stood still, only on fresh state,
+at most `flapping_us` after that ended. Time in which the vehicle is not heard, or answers nothing, or in which
+this computer stands still, does not count: a silence lasts no longer than the vehicle can fly plus `silent_us`,
+and then the run stands down.
 """
 
 from rtshcua.model.flat.contract import Contract, Link
@@ -15,19 +16,19 @@ from rtshcua.wire.permit import LINK_VALID_US
 
 
 class Limits(Frozen):
-    """How long the runtime waits for the world, in us.
+    """The runtime's time limits, in us.
 
-    `ready_us` for a vehicle that is ready. `silent_us` for a lost link to come back, or for a vehicle that answers
-    nothing to answer: on the ground, or once somebody asked this program to stop; in the air that, and as long as the
-    vehicle can fly. When the link is back, `fresh_us` for fresh state: longer than a link must be silent to count as
-    lost, so that nothing is judged after one message and no more. A link that comes and goes is waited for
-    `flapping_us` in all, from when it was back first.
+    `ready_us` for the vehicle to become ready. `silent_us` for a lost link to return, or for an unresponsive
+    vehicle to answer: on the ground, or once somebody asked this program to stop; in the air that, plus the time
+    that the vehicle can fly. When the link is back, `fresh_us` for fresh state: longer than the silence that
+    counts as a loss, so that one single message leads to no judgement. A link that comes and goes is awaited for
+    `flapping_us` in all, from its first return.
 
-    Where two steps of the runtime are more than `stalled_us` apart, this computer stood still, and fresh state is
-    waited for in the same way.
+    If two steps of the runtime are more than `stalled_us` apart, this computer stood still, and fresh state is
+    awaited in the same way.
 
-    The last link of the contingency has nothing after it: it is tried `tries` times, `retry_us` apart. `again_us`
-    bounds how long a deferred step is left without asking again when nothing was received.
+    The last link of the contingency has no successor: it is tried `tries` times, `retry_us` apart. `again_us` is
+    the longest interval between requests of a deferred step when nothing was received.
     """
 
     ready_us: int = 120_000_000
@@ -41,18 +42,18 @@ class Limits(Frozen):
 
 
 def link_us(policy: Policy, link: Link) -> int:
-    """How long a link may take: its own limit, else its skill's, else as long as anything can fly."""
+    """The longest duration of a link: its own limit, else its skill's, else the longest of any flight."""
     return link.limit_us or policy.contracts[link.skill].duration_us or policy.vehicle.endurance_us
 
 
 def falling_us(policy: Policy, contract: Contract | None, limits: Limits, period_us: int) -> int:
-    """From the moment a skill's chain begins (None: the contingency) until the run has ended, in us of time with a
-    link.
+    """The time from the beginning of a skill's chain (None: the contingency) to the end of the run, in us of time
+    with a link.
 
-    That it ended means: landed, stood down from, or given up after the last tries. A degrade rule's target, each link
-    of the chain and each of the contingency fly once; the last link is sent again, `tries` times. A run that is left
-    alone meanwhile (`Runtime.leave`, once) begins with the last link once more. A link that could not be sent in its
-    permit's time is tried again, `tries` times in a chain.
+    The end is a landing, standing down, or giving up after the last attempt. A degrade rule's target, each link of
+    the chain and each of the contingency fly once; the last link is repeated, `tries` times. A run that is left
+    unattended meanwhile (`Runtime.leave`, once) begins with the last link once more. A link that could not be sent
+    within its permit's time is repeated, `tries` times in a chain.
     """
     slack_us = limits.flapping_us + period_us
     chain = contract.fallback if contract is not None else ()
@@ -66,7 +67,8 @@ def falling_us(policy: Policy, contract: Contract | None, limits: Limits, period
 
 
 def run_us(policy: Policy, mission: Mission, limits: Limits, period_us: int) -> int | None:
-    """From the start of a run to its end, in us of time with a link; None if a step has no time limit of its own.
+    """The time from the start of a run to its end, in us of time with a link; None if a step has no time limit of its
+    own.
 
     A step waits for its deadline, or for an approval and then for its deadline again, and flies for its duration.
     """

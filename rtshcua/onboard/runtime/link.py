@@ -1,19 +1,20 @@
 """Supervision of the link: while it is down nothing is judged, and when it is back fresh state is awaited first.
 
             lost                      back
-      UP ---------> DOWN ---------------------> AWAITING ----> UP   all was reported again, or the time for it is over
-                      ^-------------------------- |
-                                 lost again
+       UP ---------> DOWN ---------------------> AWAITING ----> UP   all was reported again, or the time for it is
+       over
+                       ^-------------------------- |
+                                  lost again
 
-What is known of a vehicle that was silent is old. What was current when the link was lost, and is stale when it is
-back, has to be reported again, measured after the loss, before anything is decided on it; for a bounded time, for it
-may never be. Signals that were stale or missing before are not waited for: their absence is no news.
+The state of a vehicle that was silent is old. Values that were current when the link was lost, and are stale when
+it is back, must be reported again, measured after the loss, before any decision on them. The wait is bounded,
+because they may never come. Signals that were stale or missing before are not awaited.
 
-A computer that stood still is a silence of our own: what was known when it goes on is as old, and what it reads first
-was said meanwhile. Fresh state is awaited in the same way.
+A computer that stood still is like a silence: its state is old when it continues, and what it reads first was sent
+meanwhile. Fresh state is awaited in the same way.
 
-A vehicle that is heard, but answers nothing, is judged as ever: what is sent may arrive yet. It is waited for no longer
-than one that is silent.
+The state of a vehicle that is heard, but answers nothing, is judged as usual, because commands may still arrive.
+It is awaited no longer than a silent one.
 """
 
 from enum import Enum, auto
@@ -24,15 +25,16 @@ from rtshcua.onboard.ports import Frozen
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.monitor import StateMonitor
 
-#: the effect that says that this computer stood still, and for how long: nothing was read, judged or sent meanwhile
+#: : the effect that records that this computer stood still, and for how long: nothing was read, judged or sent
+#: meanwhile
 STOOD_STILL: Final = "stood-still"
-#: what stands for the vehicle's word on whether it flies, among the names of signals
+#: : the name, among those of signals, of the vehicle's report on whether it flies
 AIR_STATE = "whether it is in the air"
 
 
 class EndedSilence(Frozen):
-    """A silence that is over, or a stall of this computer: how long the vehicle was not heard (0 if there was only a
-    stall), how long fresh state was then waited for, both in us, and what was not reported again in time.
+    """A silence that is over, or a stall of this computer: how long the vehicle was not heard (0 for a mere stall),
+    how long fresh state was then awaited, both in us, and what was not reported again in time.
     """
 
     lasted_us: int
@@ -49,9 +51,9 @@ class LinkState(Enum):
 
 
 class LinkSupervision:
-    """Whether the vehicle is heard, and whether what is known of it may be judged. Times are monotonic, in us.
+    """Whether the vehicle is heard, and whether its state may be judged. Times are monotonic, in us.
 
-    One silence goes on until state was judged again: a link that comes and goes within it begins no new one.
+    One silence lasts until state was judged again: a link that comes and goes within it begins no new one.
     """
 
     def __init__(self, policy: Policy, monitor: StateMonitor, limits: Limits) -> None:
@@ -60,22 +62,22 @@ class LinkSupervision:
         self._limits = limits
         self.state = LinkState.UP
         self._since_us: int | None = None  # start of the current silence, or None
-        self._waits_us: int | None = None  # and is waited out since then
-        self._mute_us: int | None = None  # it answers nothing, and that is waited out since then
-        self._lost_us = 0  # the link was lost last
-        self._first_back_us: int | None = None  # the link was back first in this silence,
-        self._back_us = 0  # and last
-        self._resumed_us = 0  # this computer last went on that had stood still (0: it is not known to have)
-        self._until_us = 0  # fresh state is awaited until then, at the latest
-        self._standing_us: int | None = None  # since then nothing is judged
+        self._waits_us: int | None = None  # and of the wait for its end
+        self._mute_us: int | None = None  # start of the wait for an answer
+        self._lost_us = 0  # time of the last loss of the link
+        self._first_back_us: int | None = None  # first return of the link in this silence,
+        self._back_us = 0  # and the last one
+        self._resumed_us = 0  # when this computer last continued after a stall (0: no stall is known)
+        self._until_us = 0  # the latest end of the wait for fresh state
+        self._standing_us: int | None = None  # nothing is judged since then
         self._awaited: frozenset[int] = frozenset()
         self._awaits_air = False
-        self._away_us = 0  # how long the link was not up, in stretches that are over,
-        self._away_since_us: int | None = None  # and when the present one began
+        self._away_us = 0  # how long the link was not up, in intervals that are over,
+        self._away_since_us: int | None = None  # and the start of the present one
 
     def away_us(self, now_us: int) -> int:
-        """How long, in sum so far, the vehicle was silent, not judged yet after that, or answered nothing: what flies
-        a step counts none of it.
+        """The total time in which the vehicle was silent, not judged yet after that, or answered nothing. It does not
+        count for a flying step.
         """
         return self._away_us + (0 if self._away_since_us is None else now_us - self._away_since_us)
 
@@ -94,7 +96,7 @@ class LinkSupervision:
 
     @property
     def mute(self) -> bool:
-        """Whether the vehicle answers nothing: what is sent does not seem to arrive."""
+        """Whether the vehicle answers nothing: commands do not seem to arrive."""
         return self._mute_us is not None
 
     def answering(self, now_us: int, *, answers: bool) -> None:
@@ -125,7 +127,7 @@ class LinkSupervision:
     def back(self, now_us: int) -> int | None:
         """The link is back: how long it was down. None if it was not down.
 
-        Fresh state is waited for `fresh_us` from now, and `flapping_us` from when it was back first in this silence.
+        Fresh state is awaited for `fresh_us` from now, and `flapping_us` from the first return in this silence.
         """
         if not self.down:
             return None
@@ -139,11 +141,11 @@ class LinkSupervision:
         self._until_us = min(now_us + self._limits.fresh_us, self._first_back_us + self._limits.flapping_us)
 
     def stalled(self, before_us: int, now_us: int, *, takes_off: bool) -> None:
-        """This computer stood still from `before_us` to `now_us`: nothing that was known is current because of that.
+        """This computer stood still from `before_us` to `now_us`: none of the known state is current.
 
-        `takes_off` as for `lost`. What the vehicle said meanwhile may be read at once; where that is too old, fresh
-        state is awaited as after a silence. But for `stalled_us` of it, the time of the stall is none in which that was
-        waited for, nor one in which the vehicle had a link: a computer that does nothing but stall judges all the same.
+        `takes_off` as for `lost`. What the vehicle sent meanwhile may be read at once; where that is too old,
+        fresh state is awaited as after a silence. Except for `stalled_us` of it, the stall counts neither as
+        waiting time nor as time with a link: a computer that stalls repeatedly still judges.
         """
         self._awaited |= self._monitor.current(before_us)
         self._awaits_air = self._awaits_air or takes_off
@@ -157,20 +159,22 @@ class LinkSupervision:
         self._count_away(since_us)
 
     def air_reported(self) -> None:
-        """The vehicle said whether it is in the air."""
+        """The vehicle reported whether it is in the air."""
         self._awaits_air = False
 
     def hurry(self, now_us: int) -> None:
-        """Somebody waits for the end from now on: a silence that is under way is waited out anew, of either kind."""
+        """Somebody waits for the end from now on: the wait for the end of a silence, of either kind, restarts."""
         self._waits_us = None if self._since_us is None else now_us
         self._mute_us = None if self._mute_us is None else now_us
 
     def waited_us(self, now_us: int) -> int:
-        """How long a silence that is under way was waited out, or that it answers nothing; 0 if neither is."""
+        """The duration of the present wait for the end of a silence, or for an answer; 0 if there is none."""
         return max((now_us - us for us in (self._waits_us, self._mute_us) if us is not None), default=0)
 
     def awaits(self, now_us: int) -> bool:
-        """Whether nothing may be judged now, for fresh state may still come. To be asked while it is awaited."""
+        """Whether nothing may be judged now, because fresh state may still come. For use while fresh state is
+        awaited.
+        """
         if now_us < self._until_us and self._missing(now_us):
             self._standing_us = now_us if self._standing_us is None else self._standing_us
             self._count_away(now_us)
@@ -178,10 +182,11 @@ class LinkSupervision:
         return False
 
     def judged(self, now_us: int) -> tuple[int, EndedSilence | None]:
-        """State is judged now, though some may still be awaited: for how long it was not, and the silence if that is
-        over with it.
+        """State is judged now, even if some is still awaited. Returns for how long it was not judged, and the silence
+        if that ends with it.
 
-        Until the time for fresh state is over, what is stale only now and was not reported again is waited for too.
+        Until the time for fresh state is over, values that became stale only now and were not reported again are
+        awaited too.
         """
         stood_us = 0 if self._standing_us is None else now_us - self._standing_us
         self._standing_us = None
@@ -197,7 +202,7 @@ class LinkSupervision:
         return stood_us, silence
 
     def _forget(self) -> None:
-        """All that was awaited has come, or is not awaited any more."""
+        """Everything that was awaited has come, or is no longer awaited."""
         self.state = LinkState.UP
         self._until_us = 0
         self._lost_us = self._back_us = self._resumed_us = 0
@@ -209,7 +214,7 @@ class LinkSupervision:
         return self._monitor.unreported(self._awaited, max(self._lost_us, self._resumed_us))
 
     def _missing(self, now_us: int) -> tuple[str, ...]:
-        """The names of what is not known any more, and was awaited in vain so far."""
+        """The names of the values that are unknown now and were awaited in vain so far."""
         slots = self._pending - self._monitor.current(now_us)
         names = [signal.name for signal in self._policy.signals if not slots.isdisjoint(signal.slots)]
         return (*names, AIR_STATE) if self._awaits_air else tuple(names)

@@ -26,21 +26,21 @@ from rtshcua.wire.receipt import APPROVAL, CANCELLATION, RECALL, UNKNOWN, Receip
 from rtshcua.wire.request import STEP, Ref
 from rtshcua.wire.untrusted import Untrusted
 
-#: how much of what a vehicle says is recorded, in letters
+#: : how much of a vehicle's text is recorded, in letters
 MOST_SAID: Final = 200
-#: how often a refused document leaves a record, in us: whoever floods the vehicle must not fill its disk
+#: : the least interval between records of refused documents, in us: a flood must not fill the disk
 REFUSED_EVERY_US: Final = 1_000_000
 
-#: what is taken over before a crash or a takeover: it changes no stage, and tells how it came to that
+#: : events that are processed before a crash or a takeover: they change no stage, and explain its cause
 _TOLD: Final = (Readings, ports.Sent, ports.Obeyed, ports.ClockStepped, ports.StatusText, ports.Noted, ports.Hindered)
 
 
 class Runtime:
     """Flies one loaded bundle once.
 
-    The caller has made the log's genesis with `recorder` before, and makes its close after `End`. `resumed` says that
-    an earlier run of this bundle broke off: in the air the contingency brings the vehicle down, armed on the ground it
-    is told to land, for it may have been told to take off; at rest nothing flies.
+    The caller has made the log's genesis with `recorder` before, and makes its close after `End`. `resumed` says
+    that an earlier run of this bundle was interrupted: in the air the contingency brings the vehicle down; armed
+    on the ground it is told to land, because it may have been commanded to take off; at rest nothing flies.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class Runtime:
         self._controller = MissionController(loaded, self._journal, limits, resumed=resumed)
         self._handler = EventHandler(self._controller, self._journal, loaded.boundary)
         self._stalled_us = limits.stalled_us
-        self._stepped_us: int | None = None  # when the last step was
+        self._stepped_us: int | None = None  # time of the last step
 
     @property
     def ending(self) -> Ending | None:
@@ -60,18 +60,18 @@ class Runtime:
         return self._controller.ending
 
     def step(self, now: Now, events: Sequence[Event]) -> list[Action]:
-        """What to do at `now`, which never goes back, after `events` in the order in which they happened.
+        """The actions at `now`, which never goes back, after `events` in order.
 
-        To be called whenever something happens, and every few tens of ms: times run out without an event. Each call is
-        one observation of the policy's temporal monitors, after what was received and before what is decided. Once the
-        run ended, nothing is done any more.
+        Call it on every event, and every few tens of ms, because time limits end without an event. Each call is
+        one observation of the policy's temporal monitors, after the events and before the decisions. After the end
+        of the run it does nothing.
         """
         self.react(now, events)
         return self.actions(now)
 
     def react(self, now: Now, events: Sequence[Event]) -> Command | None:
-        """The first half of a step: a command that is held for no record, and comes first of all that is to be done, so
-        that it may be sent before the records are made. `actions` has it once more, in its place.
+        """The first half of a step: a command that needs no record and is the first action, so that it may be sent
+        before the records are made. `actions` contains it once more, in its place.
         """
         controller, monitor = self._controller, self._controller.monitor
         before_us, self._stepped_us = self._stepped_us, now.monotonic_us
@@ -79,7 +79,7 @@ class Runtime:
             controller.stalled(now, before_us)
         for event in last_words_first(events):
             if isinstance(event, Readings) and controller.stage is RunStage.RUNNING and monitor.hides(event):
-                controller.turn(now)  # no state goes by unwatched, however many came at once
+                controller.turn(now)  # no state goes unobserved, however many came at once
                 monitor.seen()
             if not controller.ended:
                 self._handler.take(now, event)
@@ -89,15 +89,15 @@ class Runtime:
         return self._journal.reflex
 
     def actions(self, now: Now) -> list[Action]:
-        """The second half of a step, at the same moment: all that is to be done, in its order."""
+        """The second half of a step, at the same moment: all actions, in order."""
         ended = self._controller.ended
         if not ended:
             self._journal.tell_counted(now)
         return self._journal.take(now, ended=ended)
 
     def prepare(self, now: Now) -> None:
-        """To be called after `step` when nothing else is to be done: what the running step's fallback would need where
-        the vehicle is now is looked at ahead. Nothing that is decided, recorded or sent depends on it.
+        """Call after `step` when there is nothing else to do: evaluates in advance the running step's fallback at the
+        vehicle's present place. No decision, record or frame depends on it.
         """
         self._controller.prepare(now)
 
@@ -112,15 +112,15 @@ class Runtime:
 
     @property
     def used_up(self) -> bool:
-        """Whether the bundle may not fly any more: a command of it was dispatched, or it was recalled or cancelled.
-        One that was refused, deferred or interrupted on the ground was not used.
+        """Whether the bundle may not fly any more: a command of it was dispatched, or it was recalled or cancelled. A
+        bundle that was refused, deferred or interrupted on the ground may fly.
         """
         return self._controller.dispatcher.used or self.ending in (Ending.RECALLED, Ending.CANCELLED)
 
     @property
     def may_fly(self) -> str:
-        """That the vehicle may be flying now that the run is over, where it was last seen, and why nothing watches it;
-        empty where it was seen to land, or nothing was sent.
+        """The warning that the vehicle may be flying after the end of the run, its last known state, and why nothing
+        watches it; empty if a landing was observed, or nothing was sent.
         """
         return self._controller.may_fly
 
@@ -131,17 +131,17 @@ class Runtime:
 
     @property
     def homeward(self) -> bool:
-        """Whether the command that flies brings the vehicle home or down, and its link is not lost."""
+        """Whether the flying command brings the vehicle home or down, and its link is not lost."""
         return self._controller.dispatcher.homeward and self.linked
 
     def view(self, now: Now) -> RuntimeView:
-        """What a display may show."""
+        """The state of the run for display."""
         return self._controller.view(now.monotonic_us)
 
 
 def last_words_first(events: Sequence[Event]) -> Sequence[Event]:
-    """Events in the order in which they are to be taken over: as they came, unless one of them is a crash or a
-    takeover. Nothing that came with it ends the run in another way, then, whichever the vehicle said first.
+    """The events in the order of processing: as they came, unless one of them is a crash or a takeover. Then no other
+    event that came with it determines how the run ends, in any order.
     """
     for event in events:
         if isinstance(event, (Crashed, TakenOver)):
@@ -156,10 +156,12 @@ def _rank(event: Event) -> int:
 
 
 class EventHandler:
-    """Takes events over, one by one: records those that matter, and hands each to the part that owns what it changes.
+    """Processes events one by one: records those that matter, and passes each to the part that owns the affected
+    state.
 
-    Documents go to the boundary, which alone says what is to be trusted. What it accepted is recorded whole, so that an
-    audit can verify it again; what it refused is recorded by its slug, and no more often than `REFUSED_EVERY_US`.
+    Documents go to the boundary, which alone decides whether they are trusted. An accepted document is recorded
+    completely, so that an audit can verify it again; a refused one by its slug, at most once every
+    `REFUSED_EVERY_US`.
     """
 
     def __init__(
@@ -168,12 +170,12 @@ class EventHandler:
         self._controller = controller
         self._journal = journal
         self._boundary = boundary
-        self._gap = False  # records are not kept, and that was recorded
+        self._gap = False  # records cannot be stored, and that was recorded
         self._refused_us: int | None = None  # when a refused document was last recorded,
         self._unrecorded = 0  # and how many were refused since
 
     def take(self, now: Now, event: Event) -> None:
-        """Take one event over. All are total: a late, repeated or senseless one changes nothing."""
+        """Process one event. A late, repeated or meaningless event changes nothing."""
         controller = self._controller
         match event:
             case Readings():
@@ -210,7 +212,7 @@ class EventHandler:
                 self._record(now, event)
 
     def _record(self, now: Now, event: Event) -> None:
-        """Record what changes nothing at once."""
+        """Record an event without an immediate effect."""
         match event:
             case ports.VehicleUnfit():
                 self._controller.unfit(event.why)
@@ -236,7 +238,7 @@ class EventHandler:
         self._controller.stand_down(now, ending, failsafe=failsafe, paused=paused)
 
     def _evidence_failed(self, now: Now, reason: str) -> None:
-        """Recorded once a gap: the record may fail like the others, and be taken up when the sink can write again."""
+        """Recorded once for each failure: the record may fail too, and is stored when the sink works again."""
         if not self._gap:
             self._gap = True
             self._journal.effect(now, "gap", detail=reason)
@@ -251,7 +253,7 @@ class EventHandler:
     # -------------------------------------------------------- documents
 
     def _presented(self, now: Now, event: ports.Presented) -> None:
-        """Present one document, act on what became of it, and answer."""
+        """Present one document, apply its result, and answer."""
         receipt = self._receipt(now, event)
         if receipt.accepted:
             self._accepted(now, receipt, event.envelope or b64encode(event.document).decode())

@@ -1,4 +1,4 @@
-"""What was seen where something did not hold, for whoever reads the log: the values of the signals that it reads."""
+"""The values behind a condition that did not hold, for readers of the log: those of the signals that it reads."""
 
 from collections.abc import Iterator
 
@@ -14,7 +14,7 @@ from rtshcua.model.quantity import Dimension, display
 def seen(text: str, prepared: PreparedInvocation, policy: PreparedPolicy, state: State) -> str:
     """`wind.speed = 12 m/s`: the signals that the clause, rule or airspace of this text reads, with their values.
 
-    Empty where it reads none.
+    Empty if it reads none.
     """
     slots = _slots(text, prepared, policy)
     return ", ".join(
@@ -42,7 +42,7 @@ def _clauses(prepared: PreparedInvocation, policy: Policy) -> Iterator[tuple[str
 
 
 def value_in_words(signal: Signal, state: State) -> str:
-    """A signal's value as a source would write it; `unknown` where nothing valid was received."""
+    """A signal's value as in a source; `unknown` where no valid value was received."""
     values = [state.values[slot] for slot in signal.slots]
     first = values[0]
     if first is None or None in values:

@@ -1,4 +1,4 @@
-"""What must hold all the while a skill runs, and while a step is waited for (`decision.watch`)."""
+"""The conditions that must hold while a skill runs, and while a step is awaited (`decision.watch`)."""
 
 from collections.abc import Iterable
 from functools import partial
@@ -15,24 +15,24 @@ from rtshcua.onboard.runtime.journal import Detail
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.seen import seen
 
-DURATION = "lasts longer than it may"
-_TIMING = 5  # the step of section 4.1 that holds a decision against its deadline
+DURATION = "exceeded its maximum duration"
+_TIMING = 5  # the step of section 4.1 that compares a decision with its deadline
 
 
 class Grace:
-    """Bears with UNKNOWN for a while: then it counts as FALSE (design 4.2)."""
+    """Tolerates UNKNOWN for a grace time, after which it counts as FALSE (design 4.2)."""
 
     def __init__(self) -> None:
         self._since: dict[str, int] = {}
 
     def stood(self, us: int) -> None:
-        """For so long nothing was judged: that time does not count."""
+        """Nothing was judged for this time, which does not count."""
         self._since = {text: since_us + us for text, since_us in self._since.items()}
 
     def over(self, broken: Iterable[tuple[str, Truth]], at_us: int, grace_us: int) -> str | None:
         """The first text that is FALSE, or was UNKNOWN at each call for longer than `grace_us`; else None.
 
-        Which of the two it was is said, for they ask for different things of whoever reads the log.
+        The text says which of the two it was, because they call for different actions.
         """
         since: dict[str, int] = {}
         for text, truth in broken:
@@ -48,8 +48,8 @@ class Grace:
 class Supervisor:
     """Watches one running skill. UNKNOWN that lasts longer than the contract's grace counts as FALSE (design 4.2).
 
-    While nothing is judged no grace runs, nor does the skill's own time: what flies it counts in time with a link, too.
-    `away_us` is how long the link was not up so far, in sum (`LinkSupervision.away_us`).
+    While nothing is judged neither grace nor the skill's own time runs: the flight time counts only time with a
+    link. `away_us` is the total time without a link so far (`LinkSupervision.away_us`).
     """
 
     def __init__(self, prepared: PreparedInvocation, policy: PreparedPolicy, started_us: int, away_us: int = 0) -> None:
@@ -60,31 +60,31 @@ class Supervisor:
         self.grace = Grace()
 
     def lasted_us(self, at_us: int, away_us: int) -> int:
-        """How long the skill runs, in time with a link."""
+        """How long the skill has run, in time with a link."""
         return at_us - self._started_us - (away_us - self._away_us)
 
     def violated(self, state: State, now: Now, away_us: int = 0, hindrance: str = "") -> Detail | None:
-        """The text of what does not hold any more, with the values that it read, or None while all does. `hindrance`
-        is what is known to have taken its time, in words.
+        """The text of the condition that does not hold any more, with the values that it read, or None while all
+        hold. `hindrance` is the known cause of a delay, as text.
         """
         contract = self._prepared.invocation.contract
         at_us = now.monotonic_us
         if 0 < contract.duration_us < self.lasted_us(at_us, away_us):
             away_ms = (away_us - self._away_us) // 1_000
-            besides = f", besides {away_ms} ms without a link" if away_ms else ""
+            besides = f", excluding {away_ms} ms without a link" if away_ms else ""
             return f"{DURATION}{besides}: {hindrance}" if hindrance else f"{DURATION}{besides}"
         text = self.grace.over(watch(self._prepared, state, self._policy, now), at_us, contract.grace_us)
         return None if text is None else partial(_with_values, text, self._prepared, self._policy, state)
 
 
 def _with_values(text: str, prepared: PreparedInvocation, policy: PreparedPolicy, state: State) -> str:
-    """Worked out when it is recorded, after the fallback was sent."""
+    """Made when it is recorded, after the fallback was sent."""
     values = seen(text, prepared, policy, state)
     return f"{text}: {values}" if values else text
 
 
 class RetryPolicy:
-    """Whether and when a step that was not admitted is asked for again, and how long it is waited for.
+    """Whether and when a step that was not admitted is requested again, and how long it is awaited.
 
     While nothing is judged no grace runs, but the step's deadline does.
     """
@@ -92,24 +92,24 @@ class RetryPolicy:
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
         self.grace = Grace()
-        self._news = True  # something was received, or began, since the step was last asked for
-        self._asked_us = 0  # when that was
+        self._news = True  # something was received, or began, since the step was last requested
+        self._asked_us = 0  # the time of the last request
         self._held = False  # a hold for the step was tried,
-        self._late = 0  # and so often it was too late
-        self._called = False  # a replacement of it was asked for
+        self._late = 0  # and how often it was too late
+        self._called = False  # a replacement of it was requested
 
     def renew(self, now_us: int, *, at_once: bool) -> None:
-        """Another step is waited for from now on; it is asked for `at_once`, or when something was received."""
+        """Another step is awaited from now on; it is requested `at_once`, or when something was received."""
         self.grace = Grace()
         self._news, self._asked_us, self._held, self._called = at_once, now_us, False, False
         self._late = 0
 
     def news(self) -> None:
-        """Something was received: the answer may be another one now."""
+        """Something was received, so the next answer may differ."""
         self._news = True
 
     def is_due(self, now_us: int) -> bool:
-        """Whether the step is to be asked for now; then it counts as asked for."""
+        """Whether to request the step now; True counts as a request."""
         if not self._news and now_us - self._asked_us < self._limits.again_us:
             return False
         self._news, self._asked_us = False, now_us
@@ -117,9 +117,10 @@ class RetryPolicy:
 
     @staticmethod
     def may_wait(invocation: Invocation, answer: Decision, released_us: int, now_us: int) -> bool:
-        """Whether asking again can help: not past the deadline, but for an approval, which has a time of its own.
+        """Whether another request can help: not past the deadline, except for an approval, which has a time of its
+        own.
 
-        What passed the timing step is in time, also by a release that an approval moved.
+        A decision that passed the timing step is in time, also by a release that an approval moved.
         """
         if answer.reason is Reason.AWAITING_APPROVAL:
             return True
@@ -127,23 +128,23 @@ class RetryPolicy:
         return in_time and may_ask_again(invocation, answer.outcome, answer.reason)
 
     def may_hold(self) -> bool:
-        """Whether a hold is to be tried while the step is waited for: once, for a hold that was sent goes on."""
+        """Whether to try a hold while the step is awaited: once, because a hold that was sent continues."""
         held, self._held = self._held, True
         return not held
 
     def hold_again(self) -> bool:
-        """The hold was not sent, for this computer was too late: whether it is tried again, which is bounded."""
+        """The hold was not sent, because this computer was too late: whether to try again, which is bounded."""
         self._held = self._late == self._limits.tries
         self._late += not self._held
         return not self._held
 
     def may_call(self, invocation: Invocation, answer: Decision) -> bool:
-        """Whether a replacement of the step is to be asked for, once: its mission says so, and it was not admitted."""
+        """Whether to request a replacement of the step, once: its mission says so, and it was not admitted."""
         called, wanted = self._called, invocation.on_inadmissible == OnInadmissible.REPLAN
         self._called = called or (wanted and answer.outcome is Outcome.FALLBACK)
         return self._called and not called
 
     def unkept(self, prepared: PreparedInvocation, state: State, policy: PreparedPolicy, now: Now) -> str | None:
-        """What forbids waiting on in the air; UNKNOWN has the step's grace."""
+        """The condition that prevents waiting in the air; UNKNOWN has the step's grace."""
         grace_us = prepared.invocation.contract.grace_us
         return self.grace.over(holding(prepared, state, policy, now), now.monotonic_us, grace_us)

@@ -1,4 +1,4 @@
-"""What a display may show of a run: plain data, made on request, with no way back into the runtime."""
+"""The data of a run for display: plain values, made on request, without access to the runtime."""
 
 from enum import StrEnum
 
@@ -6,10 +6,10 @@ from rtshcua.onboard.ports import Ending, Frozen
 
 
 class RunStage(StrEnum):
-    """Where a run stands."""
+    """The stage of a run."""
 
-    WAITING = "waiting"  # for the vehicle to be ready
-    DECIDING = "deciding"  # about the current step; on the ground, or holding
+    WAITING = "waiting"  # waits for the vehicle to be ready
+    DECIDING = "deciding"  # waits for the current step; on the ground, or holding
     RUNNING = "running"  # the current step flies
     FALLING = "falling-back"  # a chain flies, down to the ground
     ENDED = "ended"
@@ -25,7 +25,7 @@ class SignalReading(Frozen):
 
 
 class Decided(Frozen):
-    """One recorded decision, in words."""
+    """One recorded decision, as text."""
 
     at_us: int
     subject: str
@@ -37,8 +37,9 @@ class Decided(Frozen):
 class RuntimeView(Frozen):
     """A snapshot at a monotonic time.
 
-    `contract` names the skill that flies or is being decided; `left_us` counts down to its deadline while deciding,
-    to its time limit while it flies, None where there is none. `step` counts from 0 and is `steps` once all are done.
+    `contract` names the skill that flies or is being decided; `left_us` counts down to its deadline while
+    deciding, to its time limit while it flies, None if there is none. `step` counts from 0 and is `steps` once all
+    are done.
     """
 
     at_us: int

@@ -22,7 +22,7 @@ def decoded(frame: bytes) -> Message:
     return received.message
 
 
-def test_every_message_is_what_pymavlink_makes_of_it() -> None:
+def test_decoded_messages_match_pymavlink() -> None:
     chance, receiver = Random(5), mavlink.MAVLink(None)
     for number, of in mavlink.mavlink_map.items():
         kind = kind_of(number)
@@ -39,13 +39,13 @@ def test_every_message_is_what_pymavlink_makes_of_it() -> None:
                 assert name in NOT_MADE or repr(getattr(ours, name)) == repr(value), (of.msgname, name)
 
 
-def test_messages_do_not_share_what_they_hold() -> None:
+def test_messages_share_no_state() -> None:
     one, other = (decoded(frame_of(mavlink.MAVLINK_MSG_ID_HEARTBEAT, bytes([mode]))) for mode in (1, 2))
     one.custom_mode += 10
     assert (one.custom_mode, other.custom_mode) == (11, 2)
 
 
-def test_what_was_decoded_can_be_packed_again() -> None:
+def test_decoded_message_packs_to_same_frame() -> None:
     sender = mavlink.MAVLink(None, 1, 2)
     sender.seq = 9
     for number in (0, 33, 76, 253):
@@ -80,12 +80,12 @@ def test_every_message_of_numbers_is_made_as_its_constructor_makes_it() -> None:
 
 
 @rows("bit", range(8 * 14))
-def test_a_wrong_checksum_is_no_message(bit: int) -> None:
+def test_frame_with_wrong_checksum_is_refused(bit: int) -> None:
     frame = bytearray(frame_of(0, b"\1\2"))
     assert decoded(bytes(frame)).custom_mode == 0x201
     frame[bit // 8] ^= 1 << bit % 8
     assert Codec(255, 0).parse(bytes(frame)) == []
 
 
-def test_what_the_dialect_does_not_have_is_of_no_kind() -> None:
+def test_message_not_in_dialect_has_no_kind() -> None:
     assert kind_of(60_000) is None

@@ -40,7 +40,7 @@ def test_sequence_wraps() -> None:
     assert [Codec(1, 1).parse(sender.pack(heartbeat()))[0].sequence for _ in range(258)][-3:] == [255, 0, 1]
 
 
-def test_only_the_systems_asked_for() -> None:
+def test_only_selected_systems_are_received() -> None:
     receiver = Codec(1, 191, only={1})
     good = receiver.parse(Codec(2, 1).pack(heartbeat()) + Codec(1, 1).pack(heartbeat()))
     assert [r.system for r in good] == [1]

@@ -28,7 +28,7 @@ def old() -> bytes:
 
 
 @pytest.mark.parametrize("size", [1, 2, 7, 1_000])
-def test_frames_are_cut_wherever_the_octets_are_parted(size: int) -> None:
+def test_frames_are_found_across_any_chunks(size: int) -> None:
     stream, data = FrameStream(), BEAT + b"noise" + TIME + unknown() + BEAT + b"\xfd" + TIME + BEAT
     found = [frame for at in range(0, len(data), size) for frame in stream.feed(data[at : at + size])]
     assert found == [BEAT, TIME, BEAT, TIME, BEAT]
@@ -36,7 +36,7 @@ def test_frames_are_cut_wherever_the_octets_are_parted(size: int) -> None:
     assert (stream.counts.frames, stream.counts.garbage) == (5, len("noise") + 1)
 
 
-def test_a_damaged_frame_costs_only_itself() -> None:
+def test_damaged_frame_loses_only_itself() -> None:
     stream, hurt = FrameStream(), bytearray(TIME)
     hurt[12] ^= 1
     assert stream.feed(BEAT + bytes(hurt) + TIME + BEAT) == [BEAT, TIME, BEAT]
@@ -54,7 +54,7 @@ def test_frames_of_mavlink_1_are_counted_and_left_out() -> None:
     assert (stream.counts.old, stream.counts.garbage) == (2, 0)
 
 
-def test_what_cannot_be_verified_and_is_followed_by_no_frame_is_searched() -> None:
+def test_unverifiable_frame_without_successor_is_scanned() -> None:
     stream = FrameStream()
     assert stream.feed(unknown()) == []
     assert stream.feed(b"x" + BEAT * 20)[-1] == BEAT

@@ -46,7 +46,7 @@ def head(index: int, count: int, name: bytes = NAME) -> bytes:
 
 
 @rows("length", [1, CHUNK - 1, CHUNK, CHUNK + 1, 3 * CHUNK, 1_000, LONGEST])
-def test_there_and_back(length: int) -> None:
+def test_tunnel_roundtrip(length: int) -> None:
     data = bytes(n % 251 for n in range(length))
     assembler = Assembler()
     found = [assembler.take("a", frame) for frame in frames(data)]
@@ -55,13 +55,13 @@ def test_there_and_back(length: int) -> None:
     assert assembler.unfinished == 0
 
 
-def test_zeros_at_the_end_arrive() -> None:
+def test_trailing_zeros_are_preserved() -> None:
     (frame,) = frames(b"x" + bytes(40))
     assert Assembler().take("a", frame) == Whole(1, NAME, b"x" + bytes(40))
 
 
 @pytest.mark.parametrize("length", [0, LONGEST + 1])
-def test_what_is_no_message_is_not_sent(length: int) -> None:
+def test_message_of_invalid_length_is_refused(length: int) -> None:
     with pytest.raises(ValueError):
         list(messages(1, NAME, bytes(length)))
 
@@ -95,7 +95,7 @@ def test_lost_repeated_and_out_of_order(data: bytes, seed: int) -> None:
     ],
     ids=range(8),
 )
-def test_frames_that_are_none_of_ours(frame: ReceivedFrame) -> None:
+def test_foreign_frames_are_ignored(frame: ReceivedFrame) -> None:
     assembler = Assembler()
     assert assembler.take("a", frame) is None
     assert assembler.unfinished == 0
@@ -107,7 +107,7 @@ def test_other_messages_are_passed_over() -> None:
     assert Assembler().take("a", found) is None
 
 
-def test_chunks_that_contradict_each_other_undo_the_message() -> None:
+def test_contradicting_chunks_discard_the_message() -> None:
     data = bytes(range(200))
     first, second = frames(data)
     for bad in (crafted(head(0, 2) + b"x" * CHUNK), crafted(head(0, 3) + b"x" * CHUNK)):
@@ -128,7 +128,7 @@ def test_senders_do_not_disturb_each_other() -> None:
     assert assembler.take("a", second) == Whole(1, NAME, data)
 
 
-def test_what_is_kept_is_bounded() -> None:
+def test_memory_is_bounded() -> None:
     assembler = Assembler()
     for sender in range(100):
         for number in range(10):
@@ -141,7 +141,7 @@ def test_what_is_kept_is_bounded() -> None:
 
 
 @given(st.lists(st.binary(max_size=128), max_size=30))
-def test_whatever_comes(payloads: list[bytes]) -> None:
+def test_arbitrary_input_raises_nothing(payloads: list[bytes]) -> None:
     assembler = Assembler()
     for payload in payloads:
         assembler.take("a", crafted(payload))

@@ -199,7 +199,7 @@ def test_without_its_height_it_is_known_where_over_ground_it_leads(x: int, airsp
         ]
 
 
-def test_a_speed_beyond_all_sense_is_unknown() -> None:
+def test_speed_out_of_range_is_unknown() -> None:
     state = moving((0, 0, 20 * M), (MAX_SPEED, 1, 0))
     slots = [*situation(state, POLICY, NOW).values, MISSING]
     assert ahead(slots, state.ages, POLICY) is UNKNOWN_AHEAD
@@ -222,7 +222,7 @@ def test_without_braking_it_is_where_it_was_measured() -> None:
         ({"east": 99}, "vehicle: slot"),
     ],
 )
-def test_a_vehicle_that_makes_no_sense_is_refused(fields: dict[str, int], problem: str) -> None:
+def test_malformed_vehicle_is_refused(fields: dict[str, int], problem: str) -> None:
     policy = braking(2_000, 0)
     found = prepare(replace(policy, vehicle=replace(policy.vehicle, **fields)))
     assert isinstance(found, Refusal)

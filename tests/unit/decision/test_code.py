@@ -218,7 +218,7 @@ def test_a_set_of_places_as_argument() -> None:
         assert evaluated(node, arguments={0: x, 1: interval(-9, 9)}) == truth
 
 
-def test_what_code_reads() -> None:
+def test_slots_read_by_code() -> None:
     code = apply(Op.AND, (Op.SIGNAL_IN, FIX, 0), apply(Op.LE, signal(BATTERY), argument(1)))
     asks = (Op.POSITION_IN, 0, 0)
     vehicle = flat.POLICY.vehicle

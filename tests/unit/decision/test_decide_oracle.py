@@ -69,7 +69,7 @@ def test_the_oracle_chooses_the_same_links(of: Random) -> None:
 
 @MANY
 @given(worlds.CHANCES)
-def test_what_is_possible_holds_what_is_decided(of: Random) -> None:
+def test_possible_outcomes_include_decision(of: Random) -> None:
     policy, invocation = prepared(of)
     sets, context = worlds.sets(of, len(policy.monitors)), worlds.context(of, invocation.invocation)
     answers = possible(invocation, sets, policy, context)

@@ -51,7 +51,7 @@ def test_by_hand(
 
 
 @given(some.permutations([*WORDS, "intent", "effect"]), some.integers(0, 6))
-def test_of_several_words_the_greatest_counts(names: list[str], many: int) -> None:
+def test_strictest_record_class_counts(names: list[str], many: int) -> None:
     words = [number for number, word in enumerate(WORDS) if word in names[:many]]
     assert recorded_as(tuple(names[:many])) == (words[-1] if words else SYNCED)
 
@@ -59,6 +59,6 @@ def test_of_several_words_the_greatest_counts(names: list[str], many: int) -> No
 @pytest.mark.parametrize(
     ("granted", "expected"), [((), False), ((1,), True), ((0,), False), ((0, 1), True), ((0, 0), False)]
 )
-def test_confirmed_is_whatever_somebody_approved(granted: tuple[int, ...], expected: bool) -> None:
+def test_approved_decision_counts_as_confirmed(granted: tuple[int, ...], expected: bool) -> None:
     approvals = tuple(ConfirmAnswer(number, 0, each, 5) for number, each in enumerate(granted))
     assert confirmed(Context(b"", "quad-07", 7, 0, 0, 0, 0, approvals)) is expected

@@ -53,7 +53,7 @@ def test_a_link_flies_no_higher_than_an_altitude_can_be() -> None:
         (Projection(899_900_000, 0, 2_000, 11_712_000), (0, 2_000 * M), "latitude"),
     ],
 )
-def test_where_nothing_is_on_earth_nothing_is_flown(projection: Projection, place: tuple[int, int], what: str) -> None:
+def test_place_outside_earth_is_refused(projection: Projection, place: tuple[int, int], what: str) -> None:
     at = f"place {place[0]}, {place[1]}: {what} "
     assert wrong(replace(with_link(*place, 30 * M, 1), projection=projection)).startswith(f"contingency: link 0: {at}")
     policy = prepare(replace(P, projection=projection))

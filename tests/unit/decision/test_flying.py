@@ -107,6 +107,6 @@ def test_without_a_height_the_way_home_is_not_known(height: int | None) -> None:
 
 
 @rows("change", [{"cruise": 0}, {"wind": -1}, {"landing_below": -1}, {"flight_us": 0}, {"air": 0}])
-def test_speeds_that_are_none_are_refused(change: dict[str, int]) -> None:
+def test_invalid_speeds_are_refused(change: dict[str, int]) -> None:
     vehicle = replace(VEHICLE, speeds=replace(SPEEDS, **change))
     assert isinstance(prepare(replace(flat.POLICY, vehicle=vehicle)), Refusal)

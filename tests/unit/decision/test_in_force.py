@@ -135,7 +135,7 @@ def test_an_approval_that_does_not_fit_is_refused(changed: dict[str, object], sl
     assert of.approvals(STEP, START) == ()
 
 
-def test_an_approval_that_nobody_asks_for_is_refused() -> None:
+def test_unrequested_approval_is_refused() -> None:
     of = flight(entitled(roles=("*",)))
     assert take(of, approval(OF, step=0)).slug == "not-asked"
     assert take(of, approval(OF, role="harbour master")).slug == "not-asked"
@@ -145,7 +145,7 @@ def test_an_approval_of_a_step_that_was_decided_is_refused() -> None:
     assert take(flight(), approval(OF), decided=ASKED + 1).slug == "already-decided"
 
 
-def test_a_refusal_reaches_what_replaced_the_step_that_it_names_if_that_asks_for_the_same() -> None:
+def test_refusal_applies_to_equal_replacement_step() -> None:
     again = sign_replacement(OF.bundle.mission, over=OF.bundle, flight=FLIGHT, kept=ASKED, key=MISSION_KEY)
     of = flight()
     assert take(of, again).accepted
@@ -166,7 +166,7 @@ def test_after_a_recall_nothing_else_is_accepted() -> None:
     assert {take(of, each).slug for each in (approval(OF), recall(OF), replacement(OF))} == {"recalled"}
 
 
-def test_after_a_cancellation_a_persons_recall_alone_is_accepted() -> None:
+def test_only_recall_is_accepted_after_cancellation() -> None:
     of = flight()
     assert take(of, cancellation(OF)).accepted
     assert (of.cancelled, of.recalled, of.called_off) == (True, False, True)
@@ -240,7 +240,7 @@ def test_after_a_replacement_its_steps_are_in_force_and_their_answers_are_forgot
     assert take(of, recall(OF)).accepted, "by the mission that was opened"
 
 
-def test_what_a_replacement_brings_was_received_with_it() -> None:
+def test_replacement_steps_are_received_with_document() -> None:
     of = InForce(OF.bundle, OF.policy, OF.invocations, ROOT, VEHICLE, FLIGHT, 7)
     assert [of.received_us(step) for step in range(len(of.invocations))] == [7] * len(of.invocations)
     kept = take(of, replacement(OF), later(5)).step
@@ -259,7 +259,7 @@ def test_a_replacement_considered_ahead_is_taken_as_any_other() -> None:
     assert take(of, b"junk").slug == "malformed"
 
 
-def test_why_a_replacement_was_refused_ahead_is_said_when_it_is_taken() -> None:
+def test_refusal_found_ahead_is_reported_at_presentation() -> None:
     of = flight()
     document = forged(replace(shorter(OF), vehicle="quad-08"))
     of.consider(document, START)
@@ -277,7 +277,7 @@ def test_a_replacement_considered_ahead_is_refused_when_its_key_or_root_has_expi
     assert take(of, replacement(OF), now).slug == "key-expired"
 
 
-def test_a_replacement_of_what_is_not_in_force_is_compared_with_nothing_ahead() -> None:
+def test_replacement_of_inactive_mission_is_not_compared_ahead() -> None:
     of = flight()
     document = replacement(OF)
     take(of, document)
@@ -363,7 +363,7 @@ def test_a_replacement_whose_kept_steps_differ_is_not_signed() -> None:
 
 
 @pytest.mark.unmeasured
-def test_one_flight_takes_so_many_replacements_and_no_more() -> None:
+def test_replacement_limit_of_a_flight() -> None:
     of = flight()
     for number in range(MAX_REPLACEMENTS):
         mission = replace(shorter(OF), issued_at_us=OF.bundle.mission.issued_at_us + number)
@@ -372,7 +372,7 @@ def test_one_flight_takes_so_many_replacements_and_no_more() -> None:
     assert take(of, last).slug == "too-many"
 
 
-def test_so_many_may_be_few(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_replacement_limit_can_be_small(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rtshcua.decision.session.MAX_REPLACEMENTS", 0)
     receipt = take(flight(), sign_replacement(shorter(OF), over=OF.bundle, flight=FLIGHT, kept=2, key=MISSION_KEY))
     assert (receipt.slug, receipt.text) == ("too-many", "one flight accepts at most 0 replacements")

@@ -159,13 +159,13 @@ def test_watch(values: dict[int, int | None], found: list[tuple[str, int]]) -> N
     assert broken(values) == found
 
 
-def test_what_comes_home_or_down_needs_no_charge_for_the_way() -> None:
+def test_return_and_landing_need_no_charge_for_way_home() -> None:
     for step, needs in ((STEP, True), (flat.INVOCATIONS[-1], False)):
         found = watch(ready(step, POLICY), flat.state({BATTERY: 100}), POLICY, NOW)
         assert ((WAY_HOME, FALSE) in found) is needs
 
 
-def test_watch_sees_what_is_stale() -> None:
+def test_watch_reports_stale_signal() -> None:
     names = [text for text, truth in broken({}, ages={POSITION_X: S}) if truth == UNKNOWN]
     assert names == [NEAR, LOW, AIRSPACE_TEXT, WAY_HOME]
 

@@ -67,7 +67,7 @@ def test_windows_over_sets(
 
 
 @given(clocks(), windows(5), SMALL, SMALL)
-def test_what_changes_lies_between_two_moments_that_differ(
+def test_offset_change_lies_between_differing_moments(
     clock: tuple[int, tuple[int, ...]], parts: tuple[int, ...], low: int, width: int
 ) -> None:
     window = Windows(parts, 5, LocalTime(*clock))
@@ -185,7 +185,7 @@ def test_windows_of_a_week(windows: tuple[int, ...], good: bool) -> None:
     ("code", "good"),
     [((Op.WEEK_IN, 999, 0), False), ((Op.WEEK_IN, -1, 0), False), ((Op.WEEK_IN, len(flat.POLICY.sets), 1), False)],
 )
-def test_windows_that_there_are_not(code: tuple[int, ...], good: bool) -> None:
+def test_invalid_windows_are_refused(code: tuple[int, ...], good: bool) -> None:
     rule = replace(flat.POLICY.rules[0], when=flat.clause("times", code))
     read = replace(flat.POLICY, sets=(*flat.POLICY.sets, (0, 1)), rules=(rule,))
     assert isinstance(prepare(read), PreparedPolicy) is good
@@ -215,7 +215,7 @@ def test_times_of_the_day_or_of_the_week() -> None:
         ({"offsets": tuple(range(515))}, False),
     ],
 )
-def test_what_is_carried_of_a_time_zone(given: dict[str, object], good: bool) -> None:
+def test_time_zone_offsets_in_policy(given: dict[str, object], good: bool) -> None:
     made = replace(flat.POLICY, vehicle=replace(VEHICLE, **given))
     assert isinstance(prepare(made), PreparedPolicy) is good
 

@@ -192,7 +192,7 @@ def asked(policy: PreparedPolicy, said: tuple[int, ...] = (T, T, T), **state: An
         ((T, T, 8), Outcome.DEFER, Reason.STATE_UNKNOWN),
     ],
 )
-def test_what_a_monitor_says_decides(said: tuple[int, ...], outcome: Outcome, reason: Reason) -> None:
+def test_monitor_truth_decides(said: tuple[int, ...], outcome: Outcome, reason: Reason) -> None:
     decision = asked(requiring(asks(0)), said)
     assert (decision.outcome, decision.reason) == (outcome, reason)
     if reason is not Reason.ADMITTED:
@@ -226,7 +226,7 @@ def test_a_running_skill_is_watched_through_its_monitors() -> None:
         assert [one.truth for one in watch(ready(hover, policy), state, policy, NOW)] == broken
 
 
-def test_what_is_possible_over_truths() -> None:
+def test_possible_outcomes_over_monitor_truths() -> None:
     policy = requiring(asks(0))
     invocation, one = step(policy), situation(replace(flat.state(), monitors=(T, T, T)), policy, NOW)
 

@@ -217,7 +217,7 @@ def test_sets_of_choices_are_cut() -> None:
     assert changes(mixed, values={FIX: 0}) is None
 
 
-def test_what_is_missing_beside_it_leaves_no_answer() -> None:
+def test_missing_term_gives_no_change() -> None:
     code = flat.apply(Op.LE, flat.apply(Op.ADD, A(1), SIG(WIND)), N(5))
     assert changes(code, values={WIND: None}) is None
 
@@ -235,7 +235,7 @@ def test_what_is_missing_beside_it_leaves_no_answer() -> None:
         (NearestChange(False, None, 100, 200, None), point(DAY - 10), 100),
     ],
 )
-def test_the_nearest_that_a_change_allows(change: NearestChange, value: Any, answer: int) -> None:
+def test_nearest_allowed_value(change: NearestChange, value: Any, answer: int) -> None:
     assert nearest_in(change, value) == answer
 
 
@@ -274,7 +274,7 @@ def test_made_together_the_changes_help(of: Random) -> None:
     assert decided()[0].step > 3
 
 
-def test_what_undoes_another_part_is_not_offered() -> None:
+def test_change_that_breaks_another_part_is_not_offered() -> None:
     """The pattern should be 1 or 2 for the one part, and may not be 2 for the other."""
     some = clause("", flat.apply(Op.AND, flat.apply(Op.GE, A(2), N(1)), flat.apply(Op.NE, A(2), N(1))))
     policy = loaded(replace(flat.POLICY, rules=(rule(RuleKind.PERMIT, INSPECT, when=some),)))

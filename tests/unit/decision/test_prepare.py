@@ -492,7 +492,7 @@ def damage(of: Random, struct: Any) -> Any:
 
 @settings(max_examples=settings().max_examples * 4)
 @given(worlds.CHANCES)
-def test_no_damage_makes_it_fail(of: Random) -> None:
+def test_damaged_bundle_raises_nothing(of: Random) -> None:
     whole = of.choice([worlds.policy(of), flat.POLICY])
     policy = prepare(damage(of, whole) if of.random() < 0.7 else whole)
     if isinstance(policy, Refusal):

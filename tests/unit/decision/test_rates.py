@@ -29,7 +29,7 @@ def quick(deadline_us: int, **fields: object) -> Contract:
     return replace(found, deadline_us=deadline_us, **fields)  # type: ignore[arg-type]
 
 
-def test_what_is_stale_late_is_reported_seldom_and_what_effects_are_seen_by_as_often_as_they_need() -> None:
+def test_rates_follow_stale_times_and_effects() -> None:
     found = rates(POLICY)
     assert found["BATTERY_STATUS"] == Rate(1_000_000, 1_000_000)
     assert found["GLOBAL_POSITION_INT"] == Rate(100_000, 250_000)
@@ -42,7 +42,7 @@ def test_what_is_stale_late_is_reported_seldom_and_what_effects_are_seen_by_as_o
 @pytest.mark.parametrize(("deadline_us", "asked"), [
     (3 * S, 1_000_000), (500_000, 250_000), (200_000, 100_000), (100_000, 50_000), (10_000, 50_000),
 ])  # fmt: skip
-def test_what_a_step_waits_for_is_reported_twice_within_its_deadline(deadline_us: int, asked: int) -> None:
+def test_awaited_signal_is_reported_twice_within_deadline(deadline_us: int, asked: int) -> None:
     slots = {"GPS_RAW_INT", "BATTERY_STATUS", "GLOBAL_POSITION_INT"}
     found = rates(GIVEN, [quick(deadline_us)])
     for name in slots & found.keys():
@@ -54,7 +54,7 @@ def test_a_reflex_waits_for_nothing() -> None:
     assert rates(GIVEN, [quick(60_000, timing_class=TimingClass.REFLEX)]) == rates(GIVEN)
 
 
-def test_what_forbids_a_skill_is_waited_for_too() -> None:
+def test_signals_of_forbid_rules_are_awaited() -> None:
     permits = [rule for rule in GIVEN.rules if rule.kind == RuleKind.PERMIT]
     clause = quick(S).require[0]
     rule = replace(permits[0], kind=RuleKind.FORBID, when=clause, skills=())
@@ -68,7 +68,7 @@ def test_what_forbids_a_skill_is_waited_for_too() -> None:
     assert rates(replace(bare, rules=(replace(rule, skills=(99,)),)), [step]) == without
 
 
-def test_what_comes_no_more_often_is_not_hoped_for() -> None:
+def test_rate_is_limited_by_message_source() -> None:
     asked = {"HEARTBEAT": Rate(100_000, S), "RADIO_STATUS": Rate(50_000, S), "WIND": Rate(50_000, S)}
     assert delivered(asked) == {"HEARTBEAT": AT_BEST["HEARTBEAT"], "RADIO_STATUS": S, "WIND": 50_000}
 

@@ -58,7 +58,7 @@ def prepared() -> Any:
 
 
 @pytest.mark.unmeasured
-def test_answers_are_those_of_a_policy_that_was_never_asked() -> None:
+def test_cached_answers_match_fresh_policy() -> None:
     chance = Random(3)
     asked = prepared()
     for _ in range(60):
@@ -69,7 +69,7 @@ def test_answers_are_those_of_a_policy_that_was_never_asked() -> None:
             assert repr(answers(asked, state, now, after)) == repr(answers(prepared(), state, now, after))
 
 
-def test_equal_situations_are_looked_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_equal_situations_are_evaluated_once(monkeypatch: pytest.MonkeyPatch) -> None:
     policy = prepared()
     (step, _), looked = ready_of[id(policy)], []
     along = PreparedZone.along

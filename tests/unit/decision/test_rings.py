@@ -29,7 +29,7 @@ def agree(outlines: list[Ring]) -> bool:
 
 @settings(max_examples=settings().max_examples * 2)
 @given(worlds.CHANCES)
-def test_what_is_well_formed(of: Random) -> None:
+def test_well_formed_rings_are_accepted(of: Random) -> None:
     assert agree(rings(of))
 
 

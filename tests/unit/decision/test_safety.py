@@ -60,7 +60,7 @@ def test_state(values: dict[int, int | None], outcome: Outcome, clause_: Any) ->
 
 
 @rows("slot", range(flat.SLOTS))
-def test_a_slot_that_is_missing_stale_or_beyond_sense_is_unknown(slot: int) -> None:
+def test_missing_stale_or_out_of_range_slot_is_unknown(slot: int) -> None:
     stale = next(s.stale_us for s in flat.SIGNALS if s.slot in (slot, slot - (s.kind == 2)))
     assert ask(values={slot: None}).outcome is DEFER
     assert ask(ages={slot: stale + 1}).outcome is DEFER
@@ -71,7 +71,7 @@ def test_a_slot_that_is_missing_stale_or_beyond_sense_is_unknown(slot: int) -> N
 
 
 @pytest.mark.parametrize(("values", "ages"), [((), ()), ((0,) * 9, (0,) * 9), ((9_000,) * 8, (0,) * 7)])
-def test_nothing_of_a_state_of_the_wrong_size_is_believed(values: tuple[int, ...], ages: tuple[int, ...]) -> None:
+def test_state_of_wrong_size_is_ignored(values: tuple[int, ...], ages: tuple[int, ...]) -> None:
     decision = decide(ready(STEP, POLICY), flat.State(values, ages), POLICY, flat.context(), flat.NOW)
     assert (decision.outcome, decision.reason) == (DEFER, Reason.STATE_UNKNOWN)
 
@@ -121,7 +121,7 @@ def test_airspace_between_the_present_height_and_the_planned_one() -> None:
     assert ask(goto(110 * M, 0, 30 * M), values={HEIGHT: 60 * M}, policy=policy).reason is Reason.AIRSPACE
 
 
-def test_what_is_flown_instead_keeps_to_the_airspace_all_along() -> None:
+def test_fallback_stays_in_airspace_on_its_whole_path() -> None:
     """The school lies between here and home: the way there begins and ends well, and is not flown."""
     policy, contract = with_contract(INSPECT, fallback=(flat.link(HOME), flat.link(LAND)))
     decision = ask(replace(STEP, contract=contract), values={POSITION_X: 0, POSITION_Y: 450 * M}, policy=policy)
@@ -215,7 +215,7 @@ def test_the_farthest_place_counts_even_if_it_is_the_start() -> None:
 
 
 @pytest.mark.parametrize("skill", [HOME, LAND])
-def test_what_ends_on_the_ground_needs_no_way_home_and_no_reserve(skill: int) -> None:
+def test_landing_skill_needs_no_return_charge_or_reserve(skill: int) -> None:
     motion = flat.CONTRACTS[skill].motion
     step = flat.invocation(3, 2, skill, Plan(motion.kind, (0, 0) if skill == HOME else (), 0, 0))
     assert ask(step, values={BATTERY: 800}).reason is (Reason.ADMITTED if skill == HOME else Reason.DEGRADED)
@@ -239,7 +239,7 @@ def volume(near: int, far: int, gap: int = 0) -> Volume:
     (interval(600, 900), 600, 900),
     (maybe(interval(600, 900)), 0, 900),
 ])  # fmt: skip
-def test_what_is_taken_in_a_minute_counts_where_it_is_known(drain: Any, least: int, most: int) -> None:
+def test_measured_drain_counts_if_known(drain: Any, least: int, most: int) -> None:
     assert drains(drain) == (least, most)
 
 
@@ -291,7 +291,7 @@ def test_energy_over_sets(battery: Any, planned: Volume, truth: int) -> None:
         ({BATTERY: 2_499}, Reason.DEGRADED),
     ],
 )
-def test_what_is_false_outweighs_what_was_unknown_before_it(values: dict[int, int], reason: Reason) -> None:
+def test_false_condition_outweighs_earlier_unknown(values: dict[int, int], reason: Reason) -> None:
     low = clause("height <= 30 m", (Op.SIGNAL, HEIGHT, 0, Op.CONST, 30 * M, 0, Op.LE, 0, 0))
     reads = (HEIGHT, WIND, flat.LINK, FIX, OBSTACLE)
     policy, contract = with_contract(GOTO, maintain=(flat.FREE, low), reads=reads)
@@ -363,7 +363,7 @@ def test_below_home_a_landing_goes_no_further_down_than_the_vehicle_is() -> None
 
 
 @pytest.mark.parametrize("slot", [0, 1, 2])
-def test_what_is_missing_of_the_start_is_missing_of_the_volume(slot: int) -> None:
+def test_missing_start_value_is_missing_in_volume(slot: int) -> None:
     planner = Planner(MotionKind.FLY, (7, 8), 2_000, 3)
     for gap, start in ((2, MISSING), (1, maybe(START[slot]))):
         found = planner.volume([start if n == slot else value for n, value in enumerate(START)], KNOWN)
@@ -399,7 +399,7 @@ def test_a_floor_of_zero_forbids_the_take_off_and_no_floor_does_not() -> None:
     assert flat.ZONES[0].floor == LOWEST
 
 
-def test_a_policy_without_a_position_defers_what_is_about_places() -> None:
+def test_place_condition_without_position_defers() -> None:
     contracts = tuple(replace(c, reads=tuple(s for s in c.reads if s not in (5, 6))) for c in flat.CONTRACTS)
     policy = loaded(replace(flat.POLICY, vehicle=replace(flat.POLICY.vehicle, position=-1), contracts=contracts))
     takeoff = replace(flat.INVOCATIONS[0], contract=contracts[TAKEOFF])

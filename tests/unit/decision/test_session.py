@@ -115,7 +115,7 @@ LATE = {"released_us": AT_US - flat.INVOCATIONS[0].contract.deadline_us - S}
         (OnInadmissible.REPLAN, {}, LATE, FALLBACK, [0, 1], [0]),
     ],
 )
-def test_what_uses_an_id_up(
+def test_outcomes_that_use_an_id(
     on_inadmissible: int,
     values: dict[int, int | None],
     context: dict[str, Any],
@@ -204,7 +204,7 @@ def test_where_nothing_is_enforced_a_denied_step_is_the_current_one() -> None:
         (Ref(CONTINGENCY_LINK, 0, 0), UNKNOWN_STEP, UNKNOWN_STEP, UNKNOWN_STEP),
     ],
 )
-def test_what_may_be_asked_for_before_a_step_during_it_and_in_the_next(
+def test_requests_allowed_before_during_and_after_step(
     ref: Ref, before: Status | None, during: Status | None, after: Status | None
 ) -> None:
     of = Asked()
@@ -359,7 +359,7 @@ def test_a_step_that_was_given_back_may_be_replaced() -> None:
     assert asked.session.take(paper, NOW).slug == "accepted"
 
 
-def test_what_was_considered_is_known_to_fit_or_not() -> None:
+def test_verified_ahead_replacement_reports_misfit() -> None:
     asked, of = confirmed(0)
     in_force, fits, late = asked.in_force, documents.replacement(of), documents.replacement(of, 1)
     other = documents.replacement(of, mission=replace(documents.shorter(of), name="another"))
@@ -389,7 +389,7 @@ def test_a_replacement_brings_steps_that_were_never_used() -> None:
     assert (asked.used(), asked.turns(), len(asked.in_force.invocations)) == ([0, 1], [0, 1, 2], 3)
 
 
-def test_a_document_that_is_none_changes_nothing() -> None:
+def test_malformed_document_changes_nothing() -> None:
     asked, _ = confirmed(1)
     assert not asked.session.take(b"", NOW, 9).accepted
     assert (asked.turns(), asked.used()) == ([0, 1], [0])

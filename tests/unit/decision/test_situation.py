@@ -41,5 +41,5 @@ def test_a_slot_is_missing_from_its_limits_on_and_no_other_is(slot: int) -> None
 @rows(
     "values, ages", [((), ()), (FRESH.values, FRESH.ages[1:]), (FRESH.values[1:], FRESH.ages), (FRESH.values * 2,) * 2]
 )
-def test_of_a_state_of_the_wrong_size_nothing_is_believed(values: tuple[int, ...], ages: tuple[int, ...]) -> None:
+def test_state_of_wrong_size_is_all_missing(values: tuple[int, ...], ages: tuple[int, ...]) -> None:
     assert values_of(State(values, ages)) == [MISSING for _ in SLOTS]

@@ -86,7 +86,7 @@ def test_a_replay_comes_before_the_clock() -> None:
     assert ask(consumed=1, now=replace(NOW, utc_us=0)).reason is Reason.REPLAYED
 
 
-def test_an_error_below_zero_is_no_better_than_none() -> None:
+def test_negative_clock_error_counts_as_zero() -> None:
     assert ask(now=replace(NOW, utc_us=flat.ISSUED - 1, utc_error_us=-E)).reason is Reason.ISSUED_IN_FUTURE
 
 
@@ -95,7 +95,7 @@ def test_an_error_below_zero_is_no_better_than_none() -> None:
 
 @rows("source", SourceKind)
 @rows("timing_class", TimingClass)
-def test_which_source_may_use_which_class(source: SourceKind, timing_class: TimingClass) -> None:
+def test_timing_classes_of_sources(source: SourceKind, timing_class: TimingClass) -> None:
     may = {
         SourceKind.AGENT: {TimingClass.SEMANTIC, TimingClass.TACTICAL},
         SourceKind.OPERATOR: {TimingClass.SEMANTIC, TimingClass.TACTICAL},
@@ -161,7 +161,7 @@ def test_authority(rules: list[Any], outcome: Outcome, reason: Reason, deciding:
         ({"skills": (INSPECT,), "sources": (SourceKind.REFLEX,)}, Reason.NOT_PERMITTED),
     ],
 )
-def test_whom_a_rule_speaks_of(fields: dict[str, Any], reason: Reason) -> None:
+def test_rule_matches_skill_role_and_source(fields: dict[str, Any], reason: Reason) -> None:
     assert ask(policy=with_rules(replace(rule(PERMIT), **fields))).reason is reason
 
 
@@ -289,7 +289,7 @@ def test_a_release_still_to_come_lengthens_no_permit() -> None:
     assert (decision.outcome, decision.valid_until_us) == (ALLOW, AT + 100_000)
 
 
-def test_what_is_missing_grows_no_older() -> None:
+def test_age_of_missing_slot_is_ignored() -> None:
     """Nothing that was admitted rests on a value that is not there, so its age bounds no permit."""
     either = clause("calm or free", (*flat.CALM.code, *flat.FREE.code, Op.OR, 0, 0))
     reads = (*flat.CONTRACTS[flat.GOTO].reads, flat.OBSTACLE)
@@ -439,7 +439,7 @@ ADMITTED = (ALLOW, Reason.ADMITTED)
         ),
     ],
 )
-def test_what_is_possible(fields: dict[str, Any], expected: set[tuple[Outcome, Reason]]) -> None:
+def test_possible_outcomes(fields: dict[str, Any], expected: set[tuple[Outcome, Reason]]) -> None:
     assert answers(all_of(**fields)) == expected
 
 
@@ -476,7 +476,7 @@ def test_the_last_moment_of_a_deadline(monotonic: tuple[int, int], expected: set
         ),
     ],
 )
-def test_what_authority_may_say(rules: list[Any], wind: Any, expected: set[tuple[Outcome, Reason]]) -> None:
+def test_possible_authority_verdicts(rules: list[Any], wind: Any, expected: set[tuple[Outcome, Reason]]) -> None:
     policy = with_rules(*(rule(kind, INSPECT, when=when) for kind, when in rules))
     assert answers(all_of(values={flat.WIND: wind}), policy) == expected
 
@@ -501,7 +501,7 @@ def test_what_authority_may_say(rules: list[Any], wind: Any, expected: set[tuple
         ),
     ],
 )
-def test_what_a_confirmation_may_say(wind: Any, approvals: Any, monotonic: Any, expected: set[Any]) -> None:
+def test_possible_confirmation_verdicts(wind: Any, approvals: Any, monotonic: Any, expected: set[Any]) -> None:
     policy = with_rules(rule(PERMIT), rule(CONFIRM, when=MAYBE, approver=SUPERVISOR, within_us=30 * S))
     sets = all_of(values={flat.WIND: wind}, monotonic_us=monotonic)
     assert answers(sets, policy, approvals=approvals) == expected

@@ -119,7 +119,7 @@ def test_a_stale_signal_is_unknown_to_a_monitor_as_it_is_to_a_condition() -> Non
     assert observe(memory, policy, stale, now(4 * HALF))[1] == (4,)
 
 
-def test_what_the_state_says_of_monitors_is_not_looked_at() -> None:
+def test_observation_ignores_truths_in_state() -> None:
     policy = policy_of(Monitor(FOR, 1, CALM), Monitor(FOR, 1, asks(0)))
     memory, said = observe(initial(policy), policy, replace(windy("F"), monitors=(1, 1)), now(0))
     assert said == (2, 2)
@@ -186,7 +186,7 @@ def naive(code: tuple[int, ...], state: State, moment: Now, policy: PreparedPoli
 
 
 @rows(("wind", "expected"), [(4 * M, (1, 1)), (9 * M, (2, 2)), (None, (4, 4))])
-def test_what_lasts_is_known_however_far_it_is_looked_back(wind: int | None, expected: tuple[int, ...]) -> None:
+def test_lasting_state_is_known_for_any_window(wind: int | None, expected: tuple[int, ...]) -> None:
     policy = policy_of(Monitor(FOR, 20 * S, CALM), Monitor(WITHIN, 30 * S, asks(0)))
     state = State(tuple(wind if slot == WIND else None for slot in range(policy.policy.slots)), (0,) * 32, (4, 4))
     state = replace(state, ages=state.ages[: policy.policy.slots])

@@ -28,7 +28,7 @@ def test_not() -> None:
 
 
 @given(st.integers(1, 7), st.integers(1, 7))
-def test_sets_hold_what_their_members_give_and_no_more(a: int, b: int) -> None:
+def test_set_truth_is_exactly_that_of_members(a: int, b: int) -> None:
     assert set(singles(AND[a][b])) == {AND[x][y] for x in singles(a) for y in singles(b)}
     assert set(singles(OR[a][b])) == {OR[x][y] for x in singles(a) for y in singles(b)}
     assert set(singles(NOT[a])) == {NOT[x] for x in singles(a)}
@@ -40,5 +40,5 @@ def test_false_and_unknown_together_are_false_everywhere(truth: int, result: int
 
 
 @pytest.mark.parametrize("truth", [TRUE, FALSE, TRUE | FALSE])
-def test_what_may_be_missing_may_be_unknown(truth: int) -> None:
+def test_maybe_missing_value_may_be_unknown(truth: int) -> None:
     assert [known(truth, gap) for gap in (PRESENT, MAYBE, ABSENT)] == [truth, truth | UNKNOWN, UNKNOWN]

@@ -64,7 +64,7 @@ def test_at_moment_15(daily: tuple[int, ...], dates: tuple[int, ...], through: i
     assert Times(zone, LocalTime(0)).truth(((15, 15),), (0, 0), through) == answer
 
 
-def test_a_clock_that_errs() -> None:
+def test_clock_error_at_zone_times() -> None:
     zone = Zone("z", CIRCLE, LOWEST, HIGHEST, (0, 0, 1), (10, 20), (12, 18))
     answers = [Times(zone, LocalTime(0)).truth(((15, 15),), (error, error), 0) for error in (3, 4)]
     assert answers == [T, U]

@@ -99,7 +99,7 @@ def place(chance: Random, near: tuple[int, int], metres: int) -> tuple[int, int]
 
 
 @pytest.mark.parametrize("seed", [pytest.param(seed, marks=() if seed < 3 else pytest.mark.soak) for seed in range(8)])
-def test_what_a_zone_was_asked_before_changes_no_answer(seed: int) -> None:
+def test_zone_cache_changes_no_answer(seed: int) -> None:
     chance = Random(seed)
     for _ in range(60):
         asked = PreparedZone(0, field(chance))

@@ -96,14 +96,14 @@ def log() -> Log:
     return made
 
 
-def test_a_true_flight_has_nothing_against_it() -> None:
+def test_genuine_flight_has_no_flaw() -> None:
     evidence = BoundaryEvidence(ROOT, GENESIS)
     assert [evidence.check(record, 0) for record in RECORDS[1:]] == [None] * (len(RECORDS) - 1)
     (proven,), (clock,) = evidence.claims()
     assert (proven.slug, clock.slug) == ("boundary", "clock")
 
 
-def test_a_root_without_a_boundary_key_asks_for_nothing() -> None:
+def test_root_without_boundary_key_requires_no_evidence() -> None:
     for keys in ((), (case.BOUNDARY_KEY.verification(vehicles=("another",)),)):
         evidence = BoundaryEvidence(replace(ROOT, keys=keys), GENESIS)
         assert not evidence.asked
@@ -158,7 +158,7 @@ def test_refusals_that_differ_from_the_statement_are_found(slugs: tuple[str, ...
     assert last == ("boundary/differs", log.seq)
 
 
-def test_without_marks_the_digest_tells(log: Log) -> None:
+def test_digest_detects_change_without_marks(log: Log) -> None:
     for _ in range(MOST_MARKS + 2):
         log.refuse()
     log.refuse("permit/used", made=False)
@@ -263,7 +263,7 @@ def test_a_statement_that_does_not_follow(fields: dict[str, object], slug: str) 
     assert log.state(**fields) == (f"boundary/{slug}", 2)
 
 
-def test_that_frames_were_signed_ahead_is_told_and_not_that_they_were_sent() -> None:
+def test_claims_mention_frames_signed_ahead_not_sent() -> None:
     log = Log()
     for _ in range(3):
         log.chain.sign_ahead(b"a frame")
@@ -376,7 +376,7 @@ def test_a_record_may_be_two_seconds_and_both_errors_off() -> None:
         assert told(Log(), **own) == ("boundary/clock", 0)
 
 
-def test_a_runtime_that_stalls_before_a_statement_is_accused_of_nothing() -> None:
+def test_stall_before_statement_is_not_a_flaw() -> None:
     """By how far the two are apart, which a stall does not change; and what errors grew in it counts for both."""
     log = Log()
     assert told(log) is None
@@ -392,7 +392,7 @@ def test_the_first_record_that_claims_another_time_is_named(log: Log) -> None:
     assert told(log) == ("boundary/clock", 3)
 
 
-def test_none_may_be_claimed_where_the_boundary_knows_none() -> None:
+def test_time_claim_is_refused_if_boundary_has_no_time() -> None:
     said = Log().statement(source=ClockSource.UNKNOWN, utc_error_us=UTC_UNKNOWN_US)
     assert Log().take(stated(said)) == ("boundary/clock", 0)
     quiet = Log(replace(GENESIS, utc_error_us=UTC_UNKNOWN_US))
@@ -401,7 +401,7 @@ def test_none_may_be_claimed_where_the_boundary_knows_none() -> None:
     assert "did not know the time of day" in clock.text
 
 
-def test_a_clock_of_its_own_is_told_of(log: Log) -> None:
+def test_claims_mention_boundary_clock(log: Log) -> None:
     assert told(log) is None
     (_, clock), unproven = log.evidence.claims()
     assert clock == Claim(

@@ -168,7 +168,7 @@ def test_a_log_can_name_the_one_before(recorder: Recorder, now: Callable[[int], 
     assert json.loads(recorder.close(now(1), ending="refused", tlog=None))["tlog"] is None
 
 
-def test_what_the_boundary_signs_stands_before_each_seal_and_the_close(
+def test_boundary_statement_precedes_seal_and_close(
     recorder: Recorder, begin: Callable[[], bytes], now: Callable[[int], Now]
 ) -> None:
     begin()
@@ -181,7 +181,7 @@ def test_what_the_boundary_signs_stands_before_each_seal_and_the_close(
     assert (statement["event"], statement["detail"], close["type"]) == ("boundary", "bGFzdA==", "close")
 
 
-def test_the_loss_of_the_boundary_is_told_once_before_the_seal_that_it_does_not_sign_for(
+def test_boundary_loss_is_recorded_once_before_seal(
     recorder: Recorder, begin: Callable[[], bytes], now: Callable[[int], Now]
 ) -> None:
     begin()

@@ -12,7 +12,7 @@ from virtual.rows import rows
         (RecordGap(7, 127_560_000), "not signed for yet"),
     ],
 )  # fmt: skip
-def test_it_says_how_long_it_was_and_who_vouches_for_it(gap: RecordGap, words: str) -> None:
+def test_gap_claim_names_length_and_signer(gap: RecordGap, words: str) -> None:
     claim = told(gap)
     assert claim.slug == "gap"
     assert claim.text.startswith("what happened in a gap of 127.56 s before record 7: nothing was recorded; ")

@@ -9,7 +9,7 @@ from virtual.rows import rows
 
 @rows("count", [0, 1, 255, 256, 257, 700])
 @rows("asked", [None, 0, 3, 256, 300])
-def test_a_segment_is_what_its_lines_are_whenever_it_is_asked_for(count: int, asked: int | None) -> None:
+def test_segment_digest_is_right_at_any_time(count: int, asked: int | None) -> None:
     head = Head()
     assert (head.seq, head.prev, head.epoch, head.octets) == (0, START, -1, 0)
     lines = [b"%d\n" % number for number in range(count)]

@@ -75,7 +75,7 @@ def test_the_audit_and_the_quick_verifier(name: str) -> None:
 
 
 @rows("name", REJECTED)
-def test_what_the_audit_rejects(name: str) -> None:
+def test_audit_rejects_vector(name: str) -> None:
     found = audit(lines_of(f"rejected/{name}"), ROOT_KEY)
     assert found.report.verdict is LogVerdict.FAILED
     agree(b"".join(lines_of(f"rejected/{name}")), found)
@@ -101,7 +101,7 @@ def test_leaves_roots_and_checkpoints(name: str) -> None:
 
 
 @rows("name", REJECTED)
-def test_what_no_verifier_accepts(name: str) -> None:
+def test_verifiers_reject_vector(name: str) -> None:
     lines = lines_of(f"rejected/{name}")
     assert audit(lines, ROOT_KEY).report.failure is not None
     assert independent_verifier.verify(b"".join(lines), ROOT_KEY).kind in ("broken", "untrusted", "boundary")

@@ -171,7 +171,7 @@ def test_leaves_that_end_too_early_give_no_proof() -> None:
         proof_of(inclusion_ranges(3, 9), LEAVES[:8])
 
 
-def test_what_was_worked_out_before_is_bounded() -> None:
+def test_cache_of_ranges_is_bounded() -> None:
     @cache
     def root(start: int, end: int) -> bytes:
         """As RFC 9162, 2.1.1, defines it."""

@@ -92,7 +92,7 @@ def test_it_agrees_on_every_whole_log(epochs: list[int]) -> None:
     assert [claim.slug for claim in found.unproven] == ["anchor", "form"]
 
 
-def test_by_octets_alone_it_says_less(log: Log) -> None:
+def test_verification_by_octets_claims_less(log: Log) -> None:
     found = quickly(log.lines, part=octets_alone)
     assert found is not None
     assert found.verdict is LogVerdict.VERIFIED
@@ -102,7 +102,7 @@ def test_by_octets_alone_it_says_less(log: Log) -> None:
 
 
 @pytest.mark.unmeasured
-def test_no_octet_can_be_changed_unseen(log: Log) -> None:
+def test_changed_octet_is_detected(log: Log) -> None:
     data = b"".join(log.lines)
     for at in range(0, len(data), 7):
         changed = data[:at] + bytes([data[at] ^ 1]) + data[at + 1 :]
@@ -111,7 +111,7 @@ def test_no_octet_can_be_changed_unseen(log: Log) -> None:
         assert quickly(lines, part=octets_alone) is None
 
 
-def test_no_line_can_be_taken_out_doubled_moved_or_cut_unseen(log: Log) -> None:
+def test_changed_line_order_is_detected(log: Log) -> None:
     lines = log.lines
     for at in range(len(lines)):
         for other in (lines[:at] + lines[at + 1 :], lines[: at + 1] + lines[at:], lines[:at]):
@@ -124,7 +124,7 @@ def test_no_line_can_be_taken_out_doubled_moved_or_cut_unseen(log: Log) -> None:
     assert quickly([]) is None
 
 
-def test_what_all_keys_wrote_anew_must_still_add_up(log: Log) -> None:
+def test_log_resigned_with_all_keys_must_be_consistent(log: Log) -> None:
     lines = log.lines
     assert anew(lines) == lines
     assert quickly(anew(lines)) is not None
@@ -147,7 +147,7 @@ def test_what_all_keys_wrote_anew_must_still_add_up(log: Log) -> None:
         assert quickly(forged) is None
 
 
-def test_times_of_signed_records_are_looked_at(log: Log) -> None:
+def test_times_of_signed_records_are_checked(log: Log) -> None:
     at_us, utc_us = (json.loads(log.lines[4])[name] for name in ("at_us", "utc_us"))
     for lines in (
         edited(log.lines, 3, at_us=at_us + 1),
@@ -161,7 +161,7 @@ def test_times_of_signed_records_are_looked_at(log: Log) -> None:
 
 
 @pytest.mark.parametrize(("number", "field", "value"), [(0, "seq", 1), (0, "_prev", "11" * 32), (4, "seq", 5)])
-def test_numbers_and_links_of_signed_records_are_looked_at(number: int, field: str, value: object, log: Log) -> None:
+def test_numbers_and_links_of_signed_records_are_checked(number: int, field: str, value: object, log: Log) -> None:
     forged = anew(edited(log.lines, number, **{field: value}), relink=False)
     assert quickly(forged) is None
     if number:
@@ -222,7 +222,7 @@ def test_anchors_are_found_where_they_are_recorded_and_beside(log: Log) -> None:
     assert found.anchored == 3
 
 
-def test_what_a_witness_saw_otherwise_is_left_to_the_careful_one() -> None:
+def test_contradicting_anchor_is_left_to_full_verification() -> None:
     witness = Judge()
     log = Log()
     log.effects(1)
@@ -256,7 +256,7 @@ def test_a_record_between_that_signs_is_no_segment(log: Log) -> None:
     assert scan(data.replace(b'"at_us":', b'"at_ms":')) is None
 
 
-def test_what_only_looks_like_an_anchor(log: Log) -> None:
+def test_text_that_resembles_an_anchor_is_ignored(log: Log) -> None:
     """It is linked, and nobody reads it here."""
     line = b'{"_prev":"' + log.lines[1][10:74] + b'","at_us":5000000,"event":"anchored"'
     part = scan(log.lines[0] + line)
@@ -350,9 +350,7 @@ def test_a_part_of_another_place(log: Log) -> None:
         ("seal/missing", {"at_us": 1_000_000_000, "utc_us": None}),
     ],
 )
-def test_what_the_epochs_own_key_can_have_unseen_is_said_to_be_unseen(
-    log: Log, slug: str, fields: dict[str, object] | None
-) -> None:
+def test_report_names_what_fast_verification_skips(log: Log, slug: str, fields: dict[str, object] | None) -> None:
     """Who holds the key signs lines that are no records: the quick verification reads none, and says so."""
     line = log.lines[7]
     if fields is None:

@@ -60,7 +60,7 @@ def test_a_log_that_ends_between_two_records_is_kept_whole(lines: list[bytes]) -
 
 
 @pytest.mark.unmeasured
-def test_wherever_it_is_cut_what_is_whole_is_kept(lines: list[bytes]) -> None:
+def test_complete_records_survive_any_cut(lines: list[bytes]) -> None:
     whole, data = 0, b"".join(lines)
     for end in range(len(lines[0]), len(data), 61):
         while whole < len(lines) and end >= sum(map(len, lines[: whole + 1])):
@@ -78,7 +78,7 @@ def test_wherever_it_is_cut_what_is_whole_is_kept(lines: list[bytes]) -> None:
 
 
 @pytest.mark.parametrize("garbage", [b"\0" * 5_000, b"\xff\n" * 30, b"{}\n", b"\n", b'{"_prev":"', b"x" * 10])
-def test_what_is_no_record_behind_the_last_one_is_discarded(lines: list[bytes], garbage: bytes) -> None:
+def test_invalid_tail_is_discarded(lines: list[bytes], garbage: bytes) -> None:
     found = examined(split(b"".join(lines) + garbage))
     assert (found.state, found.head.seq, found.discarded) == (LogState.TORN, len(lines), len(garbage))
     assert verify(lines + recovered(found)).verdict is LogVerdict.VERIFIED
@@ -127,7 +127,7 @@ def test_an_epoch_that_was_never_sealed_is_no_crash() -> None:
     assert found.reason.slug == "seal/missing"
 
 
-def test_what_stands_behind_the_close_is_no_crash(lines: list[bytes]) -> None:
+def test_data_after_close_is_tampering(lines: list[bytes]) -> None:
     log = lines + recovered(examined(lines))
     for more in (b"x", b"\n", lines[-1], bytes(512)):
         found = examined([*log, more])
@@ -153,7 +153,7 @@ def test_a_log_of_another_key_is_not_ours(lines: list[bytes]) -> None:
     assert examined([*lines, b"x"], bytes(32)).state is LogState.FOREIGN
 
 
-def test_a_line_without_end_is_not_read_for_ever(lines: list[bytes], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_line_without_end_is_bounded(lines: list[bytes], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("rtshcua.evidence.reading.LONGEST", 2_000)
     found = examined([*lines, b"x" * 2_001, b"y"])
     assert found.reason is not None
@@ -167,7 +167,7 @@ def test_a_clock_that_was_lost_states_an_error_as_great_as_that(lines: list[byte
     assert json.loads(log[-1])["utc_error_us"] == found.latest_us
 
 
-def test_what_nobody_had_signed_is_not_called_proven(lines: list[bytes]) -> None:
+def test_unsigned_records_are_not_proven(lines: list[bytes]) -> None:
     found = examined([*lines, b"torn"])
     log = lines + recovered(found)
     said = {claim.slug: claim.text for claim in verify(log).unproven}
@@ -179,7 +179,7 @@ def test_what_nobody_had_signed_is_not_called_proven(lines: list[bytes]) -> None
     assert "after 2 crashes: " in twice["recovered"]
 
 
-def test_what_was_recovered_can_be_torn_itself(lines: list[bytes]) -> None:
+def test_recovery_can_be_interrupted(lines: list[bytes]) -> None:
     found = examined(lines)
     recover, close = recovered(found)
     again = examined([*lines, recover, close[:-1]])
@@ -192,7 +192,7 @@ SEALED = b"".join(split(LOG)[: signed(split(LOG))[-1] + 1])
 
 
 @given(some.integers(0, len(LOG)), some.integers(0, 900), some.binary(max_size=40))
-def test_whatever_stands_there_only_a_beginning_that_verifies_is_signed(start: int, size: int, put: bytes) -> None:
+def test_recovery_signs_only_verified_prefix(start: int, size: int, put: bytes) -> None:
     data = LOG[:start] + put + LOG[start + size :]
     found = examined(split(data))
     assert found.kept + found.discarded == len(data)

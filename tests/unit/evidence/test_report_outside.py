@@ -47,7 +47,7 @@ def test_notes_that_say_nothing() -> None:
 @pytest.mark.parametrize(
     ("torn", "whole"), [(b"", True), (b"{", True), (bytes(9), True), (b"\0{", False), (b"x", False)]
 )
-def test_what_a_crash_leaves_of_a_record(torn: bytes, whole: bool) -> None:
+def test_report_after_torn_record(torn: bytes, whole: bool) -> None:
     assert may_be_torn(torn, "ab" * 32) == whole
     start = b'{"_prev":"' + b"ab" * 32 + b'","at_us":'
     assert may_be_torn(start + torn, "ab" * 32)

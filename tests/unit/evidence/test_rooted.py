@@ -41,7 +41,7 @@ def test_another_root(genesis: Genesis) -> None:
     assert slug(replace(genesis, utc_us=genesis.utc_us + 2 * case.YEAR_US)) == "trust/root-expired"
 
 
-def test_what_is_not_base64(genesis: Genesis) -> None:
+def test_invalid_base64_is_refused(genesis: Genesis) -> None:
     assert slug(replace(genesis, root=genesis.root[:-1])) == "genesis/base64"
     assert slug(replace(genesis, bundle="====")) == "genesis/base64"
     assert octets("AA==") == b"\0"

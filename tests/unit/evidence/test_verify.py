@@ -96,7 +96,7 @@ def test_a_whole_log(log: list[bytes], log_key: SigningKey) -> None:
     assert report.root != b64decode(json.loads(log[-1])["checkpoint"].split("\n")[2])  # that is the root before it
 
 
-def test_writing_anew_is_what_the_next_tests_think(log: list[bytes]) -> None:
+def test_rewriting_helper_reproduces_log(log: list[bytes]) -> None:
     assert anew(log) == log
 
 
@@ -113,7 +113,7 @@ def test_records_are_handed_on_as_they_are_read(log: list[bytes]) -> None:
     ]  # fmt: skip
 
 
-def test_whoever_reads_along_can_end_it(log: list[bytes]) -> None:
+def test_caller_can_end_verification(log: list[bytes]) -> None:
     verifier = LogVerifier()
     verifier.take(log[0])
     verifier.fail(Finding("mine", 0, "because"))
@@ -311,7 +311,7 @@ def test_every_field_of_a_signed_record_is_signed(log: list[bytes]) -> None:
         assert failure(changed(log, 0, **{field: value})) == ("seal/self", 0)
 
 
-def test_what_was_written_anew_without_keys(log: list[bytes]) -> None:
+def test_log_rewritten_without_keys_fails(log: list[bytes]) -> None:
     edited = chained(changed(log, 3, outcome="allow"))
     assert failure(edited) == ("seal/bytes", 5)
     assert failure(chained(changed(log, 3, outcome="fallback", kind=1))) == ("seal/digest", 5)
@@ -396,7 +396,7 @@ def test_a_log_without_close_is_incomplete(log: list[bytes]) -> None:
     assert report.proven[0].text.startswith("record 0 is")
 
 
-def test_what_follows_the_last_seal_is_not_signed_for(log: list[bytes]) -> None:
+def test_records_after_last_seal_are_unsigned(log: list[bytes]) -> None:
     report = verify(log[:8])
     assert (report.records, report.sealed, report.epochs) == (8, 7, 2)
     assert report.unproven[1].text.startswith("record 7 is chained but not yet signed for")
@@ -411,7 +411,7 @@ def test_a_log_cut_inside_a_record_is_torn(log: list[bytes]) -> None:
             assert shortfall([*log[:number], line[:length]]) == ("tail/torn", number)
 
 
-def test_what_is_no_beginning_of_a_record_is_not_torn_but_wrong(log: list[bytes]) -> None:
+def test_tail_that_is_not_a_record_prefix_fails(log: list[bytes]) -> None:
     assert failure([*log[:2], b"x"]) == ("record/malformed", 2)
     assert failure([*log[:2], log[3][:80]]) == ("record/malformed", 2)
 

@@ -38,7 +38,7 @@ def test_a_value_is_shown_in_as_few_digits_as_tell_it(value: float, text: str) -
 
 
 @pytest.mark.parametrize("value", [nan, inf, -inf, 1e39])
-def test_what_no_float_holds_has_no_bits(value: float) -> None:
+def test_value_outside_float_range_has_no_bits(value: float) -> None:
     assert bits_of(value) is None
 
 
@@ -57,12 +57,12 @@ def test_integers_are_octets_for_px4_and_numbers_for_ardupilot(kind: int, value:
     (4, 1e9, False), (0, 80.5, True), (6, 80.5, False), (6, -(2.0**31), True), (6, 2.0**31, False), (6, inf, False),
     (9, 80.5, True),
 ])  # fmt: skip
-def test_what_an_integer_does_not_keep_is_not_written_as_one(kind: int, value: float, good: bool) -> None:
+def test_value_that_does_not_fit_integer_is_not_encoded(kind: int, value: float, good: bool) -> None:
     assert fits(value, kind) == good
     assert (encode(value, kind, bytewise=True) is not None) == good
     assert encode(value, kind, bytewise=False) == value
 
 
-def test_who_has_which() -> None:
+def test_encoding_by_autopilot() -> None:
     assert is_bytewise(PX4)
     assert not is_bytewise(ARDUPILOT)

@@ -46,7 +46,7 @@ def test_every_unit_is_spelled_as_in_the_dialect() -> None:
 
 
 @pytest.mark.parametrize("raw", [math.nan, math.inf, -math.inf])
-def test_no_number_is_unknown(raw: float) -> None:
+def test_nan_and_infinity_are_unknown(raw: float) -> None:
     assert quantise(raw, 1, 1) is None
 
 

@@ -40,7 +40,7 @@ def test_a_forged_good_report_hides_nothing() -> None:
         assert message.noise == (20 if at_s == 0 else 90)
 
 
-def test_what_is_not_known_is_the_worst() -> None:
+def test_unknown_radio_value_is_the_worst() -> None:
     tempering = radio()
     tempering.temper(status(rssi=255), 0)
     message = status(rssi=100)

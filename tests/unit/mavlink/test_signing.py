@@ -112,7 +112,7 @@ def test_it_starts_at_the_greater_of_clock_and_stored() -> None:
         assert int.from_bytes(ours.sign(frame(), 0)[-12:-6], "little") == max(timestamp_of(utc_us), stored) + 1
 
 
-def test_every_bit_counts() -> None:
+def test_any_flipped_bit_is_refused() -> None:
     signed = link().sign(frame(7), 0)
     ours = link()
     for bit in range(8 * len(signed)):
@@ -124,7 +124,7 @@ def test_every_bit_counts() -> None:
     assert ours.accept(signed, 0)
 
 
-def test_without_a_signature_or_with_one_of_another_key_nothing_comes_in() -> None:
+def test_unsigned_or_foreign_frame_is_refused() -> None:
     ours = link()
     assert not ours.accept(frame(), 0)
     assert not ours.accept(link(bytes(32)).sign(frame(), 0), 0)
@@ -132,7 +132,7 @@ def test_without_a_signature_or_with_one_of_another_key_nothing_comes_in() -> No
     assert (ours.counts.unsigned, ours.counts.forged, ours.counts.accepted) == (1, 2, 0)
 
 
-def test_a_forged_future_locks_nobody_out() -> None:
+def test_forged_future_timestamp_locks_nobody_out() -> None:
     """pymavlink believes the timestamp before it looks at the signature; here it is the other way round."""
     ours, end = link(), theirs(timestamp=timestamp_of(UTC))
     forged = bytearray(at(timestamp_of(UTC) + 1_000_000))
@@ -158,7 +158,7 @@ def test_a_replay_is_refused_within_its_stream_alone() -> None:
     assert ours.counts.stale == 2
 
 
-def test_what_it_signed_itself_does_not_come_in() -> None:
+def test_own_signed_frame_is_refused() -> None:
     ours = link()
     sent = [ours.sign(frame(mode), 0) for mode in range(3)]
     before = ours.state
@@ -172,7 +172,7 @@ def test_what_it_signed_itself_does_not_come_in() -> None:
     assert adapter.accept(at(timestamp_of(UTC) + 9, of=frame(system=191, component=191)), 0)
 
 
-def test_what_was_overheard_on_another_link_does_not_come_in() -> None:
+def test_frame_of_another_link_is_refused() -> None:
     """An autopilot signs on each of its channels; here only one of them is heard, also after a restart."""
     now = timestamp_of(UTC)
     here = [at(now + 10 * n, SignedLink(KEY, SigningState(now + 10 * n, {}), 0, 0, link=1)) for n in range(3)]
@@ -217,7 +217,7 @@ def test_timestamps_never_run_out() -> None:
     ours.sign(frame(), 0)
 
 
-def test_what_was_stored_is_not_heard_again() -> None:
+def test_frame_older_than_stored_state_is_refused() -> None:
     before, now = link(), timestamp_of(UTC)
     heard = [at(now + 1_000 * number, of=frame(number)) for number in range(5)]
     assert all(before.accept(each, 0) for each in heard)
@@ -240,7 +240,7 @@ def test_streams_are_bounded_and_old_ones_make_room() -> None:
     assert not ours.accept(at(now + 1), minute_us + 20), "what was forgotten is too old to come back"
 
 
-def test_news_is_a_new_stream_or_a_leap() -> None:
+def test_state_change_is_a_new_stream_or_a_leap() -> None:
     ours, now, told = link(), timestamp_of(UTC), []
     ours.on_news = lambda: told.append(len(told))
     leap = now + 200_007
@@ -303,7 +303,7 @@ def vehicle() -> SignedLink:
     return SignedLink(KEY, NEW, UTC, 0, as_library=True)
 
 
-def test_what_is_signed_ahead_is_above_all_that_is_signed_for_a_while() -> None:
+def test_frames_signed_ahead_have_later_timestamps() -> None:
     ours = link()
     ahead = [signed_ahead(ours, frame(mode), 0) for mode in range(3)]
     assert [stamp(each) - timestamp_of(UTC) for each in ahead] == [LEAD + 1, LEAD + 2, LEAD + 3]
@@ -321,7 +321,7 @@ def test_a_vehicle_takes_it_once_nothing_more_is_signed_however_late() -> None:
     ]  # fmt: skip
 
 
-def test_what_is_signed_later_voids_it() -> None:
+def test_later_signature_voids_frames_signed_ahead() -> None:
     """Who holds it back while the flight goes on holds nothing soon: not for the next step, nor for the next flight."""
     ours, autopilot = link(), vehicle()
     held_back = signed_ahead(ours, frame(1), 0)
@@ -341,7 +341,7 @@ def test_no_timestamp_is_promised_twice() -> None:
     assert stamp(after.sign_ahead(frame(), 0)) > promised[-1] + LEAD
 
 
-def test_who_is_given_it_all_the_time_cannot_use_up_the_timestamps() -> None:
+def test_repeated_signing_ahead_cannot_exhaust_timestamps() -> None:
     """Whoever has it signed, sends it, and shows the vehicle's answer, as fast as can be."""
     ours, autopilot = link(), vehicle()
     for now_us in range(0, 10_000_000, 10_000):
@@ -362,7 +362,7 @@ def test_a_flood_of_frames_to_sign_ahead_is_refused(monkeypatch: pytest.MonkeyPa
     assert ours.sign_ahead(frame(), 31_000_000) is not None, "they are void, and there is room again"
 
 
-def test_a_flood_that_goes_on_gains_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_continued_flood_gains_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(signing, "MOST_AHEAD", 50)
     ours = link()
     for second in range(5):
@@ -371,7 +371,7 @@ def test_a_flood_that_goes_on_gains_nothing(monkeypatch: pytest.MonkeyPatch) -> 
         assert ours.state.timestamp <= stamp(ours.sign(frame(), second * 1_000_000)) + LEAD + 50
 
 
-def test_it_is_news_to_keep() -> None:
+def test_frames_signed_ahead_change_stored_state() -> None:
     ours, news = link(), []
     ours.on_news = lambda: news.append(ours.state.timestamp)
     for now_us in (0, 0, 10_000, 20_000_000):

@@ -49,7 +49,7 @@ def test_a_cut_file_gives_its_whole_entries_and_the_place() -> None:
         assert seen == [first, first]
 
 
-def test_what_is_no_tlog_is_refused() -> None:
+def test_invalid_tlog_is_refused() -> None:
     with pytest.raises(tlog.DamagedTlog):
         list(tlog.read(b"not a tlog at all, but long enough for one"))
     with pytest.raises(tlog.DamagedTlog):

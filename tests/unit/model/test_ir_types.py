@@ -57,14 +57,14 @@ def faults(node: Node) -> Iterator[str]:
                 waiting += each
 
 
-def test_what_is_parsed_is_of_the_declared_types() -> None:
+def test_parsed_nodes_have_declared_types() -> None:
     assert len(SOURCES) > 100
     for path in (*SOURCES, CHECKOUT / "tests" / "unit" / "ground" / "language" / "forms.rts"):
         unit = parse(Source(path.name, path.read_text(encoding="utf-8", errors="replace"))).unit
         assert not list(faults(unit)), path
 
 
-def test_a_wrong_type_is_noticed_here() -> None:
+def test_wrong_type_is_detected() -> None:
     span = Span("x", 0, 1)
     unit = parse(Source("x", "zone a = circle(1 N, 2 E, 3 m)")).unit
     wrong = unit.copied(zones=(unit.zones[0].copied(floor=3),))

@@ -145,7 +145,7 @@ def test_every_decision_is_announced_and_every_document_answered() -> None:
     assert announced[2] == Announce(5, f"defer approval/awaited: {asked}")
 
 
-def test_what_the_vehicle_says_is_kept_as_its_own_words() -> None:
+def test_vehicle_text_is_recorded_unchanged() -> None:
     run = Run(loaded())
     run.tick(StatusText(0, 4, "EKF lane switch"), StatusText(0, 6, "x" * 500))
     said = [json.loads(line)["detail"] for line in run.lines if b'"event":"said"' in line]

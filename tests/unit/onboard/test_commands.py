@@ -52,7 +52,7 @@ def test_a_degrade_rule_has_a_target() -> None:
         (3, 0, 0),
     ],
 )
-def test_a_command_that_the_bundle_does_not_have_is_no_command(kind: int, step: int, link_number: int) -> None:
+def test_command_outside_bundle_raises(kind: int, step: int, link_number: int) -> None:
     with pytest.raises(LookupError):
         COMMANDS.command(kind, step, link_number, 1)
 

@@ -123,12 +123,12 @@ STORIES = st.lists(st.tuples(MOMENT, ACTS, st.integers(0, 4)), max_size=8)
 
 @settings(max_examples=settings().max_examples * 2 // 5)
 @given(STORIES)
-def test_any_story_ends_and_is_proved(acts: list[tuple[int, str, int]]) -> None:
+def test_any_document_sequence_ends_with_valid_log(acts: list[tuple[int, str, int]]) -> None:
     fly(acts)
 
 
 @pytest.mark.soak
 @settings(max_examples=3_000, phases=[Phase.explicit, Phase.reuse, Phase.generate])
 @given(STORIES)
-def test_many_stories_end_and_are_proved(acts: list[tuple[int, str, int]]) -> None:
+def test_many_document_sequences_end_with_valid_logs(acts: list[tuple[int, str, int]]) -> None:
     fly(acts)

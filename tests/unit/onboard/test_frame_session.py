@@ -215,7 +215,7 @@ def test_a_permitted_command_is_carried_out_and_no_other(
 
 
 @pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT])
-def test_what_only_asks_passes_always(autopilot: int) -> None:
+def test_request_frames_always_pass(autopilot: int) -> None:
     for gate in (session(autopilot), session(autopilot, command(K.LAND))):
         for message in ALWAYS:
             assert covers(gate, message), named(message)
@@ -232,7 +232,7 @@ def test_a_fence_passes_until_something_flies() -> None:
 
 
 @pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT])
-def test_what_is_on_no_list_never_passes(autopilot: int) -> None:
+def test_unlisted_frames_never_pass(autopilot: int) -> None:
     for gate in (session(autopilot), *(session(autopilot, command(kind)) for kind in K)):
         for message in NEVER:
             assert not covers(gate, message), named(message)
@@ -306,7 +306,7 @@ REFUSED: list[tuple[str, int, MotionKind, Any]] = [
 
 
 @rows(("why", "autopilot", "kind", "message"), REFUSED, ids=lambda value: str(value)[:40])
-def test_what_is_nearly_the_command_is_not(why: str, autopilot: int, kind: MotionKind, message: Any) -> None:
+def test_nearly_matching_frames_are_refused(why: str, autopilot: int, kind: MotionKind, message: Any) -> None:
     assert session(autopilot, command(kind)).seal(pack(message), NOW) is NOT_COVERED, why
 
 
@@ -532,7 +532,7 @@ class FakeSigner:
         return b"signed " + frame
 
 
-def test_what_passes_is_signed_and_nothing_else() -> None:
+def test_only_passing_frames_are_signed() -> None:
     signer = FakeSigner()
     gate = FrameSession()
     gate.sign_with(signer)
@@ -617,7 +617,7 @@ def test_px4s_integers_are_listed_by_their_number() -> None:
 @pytest.mark.parametrize(("landed", "mode", "age_us"), [
     (2, 0, 0), (3, 0, 0), (4, 0, 0), (0, 0, 0), (1, 128, 0), (1, 0, STANDS_US),
 ], ids=["in the air", "takes off", "lands", "does not say", "armed", "said so long ago"])  # fmt: skip
-def test_a_listed_parameter_is_not_set_unless_it_is_known_to_stand(landed: int, mode: int, age_us: int) -> None:
+def test_parameter_is_not_set_unless_on_ground(landed: int, mode: int, age_us: int) -> None:
     at_us = NOW + 10 * STANDS_US
     gate = session(ARDUPILOT)
     gate.prepare([ParameterWrite("FENCE_RADIUS", 0, bits(300.0))], at_us)
@@ -632,7 +632,7 @@ def covers_at(gate: FrameSession, message: Any, at_us: int) -> bool:
     return isinstance(gate.seal(pack(message), at_us), bytes)
 
 
-def test_what_never_said_when_it_stood_does_not_stand() -> None:
+def test_vehicle_without_landed_report_is_not_on_ground() -> None:
     gate = session(ARDUPILOT)
     gate.observe(pack(heartbeat(ARDUPILOT), component=1))
     gate.observe(pack(m.MAVLink_extended_sys_state_message(0, 1), component=1))
@@ -640,7 +640,7 @@ def test_what_never_said_when_it_stood_does_not_stand() -> None:
     assert not gate.stands(NOW)
 
 
-def test_another_vehicle_tells_nothing_of_where_this_one_is() -> None:
+def test_position_of_another_vehicle_is_ignored() -> None:
     gate = session(ARDUPILOT)
     other = SYSTEM + 1
     gate.observe(pack(heartbeat(ARDUPILOT), component=1), NOW)
@@ -662,7 +662,7 @@ def test_a_command_ends_a_preparation() -> None:
     assert covers(gate, setting("FENCE_RADIUS", 300.0)), "down again, it may be put back"
 
 
-def test_a_type_of_fence_that_is_no_number_is_none() -> None:
+def test_invalid_fence_type_is_ignored() -> None:
     gate = session(ARDUPILOT)
     gate.observe(pack(parameter("FENCE_TYPE", nan), component=1))
     assert covers(gate, setting("FENCE_TYPE", 4))

@@ -155,7 +155,7 @@ def test_the_last_link_is_signed_often_enough() -> None:
     assert 2 * (Limits().tries + 1) <= LAST <= AGAIN
 
 
-def test_what_has_ended_lets_nothing_out_any_more() -> None:
+def test_ended_link_passes_no_frame() -> None:
     of = made()
     first = of.begin(FALLBACK_LINK, 0)
     second = of.begin(FALLBACK_LINK, 1)
@@ -168,7 +168,7 @@ def test_what_has_ended_lets_nothing_out_any_more() -> None:
 
 
 @pytest.mark.parametrize("kind_of_place", ["height", "time"])
-def test_what_home_and_our_time_make_of_a_frame_is_no_other_frame(kind_of_place: str) -> None:
+def test_home_and_time_fields_do_not_distinguish_frames(kind_of_place: str) -> None:
     """Home moved by a little since it was signed, and time went on: it goes to the same place."""
 
     def target(of: float, at_ms: int = 0) -> bytes:
@@ -224,7 +224,7 @@ def pack_of_vehicle() -> bytes:
     return Codec(1, 1).pack(m.MAVLink_heartbeat_message(2, 12, 29, 0, 3, 3))
 
 
-def test_what_was_voided_by_a_normal_frame_is_not_sent() -> None:
+def test_voided_frame_is_not_sent() -> None:
     boundary = Boundary()
     of = made(boundary)
     of.sent(boundary.link.sign(pack(messages.heartbeat()), LEAD * UNIT_US + 1_000_000))
@@ -244,7 +244,7 @@ def test_another_step_takes_the_place_of_the_one_before() -> None:
 
 
 @pytest.mark.parametrize("permit", [PERMIT, b"another"])
-def test_what_stood_before_a_step_that_was_withdrawn_stands_again(permit: bytes) -> None:
+def test_withdrawn_step_restores_previous_links(permit: bytes) -> None:
     boundary = Boundary()
     of = made(boundary)
     signed = len(boundary.asked)
@@ -255,7 +255,7 @@ def test_what_stood_before_a_step_that_was_withdrawn_stands_again(permit: bytes)
     assert (of.begin(FALLBACK_LINK, 0) is None) is (permit == PERMIT)
 
 
-def test_nothing_stands_once_the_first_step_was_withdrawn() -> None:
+def test_no_links_after_withdrawal_of_first_step() -> None:
     boundary = Boundary()
     of = FramesAhead(Commands(POLICY, MISSION), boundary.sign)
     of.withdrawn(PERMIT)
@@ -280,14 +280,14 @@ def test_a_step_that_begins_waits_for_what_stands_behind_it_and_a_link_for_nothi
     assert len(boundary.asked) == 2 * signed
 
 
-def test_nothing_stands_after_a_landing() -> None:
+def test_no_links_after_landing() -> None:
     of = made()
     of.lapse()
     assert of.begin(CONTINGENCY_LINK, 0) is None
     assert of.renew(encode, 10 * EVERY_US) == ()
 
 
-def test_what_the_permit_does_not_stand_for_any_more_is_left_out_in_silence() -> None:
+def test_lapsed_links_are_skipped_silently() -> None:
     boundary = Boundary()
     boundary.refused = {CHAIN[0]: "permit/used", CHAIN[1]: "permit/backwards"}
     of = made(boundary)
@@ -295,17 +295,17 @@ def test_what_the_permit_does_not_stand_for_any_more_is_left_out_in_silence() ->
     assert of.begin(*CONTINGENCY[0]) is not None
 
 
-def test_what_cannot_be_signed_is_told() -> None:
+def test_links_that_cannot_be_signed_are_reported() -> None:
     boundary = Boundary()
     boundary.refused = {CHAIN[0]: "frame/not-covered"}
     of = FramesAhead(Commands(POLICY, MISSION), boundary.sign)
     of.stands(PERMIT, STEP)
-    assert of.renew(encode, 0, begins=True) == ["`hover` cannot be signed ahead: frame/not-covered"]
+    assert of.renew(encode, 0, begins=True) == ["cannot sign `hover` ahead: frame/not-covered"]
     of.flown()
     assert len(of.renew(lambda command: () if command.skill == "emergency_land" else encode(command), 1)) == 3
 
 
-def test_where_nothing_is_signed_what_was_signed_before_stays_and_it_is_tried_again() -> None:
+def test_failed_renewal_keeps_frames_and_is_retried() -> None:
     boundary = Boundary()
     of = made(boundary)
     boundary.refused = dict.fromkeys([*CHAIN, *CONTINGENCY], "time-apart")
@@ -340,7 +340,7 @@ def test_a_link_with_more_frames_than_a_call_takes_is_left_out_with_a_note(longe
         frames = encode(command)
         return [frames[0]] * (ahead.MOST + 1) if command.skill == longest else frames
 
-    note = f"`{longest}` cannot be signed ahead: {ahead.MOST + 1} frames, {ahead.MOST} at most"
+    note = f"cannot sign `{longest}` ahead: {ahead.MOST + 1} frames; the limit is {ahead.MOST}"
     assert of.renew(many, 0, begins=True) == [note] * 2
     left = [number for number, skill in enumerate(MODES) if skill != longest]
     assert boundary.asked == [(kind, number) for kind in (FALLBACK_LINK, CONTINGENCY_LINK) for number in left]

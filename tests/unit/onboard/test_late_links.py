@@ -85,7 +85,7 @@ def test_the_last_link_is_tried_again_at_once() -> None:
     assert run.flown[sent:] == ["emergency_land"]
 
 
-def test_what_is_late_again_and_again_is_tried_for_a_bounded_number_of_times() -> None:
+def test_late_link_is_retried_a_bounded_number_of_times() -> None:
     run = start("return_home", "emergency_land", "hover").until_flies("goto")
     run.tick(CommandFailed(0, run.vehicle.commands[-1].token, "no-progress"))
     answered = len(run.flown) - 1

@@ -44,12 +44,12 @@ def test_a_command_is_in_force_with_those_before_it_until_it_is_obeyed() -> None
     assert found.in_force[0].command.geo == run.vehicle.commands[-1].geo
 
 
-def test_what_succeeded_was_obeyed() -> None:
+def test_succeeded_command_counts_as_obeyed() -> None:
     run = Run().until_flies("inspect_area")
     assert in_force(run) == [("goto", None), ("inspect_area", None)]
 
 
-def test_what_was_allowed_may_have_been_sent() -> None:
+def test_allowed_command_may_have_been_sent() -> None:
     """The record of a fallback may be the last that was written, and its frame is out already."""
     run = Run().until_flies("goto")
     obeys(run, THERE)
@@ -76,7 +76,7 @@ def test_the_target_of_a_degrade_rule_is_known_by_its_skill() -> None:
     assert in_force(run, run.lines[:at])[-1] == in_force(run)[-1] == ("return_home", None)
 
 
-def test_what_landed_is_in_force_no_more() -> None:
+def test_no_command_in_force_after_landing() -> None:
     assert left(Run().until_over()) == Left(())
     run = Run().until_flies("goto")
     run.tick(AirState(0, False, False))
@@ -110,12 +110,12 @@ def test_a_replaced_mission_has_steps_that_are_not_known() -> None:
 
 
 @pytest.mark.parametrize("cut", [0, 1])
-def test_a_log_with_no_word_of_a_flight_tells_nothing(cut: int) -> None:
+def test_log_without_flight_gives_nothing(cut: int) -> None:
     run = Run().until_flies("takeoff")
     assert left(run, run.lines[:cut]) is None
 
 
-def test_a_log_of_another_bundle_or_one_that_cannot_be_read_tells_nothing() -> None:
+def test_other_or_unreadable_log_gives_nothing() -> None:
     run = Run().until_flies("goto")
     bundle = run.loaded.bundle
     assert left_by(run.lines, b"another", bundle.policy, bundle.mission) is None
@@ -123,7 +123,7 @@ def test_a_log_of_another_bundle_or_one_that_cannot_be_read_tells_nothing() -> N
     assert left(run, run.lines[1:]) is None
 
 
-def test_a_target_that_is_none_tells_nothing() -> None:
+def test_unknown_target_gives_nothing() -> None:
     run = Run().until_flies("takeoff")
     obeys(run, HERE)
     at = next(n for n, line in enumerate(run.lines) if b'"obeyed"' in line)
@@ -131,7 +131,7 @@ def test_a_target_that_is_none_tells_nothing() -> None:
     assert left(run, [*run.lines[:at], wrong]) is None
 
 
-def test_a_step_that_the_bundle_does_not_have_tells_nothing() -> None:
+def test_step_outside_bundle_gives_nothing() -> None:
     run = Run().until_flies("takeoff")
     at = next(n for n, line in enumerate(run.lines) if b'"dispatched"' in line)
     assert left(run, [*run.lines[:at], run.lines[at].replace(b'"step":0', b'"step":99')]) is None

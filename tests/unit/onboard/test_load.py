@@ -90,7 +90,7 @@ def test_a_bundle_with_a_changed_byte_is_refused(at: int) -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"\x00", b"\xff" * 100, sealed()[:-1], sealed() + b"\0"])
-def test_bytes_that_are_no_bundle_are_malformed(data: bytes) -> None:
+def test_garbage_bundle_is_malformed(data: bytes) -> None:
     assert refusal(data).slug == "malformed"
 
 
@@ -105,7 +105,7 @@ def test_a_policy_whose_requests_do_not_fit_the_wire_is_refused() -> None:
     assert "staleness" in refusal(sealed(lasting)).text
 
 
-def test_a_signed_bundle_that_makes_no_sense_is_refused() -> None:
+def test_signed_malformed_bundle_is_refused() -> None:
     assert "no contingency" in refusal(sealed(replace(POLICY, contingency=()))).text
     assert refusal(sealed(mission=replace(MISSION, invocations=()))).slug == "malformed"
     assert refusal(sealed(replace(POLICY, slots=POLICY.slots + 1))).slug == "malformed"

@@ -40,14 +40,14 @@ def test_a_refused_step_names_the_nearest_value_that_would_pass() -> None:
     assert [(one.subject, one.value) for one in first.nearest] == [("battery", 3_501)]
 
 
-def test_what_is_not_known_yet_may_come_in_the_air_but_not_for_the_first_step() -> None:
+def test_unknown_signal_may_arrive_for_later_steps_only() -> None:
     calm = told(state(**{f"s{WIND}": None, f"s{LINK}": None}))
     assert calm[2] == ("defer", "state/unknown", True)
     blind = told(state(**{f"s{BATTERY}": None}))
     assert blind[0] == ("defer", "state/unknown", False)
 
 
-def test_a_step_that_asks_somebody_waits() -> None:
+def test_step_that_needs_approval_waits() -> None:
     of = low()
     (asked,) = [each for each in rehearse(of, state(), START) if each.step == ASKED]
     assert (asked.decision.reason, asked.hopeful) == (Reason.AWAITING_APPROVAL, True)
@@ -90,7 +90,7 @@ def test_a_later_step_is_judged_where_the_one_before_it_ends(plan: Plan, x: int,
     assert after.ages[BATTERY] == before.ages[BATTERY]
 
 
-def test_what_was_never_told_stays_unknown_and_what_is_not_declared_is_left_alone() -> None:
+def test_unreported_stays_unknown_and_undeclared_unchanged() -> None:
     vehicle = OF.bundle.policy.vehicle
     unknown = state(**{f"s{POSITION_X}": None, f"s{HEIGHT}": None})
     after = flown(unknown, Plan(MotionKind.FLY, (5, 6), 7, 0), vehicle)

@@ -74,11 +74,11 @@ def stranded(run: Run) -> None:
 
 #: what ends a run in the air without a landing: how it ends, and the words that say why nothing watches it
 ENDS: dict[str, tuple[Way, Ending, str]] = {
-    "a pilot": (taken, Ending.STOOD_DOWN, "somebody else flies it"),
-    "a failsafe": (failsafe, Ending.STOOD_DOWN, "its own failsafe flies it"),
+    "a pilot": (taken, Ending.STOOD_DOWN, "somebody else flies the vehicle"),
+    "a failsafe": (failsafe, Ending.STOOD_DOWN, "own failsafe flies the vehicle"),
     "silence": (silent, Ending.LINK_LOST, "not heard"),
     "no answers": (mute, Ending.LINK_LOST, "does not answer"),
-    "no link left": (stranded, Ending.ABORTED, "no landing was seen"),
+    "no link left": (stranded, Ending.ABORTED, "no landing was observed"),
 }
 
 
@@ -104,12 +104,12 @@ def test_however_a_mission_was_given_up_the_links_that_failed_are_why_nothing_wa
 def test_a_standstill_says_why_it_is_watched_no_longer_and_what_to_do() -> None:
     run = flying()
     run.tick(TakenOver(0, PAUSED))
-    assert "who may fly it on at any time" in run.runtime.may_fly
+    assert "who may resume the flight at any time" in run.runtime.may_fly
     assert run.runtime.may_fly.endswith("if nobody did, nobody flies it: take it over")
 
 
 @pytest.mark.parametrize("way", [Interrupted(0), EvidenceFailed(0, "the disk is full"), None])
-def test_what_obeyed_and_never_flew_is_not_said_to_have_landed(way: Event | None) -> None:
+def test_obeying_vehicle_that_never_flew_has_not_landed(way: Event | None) -> None:
     """It says all the while that it rests, and obeyed a takeoff: the landing that was sent failed."""
     run = start(vehicle=FakeVehicle(deaf={"takeoff"}, fails={"emergency_land"})).until_flies("takeoff")
     token = run.vehicle.commands[-1].token
@@ -121,12 +121,12 @@ def test_what_obeyed_and_never_flew_is_not_said_to_have_landed(way: Event | None
         run.vehicle.values[OBSTACLE] = None
         run.tick(Succeeded(0, token), AirState(0, armed=False, airborne=False))
     over(run)
-    assert "approach it as one that may start" in run.runtime.may_fly
+    assert "approach it as if it may start" in run.runtime.may_fly
     assert MAY_FLY in run.events
 
 
 @pytest.mark.parametrize("name", ENDS)
-def test_what_ends_a_run_in_the_air_says_that_the_vehicle_may_be_flying(name: str) -> None:
+def test_run_that_ends_in_the_air_warns_that_vehicle_may_fly(name: str) -> None:
     way, ending, words = ENDS[name]
     run = flying()
     way(run)
@@ -138,7 +138,7 @@ def test_what_ends_a_run_in_the_air_says_that_the_vehicle_may_be_flying(name: st
 
 
 @pytest.mark.parametrize("ending", [Interrupted(0), None])
-def test_what_was_seen_to_land_is_not_said_to_fly(ending: Interrupted | None) -> None:
+def test_observed_landing_gives_no_warning(ending: Interrupted | None) -> None:
     run = flying()
     if ending is not None:
         run.tick(ending)
@@ -156,7 +156,7 @@ def test_a_command_that_was_obeyed_and_then_failed_on_the_ground_is_told() -> No
     run.tick(CommandFailed(0, token, "disarmed"))
     over(run)
     assert run.ending is Ending.REFUSED
-    assert "approach it as one that may start" in run.runtime.may_fly
+    assert "approach it as if it may start" in run.runtime.may_fly
     assert MAY_FLY in run.events
 
 
@@ -166,7 +166,7 @@ def test_a_refusal_with_nothing_sent_says_nothing_of_flying() -> None:
     assert over(run).runtime.may_fly == ""
 
 
-def test_a_crash_has_words_of_its_own() -> None:
+def test_crash_has_its_own_text() -> None:
     run = flying()
     run.tick(Crashed(0, "it leans 80 degrees"))
     assert (over(run).ending, run.runtime.may_fly) == (Ending.CRASHED, "")
@@ -181,7 +181,7 @@ def test_a_pilot_and_a_failsafe_take_over_with_different_words() -> None:
     assert details == ["Position", "by its own failsafe: RTL"]
 
 
-def test_what_no_waiting_changes_ends_the_wait_at_once() -> None:
+def test_unfit_vehicle_ends_the_wait_at_once() -> None:
     run = start(ready=False)
     began_us = run.clock.now().monotonic_us
     run.tick(VehicleUnfit(0, "the vehicle returns at 15 m (`RTL_ALT`), and the policy says 30 m"))

@@ -73,7 +73,7 @@ Situation = Callable[[], Run]
 
 
 @rows("situation", GROUND + AIR)
-def test_the_pilot_wins_at_once(situation: Situation) -> None:
+def test_pilot_takeover_ends_run_at_once(situation: Situation) -> None:
     run = situation()
     flown = list(run.flown)
     run.tick(TakenOver(0, "POSCTL"))
@@ -157,7 +157,7 @@ def test_a_link_that_stays_away_ends_the_run(situation: Situation) -> None:
     assert run.flown == flown, "nothing is sent that would not arrive"
     assert run.clock.now().monotonic_us - began >= waited_us, "in the air it may come back as long as it can fly"
     (detail,) = [record["detail"] for record in run.records if record.get("event") == "stood-down"]
-    seen = {waiting: "it never said whether it was in the air"}
+    seen = {waiting: "the vehicle never reported whether it was in the air"}
     seen |= dict.fromkeys((deferred_on_the_ground, taking_off), "last seen on the ground")
     last_seen = seen.get(situation, "last seen in the air")
     flies = situation in AIR
@@ -172,13 +172,13 @@ def test_a_failsafe_while_the_link_was_lost_is_the_autopilots() -> None:
     assert run.ending is Ending.STOOD_DOWN
 
 
-def test_what_failed_meanwhile_falls_back_once_the_link_is_back() -> None:
+def test_failure_during_silence_falls_back_when_link_returns() -> None:
     run = running()
     token = run.vehicle.commands[-1].token
     run.tick(LinkLost(0), CommandFailed(0, token, "no-effect"))
     assert run.flown[-1] == "inspect_area"
     (detail,) = [record["detail"] for record in run.records if record.get("event") == "failed"]
-    assert detail == "no-effect; the link is silent: what the vehicle does is not known"
+    assert detail == "no-effect; the link is silent: the state of the vehicle is unknown"
     run.tick(LinkBack(0))
     assert run.flown[-1] == "hover"
     assert run.until_over().ending is Ending.ABORTED
@@ -194,7 +194,7 @@ def test_interrupted_while_the_link_is_lost_falls_back_once_it_is_back() -> None
 
 
 @pytest.mark.parametrize("situation", GROUND)
-def test_no_evidence_no_flight(situation: Situation) -> None:
+def test_flight_needs_working_evidence(situation: Situation) -> None:
     run = situation()
     run.tick(EvidenceFailed(0, "disk full"))
     assert run.ending is Ending.EVIDENCE_LOST
@@ -285,7 +285,7 @@ def test_a_boundary_that_is_lost_on_the_ground_ends_the_run() -> None:
     assert run.flown == []
 
 
-def test_what_brings_it_home_goes_on_when_the_boundary_is_lost() -> None:
+def test_return_continues_when_boundary_is_lost() -> None:
     of = loaded()
     deaf = Deaf(of.boundary)
     run = Run(replace(of, boundary=deaf)).until_flies("return_home")

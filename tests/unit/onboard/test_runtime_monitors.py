@@ -173,7 +173,7 @@ def test_each_step_observes_once_whatever_it_decides(monkeypatch: pytest.MonkeyP
         run.clock.advance(TICK * (number % 2))
 
 
-def test_what_a_policy_without_monitors_records_has_no_word_of_them() -> None:
+def test_policy_without_monitors_records_no_monitor_field() -> None:
     run = start(loaded()).until_flies("takeoff")
     decided = [record["state"] for record in run.records if record["type"] == "decision"]
     assert decided

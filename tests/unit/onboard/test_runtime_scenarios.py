@@ -78,7 +78,7 @@ def test_the_same_events_give_the_same_bytes() -> None:
     assert first.until_over().lines == second.until_over().lines
 
 
-def test_what_dispatch_took_is_measured() -> None:
+def test_dispatch_latency_is_measured() -> None:
     run = start().until_over()
     remaining = [record["context"]["remaining_us"] for record in run.records if record["type"] == "decision"]  # type: ignore[index]
     assert remaining == [20_000] * 4, "conservative until there are enough measurements"
@@ -180,11 +180,11 @@ def test_a_skill_that_lasts_too_long_is_given_up() -> None:
     run.until_over(400)
     assert run.flown == ["takeoff", "goto", "hover", "return_home"]
     assert [record["detail"] for record in run.records if record.get("event") == "violated"] == [
-        "lasts longer than it may"
+        "exceeded its maximum duration"
     ]
 
 
-def test_what_kept_a_skill_from_getting_on_is_named_where_its_time_is_over() -> None:
+def test_timeout_names_the_hindrance() -> None:
     run = start(vehicle=FakeVehicle(deaf={"goto"})).until_flies("goto")
     token = run.vehicle.commands[-1].token
     run.step(Hindered(0, token - 1, "of the one before"))
@@ -193,7 +193,7 @@ def test_what_kept_a_skill_from_getting_on_is_named_where_its_time_is_over() -> 
     details = [record["detail"] for record in run.records if record.get("event") in ("violated", "noted")]
     assert details == [
         "it flies at 1.0 m/s instead of 5.0 m/s",
-        "lasts longer than it may: it flies at 1.0 m/s instead of 5.0 m/s",
+        "exceeded its maximum duration: it flies at 1.0 m/s instead of 5.0 m/s",
     ]
     assert run.flown == ["takeoff", "goto", "hover", "return_home"]
 
@@ -303,7 +303,7 @@ def test_without_another_step_it_falls_back_at_the_deadline() -> None:
     assert (run.ending, run.events.count("replan")) == (Ending.ABORTED, 1)
 
 
-def test_what_asks_for_another_step_flies_when_it_is_admitted_after_all() -> None:
+def test_step_awaiting_replacement_flies_when_admitted() -> None:
     run = waiting_to_be_replaced()
     run.vehicle.values[OBSTACLE] = 20 * M
     run.until_flies("inspect_area")
@@ -393,7 +393,7 @@ def test_a_vehicle_that_is_never_ready() -> None:
     assert "never-ready" in run.events
 
 
-def test_ready_without_a_word_on_the_air_state_waits() -> None:
+def test_ready_vehicle_without_air_state_waits() -> None:
     run = start(ready=False)
     run.tick(Ready(0))
     assert run.flown == []
@@ -457,7 +457,7 @@ def test_a_mission_that_ends_in_the_air_is_brought_down() -> None:
     assert run.ending is Ending.ABORTED
 
 
-def test_words_about_commands_that_are_over_mean_nothing() -> None:
+def test_reports_about_ended_commands_are_ignored() -> None:
     run = start().until_flies("goto")
     token = run.vehicle.commands[0].token
     run.tick(Succeeded(0, token), CommandFailed(0, token, "late"), Succeeded(0, 10**9))
@@ -516,7 +516,7 @@ def test_a_step_of_which_a_frame_left_does_not_come_again(skill: str) -> None:
     run.until_over()
 
 
-def test_a_hold_that_was_late_is_none_of_a_step() -> None:
+def test_late_hold_does_not_count_as_step() -> None:
     run = start().until_flies("goto")
     run.vehicle.values[WIND] = 12 * M
     run.until_flies("hover")
@@ -547,7 +547,7 @@ def test_a_permit_that_comes_too_late_by_the_boundarys_clock_is_given_up_later(a
     assert run.until_over().ending is (Ending.COMPLETED if again else Ending.REFUSED)
 
 
-def test_readings_that_make_no_sense_are_unknown_or_ignored() -> None:
+def test_invalid_readings_are_unknown_or_ignored() -> None:
     run = start().until_flies("inspect_area")
     run.tick(Readings(run.clock.now().monotonic_us + TICK, ((99, 1), (-1, 1), (OBSTACLE, 1 << 80))))
     reading = next(r for r in run.runtime.view(run.clock.now()).signals if r.name == "obstacle.distance")

@@ -227,7 +227,7 @@ def test_a_silence_that_is_not_too_long_gives_nothing_up(seconds: float) -> None
 
 
 @pytest.mark.parametrize("situation", [falling, returning])
-def test_what_is_on_its_way_home_or_down_goes_on(situation: Situation) -> None:
+def test_return_or_landing_under_way_continues(situation: Situation) -> None:
     run = situation(AfterSilence.CONTINGENCY)
     be_silent(run, 45)
     come_back(run, 0)
@@ -267,7 +267,7 @@ def test_a_breach_is_judged_once_all_is_fresh_and_not_before(order: int) -> None
     assert run.events.index("fresh") < run.events.index("violated")
 
 
-def test_what_does_not_come_again_is_waited_for_and_then_has_its_grace() -> None:
+def test_missing_signal_is_awaited_then_gets_grace() -> None:
     run = running(AfterSilence.CONTINUE)
     be_silent(run, 8)
     back_us = run.clock.now().monotonic_us
@@ -286,7 +286,7 @@ def test_what_does_not_come_again_is_waited_for_and_then_has_its_grace() -> None
     assert_audited(run)
 
 
-def test_what_was_missing_before_is_not_waited_for() -> None:
+def test_signal_missing_before_silence_is_not_awaited() -> None:
     run = start(vehicle=FakeVehicle(deaf={"goto"})).until_flies("goto")
     run.vehicle.silent = {OBSTACLE}
     run.until(lambda run: run.clock.now().monotonic_us > 510 * S)
@@ -296,7 +296,7 @@ def test_what_was_missing_before_is_not_waited_for() -> None:
     assert detail in {f"after {count * EACH_US // 1_000} ms" for count in range(8)}, "before its time was over"
 
 
-def test_what_was_measured_before_the_loss_is_not_fresh() -> None:
+def test_value_measured_before_loss_is_not_fresh() -> None:
     """A link that was slow hands over what it held."""
     run = running(AfterSilence.CONTINUE)
     be_silent(run, 5)
@@ -433,7 +433,7 @@ def test_the_time_limit_of_a_step_runs_in_link_time_and_its_reason_names_the_sil
     lasted_us = run.clock.now().monotonic_us - began_us
     assert abs(lasted_us - away_us - LIMIT_US) <= S * (len(gaps) + 1) // 2
     (reason,) = violations(run)
-    assert reason.startswith("lasts longer than it may")
+    assert reason.startswith("exceeded its maximum duration")
     assert ("without a link" in reason) == (gaps != (0,))
 
 
@@ -504,7 +504,7 @@ def test_a_vehicle_that_landed_in_the_silence_has_landed() -> None:
 
 @rows("moment", ["lost", "back"])
 @rows("situation", AIR)
-def test_the_pilot_wins_in_the_silence(situation: Situation, moment: str) -> None:
+def test_pilot_takeover_during_silence_ends_run(situation: Situation, moment: str) -> None:
     run = situation(AfterSilence.CONTINGENCY)
     flown = list(run.flown)
     be_silent(run, 45)
@@ -543,7 +543,7 @@ def test_a_vehicle_that_can_still_fly_is_waited_for(situation: Situation) -> Non
 
 
 @pytest.mark.parametrize("before", [0, 5, 120])
-def test_who_asks_for_the_end_in_a_silence_does_not_wait_for_hours(before: int) -> None:
+def test_stop_request_during_silence_is_bounded(before: int) -> None:
     """The vehicle has its chance to come back; then it is given up, as it would be on the ground."""
     run = running(AfterSilence.CONTINUE)
     run.step(LinkLost(0))
@@ -586,7 +586,7 @@ def go_on(run: Run, us: int) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("situation", AIR)
-def test_one_that_answers_nothing_is_waited_for_as_long_as_it_can_fly(situation: Situation) -> None:
+def test_unresponsive_vehicle_is_awaited_while_it_can_fly(situation: Situation) -> None:
     """Its chain is flown meanwhile, as far as it may arrive, and its end is not the end of the run."""
     run = mute(situation(AfterSilence.CONTINUE))
     go_on(run, SHORT.endurance_us + Limits().silent_us - TICK)
@@ -600,7 +600,7 @@ def test_one_that_answers_nothing_is_waited_for_as_long_as_it_can_fly(situation:
     assert_audited(run)
 
 
-def test_one_that_answers_again_is_brought_down_however_often_it_was_told_in_vain() -> None:
+def test_vehicle_that_answers_again_is_brought_down() -> None:
     run = mute(returning(AfterSilence.CONTINUE))
     run.vehicle.deaf, run.vehicle.fails = set(), {"return_home", "emergency_land"}
     run.until(lambda run: run.flown.count("emergency_land") > 2 * Limits().tries + 4)
@@ -612,7 +612,7 @@ def test_one_that_answers_again_is_brought_down_however_often_it_was_told_in_vai
     assert_audited(run)
 
 
-def test_once_it_answers_again_it_is_waited_for_anew() -> None:
+def test_wait_restarts_when_vehicle_answers_again() -> None:
     run = mute(running(AfterSilence.CONTINUE))
     go_on(run, SHORT.endurance_us)
     run.tick(VehicleAnswers(0, answers=True), VehicleAnswers(0, answers=True))
@@ -622,7 +622,7 @@ def test_once_it_answers_again_it_is_waited_for_anew() -> None:
 
 
 @pytest.mark.parametrize("situation", GROUND)
-def test_on_the_ground_one_that_answers_nothing_is_waited_for_as_a_silent_one(situation: Situation) -> None:
+def test_unresponsive_vehicle_on_ground_is_awaited_like_silent_one(situation: Situation) -> None:
     run = mute(situation(AfterSilence.CONTINUE))
     go_on(run, Limits().silent_us - TICK)
     assert run.ending is None
@@ -632,7 +632,7 @@ def test_on_the_ground_one_that_answers_nothing_is_waited_for_as_a_silent_one(si
 
 
 @pytest.mark.parametrize("silent", [False, True])
-def test_the_wait_is_one_whether_or_not_it_is_silent_too(silent: bool) -> None:
+def test_silence_and_no_answer_share_one_wait(silent: bool) -> None:
     run = mute(running(AfterSilence.CONTINUE))
     go_on(run, SHORT.endurance_us)
     run.step(*([LinkLost(0)] if silent else []), VehicleAnswers(0, answers=False))
@@ -641,7 +641,7 @@ def test_the_wait_is_one_whether_or_not_it_is_silent_too(silent: bool) -> None:
 
 
 @pytest.mark.parametrize("situation", AIR)
-def test_one_that_answers_nothing_and_is_seen_to_land_or_flown_by_others_is_not_waited_for(
+def test_landed_or_taken_over_vehicle_is_not_awaited(
     situation: Situation,
 ) -> None:
     run = mute(situation(AfterSilence.CONTINUE))
@@ -652,7 +652,7 @@ def test_one_that_answers_nothing_and_is_seen_to_land_or_flown_by_others_is_not_
     assert run.ending is Ending.ABORTED
 
 
-def test_who_asks_for_the_end_of_one_that_answers_nothing_does_not_wait_for_hours() -> None:
+def test_stop_request_for_unresponsive_vehicle_is_bounded() -> None:
     run = mute(running(AfterSilence.CONTINUE))
     go_on(run, 60 * S)
     run.step(Interrupted(0))
@@ -674,7 +674,7 @@ BATCH: tuple[Callable[[Run], Event], ...] = (
 
 
 @rows("order", list(permutations(range(len(BATCH)))))
-def test_nothing_lands_whatever_the_order_of_what_came_at_once(order: tuple[int, ...]) -> None:
+def test_order_of_simultaneous_events_does_not_matter(order: tuple[int, ...]) -> None:
     run = running(AfterSilence.CONTINUE)
     be_silent(run, 6)
     run.step(*(BATCH[number](run) for number in order))

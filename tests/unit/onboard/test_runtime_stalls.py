@@ -112,7 +112,7 @@ def test_nothing_is_judged_before_the_vehicle_reported_again(situation: object, 
     assert_audited(run)
 
 
-def test_what_waited_to_be_read_and_is_too_old_is_no_fresh_state() -> None:
+def test_old_buffered_state_is_not_fresh() -> None:
     run = running()
     before_us = run.clock.now().monotonic_us
     stand_still(run, 20 * S)
@@ -123,7 +123,7 @@ def test_what_waited_to_be_read_and_is_too_old_is_no_fresh_state() -> None:
     assert "violated" not in run.events
 
 
-def test_what_waited_to_be_read_and_is_current_is_judged_at_once() -> None:
+def test_current_buffered_state_is_judged_at_once() -> None:
     run = running()
     now_us = run.clock.now().monotonic_us
     values = tuple((slot, run.vehicle.values[slot]) for group in SLOTS for slot in group)
@@ -131,7 +131,7 @@ def test_what_waited_to_be_read_and_is_current_is_judged_at_once() -> None:
     assert details(run, "fresh") == ["after 0 ms"]
 
 
-def test_what_does_not_come_is_waited_for_no_longer_than_after_a_silence() -> None:
+def test_wait_after_stall_is_as_long_as_after_silence() -> None:
     run = running()
     run.vehicle.values[POSITION_X] = None
     stand_still(run, 5 * S)
@@ -196,13 +196,13 @@ def test_a_stall_within_a_silence(back: bool) -> None:
     assert_audited(run)
 
 
-def test_a_moment_between_two_steps_is_no_stall() -> None:
+def test_short_pause_is_not_a_stall() -> None:
     run = running()
     stand_still(run, Limits().stalled_us)
     assert STOOD_STILL not in run.events
 
 
-def test_a_run_that_is_over_tells_of_no_stall() -> None:
+def test_ended_run_reports_no_stall() -> None:
     run = start().until_over()
     assert run.ending is Ending.COMPLETED
     stand_still(run, 10 * S)
@@ -210,7 +210,7 @@ def test_a_run_that_is_over_tells_of_no_stall() -> None:
     assert STOOD_STILL not in run.events
 
 
-def test_what_ends_the_wait_for_a_step_is_recorded_though_nothing_flies() -> None:
+def test_end_of_wait_on_ground_is_recorded() -> None:
     """Between two steps no command ends by it."""
     run = start(FakeVehicle(deaf={"goto"})).until_flies("goto")
     for slot in (POSITION_X, OBSTACLE, FIX):  # the next step is deferred, and no hold may fly

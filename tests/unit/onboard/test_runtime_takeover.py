@@ -108,7 +108,7 @@ TRIED = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("stage", "along", "last"), TRIED)
-def test_it_wins_over_whatever_comes_with_it_in_any_order(stage: Callable[[], Run], along: str, last: Event) -> None:
+def test_takeover_outweighs_simultaneous_events(stage: Callable[[], Run], along: str, last: Event) -> None:
     template = stage()
     commands = len(template.vehicle.commands)
     batch = (last, *WITH[along](template.vehicle.commands[-1].token if commands else 0))
@@ -196,7 +196,7 @@ def test_no_hold_of_the_contingency_is_tried_either_after_one_that_failed() -> N
     assert run.ending is Ending.ABORTED
 
 
-def test_a_late_word_about_another_command_is_no_failed_hold() -> None:
+def test_late_report_about_other_command_is_not_a_failed_hold() -> None:
     run = held()
     run.tick(CommandFailed(0, run.vehicle.commands[-2].token, "did-not-stop"))
     for _ in range(20):

@@ -159,7 +159,7 @@ def test_a_hold_is_watched(slot: int, value: int | None, text: str) -> None:
     assert_audited(run)
 
 
-def test_a_hold_bears_with_unknown_within_the_grace() -> None:
+def test_hold_tolerates_unknown_within_grace() -> None:
     run = waiting_aloft()
     run.vehicle.values[BATTERY] = None
     for _ in range(9):
@@ -179,20 +179,20 @@ def left(run: Run) -> Runtime:
 
 
 @pytest.mark.parametrize("skill", ["goto", "inspect_area"])
-def test_who_leaves_a_flight_tells_it_to_land_first(skill: str) -> None:
+def test_leaving_a_flight_lands_it_first(skill: str) -> None:
     run = Run().until_flies(skill)
     assert left(run).homeward
     assert run.flown[-1] == "emergency_land"
 
 
-def test_who_leaves_a_return_lets_it_return() -> None:
+def test_leaving_a_return_lets_it_continue() -> None:
     run = Run().until_flies("return_home")
     assert left(run).homeward
     assert run.flown[-1] == "return_home"
 
 
 @pytest.mark.parametrize("begin", [lambda: Run(ready=False), lambda: Run(ready=False, vehicle=flying())])
-def test_who_leaves_what_is_not_ours_sends_nothing(begin: Callable[[], Run]) -> None:
+def test_leaving_a_foreign_flight_sends_nothing(begin: Callable[[], Run]) -> None:
     run = begin()
     run.step(AirState(0, run.vehicle.armed, run.vehicle.airborne))
     assert not left(run).homeward

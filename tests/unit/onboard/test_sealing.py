@@ -127,7 +127,7 @@ def test_a_seal_that_is_late_does_not_hide_that_the_boundary_was_lost_before(jou
     assert [kind for kind, _ in told(journal, late)] == ["boundary-lost", "seal", "dispatched"]
 
 
-def test_what_the_boundary_made_before_it_was_lost_is_recorded_before_the_loss(journal: Journal) -> None:
+def test_boundary_entries_are_recorded_before_its_loss(journal: Journal) -> None:
     """The seal is late in the very step in which the loss is found: it waits for what was told before."""
     late = EPOCH_US + EPOCH_US // 5
     decision = partial(journal.recorder.effect, at(late), "approval")

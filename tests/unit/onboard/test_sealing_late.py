@@ -85,9 +85,7 @@ def lines_of(steps: list[tuple[int, int, bool, bool]], end_us: int, *, signs: bo
 
 @settings(max_examples=settings().max_examples * 4)
 @given(steps=STEPS, end_us=some.integers(0, 70 * S), signs=some.booleans())
-def test_however_late_it_is_its_log_verifies(
-    steps: list[tuple[int, int, bool, bool]], end_us: int, signs: bool
-) -> None:
+def test_log_verifies_after_any_late_seal(steps: list[tuple[int, int, bool, bool]], end_us: int, signs: bool) -> None:
     given_to_disk = list(lines_of(steps, end_us, signs=signs))
     lines = [line for line, _ in given_to_disk]
     report = verify(lines)
@@ -102,7 +100,7 @@ def test_however_late_it_is_its_log_verifies(
 
 
 @given(steps=STEPS, signs=some.booleans())
-def test_wherever_it_breaks_off_it_is_recovered(steps: list[tuple[int, int, bool, bool]], signs: bool) -> None:
+def test_interrupted_log_is_recovered_at_any_point(steps: list[tuple[int, int, bool, bool]], signs: bool) -> None:
     lines = [line for line, _ in lines_of(steps, 0, signs=signs)][:-1]
     examination = Examination(KEY.public)
     for line in lines:

@@ -27,7 +27,7 @@ INSPECT = 2
         (flat.NEAR_AREA.text, {flat.POSITION_Y: None}, "height = 20 m, position = unknown"),
     ],
 )
-def test_the_signals_that_a_text_reads_are_told(text: str, values: dict[int, int | None], told: str) -> None:
+def test_signals_of_clause_are_shown(text: str, values: dict[int, int | None], told: str) -> None:
     policy = prepare(flat.POLICY)
     assert not isinstance(policy, Refusal)
     invocations = prepare_mission(flat.MISSION, policy)
@@ -36,7 +36,7 @@ def test_the_signals_that_a_text_reads_are_told(text: str, values: dict[int, int
     assert seen(text, invocations[INSPECT], policy, state) == told
 
 
-def test_of_a_rule_and_of_the_airspace_too() -> None:
+def test_signals_of_rule_and_airspace_are_shown() -> None:
     policy = prepare(flat.POLICY)
     assert not isinstance(policy, Refusal)
     invocations = prepare_mission(flat.MISSION, policy)

@@ -8,7 +8,7 @@ from rtshcua.onboard.runtime.monitor import StateMonitor
 from rtshcua.wire.request import MAX_AGE_US
 
 
-def test_nothing_received_is_unknown_and_of_no_age() -> None:
+def test_missing_signal_is_unknown_with_age_zero() -> None:
     state = StateMonitor(POLICY).state(1_000)
     assert (state.values, state.ages, state.monitors) == ((None,) * flat.SLOTS, (0,) * flat.SLOTS, ())
 
@@ -21,7 +21,7 @@ def test_values_age_until_they_are_reported_again() -> None:
     assert (state.values[:2], state.ages[:2]) == ((7, None), (300, 100))
 
 
-def test_a_report_older_than_the_one_held_is_set_aside() -> None:
+def test_older_report_is_dropped() -> None:
     monitor = StateMonitor(POLICY)
     monitor.update(Readings(300, ((0, 7),)))
     monitor.update(Readings(200, ((0, 8),)))

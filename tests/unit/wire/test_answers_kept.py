@@ -25,7 +25,7 @@ def slug(of: Approvals, step: int) -> str:
     return "kept"
 
 
-def test_what_does_not_fit_is_refused_and_what_is_there_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_answer_beyond_limit_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(approval, "MAX_ANSWERS", 3)
     of = Approvals(POLICY)
     assert [slug(of, step) for step in range(5)] == ["kept"] * 3 + ["too-many"] * 2

@@ -75,7 +75,7 @@ def test_anything_else_is_refused(data, slug, text):
         ),
     ],
 )
-def test_name_and_version_come_before_all_that_is_below(data, slug, text):
+def test_name_and_version_are_checked_first(data, slug, text):
     with pytest.raises(ArtefactError) as refused:
         unwrap(names.POLICY, data)
     assert (refused.value.slug, str(refused.value)) == (slug, text)

@@ -90,7 +90,7 @@ def test_the_same_mission_gives_the_same_bytes_and_another_time_other_ids() -> N
 
 
 @rows("field", [field for field in Invocation.__struct_fields__ if field != "binding"])
-def test_no_field_of_an_invocation_can_change_unseen(field: str) -> None:
+def test_binding_covers_every_invocation_field(field: str) -> None:
     bound = bind(mission(), DIGEST)
     changed = msgspec.structs.replace(bound.invocations[1], **{field: other(getattr(bound.invocations[1], field))})
     forged = msgspec.structs.replace(bound, invocations=(bound.invocations[0], changed))
@@ -98,7 +98,7 @@ def test_no_field_of_an_invocation_can_change_unseen(field: str) -> None:
 
 
 @rows("field", Contract.__struct_fields__)
-def test_no_field_of_its_contract_can_change_unseen(field: str) -> None:
+def test_binding_covers_every_contract_field(field: str) -> None:
     bound = bind(mission(), DIGEST)
     invocation = bound.invocations[0]
     weaker = msgspec.structs.replace(invocation.contract, **{field: other(getattr(invocation.contract, field))})
@@ -106,7 +106,7 @@ def test_no_field_of_its_contract_can_change_unseen(field: str) -> None:
 
 
 @rows("field", ["policy_digest", "policy", "policy_version", "vehicle", "name", "issued_at_us", "phases"])
-def test_what_it_stands_in_cannot_change_unseen(field: str) -> None:
+def test_binding_covers_context(field: str) -> None:
     bound = bind(mission(), DIGEST)
     assert first_unbound(msgspec.structs.replace(bound, **{field: other(getattr(bound, field))})) == 0
 

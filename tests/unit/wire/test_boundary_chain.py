@@ -73,7 +73,7 @@ CHANGES: dict[str, tuple[Callable[[BoundaryChain], object], str]] = {
 
 
 @pytest.mark.parametrize("counter", CHANGES)
-def test_what_is_only_counted_changes_a_digest_of_its_own(counter: str) -> None:
+def test_counted_events_change_only_aside_digest(counter: str) -> None:
     change, digest = CHANGES[counter]
     chain = BoundaryChain()
     before = chain.add(Tag.UNPREPARED, b"")

@@ -19,7 +19,7 @@ def slug(data: bytes, *, trust: TrustRoot | None = None, vehicle: str | None = "
     return refused.value.slug
 
 
-def test_what_was_sealed_opens_as_it_was() -> None:
+def test_sealed_bundle_opens_unchanged() -> None:
     opened = bundle.open_bundle(sealed(), root=root(), vehicle="quad-07", now_us=NOW)
     assert opened.policy == THE_POLICY
     assert opened.mission.name == "look"
@@ -37,7 +37,7 @@ def test_a_bundle_for_another_vehicle() -> None:
     assert slug(sealed(), vehicle="quad-08") == "wrong-vehicle"
 
 
-def test_a_bundle_says_whose_it_is_whoever_signed_it() -> None:
+def test_claimed_vehicle_is_read_unverified() -> None:
     assert bundle.claimed_vehicle(sealed(key=STRANGER)) == "quad-07"
     with pytest.raises(Untrusted):
         bundle.claimed_vehicle(b"no bundle")
@@ -123,7 +123,7 @@ def test_a_payload_that_leaves_a_default_out() -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"\x80", artefact.wrap(names.POLICY, ()), artefact.wrap(names.BUNDLE, (b"",))])
-def test_bytes_that_are_no_bundle(data: bytes) -> None:
+def test_garbage_is_not_a_bundle(data: bytes) -> None:
     assert slug(data) in {"malformed", "unknown-format"}
 
 

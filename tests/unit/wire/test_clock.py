@@ -36,5 +36,5 @@ def test_a_time_within_both_errors_and_two_seconds(off_us: int, own_us: int, nam
         (UTC_UNKNOWN_US + 1, UTC_UNKNOWN_US + 1, False),
     ],
 )
-def test_where_none_is_known_none_is_claimed(utc_us: int, error_us: int, *, borne: bool) -> None:
+def test_unknown_time_allows_no_claim(utc_us: int, error_us: int, *, borne: bool) -> None:
     assert bears_out(Now(5, UTC_US, UTC_UNKNOWN_US), Now(5, utc_us, error_us)) is borne

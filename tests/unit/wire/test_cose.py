@@ -40,7 +40,7 @@ def rebuilt(protected=None, unprotected=None, payload=None, signature=None):
     return b"\xd2" + cbor.encode([o if n is None else n for o, n in zip(old, new, strict=True)])
 
 
-def test_what_is_signed_is_opened():
+def test_signed_envelope_opens():
     assert opened(ENVELOPE) == cose.Opened(PAYLOAD, PUBLIC)
     assert opened(ENVELOPE).key.kid == KEY.kid
     assert cose.sign1(PAYLOAD, key=KEY, duty=Duty.POLICY, content_type=TYPE) == ENVELOPE
@@ -62,12 +62,12 @@ def test_signing_refuses_the_wrong_duty():
         cose.sign1(PAYLOAD, key=KEY, duty=Duty.MISSION, content_type=names.MISSION.content_type)
 
 
-def test_unverified_says_what_is_claimed():
+def test_unverified_returns_claims():
     claimed = cose.unverified(ENVELOPE)
     assert (claimed.content_type, claimed.kid, claimed.payload) == (TYPE, KEY.kid, PAYLOAD)
 
 
-def test_keys_that_do_not_fit():
+def test_unsuitable_keys_are_refused():
     other = SigningKey.from_seed(bytes(32), duty=Duty.POLICY).verification()
     assert refusal(ENVELOPE, keys={}) == "unknown-key"
     assert refusal(ENVELOPE, keys={other.kid: other}) == "unknown-key"
@@ -76,7 +76,7 @@ def test_keys_that_do_not_fit():
     assert refusal(ENVELOPE, content_type=names.MISSION.content_type) == "wrong-content-type"
 
 
-def test_signatures_that_do_not_fit():
+def test_wrong_signatures_are_refused():
     signature = parts()[3]
     malleated = signature[:32] + (int.from_bytes(signature[32:], "little") + L).to_bytes(32, "little")
     assert refusal(rebuilt(signature=malleated)) == "bad-signature"
@@ -92,7 +92,7 @@ def test_a_key_is_named_by_its_whole_identifier():
     assert refusal(rebuilt(protected=cbor.encode(header | {5: 0}))) == "malformed"
 
 
-def test_only_its_own_form_is_taken():
+def test_only_canonical_form_is_accepted():
     assert refusal(b"") == "malformed"
     assert refusal(ENVELOPE[1:]) == "malformed"  # COSE allows an untagged message
     assert refusal(b"\xd8\x12" + ENVELOPE[1:]) == "malformed"  # tag 18, not in its shortest form

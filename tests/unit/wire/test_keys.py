@@ -98,14 +98,14 @@ def test_verification_carries_what_the_key_is():
     )
 
 
-def test_a_verification_key_that_cannot_be():
+def test_invalid_verification_key_is_refused():
     with pytest.raises(ValueError, match="a public key is 32 bytes, not 31"):
         VerificationKey(Duty.POLICY, bytes(31))
     with pytest.raises(ValueError, match="`pilot` is not a source"):
         VerificationKey(Duty.MISSION, bytes([2] * 32), sources=("agent", "pilot"))
 
 
-def test_a_key_that_anybody_signs_for_is_none():
+def test_small_order_key_is_refused():
     neutral, other_form = bytes([1]) + bytes(31), ((1 << 255) - 1).to_bytes(32, "little")
     for weak in (neutral, other_form):
         with pytest.raises(ValueError, match="in canonical form and not of small order"):
@@ -201,7 +201,7 @@ def test_a_key_that_an_earlier_version_encrypted_is_read():
 COST = key_file.COST
 
 
-def test_a_guess_costs_what_the_page_says(monkeypatch):
+def test_passphrase_guess_has_documented_cost(monkeypatch):
     """N is 2**17 in what is written: 128 MiB a guess. Salts are drawn."""
     first = dump_signing_key(signing_key(), passphrase=PASSPHRASE)
     monkeypatch.setattr(key_file, "COST", COST)
@@ -287,7 +287,7 @@ def test_any_changed_byte_gives_a_refusal_or_another_key(at, byte):
     assert (key.kid == signing_key().kid) is (damaged == PLAIN)
 
 
-def test_a_machine_without_the_memory_that_a_guess_takes_is_told(monkeypatch):
+def test_missing_memory_for_key_is_reported(monkeypatch):
     class Full:
         def __init__(self, **_):
             pass

@@ -16,26 +16,26 @@ ONE = Preparation(1, False, 5, (ParameterWrite("FENCE_RADIUS", 1, 2),))
 
 
 @given(PREPARATIONS)
-def test_it_comes_back_as_it_went(preparation: Preparation) -> None:
+def test_preparation_roundtrip(preparation: Preparation) -> None:
     assert decode(encode(preparation)) == preparation
     assert open_preparation(seal(preparation, KEY), KEY) == preparation
     assert open_preparation(seal(preparation, KEY), OTHER) is None
 
 
 @given(st.binary(max_size=200))
-def test_hostile_octets_are_none(data: bytes) -> None:
+def test_hostile_octets_are_refused(data: bytes) -> None:
     found = decode(data)
     assert found is None or encode(found) == data
     assert open_preparation(data, KEY) is None
 
 
-def test_no_octet_of_a_permit_can_be_another() -> None:
+def test_changed_permit_octet_is_refused() -> None:
     sealed = seal(ONE, KEY)
     for at in range(len(sealed)):
         assert open_preparation(sealed[:at] + bytes([sealed[at] ^ 1]) + sealed[at + 1 :], KEY) is None
 
 
-def test_what_is_no_body() -> None:
+def test_malformed_body_is_refused() -> None:
     body = encode(ONE)
     assert decode(body) == ONE
     name = body.index(b"FENCE")
@@ -47,6 +47,6 @@ def test_what_is_no_body() -> None:
     assert decode(body[:18] + bytes([MOST + 1]) + body[19:]) is None
 
 
-def test_a_permit_lists_only_so_many() -> None:
+def test_permit_has_a_parameter_limit() -> None:
     with pytest.raises(ValueError, match="at most 32"):
         encode(Preparation(1, False, 5, ONE.writes * (MOST + 1)))

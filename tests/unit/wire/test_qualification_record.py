@@ -44,7 +44,7 @@ def slug(document: bytes, trusted: TrustRoot | None = None, vehicle: str = "quad
     return refused.value.slug
 
 
-def test_what_was_signed_is_opened() -> None:
+def test_signed_record_opens() -> None:
     signed = sign_qualification(RECORD, LOG)
     assert open_qualification(signed, root=root(), vehicle="quad-07", now_us=1_000) == RECORD
 
@@ -68,7 +68,7 @@ def test_a_key_that_has_expired_may_not_write_an_earlier_time() -> None:
     assert slug(sign_qualification(RECORD, LOG), root(expires_us=1_001), now_us=1_001) == "key-expired"
 
 
-def test_another_artefact_of_the_log_key_is_none() -> None:
+def test_other_artefact_of_log_key_is_refused() -> None:
     assert slug(cose.sign1(b"", key=LOG, duty=Duty.LOG, content_type=names.PROOF.content_type)) == "wrong-content-type"
     assert slug(bytes(MAX_QUALIFICATION + 1)) == "too-large"
 
@@ -87,7 +87,7 @@ def test_one_that_contradicts_itself_is_refused(change: dict[str, Any]) -> None:
     assert slug(sign_qualification(replace(RECORD, **change), LOG)) == "malformed"
 
 
-def test_what_qualifies() -> None:
+def test_record_qualifies_if_all_checks_passed() -> None:
     assert RECORD.qualifies
     assert replace(RECORD, checks=(HELD, TOLD)).qualifies
     assert not replace(RECORD, checks=(TOLD,)).qualifies
@@ -96,10 +96,10 @@ def test_what_qualifies() -> None:
     assert mixed.failed == (FAILED,)
 
 
-def test_what_changed_since_is_said() -> None:
+def test_changes_since_record_are_listed() -> None:
     assert RECORD.changes(PX4, dict(PARAMETERS)) == ()
     assert RECORD.changes(None, {}) == ()
-    assert RECORD.changes(PX4, {"GF_ACTION": bytes(8)}) == ("changed since: `GF_ACTION`",)
-    assert RECORD.changes(PX4, {"NEW": bytes(8), "GF_ACTION": bytes(8)}) == ("changed since: `GF_ACTION`, `NEW`",)
+    assert RECORD.changes(PX4, {"GF_ACTION": bytes(8)}) == ("parameters `GF_ACTION`",)
+    assert RECORD.changes(PX4, {"NEW": bytes(8), "GF_ACTION": bytes(8)}) == ("parameters `GF_ACTION`, `NEW`",)
     other = Firmware("px4", 0x01110000, bytes(8))
     assert RECORD.changes(other, {}) == ("its firmware is px4 1.17.0, and was px4 1.16.0 (build 0a1b2c3d)",)

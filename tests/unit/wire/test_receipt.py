@@ -12,12 +12,12 @@ INTEGERS = st.integers(-(1 << 63), (1 << 63) - 1)
 
 
 @given(st.builds(Receipt, INTEGERS, st.text(), st.text(), INTEGERS, INTEGERS, INTEGERS, INTEGERS, st.binary()))
-def test_what_is_encoded_is_decoded(receipt: Receipt) -> None:
+def test_receipt_roundtrip(receipt: Receipt) -> None:
     assert decode(encode(receipt)) == receipt
 
 
 @given(st.binary(max_size=60))
-def test_no_other_bytes_are_one(data: bytes) -> None:
+def test_other_bytes_are_not_a_receipt(data: bytes) -> None:
     assert isinstance(decode(data), Refusal)
 
 
@@ -34,7 +34,7 @@ def test_no_other_bytes_are_one(data: bytes) -> None:
         (1, "a", "b", 1, 1, 1, 1, ""),
     ],
 )
-def test_other_bodies_are_none(body: object) -> None:
+def test_other_bodies_are_refused(body: object) -> None:
     assert isinstance(decode(artefact.wrap(names.RECEIPT, body)), Refusal)
 
 

@@ -40,7 +40,7 @@ def requests(draw: st.DrawFn) -> Request:
 
 
 @given(requests())
-def test_what_is_encoded_is_read_back_and_fits(asked: Request) -> None:
+def test_request_roundtrip_fits_limit(asked: Request) -> None:
     data = request.encode(asked)
     assert len(data) <= MAX_SIZE
     assert request.decode(data, len(asked.state.values), len(asked.state.monitors)) == asked
@@ -127,7 +127,7 @@ def test_a_state_of_another_policy_is_refused() -> None:
     assert isinstance(request.decode(data, 3, 3), Refusal)
 
 
-def test_no_monitor_makes_what_does_not_fit() -> None:
+def test_monitor_state_fits_request() -> None:
     too_old = msgspec.structs.replace(plain(1), state=State((1,), (MAX_AGE_US + 1,)))
     with pytest.raises(struct.error):
         request.encode(too_old)

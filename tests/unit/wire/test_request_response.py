@@ -80,7 +80,7 @@ def test_clauses_are_numbered_from_the_rules_over_the_airspace_to_the_contract()
     st.integers(-(1 << 63), (1 << 63) - 1),
     st.just(b"") | st.binary(min_size=SIZE, max_size=SIZE),
 )
-def test_what_is_encoded_is_read_back(
+def test_response_roundtrip(
     outcome: Outcome, reason: Reason, clause: int, target: int, until_us: int, permit: bytes
 ) -> None:
     decisive = (
@@ -122,7 +122,7 @@ def changed(data: bytes, at: int, octet: int) -> bytes:
         (changed(REFUSAL, 20, 1), "a refusal contains more than its status"),
     ],
 )
-def test_what_is_no_response_says_why(data: bytes, text: str) -> None:
+def test_malformed_response_says_why(data: bytes, text: str) -> None:
     refused = read(data)
     assert isinstance(refused, Refusal)
     assert text in refused.text

@@ -26,7 +26,7 @@ def slug(data: bytes) -> str:
     return refused.value.slug
 
 
-def test_what_is_signed_is_read_back() -> None:
+def test_signed_statement_opens() -> None:
     assert open_statement(sign(SAID, KEY), KEYS) == claimed(sign(SAID, KEY)) == SAID
     whole = replace(SAID, marks=b"m" * 1024, count=(1 << 63) - 1, final=True)
     assert open_statement(sign(whole, KEY), KEYS) == whole
@@ -49,7 +49,7 @@ def test_no_key_of_another_duty_signs_one() -> None:
         {"source": 5}, {"at_us": -1}, {"utc_us": -1}, {"utc_error_us": -1},
     ],
 )  # fmt: skip
-def test_what_is_out_of_range_is_malformed(fields: dict[str, object]) -> None:
+def test_statement_out_of_range_is_malformed(fields: dict[str, object]) -> None:
     assert slug(sign(replace(SAID, **fields), KEY)) == "malformed"
 
 

@@ -295,7 +295,7 @@ def revoking(*names, **fields):
     return changed(**{"version": 2, "revoked": names, "keys": (ROOT.verification(), NEXT.verification())} | fields)
 
 
-def test_what_is_revoked_stays_revoked():
+def test_revoked_key_stays_revoked():
     second = open_successor(revoking(AGENT.kid).sign(ROOT), current=TRUST, now_us=200)
     assert (TRUST.revocations, second.revocations) == (frozenset(), {AGENT.kid})
     assert succession(revoking(POLICY.kid, version=3).sign(ROOT), current=second) == "unrevoked"
@@ -304,7 +304,7 @@ def test_what_is_revoked_stays_revoked():
     assert open_successor(third.sign(NEXT), current=second, now_us=200) == third
 
 
-def test_a_revoked_root_key_signs_no_root_more():
+def test_revoked_root_key_signs_no_new_root():
     second = revoking(ROOT.kid, keys=(NEXT.verification(),))
     assert refusal(second.sign, ROOT) == "not-self-signed"
     both = revoking(ROOT.kid, version=3)  # names it again
@@ -373,7 +373,7 @@ def speaking(key=AGENT_KEY, *, role="operator", source="agent", vehicle="quad-07
     return speaker_refusal(key, role=role, source=source, vehicle=vehicle, now_us=now_us)
 
 
-def test_an_agents_host_speaks_as_agent_only():
+def test_agent_host_acts_as_agent_only():
     assert speaking() is None
     assert speaking(source="operator") == "wrong-source"
     assert speaking(role="supervisor") == "wrong-role"
@@ -402,7 +402,7 @@ def test_any_stands_for_roles_and_vehicles_but_never_for_sources():
         AGENT.verification(sources=(ANY,))
 
 
-def test_nothing_listed_is_nothing_allowed():
+def test_empty_lists_allow_nothing():
     assert key_refusal(POLICY.verification(), vehicle="quad-07", now_us=0) == "wrong-vehicle"
     assert key_refusal(POLICY.verification(vehicles=("quad-07",)), vehicle="quad-07", now_us=0) is None
     assert speaking(AGENT.verification(vehicles=(ANY,), sources=("agent",))) == "wrong-role"

@@ -55,7 +55,7 @@ def cosigned(log: SealedLog, at: int, time_s: int = 1_750_000_100, key: SigningK
     return str(note) + cosign(text, time_s, key.public, lambda data: key.sign(data, duty=key.duty))
 
 
-def test_what_witnesses_cosigned_is_put_below(log: SealedLog) -> None:
+def test_cosignatures_are_appended_below_checkpoint(log: SealedLog) -> None:
     plain = proof(prove_inclusion(lambda: log.lines, 3))
     assert not proven(plain).believed.anchored
     at = log.signed[1]
@@ -138,7 +138,7 @@ def test_checkpoints_of_one_log_are_consistent(log: SealedLog) -> None:
     assert slug(prove_consistency(lambda: log.lines, log.signed[1], 3)) == "proof/number"
 
 
-def test_what_is_not_sealed_yet_is_not_proven() -> None:
+def test_unsealed_record_has_no_proof() -> None:
     log = sealed_log(closed=False)
     last = len(log.lines) - 1
     assert slug(prove_inclusion(lambda: log.lines, last)) == "proof/unsealed"
@@ -150,7 +150,7 @@ def test_what_is_not_sealed_yet_is_not_proven() -> None:
     assert slug(prove_inclusion(lambda: (), 0)) == "proof/no-log"
 
 
-def test_a_log_that_is_cut_while_it_is_read() -> None:
+def test_log_truncated_during_proof_is_refused() -> None:
     log = sealed_log()
     for make in (
         lambda lines: prove_inclusion(lines, 3),
@@ -161,7 +161,7 @@ def test_a_log_that_is_cut_while_it_is_read() -> None:
         assert slug(make(lambda times=times: next(times))) == "proof/log"
 
 
-def test_no_proof_is_made_of_a_log_that_does_not_hold() -> None:
+def test_invalid_log_gives_no_proof() -> None:
     lines = list(sealed_log().lines)
     changed = [*lines[:3], lines[3].replace(b'"token":3', b'"token":4'), *lines[4:]]
     assert slug(prove_inclusion(lambda: changed, 3)) == "proof/path"
@@ -197,7 +197,7 @@ def test_a_receipt_verifies_alone(log: SealedLog) -> None:
         assert isinstance(received.record, DecisionRecord | Effect | Genesis | Seal | Recover)
 
 
-def test_a_receipt_is_made_of_no_log_that_does_not_hold_and_by_no_other_key(log: SealedLog) -> None:
+def test_invalid_log_or_other_key_gives_no_receipt(log: SealedLog) -> None:
     changed = SealedLog((*log.lines[:3], log.lines[3].replace(b"goto", b"goon"), *log.lines[4:]), log.signed)
     assert slug(receipt(changed, 3)) == slug(receipt(changed, 2)) == "proof/path"
     assert slug(receipt_of(lambda: log.lines, 3, None, kid=bytes(16), signer=sign)) == "trust/log-key"

@@ -179,7 +179,7 @@ def test_a_file_that_is_no_proof_is_refused(data: bytes, slug: str) -> None:
     assert found.slug == slug
 
 
-def test_what_a_proof_carries_must_be_in_its_one_form() -> None:
+def test_noncanonical_proof_contents_are_refused() -> None:
     parts = inclusion(3)
     extra = b64encode(cbor.encode(("rtshcua/proof", 1, {**parts.extra, "fields": ()}))).decode()
     lines = parts.together().decode().split("\n")

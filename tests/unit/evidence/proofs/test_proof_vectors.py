@@ -51,5 +51,5 @@ def test_a_proof_that_was_made_verifies(name: str) -> None:
     assert check((VECTORS / name).read_bytes()) == "true"
 
 
-def test_there_are_no_others() -> None:
+def test_all_proof_vectors_are_tested() -> None:
     assert {path.name for path in VECTORS.iterdir()} == set(MADE)

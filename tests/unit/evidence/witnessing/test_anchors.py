@@ -141,7 +141,7 @@ def test_a_note_with_one_wrong_signature_says_nothing_at_all(log: Log) -> None:
     assert (found.records, found.witnessed, found.rejected) == (0, (), 1)
 
 
-def test_what_went_further_than_is_anchored(log: Log) -> None:
+def test_extent_beyond_threshold_is_reported(log: Log) -> None:
     far, near = Judge(), Judge(WITNESSES[1])
     marks = [far.blindly(log.notes[3]), near.blindly(log.notes[1])]
     for threshold, ahead in ((1, []), (2, [8]), (3, [8, 4])):
@@ -164,11 +164,11 @@ def test_what_went_further_than_is_anchored(log: Log) -> None:
     ],
     ids=range(8),
 )
-def test_what_says_nothing(log: Log, note: str) -> None:
+def test_irrelevant_anchors_are_ignored(log: Log, note: str) -> None:
     assert outcome(log, [note]) == AnchoredExtent(0, 9, 1, ())
 
 
-def test_who_is_not_trusted_says_nothing(log: Log) -> None:
+def test_untrusted_witness_is_ignored(log: Log) -> None:
     longer = Log()
     longer.effects(80)
     mark = Judge(WITNESSES[2]).blindly(longer.seal())

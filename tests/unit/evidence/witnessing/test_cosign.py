@@ -71,7 +71,7 @@ def test_a_line_in_the_name_of_a_witness_that_it_did_not_make(line: str, text: s
     assert cosignatures(f"{text}\n{line}", [KEY.public]) == found
 
 
-def test_another_name_is_as_good() -> None:
+def test_witness_name_is_not_signed() -> None:
     """The name is not signed; a witness that is not ours has its own."""
     name = "witness.example/w1"
     signature = KEY.sign(f"cosignature/v1\ntime 0\n{TEXT}".encode(), duty=Duty.WITNESS)

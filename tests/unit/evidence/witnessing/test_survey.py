@@ -87,7 +87,7 @@ def test_a_checkpoint_that_follows_another_one_than_the_log_has_is_found() -> No
     assert (found.slug, found.record) == ("seal/after", 3)
 
 
-def test_what_is_no_log(log: Log) -> None:
+def test_survey_refuses_invalid_log(log: Log) -> None:
     for lines, slug in (
         ([], "genesis/missing"),
         (log.lines[1:4], "genesis/missing"),

@@ -89,7 +89,7 @@ def test_only_what_is_durable_is_shown() -> None:
     assert log.submission.request(99, 5) is None
 
 
-def test_again_is_answered_again() -> None:
+def test_repeated_request_is_answered_again() -> None:
     log, witness = Log(), Judge()
     cosigned(witness, asked(log, None))
     cosigned(witness, asked(log, None))
@@ -100,7 +100,7 @@ def test_again_is_answered_again() -> None:
     cosigned(witness, log.submission.again(2))
 
 
-def test_who_believes_too_little_or_too_much_is_told_the_size() -> None:
+def test_wrong_known_size_is_answered_with_size() -> None:
     log, witness = Log(), Judge()
     cosigned(witness, asked(log, None))
     for _ in range(3):
@@ -285,7 +285,7 @@ def test_logs_of_others() -> None:
 
 
 @pytest.mark.parametrize("note", ["", "x", "a\n\n— b c\n", Log().notes[0].rpartition("\n\n")[0] + "\n"])
-def test_what_is_no_checkpoint(note: str) -> None:
+def test_request_without_checkpoint_is_declined(note: str) -> None:
     assert refused(Judge(), CosignRequest(0, (), note)).status == MALFORMED
 
 
@@ -337,7 +337,7 @@ def test_the_body_is_that_of_the_page() -> None:
         b"old 0\n" + (b"A" * 43 + b"=\n") * (MOST_PROOF + 1) + b"\na\n\nb\n",
     ],
 )
-def test_what_is_no_request(data: bytes) -> None:
+def test_malformed_request_is_declined(data: bytes) -> None:
     found = decode(data)
     assert isinstance(found, Declined)
     assert found.status == MALFORMED
@@ -358,7 +358,7 @@ SAMPLE.seal()
 
 
 @given(st.data())
-def test_whatever_comes(data: st.DataObject) -> None:
+def test_arbitrary_input_raises_nothing(data: st.DataObject) -> None:
     """A mutated request is refused, or is the same checkpoint."""
     witness = Judge()
     cosigned(witness, asked(SAMPLE, None, 7))

@@ -21,10 +21,10 @@ REFUSED = [
     (["FENCE_RADIUS=wide"], "is not NAME=VALUE"),
     (["FENCE_RADIUS=nan"], "is not NAME=VALUE"),
     (["FENCE_RADIUS=1e60"], "is not NAME=VALUE"),
-    (["FENCE_RADIUS=5"], "is set from 30 to 10000, and not to 5"),
-    (["ARMING_CHECK=0"], "is none of the parameters that are set for a flight"),
-    (["FENCE_TYPE=3"], "is set to 4, 5, 6, 7, 12, 13, 14, 15, and not to 3"),
-    (["GF_ACTION=0"], "is set to 2, 3, 5, and not to 0"),
+    (["FENCE_RADIUS=5"], "must be from 30 to 10000, not 5"),
+    (["ARMING_CHECK=0"], "cannot be set for a flight"),
+    (["FENCE_TYPE=3"], "must be 4, 5, 6, 7, 12, 13, 14, 15, not 3"),
+    (["GF_ACTION=0"], "must be 2, 3, 5, not 0"),
     (["FENCE_RADIUS=50", "FENCE_RADIUS=60"], "`FENCE_RADIUS` is given twice"),
 ]
 

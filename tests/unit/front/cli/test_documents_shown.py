@@ -173,14 +173,14 @@ def test_a_fallback_of_which_no_landing_was_seen_is_in_the_summary_of_run_and_au
     assert what.startswith(("contingency: ", "fallback: "))
     summary = SUMMARY | {"unconfirmed": (what,)}
     (said,) = [line for line in ending(Summary(**summary)) if "unseen" in line]
-    assert said == f"  unseen   {what}: it was sent, and not confirmed: no landing was seen"
+    assert said == f"  unseen   {what}: sent but not confirmed: no landing was observed"
     path = tmp_path / "log.jsonl"
     path.write_bytes(b"".join([*run.lines, run.recorder.close(run.clock.now(), ending=str(run.ending), tlog=None)]))
     words = ["verify-log", "--root", ROOT_KEY.public.hex(), str(path)]
     assert main([*words, "--audit"]) == ExitCode.OK
     out = " ".join(capsys.readouterr().out.split())
     (number,) = [record["seq"] for record in run.records if record.get("event") == "released"]
-    assert f"that the fallback that ended at record {number} brought the vehicle down: it was sent, and not" in out
+    assert f"that the fallback that ended at record {number} brought the vehicle down: sent but not" in out
     assert main(words) == ExitCode.OK
     assert "not confirmed" not in capsys.readouterr().out, "without an audit no record is read"
 

@@ -32,7 +32,7 @@ def test_this_process_signs_until_the_key_is_handed_over() -> None:
 
 def test_what_the_boundary_does_not_sign_does_not_fly() -> None:
     signer = LogSigner(key())
-    signer.hand_over(lambda _: Refusal("not-its-log", "the boundary refuses it"))
+    signer.hand_over(lambda _: Refusal("not-its-log", "the boundary refuses the call"))
     with pytest.raises(LogNotSigned, match="does not sign the log") as refused:
         signer.sign(TEXT)
     assert refused.value.refusal.slug == "boundary-not-its-log"

@@ -33,4 +33,4 @@ def test_a_text_that_lies_about_the_arguments_is_not_shown() -> None:
     lying = replace(first, text="takeoff(altitude = 2 m)")
     mission = replace(compiled.mission, invocations=(lying, *others))
     assert plan_of(compiled.policy, mission, mode="software", speed=1.0).steps[0].text == "takeoff(altitude = 20 m)"
-    assert call(compiled.policy, replace(lying, skill=99)) == "no call of a skill of the policy"
+    assert call(compiled.policy, replace(lying, skill=99)) == "not a call of a skill of the policy"

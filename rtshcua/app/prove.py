@@ -1,4 +1,4 @@
-"""The service `prove`: one record of a log, or two states of it, in a small file that verifies alone."""
+"""The service `prove`: write an inclusion or consistency proof of a log, which can be verified without the log."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -27,8 +27,8 @@ from rtshcua.wire.keys import Duty, SigningKey
 
 _BEGINNINGS = tuple(f"{kind}\n".encode() for kind in ProofKind)
 _IN_RECEIPT = b"rtshcua/record"
-_TRIED = 16  # checkpoints with notes of witnesses, of which the log may be read for each
-#: how a proof that cannot be made ends, by its slug; else as evidence that fails
+_TRIED = 16  # most cosigned checkpoints to try, since each may take a pass over the log
+#: exit codes of refusals by slug; any other refusal exits as failed evidence
 PROOF_CODES: Final = {
     "proof/number": ExitCode.INPUT,
     "proof/unsealed": ExitCode.INCOMPLETE,
@@ -36,14 +36,16 @@ PROOF_CODES: Final = {
     "proof/no-log": ExitCode.INPUT,
     "genesis/format": ExitCode.UNTRUSTED,
 }
-_WRONG = "`rtshcua verify-log` says what is wrong with the log"
-_HELPS = dict.fromkeys(("proof/log", "proof/path", "proof/consistency"), _WRONG)
-_HELPS |= {"proof/unsealed": "`rtshcua recover` ends a log that a crash left open"}
+_VERIFY = "run `rtshcua verify-log` to see what is wrong with the log"
+_HELPS = dict.fromkeys(("proof/log", "proof/path", "proof/consistency"), _VERIFY)
+_HELPS |= {"proof/unsealed": "run `rtshcua recover` to close a log that a crash left open"}
 
 
 class ProofRequest(NamedTuple):
-    """What is proven of a log: a record, or that nothing changed `since` a signed record; `at` which signed record, and
-    as a COSE receipt where `sign` gives the log key for one.
+    """Which proof of a log to make: inclusion of `record`, or consistency `since` a signed record.
+
+    The proof is for the checkpoint `at` a signed record (None: the newest). If `sign` returns the log key, the proof is
+    a COSE receipt.
     """
 
     log: Path
@@ -55,7 +57,7 @@ class ProofRequest(NamedTuple):
 
 
 class WrittenProof(NamedTuple):
-    """A proof that was written: where, how long it is, and whether witnesses vouch for it."""
+    """A written proof: its path, its size, and whether enough witnesses cosigned its checkpoint."""
 
     path: Path
     octets: int
@@ -65,7 +67,7 @@ class WrittenProof(NamedTuple):
 def prove(request: ProofRequest) -> WrittenProof | Refusal:
     """Make a proof and write it. Raises `Untrusted` and OSError."""
     log, record, since, at = request.log, request.record, request.since, request.at
-    log.stat()  # so that what is missing is told as such
+    log.stat()  # raises FileNotFoundError for a missing log
 
     def read() -> Iterator[bytes]:
         with open_regular(log) as file:
@@ -92,7 +94,7 @@ def prove(request: ProofRequest) -> WrittenProof | Refusal:
 
 
 def replaceable(path: Path) -> bool:
-    """Whether nothing stands there, or a proof: least of all the log is to be written over."""
+    """Whether the path is free or holds a proof. Any other file, above all the log, must not be overwritten."""
     try:
         data = read_regular(path, MAX_PROOF)
     except FileNotFoundError:
@@ -103,7 +105,7 @@ def replaceable(path: Path) -> bool:
 
 
 def _refused(path: Path, flaw: Flaw) -> Refusal:
-    """Why there is nothing to be proven."""
+    """The refusal for a proof that cannot be made."""
     if flaw.slug == "proof/no-log" and begins_as_log(path):
         return Refusal("genesis/missing", f"`{path}`: {CUT_AT_FIRST}")
     help = _HELPS.get(flaw.slug) or (f"accepted: {flaw.expected}" if flaw.expected else "")
@@ -115,7 +117,10 @@ def _receipt(read: Lines, record: int, at: int | None, key: SigningKey) -> bytes
 
 
 def _nearest(read: Lines, record: int | None, since: int | None, notes: tuple[str, ...]) -> bytes | None:
-    """The proof under the nearest checkpoint that enough witnesses cosigned; for two states of a log under the last."""
+    """Return the proof for the nearest later checkpoint that enough witnesses cosigned, or None.
+
+    A consistency proof takes the last such checkpoint.
+    """
     sizes = sorted(cosigned_sizes(notes), reverse=record is None)
     for size in [size for size in sizes if size > (record if record is not None else since or 0)][:_TRIED]:
         made = prove_consistency(read, since or 0, size) if record is None else prove_inclusion(read, record, size)

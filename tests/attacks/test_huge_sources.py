@@ -220,4 +220,4 @@ def test_ignores_of_unknown_codes_are_cheap(monkeypatch: pytest.MonkeyPatch) -> 
     many = ignores(Source("a.rts", "// rtshcua: ignore " + "E1303, " * 101 + "because why"))
     assert [each.message for each in many.faults] == ["this names more than 100 codes, so it ignores nothing"]
     assert many.given == ()
-    assert len(ignores(Source("a.rts", "// rtshcua: ignore " + "E1303, " * 100 + "because why")).given) == 100
+    assert len(ignores(Source("a.rts", "// rtshcua: ignore " + "E1303, " * 100 + "because why")).valid) == 100

@@ -1,1 +1,1 @@
-"""The service `lint`: what `check` finds and habits, remembered from run to run, ignored by configuration, fixed."""
+"""The service `lint`: the findings of `check` and of the lint rules, with a cache, ignores and fixes."""

@@ -1,4 +1,4 @@
-"""What was found in one program, as it is remembered from run to run, with the digest of all that it depends on."""
+"""Cache entries of lint: the findings of one program, with the digests of everything that they depend on."""
 
 import json
 import os
@@ -16,7 +16,7 @@ from rtshcua.ground.lint.cached_findings import findings_as_lists, findings_from
 
 
 class ProgramFindings(NamedTuple):
-    """The findings of `check`, and those of the rules."""
+    """The findings of `check` (`found`) and of the lint rules (`habits`)."""
 
     found: tuple[Diagnostic, ...]
     habits: tuple[Diagnostic, ...]
@@ -24,10 +24,12 @@ class ProgramFindings(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class LintedProgram:
-    """The program of one file. `members` are its sources; `reads` the digest of each file that was read for it, None of
-    one that could not be had; `packs` the folders of the packs that it asked for. `asked` are its files that were asked
-    for, of which alone the rules speak, each with the width of its lines, if its layout was looked at. `result` is None
-    where it was not examined, being part of another program.
+    """The program of one file, as far as lint needs it.
+
+    `members` are its sources. `reads` has the digest of each file that was read for it (None if it could not be read),
+    `packs` the folder of each skill pack that it imports (None if there is none). `asked` are those of its files that
+    are linted, each with its line width if its layout is checked. `result` is None if the program was not checked
+    because it is part of another program.
     """
 
     members: tuple[str, ...]
@@ -38,12 +40,12 @@ class LintedProgram:
 
     @property
     def lasting(self) -> bool:
-        """Whether it may be remembered: what could not be read may be there the next time, or something nearby."""
+        """Whether it may be cached. A missing file or pack may exist at the next run, so it prevents caching."""
         return None not in self.reads.values() and None not in self.packs.values()
 
 
 def encoded(examined: LintedProgram, mark: str) -> bytes:
-    """As bytes; `mark` is of all that findings depend on besides, such as the rules themselves."""
+    """Encode a program; `mark` stands for everything else that findings depend on, such as the lint rules."""
     result = examined.result
     return json.dumps(
         {
@@ -65,9 +67,11 @@ def decoded(
     folder: Callable[[str], str | None],
     length: Callable[[str], int | None],
 ) -> LintedProgram | None:
-    """From bytes, if it still holds: the same mark, the same files asked for, and every file and every pack as it was,
-    which `digest` and `folder` say. It speaks of nothing but places in the texts of these files, whose `length` counts
-    characters.
+    """Decode a program; None if the entry is malformed or out of date.
+
+    An entry is up to date if the mark is the same and every file and every pack is unchanged, by `digest` and `folder`.
+    It has a result only if the same files are linted. Every span of a finding must lie within a file that was read,
+    whose `length` is in characters.
     """
     try:
         tree: Any = json.loads(data)
@@ -87,30 +91,30 @@ def decoded(
 
 
 def _texts(found: Any) -> tuple[str, ...]:
-    """A list of texts, as a tuple. Raises TypeError for any other."""
+    """Return a list of strings as a tuple. Raises TypeError for anything else."""
     if type(found) is not list or not all(type(each) is str for each in found):
-        raise TypeError("no texts")
+        raise TypeError("expected a list of strings")
     return tuple(found)
 
 
 def _result(lists: Any, reads: Mapping[str, str | None], length: Callable[[str], int | None]) -> ProgramFindings:
-    """A result, if it speaks of nothing but what was read for it. Raises as `findings_from_lists` does."""
+    """Decode a result. Raises ValueError for a span outside the files that were read, else as `findings_from_lists`."""
     found, habits = lists
     result = ProgramFindings(findings_from_lists(found), findings_from_lists(habits))
     for place in spans_of((*result.found, *result.habits)):
         whole = length(place.file) if place.file in reads else None
         if whole is None or place.end > whole:
-            raise ValueError("it speaks of what was not read")
+            raise ValueError("a span lies outside the files that were read")
     return result
 
 
-#: the parts of the package that findings come from
+#: the parts of the package on which findings depend
 _PARTS = ("app/lint", "decision", "diagnostics", "ground", "mavlink", "model", "wire")
 
 
 @cache
 def mark() -> str:
-    """The mark: a digest. What runs is what was there when it was first asked for."""
+    """A digest of the version and of the code on which findings depend, computed once a process."""
     package = Path(__file__).resolve().parents[2]
     whole = sha256(f"{__version__} {sys.version_info[:3]}".encode())
     for part in _PARTS:

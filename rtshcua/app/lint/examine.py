@@ -1,4 +1,4 @@
-"""Examines programs: loads, checks, proves, and looks for habits. Importing this brings the whole compiler."""
+"""Load, check, prove and lint programs. Importing this module imports the whole compiler."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -14,27 +14,27 @@ from rtshcua.mavlink import dialect
 
 
 class SourceFiles(Protocol):
-    """What reads sources, and knows their digests: a `session.Session`."""
+    """Access to sources and their digests: a `session.LintSession`."""
 
     def read(self, name: str) -> bytes:
-        """The octets of a source. Raises OSError, and ValueError for a name that leads nowhere."""
+        """Return the bytes of a source. Raises OSError, and ValueError for an invalid name."""
         ...
 
     def digest(self, name: str) -> str | None:
-        """The digest of a source; None where it cannot be read."""
+        """Return the digest of a source, or None if it cannot be read."""
         ...
 
     def folder(self, pack: str) -> str | None:
-        """The folder of an installed pack."""
+        """Return the folder of an installed pack, or None."""
         ...
 
     def listing(self, name: str) -> list[str]:
-        """The names in a folder, for suggestions. Raises OSError."""
+        """Return the names in a folder, for suggestions. Raises OSError."""
         ...
 
 
 class Examiner:
-    """The programs of one run."""
+    """Loads and checks the programs of one run, each file once."""
 
     def __init__(self, session: SourceFiles, asked: Mapping[str, int | None]) -> None:
         self._session = session
@@ -42,12 +42,12 @@ class Examiner:
         self._programs: dict[Path, tuple[Program, _Reads]] = {}
 
     def loaded(self, path: Path, further: Sequence[Path]) -> LintedProgram:
-        """The program of a file, not examined."""
+        """Load the program of a file without checking it."""
         program, reads = self._load(path, further)
         return reads.examined(program, self._asked, None)
 
     def examined(self, wanted: Sequence[tuple[Path, Sequence[Path]]]) -> list[LintedProgram]:
-        """The programs of files, examined."""
+        """Load and check the programs of files."""
         done = []
         for path, further in wanted:
             program, reads = self._load(path, further)
@@ -65,7 +65,7 @@ class Examiner:
 
 
 class _Reads:
-    """Remembers what was read for one program."""
+    """Records the files and packs that were read for one program."""
 
     def __init__(self, session: SourceFiles) -> None:
         self._session = session
@@ -91,7 +91,7 @@ class _Reads:
 def examine_specification(
     session: SourceFiles, files: Sequence[Path], further: Sequence[Path], asked: Mapping[str, int | None]
 ) -> LintedProgram:
-    """A mission specification with the sources of its policy, as one program."""
+    """Check a mission specification and the sources of its policy as one program."""
     from rtshcua.ground.agent.specification import load_specification
 
     reads = _Reads(session)
@@ -107,8 +107,9 @@ def find(
     asked: Mapping[str, int | None],
     pointed: Callable[[Iterable[Diagnostic]], tuple[Diagnostic, ...]] = tuple,
 ) -> ProgramFindings:
-    """Everything that is wrong with a program; without errors also the habits of the files that were `asked` for, each
-    with the width of its lines where its layout is looked at.
+    """Return the findings of a program. If it has no errors, also lint the files in `asked`.
+
+    The value of a file in `asked` is its line width if its layout is checked, else None.
     """
     checked = examine_program(program, dialect.load())
     found = pointed(checked.diagnostics)
@@ -118,7 +119,7 @@ def find(
 
 
 def _layouts(program: Program, asked: Mapping[str, int | None]) -> Iterator[Diagnostic]:
-    """What is not laid out in the one style, where that is looked at."""
+    """Yield a finding for each file whose layout is checked and differs from the formatter's output."""
     for unit in program.units:
         width = asked.get(unit.file)
         if width is not None:

@@ -1,4 +1,4 @@
-"""What a run found, put together: each finding once, without what is ignored; and the ignores that ignored nothing."""
+"""Merge the findings of all programs of a run: each finding once, ignores applied, unused ignores reported."""
 
 import os
 import re
@@ -20,7 +20,10 @@ from rtshcua.ground.project.project_settings import IgnoredCode
 
 
 class LintFindings(NamedTuple):
-    """Findings by file and place, those that are ignored, the texts, and the configured ignores that were of use."""
+    """The findings by file and position, the ignored findings, the sources, and the used ignores of configurations.
+
+    `untold` are the files of programs with errors: their lint findings are incomplete.
+    """
 
     found: tuple[Diagnostic, ...]
     ignored: tuple[Suppressed, ...]
@@ -36,8 +39,10 @@ def gather(
     asked: Sequence[str],
     laid: Collection[str] = (),
 ) -> LintFindings:
-    """Put programs together. `configured` has the ignores of each file's configuration; `laid` are the files whose
-    layout was looked at.
+    """Merge the findings of programs.
+
+    `configured` has the ignores of each file's configuration. `asked` are the linted files. `laid` are the files whose
+    layout was checked.
     """
     every: dict[tuple[object, ...], Diagnostic] = {}
     linted: list[Linted] = []
@@ -54,20 +59,21 @@ def gather(
     spans = [each.span for each in found] + [label.span for each in found for label in each.labels]
     names = {*asked, *(span.file for span in spans if span is not None)}
     texts = sources(sorted(names))
-    sifted = filter_findings(found, texts, asked, configured, untold, laid)
+    kept = filter_findings(found, texts, asked, configured, untold, laid)
 
     def place(found: Diagnostic) -> tuple[int, Span]:
         span = found.span
         return (-1, Span("", 0, 0)) if span is None else (order.get(span.file, len(order)), span)
 
-    return LintFindings(tuple(sorted(sifted.found, key=place)), sifted.ignored, texts, sifted.used, frozenset(untold))
+    return LintFindings(tuple(sorted(kept.found, key=place)), kept.ignored, texts, kept.used, frozenset(untold))
 
 
 def unused_ignores(
     projects: Collection[Project], used: Collection[IgnoredCode], asked: Collection[Path]
 ) -> Iterator[tuple[Diagnostic, Source]]:
-    """The findings, each with the text of its configuration; none of a configuration of whose folder only a part was
-    asked for.
+    """Yield a finding for each unused ignore of a configuration, with the text of the configuration.
+
+    A project that is linted only in part is skipped: its ignores may be needed for the other files.
     """
     places = [path.absolute() for path in asked]
     for project in projects:
@@ -87,13 +93,14 @@ def _found(ignored: IgnoredCode, source: Source) -> Diagnostic:
     names = "|".join(map(re.escape, (ignored.code.id, ignored.code.slug)))
     match = re.search(rf"(?<![\w-])({names})(?![\w-])(?=[\"']?\s*=)", source.text)
     span = Span(source.file, *match.span(1)) if match else Span(source.file, 0, 0)
-    message = f"nothing of `{ignored.code.id}` ({ignored.code.slug}) is found{where}, so this ignores nothing"
+    message = f"there is no finding `{ignored.code.id}` ({ignored.code.slug}){where}, so this ignore has no effect"
     return Diagnostic(codes.UNUSED_IGNORE, message, span, "delete it")
 
 
 def affected(programs: Sequence[LintedProgram], changed: GitChanges) -> list[LintedProgram]:
-    """The programs that read a file that has changed, or one of which no repository that was asked can tell; what was
-    installed, such as the library, counts as unchanged.
+    """Return the programs that read a changed file.
+
+    A file outside of all repositories counts as changed, unless it is installed, such as the library or a pack.
     """
     known: dict[str, bool | None] = {}
 

@@ -1,4 +1,4 @@
-"""`--fix`: rounds of fixes until nothing is left to fix, none of which may bring an error."""
+"""`--fix`: apply fixes in rounds until none is left. A fix that causes an error is undone."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -9,14 +9,15 @@ from rtshcua.app.lint.session import LintSession
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.ground.lint.fixes import fixed
 
-#: rounds after which it is given up: fixes that undo each other would go on for ever
+#: most rounds; without a limit, fixes that undo each other would loop forever
 _MOST = 50
 _BOM = b"\xef\xbb\xbf"
 
 
 class FixedFiles(NamedTuple):
-    """The new bytes of files by name, those before, the findings then, and the files whose fixes would have brought an
-    error.
+    """The new bytes of the changed files, the old bytes of all, the findings after the fixes, and the refused files.
+
+    The fixes of a refused file would have caused an error.
     """
 
     files: dict[str, bytes]
@@ -33,7 +34,7 @@ def fix(
     *,
     suggested: bool,
 ) -> FixedFiles:
-    """Fix the `files` that were asked for, in memory: `session` then holds the new texts."""
+    """Fix `files` in memory. Afterwards `session` holds the new texts."""
     before = {name: session.read(name) for name in files if name in told.sources}
     writable = [name for name in before if _is_text(before[name])]
     refused: dict[str, None] = {}
@@ -53,7 +54,7 @@ def _round(
     texts: dict[str, str],
     refused: dict[str, None],
 ) -> LintFindings:
-    """Put new texts in place, all at once, or else one after the other; those that bring an error are refused."""
+    """Try all new texts at once; if that causes an error, one after the other, and refuse those that cause an error."""
     after = _tried(session, told, examine, texts)
     if after is not None:
         return after
@@ -69,7 +70,7 @@ def _round(
 def _tried(
     session: LintSession, told: LintFindings, examine: Callable[[], LintFindings], texts: dict[str, str]
 ) -> LintFindings | None:
-    """The findings with these texts; None where there are new errors among them, and all is as before."""
+    """Return the findings with these texts. If there are new errors, restore the old texts and return None."""
     kept = {name: session.read(name) for name in texts}
     for name, text in texts.items():
         mark = _BOM if kept[name].startswith(_BOM) else b""

@@ -1,4 +1,4 @@
-"""What a run of lint is asked for, which files it is about, and the configuration of each."""
+"""The options of a lint run, the files that it covers, and the configuration of each file."""
 
 import os
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ FORMATS = ("human", "json", "sarif", "github", "junit")
 
 
 class LintOptions(NamedTuple):
-    """The command line, after it was read; each is explained in `rtshcua/front/cli/commands/lint.py`."""
+    """The options of the command line, explained in `rtshcua/front/cli/commands/lint.py`."""
 
     paths: tuple[Path, ...]
     format: str = "human"
@@ -39,34 +39,32 @@ class LintOptions(NamedTuple):
 
     @property
     def form(self) -> str:
-        """The form of the report."""
+        """The format of the report."""
         return "json" if self.json else self.format
 
     @property
     def fixes(self) -> bool:
-        """Whether fixes are made, or shown."""
+        """Whether fixes are applied or shown."""
         return self.fix or self.unsafe_fixes or self.diff
 
 
 class LintScope(NamedTuple):
-    """The files, and of each its project, further sources and cache; `left_out` is how many are excluded."""
+    """The files to lint, each with its project, further sources and cache. `left_out` counts the excluded files."""
 
     files: tuple[Path, ...]
     projects: Mapping[Path, Project]
     further: Mapping[Path, Sequence[Path]]
     caches: Mapping[Path, LintCache | None]
     left_out: int
-    widths: Mapping[Path, int]  # of the files whose layout is looked at
+    widths: Mapping[Path, int]  # line widths of the files whose layout is checked
 
     def configured(self) -> dict[str, tuple[IgnoredCode, ...]]:
-        """What the configuration of each file ignores in it, by the file's name."""
+        """Return for each file name the codes that the configuration ignores in it."""
         return {shown(str(path)): ignored_in(self.projects[path], path) for path in self.files}
 
 
 def scope(options: LintOptions) -> LintScope | Refusal:
-    """The files that are asked for, but for those that their configuration excludes; what is wrong with either ends the
-    run.
-    """
+    """Find the files to lint, without those that their configuration excludes. An invalid option is a refusal."""
     files = source_files(options.paths)
     if isinstance(files, Refusal):
         return files
@@ -102,7 +100,7 @@ def _looks_at_layout(project: Project, path: Path) -> bool:
 
 
 def ignored_in(project: Project, path: Path) -> tuple[IgnoredCode, ...]:
-    """What the configuration of a project ignores in a file."""
+    """Return the codes that the configuration of a project ignores in a file."""
     return tuple(
         each for each in project.settings.lint.ignored if each.pattern is None or project.means(each.pattern, path)
     )
@@ -115,21 +113,21 @@ def _further(project: Project) -> tuple[Path, ...]:
 
 
 def _no_further(project: Project) -> Refusal | None:
-    """The first further source of a configuration that is no file, as a fault of the configuration."""
+    """Refuse the first further source (`with`) of a configuration that is not a file in the project."""
     for name, place in zip(project.settings.lint.further, _further(project), strict=True):
         edge = os.path.realpath(checkout_of(project.file or project.root) or project.root)
         if not lies_in(os.path.realpath(place), edge):
             help = "`--with` on the command line takes any source"
-            return misconfigured(shown(str(project.file)), f"`{name}` in `with` lies outside of the project", help)
+            return misconfigured(shown(str(project.file)), f"`{name}` in `with` lies outside the project", help)
         if not place.is_file():
-            what = "is a folder" if place.is_dir() else "is no file" if lexists(place) else "is not there"
+            problem = "is a folder" if place.is_dir() else "is not a file" if lexists(place) else "does not exist"
             help = "accepted: a list of sources (.rts)"
-            return misconfigured(shown(str(project.file)), f"`{name}` in `with` {what}", help)
+            return misconfigured(shown(str(project.file)), f"`{name}` in `with` {problem}", help)
     return None
 
 
 def _caches(files: Sequence[tuple[Path, Project]], *, fresh: bool) -> dict[Path, LintCache]:
-    """The cache of each file, one for each project, where its configuration does not say that there is none."""
+    """Return the cache of each file, one a project, unless the configuration turns the cache off."""
     opened: dict[Path, LintCache] = {}
     found: dict[Path, LintCache] = {}
     user = cache_folder()

@@ -1,4 +1,4 @@
-"""A run of lint: from what is asked for to what was found, fixed and not written. It imports no parser itself."""
+"""A run of lint, from its options to the findings and fixes. This module does not import the parser, to start fast."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -23,7 +23,7 @@ _ORDER = (Severity.ERROR, Severity.WARNING, Severity.NOTE)
 
 
 class LintRun(NamedTuple):
-    """What a run found, in the files of which names; what it fixed, and why files could not be written."""
+    """The result of a run: findings, the names of the linted files, fixes, and the errors of files not written."""
 
     options: LintOptions
     scope: LintScope
@@ -33,7 +33,7 @@ class LintRun(NamedTuple):
     unwritten: dict[str, OSError]
 
     def failing(self, found: Diagnostic) -> frozenset[Severity]:
-        """The severities with which a finding makes the run fail, by the configuration of its file."""
+        """Return the severities at which a finding fails the run, by the configuration of its file."""
         levels = {shown(str(path)): project.settings.lint.fail_on for path, project in self.scope.projects.items()}
         default = next(iter(levels.values()), "warning")
         level = self.options.fail_on or levels.get("" if found.span is None else found.span.file) or default
@@ -41,7 +41,7 @@ class LintRun(NamedTuple):
 
     @property
     def code(self) -> ExitCode:
-        """How the run ends, by what it found."""
+        """The exit code of the run."""
         found = self.findings.found
         if any(each.code in (NO_SUCH_FILE, TOO_LARGE) and each.span is None for each in found):
             return exit_code(found)
@@ -49,7 +49,7 @@ class LintRun(NamedTuple):
 
 
 def lint(options: LintOptions) -> LintRun | Refusal:
-    """Lint, and fix and write where that is asked for. Raises OSError for what cannot be read."""
+    """Lint files, and apply and write fixes if the options say so. Raises OSError for a file that cannot be read."""
     wrong = _misused(options)
     about = scope(options) if wrong is None else wrong
     if isinstance(about, Refusal):
@@ -86,16 +86,16 @@ def _misused(options: LintOptions) -> Refusal | None:
         if value is not None and value not in words:
             near = nearest(value, words)
             help = f"accepted: {listed(words)}" if near is None else f"did you mean `{near}`?"
-            return Refusal("usage", f"`{value}` is nothing that `{name}` can be", help)
+            return Refusal("usage", f"`{value}` is not a value of `{name}`", help)
     if options.config is not None and options.isolated:
-        return Refusal("usage", "`--config` and `--isolated` exclude each other")
+        return Refusal("usage", "`--config` and `--isolated` cannot be combined", "use one of them")
     return None
 
 
 def _find(
     options: LintOptions, about: LintScope, session: LintSession, changed: GitChanges | None
 ) -> tuple[LintFindings, tuple[str, ...]]:
-    """The findings, and the names of the files that were looked at."""
+    """Return the findings and the names of the linted files."""
     if not about.files:
         return LintFindings((), (), {}, frozenset(), frozenset()), ()
     programs = session.examine(about.files, about.further, about.caches, about.widths)
@@ -115,7 +115,7 @@ def _find(
 
 
 def _write(fixed: FixedFiles) -> dict[str, OSError]:
-    """Put the new texts in place; those that could not be, and why."""
+    """Write the changed files. Return the error of each file that could not be written."""
     from rtshcua.adapters.store import writing
 
     unwritten: dict[str, OSError] = {}

@@ -1,6 +1,6 @@
-"""A run of `lint` over files: what is remembered is taken from the cache, the rest examined, and kept for next time.
+"""Lint the programs of files. Results come from the cache where possible; new results are stored in it.
 
-Nothing here imports a parser: `examine` does, and is imported where a file must be examined.
+This module does not import the parser. `examine` does, and is imported only if a file is not in the cache.
 """
 
 import json
@@ -18,7 +18,7 @@ from rtshcua.ground.language.paths import shown
 
 
 class LintSession:
-    """Files as they were first read, or as they are to be (`put`), and what was found in their programs."""
+    """The files of a run. Each is read once; `put` replaces the content of a file for this run."""
 
     def __init__(self, asked: Iterable[Path] = ()) -> None:
         self._readable = ReadableSources(str(library.root()), asked)
@@ -33,7 +33,10 @@ class LintSession:
         return tuple(self._data)
 
     def read(self, name: str) -> bytes:
-        """A file's bytes, at most one more than the parser takes. Raises as the system did when it was first read."""
+        """Return a file's bytes, at most one more than the parser's limit.
+
+        Raises the OSError or ValueError of the first attempt to read the file.
+        """
         found = self._data.get(name)
         if found is None:
             try:
@@ -46,13 +49,13 @@ class LintSession:
         raise found
 
     def put(self, name: str, data: bytes) -> None:
-        """From now on a file has this content, for this run alone."""
+        """Replace the content of a file for the rest of this run, in memory only."""
         self._data[name] = data
         self._digests.pop(name, None)
         self._sources.pop(name, None)
 
     def digest(self, name: str) -> str | None:
-        """The digest of a file's bytes; None of one that cannot be had."""
+        """Return the digest of a file's bytes, or None if it cannot be read."""
         if name not in self._digests:
             try:
                 self._digests[name] = sha256(self.read(name)).hexdigest()
@@ -61,15 +64,15 @@ class LintSession:
         return self._digests[name]
 
     def folder(self, pack: str) -> str | None:
-        """The folder of an installed pack."""
+        """Return the folder of an installed pack, or None."""
         return self._readable.pack(pack)
 
     def listing(self, name: str) -> list[str]:
-        """The names in a folder, for suggestions. Raises OSError."""
+        """Return the names in a folder, for suggestions. Raises OSError."""
         return self._readable.listing(name)
 
     def sources(self, names: Sequence[str]) -> dict[str, Source]:
-        """The texts of files; what cannot be had, or is no text, is left out or made as legible as it can be."""
+        """Return the texts of files. Unreadable files are omitted, and invalid UTF-8 is replaced."""
         return {name: source for name in names if (source := self._source(name)) is not None}
 
     def _source(self, name: str) -> Source | None:
@@ -92,8 +95,9 @@ class LintSession:
         caches: Mapping[Path, LintCache | None],
         widths: Mapping[Path, int],
     ) -> list[LintedProgram]:
-        """What is found in the programs that files make, in order; `cli.programs` says which these are. Each file has
-        further sources, a cache to be remembered in, and, if its layout is to be looked at, the width of its lines.
+        """Lint the programs of files, in order (`files.root_programs`).
+
+        Each file has further sources, a cache or None, and a line width if its layout is checked.
         """
         names = [shown(str(path)) for path in files]
         asked = {name: widths.get(path) for name, path in zip(names, files, strict=True)}
@@ -133,13 +137,13 @@ class LintSession:
         return decoded(data, self._marked(entry), asked, self.digest, self.folder, self._length)
 
     def _marked(self, entry: str) -> str:
-        """The mark of an entry, which is of its name too: one that was moved to another's place is none."""
+        """Return the mark of an entry. It contains the entry's name, so that a moved entry is not accepted."""
         if self._mark is None:
             self._mark = mark()
         return f"{self._mark} {entry}"
 
 
 def _entry(name: str, further: Sequence[Path]) -> str:
-    """The name of the entry of a file's program: names of files are relative to the working folder."""
+    """Return the cache key of a file's program. File names are relative to the working folder, so it is included."""
     about = [str(Path.cwd()), name, [shown(str(path)) for path in further]]
     return sha256(json.dumps(about).encode("utf-8", "surrogatepass")).hexdigest()[:40]

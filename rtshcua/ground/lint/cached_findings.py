@@ -1,4 +1,4 @@
-"""Findings as plain lists for a cache, and back; anything else in the lists is refused."""
+"""Convert findings to plain lists for a cache, and back. Malformed lists are refused."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -9,7 +9,7 @@ from rtshcua.diagnostics.span import Span
 
 
 def findings_as_lists(found: tuple[Diagnostic, ...]) -> list[Any]:
-    """Findings as lists that `json` takes."""
+    """Return findings as lists that `json` can encode."""
     return [
         [
             each.code.id,
@@ -25,9 +25,9 @@ def findings_as_lists(found: tuple[Diagnostic, ...]) -> list[Any]:
 
 
 def findings_from_lists(lists: Any) -> tuple[Diagnostic, ...]:
-    """The findings that these lists were made of. Raises ValueError, KeyError or TypeError for any others.
+    """Return the findings that these lists encode. Raises ValueError, KeyError or TypeError for malformed lists.
 
-    Whether their places are in a text is for the caller to see, who has it.
+    The caller checks that the spans lie within the source text.
     """
     return tuple(
         Diagnostic(
@@ -47,7 +47,7 @@ def findings_from_lists(lists: Any) -> tuple[Diagnostic, ...]:
 
 
 def spans_of(found: tuple[Diagnostic, ...]) -> Iterator[Span]:
-    """All places that findings speak of."""
+    """Yield every span that findings, their labels and their fixes refer to."""
     for each in found:
         if each.span is not None:
             yield each.span
@@ -57,7 +57,7 @@ def spans_of(found: tuple[Diagnostic, ...]) -> Iterator[Span]:
 
 def _str(found: Any) -> str:
     if type(found) is not str:
-        raise TypeError("no text")
+        raise TypeError("expected a string")
     return found
 
 
@@ -67,5 +67,5 @@ def _optional_str(found: Any) -> str | None:
 
 def _span(file: Any, start: Any, end: Any) -> Span:
     if type(start) is not int or type(end) is not int or not 0 <= start <= end:
-        raise TypeError("no place")
+        raise TypeError("expected a span")
     return Span(_str(file), start, end)

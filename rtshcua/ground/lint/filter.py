@@ -1,4 +1,4 @@
-"""Which findings are reported: those that are not ignored, and that every program with the file agrees on."""
+"""Select the findings to report: those that are not ignored and that every program with the file has."""
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -12,7 +12,7 @@ from rtshcua.ground.project.project_settings import IgnoredCode
 
 
 class Suppressed(NamedTuple):
-    """A finding that is ignored, why, and where that is written; None where it is written in a configuration."""
+    """An ignored finding, the reason, and the span of the comment (None if a configuration ignores it)."""
 
     diagnostic: Diagnostic
     reason: str
@@ -20,7 +20,7 @@ class Suppressed(NamedTuple):
 
 
 class FilteredFindings(NamedTuple):
-    """What is found all the same, what is ignored, and the ignores of configurations that ignored something."""
+    """The findings to report, the ignored findings, and the configured ignores that had an effect."""
 
     found: tuple[Diagnostic, ...]
     ignored: tuple[Suppressed, ...]
@@ -30,18 +30,18 @@ class FilteredFindings(NamedTuple):
 def filter_findings(
     found: Iterable[Diagnostic],
     sources: Mapping[str, Source],
-    asked: Collection[str],
+    requested: Collection[str],
     configured: Mapping[str, Sequence[IgnoredCode]],
     incomplete: Collection[str] = (),
     formatted: Collection[str] = (),
 ) -> FilteredFindings:
-    """Take out what is ignored by a comment in the same file, or by the configuration of that file (`configured`).
+    """Separate findings that a comment in the same file, or the configuration of that file (`configured`), ignores.
 
-    Only the files that were `asked` for are searched for comments. Files with errors are `incomplete`: an ignore there
-    may well be used when these are corrected. `formatted` are the files whose layout was checked: in others an ignore
-    of a wrong layout is neither used nor unused.
+    Comments are read only in the `requested` files. Files with errors are `incomplete`: they have no unused ignores,
+    since an ignore may have an effect once the errors are corrected. `formatted` are the files whose layout was
+    checked: in other files an ignored layout is neither used nor unused.
     """
-    written = {file: ignores(sources[file]) for file in asked if file in sources}
+    written = {file: ignores(sources[file]) for file in requested if file in sources}
     kept: list[Diagnostic] = []
     taken: list[Suppressed] = []
     by_comment: set[Ignore] = set()
@@ -57,7 +57,7 @@ def filter_findings(
         else:
             kept.append(each)
     for file, here in written.items():
-        unused = [] if file in incomplete else [one for one in here.given if one not in by_comment]
+        unused = [] if file in incomplete else [one for one in here.valid if one not in by_comment]
         kept += here.faults
         kept += [unused_ignore(one) for one in unused if one.code is not NOT_FORMATTED or file in formatted]
     return FilteredFindings(tuple(kept), tuple(taken), frozenset(by_project))
@@ -69,25 +69,25 @@ def _ignores_of(
     written: Mapping[str, Ignores],
     configured: Mapping[str, Sequence[IgnoredCode]],
 ) -> tuple[list[Ignore], list[IgnoredCode]]:
-    """The comments, and the settings, that ignore a finding."""
+    """Return the comments and the settings that ignore a finding."""
     span = found.span
     if span is None or not can_be_ignored(found.code):
         return [], []
     line = sources[span.file].position(span.start).line if span.file in sources else 0
-    given = written[span.file].given if span.file in written else ()
-    comments = [one for one in given if one.code is found.code and one.line in (None, line)]
+    valid = written[span.file].valid if span.file in written else ()
+    comments = [one for one in valid if one.code is found.code and one.line in (None, line)]
     return comments, [one for one in configured.get(span.file, ()) if one.code is found.code]
 
 
 class Linted(NamedTuple):
-    """The files of one program, and what was found in them."""
+    """The files of one program and its findings."""
 
     files: frozenset[str]
     found: tuple[Diagnostic, ...]
 
 
 def agreed(programs: Sequence[Linted]) -> tuple[Diagnostic, ...]:
-    """What is found in a file by every program that it is part of: what one of them uses is used."""
+    """Return the findings in each file that every program with that file has: a name used by one of them is used."""
     counts = Counter(found for program in programs for found in program.found)
     members = Counter(file for program in programs for file in program.files)
     return tuple(

@@ -1,4 +1,4 @@
-"""Applies the fixes of findings to texts. Whether the result is any better is for the caller to find out."""
+"""Apply the fixes of findings to source texts. The caller checks the result."""
 
 from collections.abc import Collection, Iterable, Mapping
 
@@ -7,7 +7,7 @@ from rtshcua.diagnostics.span import Source
 
 
 def chosen(diagnostic: Diagnostic, *, suggested: bool) -> Fix | None:
-    """The fix of a finding that may be applied: the first safe one, or with `suggested` the first at all."""
+    """Return the first safe fix of a finding, or with `suggested` the first fix if none is safe."""
     safe = next((fix for fix in diagnostic.fixes if fix.applicability is Applicability.SAFE), None)
     if safe is None and suggested and diagnostic.fixes:
         return diagnostic.fixes[0]
@@ -17,9 +17,9 @@ def chosen(diagnostic: Diagnostic, *, suggested: bool) -> Fix | None:
 def fixed(
     found: Iterable[Diagnostic], sources: Mapping[str, Source], files: Collection[str], *, suggested: bool = False
 ) -> dict[str, str]:
-    """The new texts of those of `files` that a fix changes.
+    """Return the new text of each of `files` that a fix changes.
 
-    Of fixes that overlap or touch, the first by place is applied: the next round finds whatever is left.
+    Of fixes that overlap or touch, only the first by position is applied. The next round applies the others.
     """
     wanted: dict[str, set[Fix]] = {}
     for diagnostic in found:

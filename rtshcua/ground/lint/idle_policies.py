@@ -1,13 +1,13 @@
 """Policies that restrict nothing (E1306), and zones of an airspace that restrict nothing (E1307).
 
-E1306: a policy permits every request. Only skills that move the vehicle elsewhere count. Each of them that is permitted
-at all is permitted to everyone through every source in every situation (`restrictions`), no `forbid`, `confirm` or
-`degrade` ever acts on it, and the airspace has no zone that the vehicle could leave or enter. Where the analysis cannot
-answer, nothing is reported.
+E1306: a policy permits every request for the skills that it permits. Only skills that move the vehicle to another place
+count. Each of these is permitted to everyone, through every source and in every situation (`restrictions`). No
+`forbid`, `confirm` or `degrade` acts on it, and the airspace has no zone that the vehicle could leave or enter. If the
+analysis reaches no result, nothing is reported.
 
-E1307: a zone to stay outside of that the vehicle cannot reach, or that has nothing in common with a zone to stay inside
-of; and a zone to stay inside of that contains everything that the vehicle can reach, at every height and at all times.
-A wrong coordinate is the usual cause.
+E1307: an `outside` zone that the vehicle cannot reach, or that shares no point with an `inside` zone; and an `inside`
+zone that contains all points that the vehicle can reach, at every height and at all times. The usual cause is a wrong
+coordinate.
 """
 
 from collections.abc import Iterator
@@ -24,12 +24,12 @@ from rtshcua.model.flat.policy import RuleKind
 from rtshcua.model.ir.node import Name
 
 _MOVING = (MotionKind.CLIMB, MotionKind.FLY, MotionKind.COVER)
-#: more permits of one skill than this are not looked at together
+#: most permits of one skill that are analysed together
 _MAX_PERMITS = 12
 
 
 def policies_that_permit_all(subject: LintInput) -> Iterator[Diagnostic]:
-    """Report policies that refuse nothing (E1306)."""
+    """Report policies that permit every request (E1306)."""
     for ground in subject.lowered():
         deciding = ConditionEffects(ground)
         moving = _permitted_moving_skills(ground, deciding.rules)
@@ -38,7 +38,7 @@ def policies_that_permit_all(subject: LintInput) -> Iterator[Diagnostic]:
 
 
 def _permitted_moving_skills(ground: ProofContext, rules: Ruleset) -> list[int]:
-    """The skills that move the vehicle and that a permit is about."""
+    """Return the permitted skills that move the vehicle to another place."""
     permits = [number for group in rules.groups if group.kind == RuleKind.PERMIT for number in group.rules]
     skills = dict.fromkeys(skill for number in permits for skill in rules.skills(number))
     contracts = ground.prepared.policy.contracts
@@ -46,7 +46,7 @@ def _permitted_moving_skills(ground: ProofContext, rules: Ruleset) -> list[int]:
 
 
 def _always_permitted(deciding: ConditionEffects, skill: int) -> bool:
-    """Whether nothing that the skill can be asked for is refused, as far as can be told."""
+    """Whether it is proved that every request for the skill is permitted."""
     rules = deciding.rules
     about = [number for number in range(len(rules.policy.rules)) if skill in rules.skills(number)]
     permits = [number for number in about if rules.rule(number).kind == RuleKind.PERMIT]
@@ -67,18 +67,18 @@ def _permits_all(ground: ProofContext, rules: Ruleset, moving: list[int]) -> Dia
     ]
     return Diagnostic(
         codes.GATES_NOTHING,
-        f"`{declaration.name.text}` gates nothing: everyone may ask for {names}, whatever the arguments and the state",
+        f"`{declaration.name.text}` restricts nothing: everyone may request {names}, with any arguments in any state",
         declaration.name.span,
-        "name the roles, add conditions with `when` that can fail, or an `airspace` that the vehicle can leave",
+        "name the roles, add conditions with `when` that can fail, or add an `airspace` that the vehicle can leave",
         tuple(
-            Label(span, "this leaves nothing out" if len(permits) == 1 else "together, these leave nothing out")
+            Label(span, "this covers every request" if len(permits) == 1 else "together, these cover every request")
             for span in permits
         ),
     )
 
 
 def idle_airspaces(subject: LintInput) -> Iterator[Diagnostic]:
-    """Report the zones of airspaces that make no difference (E1307)."""
+    """Report the zones of airspaces that have no effect (E1307)."""
     for ground in subject.lowered():
         declared = ground.lowered.declaration.airspace
         if declared is None:
@@ -88,40 +88,37 @@ def idle_airspaces(subject: LintInput) -> Iterator[Diagnostic]:
         reach = reach_of(policy.vehicle)
         for name in declared.outside:
             if reach.misses(zones[name.text]):
-                what = "lies where the vehicle cannot come, so to stay outside of it is no limit"
-                yield _idle_zone(ground, reach, name, what)
+                yield _idle_zone(ground, reach, name, "is beyond the vehicle's reach, so staying outside is no limit")
                 continue
             region = region_of(zones[name.text])
             within = next((each for each in declared.inside if are_disjoint(region, region_of(zones[each.text]))), None)
             if within is not None:
-                yield _unmeetable_zone(ground, name, within)
+                yield _zone_beyond_airspace(ground, name, within)
         for name in declared.inside:
             if reach.belongs_to(zones[name.text]):
-                what = "holds all that the vehicle can reach, so to stay inside of it is no limit"
-                yield _idle_zone(ground, reach, name, what)
+                yield _idle_zone(ground, reach, name, "contains the vehicle's reach, so staying inside is no limit")
 
 
-def _idle_zone(ground: ProofContext, reach: VehicleReach, name: Name, what: str) -> Diagnostic:
+def _idle_zone(ground: ProofContext, reach: VehicleReach, name: Name, problem: str) -> Diagnostic:
     vehicle = ground.lowered.vehicle.name.text
     kilometres = reach.across // 1_000_000
-    help = f"look at its coordinates: `{vehicle}` comes at most {kilometres} km from its home"
+    help = f"check its coordinates: `{vehicle}` can fly at most {kilometres} km from its home"
     zone = ground.context.symbols.zones[name.text]
     if zone.floor is not None or zone.ceiling is not None:
         help += f", and {reach.up // 1_000} m above it"
-    return Diagnostic(
-        codes.IDLE_AIRSPACE, f"`{name.text}` {what}", name.span, help, (Label(zone.name.span, "it is declared here"),)
-    )
+    labels = (Label(zone.name.span, "declared here"),)
+    return Diagnostic(codes.IDLE_AIRSPACE, f"`{name.text}` {problem}", name.span, help, labels)
 
 
-def _unmeetable_zone(ground: ProofContext, name: Name, within: Name) -> Diagnostic:
+def _zone_beyond_airspace(ground: ProofContext, name: Name, within: Name) -> Diagnostic:
     zones = ground.context.symbols.zones
     return Diagnostic(
         codes.IDLE_AIRSPACE,
-        f"no path can meet `{name.text}`: it lies outside of `{within.text}`, which no path leaves",
+        f"staying outside `{name.text}` is no limit: it lies outside `{within.text}`, which no path leaves",
         name.span,
-        "look at its coordinates and heights; to stay outside of it is no limit",
+        "check its coordinates and heights",
         (
-            Label(zones[name.text].name.span, "it is declared here"),
-            Label(zones[within.text].name.span, "no path leaves this"),
+            Label(zones[name.text].name.span, "declared here"),
+            Label(zones[within.text].name.span, "no path leaves this zone"),
         ),
     )

@@ -1,12 +1,13 @@
-"""Comments that ignore findings, and what is wrong with them (E1309 to E1311).
+"""Comments that ignore findings, and findings about these comments.
 
     // rtshcua: ignore E1304 because the authority's letter says 30 m
     // rtshcua: ignore-file naming, E1301 because the register gives the names
 
-The first is about findings that begin on its line or, where its lines hold only comments, on the next line that holds
-something else. The second is about the whole file, and must stand before its first declaration. Codes go by their id or
-slug. A comment without a reason, or without a code that can be ignored, ignores nothing. Comments are read from the
-text alone, since a text with errors has comments too; the formatter reads the same ones.
+The first ignores findings that begin on its line. If its lines hold only comments, it ignores findings on the next line
+that holds anything else. The second applies to the whole file and must precede the first declaration. A code is written
+as its id or its slug. A comment without a reason, or without a code that can be ignored, has no effect. Comments are
+read from the text, not from the syntax tree, so that sources with errors may have them too. The formatter reads the
+same comments.
 """
 
 import re
@@ -22,46 +23,46 @@ from rtshcua.diagnostics.span import Source, Span
 from rtshcua.diagnostics.suggest import nearest
 from rtshcua.ground.project.strict_tables import is_reason
 
-#: what a comment may ask for: about a line, or about the whole file
+#: the directives of a comment, for one line and for the whole file
 LINE, FILE = "ignore", "ignore-file"
-#: what a comment holds that asks for anything
+#: the text that begins a directive
 MARKER = "rtshcua:"
 
 _COMMENT_TOKEN = re.compile(
     r'(?P<text>"[^"\\\n]*+(?:\\[^\n][^"\\\n]*+){0,999}"?)|(?P<comment>//[^\n]*+|/\*.*?(?:\*/|\Z))|(?P<other>[^\s"/]++|/)',
     re.DOTALL,
 )
-#: what a comment asks of the tools, by what stands between its marks
-_REQUEST = re.compile(r"\s*rtshcua:\s*(?P<word>[^\s,]*)(?P<rest>.*)", re.DOTALL)
+#: a directive, matched against the text between the comment's delimiters
+_DIRECTIVE = re.compile(r"\s*rtshcua:\s*(?P<word>[^\s,]*)(?P<rest>.*)", re.DOTALL)
 
 
 class SourceComment(NamedTuple):
-    """A comment with its marks, what stands between them, and whether a declaration stands before it.
+    """A comment: its span with the delimiters, the text between them, and whether a declaration precedes it (`begun`).
 
-    `alone` is whether nothing but comments stands on its lines; `about` is the line (from 1) that it speaks of: the one
-    that it begins on, or, where it is alone, the next that has something else than comments.
+    `alone` is whether its lines hold only comments. `about` is the line (from 1) that it applies to: its first line or,
+    if it is alone, the next line that holds anything else.
     """
 
     span: Span
     inside: str
-    offset: int  # of `inside` in the text
+    offset: int  # of `inside` in the source
     alone: bool
     about: int
     begun: bool
 
 
 def ignores_line(comment: str) -> bool:
-    """Whether a comment, with its marks, ignores findings by the line."""
+    """Whether a comment, written with its delimiters, ignores findings on one line."""
     if MARKER not in comment:
         return False
-    request = _REQUEST.match(_inside(comment))
-    return request is not None and request["word"] == LINE
+    directive = _DIRECTIVE.match(_inside(comment))
+    return directive is not None and directive["word"] == LINE
 
 
 def comments(source: Source, holding: str = "") -> Iterator[SourceComment]:
-    """The comments of a text that hold another, in order: there may be millions, and few that ask for anything."""
+    """Yield the comments that contain `holding`, in order. The filter saves time in sources with many comments."""
     found: list[tuple[int, int, bool]] = []
-    taken: list[int] = []  # lines that have something else
+    taken: list[int] = []  # lines that hold more than comments
     begun = False
     for match in _COMMENT_TOKEN.finditer(source.text):
         if match["comment"] is not None:
@@ -69,7 +70,7 @@ def comments(source: Source, holding: str = "") -> Iterator[SourceComment]:
                 found.append((*match.span(), begun))
             continue
         begun = True
-        line = source.position(match.start()).line  # what is no comment stays on one line
+        line = source.position(match.start()).line  # only a comment may span lines
         if not taken or taken[-1] != line:
             taken.append(line)
     for start, end, later in found:
@@ -82,23 +83,24 @@ def comments(source: Source, holding: str = "") -> Iterator[SourceComment]:
 
 
 def _inside(written: str) -> str:
-    """What stands between the marks of a comment; a block at the end of a text may lack the second."""
+    """The text between the delimiters of a comment. The closing one may be missing at the end of a source."""
     closed = written.startswith("/*") and written.endswith("*/") and len(written) >= 4
     return written[2:-2] if closed else written[2:]
 
 
 _REASON = re.compile(r"(?:^|(?<=[\s,]))because(?!\S)")
 _NAME = re.compile(r"[^\s,]+")
-#: codes that one comment names; there are not that many
+#: most codes that one comment may name, more than there are
 MOST_NAMES = 100
-#: faults for which the nearest code is looked for: that takes long, and a file may have a hundred thousand
+#: most findings with a suggested code: the search is slow, and a file may have a hundred thousand unknown codes
 MOST_GUESSES = 1_000
 _HELP = "write it as `// rtshcua: ignore E1304 because the authority's letter says 30 m`"
 
 
 class Ignore(NamedTuple):
-    """One code that a comment ignores: on one line (from 1), or in the whole file (None). `span` is the name of the
-    code, `fix` what takes it out again.
+    """A code that a comment ignores on one line (from 1), or in the whole file (None).
+
+    `span` covers the name of the code; `fix` removes it.
     """
 
     code: Code
@@ -109,42 +111,40 @@ class Ignore(NamedTuple):
 
 
 class Ignores(NamedTuple):
-    """What the comments of a file ignore, and what is wrong with them."""
+    """The valid ignores of a file, and the findings about its comments."""
 
-    given: tuple[Ignore, ...]
+    valid: tuple[Ignore, ...]
     faults: tuple[Diagnostic, ...]
 
 
 def ignores(source: Source) -> Ignores:
-    """The ignores of a text."""
+    """Read the comments of a source that ignore findings."""
     if MARKER not in source.text:
         return Ignores((), ())
     faults: list[Diagnostic] = []
-    given: list[Ignore] = []
+    valid: list[Ignore] = []
     for comment in comments(source, MARKER):
-        request = _REQUEST.match(comment.inside)
-        if request is not None:
-            given += _parse_ignore(source, comment, request, faults)
-    return Ignores(tuple(given), tuple(faults))
+        directive = _DIRECTIVE.match(comment.inside)
+        if directive is not None:
+            valid += _parse_ignore(source, comment, directive, faults)
+    return Ignores(tuple(valid), tuple(faults))
 
 
 def _parse_ignore(
-    source: Source, comment: SourceComment, what: "re.Match[str]", faults: list[Diagnostic]
+    source: Source, comment: SourceComment, directive: "re.Match[str]", faults: list[Diagnostic]
 ) -> Iterator[Ignore]:
-    word = what["word"]
+    word = directive["word"]
     if word not in (LINE, FILE):
         near = nearest(word, (LINE, FILE))
         help = _HELP if near is None else f"did you mean `{near}`?"
-        faults.append(
-            Diagnostic(codes.UNKNOWN_IGNORE, f"`{word}` is nothing that a comment can ask for", comment.span, help)
-        )
+        faults.append(Diagnostic(codes.UNKNOWN_IGNORE, f"unknown directive `{word}`", comment.span, help))
         return
-    start = comment.offset + what.start("rest")
-    found = _REASON.search(what["rest"])
-    written = what["rest"] if found is None else what["rest"][: found.start()]
-    reason = "" if found is None else " ".join(what["rest"][found.end() :].split())
+    start = comment.offset + directive.start("rest")
+    found = _REASON.search(directive["rest"])
+    written = directive["rest"] if found is None else directive["rest"][: found.start()]
+    reason = "" if found is None else " ".join(directive["rest"][found.end() :].split())
     if len([*islice(_NAME.finditer(written), MOST_NAMES + 1)]) > MOST_NAMES:
-        message = f"this names more than {MOST_NAMES} codes, so it ignores nothing"
+        message = f"this names more than {MOST_NAMES} codes, so it has no effect"
         faults.append(Diagnostic(codes.UNKNOWN_IGNORE, message, comment.span, _HELP))
         return
     names = [(each[0], Span(source.file, start + each.start(), start + each.end())) for each in _NAME.finditer(written)]
@@ -154,8 +154,8 @@ def _parse_ignore(
     if not names:
         faults.append(Diagnostic(codes.UNKNOWN_IGNORE, "this names no code to ignore", comment.span, _HELP))
     if word == FILE and comment.begun:
-        message = f"`{FILE}` stands behind the first declaration, so it ignores nothing"
-        faults.append(Diagnostic(codes.UNUSED_IGNORE, message, comment.span, "put it before the first declaration"))
+        message = f"`{FILE}` follows the first declaration, so it has no effect"
+        faults.append(Diagnostic(codes.UNUSED_IGNORE, message, comment.span, "move it before the first declaration"))
         return
     for at, (name, span) in enumerate(names):
         code = code_named(name)
@@ -168,31 +168,31 @@ def _parse_ignore(
 
 
 def _without_reason(comment: SourceComment) -> Diagnostic:
-    message = "this does not say why, so it ignores nothing"
-    return Diagnostic(codes.IGNORE_WITHOUT_REASON, message, comment.span, "end it with `because ...`")
+    message = "this ignore gives no reason, so it has no effect"
+    return Diagnostic(codes.IGNORE_WITHOUT_REASON, message, comment.span, "add the reason: `because ...`")
 
 
 def _unknown_ignore(name: str, code: Code | None, span: Span, *, guess: bool) -> Diagnostic:
     if code is not None:
         why = "is an error, and errors cannot be ignored"
         if code.severity is not Severity.ERROR:
-            why = "is about ignores themselves, and cannot be ignored"
-        return Diagnostic(codes.UNKNOWN_IGNORE, f"`{name}` {why}", span, "remove it, and correct what it is about")
+            why = "is a finding about ignores, and cannot be ignored"
+        return Diagnostic(codes.UNKNOWN_IGNORE, f"`{name}` {why}", span, "remove it, and correct the finding")
     near = None
     if guess:
         can = [code for code in REGISTRY.values() if can_be_ignored(code)]
         near = nearest(name, [*(code.id for code in can), *(code.slug for code in can)])
-    help = "codes are written as `E1304` or `repeated-number`" if near is None else f"did you mean `{near}`?"
+    help = "write a code as `E1304` or `repeated-number`" if near is None else f"did you mean `{near}`?"
     fixes = () if near is None else (Fix(span, near, f"write `{near}`"),)
     return Diagnostic(codes.UNKNOWN_IGNORE, f"there is no code `{name}`", span, help, fixes=fixes)
 
 
 def _removal(source: Source, comment: SourceComment, names: list[tuple[str, Span]], at: int) -> Fix:
-    """Take one code out of a comment; with the last one the comment goes, and its line if nothing else stands there."""
+    """A fix that removes one code from a comment. The last code takes the comment with it, and its line if empty."""
     text, span = source.text, names[at][1]
     if len(names) > 1:
         start, end = (span.start, names[at + 1][1].start) if at == 0 else (names[at - 1][1].end, span.end)
-        return Fix(Span(source.file, start, end), "", f"take `{names[at][0]}` out", Applicability.SAFE)
+        return Fix(Span(source.file, start, end), "", f"remove `{names[at][0]}`", Applicability.SAFE)
     start, end = comment.span.start, comment.span.end
     while start and text[start - 1] in " \t":
         start -= 1
@@ -205,7 +205,7 @@ def _removal(source: Source, comment: SourceComment, names: list[tuple[str, Span
 
 
 def unused_ignore(ignore: Ignore) -> Diagnostic:
-    """The finding on an ignore that ignores nothing."""
-    where = "in this file" if ignore.line is None else "there"
-    message = f"nothing of `{ignore.code.id}` ({ignore.code.slug}) is found {where}, so this ignores nothing"
+    """The finding about an ignore that has no effect."""
+    where = "in this file" if ignore.line is None else "on that line"
+    message = f"there is no finding `{ignore.code.id}` ({ignore.code.slug}) {where}, so this ignore has no effect"
     return Diagnostic(codes.UNUSED_IGNORE, message, ignore.span, ignore.fix.title, fixes=(ignore.fix,))

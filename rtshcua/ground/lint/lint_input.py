@@ -14,38 +14,37 @@ from rtshcua.model.ir.program import Unit
 
 @dataclass(frozen=True, slots=True)
 class LintInput:
-    """A program as it is written, and which of its sources were asked for; `grounds` are its policies as lowered, each
-    for a vehicle, with which the analysis can be asked.
+    """A program, its units to lint (`requested`), and its lowered policies, one for each vehicle (`grounds`).
 
-    A mission specification is none of them: it is no source, and an agent writes it by another form.
+    Mission specifications are not linted: they are written by agents, not in the language.
     """
 
     program: Program
     symbols: Symbols
-    asked: tuple[Unit, ...]
+    requested: tuple[Unit, ...]
     imports: Imports
     grounds: tuple[ProofContext, ...] = ()
 
     @staticmethod
-    def of(program: Program, asked: Collection[str], grounds: tuple[ProofContext, ...] = ()) -> "LintInput":
-        """A program without errors."""
-        units = tuple(unit for unit in program.units if unit.file in asked and PurePath(unit.file).suffix != ".json")
+    def of(program: Program, requested: Collection[str], grounds: tuple[ProofContext, ...] = ()) -> "LintInput":
+        """Return the input for a program without errors and the names of the files to lint."""
+        units = tuple(u for u in program.units if u.file in requested and PurePath(u.file).suffix != ".json")
         return LintInput(program, collect(program.units), units, Imports(program.units, program.stable), grounds)
 
     def lowered(self) -> Iterator[ProofContext]:
-        """The lowered policies of the files that were asked for."""
-        asked = {unit.file for unit in self.asked}
-        return (ground for ground in self.grounds if ground.lowered.declaration.span.file in asked)
+        """The lowered policies of the requested files."""
+        requested = {unit.file for unit in self.requested}
+        return (ground for ground in self.grounds if ground.lowered.declaration.span.file in requested)
 
     def rules(self) -> tuple[RuleDecl | Delegation, ...]:
-        """Every rule and delegation of the program, those of templates once, as they are written."""
+        """Return every rule and delegation of the program as written, those of a template once."""
         policies = tuple(self.symbols.policies.values())
         owners: list[PolicyDecl | TemplateDecl] = [*policies, *self.symbols.templates.values()]
         found: list[RuleDecl | Delegation] = [rule for owner in owners for rule in owner.rules]
         return (*found, *(each for policy in policies for each in policy.delegations))
 
     def permits_any(self) -> bool:
-        """Whether a rule permits every skill that there is."""
+        """Whether a rule permits every skill."""
         return any(isinstance(rule, RuleDecl) and rule.kind == "permit" and not rule.skills for rule in self.rules())
 
 

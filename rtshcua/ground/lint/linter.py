@@ -1,4 +1,4 @@
-"""Runs all lint rules over one program."""
+"""Run all lint rules over one program."""
 
 from collections.abc import Callable, Collection, Iterator
 
@@ -20,16 +20,16 @@ RULES: tuple[Callable[[LintInput], Iterator[Diagnostic]], ...] = (
 
 
 def lint(
-    program: Program, asked: Collection[str] | None = None, grounds: tuple[ProofContext, ...] = ()
+    program: Program, requested: Collection[str] | None = None, grounds: tuple[ProofContext, ...] = ()
 ) -> tuple[Diagnostic, ...]:
-    """What is worth a second look in the files `asked` for (None: the first), by place. `grounds` are the lowered
-    policies of the program, if it was compiled; without them, the rules about what a policy decides say nothing.
+    """Return the lint findings in the `requested` files (None: the first file), in order of position.
 
-    Nothing of a program that could not be read without errors, for what has an error may be what uses the rest.
+    `grounds` are the lowered policies of the program. Without them, rules about the decisions of a policy do not run.
+    A program with errors has no lint findings: the part with the error may use the other declarations.
     """
     if has_errors(program.diagnostics) or not program.units:
         return ()
-    subject = LintInput.of(program, {program.units[0].file} if asked is None else asked, grounds)
+    subject = LintInput.of(program, {program.units[0].file} if requested is None else requested, grounds)
     return tuple(sorted(dict.fromkeys(found for rule in RULES for found in rule(subject)), key=_place))
 
 

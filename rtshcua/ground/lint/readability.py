@@ -1,9 +1,10 @@
-"""Names that violate the naming convention (E1302), and numbers that are repeated (E1304).
+"""Names that violate the naming convention (E1302), and repeated numbers (E1304).
 
-E1302: names are `lower_snake_case`, those of signals have dots between such parts. Roles and proposers keep the names
-of their keys, and values of an enumeration that mirrors one of MAVLink may be spelled as there.
+E1302: names are `lower_snake_case`. The name of a signal consists of such parts with dots between them. Roles and
+proposers keep the names of their keys. Members of an enumeration that mirrors a MAVLink enumeration may keep its
+spelling.
 
-E1304: one number stands for the same quantity in several conditions; who changes it in one place forgets another.
+E1304: several conditions compare one quantity with the same number. A later edit may miss one of them.
 """
 
 import re
@@ -29,7 +30,7 @@ _HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 def misnamed_declarations(subject: LintInput) -> Iterator[Diagnostic]:
     """Report every name that violates the naming convention (E1302)."""
-    for unit in subject.asked:
+    for unit in subject.requested:
         for signal in unit.signals:
             if not all(_PART.fullmatch(part) for part in signal.name.text.split(".")):
                 yield _misnamed(
@@ -41,7 +42,7 @@ def misnamed_declarations(subject: LintInput) -> Iterator[Diagnostic]:
 
 
 def _names(subject: LintInput, unit: Unit) -> Iterator[Name]:
-    """The names that a file gives, but for those of signals."""
+    """Yield the names that a file declares, except those of signals."""
     for declarations in (
         unit.enums, unit.zones, unit.vehicles, unit.skills, unit.templates, unit.policies, unit.missions
     ):  # fmt: skip
@@ -64,7 +65,7 @@ def _names(subject: LintInput, unit: Unit) -> Iterator[Name]:
 
 def _misnamed(name: Name, better: str, style: str) -> Diagnostic:
     help = f"write it as `{better}`" if all(map(_PART.fullmatch, better.split("."))) else None
-    return Diagnostic(codes.NAMING, f"`{name.text}` is not written in {style}, as names are", name.span, help)
+    return Diagnostic(codes.NAMING, f"`{name.text}` violates the naming convention: {style}", name.span, help)
 
 
 def _snake(text: str) -> str:
@@ -73,22 +74,22 @@ def _snake(text: str) -> str:
 
 NumberOwner: TypeAlias = PolicyDecl | TemplateDecl | SkillDecl
 
-#: in how many conditions a number may stand before it is worth a name
+#: the number of conditions from which a repeated number is reported
 MIN_REPEATS = 3
 
 
 class NumberUse(NamedTuple):
-    """What a number is compared with, as it is written, and the number."""
+    """A quantity as written in the source, and the number with which it is compared."""
 
-    what: str
+    quantity: str
     value: int
     dimension: Dimension
     datum: Datum | None
 
 
 def repeated_numbers(subject: LintInput) -> Iterator[Diagnostic]:
-    """Report each number that stands for the same quantity in several conditions of one declaration (E1304)."""
-    for unit in subject.asked:
+    """Report each number that several conditions of one declaration compare with the same quantity (E1304)."""
+    for unit in subject.requested:
         owners: list[NumberOwner] = [*unit.policies, *unit.templates, *unit.skills]
         for owner in owners:
             yield from _repeated(subject, owner)
@@ -98,8 +99,8 @@ def _repeated(subject: LintInput, owner: NumberOwner) -> Iterator[Diagnostic]:
     found: dict[NumberUse, list[Span]] = {}
     for condition in _conditions(owner):
         here: dict[NumberUse, Span] = {}
-        for what, number in _numbers(condition):
-            key = NumberUse(_written(subject, what), number.value, number.dimension, number.datum)
+        for other, number in _numbers(condition):
+            key = NumberUse(_written(subject, other), number.value, number.dimension, number.datum)
             here.setdefault(key, number.span)
         for key, span in here.items():
             found.setdefault(key, []).append(span)
@@ -108,7 +109,7 @@ def _repeated(subject: LintInput, owner: NumberOwner) -> Iterator[Diagnostic]:
             written = _written(subject, spans[0])
             yield Diagnostic(
                 codes.REPEATED_NUMBER,
-                f"`{written}` stands for the same `{key.what}` in {len(spans)} conditions",
+                f"{len(spans)} conditions compare `{key.quantity}` with `{written}`",
                 spans[0],
                 _help(owner, written),
                 tuple(Label(span, "again here") for span in spans[1:]),
@@ -117,9 +118,9 @@ def _repeated(subject: LintInput, owner: NumberOwner) -> Iterator[Diagnostic]:
 
 def _help(owner: NumberOwner, number: str) -> str:
     if isinstance(owner, PolicyDecl):
-        return "make one rule of them, or a template with a parameter, so that it is written once"
-    what = "template" if isinstance(owner, TemplateDecl) else "skill"
-    return f"give the {what} a parameter with `{number}` as its default, so that it is written once"
+        return "write the number once: merge the rules, or use a template with a parameter"
+    kind = "template" if isinstance(owner, TemplateDecl) else "skill"
+    return f"write the number once: give the {kind} a parameter with `{number}` as its default"
 
 
 def _conditions(owner: NumberOwner) -> Iterable[Condition]:
@@ -131,7 +132,7 @@ def _conditions(owner: NumberOwner) -> Iterable[Condition]:
 
 
 def _numbers(condition: Condition) -> Iterator[tuple[Span, Quantity]]:
-    """The numbers of a condition, but for zero, each with the place of what it is compared with."""
+    """Yield the numbers of a condition except zero, each with the span of the value with which it is compared."""
     for part in walk(condition):
         pairs: list[tuple[Value | Reference, Value]] = []
         match part:
@@ -141,9 +142,9 @@ def _numbers(condition: Condition) -> Iterator[tuple[Span, Quantity]]:
                 pairs = [(part.subject, part.range.low), (part.subject, part.range.high)]
             case Grow():
                 pairs = [(part.zone, part.margin)]
-        for what, number in pairs:
-            if isinstance(number, Quantity) and number.value != 0 and not isinstance(what, Quantity):
-                yield what.span, number
+        for other, number in pairs:
+            if isinstance(number, Quantity) and number.value != 0 and not isinstance(other, Quantity):
+                yield other.span, number
 
 
 def _written(subject: LintInput, span: Span) -> str:

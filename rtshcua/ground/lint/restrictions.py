@@ -1,13 +1,13 @@
 """Whether a condition or a zone of a policy restricts anything, over every situation in which a step can be decided.
 
-A step is decided while the vehicle is within its reach, has at least its battery reserve, and each argument and reading
-is in its range. A condition that fails in no such situation restricts nothing. A missing reading makes a condition
-unknown, and so refuses even here: that is the language's rule, not the policy's.
+In such a situation the vehicle is within its reach, the battery is at or above the reserve, and each argument and
+reading is in its range. A condition that fails in no such situation restricts nothing. Missing readings are not
+considered: a condition that is unknown refuses a step by the rules of the language, not by the policy.
 
-The reach is how far the vehicle flies from home at its highest speed on a full battery, and how high it climbs in that
-time, plus the distance by which home may be off (`within`) and one per cent. A zone that contains all of the reach
-restricts nothing, nor does a zone that has nothing in common with it. Every estimate here errs towards a longer reach,
-so towards "restricted". Lengths are in mm.
+The reach is the distance that the vehicle flies from home at its highest speed on a full battery, and the height that
+it climbs in that time, plus the position error of home (`within`) and one per cent. A zone that contains the reach
+restricts nothing, and neither does a zone that the reach does not touch. Every estimate errs towards a longer reach,
+and so towards "restricted". Lengths are in mm.
 """
 
 from collections.abc import Iterator, Sequence
@@ -32,7 +32,7 @@ from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone
 from rtshcua.model.ir.policies import Delegation, RuleDecl
 
 _SECOND = 1_000_000
-#: the local plane is true to 1 part in 1,000 within 5 km; a per cent is more than it errs by within what flies
+#: a hundredth: the error of the local plane is 1 part in 1,000 within 5 km, and below 1 % within any vehicle's reach
 _MARGIN = 100
 
 
@@ -44,7 +44,7 @@ class VehicleReach(NamedTuple):
     down: int
 
     def belongs_to(self, zone: Zone) -> bool:
-        """Whether it is proved that a zone holds all of it, at all times."""
+        """Whether it is proved that a zone contains the whole reach at all times."""
         if timed(zone) or zone.floor > self.down or zone.ceiling < self.up:
             return False
         if zone.shape == CIRCLE:
@@ -54,12 +54,12 @@ class VehicleReach(NamedTuple):
         return lies_within(Region(RoundArea((0, 0), self.across), LOWEST, HIGHEST), plan)
 
     def misses(self, zone: Zone) -> bool:
-        """Whether it is proved that a zone has nothing of it."""
+        """Whether it is proved that a zone contains no part of the reach."""
         return zone.floor > self.up or zone.ceiling < self.down or _distance(zone) > self.across
 
 
 def reach_of(vehicle: VehicleLimits) -> VehicleReach:
-    """Where a vehicle may come. Down it may come faster than it climbs, but not further than it flies."""
+    """Return the reach of a vehicle. It may descend faster than it climbs, but not farther than it flies."""
 
     def flown(speed: int) -> int:
         way = -(-speed * vehicle.endurance_us // _SECOND) + vehicle.home_within + vehicle.position_error
@@ -69,21 +69,21 @@ def reach_of(vehicle: VehicleLimits) -> VehicleReach:
 
 
 def is_open(policy: Policy) -> bool:
-    """Whether nothing in a policy's airspace restricts where its vehicle comes, or it has none."""
+    """Whether a policy has no airspace, or one that does not restrict where its vehicle can fly."""
     reach = reach_of(policy.vehicle)
     without = () if policy.airspace is None else policy.airspace.outside
     return is_unbounded(policy) and all(reach.misses(policy.zones[number]) for number in without)
 
 
 def is_unbounded(policy: Policy) -> bool:
-    """Whether a policy has no zone to stay inside of that restricts where its vehicle comes."""
+    """Whether a policy has no `airspace inside` zone that restricts where its vehicle can fly."""
     reach = reach_of(policy.vehicle)
     within = () if policy.airspace is None else policy.airspace.inside
     return all(reach.belongs_to(policy.zones[number]) for number in within)
 
 
 def region_of(zone: Zone) -> Region:
-    """A zone as a region of the plane, without its times; a circle is no smaller than it is."""
+    """Return a zone as a region, without its times. The radius of a circle is rounded up."""
     if zone.shape == CIRCLE:
         x, y, squared = zone.data
         return Region(RoundArea((x, y), isqrt(squared) + 1), zone.floor, zone.ceiling)
@@ -91,13 +91,13 @@ def region_of(zone: Zone) -> Region:
 
 
 def _distance(zone: Zone) -> int:
-    """A distance from home that a zone keeps at least; 0 where home may lie in it."""
+    """Return a lower bound of the distance from home to a zone; 0 if home may lie in the zone."""
     if zone.shape == CIRCLE:
         x, y, squared = zone.data
         return max(0, isqrt(x * x + y * y) - isqrt(squared) - 1)
     corners = [corner for ring in rings_of(zone) for corner in ring]
     xs, ys = [x for x, _ in corners], [y for _, y in corners]
-    # the box around it is nearer than the zone is, never further
+    # the bounding box is never farther than the zone
     dx, dy = max(min(xs), -max(xs), 0), max(min(ys), -max(ys), 0)
     return isqrt(dx * dx + dy * dy)
 
@@ -106,7 +106,7 @@ _MINUTE = 60_000_000  # us
 
 
 class ConditionEffects:
-    """The rules of a lowered policy, each with whether it ever makes a difference to a skill."""
+    """Analysis of which rules of a lowered policy ever affect a skill."""
 
     def __init__(self, ground: ProofContext) -> None:
         self.rules = Ruleset(ground)
@@ -114,18 +114,19 @@ class ConditionEffects:
         self._spaces: dict[int, SituationSpace] = {}
 
     def always_permit(self, numbers: Sequence[int], skill: int) -> bool:
-        """Whether it is proved that in each step of a skill one of some permits has its condition met."""
+        """Whether it is proved that in each step of a skill the condition of one of these permits holds."""
         return self._never([(number, FALSE | UNKNOWN) for number in numbers], skill)
 
     def acts(self, number: int, skill: int) -> bool:
-        """Whether a rule that is no permit may act. A `degrade` is watched in flight, so there any state counts."""
+        """Whether a rule other than a permit may act. A `degrade` is monitored in flight, so any state counts."""
         if self.rules.rule(number).kind == RuleKind.DEGRADE:
             return not isinstance(self.rules.ask([(number, TRUE)], skill), No)
         return not self._never([(number, TRUE | UNKNOWN)], skill)
 
     def is_vacuous(self, rule: RuleDecl, skill: str) -> bool | None:
-        """Whether the condition of a rule as it is written makes no difference to a skill; None where the policy has no
-        such rule. A permit's never fails, that of any other rule is never met.
+        """Whether the condition of a rule as written has no effect on a skill; None if the policy lacks the rule.
+
+        The condition of a permit has no effect if it never fails, that of any other rule if it never holds.
         """
         group = self.rules.at.get(rule.span)
         number = self._ground.lowered.skills.get(skill)
@@ -137,12 +138,12 @@ class ConditionEffects:
         return not any(self.acts(each, number) for each in about)
 
     def _is_own(self, number: int, skill: int) -> bool:
-        """Whether a flat rule about a skill is as it was written, and not what a delegation narrowed."""
+        """Whether a flat rule about a skill was written in the policy, and not derived by a delegation."""
         origin = self._ground.lowered.rules[number].origin
         return skill in self.rules.skills(number) and not any(isinstance(each, Delegation) for each in origin)
 
     def _never(self, wanted: Sequence[tuple[int, Truth]], skill: int) -> bool:
-        """Whether it is proved that the conditions of flat rules have such truths in no step of a skill."""
+        """Whether it is proved that no step of a skill gives the conditions of flat rules these truth values."""
 
         def goals() -> list[Goal]:
             return [(self.rules.node(number), truth) for number, truth in wanted]
@@ -159,7 +160,7 @@ class ConditionEffects:
 
 
 def _when_admitted(space: SituationSpace, policy: Policy, contract: Contract) -> SituationSpace:
-    """The situations of a space in which a step may be admitted, and perhaps more; every sensor reports."""
+    """Return a superset of the situations in which a step may be admitted and every sensor reports."""
     vehicle, reach = policy.vehicle, reach_of(policy.vehicle)
     arguments, slots = list(space.arguments), list(space.slots)
     for parameter in contract.parameters:
@@ -168,7 +169,7 @@ def _when_admitted(space: SituationSpace, policy: Policy, contract: Contract) ->
     if vehicle.position >= 0:
         _within_reach(slots, vehicle.position, reach)
     for signal in policy.signals:
-        # two ways to read one quantity: where one of them is the length of a vector, the other is no less than nothing
+        # all sources of a signal measure one quantity: if one is the length of a vector, no value is negative
         if signal.kind == NUMBER and any(len(source.fields) > 1 for source in signal.sources):
             _clip(slots, signal.slot, 0, MAX_VALUE)
     if vehicle.height >= 0:
@@ -190,7 +191,7 @@ def _clip(values: list[Value], at: int, low: int, high: int) -> None:
 
 
 def _without_last_minute(utc: Sequence[Between], local: LocalTime) -> Iterator[Between]:
-    """Moments without the last minute of each local day, where the local time is known."""
+    """Yield the times, without the last minute of each local day, for which the local time is known."""
     stretches = ((low, after - 1, offset) for span in utc for low, after, offset in local.stretches(*span))
     for low, high, offset in stretches:
         for day in range((low + offset) // DAY, (high + offset) // DAY + 1):
@@ -200,13 +201,13 @@ def _without_last_minute(utc: Sequence[Between], local: LocalTime) -> Iterator[B
 
 
 class VacuousRules:
-    """Which rules of a program, as they are written, make no difference, in every policy that has them."""
+    """Find the rules, as written in a program, that have no effect in any policy that has them."""
 
     def __init__(self, grounds: Sequence[ProofContext]) -> None:
         self._every = [ConditionEffects(ground) for ground in grounds]
 
     def __call__(self, rule: RuleDecl, skill: str) -> bool:
-        """Whether the condition of a rule makes no difference to a skill; False where it cannot be told."""
-        answers = (each.is_vacuous(rule, skill) for each in self._every)
-        told = [answer for answer in answers if answer is not None]
-        return bool(told) and all(told)
+        """Whether it is proved that the condition of a rule has no effect on a skill."""
+        results = [each.is_vacuous(rule, skill) for each in self._every]
+        known = [result for result in results if result is not None]
+        return bool(known) and all(known)

@@ -1,14 +1,14 @@
-"""Rules that keep the vehicle on the ground (E1313) or in the air (E1312).
+"""Rules that prevent every take-off (E1313) or replace a landing by a flight (E1312).
 
-E1313: a rule or a contract that prevents every take-off, because it reads a signal that no autopilot knows on the
-ground. Both autopilots estimate the wind only in the air (docs/flying/vehicles.md). A `forbid`, `confirm` or `degrade`
-whose condition is then unknown defers the take-off until its deadline has passed, and so does an `assume` or `require`
-of the climbing skill; a `permit` that is unknown permits nothing. Reported where it is proved that no truth of the
-condition lets the take-off through while the vehicle stands on the ground without such a reading.
+E1313: a rule or a contract prevents every take-off because it reads a signal that no autopilot reports on the ground.
+Both autopilots estimate the wind only in the air (docs/flying/vehicles.md). A `forbid`, `confirm` or `degrade` whose
+condition is unknown defers the take-off until its deadline has passed, and so does an `assume` or `require` of the
+climbing skill. A `permit` whose condition is unknown permits nothing. A finding means: it is proved that the condition
+never has a truth value that allows the take-off while the vehicle stands on the ground without such a reading.
 
-E1312: a `degrade` that covers a skill that lands, and whose target does not land there. `degrade any` covers every
-skill, also one that a person requests to land at once: the request becomes a flight home. Whoever requests a landing
-has often seen what no signal reports.
+E1312: a `degrade` rule applies to a skill that lands, and its target does not land on the spot. `degrade any` applies
+to every skill. If a person requests an immediate landing, the vehicle flies home instead, although the person may have
+seen a danger that no signal reports.
 """
 
 from collections.abc import Iterator
@@ -33,24 +33,24 @@ from rtshcua.model.ir.policies import RuleDecl
 
 #: messages that both autopilots fill only in the air
 _AIRBORNE_MESSAGES = frozenset({"WIND_COV", "WIND"})
-#: how far from its home height a vehicle may read itself on the ground, mm
+#: largest error of the measured height while the vehicle stands on the ground, mm
 _ON_THE_GROUND = 2_000
-#: the truths of its condition with which a rule lets a take-off through; FALSE for the other kinds
-_LETS_THROUGH: dict[int, Truth] = {RuleKind.PERMIT: TRUE, RuleKind.CONFIRM: FALSE | TRUE}
+#: by kind of rule, the truth values of its condition that allow a take-off; FALSE for other kinds
+_ALLOWING: dict[int, Truth] = {RuleKind.PERMIT: TRUE, RuleKind.CONFIRM: FALSE | TRUE}
 
 
 def rules_that_keep_grounded(subject: LintInput) -> Iterator[Diagnostic]:
-    """Report the rules and clauses that keep every take-off on the ground (E1313)."""
+    """Report the rules and clauses that prevent every take-off (E1313)."""
     for ground in subject.lowered():
         policy = ground.prepared.policy
         signals = tuple(each for each in policy.signals if _unknown_on_the_ground(each))
         climbing = [number for number, each in enumerate(policy.contracts) if each.motion.kind == MotionKind.CLIMB]
         rules = Ruleset(ground)
-        told: set[Span] = set()
+        reported: set[Span] = set()
         for skill in climbing if signals else ():
             for found in _for_skill(ground, rules, skill, signals):
-                if found.span is not None and found.span not in told:
-                    told.add(found.span)
+                if found.span is not None and found.span not in reported:
+                    reported.add(found.span)
                     yield found
 
 
@@ -63,32 +63,32 @@ def _for_skill(ground: ProofContext, rules: Ruleset, skill: int, signals: tuple[
     contract, slots = policy.contracts[skill], {each.slot for each in signals}
     space = _with_monitors(ground, skill, _standing_space(policy, rules.space(skill), slots))
 
-    def stuck(clause: Clause | None, node: Node, lets: Truth) -> bool:
-        """Whether a condition reads such a signal, and has no truth that lets the take-off through."""
+    def prevents(clause: Clause | None, node: Node, allowing: Truth) -> bool:
+        """Whether a condition reads such a signal, and never has a truth value that allows the take-off."""
         if clause is None or slots.isdisjoint(slots_read([clause], policy.vehicle, policy.monitors)):
             return False
-        key = ("standing", skill, clause.code, lets)
-        return isinstance(ground.questions.ask(key, lambda: [(node, lets)], space), No)
+        key = ("standing", skill, clause.code, allowing)
+        return isinstance(ground.questions.ask(key, lambda: [(node, allowing)], space), No)
 
     about = [number for number in range(len(policy.rules)) if skill in rules.skills(number)]
     permits = {number for number in about if rules.rule(number).kind == RuleKind.PERMIT}
-    kept = {
+    preventing = {
         number
         for number in about
-        if stuck(rules.rule(number).when, rules.node(number), _LETS_THROUGH.get(rules.rule(number).kind, FALSE))
+        if prevents(rules.rule(number).when, rules.node(number), _ALLOWING.get(rules.rule(number).kind, FALSE))
     }
-    if not permits <= kept:  # one of them may permit it
-        kept -= permits
-    for number in sorted(kept):
+    if not permits <= preventing:  # another permit may allow the take-off
+        preventing -= permits
+    for number in sorted(preventing):
         group = rules.groups[rules.group_of(number)]
         yield _keeps_grounded(group.span, contract.name, f"this `{group.declared.kind}`", signals)
     for clause in (*contract.require, *contract.assume):
-        if stuck(clause, ground.prepared.compiler.node(clause, contract), TRUE):
-            yield _keeps_grounded(ground.span(clause), contract.name, "this", signals)
+        if prevents(clause, ground.prepared.compiler.node(clause, contract), TRUE):
+            yield _keeps_grounded(ground.span(clause), contract.name, "this clause", signals)
 
 
 def _standing_space(policy: Policy, space: SituationSpace, unknown: set[int]) -> SituationSpace:
-    """The situations of a space in which the vehicle stands on the ground, and all but some signals are known."""
+    """Restrict a space to a vehicle on the ground, with all slots known except the `unknown` ones."""
     slots = [MISSING if slot in unknown else present(value) for slot, value in enumerate(space.slots)]
     height = policy.vehicle.height
     if height >= 0:
@@ -97,34 +97,36 @@ def _standing_space(policy: Policy, space: SituationSpace, unknown: set[int]) ->
 
 
 def _with_monitors(ground: ProofContext, skill: int, space: SituationSpace) -> SituationSpace:
-    """The same, with what conditions over time may say there. What one says of a window is what its condition was at
-    some moment of it, or UNKNOWN; one that rises or falls was UNKNOWN, or what it may be, at the observation before.
+    """Return the space with the possible truth values of the monitors.
+
+    A monitor over a window has a value that its condition had in the window, or UNKNOWN. A monitor of a rising or
+    falling condition compares the condition with its previous value, which may also be UNKNOWN.
     """
     prepared = ground.prepared
     for number, monitor in enumerate(prepared.policy.monitors):
         node = prepared.compiler.monitor_node(monitor, number)
         now = sum(truth for truth in (FALSE, TRUE, UNKNOWN) if _can_be(ground, (skill, number), node, truth, space))
-        says = before = now | UNKNOWN
+        possible = before = now | UNKNOWN
         if monitor.kind == MonitorKind.RISING:
-            says = AND[NOT[before]][now]
+            possible = AND[NOT[before]][now]
         elif monitor.kind == MonitorKind.FALLING:
-            says = AND[before][NOT[now]]
-        space = space._replace(monitors=(*space.monitors[:number], says, *space.monitors[number + 1 :]))
+            possible = AND[before][NOT[now]]
+        space = space._replace(monitors=(*space.monitors[:number], possible, *space.monitors[number + 1 :]))
     return space
 
 
 def _can_be(ground: ProofContext, of: tuple[int, int], node: Node, truth: Truth, space: SituationSpace) -> bool:
-    """Whether what a monitor looks at may have a truth there; `of`: about which skill, and the monitor's number."""
+    """Whether the condition of a monitor may have a truth value in a space; `of` is the skill and the monitor."""
     return not isinstance(ground.questions.ask(("looked at", *of, truth), lambda: [(node, truth)], space), No)
 
 
-def _keeps_grounded(span: Span, skill: str, what: str, signals: tuple[Signal, ...]) -> Diagnostic:
+def _keeps_grounded(span: Span, skill: str, subject: str, signals: tuple[Signal, ...]) -> Diagnostic:
     names = ", ".join(f"`{each.name}`" for each in signals)
     return Diagnostic(
         codes.NEVER_TAKES_OFF,
-        f"{what} keeps `{skill}` on the ground for ever: {names} is not known before the vehicle flies",
+        f"{subject} prevents every `{skill}`: {names} is unknown until the vehicle flies",
         span,
-        f"leave `{skill}` out of it, or write the condition of a `degrade` of the skills that fly on",
+        f"exclude `{skill}`, or move the condition to a `degrade` of the skills that fly afterwards",
     )
 
 
@@ -132,8 +134,8 @@ _LAND = "land"
 
 
 def degrades_that_keep_up(subject: LintInput) -> Iterator[Diagnostic]:
-    """Report degrade rules that keep a skill from landing (E1312)."""
-    for unit in subject.asked:
+    """Report `degrade` rules that replace a landing by a flight (E1312)."""
+    for unit in subject.requested:
         for rule in rules_of(unit):
             if rule.kind == "degrade" and rule.target is not None and not _lands(subject, rule.target.skill.text):
                 yield from _skills_kept_up(subject, rule, rule.target.skill.text)
@@ -147,13 +149,12 @@ def _lands(subject: LintInput, name: str) -> bool:
 def _skills_kept_up(subject: LintInput, rule: RuleDecl, target: str) -> Iterator[Diagnostic]:
     landing = [name for name in subject.symbols.skills if _lands(subject, name)]
     if not rule.skills and landing:
-        help = "name the skills that you mean, and leave out those that land"
+        help = "name the skills to degrade, without those that land"
         yield _kept_from_landing(subject, rule, target, landing[0], help)
     for name in rule.skills:
         if name.text in landing:
-            yield _kept_from_landing(
-                subject, rule, target, name.text, f"leave `{name.text}` out, or degrade it to what lands", name
-            )
+            help = f"remove `{name.text}`, or degrade it to a skill that lands on the spot"
+            yield _kept_from_landing(subject, rule, target, name.text, help, name)
 
 
 def _kept_from_landing(
@@ -163,8 +164,8 @@ def _kept_from_landing(
     assert motion is not None
     return Diagnostic(
         codes.KEPT_FROM_LANDING,
-        f"whoever asks for `{landing}` under this condition gets `{target}`, which does not land on the spot",
+        f"under this condition, `{target}` replaces `{landing}`, but does not land on the spot",
         rule.span if name is None else name.span,
         help,
-        (Label(motion.span, f"`{landing}` lands here and now"),),
+        (Label(motion.span, f"`{landing}` lands on the spot"),),
     )

@@ -1,15 +1,15 @@
 """Unused declarations and parameters (E1301), and unused imports (E1305).
 
-E1301: a parameter of a template or a mission must be read in it, one of a skill in it or by a rule. Other declarations
-are reported only in a file with a mission or a policy, since any other file may be meant for import. The zones and
-vehicles of a policy are used by missions elsewhere.
+E1301: a template or a mission must read its parameters. A parameter of a skill must be read by the skill or by a rule.
+Other declarations are reported only in a file with a mission or a policy, since any other file may exist to be
+imported. Zones and vehicles are not reported in a file with a policy, since missions in other files use them.
 
-E1305: an import is used where the importing file mentions a declaration of the imported file, or where some file that
-stays mentions a declaration that only this import brings. A policy also uses without mention its zones and its vehicle,
-the signals that every flight reads, and under `permit any` all skills. A file without a mission or a policy may import
-for the files that import it, so there only imports count whose files all come by another import too; the imports of a
-file that declares nothing are all used. Nobody knows who else imports a file, so to delete an import is safe only where
-another import brings everything that it brings.
+E1305: an import is used if the importing file mentions a declaration of the imported file, or if a remaining file
+mentions a declaration that only this import provides. A policy also uses, without mention, its zones, its vehicle, the
+signals that every flight reads, and under `permit any` all skills. A file without a mission or a policy may import for
+the files that import it. There an import is unused only if other imports provide all of its files. All imports of a
+file without declarations are used. Other projects may import a file, so a deletion is safe only if another import
+provides everything that the deleted one does.
 """
 
 from collections.abc import Iterable, Iterator
@@ -34,9 +34,9 @@ from rtshcua.model.ir.tests import Named
 
 
 def mentions(*nodes: Node | None) -> frozenset[str]:
-    """The names that nodes mention, but for those that they give: to a declaration, a parameter, an argument.
+    """Return the names that nodes refer to. Names of declarations, parameters and arguments are not references.
 
-    `bridge_a.entry` mentions `bridge_a` too. The type of a parameter is a word of the language.
+    `bridge_a.entry` mentions `bridge_a` too. The type of a parameter is a keyword, not a name.
     """
     found: set[str] = set()
     for node in nodes:
@@ -45,7 +45,7 @@ def mentions(*nodes: Node | None) -> frozenset[str]:
 
 
 def mentioned_by(unit: Unit) -> frozenset[str]:
-    """The names that the declarations of a file mention."""
+    """Return the names that the declarations of a file mention."""
     return mentions(*_declarations(unit))
 
 
@@ -74,22 +74,22 @@ def _mentioned(node: Any, found: set[str]) -> None:
 
 @cache
 def _fields(kind: type[Node]) -> tuple[str, ...]:
-    """The fields of a node that may mention something."""
-    given = ("span", "name", "type") if issubclass(kind, ParameterDecl) else ("span", "name")
-    return tuple(field for field in kind.__struct_fields__ if field not in given)
+    """Return the fields of a node that may mention a name."""
+    declaring = ("span", "name", "type") if issubclass(kind, ParameterDecl) else ("span", "name")
+    return tuple(field for field in kind.__struct_fields__ if field not in declaring)
 
 
-#: in the place of a skill's name: whichever
+#: key for rules about every skill
 _ANY = "any"
 
 
 def unused_declarations(subject: LintInput) -> Iterator[Diagnostic]:
-    """Report parameters that nothing reads, and declarations that nothing uses (E1301)."""
+    """Report unused parameters and declarations (E1301)."""
     used: dict[str, set[str]] = {}
     for name, declaration in subject.symbols.declared.items():
         for mention in mentions(declaration):
             used.setdefault(mention, set()).add(name)
-    for unit in subject.asked:
+    for unit in subject.requested:
         owners: list[Parametric] = [*unit.templates, *unit.missions]
         for owner in owners:
             yield from _unread_parameters(owner, mentions(owner))
@@ -104,7 +104,7 @@ def unused_declarations(subject: LintInput) -> Iterator[Diagnostic]:
 
 
 def _private_declarations(subject: LintInput, unit: Unit) -> Iterator[Declaration]:
-    """What a file declares for itself alone."""
+    """Yield the declarations of a file that other files are not expected to use."""
     yield from unit.enums
     yield from (signal for signal in unit.signals if signal.name.text not in WELL_KNOWN.keys() | MEASURED.keys())
     yield from unit.templates
@@ -117,13 +117,13 @@ def _private_declarations(subject: LintInput, unit: Unit) -> Iterator[Declaratio
 
 
 def _any_zone(subject: LintInput) -> bool:
-    """Whether a mission has a parameter whose value may be any zone, or the entry of any."""
+    """Whether a mission has a parameter that may be any zone, or the entry point of any zone."""
     missions = subject.symbols.missions.values()
     return any(each.type.text in ("zone", "position") for mission in missions for each in mission.parameters)
 
 
 def _read_by_rules(subject: LintInput) -> dict[str, set[str]]:
-    """By skill, the names that rules and delegations about it mention."""
+    """Return for each skill the names that the rules and delegations about it mention."""
     found: dict[str, set[str]] = {}
     for rule in subject.rules():
         read = mentions(rule.when)
@@ -139,28 +139,24 @@ def _unread_parameters(owner: Parametric, read: frozenset[str]) -> Iterator[Diag
 
 
 def _unread_parameter(owner: Parametric, parameter: ParameterDecl) -> Diagnostic:
-    by = "neither the skill nor a rule reads" if isinstance(owner, SkillDecl) else "nothing in it reads"
-    return Diagnostic(
-        codes.UNUSED,
-        f"`{parameter.name.text}` is a parameter of `{owner.name.text}` that {by}",
-        parameter.name.span,
-        "remove it, or say what it is for",
-    )
+    also = ", and no rule about it reads it either" if isinstance(owner, SkillDecl) else ""
+    message = f"`{owner.name.text}` does not read its parameter `{parameter.name.text}`{also}"
+    return Diagnostic(codes.UNUSED, message, parameter.name.span, "remove it, or use it")
 
 
 def _unused_declaration(declaration: Declaration) -> Diagnostic:
     return Diagnostic(
         codes.UNUSED,
-        f"`{declaration.name.text}` is {WORDS[type(declaration)]} that nothing uses",
+        f"`{declaration.name.text}` is {WORDS[type(declaration)]} that is never used",
         declaration.name.span,
-        "remove it; what is for others to import stands in a file without a mission or a policy",
+        "remove it, or move it to a file without a mission or a policy if other files are to import it",
     )
 
 
 def unused_imports(subject: LintInput) -> Iterator[Diagnostic]:
-    """Report unused imports (E1305), each given that those before it were removed."""
+    """Report unused imports (E1305). Each is checked with the unused imports before it removed."""
     needs = _ImportNeeds(subject)
-    for unit in subject.asked:
+    for unit in subject.requested:
         if needs.declared[unit.file]:
             for each in unit.imports:
                 lost = needs.lost(unit.file, each)
@@ -169,7 +165,7 @@ def unused_imports(subject: LintInput) -> Iterator[Diagnostic]:
 
 
 class _ImportNeeds:
-    """What the files of a program need, while imports are taken away."""
+    """The declarations that the files of a program need while unused imports are removed."""
 
     def __init__(self, subject: LintInput) -> None:
         symbols = subject.symbols
@@ -185,12 +181,13 @@ class _ImportNeeds:
         for file, unit in self._units.items():
             self.declared[file] |= {name.text for declaration in unit.roles for name in declaration.names}
         imported = {self._imports.target(file, each) for file, unit in self._units.items() for each in unit.imports}
-        self._roots = {unit.file for unit in subject.asked} | (self._units.keys() - imported)
+        self._roots = {unit.file for unit in subject.requested} | (self._units.keys() - imported)
         self._any = subject.permits_any()
 
     def lost(self, file: str, gone: Import) -> frozenset[str] | None:
-        """The files that `file` no longer has without one of its imports, if nothing of that is needed; then it is
-        taken away. None where something is.
+        """Remove an import of `file` if nothing in it is needed, and return the files that `file` then no longer has.
+
+        Returns None, and keeps the import, if something in it is needed.
         """
         unit = self._units[file]
         left = unit.copied(imports=tuple(each for each in unit.imports if each is not gone))
@@ -211,7 +208,7 @@ class _ImportNeeds:
         return lost
 
     def _is_needed(self, by: Iterable[Unit], files: frozenset[str]) -> bool:
-        """Whether a file of `by` needs what `files` declare."""
+        """Whether a file of `by` needs a declaration of `files`."""
         names = {name for file in files for name in self.declared[file]}
         units = [self._units[file] for file in files]
         implied = bool(names & WELL_KNOWN.keys()) or any(
@@ -221,9 +218,9 @@ class _ImportNeeds:
 
 
 def _unused_import(subject: LintInput, each: Import, *, alone: bool) -> Diagnostic:
-    """The finding on an import; `alone` is whether no other brings along what it does.
+    """The finding about an unused import; `alone` means that no other import provides its files.
 
-    A comment on its line stays. It may then speak of something else, so that a person has to look.
+    The fix keeps a comment on the same line. A person must then check the comment, so the fix is not safe.
     """
     text = subject.program.sources[each.span.file].text
     commented = _is_commented(text, each.span)
@@ -231,11 +228,11 @@ def _unused_import(subject: LintInput, each: Import, *, alone: bool) -> Diagnost
     help = f"{title}, if no file that imports this one needs it" if alone else title
     how = Applicability.SUGGESTED if alone or commented else Applicability.SAFE
     fix = Fix(each.span if commented else whole_line(text, each.span), "", title, how)
-    return Diagnostic(codes.UNUSED_IMPORT, f"nothing of `{each.path}` is used", each.span, help, fixes=(fix,))
+    return Diagnostic(codes.UNUSED_IMPORT, f"`{each.path}` is imported but not used", each.span, help, fixes=(fix,))
 
 
 def _is_commented(text: str, span: Span) -> bool:
-    """Whether a comment stands on the line of an import, or ends there."""
+    """Whether a comment is on the line of an import, or ends there."""
     start, end = text.rfind("\n", 0, span.start) + 1, text.find("\n", span.end)
-    beside = text[start : span.start], text[span.end : end if end >= 0 else len(text)]
-    return any(mark in part for part in beside for mark in ("//", "/*", "*/"))
+    rest = text[start : span.start], text[span.end : end if end >= 0 else len(text)]
+    return any(mark in part for part in rest for mark in ("//", "/*", "*/"))

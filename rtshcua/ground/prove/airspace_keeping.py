@@ -1,9 +1,9 @@
-"""Whether a part of a way keeps the airspace, and where it leaves it, in words.
+"""Decide whether a part of a path stays in the airspace, and describe where it leaves it.
 
-All that lies on straight ways between two sets of places is their convex hull, widened by a box. A hull does not cut
-into a zone when its edge keeps clear of the zone's edges and no ring of these lies within it. A sweep along the hull's
-edge (`decision.zones`) answers the first and on which side of the zone the hull is; for the second one corner of each
-ring is enough.
+The straight paths between two sets of places lie in their convex hull, widened by a box. The hull does not cut into a
+zone if its edge does not cross the zone's edges and no ring of the zone lies within the hull. A sweep along the hull's
+edge (`decision.zones`) tests the first condition and finds the side of the zone on which the hull is. For the second
+condition, one corner of each ring is enough.
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -26,7 +26,7 @@ _QUARTER = ((1_020, 0), (943, 391), (722, 722), (391, 943))
 
 
 def disc(radius: int) -> list[Point]:
-    """The corners of a polygon that holds a circle around home; home alone where the radius is 0."""
+    """Return the corners of a polygon that contains a circle around home; home itself if the radius is 0. In mm."""
     if not radius:
         return [(0, 0)]
     quarter = [(-(-x * radius // 1_000), -(-y * radius // 1_000)) for x, y in _QUARTER]
@@ -35,7 +35,7 @@ def disc(radius: int) -> list[Point]:
 
 
 def hull(points: Iterable[Point]) -> list[Point]:
-    """The corners of the convex hull, counter-clockwise (Andrew's monotone chain)."""
+    """Return the corners of the convex hull, counter-clockwise (Andrew's monotone chain)."""
     ordered = sorted(set(points))
     if len(ordered) < 3:
         return ordered
@@ -52,23 +52,23 @@ def _half(ordered: Sequence[Point]) -> list[Point]:
 
 
 def _turn(a: Point, b: Point, c: Point) -> int:
-    """Above 0 where `c` lies left of the way from `a` to `b`."""
+    """Return a positive number if `c` lies left of the line from `a` to `b`, 0 if on it."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
 class Landmarks:
-    """One place of each ring of the zones of a policy; a circle's is its centre."""
+    """One point of each ring of a policy's zones. For a circle it is the centre."""
 
     def __init__(self, policy: Policy) -> None:
         self._zones = policy.zones
         self._found: dict[int, tuple[Point, ...]] = {}
 
     def zone(self, number: int) -> Zone:
-        """A zone of the policy."""
+        """Return a zone of the policy."""
         return self._zones[number]
 
     def of(self, number: int) -> tuple[Point, ...]:
-        """The places of one zone."""
+        """Return the points of one zone."""
         if number not in self._found:
             zone = self._zones[number]
             if zone.shape == CIRCLE:
@@ -79,7 +79,7 @@ class Landmarks:
 
 
 class HullSweep(Sweep):
-    """A convex hull as a sweep: what it answers of a zone holds for all that is within it."""
+    """A convex hull as a sweep. Its result for a zone holds for every place in the hull."""
 
     __slots__ = ("_corners", "_landmarks")
 
@@ -93,13 +93,13 @@ class HullSweep(Sweep):
         """Whether the places of the hull are inside the zone, whatever their height."""
         answer = super().within(zone)
         if answer == TRUE and self._landmarks.zone(zone.number).shape == CIRCLE:
-            return TRUE  # a disc that holds the edge of a hull holds the hull
+            return TRUE  # a disc that contains the edge of a hull contains the hull
         if answer in (TRUE, FALSE) and any(map(self._holds, self._landmarks.of(zone.number))):
             return TRUE | FALSE
         return answer
 
     def _holds(self, place: Point) -> bool:
-        """Whether a place is within the hull, or on its edge."""
+        """Whether a place is inside the hull or on its edge."""
         corners = self._corners
         if len(corners) < 3:
             return False
@@ -108,21 +108,22 @@ class HullSweep(Sweep):
 
 Leg: TypeAlias = tuple[Point, Point]
 
-#: a leg is looked at every metre, but at no more places than this
+#: spacing in mm of the places tested on a leg, and their largest number
 _EVERY, _MOST = 1_000, 500
 _NO_BOX: Box = (0, 0, 0, 0)
 
 
 def breach_text(policy: Policy, airspace: PreparedAirspace, legs: Sequence[Leg], low: int, high: int) -> str:
-    """What a vehicle would do on these legs, at heights in mm, that the airspace does not allow, as if all its zones
-    existed; to stand after "would".
+    """Describe how a vehicle on these legs would violate the airspace, as a phrase that follows "would".
+
+    Heights are in mm. All zones of the airspace are taken to exist.
     """
     error = policy.vehicle.position_error
     box, within = (-error, -error, error, error), f"come within {_length(error)} of"
     places = list(places_along(legs))
 
-    def near(what: str, zone: PreparedZone, place: Point) -> str:
-        return f"{what} `{policy.zones[zone.number].name}`, near {place_text(policy, place)}"
+    def near(violation: str, zone: PreparedZone, place: Point) -> str:
+        return f"{violation} `{policy.zones[zone.number].name}`, near {place_text(policy, place)}"
 
     for zone in airspace.inside:
         found = _vertical(policy, zone, low, high)
@@ -142,12 +143,12 @@ def breach_text(policy: Policy, airspace: PreparedAirspace, legs: Sequence[Leg],
 
 
 def path_legs(points: Sequence[Point]) -> list[Leg]:
-    """The legs of a path; where it is one place, that alone."""
+    """Return the legs of a path. A path of one place has one leg of length 0."""
     return list(pairwise(points)) or [(points[0], points[0])]
 
 
 def place_text(policy: Policy, place: Point) -> str:
-    """A place as it is written in sources, to 5 decimals."""
+    """Format a place as in sources, to 5 decimals of a degree."""
     latitude, longitude = unproject(policy.projection, *place)
     return f"{_degrees(latitude, 'NS')}, {_degrees(longitude, 'EW')}"
 
@@ -155,14 +156,14 @@ def place_text(policy: Policy, place: Point) -> str:
 def _vertical(policy: Policy, zone: PreparedZone, low: int, high: int) -> str | None:
     name = policy.zones[zone.number].name
     if high >= zone.ceiling:
-        return f"fly at {_height(high)} where `{name}` has its ceiling at {_height(zone.ceiling)}"
+        return f"fly at {_height(high)}, and the ceiling of `{name}` is {_height(zone.ceiling)}"
     if low <= zone.floor:
-        return f"be down to {_height(low)} where `{name}` has its floor at {_height(zone.floor)}"
+        return f"fly at {_height(low)}, and the floor of `{name}` is {_height(zone.floor)}"
     return None
 
 
 def places_along(legs: Sequence[Leg]) -> Iterator[Point]:
-    """Places on some legs, their ends among them, near enough to each other to say where something is."""
+    """Yield places along legs, including their ends, close enough together to locate a violation."""
     for (x0, y0), (x1, y1) in legs:
         count = min(isqrt((x1 - x0) ** 2 + (y1 - y0) ** 2) // _EVERY + 1, _MOST)
         for at in range(count + 1):
@@ -183,7 +184,7 @@ def _height(value: int) -> str:
 
 
 def keeps(place: PlaceSet, airspace: PreparedAirspace) -> Truth:
-    """Whether a place is in the airspace, as if all its zones existed."""
+    """Whether places are in the airspace. All its zones are taken to exist."""
     truth = TRUE
     for zone in airspace.inside:
         truth = AND[truth][place.inside(zone)]

@@ -1,8 +1,10 @@
-"""Whether a step is refused in every state of the vehicle: what only the state decides is taken to go the step's way.
+"""Decide whether a step is refused in every state of the vehicle.
 
-Arguments, the time and the phase are known, or known to be in a set. A permit that no state makes true does not permit,
-a forbid that every state makes true forbids, and a degrade that every state makes true flies in the step's place. What
-is not known of the time (`TimeKnowledge`) is taken to go the step's way too.
+Arguments, time and phase are known, or known to be in a set. Each part of a condition that depends only on the state is
+assumed to favour the step,
+and so is each part that depends on an unknown time (`TimeKnowledge`). A permit that no state
+makes true does not permit, a forbid that every state makes true forbids, and a degrade that every state makes true
+replaces the step.
 """
 
 from collections.abc import Iterator
@@ -25,7 +27,7 @@ from rtshcua.model.flat.zone import Zone
 
 
 class TimeKnowledge(Enum):
-    """What is known of the time: all of it, so zones exist on their dates; the time of day, and no date; nothing."""
+    """What is known of the time: everything, so that zones exist on their dates; only the time of day; nothing."""
 
     ALL = "all"
     DAYTIME = "daytime"
@@ -39,10 +41,10 @@ def certain_refusals(
     known: TimeKnowledge,
     given: tuple[Goal, ...] = (),
 ) -> Iterator[tuple[Witness, Rule | None]]:
-    """Situations of a space in which a step is surely refused: by a forbid or degrade, or (None) for want of a permit.
+    """Yield situations in which a step is certainly refused, with the forbid or degrade, or None if no permit holds.
 
-    At most one of each, and time between two dates. `given` must hold in them. Where not all of the time is known, the
-    places in the space are those of the invocation.
+    There is at most one situation for each rule and each interval between two dates. The goals `given` hold in each.
+    If the time is not fully known, the places in the space must be those of the invocation.
     """
     candidates = invocation.candidates
     for span in _between_dates(proof, space.utc) if known is TimeKnowledge.ALL else (None,):
@@ -62,19 +64,21 @@ def certain_refusals(
 
 
 def refusing_rules(invocation: PreparedInvocation) -> tuple[Rule, ...]:
-    """The rules that refuse a step where they hold: the forbids, and the degrades that fly something else."""
+    """Return the rules that refuse a step if they hold: the forbids, and the degrades to another skill."""
     candidates = invocation.candidates
     return (*(each.rule for each in candidates.forbids), *(each.rule for each in candidates.degrades))
 
 
 def deciding_rules(invocation: PreparedInvocation) -> tuple[Rule, ...]:
-    """The permits of a step, and the rules that refuse it where they hold."""
+    """Return the permits of a step, and the rules that refuse it if they hold."""
     return (*(each.rule for each in invocation.candidates.permits), *refusing_rules(invocation))
 
 
 class _Moment(NamedTuple):
-    """A time in which no zone begins or ceases to exist on a date, where all is known of it; else the arguments of a
-    step, for which what is not known goes its way.
+    """The knowledge of the time with which a condition is simplified.
+
+    `span` is an interval in which no zone begins or ceases to exist on a date. It is None if the time is not fully
+    known; `arguments` are then those of the step that an unknown time is assumed to favour.
     """
 
     known: TimeKnowledge
@@ -82,14 +86,14 @@ class _Moment(NamedTuple):
     arguments: tuple[int, ...]
 
     def leaves_open(self, zone: Zone) -> bool:
-        """Whether a zone may exist, or not, for all that is known."""
+        """Whether it is unknown if a zone exists."""
         return self.span is None and bool(
             zone.dates or ((zone.daily or zone.weekly) and self.known is TimeKnowledge.NOTHING)
         )
 
 
 def _between_dates(proof: ProofContext, utc: tuple[Span, ...]) -> Iterator[Span]:
-    """The moments in pieces, in each of which no zone begins or ceases to exist on a date."""
+    """Split times into intervals in which no zone begins or ceases to exist on a date."""
     edges = {edge for zone in proof.policy.zones if zone.dates for edge in (zone.dates[0], zone.dates[1] + 1)}
     for low, high in utc:
         for start, end in pairwise([low, *sorted(edge for edge in edges if low < edge <= high), high + 1]):
@@ -97,10 +101,11 @@ def _between_dates(proof: ProofContext, utc: tuple[Span, ...]) -> Iterator[Span]
 
 
 def _optimistic_condition(proof: ProofContext, rule: Rule, hope: bool, time: _Moment) -> tree.Node | None:
-    """A rule's condition in the best case: what dates decide is decided, and what is not known of the time is what
-    brings it nearest to `hope`; a place that is given is inside a zone, or not, while that exists.
+    """Return a rule's condition with the parts about the time resolved as far as possible in favour of `hope`.
 
-    What says that a zone exists, of a zone that is an argument, is to be in a place that is everywhere on those dates.
+    Parts that depend on dates get their value. Parts that depend on an unknown time get the value `hope`, except that a
+    known place outside a zone stays outside whenever the zone exists. The existence of a zone argument is encoded as
+    being inside a zone that is everywhere on its dates.
     """
     key = (() if rule.when is None else rule.when.code, hope, time)
     if key in proof.hopes:

@@ -1,9 +1,9 @@
-"""E1101, E1102: what a skill requires, assumes and maintains cannot all hold at once; nor all zones of an airspace; a
-clause that cannot fail.
+"""Contradictory contracts and airspaces (E1101), and clauses that cannot fail (E1102).
 
-Of each skill for all arguments that it may be given, and of each step of a mission with the arguments that it has. The
-airspace counts too, but not for a skill that no permit names: it need not be one that flies there. The clauses and the
-airspace hold together at the moment at which a step begins.
+The clauses that a skill requires, assumes and maintains must be able to hold together when a step begins, and together
+with the airspace. This is proved for each skill over the ranges of its arguments, and for each step of a mission with
+its own arguments. The airspace does not count for a skill that no permit names: it need not fly under this policy. The
+zones of an airspace must leave a place for the vehicle.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,16 +26,16 @@ _AIRSPACE = "this is the airspace"
 
 
 class Conjunct(NamedTuple):
-    """Something that must hold: in words, where it is written, its condition; of a clause, what that comes from."""
+    """A condition that must hold: its label, where it is written, and its tree; of a clause also the code."""
 
-    words: str
+    label: str
     span: Span
     node: tree.Node
     code: tuple[int, ...] = ()
 
 
 def prove_contracts(proof: ProofContext) -> None:
-    """Report every skill whose clauses contradict each other, and every clause of one that cannot fail."""
+    """Report every skill whose clauses contradict each other, and every clause that cannot fail."""
     permitted = {skill for rule in proof.policy.rules if rule.kind == RuleKind.PERMIT for skill in rule.skills}
     _nowhere(proof)
     for number, contract in enumerate(proof.policy.contracts):
@@ -46,40 +46,40 @@ def prove_contracts(proof: ProofContext) -> None:
         conflict = _conflict(proof, parts, proof.questions.space(number), ("skill", number), name)
         if conflict:
             proof.impossible.add(number)
-            alone = f"this part of `{contract.name}` can never hold"
-            several = f"these parts of `{contract.name}` never hold together"
+            alone = f"this condition of `{contract.name}` can never hold"
+            several = f"these conditions of `{contract.name}` can never hold together"
             *others, main = conflict
             _report(proof, main.span, several if others else alone, others, [(name, "the skill")])
 
 
 def _nowhere(proof: ProofContext) -> None:
-    """Report an airspace in which a vehicle can be nowhere, at no time."""
+    """Report an airspace that is empty at all times."""
     declared, space = proof.lowered.declaration.airspace, proof.questions.space(0)
     if declared is None:
         return
     parts: list[Conjunct] = []
-    for words, names in (("inside", declared.inside), ("outside", declared.outside)):
+    for side, names in (("inside", declared.inside), ("outside", declared.outside)):
         for name in names:
-            smaller = words == "inside"
+            smaller = side == "inside"
             inside = tree.InsideZone(proof.lowered.zones.zone(name.text, 0, smaller=smaller, span=name.span))
-            parts.append(Conjunct(words, name.span, inside if smaller else tree.Negation(inside)))
+            parts.append(Conjunct(side, name.span, inside if smaller else tree.Negation(inside)))
     if not isinstance(proof.questions.ask(("airspace",), partial(_goals, parts), space), No):
         return
     proof.report.add(
         codes.CONTRADICTION,
         declared.span,
-        "nothing is left of the airspace: the vehicle can be nowhere in it",
-        help="it is inside of all zones after `inside`, and outside of all after `outside`: leave one out of those "
-        "marked, or take their union",
-        labels=[(part.span, f"it must be {part.words} of this") for part in _minimal(parts, space)],
+        "the airspace is empty: no place satisfies all of its zones",
+        help="the airspace lies inside every zone after `inside` and outside every zone after `outside`: remove one of "
+        "the marked zones, or use their union",
+        labels=[(part.span, f"the vehicle must be {part.label} this zone") for part in _minimal(parts, space)],
     )
 
 
 def prove_step_contract(proof: ProofContext, step: MissionStep) -> None:
-    """Report a step whose contract contradicts itself, or the airspace, with the arguments that it has."""
+    """Report a step whose contract contradicts itself or the airspace with the arguments of the step."""
     flat = step.flat
     if isinstance(proof.questions.known(("skill", flat.skill)), No):
-        return  # said of the skill
+        return  # already reported for the skill
     parts = list(_clauses(proof, flat.contract))
     key = ("step", flat.skill, step.prepared.arguments, tuple(part.code for part in parts))
     if isinstance(proof.questions.known(key), Yes):
@@ -90,20 +90,19 @@ def prove_step_contract(proof: ProofContext, step: MissionStep) -> None:
     space = proof.questions.space(flat.skill)._replace(arguments=step.prepared.arguments)
     conflict = _conflict(proof, [*parts, *_airspace(proof)], space, key, step.span)
     if conflict:
-        message = "this cannot hold" if len(conflict) == 1 else "this never holds together"
-        _report(
-            proof, step.span, f"`{flat.contract.name}` can never begin with these arguments: {message}", conflict, []
-        )
+        reason = "a condition cannot hold" if len(conflict) == 1 else "its conditions cannot hold together"
+        message = f"`{flat.contract.name}` can never begin with these arguments: {reason}"
+        _report(proof, step.span, message, conflict, [])
 
 
 def _clauses(proof: ProofContext, contract: Contract) -> Iterator[Conjunct]:
-    for words, clauses in (
+    for label, clauses in (
         ("this is required", contract.require),
         ("this is assumed", contract.assume),
         ("this is maintained", contract.maintain),
     ):
         for clause in clauses:
-            yield Conjunct(words, proof.span(clause), proof.prepared.compiler.node(clause, contract), clause.code)
+            yield Conjunct(label, proof.span(clause), proof.prepared.compiler.node(clause, contract), clause.code)
 
 
 def _airspace(proof: ProofContext) -> Iterator[Conjunct]:
@@ -119,15 +118,14 @@ def _airspace(proof: ProofContext) -> Iterator[Conjunct]:
 def _conflict(
     proof: ProofContext, parts: Sequence[Conjunct], space: SituationSpace, key: tuple[object, ...], span: Span
 ) -> list[Conjunct]:
-    """Conjuncts that cannot hold together; none where all can, or where that is undecided, which is reported."""
+    """Return a minimal set of conditions that cannot hold together; empty if all can. Reports an undecided question."""
     answer = proof.questions.ask(key, partial(_goals, parts), space)
     if isinstance(answer, Undecided):
-        proof.report.add(
-            codes.UNDECIDED, span, "it could not be decided whether its conditions can hold together", help=answer.why
-        )
+        message = "the proof could not decide whether these conditions can hold together"
+        proof.report.add(codes.UNDECIDED, span, message, help=answer.why)
     found = _minimal(parts, space) if isinstance(answer, No) else []
-    # the airspace alone is empty: no fault of what flies in it
-    return [] if all(part.words == _AIRSPACE for part in found) else found
+    # an empty airspace is reported once, not for each skill
+    return [] if all(part.label == _AIRSPACE for part in found) else found
 
 
 def _goals(parts: Sequence[Conjunct]) -> list[Goal]:
@@ -145,8 +143,8 @@ def _report(
         codes.CONTRADICTION,
         span,
         message,
-        help="no state of the vehicle meets it; change one of the conditions",
-        labels=dict.fromkeys([*((part.span, part.words) for part in conflict), *labels]),
+        help="change one of the conditions, so that a state of the vehicle satisfies all of them",
+        labels=dict.fromkeys([*((part.span, part.label) for part in conflict), *labels]),
     )
 
 
@@ -158,6 +156,6 @@ def _vacuous(proof: ProofContext, skill: int, contract: Contract, parts: Sequenc
             proof.report.add(
                 codes.ALWAYS_HOLDS,
                 part.span,
-                f"this cannot fail for any arguments that `{contract.name}` may be given",
-                help="leave it out, or say what was meant",
+                f"this condition cannot fail for any arguments of `{contract.name}`",
+                help="remove it, or correct it",
             )

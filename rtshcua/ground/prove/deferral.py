@@ -1,10 +1,11 @@
-"""E0717: whatever a step may be deferred for can come in the time for which it waits.
+"""Prove that every deferral of a step can end before its deadline (E0717).
 
-A deferral for an approval is bounded by the rule's `within` (E0707 asks for it, E0806 that it fits the validity), one
-for a phase by the mission itself (E0803). What remains is UNKNOWN: of a signal, which a report resolves, or of a
-temporal monitor, which time resolves. Each must be able to before the deadline. A reflex does not wait: what is unknown
-to it falls back at once or within its 200 ms, as it should; but no person can approve it in that time, nor anything in
-less than `PERSON_US`. A step's own block may make its contract's deadline shorter, so each such step is asked again.
+Two kinds of deferral are proved elsewhere: one for an approval is bounded by the rule's `within` (E0707, E0806),
+one for
+a phase by the mission itself (E0803). The other deferrals are for an UNKNOWN condition. A report resolves an unknown
+signal, and time resolves an unknown temporal monitor, and both must be possible before the deadline. A reflex does not
+wait: it falls back within its 200 ms. A person cannot approve a reflex in that time, nor any step in less than
+`PERSON_US`. A step may shorten the deadline in its own block, so such a step is proved again.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -31,14 +32,14 @@ from rtshcua.model.flat.contract import Contract, TimingClass
 from rtshcua.model.flat.policy import MonitorKind, RuleKind
 from rtshcua.model.flat.signal import Signal
 
-#: no person sees what is asked, judges it and answers in less, us
+#: least time in us that a person needs to read a request, judge it and answer
 PERSON_US = 2_000_000
-#: us, longer than anything lasts
+#: us, longer than any duration
 NEVER = 1 << 62
 
 
 def prove_deferrals(proof: ProofContext) -> None:
-    """Report the deferrals of each skill that no report can end, and approvals that come too late by their nature."""
+    """Report deferrals of skills that no report can end in time, and approvals that no person can give in time."""
     policy = proof.policy
     often = report_intervals(policy)
     reported: set[str] = set()
@@ -59,14 +60,14 @@ def prove_deferrals(proof: ProofContext) -> None:
 
 
 def prove_step_deferral(proof: ProofContext, step: MissionStep) -> None:
-    """Report a step whose own deadline or clauses leave its contract no time for a report, as the skill's do not."""
+    """Report a step whose own deadline or clauses leave no time for a report. The skill's own are reported already."""
     flat = step.flat
     if step.overrides is None or flat.contract.timing_class == TimingClass.REFLEX:
         return
     policy = proof.policy
     skills, often = policy.contracts[flat.skill], report_intervals(policy, (flat.contract,))
     if any(report_interval(signal, often) > skills.deadline_us for _, signal in _awaited(proof, flat.skill, skills)):
-        return  # said of the skill
+        return  # already reported for the skill
     for clause, signal in _awaited(proof, flat.skill, flat.contract):
         if arrives(signal) and report_interval(signal, often) > flat.contract.deadline_us:
             own = step.overrides.deadline
@@ -75,30 +76,30 @@ def prove_step_deferral(proof: ProofContext, step: MissionStep) -> None:
 
 
 def _awaited(proof: ProofContext, number: int, contract: Contract) -> Iterator[tuple[Clause, Signal]]:
-    """The signals that a decision on a contract may wait for, and what reads them."""
+    """Yield the signals for which a decision on a contract may wait, with the clauses that read them."""
     for clause in awaited(proof.policy, number, contract):
         for signal in signals_read(proof, clause):
             yield clause, signal
 
 
 def _prove_approval_times(proof: ProofContext) -> None:
-    """Approvals that are awaited for less time than a person takes."""
+    """Report approvals with a shorter timeout than a person needs."""
     for rule in proof.policy.rules:
         if rule.kind == RuleKind.CONFIRM and rule.within_us < PERSON_US:
             written = proof.lowered.written[rule].within
             proof.report.add(
                 codes.NO_RESOLVER,
                 proof.span(rule) if written is None else written.span,
-                f"an approval is awaited for {duration(rule.within_us)}, and a person takes {duration(PERSON_US)} "
-                "at least",
-                help=f"wait for `{duration(PERSON_US)}` or longer: 30 s leave time to look",
+                f"the time for an approval is {duration(rule.within_us)}, but a person needs at least "
+                f"{duration(PERSON_US)}",
+                help=f"allow `{duration(PERSON_US)}` or more; 30 s leave time to check the request",
             )
 
 
 def prove_observation_time(proof: ProofContext, steps: Sequence[MissionStep]) -> None:
-    """Report the first step that needs to have observed something for longer than the whole flight up to it.
+    """Report the first step that needs a longer observation than the flight up to it can last.
 
-    Observation begins with the run, with which the first step begins to wait: the time since the issue does not count.
+    Observation begins with the run. The time between the mission's issue and the run does not count.
     """
     if not proof.policy.monitors:
         return
@@ -115,10 +116,10 @@ def prove_observation_time(proof: ProofContext, steps: Sequence[MissionStep]) ->
                 proof.report.add(
                     codes.NO_RESOLVER,
                     step.span,
-                    f"`{clause.text}` is unknown until {duration(window)} were observed, and this step waits no longer "
-                    f"than {duration(latest)} after the run began, with which observation begins",
-                    help="take a shorter window, or ask for it in a later step",
-                    labels=[(proof.span(clause), "the contract asks for this")],
+                    f"`{clause.text}` is unknown for the first {duration(window)} of the run, and this step waits at "
+                    f"most until {duration(latest)} after the run begins",
+                    help="use a shorter window, or move the step to a later position",
+                    labels=[(proof.span(clause), "the contract contains this condition")],
                 )
                 return
         if _forbidden(proof, step, latest):
@@ -127,7 +128,7 @@ def prove_observation_time(proof: ProofContext, steps: Sequence[MissionStep]) ->
 
 
 def _forbidden(proof: ProofContext, step: MissionStep, latest: int) -> bool:
-    """Whether a rule that defers while it is unknown must observe longer than the flight up to a step; reports it."""
+    """Whether a rule must observe longer than the flight up to a step, and defers it until then. Reports the rule."""
     at, compiler = proof.around(step.prepared), proof.prepared.compiler
     for rule in refusing_rules(step.prepared):
         node = compiler.when(rule)
@@ -136,18 +137,19 @@ def _forbidden(proof: ProofContext, step: MissionStep, latest: int) -> bool:
             proof.report.add(
                 codes.NO_RESOLVER,
                 step.span,
-                f"a rule defers this step until {duration(window)} were observed, and it waits no longer than "
-                f"{duration(latest)} after the run began, with which observation begins",
-                help="take a shorter window, let the step wait for longer, or ask for it in a later step",
-                labels=[(proof.span(rule), "this is unknown until then")],
+                f"a rule defers this step for the first {duration(window)} of the run, and the step waits at most "
+                f"until {duration(latest)} after the run begins",
+                help="use a shorter window, a longer deadline, or move the step to a later position",
+                labels=[(proof.span(rule), "the condition of this rule is unknown until then")],
             )
             return True
     return False
 
 
 def _unpermitted(proof: ProofContext, step: MissionStep, latest: int) -> bool:
-    """Whether each permit that may cover a step must observe for longer than the flight up to its release; reports it.
-    A step does not wait for a permit: it is denied.
+    """Whether each permit for a step must observe longer than the flight up to its release. Reports the step.
+
+    A step does not wait for a permit: without one it is denied.
     """
     at, compiler = proof.around(step.prepared), proof.prepared.compiler
     permits = [permit.rule for permit in step.prepared.candidates.permits if permit.condition(at) & TRUE]
@@ -159,17 +161,17 @@ def _unpermitted(proof: ProofContext, step: MissionStep, latest: int) -> bool:
     proof.report.add(
         codes.NO_RESOLVER,
         step.span,
-        f"nothing permits this step before {duration(least)} were observed, and it is released "
-        + (f"no later than {duration(latest)} after the run began" if latest else "when the run begins")
-        + ", with which observation begins: it is denied then",
-        help="ask for it in a later step, or write a `forbid` of the opposite `within the last`: a step waits for that",
+        f"this step is denied: no permit can hold in the first {duration(least)} of the run, and the step is released "
+        + (f"at most {duration(latest)} after the run begins" if latest else "when the run begins"),
+        help="move the step to a later position, or replace the permit's condition by a `forbid` of the opposite "
+        "`within the last`: a step waits for a forbid",
         labels=[(proof.span(rule), f"this permits it after {duration(window)}") for rule, window in needed],
     )
     return True
 
 
 def _needed(proof: ProofContext, at: Environment, node: tree.Node, wanted: bool) -> int:
-    """How long must have been observed at least for a condition to be true (or false, where that is wanted)."""
+    """Return the least observation time, in us, after which a condition can have the `wanted` truth value."""
     match node:
         case tree.Negation(operand):
             return _needed(proof, at, operand, not wanted)
@@ -190,7 +192,7 @@ def _report_never(proof: ProofContext, signal: Signal, clause: Clause) -> None:
     proof.report.add(
         codes.NO_RESOLVER,
         proof.span(clause),
-        f"`{signal.name}` stays unknown: `{message.text}` is a message that vehicles are sent and never report",
+        f"`{signal.name}` is always unknown: vehicles receive `{message.text}` but never send it",
         help="read the signal from a message that the vehicle reports",
         labels=[(message.span, "read from this message")],
     )
@@ -210,22 +212,22 @@ def _report_late(
     proof.report.add(
         codes.NO_RESOLVER,
         span or deadline.span,
-        f"`{contract.name}` waits {duration(contract.deadline_us)} at most, and while `{signal.name}` is unknown its "
-        f"next report may take {every}: `{most_frequent(signal, often).message}` comes every {every} at best",
-        help=f"let the deadline be {every} or more, or read `{signal.name}` from a message that comes more often",
-        labels=[(proof.span(clause), "this waits for it")],
+        f"`{contract.name}` waits at most {duration(contract.deadline_us)} for `{signal.name}`, but "
+        f"`{most_frequent(signal, often).message}` is sent every {every} at most",
+        help=f"set the deadline to {every} or more, or read `{signal.name}` from a message that is sent more often",
+        labels=[(proof.span(clause), "this condition waits for the signal")],
     )
 
 
 def _report_reflex_approval(proof: ProofContext, number: int, contract: Contract) -> None:
-    """A reflex that a person would have to approve."""
+    """Report a rule that requires a person's approval for a reflex."""
     for rule in proof.policy.rules:
         if rule.kind == RuleKind.CONFIRM and number in rule.skills:
             proof.report.add(
                 codes.NO_RESOLVER,
                 proof.span(rule),
-                f"`{contract.name}` is a reflex, and no person approves within its {duration(contract.deadline_us)}",
-                help="leave the reflex out of the rule",
+                f"`{contract.name}` is a reflex, and no person can approve it within {duration(contract.deadline_us)}",
+                help="remove the reflex from the rule",
                 labels=[(_class(proof, contract), "its class")],
             )
 

@@ -46,13 +46,13 @@ def test_what_stands_in_comments(text: str) -> None:
 @given(TEXTS)
 def test_a_fix_takes_an_ignore_out_and_nothing_else(text: str) -> None:
     source = Source("x", text)
-    for each in ignores(source).given:
+    for each in ignores(source).valid:
         start, end = each.fix.span.start, each.fix.span.end
         gone = text[start:end]
         rest = text[:start] + each.fix.replacement + text[end:]
         assert each.fix.replacement == ""
-        left = {(one.code, one.line is None, one.reason) for one in ignores(Source("x", rest)).given}
-        assert left <= {(one.code, one.line is None, one.reason) for one in ignores(source).given}
+        left = {(one.code, one.line is None, one.reason) for one in ignores(Source("x", rest)).valid}
+        assert left <= {(one.code, one.line is None, one.reason) for one in ignores(source).valid}
         assert each.code.id in gone or each.code.slug in gone
         outside = gone.replace("\n", "", 1).strip()
         assert outside.startswith(("//", "/*")) or "because" not in gone
@@ -72,7 +72,7 @@ def test_a_fix_takes_an_ignore_out_and_nothing_else(text: str) -> None:
 def test_the_line_that_an_ignore_is_about(comment: str, line: int) -> None:
     for marks in ("// {}", "/* {} */"):
         text = comment.format(marks.format("rtshcua: ignore E1302 because it is so"))
-        (given,) = ignores(Source("x", text)).given
+        (given,) = ignores(Source("x", text)).valid
         assert given.line == line
 
 
@@ -94,5 +94,5 @@ def test_a_reason_has_letters(reason: str, says_why: bool) -> None:
 def test_the_formatter_means_the_same_comments(blank: str, word: str, marks: str) -> None:
     comment = marks.format(f"{blank}rtshcua:{blank}{word} E1302 because it is so")
     (row,) = gap_of(f"\n{comment}\n", at_start=True, at_end=False).comments
-    given = ignores(Source("x", f"{comment}\n")).given
+    given = ignores(Source("x", f"{comment}\n")).valid
     assert row.ignores == any(each.line is not None for each in given)

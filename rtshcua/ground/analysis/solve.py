@@ -94,11 +94,11 @@ def implies(node: tree.Node, other: tree.Node, space: SituationSpace, budget: in
 
 
 class StepInstance(NamedTuple):
-    """A step of an instance of a mission; `asked` is what its way and its contract ask of the time of issue."""
+    """A step of an instance of a mission; `requirements` are those of its path and contract on the time of issue."""
 
     skill: int
     arguments: tuple[int, ...]
-    asked: tuple[IssueRequirement, ...]
+    requirements: tuple[IssueRequirement, ...]
 
 
 class Questions:

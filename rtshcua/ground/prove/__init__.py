@@ -1,5 +1,5 @@
-"""What is proved of a lowered policy and of the missions under it: `proofs` calls all proofs in their order.
+"""Proofs about a lowered policy and the missions under it. `proofs` runs all of them in order.
 
-The proofs ask the rules of `rtshcua.decision` over sets of values: a step's arguments are known, the state of the
-vehicle is not. A proof does not replace the decision on board, which is made again.
+The proofs evaluate the rules of `rtshcua.decision` over sets of values: the arguments of a step are known, the state of
+the vehicle is not. A proof does not replace the decision on board.
 """

@@ -1,10 +1,10 @@
-"""E0514, E0515: wherever a step is broken off, the straight way home, and to where its links fly, keeps the airspace;
-and E0508, so does a step that is the way home.
+"""Prove that the fallbacks of a step stay in the airspace, wherever the step is aborted (E0514, E0515, E0508).
 
-The way may begin at every place of the planned path and of the leg to it, not at its ends alone, and it is as wide as
-the vehicle's position error. The way home climbs there first, goes across at the height that the vehicle returns at
-(`decision.volume.across`), and ends with a descent at any place where home may really be. On board a link that would
-leave the airspace is not flown, and the vehicle lands where it is: better than nothing, but not what the chain says.
+A fallback flies straight home (E0514) or to a fixed place (E0515). A step that flies home is proved like a fallback
+(E0508). The way may begin at every place of the planned path and of the leg to it, and it is as wide as the vehicle's
+position error. The way home climbs first, then crosses at the return altitude (`decision.volume.across`), and ends with
+a descent at any place where home may be. On board, a link that would leave the airspace is not flown, and the vehicle
+lands where it is. That is safe, but not what the chain declares.
 """
 
 from collections.abc import Iterator, Sequence
@@ -32,13 +32,14 @@ from rtshcua.model.quantity import Dimension, display
 
 _HOME = (0, 0)
 _METRE = 1_000  # mm
-#: mm: a leg of which a part is near home is looked at in parts down to this length
+#: a leg that is partly near home is split into parts not shorter than this, in mm
 _SHORTEST = 1_000
 
 
 class FlownPath(NamedTuple):
-    """The places from which a link may begin, in the order of the path, and their heights in mm; the last one may be
-    where a link ends, `after` is that one's skill.
+    """The places at which a link may begin, in the order of the path, and their heights in mm.
+
+    If the last place is the end of an earlier link, `after` is the skill of that link.
     """
 
     points: tuple[Point, ...]
@@ -48,16 +49,16 @@ class FlownPath(NamedTuple):
 
 
 class Stretch(NamedTuple):
-    """A part of a way: what is done there, the places that it leads between, in any order, and its heights in mm."""
+    """A part of a way: its description, the places between which it leads, in any order, and its heights in mm."""
 
-    what: str
+    part: str
     points: tuple[Point, ...]
     low: int
     high: int
 
 
 class Departure(NamedTuple):
-    """Where a way begins that leaves the airspace, and the part of it that does."""
+    """The start of a way that leaves the airspace, and the part of the way that leaves it."""
 
     place: Point
     stretch: Stretch
@@ -65,8 +66,9 @@ class Departure(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class _LinkTime:
-    """When a link may fly: until `further` us after the latest begin of a step. The airspace, and what of it may be
-    present then.
+    """The time in which a link may fly, until `further` us after the latest begin of a step.
+
+    `present` is the airspace without zones that cannot exist in that time.
     """
 
     period: StepTime
@@ -79,7 +81,7 @@ class _LinkTime:
 
 
 class FallbackWays:
-    """The ways that lead from the steps of one mission."""
+    """Proves the ways of the fallbacks from the steps of one mission."""
 
     def __init__(self, proof: ProofContext) -> None:
         self._proof = proof
@@ -88,16 +90,17 @@ class FallbackWays:
         self._box = (-reach, -reach, reach, reach)
         self._landmarks = Landmarks(proof.policy)
         self._homes = disc(self._vehicle.home_within)
-        self._told: set[Point] = set()
+        self._reported: set[Point] = set()
         self._nowhere: set[PreparedLink] = set()
 
     def prove(self, step: MissionStep, starts: Sequence[StartPlace]) -> None:
-        """Report the first way from a step that leaves the airspace; the step itself was found to keep it, if home is
-        where it is declared.
+        """Report the first way from a step that leaves the airspace.
+
+        The step itself is already proved to stay in the airspace, for home at its declared place.
         """
         airspace = self._proof.prepared.airspace
         if airspace is None or step.flat.plan.kind == MotionKind.LAND:
-            return  # it leads nowhere
+            return  # a landing has no way
         if step.flat.plan.kind == MotionKind.HOME:
             there = _LinkTime(step.time, step.prepared.lasts_us, airspace)
             for start in starts:
@@ -120,11 +123,12 @@ class FallbackWays:
                     flown = self._beyond(link, flown)
 
     def _links(self, invocation: PreparedInvocation) -> Iterator[tuple[PreparedLink, int]]:
-        """What may be flown instead of a step, or in the midst of it, and when it has ended, us after the step; holding
-        and landing lead nowhere.
+        """Yield the links that may replace or abort a step, each with its latest end in us after the step.
+
+        Links that hold or land are omitted: they have no way.
         """
         degrades = [[rule.target] for rule in invocation.candidates.degrades]
-        before = 0  # the contingency flies when the step's own chain has failed
+        before = 0  # the contingency flies after the step's own chain has failed
         for chain in (*degrades, invocation.chain, self._proof.prepared.contingency):
             lasts = before if chain is self._proof.prepared.contingency else 0
             for link in chain:
@@ -138,9 +142,7 @@ class FallbackWays:
         return longest(policy.contracts[link.link.skill], policy.vehicle, link.link.limit_us)
 
     def _link(self, step: MissionStep, link: PreparedLink | None, flown: FlownPath, then: _LinkTime) -> bool:
-        """Whether a link, or a step that is the way home (None), keeps the airspace; reports the place from where it
-        does not.
-        """
+        """Whether a link, or a step that flies home (None), stays in the airspace. Reports a way that does not."""
         home = link is None or link.motion == MotionKind.HOME
         if link is None or home:
             to: Sequence[Point] = self._homes
@@ -149,12 +151,12 @@ class FallbackWays:
             altitude = self._altitude(link)
             flown = flown._replace(low=min(flown.low, altitude), high=max(flown.high, altitude))
             if to and not self._keeps(Stretch("", tuple(to), altitude, altitude), then.present):
-                self._nowhere.add(link)  # said once: it is the same from everywhere
+                self._nowhere.add(link)  # report it once: the target is outside from everywhere
                 self._report(step, link, flown, Departure(to[0], Stretch("", (to[0],), altitude, altitude)), to, then)
                 return False
-        leaves = self._leaving(flown, to, home, then.present, self._vehicle, self._told)
+        leaves = self._leaving(flown, to, home, then.present, self._vehicle, self._reported)
         if leaves is not None:
-            self._told.add(leaves.place)
+            self._reported.add(leaves.place)
             self._report(step, link, flown, leaves, to, then)
             return False
         missing = then.period.missing(then.airspace, then.further)
@@ -176,10 +178,11 @@ class FallbackWays:
         home: bool,
         airspace: PreparedAirspace,
         vehicle: VehicleLimits,
-        told: AbstractSet[Point] = frozenset(),
+        reported: AbstractSet[Point] = frozenset(),
     ) -> Departure | None:
-        """A place of the path from where the straight way leaves the airspace, but not of a leg from one that was
-        `told`; `to` is all that it may lead to, and empty where the link leads up and nowhere else.
+        """Return a place of the path from which the straight way leaves the airspace, or None.
+
+        Legs that begin at a `reported` place are skipped. `to` are all possible targets; it is empty for a climb.
         """
         zones = tuple(tuple(zone.number for zone in each) for each in (airspace.inside, airspace.outside))
         key = (flown.points, flown.low, flown.high, tuple(to), home and vehicle.return_altitude, zones)
@@ -187,11 +190,11 @@ class FallbackWays:
             return None
         legs = path_legs(flown.points)
         near = home and any(_comes_near(leg, near_home(vehicle)) for leg in legs)
-        # nearly always all of it lies in one hull that keeps the airspace
+        # fast path: usually the hull of the whole path stays in the airspace
         whole = _stretches(flown.points, flown, to, vehicle if home else None, near=near)
         if not all(self._keeps(each, airspace) for each in whole):
             for leg in legs:
-                found = None if leg[0] in told else self._leg(leg, flown, to, vehicle if home else None, airspace)
+                found = None if leg[0] in reported else self._leg(leg, flown, to, vehicle if home else None, airspace)
                 if found is not None:
                     return Departure(leg[1], found)
         self._proof.kept.add(key)
@@ -200,7 +203,7 @@ class FallbackWays:
     def _leg(
         self, leg: Leg, flown: FlownPath, to: Sequence[Point], returns: VehicleLimits | None, airspace: PreparedAirspace
     ) -> Stretch | None:
-        """The part of the way from somewhere on a leg that leaves the airspace; `returns` is who flies home on it."""
+        """Return a part of a way from a leg that leaves the airspace. `returns` is the vehicle on a way home."""
         limit = 0 if returns is None else near_home(returns)
         near = returns is not None and returns.return_altitude > 0 and _comes_near(leg, limit)
         stretches = _stretches(leg, flown, to, returns, near=near)
@@ -210,14 +213,14 @@ class FallbackWays:
             return found
         if _comes_near((leg[0], leg[0]), limit) and _comes_near((leg[1], leg[1]), limit):
             return found
-        # the way is low from a part of the leg only
+        # only near home is the way low, so look at each half
         middle = ((ax + bx) // 2, (ay + by) // 2)
         halves = ((leg[0], middle), (middle, leg[1]))
         parts = (self._leg(half, flown, to, returns, airspace) for half in halves)
         return next((part for part in parts if part is not None), None)
 
     def _keeps(self, stretch: Stretch, airspace: PreparedAirspace) -> bool:
-        """Whether the hull of a part of a way keeps the airspace."""
+        """Whether the hull of a part of a way stays in the airspace."""
         return keeps(self._space(stretch), airspace) == TRUE
 
     def _space(self, stretch: Stretch) -> Places:
@@ -225,7 +228,7 @@ class FallbackWays:
         return Places(((sweep, stretch.low, stretch.high),), 0)
 
     def _beyond(self, link: PreparedLink, flown: FlownPath) -> FlownPath:
-        """Where later links may begin: the place that this one flies to too."""
+        """Return the path with the target of a link added, since later links may begin there."""
         altitude = self._altitude(link)
         name = self._proof.policy.contracts[link.link.skill].name
         low, high = min(flown.low, altitude), max(flown.high, altitude)
@@ -241,15 +244,15 @@ class FallbackWays:
 
     def _missing(self, step: MissionStep, link: PreparedLink | None, zone: PreparedZone, then: _LinkTime) -> None:
         if link is None:
-            return  # of a step that is found where its own path is looked at
+            return  # the proof of the step's own path reports it
         proof, policy = self._proof, self._proof.policy
         name = policy.contracts[link.link.skill].name
         proof.report.add(
             codes.RETURN_OUTSIDE if link.motion == MotionKind.HOME else codes.LOITER_OUTSIDE,
             step.span,
-            f"the way of the link `{name}` from this step would be in `{policy.zones[zone.number].name}`, which does "
-            f"not exist at all times {then.period.from_to(then.further)}: it may be flown then",
-            help="issue the mission at another time, or let its steps take less",
+            f"the link `{name}` may fly {then.period.from_to(then.further)}, and its way from this step stays in "
+            f"`{policy.zones[zone.number].name}`, which does not always exist then",
+            help="issue the mission at another time, or shorten its steps",
             labels=[
                 (proof.span(then.airspace.airspace), "the airspace"),
                 (proof.span(link.link), "this link would fly there"),
@@ -269,33 +272,33 @@ class FallbackWays:
         airspace, (place, stretch) = then.present, leaves
         proof, policy = self._proof, self._proof.policy
         home = link is None or link.motion == MotionKind.HOME
-        if stretch.what == _ACROSS:
+        if stretch.part == _ACROSS:
             legs = [(place, each) for each in ([_HOME, *to] if home else to or [place])]
         else:
             legs = path_legs(stretch.points)
         from_ = f"where the link `{flown.after}` ends" if flown.after and place == flown.points[-1] else "this step"
         begins = f"from {from_}, which begins {from_home(*place)},"
         labels = [(proof.span(airspace.airspace), "the airspace")]
-        help = "move the step, or lead the mission around by further steps"
-        code, subject = codes.PATH_OUTSIDE, f"{stretch.what} home {begins}"
+        help = "move the step, or add steps that lead around"
+        code, subject = codes.PATH_OUTSIDE, f"{stretch.part} home {begins}"
         if link is not None:
             name = policy.contracts[link.link.skill].name
             labels.append((proof.span(link.link), "this link would fly there"))
             code = codes.RETURN_OUTSIDE if home else codes.LOITER_OUTSIDE
-            subject = subject if home else f"{stretch.what} of the link `{name}` {begins}"
+            subject = subject if home else f"{stretch.part} of the link `{name}` {begins}"
             subject = f"`{name}`, a link of this step's chains," if place in to else subject
         labels += then.period.labels(airspace, self._space(stretch), then.further)
         if home:
             vehicle = proof.lowered.vehicle
             if self._vehicle.home_within and self._keeps(stretch._replace(points=_of_home(stretch, to)), airspace):
-                labels.append((vehicle.within.span, "home may lie so far from where it is declared"))
+                labels.append((vehicle.within.span, "home may be this far from its declared place"))
             raised = self._raised(flown, to, stretch, airspace)
             if raised is not None:
                 help = f"{_above(raised)}; or {help}"
                 if vehicle.return_altitude is not None:
                     labels.append((vehicle.return_altitude.span, "the vehicle returns at this height"))
         if link is not None:
-            help = f"on board the link would not be flown then, but the one after it; {help}"
+            help = f"on board, the next link would fly instead; {help}"
         proof.report.add(
             code,
             step.span,
@@ -305,7 +308,7 @@ class FallbackWays:
         )
 
     def raised(self, start: StartPlace, airspace: PreparedAirspace) -> str:
-        """Which return altitude would lead a way home from a place above what stands in it, in words; or nothing."""
+        """Return advice on a return altitude that leads the way home from a place above all obstacles; else empty."""
         flown = FlownPath(((start.x, start.y),), start.height, start.height)
         leaves = self._leaving(flown, self._homes, True, airspace, self._vehicle)
         height = None if leaves is None else self._raised(flown, self._homes, leaves.stretch, airspace)
@@ -314,11 +317,12 @@ class FallbackWays:
     def _raised(
         self, flown: FlownPath, to: Sequence[Point], stretch: Stretch, airspace: PreparedAirspace
     ) -> int | None:
-        """The least return altitude, in whole metres, with which all ways home from a step keep the airspace; None if
-        there is none above what stands in the way.
+        """Return the least return altitude, in whole metres, at which all ways home from a step stay in the airspace.
+
+        Returns None if no altitude above the obstacles does.
         """
         vehicle = self._vehicle
-        while stretch.what == _ACROSS:
+        while stretch.part == _ACROSS:
             space = self._space(stretch)
             above = [zone.ceiling for zone in airspace.outside if space.inside(zone) != FALSE]
             height = -(-(max(above, default=HIGHEST) + SHORT) // _METRE) * _METRE
@@ -337,15 +341,15 @@ _ACROSS = "the straight way"
 
 def _above(height: int) -> str:
     return (
-        f"with `return at {display(height, Dimension.ALTITUDE)}` the way home leads above it: write that, and set the "
-        "autopilot so"
+        f"with `return at {display(height, Dimension.ALTITUDE)}` the way home leads above it; set the autopilot to the "
+        "same height"
     )
 
 
 def _stretches(
     points: Sequence[Point], flown: FlownPath, to: Sequence[Point], returns: VehicleLimits | None, *, near: bool
 ) -> list[Stretch]:
-    """The parts of the way from some places to where it leads; `near`: some of these are near home."""
+    """Return the parts of a way from places to its targets. `near` means that some places are near home."""
     if returns is None:
         return [Stretch(_ACROSS, (*points, *to), flown.low, flown.high)]
     top = max(flown.high, returns.return_altitude)
@@ -356,12 +360,12 @@ def _stretches(
 
 
 def _of_home(stretch: Stretch, to: Sequence[Point]) -> tuple[Point, ...]:
-    """The places of a part of the way, if home is where it is declared."""
+    """Return the places of a part of a way for home at its declared place."""
     return (*(each for each in stretch.points if each not in to), *([_HOME] if set(to) & set(stretch.points) else []))
 
 
 def _comes_near(leg: Leg, limit: int) -> bool:
-    """Whether some place of a leg is no further from home than `limit` mm."""
+    """Whether some place of a leg is at most `limit` mm from home."""
     (ax, ay), (bx, by) = leg
     ux, uy = bx - ax, by - ay
     along, square = -ax * ux - ay * uy, ux * ux + uy * uy

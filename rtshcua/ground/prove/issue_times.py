@@ -1,11 +1,11 @@
-"""E0718: a step may begin at a time of day, or on a date, at which it is not permitted.
+"""Prove that each step is permitted at every time at which it may begin (E0718).
 
-With a time of issue, every moment at which a step may begin must be permitted. Without one, some time of issue must
-suit all steps at once: what their paths and contracts ask of it (`StepTime.asked`), and what permits and forbids them.
-Dates are left for the time of issue.
+If the time of issue is known, each step must be permitted at every time at which it may begin. Otherwise there must be
+one time of issue that suits all steps: it must meet the requirements of their paths and contracts
+(`StepTime.requirements`) and of the rules. Dates are not considered then.
 
-Between two instances of a mission each value needs such a time of issue, not all of them the same: where none does for
-all, the values are halved until one does for each part, or a single value is left.
+For the values between two instances of a mission, each value needs a time of issue of its own. If no time suits all
+values, they are halved until each part has a suitable time or a single value is left.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,7 +26,7 @@ from rtshcua.model.quantity import Dimension, display
 
 
 def prove_known_issue(proof: ProofContext, steps: Sequence[MissionStep], lines: Sequence[ArgumentLine | None]) -> bool:
-    """Report the first step that may come at such a time, with arguments on its line; whether there is one."""
+    """Whether a step may begin when it is not permitted, for some arguments on its line. Reports the first."""
     return any(
         line is not None and _report_refused(proof, step, line, step.time.utc(0)[0])
         for step, line in zip(along_lines(steps, lines), lines, strict=True)
@@ -42,24 +42,25 @@ def _report_refused(proof: ProofContext, step: MissionStep, line: ArgumentLine, 
         local, day = proof.prepared.tables.local, reads_days(proof.policy)
         at, first, last = (local_time_text(moment, local, day=day) for moment in (witness.at.utc[0][0], *window))
         rules = [each.rule for each in step.prepared.candidates.permits] if rule is None else [rule]
-        does = "does not permit it" if rule is None else "forbids it"
+        effect = "does not permit it" if rule is None else "forbids it"
         if rule is not None and rule.target is not None:
-            does = "flies another skill in its place"
+            effect = "replaces it by another skill"
         moved = f" with {witness_text(witness, proof.policy, flat.contract)}" if line.moving else ""
         proof.report.add(
             codes.NOT_ALWAYS_PERMITTED,
             step.span,
-            f"at {at} this step is not permitted{moved}, and it may come from {first} to {last}, local time",
+            f"this step may begin from {first} to {last}, local time, and at {at} it is not permitted{moved}",
             help="issue the mission at another time, or move the step",
-            labels=[(proof.span(each), f"this {does} then") for each in rules],
+            labels=[(proof.span(each), f"this {effect} then") for each in rules],
         )
         return True
     return False
 
 
 def prove_some_issue(proof: ProofContext, steps: Sequence[MissionStep], lines: Sequence[ArgumentLine | None]) -> bool:
-    """Report the first step up to which no time of issue will do, for some arguments on its line; whether there is
-    one.
+    """Report the first step at which no time of issue suits all steps so far, for some arguments on their lines.
+
+    Returns whether there is one.
     """
     waiting = [list(lines)]
     while waiting:
@@ -76,29 +77,29 @@ def prove_some_issue(proof: ProofContext, steps: Sequence[MissionStep], lines: S
 
 
 class _Unmet(NamedTuple):
-    """A step for which no time of issue will do, and what is asked of that time."""
+    """A step for which there is no time of issue, and its requirements of that time."""
 
     step: MissionStep
-    asked: Sequence[IssueRequirement]
+    requirements: Sequence[IssueRequirement]
 
 
 def _first_unmet(
     proof: ProofContext, steps: Sequence[MissionStep], lines: Sequence[ArgumentLine | None]
 ) -> _Unmet | None:
-    """The first step up to which no one time of issue will do for all arguments on the lines."""
-    asked: list[IssueRequirement] = []
+    """Return the first step at which no single time of issue suits all steps so far with all arguments on the lines."""
+    every: list[IssueRequirement] = []
     for step, line in zip(along_lines(steps, lines), lines, strict=True):
         if line is None or line.empty or may_be_skipped(step.prepared):
             continue
-        found = [*step.time.asked, *_demands(proof, step, line)]
-        asked += found
-        if found and not met_by_some(asked):
+        found = [*step.time.requirements, *_rule_requirements(proof, step, line)]
+        every += found
+        if found and not met_by_some(every):
             return _Unmet(step, found)
     return None
 
 
-def _demands(proof: ProofContext, step: MissionStep, line: ArgumentLine) -> Iterator[IssueRequirement]:
-    """What the rules that read the time of day ask."""
+def _rule_requirements(proof: ProofContext, step: MissionStep, line: ArgumentLine) -> Iterator[IssueRequirement]:
+    """Yield the requirement of the rules that read the time of day."""
     rules = deciding_rules(step.prepared)
     read = [(rule, changes_read(proof, rule.when, step.flat.arguments)) for rule in rules if rule.when is not None]
     clocked = [rule for rule, (windows, _) in read if windows]
@@ -113,7 +114,7 @@ def _demands(proof: ProofContext, step: MissionStep, line: ArgumentLine) -> Iter
 def _permitted(
     proof: ProofContext, step: MissionStep, line: ArgumentLine, cycle: IssueCycle, edges: Sequence[int]
 ) -> tuple[Arc, ...]:
-    """When a step is surely permitted with all arguments on its line, as far as these and the time say."""
+    """Return the times at which no rule certainly refuses a step, for all arguments on its line."""
     space = space_along(proof, step, line)
 
     def permitted(moment: int) -> bool:
@@ -128,28 +129,29 @@ def _report_unmet(
 ) -> None:
     low = failed.step.time.low
     first = display(low, Dimension.DURATION)
-    last = display(max(one.high for one in failed.asked), Dimension.DURATION)
-    moves = (line.words(step.contract) for line, step in zip(lines, steps, strict=True) if line is not None)
+    last = display(max(one.high for one in failed.requirements), Dimension.DURATION)
+    moves = (line.text(step.contract) for line, step in zip(lines, steps, strict=True) if line is not None)
     moved = next(filter(None, moves), "")
     proof.report.add(
         codes.NOT_ALWAYS_PERMITTED,
         failed.step.span,
         (f"with {moved}, which the mission's parameters allow: " if moved else "")
-        + f"whenever the mission is issued, this step may come at a time at which it is not permitted: it comes "
-        f"{f'{first} to {last}' if low else f'at once or up to {last}'} after that",
-        help="widen the times, or let the mission take less: that is the time to its start, then all deadlines, "
-        "approvals and durations before the step",
-        labels=dict.fromkeys(label for one in failed.asked for label in one.labels),
+        + "for any time of issue, this step may begin when it is not permitted: it begins "
+        f"{f'{first} to {last}' if low else f'up to {last}'} after the issue",
+        help="widen the permitted times, or shorten the time before the step: the time to the start, and all "
+        "deadlines, approvals and durations",
+        labels=dict.fromkeys(label for one in failed.requirements for label in one.labels),
     )
 
 
 def along_lines(steps: Sequence[MissionStep], lines: Sequence[ArgumentLine | None]) -> Iterator[MissionStep]:
-    """The steps with the times for all arguments on lines: a step begins no sooner than those before it take at least
-    with any of them, and asks for all of them what its time says.
+    """Yield the steps with their times adapted to all arguments on the lines.
+
+    A step begins at the earliest after the least time that the steps before it take with any of the arguments.
     """
     earliest = 0
     for step, line in zip(steps, lines, strict=True):
-        asked = [each._replace(low=earliest) for each in step.time.asked]
-        yield step._replace(time=replace(step.time, low=earliest, asked=asked))
+        requirements = [each._replace(low=earliest) for each in step.time.requirements]
+        yield step._replace(time=replace(step.time, low=earliest, requirements=requirements))
         flat, time = step.flat, step.contract.motion.time
         earliest += 0 if time < 0 else flat.arguments[time] if line is None else line.least(time)

@@ -1,14 +1,14 @@
-"""E0809 to E0812: what a mission takes at most in steps, time and energy. E0620: each step finds the charge it needs.
+"""Upper bounds of a mission's steps, time and energy (E0809 to E0812), and the charge for each step (E0620).
 
-Time runs from the issue to the end: the start window, each step's approval, deadline and duration, and the longest
-chain that may follow one of them. Energy is what the contracts of the steps may take up to one that is given up, and of
-the chain that is then flown, whichever step that is; a return takes no less than the way home from the farthest planned
-place. A mission whose bound exceeds a full charge is refused: no battery that is put in would be enough.
+The time runs from the issue to the end: the start window, the approval, deadline and duration of each step, and the
+longest chain that may follow a step. The energy is the most that the contracts of the steps may use up to an aborted
+step, plus the chain that then flies; a return needs at least the way home from the farthest planned place. A mission
+that may need more than a full charge is refused.
 
-For E0620 the flight begins with a full charge, and every step before took all that it may. A step that may be skipped
-counts as flown, and is not asked itself: its `skip` is for that. Needed is what step 7 of the decision asks for (the
-step's own bound, the way home from the farthest planned place, the reserve), and that no clause about the battery, and
-no rule, then refuses the step.
+For E0620 the flight begins with a full charge, and every earlier step used all that it may. A step that may be skipped
+counts as flown, but is not checked itself. A step needs the charge that step 7 of the decision requires (its own bound,
+the way home from the farthest planned place, and the reserve), and no clause about the battery and no rule may refuse
+it with the remaining charge.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -34,37 +34,38 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.ir.missions import MissionDecl, Step
 from rtshcua.model.quantity import Dimension, display
 
-#: so many steps before the one that lacks charge are told of
+#: the number of earlier steps that a message lists
 _SHOWN_STEPS = 6
 
 
 def prove_charge(proof: ProofContext, steps: Sequence[MissionStep], starts: Sequence[Sequence[StartPlace]]) -> None:
-    """Report the first step that may find too little; `starts` are the places where each may begin."""
+    """Report the first step that may lack charge. `starts` are the places where each step may begin."""
     left = FULL
     spent: list[tuple[str, int]] = []
     for step, places in zip(steps, starts, strict=True):
         if not may_be_skipped(step.prepared):
-            why = next(_wants(proof, step.prepared, places, left), None)
-            if why is not None:
-                _report_short(proof, step, left, why, spent)
+            reason = next(_shortages(proof, step.prepared, places, left), None)
+            if reason is not None:
+                _report_short(proof, step, left, reason, spent)
                 return
         left = max(left - step.contract.energy, 0)
         spent.append((step.contract.name, left))
 
 
-_Why = tuple[str, tuple[tuple[Span, str], ...]]
+#: a reason as text, and its labels
+_Reason = tuple[str, tuple[tuple[Span, str], ...]]
 
 
-def _wants(
+def _shortages(
     proof: ProofContext, invocation: PreparedInvocation, places: Sequence[StartPlace], left: int
-) -> Iterator[_Why]:
-    """Why a step is refused with this charge and would not be with a full one: in words, and where that is written."""
+) -> Iterator[_Reason]:
+    """Yield the reasons why a step is refused with this charge but not with a full one."""
     battery = proof.prepared.tables.known.battery
     for place in places:
         at, volume = planned(proof, invocation, place)
         needed = invocation.energy.needed(volume.farthest[1], volume.height[:2])
         if needed > left:
-            yield _needs(proof, invocation, needed), ((proof.lowered.vehicle.reserve.span, "what must be left"),)
+            yield _needs(proof, invocation, needed), ((proof.lowered.vehicle.reserve.span, "the reserve"),)
         slots = list(at.slots)
         slots[battery] = point(left)
         worst = at.over(slots, None, 0)
@@ -76,23 +77,23 @@ def _wants(
 
 def _needs(proof: ProofContext, invocation: PreparedInvocation, needed: int) -> str:
     own = invocation.invocation.contract.energy
-    words = f"it needs {_percent_text(needed)}: {_percent_text(own)} for itself"
+    text = f"it needs {_percent_text(needed)}: {_percent_text(own)} for itself"
     if needed > own:
         reserve = proof.policy.vehicle.reserve
-        words += f", {_percent_text(needed - own - reserve)} for the way home and {_percent_text(reserve)} in reserve"
-    return words
+        text += f", {_percent_text(needed - own - reserve)} for the way home and {_percent_text(reserve)} in reserve"
+    return text
 
 
 def _refusals(
     proof: ProofContext, invocation: PreparedInvocation, worst: Environment, full: Environment
-) -> Iterator[_Why]:
-    """What refuses a step whatever else the state is."""
+) -> Iterator[_Reason]:
+    """Yield what refuses a step in every state with the worst charge, but not with a full one."""
     for clause, condition in (*invocation.require, *invocation.assume):
         if not condition(worst) & TRUE and condition(full) & TRUE:
-            yield f"`{clause.text}` does not hold then", ((proof.span(clause), "the contract asks for this"),)
+            yield f"`{clause.text}` does not hold then", ((proof.span(clause), "the contract contains this condition"),)
     for degrade in invocation.candidates.degrades:
         if degrade.condition(worst) == TRUE != degrade.condition(full):
-            yield "a rule of the policy then sends it home", ((proof.span(degrade.rule), "this rule"),)
+            yield "a rule of the policy then replaces it", ((proof.span(degrade.rule), "this rule"),)
     for forbid in invocation.candidates.forbids:
         if forbid.condition(worst) == TRUE != forbid.condition(full):
             yield "a rule of the policy then forbids it", ((proof.span(forbid.rule), "this rule"),)
@@ -102,16 +103,16 @@ def _refusals(
 
 
 def _report_short(
-    proof: ProofContext, step: MissionStep, left: int, why: _Why, spent: Sequence[tuple[str, int]]
+    proof: ProofContext, step: MissionStep, left: int, reason: _Reason, spent: Sequence[tuple[str, int]]
 ) -> None:
-    told = [f"{_percent_text(charge)} after `{name}`" for name, charge in spent[-_SHOWN_STEPS:]]
+    listed = [f"{_percent_text(charge)} after `{name}`" for name, charge in spent[-_SHOWN_STEPS:]]
     from_ = ["..."] if len(spent) > _SHOWN_STEPS else ["full at the start"]
     proof.report.add(
         codes.SHORT_OF_ENERGY,
         step.span,
-        f"{_percent_text(left)} of the charge may be left when this step begins, and {why[0]}",
-        help="what is left when each step takes all that it may: " + ", ".join([*from_, *told]),
-        labels=why[1],
+        f"only {_percent_text(left)} of the charge may be left when this step begins, and {reason[0]}",
+        help="the charge left if each step uses as much as it may: " + ", ".join([*from_, *listed]),
+        labels=reason[1],
     )
 
 
@@ -121,18 +122,19 @@ def _percent_text(charge: int) -> str:
 
 SECOND_US = 1_000_000
 
-#: what brings the vehicle down is not given up for the contingency: only its own chain follows
+#: motions after which only the step's own chain follows, never the contingency, since they already end on the ground
 _HOMEWARD = (MotionKind.HOME, MotionKind.LAND)
-#: what leads to a height
+#: motions that end at a planned height
 _ALOFT = (MotionKind.CLIMB, MotionKind.FLY, MotionKind.COVER)
 
-#: so many of the largest contributions are shown
+#: the number of largest contributions that a message lists
 _SHOWN = 3
 
 
 class Bounds(NamedTuple):
-    """At most so many invocations, so long from the issue to the end (us), and so much energy (1/10000); and what each
-    step is proved to take of its own.
+    """The bounds of a mission: invocations, us from the issue to the end, energy in 1/10000 of a full charge.
+
+    `steps` are the proved bounds of each step.
     """
 
     invocations: int
@@ -142,7 +144,7 @@ class Bounds(NamedTuple):
 
 
 def greatest(one: Bounds, other: Bounds | None) -> Bounds:
-    """What is within both."""
+    """Return the larger of two bounds, field by field."""
     if other is None:
         return one
     steps = one.steps
@@ -157,9 +159,7 @@ def greatest(one: Bounds, other: Bounds | None) -> Bounds:
 def bounds_of(
     proof: ProofContext, declared: MissionDecl, mission: Mission, flown: tuple[StepBound, ...] = ()
 ) -> Bounds:
-    """The bounds of a mission, of which `flown` is what each step is proved to take; reports where they exceed what it
-    says.
-    """
+    """Return the bounds of a mission, and report those above its declaration. `flown` are the bounds of its steps."""
     policy = proof.policy
     steps = [step for phase in declared.phases for step in phase.steps]
     times = [_step_time(proof, mission, invocation) for invocation in mission.invocations]
@@ -177,7 +177,7 @@ def bounds_of(
 
 
 def _step_time(proof: ProofContext, mission: Mission, invocation: Invocation) -> int:
-    """How long a step takes from its turn to its end, in us."""
+    """Return the longest time in us from a step's turn to its end."""
     contract, vehicle = invocation.contract, proof.policy.vehicle
     prepared = proof.prepare(invocation, mission.phases)
     waits = 0 if isinstance(prepared, Refusal) else approval(proof, prepared)  # the proofs report a refusal
@@ -189,12 +189,12 @@ def _chain_time(chain: Iterable[Link], policy: Policy) -> int:
 
 
 def _taken(contract: Contract, way_home: int) -> int:
-    """What a contract takes; one that flies home no less than the way there."""
+    """Return the energy of a contract; for a return, at least that of the way home."""
     return max(contract.energy, way_home) if contract.motion.kind == MotionKind.HOME else contract.energy
 
 
 def _mission_energy(proof: ProofContext, mission: Mission) -> int:
-    """What the steps take up to the one that a chain follows, and that chain: after it no step is flown."""
+    """Return the most energy of the steps up to one that a chain follows, plus the chain, which ends the mission."""
     policy = proof.policy
     way_home = _way_home(proof, mission)
 
@@ -207,13 +207,16 @@ def _mission_energy(proof: ProofContext, mission: Mission) -> int:
         denied = spent + contingency
         spent += _taken(invocation.contract, way_home)
         own = chain_energy(invocation.contract.fallback)
-        given_up = own if invocation.contract.motion.kind in _HOMEWARD else max(own, contingency)
-        largest = max(largest, denied, spent + given_up)
+        aborted = own if invocation.contract.motion.kind in _HOMEWARD else max(own, contingency)
+        largest = max(largest, denied, spent + aborted)
     return largest
 
 
 def _way_home(proof: ProofContext, mission: Mission) -> int:
-    """The energy of the way home from the farthest and highest planned place, rounded up; low it is only near home."""
+    """Return the energy of the way home from the farthest and highest planned place, rounded up.
+
+    The way home is low only near home.
+    """
     vehicle, plans = proof.policy.vehicle, [invocation.plan for invocation in mission.invocations]
     speeds = proof.speeds
     squares = (x * x + y * y for plan in plans for x, y in zip(plan.path[::2], plan.path[1::2], strict=True))
@@ -231,11 +234,9 @@ def _count(proof: ProofContext, declared: MissionDecl, steps: int) -> None:
     proof.report.add(
         codes.MISSION_STEPS,
         declared.name.span,
-        f"the mission `{declared.name.text}` has {steps} steps, and says that it has at most {declared.most_steps}",
-        help=f"leave steps out, or write `steps at most {steps}`",
-        labels=[(phase.name.span, f"these are {len(phase.steps)}") for phase in declared.phases if phase.steps][
-            :_SHOWN
-        ],
+        f"the mission `{declared.name.text}` has {steps} steps, but declares `steps at most {declared.most_steps}`",
+        help=f"remove steps, or write `steps at most {steps}`",
+        labels=[(phase.name.span, f"{len(phase.steps)} steps") for phase in declared.phases if phase.steps][:_SHOWN],
     )
 
 
@@ -253,11 +254,11 @@ def _within(
         report.add(
             codes.MISSION_TIME,
             declared.most_time.span,
-            f"the mission may last {rounded_time(found.time_us)} from its issue, and says that it lasts at most "
+            f"the mission may last {rounded_time(found.time_us)} from its issue, but declares at most "
             f"{display(declared.most_time.value, Dimension.DURATION)}",
-            help=f"{start} to the start, {rounded_time(sum(times))} for the approvals, deadlines and durations of all "
-            f"steps, and {rounded_time(found.time_us - START_WINDOW_US - sum(times))} for the longest chain; give "
-            "steps shorter times of their own, or the mission more",
+            help=f"the time is {start} to the start, {rounded_time(sum(times))} for the approvals, deadlines and "
+            f"durations of all steps, and {rounded_time(found.time_us - START_WINDOW_US - sum(times))} for the longest "
+            "chain; shorten the times of steps, or raise the mission's limit",
             labels=_largest(steps, times, rounded_time),
         )
     limit = declared.most_energy
@@ -267,28 +268,28 @@ def _within(
     spent, advice = sum(energies), ""
     if limit is not None and not over:
         code, span = codes.MISSION_ENERGY, limit.span
-        against = f"says that it needs at most {display(limit.value, Dimension.RATIO)}"
+        against = f"but declares at most {display(limit.value, Dimension.RATIO)}"
     else:
-        code, span, against = codes.OVER_CHARGE, declared.name.span, "a battery has 100 %"
-        advice = "; leave steps out, or make two missions of it"
+        code, span, against = codes.OVER_CHARGE, declared.name.span, "which is more than 100 %"
+        advice = "; remove steps, or split the mission in two"
     report.add(
         code,
         span,
-        f"the mission may need {rounded_energy(found.energy)} of a full charge, and {against}",
-        help=f"{rounded_energy(spent)} for all steps, as their contracts allow, and "
-        f"{rounded_energy(found.energy - spent)} more where one of them is given up and a chain flies{advice}",
+        f"the mission may need {rounded_energy(found.energy)} of a full charge, {against}",
+        help=f"the contracts of all steps allow {rounded_energy(spent)}, and an aborted step with the chain after it "
+        f"may need {rounded_energy(found.energy - spent)} more{advice}",
         labels=_largest(steps, energies, rounded_energy),
     )
 
 
 def _short_already(proof: ProofContext, steps: Sequence[Step]) -> bool:
-    """Whether one of the steps was found to lack charge: that says more."""
+    """Whether a step is already reported to lack charge, which is more precise."""
     spans = {step.span for step in steps}
     return any(each.code is codes.SHORT_OF_ENERGY and each.span in spans for each in proof.report.found)
 
 
 def _largest(steps: Sequence[Step], amounts: Sequence[int], words: Callable[[int], str]) -> list[tuple[Span, str]]:
-    """The places that contribute most, those of a repeated step together."""
+    """Return labels for the steps that contribute most. Repetitions of a step are added up."""
     sums: dict[Span, list[int]] = {}
     for step, amount in zip(steps, amounts, strict=True):
         sums.setdefault(step.span, []).append(amount)
@@ -300,11 +301,11 @@ def _largest(steps: Sequence[Step], amounts: Sequence[int], words: Callable[[int
 
 
 def rounded_time(us: int) -> str:
-    """A time for a person, rounded up to the second."""
+    """Format a time in us, rounded up to the second."""
     minutes, seconds = divmod(-(-us // SECOND_US), 60)
     return (f"{minutes} min" + (f" {seconds} s" if seconds else "")) if minutes else f"{seconds} s"
 
 
 def rounded_energy(energy: int) -> str:
-    """A part of a full charge for a person, rounded up to the percent."""
+    """Format an energy in 1/10000 of a full charge, rounded up to the percent."""
     return f"{-(-energy // (FULL // 100))} %"

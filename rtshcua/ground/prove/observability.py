@@ -1,12 +1,13 @@
-"""E1201, E1203, E0808: what a running skill is watched by can be seen, in time for something to come of it.
+"""Prove that the conditions monitored in flight are observable (E1201, E1203), and in time for a reaction (E0808).
 
-A signal that `assume`, `maintain`, a `degrade` rule or a temporal monitor reads must be reported by vehicles, at least
-as often as it goes stale. A clause of `assume` or `maintain` must read something that can change. How often reports
-come is what the adapters ask for (`decision.rates`).
+Vehicles must report each signal that `assume`, `maintain`, a `degrade` rule or a temporal monitor reads, at least as
+often as it goes stale. A clause of `assume` or `maintain` must read a value that can change. The report rates are those
+that the adapters request (`decision.rates`).
 
-A breach, and the loss of a signal, must be noticed while the skill still runs: from one report to the next (or until
-the signal is stale and the grace is over), then the decision, then one round trip of the command that begins the
-fallback. A step's own block may shorten the time or add clauses, so each such step is asked again.
+A violated condition and a lost signal must both be noticed while the skill still runs. The reaction time is the time to
+the next report (or until the signal is stale and the grace is over), plus the decision, plus one round trip of the
+command that begins the fallback. A step's own block may shorten the duration or add clauses, so such a step is proved
+again.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,7 +27,7 @@ from rtshcua.model.flat.policy import MonitorKind, Policy, RuleKind
 from rtshcua.model.flat.signal import Signal, SignalSource
 from rtshcua.model.quantity import Dimension, display
 
-#: messages that a vehicle is sent and never sends itself as telemetry
+#: messages that a vehicle receives, and never sends as telemetry
 COMMAND_MESSAGES = frozenset({
     "COMMAND_INT", "COMMAND_LONG", "FILE_TRANSFER_PROTOCOL", "GPS_INJECT_DATA", "GPS_RTCM_DATA",
     "LOG_ERASE", "LOG_REQUEST_DATA", "LOG_REQUEST_END", "LOG_REQUEST_LIST", "MANUAL_CONTROL", "MANUAL_SETPOINT",
@@ -37,19 +38,20 @@ COMMAND_MESSAGES = frozenset({
 })  # fmt: skip
 
 
-#: what tells when the vehicle measured, among a message's fields
+#: message fields that carry the time of the measurement
 STAMPS = frozenset({"time_boot_ms", "time_usec"})
 
 
 def report_intervals(policy: Policy, contracts: Sequence[Contract] = ()) -> dict[str, int]:
-    """How long it is between two reports of each message that a policy's signals are read from, in us: as asked for,
-    where any autopilot reports so often.
+    """Return the interval in us between two reports of each message from which the policy reads a signal.
+
+    It is the requested interval, or a longer one if autopilots do not report so often.
     """
     return rates.delivered(rates.rates(policy, contracts))
 
 
 def older_by(message: str, dialect: Dialect) -> int:
-    """How much older than its report what a message carries may be, in us, on a link without delay."""
+    """Return by how many us a measurement may be older than the message that carries it, on a link without delay."""
     if message == "GPS_RAW_INT":
         return rates.FIX
     known = dialect.messages.get(message)
@@ -62,20 +64,20 @@ def arrives(signal: Signal) -> bool:
 
 
 def most_frequent(signal: Signal, intervals: Mapping[str, int]) -> SignalSource:
-    """The source of a signal that reports most often."""
+    """Return the source of a signal that reports most often."""
     return min(signal.sources, key=lambda source: intervals[source.message])
 
 
 def report_interval(signal: Signal, intervals: Mapping[str, int]) -> int:
-    """How long it is at most between two reports of a signal, from the most frequent of its messages."""
+    """Return the interval in us between two reports of a signal, from its most frequent message."""
     return intervals[most_frequent(signal, intervals).message]
 
 
-#: `L_rem` as it is assumed on board until it was measured (a test compares them), us
+#: `L_rem`, as assumed on board until it is measured, us; a test compares the two constants
 DECIDE_US = 20_000
-#: one round trip of a command, after which the adapters send it again (a test compares them), us
+#: round trip of a command, after which the adapters send it again, us; a test compares the two constants
 ACTUATE_US = 1_000_000
-#: a lost signal is noticed within this time at least, however long the skill lasts, us
+#: a loss of signal may always take this long to be noticed, us, even if the skill is shorter
 BLIND_US = 30_000_000
 
 _CHANGING = frozenset({
@@ -84,14 +86,14 @@ _CHANGING = frozenset({
 
 
 class WatchedSignal(NamedTuple):
-    """A signal and the first condition that is watched by it in flight."""
+    """A signal, and the first monitored condition that reads it."""
 
     signal: Signal
     span: Span
 
 
 def prove_observability(proof: ProofContext) -> None:
-    """Report every signal, window and clause of a policy that nothing comes of, and contracts that react too late."""
+    """Report signals and windows that cannot be observed, clauses that cannot change, and late reactions."""
     policy = proof.policy
     intervals = report_intervals(policy)
     found: dict[str, WatchedSignal] = {}
@@ -100,11 +102,11 @@ def prove_observability(proof: ProofContext) -> None:
             found.setdefault(signal.name, WatchedSignal(signal, proof.span(clause)))
     for watched in found.values():
         _observable(proof, watched, intervals)
-    for clause in _asked(policy):
+    for clause in _checked_once(policy):
         for signal in signals_read(proof, clause):
             if signal.name not in found and arrives(signal):
                 found[signal.name] = WatchedSignal(signal, proof.span(clause))
-                _stays_known(proof, found[signal.name], intervals, "this asks for it")
+                _stays_known(proof, found[signal.name], intervals, "this reads it")
     _windows(proof, intervals)
     for contract in policy.contracts:
         for clause in (*contract.assume, *contract.maintain):
@@ -116,7 +118,7 @@ def prove_observability(proof: ProofContext) -> None:
 
 
 def prove_step_observability(proof: ProofContext, step: MissionStep) -> None:
-    """Report what a step's own block makes of its contract, where the skill's alone was found good."""
+    """Report faults that a step's own block adds to the contract of its skill."""
     own = step.overrides
     if own is None:
         return
@@ -137,7 +139,7 @@ def prove_step_observability(proof: ProofContext, step: MissionStep) -> None:
 
 
 def _watched(proof: ProofContext) -> Iterator[Clause]:
-    """What is evaluated again and again in flight."""
+    """Yield the conditions that are monitored in flight."""
     policy = proof.policy
     for contract in policy.contracts:
         yield from contract.assume
@@ -149,8 +151,8 @@ def _watched(proof: ProofContext) -> Iterator[Clause]:
         yield monitor.when
 
 
-def _asked(policy: Policy) -> Iterator[Clause]:
-    """What is evaluated before a step begins, and not again."""
+def _checked_once(policy: Policy) -> Iterator[Clause]:
+    """Yield the conditions that are evaluated before a step begins."""
     for contract in policy.contracts:
         yield from contract.require
     for rule in policy.rules:
@@ -159,7 +161,7 @@ def _asked(policy: Policy) -> Iterator[Clause]:
 
 
 def signals_read(proof: ProofContext, *clauses: Clause) -> Iterator[Signal]:
-    """The signals that some clauses read, each once."""
+    """Yield the signals that clauses read, each once."""
     policy = proof.policy
     slots = slots_read(clauses, policy.vehicle, policy.monitors)
     yield from {signal.name: signal for slot in slots for signal in (signal_of(policy, slot),)}.values()
@@ -172,34 +174,34 @@ def _observable(proof: ProofContext, watched: WatchedSignal, intervals: Mapping[
         proof.report.add(
             codes.UNOBSERVABLE,
             declared.sources[0].message.span,
-            f"`{signal.name}` is read from `{signal.sources[0].message}`, which vehicles are sent and never report",
+            f"`{signal.name}` is read from `{signal.sources[0].message}`, which vehicles receive but never send",
             help="read it from a message that the vehicle reports",
-            labels=[(span, "this watches it in flight")],
+            labels=[(span, "this monitors it in flight")],
         )
         return
-    _stays_known(proof, watched, intervals, "this watches it in flight")
+    _stays_known(proof, watched, intervals, "this monitors it in flight")
 
 
 def _stays_known(proof: ProofContext, watched: WatchedSignal, intervals: Mapping[str, int], reads: str) -> None:
-    """A signal that is stale before its next report can come is unknown again and again, whatever is asked for."""
+    """Report a signal that goes stale before its next report can arrive."""
     signal, span = watched
     often, message = report_interval(signal, intervals), most_frequent(signal, intervals).message
     older = older_by(message, proof.context.dialect)
     if signal.stale_us >= often + older:
         return
-    why = f", and what it says may be {duration(older)} old then" if older else ""
+    aged = f" with measurements up to {duration(older)} old" if older else ""
     proof.report.add(
         codes.UNOBSERVABLE,
         proof.context.symbols.signals[signal.name].stale_after.span,
-        f"`{signal.name}` is stale after {duration(signal.stale_us)}, and `{message}` comes every {duration(often)} at "
-        f"best{why}: it is unknown again and again",
-        help=f"let it be stale after {duration(2 * often + older)} or more",
+        f"`{signal.name}` is unknown between reports: it is stale after {duration(signal.stale_us)}, but `{message}` "
+        f"is sent every {duration(often)} at most{aged}",
+        help=f"set `stale after` to {duration(2 * often + older)} or more",
         labels=[(span, reads)],
     )
 
 
 def _windows(proof: ProofContext, intervals: Mapping[str, int]) -> None:
-    """A window that no two reports fit into says nothing that the last report does not say."""
+    """Report windows shorter than the time between two reports: they add nothing to the last report."""
     for monitor in proof.policy.monitors:
         signals = [signal for signal in signals_read(proof, monitor.when) if arrives(signal)]
         if monitor.kind not in (MonitorKind.FOR_LAST, MonitorKind.WITHIN_LAST) or not signals:
@@ -210,9 +212,8 @@ def _windows(proof: ProofContext, intervals: Mapping[str, int]) -> None:
             proof.report.add(
                 codes.UNOBSERVABLE,
                 proof.span(monitor.when),
-                f"this is looked at over {duration(monitor.window_us)}, and {names} comes every {duration(often)} "
-                "at best",
-                help="take a longer window, or ask for the present value alone",
+                f"the window is {duration(monitor.window_us)}, but {names} is reported every {duration(often)} at most",
+                help="use a longer window, or only the present value",
             )
 
 
@@ -221,20 +222,20 @@ def _unwatched(proof: ProofContext, clause: Clause) -> None:
         codes.UNWATCHED,
         proof.span(clause),
         f"`{clause.text}` reads nothing that can change while the skill runs",
-        help="write it under `require`, or compare a signal, as in `maintain height <= altitude + 5 m`",
+        help="move it to `require`, or compare a signal, as in `maintain height <= altitude + 5 m`",
     )
 
 
 class _LateReaction(NamedTuple):
-    """The signal that tells of a cause too late, how long it all takes in us, and what that is made of."""
+    """A signal that is too slow, the reaction time in us, and a description of the time until the cause is noticed."""
 
     signal: Signal
     takes: int
-    what: str
+    delay: str
 
 
 def _late_reaction(proof: ProofContext, contract: Contract, intervals: Mapping[str, int]) -> _LateReaction | None:
-    """What cannot be answered while a skill runs: a breach, or the loss of a signal."""
+    """Return a reaction, to a violated condition or a lost signal, that takes longer than the skill runs; else None."""
     signals = [signal for signal in signals_read(proof, *contract.assume, *contract.maintain) if arrives(signal)]
     lasts = contract.duration_us
     if not signals or not lasts:
@@ -244,17 +245,16 @@ def _late_reaction(proof: ProofContext, contract: Contract, intervals: Mapping[s
     breach = report_interval(seldom, intervals) + DECIDE_US + ACTUATE_US
     lost = late.stale_us + contract.grace_us + DECIDE_US + ACTUATE_US
     if breach > lasts:
-        return _LateReaction(
-            seldom, breach, f"{duration(report_interval(seldom, intervals))} until `{seldom.name}` tells"
-        )
+        delay = f"{duration(report_interval(seldom, intervals))} until `{seldom.name}` is reported"
+        return _LateReaction(seldom, breach, delay)
     if lost > max(lasts, BLIND_US):
-        what = f"{duration(late.stale_us)} until `{late.name}` is stale, {duration(contract.grace_us)} of grace"
-        return _LateReaction(late, lost, what)
+        delay = f"{duration(late.stale_us)} until `{late.name}` is stale, {duration(contract.grace_us)} of grace"
+        return _LateReaction(late, lost, delay)
     return None
 
 
 def _reaction(proof: ProofContext, contract: Contract, intervals: Mapping[str, int], span: Span) -> None:
-    """Whether a breach and the loss of a signal can both be answered while the skill runs."""
+    """Report a contract whose fallback may begin only after the skill has ended."""
     late = _late_reaction(proof, contract, intervals)
     if late is None:
         return
@@ -264,14 +264,14 @@ def _reaction(proof: ProofContext, contract: Contract, intervals: Mapping[str, i
     proof.report.add(
         codes.SLOW_REACTION,
         span,
-        f"`{contract.name}` lasts at most {duration(contract.duration_us)}, and a fallback may begin only "
-        f"{duration(late.takes)} after its cause",
-        help=f"that is {late.what}, {duration(DECIDE_US)} to decide and {duration(ACTUATE_US)} for the command; at top "
-        f"speed `{vehicle.name}` flies {metres} meanwhile",
-        labels=[(stale, "this signal is the last to tell")],
+        f"`{contract.name}` lasts at most {duration(contract.duration_us)}, but its fallback may begin as late as "
+        f"{duration(late.takes)} after the cause",
+        help=f"the delay is {late.delay}, {duration(DECIDE_US)} to decide and {duration(ACTUATE_US)} for the command; "
+        f"`{vehicle.name}` flies up to {metres} in that time",
+        labels=[(stale, "this signal is the slowest")],
     )
 
 
 def duration(us: int) -> str:
-    """A duration as sources write it."""
+    """Format a duration in us as in sources."""
     return display(us, Dimension.DURATION)

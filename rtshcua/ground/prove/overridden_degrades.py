@@ -1,10 +1,9 @@
-"""E0721, E0723: degrade rules that another always comes before.
+"""Degrade rules that an earlier one always precedes (E0721, E0723).
 
-The first `degrade` that matches and whose target may fly is the one that flies. A narrower rule after a wider one is
-not what its author means: where it matches, the wider one flies. Nor are two with one condition: they ask for different
-things at once, and what follows a target that cannot fly is said by a chain. If nothing can keep the first one's target
-from flying, the other never does. Rules that merely overlap are left alone: which of them comes first says what matters
-more.
+The first `degrade` that matches and whose target can fly decides. A narrower rule after a wider one is a mistake: where
+it matches, the wider one decides. Two rules with the same condition are a mistake too: they require different skills at
+once, and a fallback for a target that cannot fly belongs in a chain. If the target of the earlier rule can always fly,
+the later rule never decides (E0721). Rules that only overlap are not reported: their order states a priority.
 """
 
 from collections.abc import Iterator
@@ -21,11 +20,11 @@ from rtshcua.model.flat.policy import RuleKind
 
 
 def report_overridden(rules: Ruleset, alive: list[WrittenRule]) -> None:
-    """Report each degrade rule that comes after one to another target that is wider, or has the same condition."""
+    """Report each degrade rule after one with another target and a wider or the same condition."""
     degrades = [group for group in alive if group.kind == RuleKind.DEGRADE]
     place = {rules.group_of(group.rules[0]): at for at, group in enumerate(degrades)}
     flown = {rules.flown(number) for group in degrades for number in group.rules}
-    last = -1  # of the rules of those before
+    last = -1  # the last flat rule of the groups before
     for at, later in enumerate(degrades):
         looked_at: set[int] = set()
         for candidate in _candidates(rules, later, flown):
@@ -40,12 +39,12 @@ def report_overridden(rules: Ruleset, alive: list[WrittenRule]) -> None:
 
 
 def _candidates(rules: Ruleset, later: WrittenRule, flown: AbstractSet[int | None]) -> Iterator[int]:
-    """The rules, in order, that may match wherever one does, and fly something else; each is to be asked about."""
+    """Yield in order the rules to another target that may match wherever `later` does. The caller proves each."""
     pairs = [(number, skill) for number in later.rules for skill in rules.skills_decided(number)]
-    # an earlier rule that flies the very skill says nothing of it; so one is taken that none flies, if there is any
+    # a degrade to a skill does not decide about that skill, so prefer a skill that is no target
     number, skill = next((pair for pair in pairs if pair[1] not in flown), pairs[0] if pairs else (-1, -1))
     if number < 0:
-        return iter(())  # it is about nothing but what it flies itself
+        return iter(())  # it applies only to its own target
     if skill in flown:
         return (each for each, rule in enumerate(rules.policy.rules) if rule.kind == RuleKind.DEGRADE)
     rule, effect = rules.rule(number), rules.effect(number)
@@ -56,7 +55,7 @@ def _candidates(rules: Ruleset, later: WrittenRule, flown: AbstractSet[int | Non
 
 
 def _after_wider(rules: Ruleset, earlier: WrittenRule, later: WrittenRule) -> bool:
-    """Whether one rule matches wherever another does; reports it."""
+    """Whether the earlier rule matches wherever the later one does. Reports it."""
     witness: tuple[Yes, int] | None = None
     narrower = False
     target = rules.rule(earlier.rules[0]).target
@@ -82,18 +81,18 @@ def _after_wider(rules: Ruleset, earlier: WrittenRule, later: WrittenRule) -> bo
     rules.proof.report.add(
         codes.SHADOWED_RULE if always else codes.CONFLICTING_RULES,
         later.span,
-        "this `degrade` never decides: wherever it matches, an earlier one does too"
+        "this `degrade` never decides: wherever it matches, an earlier `degrade` decides"
         if always
-        else f"at {situation} an earlier `degrade` matches too, and it is the one that decides",
-        help=("write the narrower rule first" if narrower else "delete one of them, or tell their conditions apart")
-        + (f"; at {situation} `{name}` flies" if always else f"; now `{name}` flies there, if it may"),
+        else f"at {situation} an earlier `degrade` matches too, and decides",
+        help=("write the narrower rule first" if narrower else "delete one of them, or separate their conditions")
+        + (f"; at {situation} `{name}` flies" if always else f"; now `{name}` flies there, if it can"),
         labels=[(earlier.span, "this comes first")],
     )
     return True
 
 
 def _before(rules: Ruleset, earlier: WrittenRule, number: int, skill: int) -> int | None:
-    """The flat rule of an earlier one that matches wherever another does, for a skill, and flies something else."""
+    """Return the flat rule of `earlier` to another target that matches wherever a rule does, for a skill; else None."""
     matching = rules.ask([(number, TRUE)], skill)
     for candidate in earlier.rules:
         if rules.effect(candidate) == rules.effect(number) or not rules.wider(candidate, number, skill):

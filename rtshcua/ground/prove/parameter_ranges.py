@@ -1,11 +1,11 @@
-"""E0703, E0704, E0718, E0719: no step is refused for a value between those with which the mission is checked.
+"""Prove that no step is refused for a parameter value between the proved instances of a mission.
 
-Arguments are sums of parameters, so between two instances of a mission that differ in numbers alone, each step's
-arguments lie on the straight line from the one's to the other's.
+Arguments are sums of parameters. So between two instances that differ only in numbers, the arguments of each step lie
+on a straight line.
 
-With a value that is refused whatever the time, the step is out of scope, or forbidden. Of one that is refused at times
-only, the same is asked as of every instance (`issue_times`). What the ways of the two instances ask of the time of
-issue, either of them, is asked of all values between.
+A value that is refused at all times is out of scope (E0703), forbidden (E0704) or replaced (E0719). For a value that is
+refused at some times, the times of issue are proved as for an instance (E0718, `issue_times`). The requirements that
+the paths of the two instances have of the time of issue apply to all values between.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -26,14 +26,14 @@ from rtshcua.model.flat.contract import QUANTITY, Contract
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.quantity import Dimension, display
 
-#: a line is cut at whole parts of it, so many
+#: positions on a line are integers from 0 to this
 _WHOLE: Final = 1 << 64
 
 
 class ArgumentLine(NamedTuple):
-    """The arguments of a step in one instance and in another, and all in whole numbers between; both may be the same.
+    """The arguments of a step in two instances, which may be equal, and all integer arguments between them.
 
-    Of a part of the line those that lie from `start` to `end` of it, in parts of `_WHOLE`.
+    A part of the line contains only those from position `start` to `end`, in parts of `_WHOLE`.
     """
 
     one: tuple[int, ...]
@@ -48,7 +48,7 @@ class ArgumentLine(NamedTuple):
 
     @property
     def spans(self) -> list[Span]:
-        """The least and the greatest whole number of each cell; where there is none the first is above the second."""
+        """The least and the greatest integer of each cell. If there is none, the first is above the second."""
         found: list[Span] = []
         for one, other in zip(self.one, self.other, strict=True):
             ends = sorted(one * _WHOLE + (other - one) * at for at in (self.start, self.end))
@@ -57,27 +57,27 @@ class ArgumentLine(NamedTuple):
 
     @property
     def values(self) -> tuple[Value, ...]:
-        """What each cell may hold; only asked of a line that is not `empty`."""
+        """The possible values of each cell. The line must not be `empty`."""
         return tuple(interval(*span) for span in self.spans)
 
     @property
     def empty(self) -> bool:
-        """Whether some cell has no whole number on it."""
+        """Whether some cell has no integer on the line."""
         return any(low > high for low, high in self.spans)
 
     @property
     def single(self) -> bool:
-        """Whether no cell has more than one whole number on it."""
+        """Whether no cell has more than one integer on the line."""
         return all(low >= high for low, high in self.spans)
 
     def halves(self) -> tuple["ArgumentLine", "ArgumentLine"]:
-        """The part up to the middle, and the part from there."""
+        """Split the line at its middle."""
         middle = (self.start + self.end) // 2
         return self._replace(end=middle), self._replace(start=middle)
 
     @property
     def given(self) -> tuple[Goal, ...]:
-        """What holds of cells on the line: two points of it, and any third one, are on it together."""
+        """Conditions that hold on the line: each pair of cells lies on a straight line."""
         goals: list[Goal] = []
         for one, other in pairwise(self.moving):
             rise, run = self.other[other] - self.one[other], self.other[one] - self.one[one]
@@ -86,32 +86,32 @@ class ArgumentLine(NamedTuple):
         return tuple(goals)
 
     def least(self, cell: int) -> int:
-        """The least that a cell holds."""
+        """Return the least value of a cell."""
         return self.spans[cell][0]
 
-    def words(self, contract: Contract) -> str:
-        """The arguments that move, of a line of which one value is left; empty where nothing moves."""
-        told = [
+    def text(self, contract: Contract) -> str:
+        """Format the arguments that differ, of a line with a single value; empty if none differs."""
+        values = [
             f"`{each.name} = {display(self.spans[each.cell][0], Dimension(each.dimension))}`"
             for each in contract.parameters
             if each.cell in self.moving
         ]
-        return " and ".join(told)
+        return " and ".join(values)
 
 
 def unmoved_lines(steps: Sequence[MissionStep]) -> list[ArgumentLine]:
-    """The lines of a single instance."""
+    """Return the lines of a single instance."""
     return [ArgumentLine(each.flat.arguments, each.flat.arguments) for each in steps]
 
 
 def space_along(proof: ProofContext, step: MissionStep, line: ArgumentLine) -> SituationSpace:
-    """Any situation in which a step may be asked for with the arguments on a line."""
+    """Return all situations in which a step may be requested with the arguments on a line."""
     space = proof.questions.space(step.flat.skill)
     return space._replace(arguments=line.values, phases=frozenset((step.prepared.phase,)))
 
 
 def lines_from(before: Sequence[StepInstance], steps: Sequence[MissionStep]) -> Iterator[ArgumentLine | None]:
-    """For each step the line from an earlier instance; None where the two differ in more than numbers."""
+    """Yield for each step its line from an earlier instance, or None if the two differ in more than numbers."""
     for earlier, step in zip(before, steps, strict=True):
         now = step.flat
         line = ArgumentLine(earlier.arguments, now.arguments) if earlier.skill == now.skill else None
@@ -119,16 +119,16 @@ def lines_from(before: Sequence[StepInstance], steps: Sequence[MissionStep]) -> 
         yield line if line is not None and numbers.issuperset(line.moving) else None
 
 
-#: to how many earlier instances of a mission one is compared
+#: the number of earlier instances with which an instance is compared
 _COMPARED: Final = 8
 
-#: the proof about the time: whether the steps may come at a time at which they are refused, which it then reports
+#: a proof that reports steps that may begin when they are refused, and returns whether there are any
 Timely: TypeAlias = Callable[[ProofContext, Sequence[MissionStep], Sequence[ArgumentLine | None]], bool]
 
 
 def prove_between(proof: ProofContext, mission: MissionDecl, steps: Sequence[MissionStep], timely: Timely) -> None:
     """Report the first value between this instance and an earlier one with which a step is refused."""
-    now = tuple(StepInstance(step.flat.skill, step.flat.arguments, tuple(step.time.asked)) for step in steps)
+    now = tuple(StepInstance(step.flat.skill, step.flat.arguments, tuple(step.time.requirements)) for step in steps)
     earlier = proof.questions.instances.setdefault(mission.name.text, [])
     for before in earlier[:_COMPARED]:
         if len(before) != len(now):
@@ -139,7 +139,7 @@ def prove_between(proof: ProofContext, mission: MissionDecl, steps: Sequence[Mis
                 return
         if any(line is not None and line.moving for line in between):
             both = [
-                step._replace(time=replace(step.time, asked=[*step.time.asked, *other.asked]))
+                step._replace(time=replace(step.time, requirements=[*step.time.requirements, *other.requirements]))
                 for step, other in zip(steps, before, strict=True)
             ]
             if timely(proof, both, between):
@@ -154,15 +154,15 @@ def _report_refused(proof: ProofContext, step: MissionStep, line: ArgumentLine) 
         situation = witness_text(witness, policy, step.flat.contract)
         rules = [each.rule for each in step.prepared.candidates.permits] if rule is None else [rule]
         label = "this does not permit it" if rule is None else "by this rule"
-        code, said = codes.OUT_OF_SCOPE, f"outside of what `{policy.name}` permits"
+        code, result = codes.OUT_OF_SCOPE, f"not permitted by `{policy.name}`"
         if rule is not None and rule.target is None:
-            code, said = codes.FORBIDDEN, f"forbidden by `{policy.name}`"
+            code, result = codes.FORBIDDEN, f"forbidden by `{policy.name}`"
         elif rule is not None:
-            code, said = codes.DEGRADED, f"not flown: `{policy.name}` flies another skill in its place"
+            code, result = codes.DEGRADED, f"not flown: `{policy.name}` replaces it by another skill"
         proof.report.add(
             code,
             step.span,
-            f"with {situation}, which the mission's parameters allow, this step is {said}",
+            f"with {situation}, which the mission's parameters allow, this step is {result}",
             help="narrow the range of the mission's parameter",
             labels=[(proof.span(each), label) for each in rules],
         )

@@ -1,4 +1,4 @@
-"""What all proofs ask: a policy as on board, with all arguments of a step and nothing of the vehicle's state known."""
+"""The context of all proofs: a policy prepared as on board, in which only the arguments of a step are known."""
 
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, field
@@ -25,10 +25,10 @@ from rtshcua.model.ir.skills import SkillDecl
 
 
 def optimistic(node: tree.Node, hope: bool, fixed: frozenset[int] | None = None) -> tree.Node:
-    """A condition whose atoms about the state are what brings it nearest to `hope`.
+    """Replace the atoms of a condition that depend on the state by the value that favours `hope`.
 
-    Arguments, the time and the phase are known. `fixed` are slots of the state that are known too, and with them the
-    place: None where nothing of the state is.
+    Arguments, the time and the phase are known. `fixed` are the known slots of the state; with them the place is known
+    too. None means that nothing of the state is known.
     """
     slots = fixed or frozenset()
 
@@ -49,20 +49,22 @@ def optimistic(node: tree.Node, hope: bool, fixed: frozenset[int] | None = None)
     return replace_atoms(node, best, hope)
 
 
-#: us since the epoch: later than any flight
+#: a time later than any flight, us since the epoch
 EVER = 1 << 53
 
 
 @dataclass(frozen=True, slots=True)
 class ProofContext:
-    """A lowered policy, prepared as on board, and any state that its vehicle may be in; `questions` are asked of it.
+    """A lowered policy, prepared as on board, with all states of its vehicle, and caches that its proofs share.
 
-    `kept` are the ways that were found to keep its airspace (`ways`): the missions of one policy share many.
-    `steps` are those that were prepared, `hopes` the conditions of rules as `optimistic` has them: the choices of a
-    mission's parameters share many.
-    `nodes` and `conditions` are those of its rules, by their code.
-    `bests` are the clauses of contracts in the best of all states.
-    `impossible` are the skills whose contracts were reported to contradict themselves: no step of one is looked at.
+    `anything`: every value of each signal.
+    `questions`: answers of the analysis.
+    `kept`: ways proved to stay in the airspace (`fallback_ways`). The missions of one policy share many of them.
+    `steps`: prepared steps. The instances of a mission share many of them.
+    `hopes`: conditions of rules simplified by `optimistic`.
+    `nodes`, `conditions`: conditions of rules by their code.
+    `bests`: clauses of contracts in the best state.
+    `impossible`: skills with contradictory contracts, which are reported. Their steps are not proved.
     """
 
     context: CheckContext
@@ -80,7 +82,7 @@ class ProofContext:
 
     @property
     def report(self) -> Report:
-        """Where findings go."""
+        """The report that collects findings."""
         return self.context.report
 
     @property
@@ -90,18 +92,18 @@ class ProofContext:
 
     @property
     def speeds(self) -> Speeds:
-        """How fast the vehicle flies; the compiler writes them."""
+        """The speeds of the vehicle, which the compiler always sets."""
         speeds = self.policy.vehicle.speeds
         assert speeds is not None
         return speeds
 
     @property
     def skills(self) -> Mapping[str, SkillDecl]:
-        """The skills as they are declared, by name."""
+        """The declared skills by name."""
         return self.context.symbols.skills
 
     def node(self, rule: Rule) -> Node:
-        """The condition of a rule as a tree; rules share those that are alike."""
+        """Return the condition of a rule as a tree, shared by rules with equal conditions."""
         code = () if rule.when is None else rule.when.code
         found = self.nodes.get(code)
         if found is None:
@@ -110,7 +112,7 @@ class ProofContext:
         return found
 
     def condition(self, rule: Rule) -> Condition:
-        """The condition of a rule, to be evaluated; rules share those that are alike."""
+        """Return the condition of a rule ready for evaluation, shared by rules with equal conditions."""
         code = () if rule.when is None else rule.when.code
         found = self.conditions.get(code)
         if found is None:
@@ -118,7 +120,7 @@ class ProofContext:
         return found
 
     def best(self, clause: Clause, contract: Contract) -> Condition:
-        """A clause, in the best of all states that the place, the height, the time and the arguments leave open."""
+        """Return a clause in the best state for a given place, height, time and arguments."""
         found = self.bests.get(clause.code)
         if found is None:
             fixed = frozenset(where(self.prepared.policy.vehicle))
@@ -127,26 +129,26 @@ class ProofContext:
         return found
 
     def sets(self, at_us: int = 0) -> Sets:
-        """Any state, at any time within a week from a UTC time; at any time at all where that is not known (0)."""
+        """Return all states at all times within a week from a UTC time, or at all times if it is unknown (0)."""
         return Sets(self.anything, (0, 0), ((at_us, at_us + WEEK - 1 if at_us else EVER),), (0, 0))
 
     def prepare(self, invocation: Invocation, phases: tuple[str, ...]) -> PreparedInvocation | Refusal:
-        """A step of a mission with these phases, prepared as on board, or what is wrong with it."""
+        """Prepare a step of a mission with these phases as on board. Returns the refusal if it is refused there."""
         found = self.steps.get((invocation, phases))
         if found is None:
             found = self.steps[invocation, phases] = prepare_invocation(invocation, self.prepared, phases)
         return found
 
     def around(self, invocation: PreparedInvocation) -> Environment:
-        """Any state around a step, for a condition."""
+        """Return all states in which a step may be decided, as the environment of a condition."""
         sets = self.sets(invocation.invocation.issued_at_us)
         return environment(sets, self.prepared, invocation.arguments, invocation.phase)
 
     def environment(self, arguments: tuple[Value, ...], phase: int) -> Environment:
-        """Arguments in any state, in a phase by its number among the policy's names, for a condition."""
+        """Return arguments in all states, in a phase by its index in the policy, as the environment of a condition."""
         sets = self.sets()
         return Environment((*sets.values, MISSING), arguments, sets.utc_us, sets.utc_error_us, phase=phase)
 
     def span(self, part: Clause | Rule | Link | Airspace) -> Where:
-        """Where a part of the policy is written."""
+        """Return the source span of a part of the policy."""
         return self.lowered.files.span(part.source, part.start, part.end)

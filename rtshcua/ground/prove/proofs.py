@@ -1,4 +1,4 @@
-"""All proofs in their order: those of a policy, and those of a mission, which follow the vehicle from step to step."""
+"""Run all proofs in order: those of a policy, and those of a mission, which follow the vehicle from step to step."""
 
 from collections.abc import Sequence
 from functools import lru_cache
@@ -40,7 +40,7 @@ from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.ir.missions import MissionDecl
 
-#: the proofs of a policy, in their order
+#: the proofs of a policy, in order
 POLICY_PROOFS = (
     prove_links, prove_last_links, prove_deferrals, prove_observability, prove_contracts, prove_delegations,
     prove_rules,
@@ -48,7 +48,7 @@ POLICY_PROOFS = (
 
 
 def prove_policy(context: CheckContext, lowered: LoweredPolicy) -> ProofContext | None:
-    """The policy prepared as on board, after its proofs; None where it would be refused there."""
+    """Prove a policy and return it prepared as on board, or None if it would be refused there."""
     found = _prepared(lowered.policy)
     if isinstance(found, Refusal):
         report_refused(context, lowered, found)
@@ -62,15 +62,13 @@ def prove_policy(context: CheckContext, lowered: LoweredPolicy) -> ProofContext 
 
 @lru_cache(maxsize=32)
 def _prepared(policy: Policy) -> tuple[PreparedPolicy, Questions] | Refusal:
-    """A policy prepared, and what is asked about it: missions in several files are often under the same one, and each
-    is a program of its own, in which the same questions come up.
-    """
+    """Prepare a policy and its questions. The cache serves programs of several missions with the same policy."""
     prepared = prepare(policy)
     return prepared if isinstance(prepared, Refusal) else (prepared, Questions(prepared))
 
 
 def prove_mission(proof: ProofContext, declared: MissionDecl, mission: Mission) -> tuple[StepBound, ...]:
-    """The proofs of a mission under a policy; what each step takes at most, as far as the mission can be flown."""
+    """Prove a mission under a policy. Returns the bounds of its steps, empty if the mission cannot be flown."""
     too_long = paths_fit(mission, proof.prepared)
     if too_long is not None:
         text = f"`{declared.name.text}` does not fit on board: {too_long.text}"
@@ -106,22 +104,21 @@ def prove_mission(proof: ProofContext, declared: MissionDecl, mission: Mission) 
 
 
 def report_refused(context: CheckContext, lowered: LoweredPolicy, malformed: Refusal) -> None:
-    """Report what would not be loaded on board."""
+    """Report a compiled policy or mission that would be refused on board."""
     context.report.add(
         codes.REFUSED_ON_BOARD,
         lowered.declaration.name.span,
-        f"what `{lowered.declaration.name.text}` was compiled to would be refused on board: {malformed.text}",
-        help="this is a fault of the compiler, unless a limit is named",
+        f"`{lowered.declaration.name.text}` as compiled would be refused on board: {malformed.text}",
+        help="stay within the limit that the message names; if it names none, this is a bug in the compiler",
     )
 
 
 def prove_flight(
     proof: ProofContext, mission: MissionDecl, steps: Sequence[MissionStep], permitted: Sequence[bool]
 ) -> tuple[StepBound, ...]:
-    """Report what is wrong with the way of a mission, up to the first step that cannot be flown; what each step takes
-    at most, where all are proved.
+    """Prove the flight of a mission up to the first step that cannot be flown. Returns the bounds of the steps, or ().
 
-    What comes after such a step would begin at a place that is never reached.
+    Steps after it are not proved: they would begin at a place that the vehicle never reaches.
     """
     ways = FallbackWays(proof)
     starts: list[tuple[StartPlace, ...]] = []
@@ -160,6 +157,6 @@ def _too_many_places(proof: ProofContext, step: MissionStep) -> None:
     proof.report.add(
         codes.UNDECIDED,
         step.span,
-        f"after this step the vehicle may be at more than {MOST_PLACES} places, for so many steps may be skipped",
-        help="the ways from some of them are left for on board; let a step between them `abort` or `hold`",
+        f"after this step the vehicle may be at more than {MOST_PLACES} places, because many steps may be skipped",
+        help="the ways from some of these places are only checked on board; let an earlier step `abort` or `hold`",
     )

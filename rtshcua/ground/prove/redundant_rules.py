@@ -1,14 +1,15 @@
-"""E0721, E0722: rules that decide nothing, because others always outweigh them or always say the same.
+"""Rules that have no effect, because other rules always override them (E0721) or cover them (E0722).
 
-A permit never decides where, wherever it is true, some forbid or some degrade to another skill is true or unknown. A
-permit is redundant where some other permit is true wherever it is; a forbid, where some other forbid is, and where
-wherever it is unknown another is true or unknown. A later degrade rule to the same target never decides where an
-earlier one is true wherever it is, and not false wherever it is unknown; an earlier one neither, if no degrade to
-another target stands between the two. A confirm rule is redundant where another awaits the same role wherever it does,
-and no longer. Of rules that make each other redundant the last one is reported.
+- A permit is overridden if, wherever it is true, a forbid or a degrade to another skill is true or unknown.
+- A permit is redundant if, wherever it is true, another permit is true.
+- A forbid is redundant if, wherever it is true, another forbid is true, and wherever it is unknown, another is true or
+  unknown.
+- A degrade is redundant if an earlier degrade to the same target covers it in the same way. A later degrade covers it
+  too, unless a degrade to another target comes between the two.
+- A confirm is redundant if another confirm awaits the same roles wherever it does, and no longer.
 
-A `use` or `delegate` is redundant where each of its rules says nothing that the rules from elsewhere do not say: a
-template may repeat a `forbid` each time it is used.
+Of rules that make each other redundant, the last one is reported. A `use` or `delegate` is redundant if each of its
+rules is. One rule of a template may be: a template may repeat a `forbid` each time it is used.
 """
 
 from collections.abc import Iterator
@@ -28,7 +29,7 @@ from rtshcua.model.ir.policies import Use
 
 
 def covering_rule(rules: Ruleset, group: WrittenRule, but: AbstractSet[int]) -> Span | None:
-    """Where a rule is written that alone says all that a rule says, without some numbers; None where none does."""
+    """Return the span of one rule that covers a whole group, ignoring the flat rules `but`; None if there is none."""
     looked_at: set[int] = set()
     for candidate in _covering_candidates(rules, group, but):
         at = rules.group_of(candidate)
@@ -47,7 +48,7 @@ def covering_rule(rules: Ruleset, group: WrittenRule, but: AbstractSet[int]) -> 
 
 
 def _covering_candidates(rules: Ruleset, group: WrittenRule, but: AbstractSet[int]) -> Iterator[int]:
-    """The rules, in order, that may say all that a rule says; each is to be asked about."""
+    """Yield in order the flat rules that may cover a group. The caller proves each."""
     pair = next(((number, skill) for number in group.rules for skill in rules.skills_decided(number)), None)
     kind = RuleKind(group.kind)
     if pair is None:
@@ -60,7 +61,7 @@ def _covering_candidates(rules: Ruleset, group: WrittenRule, but: AbstractSet[in
 
 
 def _covers_rule(rules: Ruleset, number: int, candidate: int, skill: int) -> bool:
-    """Whether a rule, for a skill, does nothing that a candidate does not do."""
+    """Whether a candidate has, for a skill, every effect of a rule."""
     rule = rules.rule(number)
     if not rules.wider(candidate, number, skill) or rules.effect(candidate) != rules.effect(number):
         return False
@@ -75,7 +76,7 @@ def _covers_rule(rules: Ruleset, number: int, candidate: int, skill: int) -> boo
 
 
 def report_redundant(rules: Ruleset, alive: list[WrittenRule]) -> set[int]:
-    """Report the permits that forbids outweigh, and then the rules that others make redundant; their numbers."""
+    """Report overridden permits, and then redundant rules. Returns the numbers of the reported flat rules."""
     gone: set[int] = set()
     for group in alive:
         if group.kind == RuleKind.PERMIT and _shadowed(rules, group):
@@ -84,55 +85,50 @@ def report_redundant(rules: Ruleset, alive: list[WrittenRule]) -> set[int]:
     for group in reversed(alive):
         if not gone.intersection(group.rules):
             gone.update(group.rules)
-            said_by = _saying_all(rules, group, gone)
-            if said_by is None:
+            covered_by = _covering(rules, group, gone)
+            if covered_by is None:
                 gone.difference_update(group.rules)
             else:
                 rules.drop(group.rules)
-                _report_rule(rules, group, said_by)
+                _report_rule(rules, group, covered_by)
     return gone
 
 
 def _shadowed(rules: Ruleset, group: WrittenRule) -> bool:
-    outweighing = None
+    overriding = None
     for kind in (RuleKind.FORBID, RuleKind.DEGRADE):
         word = kind.name.lower()
-        what = f"is ever not outweighed by a `{word}`"
-        outweighing = _covered(rules, group, kind, frozenset(), ((TRUE, FALSE),), what)
-        if outweighing is not None:
+        question = f"is always overridden by a `{word}`"
+        overriding = _covered(rules, group, kind, frozenset(), ((TRUE, FALSE),), question)
+        if overriding is not None:
             break
-    if outweighing is None:
+    if overriding is None:
         return False
     rules.proof.report.add(
         codes.SHADOWED_RULE,
         group.span,
-        f"this `permit` never decides: wherever it matches, a `{word}` does too, or is unknown",
+        f"this `permit` never decides: wherever it matches, a `{word}` matches too, or is unknown",
         help=f"narrow the `{word}`, or delete this rule",
-        labels=[(span, "this outweighs it") for span in outweighing],
+        labels=[(span, "this overrides it") for span in overriding],
     )
     return True
 
 
-def _saying_all(rules: Ruleset, group: WrittenRule, gone: AbstractSet[int]) -> tuple[Span, ...] | None:
-    """Where the rules are written that say all that a rule says; `gone` has its own numbers and those of rules that
-    were already reported.
-    """
-    if group.kind in (RuleKind.PERMIT, RuleKind.FORBID):
-        return saying(rules, group, gone)
-    one = covering_rule(rules, group, gone)
-    return None if one is None else (one,)
-
-
-def saying(
+def _covering(
     rules: Ruleset, group: WrittenRule, gone: AbstractSet[int], *, quiet: bool = False
 ) -> tuple[Span, ...] | None:
-    """Where the permits or forbids are written that say all that one says; nothing is noted if `quiet`."""
+    """Return the spans of the rules that together cover a group, or None. Reports an undecided question unless `quiet`.
+
+    `gone` are the flat rules of the group itself and those of rules that are already reported.
+    """
     kind = RuleKind(group.kind)
+    if kind not in (RuleKind.PERMIT, RuleKind.FORBID):
+        one = covering_rule(rules, group, gone)
+        return None if one is None else (one,)
     questions: tuple[tuple[Truth, Truth], ...] = ((TRUE, FALSE | UNKNOWN),)
     if kind is RuleKind.FORBID:
         questions = (*questions, (UNKNOWN, FALSE))
-    what = None if quiet else "says anything that others do not say"
-    return _covered(rules, group, kind, gone, questions, what)
+    return _covered(rules, group, kind, gone, questions, None if quiet else "is redundant")
 
 
 def _covered(
@@ -141,59 +137,64 @@ def _covered(
     kind: RuleKind,
     but: AbstractSet[int],
     questions: tuple[tuple[Truth, Truth], ...],
-    what: str | None,
+    question: str | None,
 ) -> tuple[Span, ...] | None:
-    """Where the rules are written that together leave a rule nothing; None where they leave something.
+    """Return the spans of the rules of a kind that together leave a group without effect, or None.
 
-    Each question is a truth of the rule's condition, and the truths of the others that leave it something.
+    Each of `questions` is a truth value of the group's condition, and the truth values of another rule with which that
+    rule does not cover it. An undecided question is reported with the text `question`, if there is one.
     """
     found: dict[Span, None] = {}
-    open_: str | None = None
+    undecided: str | None = None
     for number in group.rules:
         for key in rules.keys(number):
             for wanted, escape in questions:
                 by = rules.covered(number, wanted, kind, but, escape, key)
                 if isinstance(by, Undecided):
-                    open_ = by.why
+                    undecided = by.why
                 elif by is None or _clock_matters(rules, number, by):
                     return None
                 else:
                     found.update(dict.fromkeys(rules.proof.span(rules.rule(each)) for each in by))
-    if open_ is not None:
-        if what is not None:
-            rules.undecided(group, what, open_)
+    if undecided is not None:
+        if question is not None:
+            rules.undecided(group, question, undecided)
         return None
     return tuple(found)
 
 
 def _clock_matters(rules: Ruleset, number: int, used: tuple[int, ...]) -> bool:
-    """Whether several rules share the times of one: with an inexact clock there is then a moment that none has."""
+    """Whether several rules together cover the times of one. With an inexact clock, a gap between them is possible."""
     return len(used) > 1 and rules.timed(number)
 
 
-def _report_rule(rules: Ruleset, group: WrittenRule, said_by: tuple[Span, ...]) -> None:
+def _report_rule(rules: Ruleset, group: WrittenRule, covered_by: tuple[Span, ...]) -> None:
     kind = group.declared.kind
     report = rules.proof.report
-    copies = [span for span in said_by if _identical(rules, group, rules.at[span])]
-    help = "delete it, or change what it is about"
-    if len(said_by) == 1 and not copies:
-        much = "permits too much" if kind == "permit" else "says too much"
-        help = f"look at `{report.text(said_by[0])}` first: if it {much}, narrow it; else delete this rule"
+    copies = [span for span in covered_by if _identical(rules, group, rules.at[span])]
+    help = "delete it, or change it"
+    if len(covered_by) == 1 and not copies:
+        much = "permits too much" if kind == "permit" else "is too wide"
+        help = f"check `{report.text(covered_by[0])}` first: if it {much}, narrow it; otherwise delete this rule"
     source = report.sources.get(group.span.file)
     gone = group.span if source is None else whole_line(source.text, group.span)
+    others, label = "other rules cover it", "this covers a part of it"
+    if len(covered_by) == 1:
+        others, label = "another rule covers it", "this covers it"
     report.add(
         codes.REDUNDANT_RULE,
         group.span,
-        f"this `{kind}` says nothing that " + ("another does" if len(said_by) == 1 else "others do") + " not say",
+        f"this `{kind}` is redundant: {others}",
         help=help,
-        labels=[(span, "this says it already" if len(said_by) == 1 else "this says a part of it") for span in said_by],
+        labels=[(span, label) for span in covered_by],
         fix=(gone, "", "delete this rule") if copies else None,
     )
 
 
 def _identical(rules: Ruleset, one: WrittenRule, other: WrittenRule) -> bool:
-    """Whether one rule is written twice: for the same skills, roles and sources, under the same conditions, to the same
-    effect. Where the other is wider, it may be the one that is wrong, and no fix deletes the narrow one.
+    """Whether two rules have the same skills, roles, sources, conditions and effect.
+
+    Only then does a fix delete one of them: otherwise the wider rule may be the mistake.
     """
     return _content(rules, one) == _content(rules, other)
 
@@ -216,32 +217,32 @@ def _content(rules: Ruleset, group: WrittenRule) -> set[tuple[object, ...]]:
 
 
 def report_bundles(rules: Ruleset, alive: list[WrittenRule], gone: AbstractSet[int]) -> None:
-    """Report each that is redundant, the last one first; `gone` are the rules that were reported themselves."""
+    """Report each redundant `use` and `delegate`, the last one first. `gone` are the rules already reported."""
     living = {number for group in alive for number in group.rules}
     alone = {frozenset(group.rules) for group in rules.groups}
     left_out = set(gone)
     for node, numbers in reversed(_bundles(rules)):
-        # what all comes from one rule of the source was already asked about as that
+        # a bundle with the rules of one written rule is already proved as that rule
         if not living.issuperset(numbers) or not left_out.isdisjoint(numbers) or frozenset(numbers) in alone:
             continue
         left_out.update(numbers)
         found = _bundle_covered(rules, numbers, left_out)
         if not found:
             left_out.difference_update(numbers)
-            continue  # nothing else says it, or there is nothing in it, which is reported as that
+            continue  # not covered, or empty, which is reported elsewhere
         rules.drop(numbers)
         word = "use" if isinstance(node, Use) else "delegate"
         rules.proof.report.add(
             codes.REDUNDANT_RULE,
             node.span,
-            f"this `{word}` says nothing that other rules do not say",
-            help="delete it, or change what it is about",
-            labels=[(span, "this says it already") for span in found],
+            f"this `{word}` is redundant: other rules cover it",
+            help="delete it, or change it",
+            labels=[(span, "this covers it") for span in found],
         )
 
 
 def _bundles(rules: Ruleset) -> list[tuple[Node, list[int]]]:
-    """The rules that each `use` and `delegate` of the policy brought about, in their order."""
+    """Return the flat rules that each `use` and `delegate` of the policy created, in order of position."""
     found: dict[Node, list[int]] = {}
     for number, declared in enumerate(rules.proof.lowered.rules):
         for node in declared.origin:
@@ -250,17 +251,12 @@ def _bundles(rules: Ruleset) -> list[tuple[Node, list[int]]]:
 
 
 def _bundle_covered(rules: Ruleset, numbers: list[int], but: set[int]) -> tuple[Span, ...] | None:
-    """Where the rules are written that say all of some rules; None where they leave something."""
+    """Return the spans of the rules that cover each of some flat rules, or None."""
     places: dict[Span, None] = {}
     for number in numbers:
-        kind = RuleKind(rules.rule(number).kind)
         declared = rules.proof.lowered.rules[number]
-        group = WrittenRule(declared, declared.span, kind, (number,))
-        if kind in (RuleKind.PERMIT, RuleKind.FORBID):
-            spans = saying(rules, group, but, quiet=True)
-        else:
-            one = covering_rule(rules, group, but)
-            spans = None if one is None else (one,)
+        group = WrittenRule(declared, declared.span, RuleKind(rules.rule(number).kind), (number,))
+        spans = _covering(rules, group, but, quiet=True)
         if spans is None:
             return None
         places.update(dict.fromkeys(spans))

@@ -1,8 +1,7 @@
-"""E0715, E0720 to E0723, E1102: rules and delegations that never match, and the order of all checks of rules.
+"""Rules and delegations that never match, and the order of all checks of rules.
 
-A forbid and a confirm rule act too where their condition is unknown: they may then defer a step, but never do what they
-say, so they are reported too. A delegation's condition must be able to hold together with one of the permits that it
-passes on.
+A forbid or confirm rule whose condition can be unknown but never true only defers steps. It is reported too. The
+condition of a delegation must be able to hold together with one of the delegated permits.
 """
 
 from collections.abc import Iterator
@@ -21,12 +20,12 @@ from rtshcua.model.flat.policy import Rule, RuleKind
 from rtshcua.model.ir.expression import Condition
 from rtshcua.model.ir.policies import Delegation
 
-#: so many permits are shown that a condition contradicts
+#: the number of contradicting permits that a message lists
 _SHOWN_PERMITS = 3
 
 
 def prove_delegations(proof: ProofContext) -> None:
-    """Report every delegation of which it is proved that nothing can ever be had by it."""
+    """Report every delegation that is proved to delegate nothing."""
     for delegation in proof.lowered.declaration.delegations:
         permits = _delegated(proof, delegation)
         if delegation.when is None or not permits:
@@ -35,10 +34,9 @@ def prove_delegations(proof: ProofContext) -> None:
             proof.report.add(
                 codes.EMPTY_DELEGATION,
                 delegation.when.span,
-                f"`{proof.report.text(delegation.when.span)}` can never hold together with what "
-                f"`{delegation.grantor.text}` is permitted",
-                help=f"so nothing is delegated to `{delegation.grantee.text}`: a delegation narrows what its grantor "
-                "has, and gives nothing beyond it",
+                f"`{proof.report.text(delegation.when.span)}` can never hold together with the conditions of "
+                f"`{delegation.grantor.text}`'s permits, so nothing is delegated to `{delegation.grantee.text}`",
+                help="correct the condition; a delegation can only narrow the permits of its grantor",
                 labels=[
                     (proof.lowered.written[permit].span, "permitted by this rule")
                     for permit in permits[:_SHOWN_PERMITS]
@@ -47,7 +45,7 @@ def prove_delegations(proof: ProofContext) -> None:
 
 
 def _delegated(proof: ProofContext, delegation: Delegation) -> list[Rule]:
-    """The permits that a delegation made."""
+    """Return the permits that a delegation created."""
     return [
         flat
         for flat, rule in proof.lowered.written.items()
@@ -56,7 +54,7 @@ def _delegated(proof: ProofContext, delegation: Delegation) -> list[Rule]:
 
 
 def _may_match(proof: ProofContext, permit: Rule) -> bool:
-    """Whether a permit may ever match, for all that can be proved."""
+    """Whether it is not proved that a permit never matches."""
     node = proof.prepared.compiler.when(permit)
     if node is None:
         return True
@@ -70,9 +68,9 @@ def _may_match(proof: ProofContext, permit: Rule) -> bool:
 
 
 def report_dead(rules: Ruleset, group: WrittenRule) -> bool:
-    """Whether a rule is dead; reports it."""
+    """Whether a rule is proved never to match. Reports it."""
     wanted: Truth = TRUE
-    open_: str | None = None
+    undecided: str | None = None
     for number in group.rules:
         for skill in rules.skills(number):
             if rules.exhausted or rules.may_match(number, skill):
@@ -81,31 +79,27 @@ def report_dead(rules: Ruleset, group: WrittenRule) -> bool:
             if isinstance(answer, Yes):
                 return False
             if isinstance(answer, Undecided):
-                open_ = answer.why
-    if open_ is not None:
-        rules.undecided(group, "can match", open_)
+                undecided = answer.why
+    if undecided is not None:
+        rules.undecided(group, "can match", undecided)
         return False
     conflict = _conflict(rules, group, wanted)
     last = conflict[-1]
-    others = [(each.span, "this does not go together with it") for each in conflict[:-1]]
+    others = [(each.span, "this contradicts it") for each in conflict[:-1]]
     rules.proof.report.add(
         codes.DEAD_RULE,
         last.span,
         f"this `{group.declared.kind}` can never match: "
-        + ("what it asks for cannot all hold at once" if others else "this cannot hold"),
+        + ("its conditions cannot hold together" if others else "this condition cannot hold"),
         help="change the condition, or delete the rule"
-        + (
-            f"; it can only be unknown, and then it defers what it is to {group.declared.kind}"
-            if _defers(rules, group)
-            else ""
-        ),
+        + ("; the condition can only be unknown, and then the step is deferred" if _defers(rules, group) else ""),
         labels=[*others, *_range_labels(rules, group, conflict)],
     )
     return True
 
 
 def report_always(rules: Ruleset, group: WrittenRule) -> None:
-    """Report a condition that makes no difference to who confirms; of what forbids or degrades always, E0721 tells."""
+    """Report the condition of a `confirm` that cannot be false. E0721 covers such a forbid or degrade."""
     when = group.declared.when
     if group.kind != RuleKind.CONFIRM or when is None:
         return
@@ -116,31 +110,31 @@ def report_always(rules: Ruleset, group: WrittenRule) -> None:
     rules.proof.report.add(
         codes.ALWAYS_HOLDS,
         when.span,
-        "this cannot be false, so every step that the rule is about is confirmed",
-        help="leave the condition out, or say what was meant",
+        "this condition cannot be false, so the rule requires approval for every step of its skills",
+        help="remove the condition, or correct it",
     )
 
 
 def _defers(rules: Ruleset, group: WrittenRule) -> bool:
-    """Whether a rule whose condition is never true may still defer, for it may be unknown."""
+    """Whether a rule whose condition is never true may still defer a step because it is unknown."""
     return group.kind in (RuleKind.FORBID, RuleKind.CONFIRM) and any(
         not rules.never([(number, UNKNOWN)], skill) for number in group.rules for skill in rules.skills(number)
     )
 
 
 def _range_labels(rules: Ruleset, group: WrittenRule, conflict: list[Condition]) -> Iterator[tuple[Span, str]]:
-    """Where the ranges of the arguments are declared that a conflict reads."""
+    """Yield labels for the declared ranges of the arguments that a conflict reads."""
     names = dict.fromkeys(each.name for condition in conflict for each in references(condition))
     context = rules.proof.context
     for name in names:
         for skill in group.declared.skills:
             argument = context.arguments(context.symbols.skills[skill.text]).get(name)
             if argument is not None and argument.declaration.range is not None:
-                yield argument.declaration.span, f"`{name}` is in this range"
+                yield argument.declaration.span, f"the range of `{name}`"
 
 
 def _conflict(rules: Ruleset, group: WrittenRule, wanted: Truth) -> list[Condition]:
-    """The conjuncts that rule each other out, for all that the rule speaks of."""
+    """Return a minimal set of conjuncts that contradict each other for all skills of the rule."""
     when = group.declared.when
     assert when is not None
     split = [list(conjuncts(when, rules.node(number))) for number in group.rules]
@@ -167,7 +161,7 @@ def _conjunction(nodes: list[tree.Node]) -> tree.Node:
 
 
 def prove_rules(proof: ProofContext) -> None:
-    """Report what no rule should be; a dead rule is reported as that alone."""
+    """Report rules without effect. A rule that never matches is reported only for that."""
     rules = Ruleset(proof)
     alive = [group for group in rules.groups if not report_dead(rules, group) and group.span not in rules.open]
     living = {number for group in alive for number in group.rules}
@@ -182,8 +176,8 @@ def prove_rules(proof: ProofContext) -> None:
         proof.report.add(
             codes.UNDECIDED,
             declared.name.span,
-            f"the rules of `{declared.name.text}` were not all compared with each other: "
-            f"after {MOST_EFFORT:,} steps that is given up",
-            help="rules that are dead, shadowed, redundant or in conflict may not have been reported; "
-            "fewer rules, or simpler conditions, would do",
+            f"the rules of `{declared.name.text}` were not all compared with each other: the analysis stopped at its "
+            f"limit of {MOST_EFFORT:,} steps",
+            help="use fewer rules or simpler conditions; dead, shadowed, redundant or conflicting rules may be missing "
+            "from this report",
         )

@@ -1,7 +1,7 @@
-"""Which of a policy's rules may matter to one of them: found by the bounds of their conditions, not one by one.
+"""An index of rules by the bounds of their conditions.
 
-A policy may have thousands of rules. To hold each against each other takes as many steps as pairs; here the rules of a
-kind lie in a tree by what their conditions can hold in, and it is asked for those around some situations.
+A policy may have thousands of rules, too many to compare each with each. The index holds the rules of one kind in a
+tree by the bounds in which their conditions can hold, and finds those that may hold in given situations.
 """
 
 from collections import Counter
@@ -15,17 +15,18 @@ from rtshcua.ground.analysis.box import Cell
 from rtshcua.ground.analysis.extent import FAR, PHASE, Bounds, Conjunction, EnclosingBoxes, OtherCondition
 from rtshcua.model.flat.policy import Rule
 
-#: of the cells that conditions read, so many are told apart; the rest is asked of the conditions themselves
+#: the number of cells by which rules are indexed, the most frequent ones; the conditions themselves decide on the
+#: others
 _CELLS = 6
-#: where rules have more different conditions besides bounds, only the same ones are compared
+#: if rules have more sets of other conditions than this, only equal sets are compared
 _DIFFERENT = 64
-#: both sides of an axis: any value, and one that everything has
+#: the two sides of an axis that every query finds, and of a query that finds every rule
 _ANY: Final = (FAR, FAR)
 _NONE: Final = (-2 * FAR, -2 * FAR)
 
 
 class IndexedRule(NamedTuple):
-    """A rule by its number: what its condition can hold in, exactly what it is, and of which effect it is."""
+    """A rule by its number: bounds in which its condition can hold, its exact conjunctions, and its effect."""
 
     number: int
     rule: Rule
@@ -35,9 +36,9 @@ class IndexedRule(NamedTuple):
 
 
 class RuleQuery(NamedTuple):
-    """Whom a rule that is looked for must be about: a skill, and all of some roles and sources; none is anyone.
+    """Criteria for rules: the skill, and all of some roles and sources, where an empty tuple means any.
 
-    `effect` is that which it must have, the lowest and the highest; `within_us` the longest that it may wait.
+    `effect` is the range of its effect; `within_us` is the longest time that it may wait for an approval.
     """
 
     skill: int
@@ -48,8 +49,10 @@ class RuleQuery(NamedTuple):
 
 
 class RuleBoundsIndex:
-    """Some rules, by what their conditions can hold in. `implies` says of two conditions besides bounds whether one is
-    true wherever the other is, and not false where that is unknown.
+    """Rules indexed by the bounds in which their conditions can hold.
+
+    `implies` compares two conditions that are not bounds: whether the second is true wherever the first is, and not
+    false where the first is unknown.
     """
 
     def __init__(self, entries: Iterable[IndexedRule], implies: Callable[[tree.Node, tree.Node], bool]) -> None:
@@ -67,21 +70,23 @@ class RuleBoundsIndex:
         self._holding = {others: EnclosingBoxes(found) for others, found in rows.items()}
 
     def remove(self, number: int) -> None:
-        """Forget a rule."""
+        """Remove a rule."""
         self._meeting.remove(number)
         for others in dict.fromkeys(part.others for part in self._exact.get(number, ())):
             self._holding[others].remove(number)
 
     def meeting(self, about: RuleQuery, points: Sequence[Environment], *, sure: bool, after: int = -1) -> Iterator[int]:
-        """The rules, in order, whose conditions may be true in all of some situations; with `sure` unset, may be true
-        or unknown. Each is to be asked itself: none is left out, and others may be among them.
+        """Yield in order the rules whose conditions may be true (without `sure`: or unknown) in all given situations.
+
+        No such rule is omitted, but others may be among them, so the caller must evaluate each.
         """
         sides = [side for cell in self._cells for side in _over(cell, points, sure=sure)]
         return _in_order(self._meeting, about, sides, after)
 
     def holding(self, about: RuleQuery, exact: Conjunction) -> Iterator[int]:
-        """Rules whose condition is true wherever a conjunction is, and not false where that is unknown, as can be seen
-        from both; those in order that have the same other conditions.
+        """Yield rules whose condition is true wherever a conjunction is, and not false where it is unknown.
+
+        Only rules for which the bounds show it are found. Those with the same other conditions come in order.
         """
         sides = [side for cell in self._cells for side in _sides(exact.bounds.get(cell))]
         weaker = self._weaker.get(exact.others)
@@ -93,11 +98,11 @@ class RuleBoundsIndex:
                     yield number
 
     def _found_weaker(self, others: frozenset[OtherCondition]) -> Iterator[frozenset[OtherCondition]]:
-        """The conditions besides bounds, of rules, that hold wherever others do."""
+        """Yield the sets of conditions of rules, other than bounds, that hold wherever `others` do."""
         if len(self._holding) > _DIFFERENT:
             yield from (each for each in dict.fromkeys((others, frozenset[OtherCondition]())) if each in self._holding)
             return
-        for each in sorted(self._holding, key=lambda each: each != others):  # the same ones first
+        for each in sorted(self._holding, key=lambda each: each != others):  # equal sets first
             if all(one in others or any(self._implies(other.node, one.node) for other in others) for one in each):
                 yield each
 
@@ -135,7 +140,7 @@ def _sides(bounds: tuple[int, int] | None) -> tuple[int, int]:
 
 
 def _over(cell: Cell, points: Sequence[Environment], *, sure: bool) -> tuple[int, int]:
-    """What bounds of a cell must enclose to hold in all situations."""
+    """Return the two sides that bounds of a cell must enclose to hold in all situations."""
     low, high = FAR, -FAR
     argument, at = cell
     for point in points:

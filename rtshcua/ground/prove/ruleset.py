@@ -1,7 +1,7 @@
-"""The rules of a policy, as the checks of rules against each other ask about them.
+"""The rules of a policy, and questions about them, for the checks that compare rules with each other.
 
-A rule of the source may have become several flat ones: for skills that keep their arguments in different cells, and for
-each use of a template or delegation. They count as one, which is reported only if what is said holds of all of them.
+A rule of the source may be lowered to several flat rules: for skills with different cells for their arguments, and for
+each use of a template or delegation. They form one group, which is reported only if all its flat rules have the fault.
 """
 
 from collections.abc import Hashable, Iterable, Iterator, Sequence
@@ -30,20 +30,20 @@ from rtshcua.model.flat.policy import Rule, RuleKind
 from rtshcua.model.flat.zone import Zone
 from rtshcua.model.ir.policies import RuleDecl as RuleDecl
 
-#: the code of a condition; empty where a rule has none
+#: the code of a condition; empty for a rule without one
 Code: TypeAlias = tuple[int, ...]
-#: how many other rules are looked at together before a question is left open
+#: most rules that are considered together before a question stays undecided
 _TOGETHER = 12
-#: of a rule's bounds, so many are gone to the ends of, in all ways
+#: most bounds of a rule of which all combinations of ends are tried
 _CORNERS = 3
-#: what all questions about the rules of one policy may take: boxes times conditions
+#: most effort for all questions about the rules of one policy, in boxes times conditions
 MOST_EFFORT = 60_000
-#: so many conditions are evaluated in the time of one box
+#: the number of evaluations of a condition that take as long as one box
 _EVALUATIONS = 16
 
 
 class WrittenRule(NamedTuple):
-    """A rule of the source, and the numbers of what it was lowered to."""
+    """A rule of the source, and the numbers of its flat rules."""
 
     declared: RuleDecl
     span: Span
@@ -52,7 +52,7 @@ class WrittenRule(NamedTuple):
 
 
 class RuleSubject(NamedTuple):
-    """A skill, a role and a source that stand for all that the same rules speak of."""
+    """A skill, a role and a source, representing all others to which the same rules apply."""
 
     skill: int
     role: int
@@ -60,7 +60,7 @@ class RuleSubject(NamedTuple):
 
 
 class Ruleset:
-    """The rules of a prepared policy; remembers what was asked. `open` are the rules that were not decided on."""
+    """The rules of a prepared policy, with cached answers. `open` are the rules with an undecided question."""
 
     def __init__(self, proof: ProofContext) -> None:
         self.proof = proof
@@ -91,37 +91,37 @@ class Ruleset:
         )
 
     def rule(self, number: int) -> Rule:
-        """A flat rule."""
+        """Return a flat rule."""
         return self.policy.rules[number]
 
     def code(self, number: int) -> Code:
-        """The code of a flat rule's condition."""
+        """Return the code of a flat rule's condition."""
         when = self.rule(number).when
         return () if when is None else when.code
 
     def node(self, number: int) -> tree.Node:
-        """The condition of a flat rule."""
+        """Return the condition of a flat rule as a tree."""
         return self.proof.node(self.rule(number))
 
     def skills(self, number: int) -> Sequence[int]:
-        """The skills that a flat rule is about."""
+        """Return the skills to which a flat rule applies."""
         return self.rule(number).skills or range(len(self.policy.contracts))
 
     def skills_decided(self, number: int) -> list[int]:
-        """The skills that a flat rule decides on: not the one that it flies itself."""
+        """Return the skills that a flat rule decides on: all to which it applies except its target."""
         return [skill for skill in self.skills(number) if skill != self.flown(number)]
 
     def flown(self, number: int) -> int | None:
-        """The skill that a `degrade` flies."""
+        """Return the target skill of a `degrade`, or None."""
         target = self.rule(number).target
         return None if target is None else target.skill
 
     def space(self, skill: int) -> SituationSpace:
-        """Any situation in which a skill may be asked for."""
+        """Return all situations in which a skill may be requested."""
         return self.proof.questions.space(skill)
 
     def keys(self, number: int) -> Iterator[RuleSubject]:
-        """The skills, roles and sources of a flat rule; one for all about which the policy's rules are the same."""
+        """Yield the subjects of a flat rule, one for each class to which the same rules apply."""
         rule = self.rule(number)
         roles = dict.fromkeys(self._roles[role] for role in rule.roles or self._roles)
         sources = dict.fromkeys(self._sources[source] for source in rule.sources or self._sources)
@@ -132,16 +132,16 @@ class Ruleset:
 
     @property
     def effort(self) -> int:
-        """What all questions took so far."""
+        """The effort of all questions so far."""
         return self._effort // _EVALUATIONS
 
     @property
     def exhausted(self) -> bool:
-        """Whether the rules took so much already that no more is asked about them."""
+        """Whether the limit of the effort is reached."""
         return self._effort >= MOST_EFFORT * _EVALUATIONS
 
     def ask(self, goals: Sequence[tuple[int, Truth]], skill: int) -> Answer:
-        """Whether, for a skill, the conditions of flat rules can have such truths at once."""
+        """Return whether the conditions of flat rules can have these truth values together, for a skill."""
         key = self._question(goals, skill)
 
         def conditions() -> list[Goal]:
@@ -152,18 +152,18 @@ class Ruleset:
         return answer
 
     def never(self, goals: Sequence[tuple[int, Truth]], skill: int) -> bool:
-        """Whether it is proved that the conditions of flat rules never have such truths at once."""
+        """Whether it is proved that the conditions of flat rules never have these truth values together."""
         return isinstance(self.ask(goals, skill), No)
 
     def known(self, goals: Sequence[tuple[int, Truth]], skill: int) -> Answer | None:
-        """The answer to a question, if it was asked."""
+        """Return the answer to an earlier question, or None."""
         return self.proof.questions.known(self._question(goals, skill))
 
     def _question(self, goals: Sequence[tuple[int, Truth]], skill: int) -> Hashable:
         return ("rules", skill, *((self.code(number), wanted) for number, wanted in goals))
 
     def drop(self, numbers: Iterable[int]) -> None:
-        """Look at some rules no more when asking about others."""
+        """Ignore some rules in questions about others."""
         for number in numbers:
             self._left_out.add(number)
             kind = self.rule(number).kind
@@ -171,17 +171,17 @@ class Ruleset:
                 self._overlaps[kind].remove(number)
 
     def group_of(self, number: int) -> int:
-        """Of which group, by its place among all, a flat rule is."""
+        """Return the index of the group of a flat rule."""
         return self._group_of[number]
 
     def effect(self, number: int) -> int:
-        """What a rule does where its condition holds: the same number for the same."""
+        """Return a number for the effect of a rule, equal for equal effects."""
         rule = self.rule(number)
         does = (rule.approver, rule.second) if rule.target is None else (rule.target.skill, rule.target.arguments)
         return self._effects.setdefault(does, len(self._effects))
 
     def other_effect_after(self, number: int) -> int:
-        """The number of the next `degrade` after one that flies something else; more than any where there is none."""
+        """Return the next `degrade` after `number` with another effect, or the number of rules if there is none."""
         if not self._next:
             last = other = len(self.policy.rules)
             for each in range(len(self.policy.rules) - 1, -1, -1):
@@ -193,19 +193,17 @@ class Ruleset:
         return self._next[number]
 
     def holds(self, number: int, at: Environment) -> Truth:
-        """The truth of a rule's condition in a situation."""
+        """Return the truth value of a rule's condition in a situation."""
         self._effort += 1
         return self.proof.condition(self.rule(number))(at)
 
     def may_match(self, number: int, skill: int) -> bool | None:
-        """Whether the condition of a rule can be true; None where that is best asked of the analysis."""
+        """Return True if a rule's condition is known to become true, or None if the analysis must decide."""
         certain = any(not each.others for each in self._alternatives(number))
         return True if certain and self.situations(number, skill) else None
 
     def situations(self, number: int, skill: int) -> tuple[Environment, ...]:
-        """Some situations in which the condition of a rule is true, as far apart as its bounds allow; none, where none
-        was found.
-        """
+        """Return some situations in which the condition of a rule is true, as far apart as its bounds allow."""
         found = self._situations.get((number, skill))
         if found is None:
             found = self._situations[number, skill] = tuple(self._ends(number, skill))
@@ -241,7 +239,7 @@ class Ruleset:
                     yield made
 
     def _implies(self, one: tree.Node, other: tree.Node) -> bool:
-        """Whether a place is inside one zone wherever it is inside another; not, where zones have times."""
+        """Whether a place inside the first zone is inside the second. False for zones with times."""
         if not isinstance(one, tree.PointInside) or not isinstance(other, tree.PointInside) or one.cell != other.cell:
             return False
         pair = (one.zone, other.zone)
@@ -253,7 +251,7 @@ class Ruleset:
         return found
 
     def overlaps(self, kind: int) -> RuleBoundsIndex:
-        """The rules of a kind, by what their conditions can hold in; without those that were dropped."""
+        """Return the index of the rules of a kind, without the dropped ones."""
         found = self._overlaps.get(kind)
         if found is None:
             numbers = (
@@ -277,8 +275,10 @@ class Ruleset:
     def candidates(
         self, kind: RuleKind, number: int, queries: Sequence[RuleQuery], but: AbstractSet[int], *, sure: bool
     ) -> Iterator[int]:
-        """The rules of a kind, in order and but for some, that queries for one skill find and that may be true wherever
-        a rule is (with `sure` unset: true or unknown, wherever it is either); each is to be asked about.
+        """Yield in order the rules of a kind, except `but`, that may be true wherever a rule is true.
+
+        Without `sure`: true or unknown wherever the rule is true or unknown. All queries are for one skill. The caller
+        proves each candidate.
         """
         wanted, escape = (TRUE, FALSE | UNKNOWN) if sure else (TRUE | UNKNOWN, FALSE)
         skill, index = queries[0].skill, self.overlaps(kind)
@@ -292,12 +292,12 @@ class Ruleset:
                 continue
             yield candidate
             answer = self.known([(number, wanted), (candidate, escape)], skill)
-            if isinstance(answer, Yes):  # nor does any other that is not there what it should be
+            if isinstance(answer, Yes):  # its witness excludes other candidates too
                 points.append(answer.witness.at)
                 found = merge(*(index.meeting(each, points, sure=sure, after=candidate) for each in queries))
 
     def wider(self, candidate: int, number: int, skill: int) -> bool:
-        """Whether a rule is about a skill, and about all roles and sources of another rule."""
+        """Whether the candidate applies to a skill, and to all roles and sources of a rule."""
         one, other = self.rule(candidate), self.rule(number)
         return (
             skill in self.skills(candidate)
@@ -308,10 +308,11 @@ class Ruleset:
     def covered(
         self, number: int, wanted: Truth, kind: RuleKind, but: AbstractSet[int], escape: Truth, key: RuleSubject
     ) -> tuple[int, ...] | Undecided | None:
-        """Rules of a kind about a key, but for some, of which one has none of the truths `escape` wherever a rule's
-        condition has the truth `wanted`; None where there is a situation without such a rule.
+        """Return rules of a kind that together cover a rule for a subject, or None if they do not.
 
-        Only those rules are asked of that a situation found so far was not an escape from.
+        They cover it if, wherever its condition has the truth value `wanted`, one of them has none of the truth values
+        `escape`. The rules `but` are ignored. Rules are added one by one: each covers a situation that those before do
+        not cover.
         """
         for one in self._alike_rules(number, kind, but, key):
             return (one,)
@@ -337,7 +338,7 @@ class Ruleset:
         return None
 
     def _alike_rules(self, number: int, kind: RuleKind, but: AbstractSet[int], key: RuleSubject) -> Iterator[int]:
-        """The rules about a key, but for some, of the same condition as a rule, or of none."""
+        """Yield the rules for a subject, except `but`, with the same condition as a rule, or without one."""
         for code in dict.fromkeys((self.code(number), ())):
             alike = merge(*(self._alike.get((kind, code, skill), ()) for skill in (key.skill, ANY)))
             yield from (each for each in alike if each not in but and self._about(each, key))
@@ -345,7 +346,7 @@ class Ruleset:
     def _holding(
         self, about: RuleQuery, key: RuleSubject, kind: int, exact: Conjunction, but: AbstractSet[int]
     ) -> int | None:
-        """A rule, but for some, that is seen to hold wherever a conjunction does."""
+        """Return a rule, not in `but`, whose bounds show that it holds wherever a conjunction does; else None."""
         for number in self.overlaps(kind).holding(about, exact):
             self._effort += 1
             if number not in but and self._about(number, key):
@@ -357,7 +358,7 @@ class Ruleset:
     def _met(
         self, about: RuleQuery, key: RuleSubject, kind: int, at: Environment, escape: Truth, but: AbstractSet[int]
     ) -> int | None:
-        """The first of the rules, but for some, that does not have one of some truths in a situation."""
+        """Return the first rule, not in `but`, that has none of the truth values `escape` in a situation; else None."""
         for number in self.overlaps(kind).meeting(about, (at,), sure=bool(escape & UNKNOWN)):
             if not self.holds(number, at) & escape and number not in but and self._about(number, key):
                 return number
@@ -366,7 +367,7 @@ class Ruleset:
         return None
 
     def _about(self, number: int, key: RuleSubject) -> bool:
-        """Whether a rule is about a key; none is about the skill that it flies itself."""
+        """Whether a rule applies to a subject. A degrade does not apply to its own target."""
         rule = self.rule(number)
         return (
             (rule.target is None or rule.target.skill != key.skill)
@@ -379,26 +380,27 @@ class Ruleset:
         """Whether a rule's condition reads the time of day, by itself or through a zone."""
         return timed(self.code(number), self.policy.zones)
 
-    def undecided(self, group: WrittenRule, what: str, why: str) -> None:
-        """Say, once a rule, that a check could not decide."""
+    def undecided(self, group: WrittenRule, question: str, reason: str) -> None:
+        """Report that a check could not decide a question about a rule, once for each rule."""
         if group.span not in self.open:
             self.open.add(group.span)
             self.proof.report.add(
                 codes.UNDECIDED,
                 group.span,
-                f"it could not be decided whether this rule {what}",
-                help=f"{why}; a simpler condition would do",
+                f"the analysis could not decide whether this rule {question}",
+                help=f"{reason}; use a simpler condition",
             )
 
 
 def _has_all(wider: tuple[int, ...], narrower: tuple[int, ...]) -> bool:
-    """Whether a list of roles or sources, where none means any, has all of another."""
+    """Whether a list of roles or sources contains all of another. An empty list means any."""
     return not wider or (bool(narrower) and set(narrower) <= set(wider))
 
 
 def _corners(space: SituationSpace, exact: Conjunction, cells: Sequence[Cell]) -> Iterable[tuple[int, ...]]:
-    """The values of some cells at the ends of their bounds (of many, all at the lower or all at the upper ones), and in
-    the middle of them.
+    """Return values of cells at the ends and in the middle of their bounds.
+
+    For more than `_CORNERS` cells, only the combinations with all lower or all upper ends are included.
     """
     ends: list[tuple[int, int]] = []
     for cell in cells:
@@ -422,7 +424,7 @@ def timed(code: Code, zones: Sequence[Zone]) -> bool:
 
 
 def _groups(proof: ProofContext) -> Iterator[WrittenRule]:
-    """The rules by the place where they are written, in the order of their last ones."""
+    """Yield the flat rules grouped by the rule of the source."""
     declared: dict[Span, RuleDecl] = {}
     for each in proof.lowered.declaration.rules:
         declared.setdefault(each.span, each)
@@ -435,7 +437,7 @@ def _groups(proof: ProofContext) -> Iterator[WrittenRule]:
 
 
 def _representatives(members: Iterable[int], mentions: Iterable[tuple[int, ...]]) -> dict[int, int]:
-    """For each member the least one that the same rules mention."""
+    """Return for each member the least member that the same rules mention."""
     mentioned: dict[int, list[int]] = {member: [] for member in members}
     for at, mention in enumerate(mentions):
         for member in mention:

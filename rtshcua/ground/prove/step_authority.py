@@ -1,7 +1,7 @@
-"""E0702 to E0704, E0706, E0719: the policy permits each step with the arguments that it has, and lets it fly.
+"""Prove that the policy permits each step with its arguments, and does not always replace it by another skill.
 
-A permit's clauses over arguments and zones must be true; those over signals, the time and the vehicle's position are
-left for on board.
+The clauses of a permit about arguments and zones must be true. Those about signals, the time and the vehicle's position
+are decided on board.
 """
 
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ from rtshcua.model.quantity import Dimension, display
 
 
 class _FailedClause(NamedTuple):
-    """A clause of a permit that is not true: where it is written, the parameters it reads, what would do."""
+    """A clause of a permit that cannot be true: its span, the parameters that it reads, and accepted values."""
 
     span: Span
     parameters: tuple[str, ...]
@@ -36,12 +36,12 @@ class _FailedClause(NamedTuple):
 
 
 def prove_authority(proof: ProofContext, mission: MissionDecl, step: MissionStep) -> bool:
-    """Whether in some state of the vehicle a step is permitted and flown; reports it where in none it is."""
+    """Whether some state of the vehicle lets a step be permitted and flown. Reports the step otherwise."""
     at = proof.around(step.prepared)
     found = authority(step.prepared, at)
     if PASS in found or not found:
         return not _degraded(proof, step, at)
-    # a forbid that some state makes false does not decide in the best case; what permits, or does not, comes last
+    # a forbid that some state makes false does not decide in the best case; a missing permit is the last reason
     forbids = (each.rule for each in step.prepared.candidates.forbids if not each.condition(at) & FALSE)
     forbid = None if found[0].reason is Reason.CLASS_NOT_PERMITTED else next(forbids, None)
     if forbid is not None:
@@ -64,7 +64,7 @@ def prove_authority(proof: ProofContext, mission: MissionDecl, step: MissionStep
 
 
 def _degraded(proof: ProofContext, step: MissionStep, at: Environment) -> bool:
-    """Whether a degrade holds, or is unknown, in every state; reports it."""
+    """Whether a degrade holds, or is unknown, in every state. Reports it."""
     always = (each.rule for each in step.prepared.candidates.degrades if not each.condition(at) & FALSE)
     rule = next(always, None)
     if rule is None or rule.target is None:
@@ -73,8 +73,7 @@ def _degraded(proof: ProofContext, step: MissionStep, at: Environment) -> bool:
     proof.report.add(
         codes.DEGRADED,
         step.span,
-        f"the policy `{policy.name}` flies `{policy.contracts[rule.target.skill].name}` in place of this step, "
-        "whatever the state",
+        f"the policy `{policy.name}` replaces this step by `{policy.contracts[rule.target.skill].name}` in every state",
         help=_help_against(proof, step.prepared, at, rule),
         labels=[(proof.span(rule), "by this rule")],
     )
@@ -82,19 +81,19 @@ def _degraded(proof: ProofContext, step: MissionStep, at: Environment) -> bool:
 
 
 def _help_against(proof: ProofContext, invocation: PreparedInvocation, at: Environment, rule: Rule) -> str:
-    """The nearest arguments for which a rule does not hold; where there are none, what else to change."""
+    """Return advice against a rule: the nearest arguments for which it does not hold, or another change."""
     node = proof.prepared.compiler.when(rule)
     changes = ChangeSearch(at, proof.prepared.tables)
     wanted = None if node is None else changes.find(optimistic(node, False), False)
     contract, policy = invocation.invocation.contract, proof.policy
     offers = [offer(change, contract, policy, at) for change in wanted or ()]
     if not offers or not all(each.change.argument and each.options for each in offers):
-        return "narrow the condition of the rule, or leave the step out"
+        return "narrow the condition of the rule, or remove the step"
     return _accepted({each.subject: "` or `".join(_values_text(each)) for each in offers})
 
 
 def _accepted(values: Mapping[str, str]) -> str:
-    return "nearest accepted: " + ", ".join(f"`{name} = {words}`" for name, words in values.items())
+    return "nearest accepted: " + ", ".join(f"`{name} = {value}`" for name, value in values.items())
 
 
 def _class(proof: ProofContext, mission: MissionDecl, step: MissionStep) -> None:
@@ -105,8 +104,8 @@ def _class(proof: ProofContext, mission: MissionDecl, step: MissionStep) -> None
     proof.report.add(
         codes.SOURCE_CLASS,
         step.declared.skill.span,
-        f"`{mission.source.text}` may not ask for a skill of the class `{timing}`",
-        help="an agent and an operator may ask for `semantic` and `tactical` skills",
+        f"`{mission.source.text}` may not request a skill of the class `{timing}`",
+        help="an agent or an operator may request `semantic` and `tactical` skills",
         labels=[
             (skill.timing_class.span, "the class is declared here"),
             (mission.source.span, "proposed by this source"),
@@ -128,13 +127,13 @@ def _not_permitted(proof: ProofContext, mission: MissionDecl, step: MissionStep)
         codes.NOT_PERMITTED,
         step.declared.skill.span,
         f"no rule permits `{step.declared.skill.text}` to the role `{mission.role.text}` through `{source}`",
-        help="it is permitted to " + "; to ".join(dict.fromkeys(may)) if may else "it is permitted to nobody",
+        help="it is permitted to " + "; to ".join(dict.fromkeys(may)) if may else "no rule permits it to anyone",
         labels=[(proof.lowered.declaration.name.span, "the policy is declared here")],
     )
 
 
 def _out_of_scope(proof: ProofContext, step: MissionStep, at: Environment) -> None:
-    """Explain by the permit that is nearest to permitting."""
+    """Report a step outside all permits, with the clauses of the permit that has the fewest failed ones."""
     permits = [_failed_clauses(proof, permit, step.prepared, at) for permit in step.prepared.candidates.permits]
     nearest = min(permits, key=len)
     name = next((each for unmet in nearest for each in unmet.parameters), None)
@@ -147,14 +146,14 @@ def _out_of_scope(proof: ProofContext, step: MissionStep, at: Environment) -> No
         if written is not None:
             subject += f" = {proof.report.text(written)}"
         if span == step.span:
-            labels += [(written, "the step says nothing, so this default holds")] if written is not None else []
+            labels += [(written, "the step uses this default")] if written is not None else []
         elif len(nearest) == 1 and name in accepted:
             replacement = _values_text(nearest[0].accepted[0])[0]
             fix = (span, replacement, f"write `{replacement}`")
     proof.report.add(
         codes.OUT_OF_SCOPE,
         span,
-        f"`{subject}` is outside of what `{proof.policy.name}` permits for `{step.contract.name}`",
+        f"`{subject}` is not permitted by `{proof.policy.name}` for `{step.contract.name}`",
         help=_accepted(accepted) if accepted else None,
         labels=labels,
         fix=fix,
@@ -162,20 +161,20 @@ def _out_of_scope(proof: ProofContext, step: MissionStep, at: Environment) -> No
 
 
 def _default(proof: ProofContext, step: MissionStep, parameter: str) -> Span | None:
-    """Where the default of a parameter is written."""
+    """Return the span of a parameter's default, or None."""
     skill = proof.skills[step.declared.skill.text]
     return next((p.default.span for p in skill.parameters if p.name.text == parameter and p.default is not None), None)
 
 
 def _values_text(offer: Offer) -> list[str]:
-    """The values that would do, as a source writes them."""
+    """Format the accepted values as in sources."""
     return [name or display(value, Dimension(offer.dimension)) for value, name in offer.options]
 
 
 def _failed_clauses(
     proof: ProofContext, permit: PreparedRule, invocation: PreparedInvocation, at: Environment
 ) -> list[_FailedClause]:
-    """The clauses of a permit that cannot be true, in source order."""
+    """Return the clauses of a permit that cannot be true, in source order."""
     rule = permit.rule
     declared = _declaration(proof, rule)
     node = proof.prepared.compiler.when(rule)
@@ -196,5 +195,5 @@ def _failed_clauses(
 
 
 def _declaration(proof: ProofContext, rule: Rule) -> Condition | None:
-    """The condition of the rule that was lowered to this one."""
+    """Return the condition of the rule in the source."""
     return proof.lowered.written[rule].when

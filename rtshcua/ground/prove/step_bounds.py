@@ -1,9 +1,9 @@
-"""E0804, E0814, E0815: each step, and each link of its chains, is done in the time that its skill allows; each step,
-and each return of its chains, with the charge.
+"""Prove that each step and each link finishes within the duration of its skill (E0804), and each step and each return
+within its energy (E0814, E0815).
 
-Durations are those of `decision.flying`: the speeds that the vehicle declares, against the most wind that it is flown
-in, and no more than what the step assumes of the wind. Of a return, the speed of the slowest step before it counts too,
-for an autopilot may go on with a speed that it was told (PX4). Charge is that of the time in the air.
+Durations follow `decision.flying`: the declared speeds of the vehicle, against the strongest wind in which it is flown
+or, if that is less, the strongest wind that the step assumes. A return may also fly at the speed of the slowest step
+before it, because an autopilot may keep a speed that was set (PX4). The charge follows from the time in the air.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -43,14 +43,14 @@ from rtshcua.model.quantity import Dimension, display
 SECOND_US: Final = 1_000_000
 _MILLISECOND: Final = 1_000
 _METRE: Final = 1_000  # mm
-#: where to write what, and what that is
+#: a fix: the span to replace, the new text, and its title
 _Fix = tuple[Span, str, str]
-#: where autopilots report the wind
+#: the messages in which autopilots report the wind
 _WIND_MESSAGES: Final = ("WIND_COV", "WIND")
 
 
 class StepBound(NamedTuple):
-    """What a step is proved to take at most: us from its dispatch to its end, and 1/10000 of a full charge."""
+    """The proved bounds of a step: us from its dispatch to its end, and energy in 1/10000 of a full charge."""
 
     skill: str
     time_us: int
@@ -60,15 +60,16 @@ class StepBound(NamedTuple):
 def prove_step_bounds(
     proof: ProofContext, step: MissionStep, starts: Sequence[StartPlace], slowest: int
 ) -> StepBound | None:
-    """What a step takes at most that may begin at `starts`; None after a finding. `slowest` is the slowest speed that
-    it and those before it ask for, mm/s, 0 if none does.
+    """Return the bounds of a step that may begin at `starts`, or None after a finding.
+
+    `slowest` is the lowest speed that this step and the steps before it set, in mm/s, or 0 if none sets a speed.
     """
     before = len(proof.report.found)
     speeds, contract = proof.speeds, step.contract
     wind = _wind(proof, step.prepared)
 
     def takes(height: int) -> int:
-        """What it takes if it leads to a height."""
+        """The longest time of the step in us if it flies to a height."""
         return max(_step_us(proof, step.prepared, start, height, slowest, wind) for start in starts)
 
     time_us, fits = takes(step.flat.plan.altitude), contract.energy * speeds.flight_us // FULL
@@ -79,7 +80,7 @@ def prove_step_bounds(
         nearer = _nearer(proof, step, starts[0].height, takes, min(fits, contract.duration_us))
         _too_long(proof, step, "the step", contract, time_us, contract.duration_us, limit.span, nearer, slowest)
     energy = charge(speeds, time_us)
-    # a return is never refused for want of charge, and the mission's bound counts the way home, if that is more
+    # a return is never refused for lack of charge, and the mission's bound includes the way home
     home = step.flat.plan.kind == MotionKind.HOME
     if len(proof.report.found) == before and energy > contract.energy and not home:
         fits = min(fits, contract.duration_us or fits)
@@ -91,7 +92,7 @@ def prove_step_bounds(
     if len(proof.report.found) > before:
         return None
     for link, needed in returns:
-        if not _is_told(proof, link):
+        if not _is_reported(proof, link):
             _too_much(proof, step, "the return, a link of this step's chains,", link, needed, code=codes.RETURN_ENERGY)
     if home and energy > contract.energy:
         _too_much(proof, step, "the return", contract, energy, code=codes.RETURN_ENERGY)
@@ -99,28 +100,29 @@ def prove_step_bounds(
 
 
 def _nearer(proof: ProofContext, step: MissionStep, here: int, takes: Callable[[int], int], fits: int) -> _Fix | None:
-    """The height nearest to what the step asks for, towards where it begins, to which it takes no longer than `fits`;
-    None where its height is no argument, or none does.
+    """Return a fix with the height nearest to the planned one, towards the start, that the step reaches in `fits` us.
+
+    Returns None if the height is not an argument of the step, or if there is no such height.
     """
-    contract, asked = step.contract, step.flat.plan.altitude
+    contract, planned_height = step.contract, step.flat.plan.altitude
     cell = contract.motion.altitude
     parameter = next((each for each in contract.parameters if 0 <= each.cell == cell), None)
     span = None if parameter is None else argument_span(proof.context, step.declared, parameter.name)
     if parameter is None or span is None or span == step.span or not parameter.low <= here <= parameter.high:
         return None
-    sign = 1 if here > asked else -1
-    least, most = 0, abs(here - asked) // _METRE
-    if takes(asked + sign * most * _METRE) > fits:
+    sign = 1 if here > planned_height else -1
+    least, most = 0, abs(here - planned_height) // _METRE
+    if takes(planned_height + sign * most * _METRE) > fits:
         return None
-    while least < most:  # the fewest metres nearer that are enough
+    while least < most:  # find the smallest sufficient change, in metres
         middle = (least + most) // 2
-        least, most = (least, middle) if takes(asked + sign * middle * _METRE) <= fits else (middle + 1, most)
-    height = display(asked + sign * least * _METRE, Dimension.ALTITUDE)
+        least, most = (least, middle) if takes(planned_height + sign * middle * _METRE) <= fits else (middle + 1, most)
+    height = display(planned_height + sign * least * _METRE, Dimension.ALTITUDE)
     return span, height, f"write `{height}`"
 
 
 def _wind(proof: ProofContext, invocation: PreparedInvocation) -> int:
-    """The most wind in which a step goes on: what the vehicle is flown in, and what `assume` and `degrade` leave."""
+    """Return the strongest wind in mm/s in which a step continues, by the vehicle, its `assume` and `degrade` rules."""
     policy, most = proof.policy, proof.speeds.wind
     slots = [
         signal.slot
@@ -139,7 +141,7 @@ def _wind(proof: ProofContext, invocation: PreparedInvocation) -> int:
 
     for slot in slots:
         low, high = 0, most + 1
-        while low < high:  # the least wind from which on it never goes on
+        while low < high:  # find the least wind from which on the step never continues
             middle = (low + high) // 2
             low, high = (middle + 1, high) if goes_on(slot, middle) else (low, middle)
         most = min(most, low)
@@ -149,7 +151,7 @@ def _wind(proof: ProofContext, invocation: PreparedInvocation) -> int:
 def _step_us(
     proof: ProofContext, invocation: PreparedInvocation, start: StartPlace, altitude: int, slowest: int, wind: int
 ) -> int:
-    """How long a step takes at most from where it begins to where it is done, which is at a height."""
+    """Return the longest time of a step in us from its start to its end at an altitude."""
     flat, vehicle, speeds = invocation.invocation, proof.policy.vehicle, proof.speeds
     plan = flat.plan
     height = sinking_us(speeds, start.height - altitude) + rising_us(speeds, altitude - start.height)
@@ -169,21 +171,22 @@ def _step_us(
     return BEGINS + sum(leg_us(speeds, length(a, b) + 1, speed) for a, b in pairwise(points)) + height + SETTLES
 
 
-def _is_told(proof: ProofContext, contract: Contract) -> bool:
-    """Whether it was said already of another step that this return may take more than its skill says."""
-    written = f"`{contract.name}` takes at most"
+def _is_reported(proof: ProofContext, contract: Contract) -> bool:
+    """Whether the energy of this return is already reported for another step."""
+    written = f"`{contract.name}` may use at most"
     return any(each.code is codes.RETURN_ENERGY and written in each.message for each in proof.report.found)
 
 
 def _prove_links(
     proof: ProofContext, step: MissionStep, starts: Sequence[StartPlace], slowest: int
 ) -> list[tuple[Contract, int]]:
-    """Report the first link that may take longer than it may, wherever in the step it begins. Given are the returns
-    that may take more charge than their skill says, and how much; none is refused for that.
+    """Report the first link that may exceed its duration, wherever in the step it begins.
+
+    Returns the returns that may exceed the energy of their skill, with the charge that they need.
     """
     returns: list[tuple[Contract, int]] = []
     if step.flat.plan.kind in (MotionKind.HOME, MotionKind.LAND):
-        return returns  # what follows it lands
+        return returns  # the links after it only land
     volumes = [planned(proof, step.prepared, start)[1] for start in starts]
     distance = max(volume.farthest[1] for volume in volumes)
     low = min(volume.height[0] for volume in volumes)
@@ -194,8 +197,8 @@ def _prove_links(
         for link in chain:
             reach, time_us = _link_us(proof, link, *reach, so_far)
             contract = proof.policy.contracts[link.link.skill]
-            asks = contract.motion.speed >= 0 and contract.motion.kind == MotionKind.FLY
-            so_far = slower(so_far, link.link.arguments[contract.motion.speed] if asks else 0)
+            sets_speed = contract.motion.speed >= 0 and contract.motion.kind == MotionKind.FLY
+            so_far = slower(so_far, link.link.arguments[contract.motion.speed] if sets_speed else 0)
             allowed = link.link.limit_us or contract.duration_us
             name = f"`{contract.name}`, a link of this step's chains,"
             if link is not chain[-1] and 0 < allowed < time_us:
@@ -212,7 +215,10 @@ def _prove_links(
 def _link_us(
     proof: ProofContext, link: PreparedLink, distance: int, low: int, high: int, slowest: int
 ) -> tuple[tuple[int, int, int], int]:
-    """From how far and between which heights later links begin, and how long a link takes at most; 0: it is cut."""
+    """Return the reach at which later links begin (distance, low, high), and the longest time of a link in us.
+
+    The time is 0 for a hold, which ends at its limit.
+    """
     vehicle, speeds = proof.policy.vehicle, proof.speeds
     contract, arguments = proof.policy.contracts[link.link.skill], link.link.arguments
     reach = (distance, low, high)
@@ -232,15 +238,15 @@ def _link_us(
     x, y = arguments[place : place + 2]
     away = isqrt(x * x + y * y) + 1
     cell, cruise = contract.motion.speed, min(speeds.cruise, slowest or speeds.cruise)
-    asked = arguments[cell] if cell >= 0 else cruise
-    way = leg_us(speeds, distance + away, over_ground(speeds, asked))
+    speed = arguments[cell] if cell >= 0 else cruise
+    way = leg_us(speeds, distance + away, over_ground(speeds, speed))
     return (max(distance, away), *there[1:]), BEGINS + way + height + SETTLES
 
 
 def _too_long(
     proof: ProofContext,
     step: MissionStep,
-    what: str,
+    subject: str,
     contract: Contract,
     time_us: int,
     allowed: int,
@@ -249,22 +255,22 @@ def _too_long(
     slowest: int = 0,
 ) -> None:
     speeds = proof.speeds
-    goes_on = ""
+    kept_speed = ""
     if contract.motion.kind == MotionKind.HOME and 0 < slowest < speeds.homeward:
-        goes_on = f", at {display(slowest, Dimension.SPEED)}, the slowest that a step asks for"
+        kept_speed = f", at {display(slowest, Dimension.SPEED)}, the lowest speed that a step sets"
     size = named_at(proof.report, proof.skills[contract.name], limit)
     enough = display(-(-time_us // SECOND_US) * SECOND_US, Dimension.DURATION)
-    longer = "let it last longer" if size is None else f"write `sizes {contract.name}({size} = {enough})`"
+    longer = "raise `lasts at most`" if size is None else f"write `sizes {contract.name}({size} = {enough})`"
     lasts = f"`{contract.name}` lasts at most {display(allowed, Dimension.DURATION)}"
     over = time_us - allowed
     proof.report.add(
         codes.PLAN_TOO_LONG,
         step.span if nearer is None else nearer[0],
-        f"{what} takes up to {enough}, and {lasts}"
+        f"{subject} takes up to {enough}, but {lasts}"
         if over >= SECOND_US
-        else f"{lasts}, and {what} takes up to "
+        else f"{lasts}, but {subject} takes up to "
         f"{display(-(-over // _MILLISECOND) * _MILLISECOND, Dimension.DURATION)} longer",
-        help=f"fly a shorter path, or faster, or {longer}; {_counted_with(proof)}{goes_on}",
+        help=f"fly a shorter path, fly faster, or {longer}; {_counted_with(proof)}{kept_speed}",
         labels=[(limit, "declared here"), *_speeds_span(proof)],
         fix=nearer,
         amount=time_us,
@@ -274,7 +280,7 @@ def _too_long(
 def _too_much(
     proof: ProofContext,
     step: MissionStep,
-    what: str,
+    subject: str,
     contract: Contract,
     energy: int,
     nearer: _Fix | None = None,
@@ -291,9 +297,9 @@ def _too_much(
     proof.report.add(
         code,
         step.span if nearer is None else nearer[0],
-        f"{what} takes up to {enough} of a full charge, and `{contract.name}` takes at most "
+        f"{subject} needs up to {enough} of a full charge, but `{contract.name}` may use at most "
         f"{display(contract.energy, Dimension.RATIO)}",
-        help=f"write {more}, or fly a shorter path, or faster; {_counted_with(proof)}",
+        help=f"write {more}, fly a shorter path, or fly faster; {_counted_with(proof)}",
         labels=[(declared.span, "declared here"), *_speeds_span(proof)],
         fix=nearer,
         amount=energy,
@@ -301,19 +307,19 @@ def _too_much(
 
 
 def _speeds_span(proof: ProofContext) -> Iterator[tuple[Span, str]]:
-    """Where the vehicle says how fast it is."""
+    """Yield a label for the declared speeds of the vehicle."""
     speeds = proof.lowered.vehicle.speeds
     if speeds:
         first, last = speeds[0].span, speeds[-1].span
-        yield Span(first.file, first.start, last.end), "the speeds that are counted with"
+        yield Span(first.file, first.start, last.end), "the speeds of the estimate"
 
 
 def _counted_with(proof: ProofContext) -> str:
-    """By which speeds it was counted, in words."""
+    """Describe the speeds with which durations are estimated."""
     speeds, vehicle = proof.speeds, proof.policy.vehicle
     names = {"cruise": speeds.cruise, "climb": speeds.climb, "descent": speeds.descent, "landing": speeds.landing}
-    told = ", ".join(f"{name} {display(value, Dimension.SPEED)}" for name, value in names.items())
+    defaults = ", ".join(f"{name} {display(value, Dimension.SPEED)}" for name, value in names.items())
     against = f"against {display(speeds.wind, Dimension.SPEED)} of wind" if speeds.wind else "without wind"
     if proof.lowered.vehicle.speeds:
-        return f"counted with the speeds of `{vehicle.name}`, {against}"
-    return f"`{vehicle.name}` declares no `speeds`: counted with {told}, {against}"
+        return f"the estimate uses the speeds of `{vehicle.name}`, {against}"
+    return f"`{vehicle.name}` declares no `speeds`: the estimate uses {defaults}, {against}"

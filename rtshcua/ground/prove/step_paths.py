@@ -1,8 +1,9 @@
-"""E0508, E0614, E0616: the mission begins in the airspace, and each step's way keeps it and has the charge for it.
+"""Prove that home and the path of each step lie in the airspace (E0508), that its contract can hold along the path
+(E0616), and that the vehicle can fly it (E0614).
 
-The vehicle stands at home before the first step, and comes down there after the last: the whole disc within which home
-may lie must be in the airspace. The leg to a step's path is part of its way, from wherever the vehicle may be then
-(`step_starts`), and whenever the step may begin (`step_times`).
+The vehicle is at home before the first step and lands there after the last, so the whole disc in which home may lie
+must be in the airspace. The leg to a step's path is part of its path. It begins at every place where the vehicle may
+then be (`step_starts`), at every time at which the step may begin (`step_times`).
 """
 
 from collections.abc import Callable, Sequence
@@ -47,7 +48,7 @@ from rtshcua.model.quantity import Dimension, display
 
 
 def prove_home(proof: ProofContext, steps: Sequence[MissionStep]) -> bool:
-    """Whether a vehicle on the ground is in the airspace wherever its home is; reports at the first step where not."""
+    """Whether a vehicle on the ground is in the airspace wherever home may lie. Reports the first step otherwise."""
     airspace, policy = proof.prepared.airspace, proof.policy
     if airspace is None:
         return True
@@ -68,11 +69,11 @@ def prove_home(proof: ProofContext, steps: Sequence[MissionStep]) -> bool:
     proof.report.add(
         codes.PATH_OUTSIDE,
         first.span,
-        f"home may lie up to {display(within, Dimension.LENGTH)} from where it is declared, and from there the "
+        f"home may lie up to {display(within, Dimension.LENGTH)} from its declared place, and there the "
         f"vehicle would {breach_text(policy, present, legs, 0, 0)}",
-        help="every place where home may be must lie in the airspace: make that wider, or state home more exactly",
+        help="widen the airspace, or reduce `within` of home",
         labels=[
-            (written.span, "how far the real home may lie"),
+            (written.span, "home may be this far from its declared place"),
             (proof.span(airspace.airspace), "the airspace"),
             *whole.labels(present, space, last.lasts_us),
         ],
@@ -83,10 +84,9 @@ def prove_home(proof: ProofContext, steps: Sequence[MissionStep]) -> bool:
 def prove_path(
     proof: ProofContext, step: MissionStep, starts: Sequence[StartPlace], skipped: Sequence[MissionStep]
 ) -> tuple[StartPlace, ...]:
-    """Report what no state makes possible about a step that may come at any of `starts`; where of these it may begin,
-    nowhere after a finding.
+    """Report why a step cannot fly from `starts` in any state. Returns the places from which it can.
 
-    The first of `starts` is where it begins when none of the steps that may be `skipped` was.
+    The first of `starts` is the place where it begins if none of the `skipped` steps was skipped.
     """
     if _too_fast(proof, step):
         return ()
@@ -98,7 +98,7 @@ def prove_path(
 
 
 def _too_fast(proof: ProofContext, step: MissionStep) -> bool:
-    """Whether a step asks for more speed than the vehicle has; reports it."""
+    """Whether a step sets a speed above the vehicle's limit. Reports it."""
     flat, vehicle = step.flat, proof.policy.vehicle
     if flat.plan.speed <= vehicle.speed:
         return False
@@ -109,8 +109,8 @@ def _too_fast(proof: ProofContext, step: MissionStep) -> bool:
     proof.report.add(
         codes.BEYOND_VEHICLE,
         span,
-        f"`{vehicle.name}` flies at most {most}, and the step asks for {display(flat.plan.speed, Dimension.SPEED)}",
-        help=f"the nearest value that it can fly is `{most}`",
+        f"`{vehicle.name}` flies at most {most}, but the step sets {display(flat.plan.speed, Dimension.SPEED)}",
+        help=f"nearest accepted: `{most}`",
         labels=[(proof.lowered.vehicle.speed.span, "declared here")],
         fix=None if span == step.span else (span, most, f"write `{most}`"),
     )
@@ -118,7 +118,7 @@ def _too_fast(proof: ProofContext, step: MissionStep) -> bool:
 
 
 def _volume(proof: ProofContext, step: MissionStep, start: StartPlace, skipped: Sequence[MissionStep]) -> None:
-    """The planned volume keeps the airspace and what the contract maintains; charge and clauses can suffice."""
+    """Report a planned volume that leaves the airspace, breaks the contract, or needs more than a full charge."""
     at, volume = planned(proof, step.prepared, start)
     labels = [(each.span, "this step may be skipped") for each in skipped[-1:]]
     if not _airspace(proof, step, start, volume, labels):
@@ -135,19 +135,21 @@ def _volume(proof: ProofContext, step: MissionStep, start: StartPlace, skipped: 
             codes.BEYOND_VEHICLE,
             step.span,
             f"the step needs {display(needed, Dimension.RATIO)} of a full charge, with the way home and the reserve",
-            labels=[(proof.lowered.vehicle.endurance.span, "what a full charge is worth")],
+            labels=[(proof.lowered.vehicle.endurance.span, "the endurance of a full charge")],
         )
 
 
 def _airspace(
     proof: ProofContext, step: MissionStep, start: StartPlace, volume: Volume, labels: list[tuple[Span, str]]
 ) -> bool:
-    """Whether the planned volume keeps the airspace whenever the step may come."""
+    """Whether the planned volume stays in the airspace whenever the step may fly. Reports the first violation."""
     airspace, policy, lasts = proof.prepared.airspace, proof.policy, step.prepared.lasts_us
     if airspace is None:
         return True
     present = step.time.present(airspace, lasts)
-    begins = f"on its way, which {'may begin' if labels else 'begins'} {from_home(start.x, start.y)}, the vehicle would"
+    begins = (
+        f"on the path, which {'may begin' if labels else 'begins'} {from_home(start.x, start.y)}, the vehicle would"
+    )
     written = (proof.span(airspace.airspace), "the airspace")
     if EVERYWHERE[keeps(volume.place, present)] == FALSE:
         home = step.flat.plan.kind == MotionKind.HOME
@@ -156,10 +158,10 @@ def _airspace(
             codes.PATH_OUTSIDE,
             step.span,
             f"{begins} {_breach_of(proof, present, volume)}",
-            help=f"{higher}; or go around by further steps"
+            help=f"{higher}; or add steps that lead around"
             if higher
-            else "the leg to where the step begins counts, widened by the vehicle's position error; "
-            "go around by further steps",
+            else "add steps that lead around; the leg to the step's first place counts too, and the path is widened by "
+            "the vehicle's position error",
             labels=[written, *step.time.labels(present, volume.place, lasts), *labels],
         )
         return False
@@ -170,7 +172,7 @@ def _airspace(
             codes.PATH_OUTSIDE,
             step.span,
             f"{begins} be in `{name}`, which does not always exist {step.time.from_to(lasts)}, when this step may fly",
-            help="issue the mission at another time, or let the steps before this one take less",
+            help="issue the mission at another time, or shorten the steps before this one",
             labels=[written, (zone_span(proof, missing), "declared here")],
         )
         return False
@@ -183,7 +185,7 @@ def _airspace(
 
 
 def _breach_of(proof: ProofContext, airspace: PreparedAirspace, volume: Volume) -> str:
-    """What the vehicle would do in the first part of a volume that does not keep the airspace."""
+    """Describe how the first part of a volume that leaves the airspace violates it."""
     parts = volume.place.parts
     sweep, low, high = next((part for part in parts if keeps(Places((part,)), airspace) != TRUE), parts[0])
     points = list(zip(sweep.path[::2], sweep.path[1::2], strict=True))
@@ -191,9 +193,7 @@ def _breach_of(proof: ProofContext, airspace: PreparedAirspace, volume: Volume) 
 
 
 class _BrokenClause(NamedTuple):
-    """A clause of the contract that cannot hold, the moment of UTC at which it cannot, near where, and between which
-    heights the step flies; None where these do not matter.
-    """
+    """A clause of the contract that cannot hold, with the UTC time, the place and the heights, if they matter."""
 
     clause: Clause
     moment: int | None = None
@@ -204,13 +204,13 @@ class _BrokenClause(NamedTuple):
 def _broken(
     proof: ProofContext, step: MissionStep, at: Environment, volume: Volume, legs: Sequence[Leg]
 ) -> _BrokenClause | None:
-    """A clause of the contract that cannot hold over the planned volume, which leads along `legs`, or at the start."""
+    """Return a clause of the contract that cannot hold over the planned volume along `legs`, or at the start."""
     invocation, period, arguments = step.prepared, step.time, step.flat.arguments
     over = ranging(at, volume, proof.prepared.tables.known.height, invocation.lasts_us)
     anywhere = proof.around(invocation)
 
     def can(condition: Condition, best: Condition | None, there: Environment, utc: Utc) -> bool:
-        """Whether a clause can be true at a moment, and in the best case is nowhere false."""
+        """Whether a clause can be true at a time, and in the best case is nowhere false."""
         then = at_moment(there, utc)
         return bool(condition(then) & TRUE) and (best is None or EVERYWHERE[best(then)] != FALSE)
 
@@ -230,7 +230,7 @@ def _broken(
             of_height = slots_read((clause,), vehicle, proof.policy.monitors) == (vehicle.height,)
             return _BrokenClause(clause, moment, near, (low, high) if of_height and low < high else None)
     for clause, condition in (*invocation.require, *invocation.assume):
-        # where the step begins, only if the time matters too: else E0619 says so
+        # the start place matters only together with the time; E0619 covers the place alone
         for there in (anywhere, at) if period.timed(clause, arguments) else (anywhere,):
             fails, moment = period.fails(clause, arguments, 0, partial(can, condition, None, there))
             if fails:
@@ -246,7 +246,7 @@ def _near(
     legs: Sequence[Leg],
     holds: Callable[[Environment], bool],
 ) -> Point | None:
-    """The first place on the way at which a clause cannot hold; None where that is so everywhere, or nowhere alone."""
+    """Return the first place at which a clause cannot hold, if it can hold elsewhere on the path; else None."""
     error = proof.policy.vehicle.position_error
     box = (-error, -error, error, error)
     first, elsewhere = None, False
@@ -273,12 +273,12 @@ def _report_broken(
         where = f": it fails near {place_text(policy, broken.place)}"
     elif broken.height is not None:
         low, high = (display(each, Dimension.ALTITUDE) for each in broken.height)
-        where = f": from where it begins on it flies between {low} and {high}"
+        where = f": the step flies between {low} and {high}"
     proof.report.add(
         codes.NEVER_HOLDS,
         step.span,
-        f"`{clause.text}` cannot hold all along this step{at}{where}",
-        help="change the step's arguments, or where it begins"
-        + (": a step before it may be skipped, and then it begins elsewhere" if labels else ""),
-        labels=[(proof.span(clause), "the contract asks for this"), *labels],
+        f"`{clause.text}` cannot hold during the whole step{at}{where}",
+        help="change the step's arguments or its start"
+        + ("; it begins elsewhere if the step before it is skipped" if labels else ""),
+        labels=[(proof.span(clause), "the contract contains this condition"), *labels],
     )

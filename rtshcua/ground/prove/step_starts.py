@@ -1,11 +1,11 @@
-"""E0619, E0621: where each step may begin, and that it finds there what it needs: in the air or not, where, how high.
+"""The places at which each step may begin, and the proof that it can begin there (E0619, E0621).
 
-Before the first step the vehicle stands at the declared home. A step ends where it was planned to; one that is skipped
-when it is inadmissible may also leave the vehicle where it was, so there can be several places.
+Before the first step the vehicle is at the declared home. A step ends at its planned place. If a step may be skipped,
+the vehicle may also stay where it was, so the next step may begin at several places.
 
-What a motion determines is the position, the height above home, and the landed state that the autopilot reports. A
-clause of `require` or `assume` that cannot hold with these, whatever everything else is, is what no step brought about.
-A vehicle that has not climbed cannot fly, survey or hold: no autopilot does that from the ground.
+A motion determines the position, the height above home, and the landed state that the autopilot reports. If a clause of
+`require` or `assume` cannot hold with these values, no earlier step established its condition. A vehicle on the ground
+cannot fly, survey or hold: no autopilot starts these from the ground.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,12 +28,12 @@ from rtshcua.model.flat.signal import ENUMERATION
 from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.quantity import Dimension, display
 
-#: so many places are followed; where steps that may be skipped leave more, the rest is left for on board
+#: most places that the proofs follow; the ways from further places are only checked on board
 MOST_PLACES = 16
 
 
 class StartPlace(NamedTuple):
-    """Local x, y and the height in mm, and whether the vehicle is in the air."""
+    """Local x, y and height in mm, and whether the vehicle is in the air."""
 
     x: int
     y: int
@@ -45,7 +45,7 @@ AT_HOME = StartPlace(0, 0, 0, aloft=False)
 
 
 def place_after(invocation: PreparedInvocation, start: StartPlace) -> StartPlace:
-    """Where a step ends that began at `start` and was done."""
+    """Return the place at which a completed step ends that began at `start`."""
     plan = invocation.invocation.plan
     x, y = plan.path[-2:] if plan.path else start[:2]
     match plan.kind:
@@ -60,9 +60,10 @@ def place_after(invocation: PreparedInvocation, start: StartPlace) -> StartPlace
 def places_after(
     invocation: PreparedInvocation, starts: Sequence[StartPlace], able: Sequence[StartPlace]
 ) -> tuple[StartPlace, ...]:
-    """Where the vehicle may be after a step that may come at any of `starts`, and may begin at those that are `able`.
+    """Return the places where the vehicle may be after a step.
 
-    No regard is had to `MOST_PLACES`.
+    `starts` are the places where it may be before the step, and `able` those at which the step may begin. The result is
+    not limited to `MOST_PLACES`.
     """
     ends = [place_after(invocation, start) for start in able]
     if may_be_skipped(invocation):
@@ -71,7 +72,7 @@ def places_after(
 
 
 def may_be_skipped(invocation: PreparedInvocation) -> bool:
-    """Whether the mission goes on without a step that is not admitted."""
+    """Whether the mission continues if a step is not admitted."""
     return invocation.invocation.on_inadmissible == OnInadmissible.SKIP
 
 
@@ -81,9 +82,10 @@ def from_where(
     starts: Sequence[StartPlace],
     finds: Callable[[StartPlace], None],
 ) -> tuple[StartPlace, ...]:
-    """The places where `finds`, which proves what admission asks for, reports nothing; none if that forbids the step.
+    """Return the places of `starts` for which `finds`, a proof of a condition of admission, reports nothing.
 
-    A step that may be skipped is, where it is not admitted: so it must only be admitted somewhere.
+    Returns none if a step that cannot be skipped fails anywhere. A step that may be skipped must only be admitted at
+    one of the places; its findings are reported if it is admitted nowhere.
     """
     found = proof.report.found
     able: list[StartPlace] = []
@@ -104,7 +106,7 @@ def from_where(
 
 
 def planned(proof: ProofContext, invocation: PreparedInvocation, start: StartPlace) -> tuple[Environment, Volume]:
-    """Any state of a vehicle that is at `start`, and the volume that the step is planned to take from there."""
+    """Return all states of a vehicle at `start`, and the planned volume of the step from there."""
     known = proof.prepared.tables.known
     at = proof.around(invocation)
     slots = list(at.slots)
@@ -113,35 +115,35 @@ def planned(proof: ProofContext, invocation: PreparedInvocation, start: StartPla
 
 
 def from_home(x: int, y: int) -> str:
-    """A place in words, to the nearest metre."""
+    """Describe a place relative to home, to the nearest metre."""
     east, north = (x + 500) // 1000, (y + 500) // 1000
-    words = [f"{abs(east)} m {'east' if east > 0 else 'west'}"] if east else []
-    words += [f"{abs(north)} m {'north' if north > 0 else 'south'}"] if north else []
-    return f"{' and '.join(words)} of home" if words else "at home"
+    parts = [f"{abs(east)} m {'east' if east > 0 else 'west'}"] if east else []
+    parts += [f"{abs(north)} m {'north' if north > 0 else 'south'}"] if north else []
+    return f"{' and '.join(parts)} of home" if parts else "at home"
 
 
-#: where an autopilot reports whether it has landed
+#: the message and the field in which an autopilot reports whether it has landed
 LANDED = ("EXTENDED_SYS_STATE", "landed_state")
 
-_ALOFT = {MotionKind.FLY: "flies somewhere", MotionKind.COVER: "flies a survey", MotionKind.HOLD: "holds in the air"}
+_ALOFT = {MotionKind.FLY: "flies to a place", MotionKind.COVER: "flies a survey", MotionKind.HOLD: "holds in the air"}
 
 
 def prove_aloft(
     proof: ProofContext, step: MissionStep, starts: Sequence[StartPlace], skipped: Sequence[MissionStep]
 ) -> tuple[StartPlace, ...]:
-    """All of `starts` if the vehicle can do there what a step does, nowhere after a finding: that it is on the ground.
+    """Return `starts`, or nothing after reporting a step that cannot begin on the ground.
 
-    That it cannot hold or fly there is not asked when the step is admitted, so `skip` does not help against that.
+    Admission on board does not check this, so a `skip` of the step does not help.
     """
     flat = step.flat
     for start in starts:
         if not start.aloft and flat.plan.kind in _ALOFT:
             motion = proof.skills[flat.contract.name].motion
             assert motion is not None
-            words = f"`{flat.contract.name}` {_ALOFT[MotionKind(flat.plan.kind)]}"
-            help = "let a step before it climb, as `takeoff` does"
+            need = f"`{flat.contract.name}` {_ALOFT[MotionKind(flat.plan.kind)]}"
+            help = "add a step before it that climbs, such as `takeoff`"
             before = () if start is starts[0] else skipped
-            _report_unchained(proof, step, start, words, (motion.span, "its motion"), before, help)
+            _report_unchained(proof, step, start, need, (motion.span, "its motion"), before, help)
             return ()
     return tuple(starts)
 
@@ -149,17 +151,17 @@ def prove_aloft(
 def prove_start(
     proof: ProofContext, step: MissionStep, starts: Sequence[StartPlace], skipped: Sequence[MissionStep]
 ) -> tuple[StartPlace, ...]:
-    """Where of `starts` a step finds what it needs, nowhere after a finding: the first thing that it lacks.
+    """Return the places of `starts` at which a step's conditions can hold. Reports a condition that cannot.
 
-    The first of `starts` is where it begins when none of the steps that may be `skipped` was.
+    The first of `starts` is the place where it begins if none of the `skipped` steps was skipped.
     """
 
     def finds(start: StartPlace) -> None:
         clause = _lacking(proof, step.prepared, start)
         if clause is not None:
-            words, label = f"it needs `{clause.text}`", (proof.span(clause), "the contract asks for this")
-            help, before = "add a step before it that brings this about", () if start is starts[0] else skipped
-            _report_unchained(proof, step, start, words, label, before, help)
+            need, label = f"it needs `{clause.text}`", (proof.span(clause), "the contract contains this condition")
+            help, before = "add a step before it that establishes this", () if start is starts[0] else skipped
+            _report_unchained(proof, step, start, need, label, before, help)
 
     return from_where(proof, step.prepared, starts, finds)
 
@@ -168,7 +170,7 @@ def _report_unchained(
     proof: ProofContext,
     step: MissionStep,
     start: StartPlace,
-    words: str,
+    need: str,
     label: tuple[Span, str],
     skipped: Sequence[MissionStep],
     help: str,
@@ -176,29 +178,29 @@ def _report_unchained(
     proof.report.add(
         codes.NOT_CHAINED,
         step.span,
-        f"{words}, and when this step begins the vehicle {'may be' if skipped else 'is'} {_place_text(start)}",
-        help="a step before it may be skipped: let that `abort` or `hold`" if skipped else help,
+        f"{need}, but when this step begins the vehicle {'may be' if skipped else 'is'} {_place_text(start)}",
+        help="let the step that may be skipped `abort` or `hold`" if skipped else help,
         labels=[label, *((each.span, "this step may be skipped") for each in skipped[-1:])],
     )
 
 
 def warn_not_landed(proof: ProofContext, mission: MissionDecl, step: MissionStep, ends: Sequence[StartPlace]) -> None:
-    """Warn of a mission that leaves the vehicle in the air: only its contingency then brings it down."""
+    """Warn of a mission that ends in the air, so that only the contingency lands the vehicle."""
     for place in ends:
         if place.aloft:
-            may = "ends" if place is ends[0] else "may end, when steps are skipped,"
+            may = "ends" if place is ends[0] else "may end, if steps are skipped,"
             proof.report.add(
                 codes.NOT_LANDED,
                 step.span,
                 f"`{mission.name.text}` {may} in the air, {_place_text(place)}",
-                help="end it in a step that lands, as `return_home` does, and cannot be skipped; else the policy's "
-                "contingency brings the vehicle down",
+                help="end it with a step that lands, such as `return_home`, and that cannot be skipped; otherwise the "
+                "policy's contingency lands the vehicle",
             )
             return
 
 
 def _lacking(proof: ProofContext, invocation: PreparedInvocation, start: StartPlace) -> Clause | None:
-    """A clause that cannot hold at `start`, and can elsewhere."""
+    """Return a clause that cannot hold at `start` but can elsewhere, or None."""
     if not invocation.require and not invocation.assume:
         return None
     at, _ = planned(proof, invocation, start)

@@ -1,10 +1,10 @@
-"""When each step may begin. E0801, E0805: even on the slowest way its validity is not over by then.
+"""The time at which each step may begin, and the proof that its decision is still valid then (E0801, E0805).
 
-A step begins no sooner after the mission's issue than those before it take at least, and no later than they take at
-most: up to `START_WINDOW_US` to the start, and for each step its approval, its deadline, and as long as its contract
-allows. A zone to stay out of counts as present if it may exist at some moment between, or while the step lasts; a zone
-to stay inside of must exist at all of them. Without a time of issue some one must do: what a step asks of the time of
-day is collected here (`StepTime.asked`) and asked of all steps together in `issue_times`, dates excepted.
+The earliest begin after the mission's issue is the least time of the steps before. The latest is `START_WINDOW_US` plus
+the approval, the deadline and the duration of each step before. An `outside` zone counts if it may exist at some time
+between, or while the step lasts. An `inside` zone must exist at all of these times. If the time of issue is unknown,
+one suitable time of issue must exist: the requirements of each step are collected here (`StepTime.requirements`), and
+`issue_times` proves them for all steps together. Dates are not considered then.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -29,12 +29,12 @@ from rtshcua.model.flat.mission import Invocation
 from rtshcua.model.ir.missions import Overrides, Step
 from rtshcua.model.quantity import Dimension, display
 
-#: how long after its issue a mission may begin
+#: longest time from the issue of a mission to its start
 START_WINDOW_US = 300 * 1_000_000
 
 
 def approval(proof: ProofContext, invocation: PreparedInvocation) -> int:
-    """How long a step may wait for approvals."""
+    """Return the longest time in us that a step may wait for approvals."""
     confirms = invocation.candidates.confirms
     at = proof.around(invocation) if confirms else None
     return max((each.rule.within_us for each in confirms if at and each.condition(at) & TRUE), default=0)
@@ -44,7 +44,7 @@ _EXACT = (0, 0)
 
 
 class ClauseFailure(NamedTuple):
-    """Whether a condition fails, and at which moment of UTC, where one is known."""
+    """Whether a condition fails, and the UTC time at which it does, if it is known."""
 
     fails: bool
     moment: int | None = None
@@ -52,8 +52,9 @@ class ClauseFailure(NamedTuple):
 
 @dataclass(slots=True)
 class StepTime:
-    """A step may begin from `low` to `high` us after the issue, which is 0 where it is not known, and lasts at most
-    `lasts_us`. `asked` is what it asks of a time of issue, once it is looked at.
+    """The time of a step: it begins from `low` to `high` us after the issue and lasts at most `lasts_us`.
+
+    `issued_at_us` is 0 if the time of issue is unknown. `requirements` of that time are added by the proofs.
     """
 
     proof: ProofContext
@@ -61,16 +62,16 @@ class StepTime:
     low: int
     high: int
     lasts_us: int
-    asked: list[IssueRequirement] = field(default_factory=list)
+    requirements: list[IssueRequirement] = field(default_factory=list)
 
     def utc(self, further: int) -> tuple[Span, ...]:
-        """All moments from its earliest begin to `further` us after its latest, as far as they are known."""
+        """Return the times from its earliest begin to `further` us after its latest; all times if unknown."""
         if not self.issued_at_us:
             return ((0, EVER),)
         return ((self.issued_at_us + self.low, self.issued_at_us + self.high + further),)
 
     def present(self, airspace: PreparedAirspace, further: int) -> PreparedAirspace:
-        """The airspace with those of the zones to stay out of that may exist in that time."""
+        """Return the airspace without `outside` zones that cannot exist until `further` us after the latest begin."""
         return airspace._replace(outside=tuple(each for each in airspace.outside if self._present(each, further)))
 
     def _present(self, zone: PreparedZone, further: int) -> bool:
@@ -80,28 +81,28 @@ class StepTime:
         return bool(truth & TRUE) if self.issued_at_us else truth == TRUE
 
     def avoidable(self, airspace: PreparedAirspace, further: int) -> Iterator[PreparedZone]:
-        """The zones to stay out of that some time of issue avoids, where none is known."""
+        """Yield the `outside` zones that a suitable time of issue avoids, if that time is unknown."""
         if not self.issued_at_us:
             yield from (each for each in airspace.outside if not self._present(each, further))
 
     def labels(self, airspace: PreparedAirspace, place: PlaceSet, further: int) -> list[tuple[Where, str]]:
-        """Which of the zones to stay out of that a place is not clear of exist at some times only."""
+        """Return labels for the zones that a place may touch and that exist only at some times."""
         zones = (each for each in airspace.outside if each.times is not None and place.inside(each) != FALSE)
         return [
-            (zone_span(self.proof, zone), f"this may exist then: the step may fly {self.from_to(further)}")
+            (zone_span(self.proof, zone), f"this zone may exist then: the step may fly {self.from_to(further)}")
             for zone in zones
             if self.issued_at_us
         ]
 
     def avoid(self, zone: PreparedZone, further: int) -> None:
-        """Ask for a time of issue with which a zone does not exist in that time; of one with dates, its issue tells."""
-        self._ask_zone(zone, further, exists=False)
+        """Require a time of issue with which a zone does not exist during the step. Zones with dates are ignored."""
+        self._require_zone(zone, further, exists=False)
 
     def stay(self, zone: PreparedZone, further: int) -> None:
-        """Ask for a time of issue with which a zone to stay inside of exists all that time."""
-        self._ask_zone(zone, further, exists=True)
+        """Require a time of issue with which an `inside` zone exists during the whole step."""
+        self._require_zone(zone, further, exists=True)
 
-    def _ask_zone(self, zone: PreparedZone, further: int, *, exists: bool) -> None:
+    def _require_zone(self, zone: PreparedZone, further: int, *, exists: bool) -> None:
         flat = self.proof.policy.zones[zone.number]
         if not (flat.daily or flat.weekly) or flat.dates or self.issued_at_us:
             return
@@ -112,11 +113,11 @@ class StepTime:
             cycle.edges(windows), lambda at: window.truth((cycle.at(at),), _EXACT) == wanted, cycle.period
         )
         sometimes = "at some times of the day" if flat.daily else "at some times of the week"
-        label = (zone_span(self.proof, zone), f"`{flat.name}` exists {sometimes} only")
-        self._ask(IssueRequirement(arcs, self.low, self.high + further, cycle.period, (label,)))
+        label = (zone_span(self.proof, zone), f"`{flat.name}` exists only {sometimes}")
+        self._require(IssueRequirement(arcs, self.low, self.high + further, cycle.period, (label,)))
 
     def missing(self, airspace: PreparedAirspace, further: int) -> PreparedZone | None:
-        """A zone to stay inside of that may not exist all that time; for a time of issue that is known."""
+        """Return an `inside` zone that may not exist during the whole step, if the time of issue is known."""
         if self.issued_at_us:
             for zone in airspace.inside:
                 if zone.times is not None and zone.times.truth(self.utc(further), _EXACT, 0) != TRUE:
@@ -124,7 +125,7 @@ class StepTime:
         return None
 
     def from_to(self, further: int) -> str:
-        """That time in words; it is known."""
+        """Format the time until `further` us after the latest begin. The time of issue must be known."""
         local, day = self.proof.prepared.tables.local, reads_days(self.proof.policy)
         ((low, high),) = self.utc(further)
         return f"from {local_time_text(low, local, day=day)} to {local_time_text(high, local, day=day)}, local time"
@@ -132,9 +133,10 @@ class StepTime:
     def fails(
         self, clause: Clause, arguments: Sequence[int], through: int, holds: Callable[[Span], bool]
     ) -> ClauseFailure:
-        """Whether a condition fails at some moment at which the step may begin, or whatever the time of issue: what
-        `holds` says of a moment. `through` is how far after it the zones count. What it asks of a time of issue that
-        is not known is collected.
+        """Return whether a condition fails at some time at which the step may begin.
+
+        `holds` evaluates the condition over a time span, and zones count until `through` us after it. If the time of
+        issue is unknown, the condition fails only if it fails for every time of issue; else a requirement is added.
         """
         windows, dates = changes_read(self.proof, clause, arguments)
         if self.issued_at_us:
@@ -145,7 +147,7 @@ class StepTime:
             return ClauseFailure(False)
         if not windows and not dates:
             return ClauseFailure(not holds((0, EVER)))
-        if dates:  # on some date it must hold, at some time of the day
+        if dates:  # it must hold on some date, at some time of the day
             period = max((window.period for window in windows), default=DAY)
             starts = {self.proof.prepared.tables.local.steady(), *(date - period for date in dates)}
             moments = {
@@ -158,26 +160,26 @@ class StepTime:
         edges = {each - back for each in cycle.edges(windows) for back in (0, through)}
         arcs = arcs_where(edges, lambda at: holds(cycle.at(at)), cycle.period)
         if arcs and arcs[0].length < cycle.period:
-            label = (self.proof.span(clause), "the contract asks for this")
-            self._ask(IssueRequirement(arcs, self.low, self.high, cycle.period, (label,)))
+            label = (self.proof.span(clause), "the contract contains this condition")
+            self._require(IssueRequirement(arcs, self.low, self.high, cycle.period, (label,)))
         return ClauseFailure(not arcs)
 
     def timed(self, clause: Clause, arguments: Sequence[int]) -> bool:
-        """Whether what a condition says depends on the time."""
+        """Whether the value of a condition depends on the time."""
         return any(changes_read(self.proof, clause, arguments))
 
-    def _ask(self, asked: IssueRequirement) -> None:
-        if asked not in self.asked:
-            self.asked.append(asked)
+    def _require(self, requirement: IssueRequirement) -> None:
+        if requirement not in self.requirements:
+            self.requirements.append(requirement)
 
 
 def zone_span(proof: ProofContext, zone: PreparedZone) -> Where:
-    """Where a zone of the airspace is declared."""
+    """Return the span of the name in a zone's declaration."""
     return proof.context.symbols.zones[proof.policy.zones[zone.number].name].name.span
 
 
 class MissionStep(NamedTuple):
-    """A step of a mission as it is declared, as it is prepared on board, and when it may begin."""
+    """A step of a mission: as declared, as prepared on board, and the time at which it may begin."""
 
     declared: Step
     prepared: PreparedInvocation
@@ -185,29 +187,29 @@ class MissionStep(NamedTuple):
 
     @property
     def span(self) -> Where:
-        """Where it is written."""
+        """The span of the step in the source."""
         return self.declared.span
 
     @property
     def overrides(self) -> Overrides | None:
-        """Its own block, which changes the contract of its skill."""
+        """The step's own block, which changes the contract of its skill."""
         return self.declared.overrides
 
     @property
     def flat(self) -> Invocation:
-        """What the bundle carries of it."""
+        """The step in the flat form."""
         return self.prepared.invocation
 
     @property
     def contract(self) -> Contract:
-        """The contract under which it flies."""
+        """The contract of the step."""
         return self.prepared.invocation.contract
 
 
 def mission_steps(
     proof: ProofContext, declared: Sequence[Step], invocations: Sequence[PreparedInvocation]
 ) -> Iterator[MissionStep]:
-    """The steps of a mission, each with the time at which it may begin."""
+    """Yield the steps of a mission, each with the time at which it may begin."""
     earliest, latest = 0, START_WINDOW_US
     for step, invocation in zip(declared, invocations, strict=True):
         flat = invocation.invocation
@@ -219,13 +221,14 @@ def mission_steps(
 
 
 def at_moment(at: Environment, utc: Span) -> Environment:
-    """The same at some moment."""
+    """Return an environment at another time."""
     return Environment(at.slots, at.arguments, (utc,), (0, 0), at.place, at.monitors, at.phase, at.through)
 
 
 class IssueCycle(NamedTuple):
-    """What stands for all times: a day or a week, `period` us from `base` on, in which local time has one offset. The
-    nights in which clocks are set are left for the time of issue.
+    """A day or a week that represents all times: `period` us from `base` on, with one offset of local time.
+
+    Changes of the offset, as for daylight saving time, are not represented.
     """
 
     base: int
@@ -233,20 +236,20 @@ class IssueCycle(NamedTuple):
 
     @classmethod
     def of(cls, proof: ProofContext, windows: Sequence[Window]) -> "IssueCycle":
-        """The one that shows all that some windows do: a week where one of them is of some days of the week."""
+        """Return the cycle for some windows: a week if one of them depends on the day of the week, else a day."""
         return cls(proof.prepared.tables.local.steady(), max((each.period for each in windows), default=DAY))
 
     def at(self, moment: int) -> Span:
-        """A moment of it, in us since it began."""
+        """Return the UTC span of a time in the cycle, given in us since its begin."""
         return (self.base + moment, self.base + moment)
 
     def edges(self, windows: Sequence[Window]) -> list[int]:
-        """When in it something changes of the windows."""
+        """Return the times in the cycle at which one of the windows opens or closes."""
         return [at - self.base for each in windows for at in each.changes(self.base - 1, self.base + self.period - 1)]
 
 
 def zones_read(proof: ProofContext, clause: Clause, arguments: Sequence[int]) -> Iterator[int]:
-    """The zones that a condition asks about, given the arguments."""
+    """Yield the zones that a condition reads, with some arguments."""
     tables = proof.prepared.tables.tables
     for op, a, b in zip(clause.code[::3], clause.code[1::3], clause.code[2::3], strict=True):
         match op:
@@ -259,7 +262,7 @@ def zones_read(proof: ProofContext, clause: Clause, arguments: Sequence[int]) ->
 
 
 def changes_read(proof: ProofContext, clause: Clause, arguments: Sequence[int]) -> tuple[list[Window], list[int]]:
-    """The windows of the local day or week, and the dates, by which something changes that a condition reads."""
+    """Return the windows of the local day or week, and the dates, on which the value of a condition depends."""
     policy, local = proof.policy, proof.prepared.tables.local
     read = [policy.zones[number] for number in zones_read(proof, clause, arguments)]
     windows: list[Window] = []
@@ -273,7 +276,7 @@ def changes_read(proof: ProofContext, clause: Clause, arguments: Sequence[int]) 
 
 
 def _moments(windows: Sequence[Window], dates: Sequence[int], low: int, high: int, through: int) -> Iterator[int]:
-    """The moments of a time at which something changes, for zones count until `through` us after it."""
+    """Yield the times from `low` to `high` at which a window or a date changes the value, `through` included."""
     for back in {0, through}:
         for window in windows:
             yield from (moment - back for moment in window.changes(low + back - 1, high + back))
@@ -281,7 +284,7 @@ def _moments(windows: Sequence[Window], dates: Sequence[int], low: int, high: in
 
 
 def prove_validity(proof: ProofContext, steps: Sequence[MissionStep]) -> None:
-    """Report every step whose decision may mean nothing any more when its turn comes."""
+    """Report the first step whose decision may have expired when its turn comes."""
     latest = START_WINDOW_US
     for step in steps:
         contract = step.contract
@@ -290,7 +293,7 @@ def prove_validity(proof: ProofContext, steps: Sequence[MissionStep]) -> None:
             proof.report.add(
                 codes.ENDLESS_STEP,
                 step.span,
-                f"`{contract.name}` does not end, so nothing after this step would ever begin",
+                f"`{contract.name}` has no end, so no step after this one would ever begin",
                 help="add `lasts at most` to the skill",
                 labels=[(skill.name.span, "declared here, without `lasts at most`")],
             )
@@ -302,10 +305,11 @@ def prove_validity(proof: ProofContext, steps: Sequence[MissionStep]) -> None:
             proof.report.add(
                 codes.VALIDITY_TOO_SHORT,
                 step.span,
-                f"this step may begin {display(latest, Dimension.DURATION)} after the mission was issued, and "
+                f"this step may begin {display(latest, Dimension.DURATION)} after the issue of the mission, but "
                 f"`{contract.name}` is valid for {display(contract.validity_us, Dimension.DURATION)}",
-                help=f"{display(START_WINDOW_US, Dimension.DURATION)} to the start, then all deadlines, approvals and "
-                "durations before it count; move the step forward, or shorten those before it",
+                help="move the step forward, or shorten the steps before it; the time includes "
+                f"{display(START_WINDOW_US, Dimension.DURATION)} to the start, and all deadlines, approvals and "
+                "durations before the step",
                 labels=[(validity.span, "declared here")],
             )
             return

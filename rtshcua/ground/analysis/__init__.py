@@ -1,18 +1,18 @@
-"""What conditions mean together: whether some situation gives each of several conditions a wanted truth.
+"""Decides whether some situation gives each of several conditions a wanted truth value.
 
     space = space_of(prepared, contract)
     answer = satisfiable([(node, TRUE), (other, FALSE | UNKNOWN)], space)
 
 `node` is a tree of `rtshcua.decision.tree` (`prepared.compiler.when(rule)`, `prepared.compiler.node(clause, contract)`,
-or trees joined by `tree.Both` and its like), the second of each pair the set of truths that will do, and `space` what
-the situation may be: `space_of` says any that can be met, `replace` narrows it. The answer is `Yes` with a witness that
-the decision's own evaluator has confirmed, `No`, which is a proof, or `Undecided` where the budget was used up or no
-place was found. `implies(node, other, space)` asks whether `other` is true wherever `node` is; its `No` has the
-witness against it.
+or trees joined by connectives such as `tree.Both`). The second element of each pair is the set of wanted truth values.
+`space` is the set of possible situations: `space_of` returns all of them, and `_replace` narrows them. The answer is
+`Yes` with a witness that the decision's own evaluator has confirmed, `No`, which is a proof, or `Undecided` if the
+budget was used up or no place was found. `implies(node, other, space)` decides whether `other` is true wherever `node`
+is: `No` is the proof, and `Yes` has a counterexample.
 
-The search is by branch and bound: a *box* holds a set of values for everything that the conditions read; the conditions
-are evaluated over it by the rules of `rtshcua.decision`; where that leaves more than one truth, the box is split at a
-threshold of an atom that it does not decide. Sums of several variables are variables of their own, tied to their parts
-by interval arithmetic. Whether a place is inside a zone is one variable for each zone; which of them go together is
-proved by the zones' relations, or shown by a place.
+The search is by branch and bound. A *box* holds a set of values for everything that the conditions read, and the rules
+of `rtshcua.decision` evaluate the conditions over it. If more than one truth value is possible, the box is split at a
+threshold of an undecided atom. A sum of several variables is a variable of its own, tied to its parts by interval
+arithmetic. For each zone, one variable holds whether a place is inside it. The relations of the zones prove which of
+these values are possible together, or a place shows it.
 """

@@ -1,5 +1,6 @@
-"""A box: for everything that some conditions read, the set of values that it may have; and what a box rules out by
-itself, sums against their parts and zones against each other.
+"""Boxes: a set of possible values for everything that conditions read.
+
+A box is narrowed by comparing sums with their parts, and the sides of zones with each other.
 """
 
 from collections.abc import Callable, Iterator
@@ -13,14 +14,16 @@ from rtshcua.ground.analysis.plane import Plane
 Cell: TypeAlias = tuple[bool, int]
 #: a sum of several cells and slots: ascending, without a common factor, the first factor above zero
 Form: TypeAlias = tuple[LinearTerm, ...]
-#: what is a place: the vehicle, or the argument cell of a place's x
+#: the owner of a place: the vehicle, or the argument cell that holds the x of a place
 Who: TypeAlias = int
 VEHICLE: Final[Who] = -1
 
 
 class ValueBox:
-    """Sets of values. `sides` says of a place and a zone's ground plan whether the place is inside; `located` whether
-    the vehicle's position is known. What a box does not name may have any value that the space allows.
+    """Sets of values. Anything that a box does not contain may have every value of the space.
+
+    `sides` holds whether a place is inside the ground plan of a zone, and `located` whether the vehicle's position is
+    known.
     """
 
     __slots__ = ("cells", "forms", "located", "monitors", "phases", "sides", "utc")
@@ -39,7 +42,7 @@ class ValueBox:
         self.utc, self.phases, self.located = utc, phases, located
 
     def copy(self) -> "ValueBox":
-        """The same box, to be changed."""
+        """Return a copy that may be changed."""
         return ValueBox(
             dict(self.cells),
             dict(self.forms),
@@ -51,26 +54,26 @@ class ValueBox:
         )
 
     def with_cell(self, cell: Cell, value: Value) -> "ValueBox":
-        """The same with another value in a cell."""
+        """Return a copy with another value of a cell."""
         made = self.copy()
         made.cells[cell] = value
         return made
 
     def with_form(self, form: Form, value: Value) -> "ValueBox":
-        """The same with another value of a sum."""
+        """Return a copy with another value of a sum."""
         made = self.copy()
         made.forms[form] = value
         return made
 
     def with_side(self, side: tuple[Who, int], truth: Truth) -> "ValueBox":
-        """The same with a place on one side of a zone's boundary."""
+        """Return a copy with a place on one side of a zone's boundary."""
         made = self.copy()
         made.sides[side] = truth
         return made
 
 
 def clipped(value: Value, low: int, high: int) -> Value | None:
-    """What of a value is in `low`..`high`; None where nothing is. Being missing is left as it is."""
+    """Return the part of a value within `low`..`high`; None if it is empty. Whether it is missing does not change."""
     least, most, gap, elements = value
     if least >= low and most <= high:
         return value
@@ -82,7 +85,7 @@ def clipped(value: Value, low: int, high: int) -> Value | None:
 
 
 def chosen(value: Value, wanted: frozenset[int], *, belongs: bool) -> Value | None:
-    """What of an enumeration's or a zone's value belongs to a set, or does not; None where nothing does."""
+    """Return the part of an enumeration's or a zone's value inside (`belongs`) or outside a set; None if empty."""
     low, high, gap, elements = value
     every = frozenset(range(low, high + 1)) if elements is None else elements
     kept = every & wanted if belongs else every - wanted
@@ -90,23 +93,23 @@ def chosen(value: Value, wanted: frozenset[int], *, belongs: bool) -> Value | No
 
 
 def present(value: Value) -> Value:
-    """The same, surely there."""
+    """Return the value as certainly present."""
     return (value[0], value[1], PRESENT, value[3])
 
 
 def absent(value: Value) -> Value:
-    """Surely missing."""
+    """Return the value as certainly missing."""
     return (value[0], value[1], ABSENT, None)
 
 
-#: the moments after one and up to another at which something about the time changes
+#: yields the times after the first argument, up to the second, at which the value of a condition changes
 Cuts: TypeAlias = Callable[[int, int], Iterator[int]]
 
 
 def moments_split(box: ValueBox, where: Cuts) -> list[ValueBox]:
-    """The box with the first half of its intervals and with the other; a single interval is cut.
+    """Split a box into the two halves of its time intervals; a single interval is split at a cut.
 
-    One that nothing cuts is halved: what a clock's error leaves open is decided by a moment.
+    An interval without a cut is halved: a short enough interval decides a condition that the clock's error leaves open.
     """
     if len(box.utc) > 1:
         half = len(box.utc) // 2
@@ -122,12 +125,12 @@ def _with_moments(box: ValueBox, utc: tuple[Span, ...]) -> ValueBox:
     return made
 
 
-#: how often sums and parts tighten each other; bounds that creep are left to the search
+#: most rounds of tightening sums and parts; the search handles bounds that converge slowly
 _ROUNDS = 6
 
 
 def narrow(box: ValueBox, plane: Plane) -> bool:
-    """Tighten a box in place; False where nothing is in it."""
+    """Tighten a box in place. Returns False if it is empty."""
     return _sums(box) and _zones(box, plane)
 
 
@@ -138,7 +141,7 @@ def _sums(box: ValueBox) -> bool:
         changed = False
         for form in box.forms:
             if any(box.cells[term.argument, term.at][2] for term in form):
-                continue  # a sum that may be missing says nothing of its parts
+                continue  # a sum that may be missing does not bound its parts
             outcome = _tighten(box, form)
             if outcome is None:
                 return False
@@ -149,7 +152,7 @@ def _sums(box: ValueBox) -> bool:
 
 
 def _tighten(box: ValueBox, form: Form) -> bool | None:
-    """Whether anything became smaller; None where nothing is left."""
+    """Tighten one sum and its parts. Returns whether a value became smaller, or None if one is empty."""
     ends = [_ends(box.cells[term.argument, term.at], term.factor) for term in form]
     low, high = sum(end[0] for end in ends), sum(end[1] for end in ends)
     value = clipped(box.forms[form], low, high)
@@ -177,7 +180,7 @@ def _ends(value: Value, factor: int) -> tuple[int, int]:
 
 
 def _zones(box: ValueBox, plane: Plane) -> bool:
-    """Follow the sides that are decided: within one, within all around it and outside all apart from it."""
+    """Derive further sides: a place inside a zone is inside all zones around it and outside all disjoint ones."""
     waiting = [key for key, side in box.sides.items() if side in (TRUE, FALSE)]
     if len(box.sides) < 2:
         return True
@@ -199,7 +202,7 @@ def _zones(box: ValueBox, plane: Plane) -> bool:
 
 
 def _implied(plane: Plane, zone: int, other: int, *, inside: bool) -> Truth:
-    """On which side of another zone a place inside, or outside, of a zone must be; 0: on any."""
+    """Return the side of another zone on which a place inside (or outside) a zone must be; 0 if both are possible."""
     if not inside:
         return FALSE if plane.within(other, zone) else 0
     if plane.within(zone, other):

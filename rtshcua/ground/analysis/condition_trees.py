@@ -1,4 +1,4 @@
-"""Conditions as trees: always and never true, their atoms, the same with other atoms, their conjuncts and conflicts."""
+"""Helpers for trees of conditions: constants, atoms, conjuncts and minimal conflicts."""
 
 from collections.abc import Callable, Iterator, Sequence
 from typing import Final, TypeVar
@@ -12,7 +12,7 @@ NEVER: Final = tree.AtMost((), -1)
 
 
 def signed_atoms(node: tree.Node, positive: bool = True) -> Iterator[tuple[tree.Atom, bool]]:
-    """The atoms of a condition, from left to right, and whether an even number of `not` stands before each."""
+    """Yield the atoms of a condition from left to right, each with whether it is under an even number of `not`."""
     match node:
         case tree.Both(left, right) | tree.Either(left, right):
             yield from signed_atoms(left, positive)
@@ -24,7 +24,7 @@ def signed_atoms(node: tree.Node, positive: bool = True) -> Iterator[tuple[tree.
 
 
 def replace_atoms(node: tree.Node, atom: Callable[[tree.Atom, bool], tree.Node], positive: bool = True) -> tree.Node:
-    """The condition with what `atom` gives for each atom; it is told whether an even number of `not` stands before."""
+    """Replace each atom by `atom(node, positive)`; `positive` is whether it is under an even number of `not`."""
     match node:
         case tree.Both(left, right):
             return tree.Both(replace_atoms(left, atom, positive), replace_atoms(right, atom, positive))
@@ -37,7 +37,7 @@ def replace_atoms(node: tree.Node, atom: Callable[[tree.Atom, bool], tree.Node],
 
 
 def conjuncts(condition: Condition, node: tree.Node) -> Iterator[tuple[Condition, tree.Node]]:
-    """In source order; a condition that is no `and` is its own and only conjunct."""
+    """Yield the conjuncts in source order. A condition without `and` is its own only conjunct."""
     operands = condition.operands if isinstance(condition, Junction) and condition.operator == "and" else ()
     nodes: list[tree.Node] = []
     rest = node
@@ -55,9 +55,9 @@ _T = TypeVar("_T")
 
 
 def minimal_conflict(parts: Sequence[_T], impossible: Callable[[list[_T]], bool]) -> list[_T]:
-    """A subset of parts which are impossible together, such that without any one of them they are not proved to be.
+    """Return a minimal subset of parts that are impossible together.
 
-    By deletion: each part is left out if the others are impossible without it.
+    A part is deleted if the others are impossible without it.
     """
     kept = list(parts)
     for part in parts:

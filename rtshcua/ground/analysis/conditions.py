@@ -1,5 +1,6 @@
-"""Conditions over boxes: atoms, joined by Kleene's connectives. Each says which truths it may have in a box; an atom
-that a box leaves undecided says how the box is split.
+"""Conditions over boxes: atoms, joined by Kleene's connectives.
+
+Each condition returns its possible truth values in a box. An atom that a box leaves undecided splits the box.
 """
 
 from abc import ABC, abstractmethod
@@ -30,29 +31,29 @@ MOST = 2 * MAX_MAGNITUDE
 
 
 class Atom(ABC):
-    """One atom. `split` gives boxes that together are the box; at least two, or one that is smaller."""
+    """An atomic condition."""
 
     @abstractmethod
     def enter(self, box: ValueBox, space: SituationSpace) -> None:
-        """Put what the atom reads into the box that a search begins with."""
+        """Add everything that the atom reads to the first box of a search."""
 
     @abstractmethod
     def truth(self, box: ValueBox) -> Truth:
-        """All truths that the atom may have in the box."""
+        """Return all truth values that the atom may have in the box."""
 
     @abstractmethod
     def split(self, box: ValueBox) -> list[ValueBox]:
-        """The box in pieces, in which the atom is nearer to being decided."""
+        """Split a box that leaves the atom undecided into at least two boxes, or return a single smaller box."""
 
 
 def initial(cell: Cell, space: SituationSpace) -> Value:
-    """What a space says of a cell."""
+    """Return the value of a cell in a space."""
     argument, index = cell
     return space.arguments[index] if argument else space.slots[index]
 
 
 def whether_there(box: ValueBox, cells: tuple[Cell, ...]) -> list[ValueBox]:
-    """The box split by whether the first of some cells is there that may be missing; nothing where all are decided."""
+    """Split a box by whether the first cell that may be missing is present; empty if there is no such cell."""
     for cell in cells:
         value = box.cells[cell]
         if value[2] == MAYBE:
@@ -61,7 +62,7 @@ def whether_there(box: ValueBox, cells: tuple[Cell, ...]) -> list[ValueBox]:
 
 
 class LinearAtom(Atom):
-    """A sum is in `low`..`high`; one of a single cell is about that cell, any other about a form."""
+    """A sum is in `low`..`high`. A sum of one cell reads that cell, any other a form."""
 
     def __init__(self, terms: tuple[tree.LinearTerm, ...], low: int, high: int) -> None:
         self._cells: tuple[Cell, ...] = tuple((term.argument, term.at) for term in terms)
@@ -82,14 +83,14 @@ class LinearAtom(Atom):
             self._form = tuple(term._replace(factor=term.factor // scale) for term in moving)
 
     def enter(self, box: ValueBox, space: SituationSpace) -> None:
-        """Its cells, and the sum's bounds."""
+        """Add its cells and its sum."""
         for cell in self._cells:
             box.cells.setdefault(cell, initial(cell, space))
         if self._form:
             box.forms.setdefault(self._form, (-MOST, MOST, 0, None))
 
     def truth(self, box: ValueBox) -> Truth:
-        """Whether the sum is in the bounds, where nothing of it is missing."""
+        """Whether the sum is in the bounds; unknown if a part is missing."""
         gap = max(box.cells[cell][2] for cell in self._cells) if self._cells else 0
         return known(self._inside(box), gap)
 
@@ -111,7 +112,7 @@ class LinearAtom(Atom):
         return TRUE | FALSE
 
     def split(self, box: ValueBox) -> list[ValueBox]:
-        """First by what is missing, then below, within and above the bounds."""
+        """Split by missing cells, then below, within and above the bounds."""
         pieces = whether_there(box, self._cells)
         if pieces:
             return pieces
@@ -132,7 +133,7 @@ class MemberAtom(Atom):
         self._cell, self._wanted = cell, wanted
 
     def enter(self, box: ValueBox, space: SituationSpace) -> None:
-        """Its cell."""
+        """Add its cell."""
         box.cells.setdefault(self._cell, initial(self._cell, space))
 
     def truth(self, box: ValueBox) -> Truth:
@@ -144,7 +145,7 @@ class MemberAtom(Atom):
         return known((TRUE if some else 0) | (FALSE if others else 0), value[2])
 
     def split(self, box: ValueBox) -> list[ValueBox]:
-        """By whether it is there, then by whether it belongs."""
+        """Split by whether the cell is present, then by whether it belongs to the set."""
         pieces = whether_there(box, (self._cell,))
         if pieces:
             return pieces
@@ -165,32 +166,32 @@ class LocalTimeAtom(Atom):
         self._error = space.error
 
     def enter(self, box: ValueBox, space: SituationSpace) -> None:
-        """Nothing: every box has its moments."""
+        """Add nothing: every box has its times."""
 
     def truth(self, box: ValueBox) -> Truth:
-        """Whether the moments are in the window."""
+        """Whether the times are in the window."""
         return self._window.truth(box.utc, self._error)
 
     def split(self, box: ValueBox) -> list[ValueBox]:
-        """At the ends of the window."""
+        """Split at the ends of the window."""
         return moments_split(box, self._window.changes)
 
 
 class PhaseAtom(Atom):
-    """The phase is one of some."""
+    """The phase belongs to a set."""
 
     def __init__(self, wanted: frozenset[int]) -> None:
         self._wanted = wanted
 
     def enter(self, box: ValueBox, space: SituationSpace) -> None:
-        """Nothing: every box has its phases."""
+        """Add nothing: every box has its phases."""
 
     def truth(self, box: ValueBox) -> Truth:
-        """Whether the phase belongs to them."""
+        """Whether the phase belongs to the set."""
         return (TRUE if box.phases & self._wanted else 0) | (FALSE if box.phases - self._wanted else 0)
 
     def split(self, box: ValueBox) -> list[ValueBox]:
-        """Those and the others."""
+        """Split into the phases of the set and the others."""
         pieces: list[ValueBox] = []
         for part in (box.phases & self._wanted, box.phases - self._wanted):
             made = box.copy()
@@ -200,21 +201,21 @@ class PhaseAtom(Atom):
 
 
 class MonitorAtom(Atom):
-    """What a temporal monitor says: anything, whatever it watches."""
+    """The value of a temporal monitor. It is treated as independent of the monitored condition."""
 
     def __init__(self, number: int) -> None:
         self._number = number
 
     def enter(self, box: ValueBox, space: SituationSpace) -> None:
-        """Its truths."""
+        """Add the monitor's possible truth values."""
         box.monitors.setdefault(self._number, space.monitors[self._number])
 
     def truth(self, box: ValueBox) -> Truth:
-        """Its truths."""
+        """Return the monitor's possible truth values."""
         return box.monitors[self._number]
 
     def split(self, box: ValueBox) -> list[ValueBox]:
-        """One piece a truth."""
+        """Split by truth value."""
         pieces: list[ValueBox] = []
         for single in (TRUE, FALSE, UNKNOWN):
             if box.monitors[self._number] & single:
@@ -225,7 +226,7 @@ class MonitorAtom(Atom):
 
 
 class ZoneExistence:
-    """The times of one zone."""
+    """The times at which a zone exists."""
 
     def __init__(self, zone: int, space: SituationSpace) -> None:
         flat = space.plane.zone(zone)
@@ -240,7 +241,7 @@ class ZoneExistence:
         return self._times.truth(box.utc, self._error, 0) if self._timed else TRUE
 
     def split(self, box: ValueBox) -> list[ValueBox]:
-        """The box in pieces, where its moments do not decide; else none."""
+        """Split a box whose times leave the existence undecided; otherwise return an empty list."""
         truth = self.truth(box)
         return moments_split(box, self._cuts) if truth & (truth - 1) else []
 
@@ -254,21 +255,21 @@ _BEYOND = 1 << 62
 
 
 def enter_side(box: ValueBox, space: SituationSpace, who: Who, zone: int, x: Value, y: Value) -> None:
-    """Put into a box on which sides of a zone's boundary a place may be."""
+    """Add the possible sides of a place and a zone to a box."""
     if (who, zone) not in box.sides:
         west, east, south, north = x[0], x[1], y[0], y[1]
         box.sides[who, zone] = space.tables.zones[zone].along((west, south), (0, 0, east - west, north - south))
 
 
 class PointInZone(Atom):
-    """A place that was given is inside a zone, at any height."""
+    """A place argument is inside a zone, at any height."""
 
     def __init__(self, cell: int, zone: int, space: SituationSpace) -> None:
         self._cell, self._zone = cell, zone
         self._existing = ZoneExistence(zone, space)
 
     def enter(self, box: ValueBox, space: SituationSpace) -> None:
-        """The zone's sides."""
+        """Add the sides of the place and the zone."""
         x, y = space.arguments[self._cell], space.arguments[self._cell + 1]
         enter_side(box, space, self._cell, self._zone, x, y)
 
@@ -277,12 +278,12 @@ class PointInZone(Atom):
         return AND[self._existing.truth(box)][box.sides[self._cell, self._zone]]
 
     def split(self, box: ValueBox) -> list[ValueBox]:
-        """By the zone's existence, then by its sides."""
+        """Split by the zone's existence, then by the sides."""
         return self._existing.split(box) or sides_split(box, self._cell, self._zone)
 
 
 def sides_split(box: ValueBox, who: Who, zone: int) -> list[ValueBox]:
-    """The box with a place inside, and with it outside."""
+    """Split a box into one with a place inside a zone and one with it outside."""
     return [box.with_side((who, zone), side) for side in (TRUE, FALSE)]
 
 
@@ -296,20 +297,20 @@ class VehicleInZone(Atom):
         self._existing = ZoneExistence(zone, space)
 
     def enter(self, box: ValueBox, space: SituationSpace) -> None:
-        """Where the vehicle is, and how high."""
+        """Add the position and the height of the vehicle."""
         box.cells.setdefault(self._height, initial(self._height, space))
         x, y = space.slots[space.tables.known.x], space.slots[space.tables.known.y]
         box.located = max(x[2], y[2])
         enter_side(box, space, VEHICLE, self._zone, x, y)
 
     def truth(self, box: ValueBox) -> Truth:
-        """Whether the vehicle is inside, as far as position and height tell."""
+        """Whether the vehicle is inside, by its position and height, while the zone exists."""
         low, high, gap, _ = box.cells[self._height]
         across = known(box.sides[VEHICLE, self._zone], box.located)
         return AND[self._existing.truth(box)][AND[self._prepared.between(low, high, gap)][across]]
 
     def split(self, box: ValueBox) -> list[ValueBox]:
-        """By what is missing, by floor and ceiling, by the zone's existence, then by its sides."""
+        """Split by missing values, by floor and ceiling, by the sides, then by the zone's existence."""
         if box.located == MAYBE:
             there, missing = box.copy(), box.copy()
             there.located, missing.located = PRESENT, ABSENT
@@ -328,7 +329,7 @@ class VehicleInZone(Atom):
 
 
 class KnownAtom(Atom):
-    """A slot has a value. Whether the vehicle's position does, its box keeps for all zones together."""
+    """A slot has a value. A box has one such value for the whole position, shared by all zones."""
 
     def __init__(self, slot: int, space: SituationSpace) -> None:
         known = space.tables.known
@@ -336,19 +337,19 @@ class KnownAtom(Atom):
         self._cells: tuple[Cell, ...] = ((False, known.x), (False, known.y)) if self._located else ((False, slot),)
 
     def enter(self, box: ValueBox, space: SituationSpace) -> None:
-        """The slot; of the position both."""
+        """Add the slot, or both slots of the position."""
         for cell in self._cells:
             box.cells.setdefault(cell, initial(cell, space))
         if self._located:
             box.located = max(space.slots[index][2] for _, index in self._cells)
 
     def truth(self, box: ValueBox) -> Truth:
-        """True where it is there, else unknown."""
+        """True if the value is present, unknown if it is missing."""
         gap = box.located if self._located else box.cells[self._cells[0]][2]
         return TRUE if gap == PRESENT else UNKNOWN if gap == ABSENT else TRUE | UNKNOWN
 
     def split(self, box: ValueBox) -> list[ValueBox]:
-        """By whether it is there."""
+        """Split by whether the value is present."""
         there, missing = box.copy(), box.copy()
         for cell in self._cells:
             there.cells[cell], missing.cells[cell] = present(box.cells[cell]), absent(box.cells[cell])
@@ -358,7 +359,7 @@ class KnownAtom(Atom):
 
 
 class VehicleInArgumentZone(Atom):
-    """The vehicle is inside the zone that a table gives for a zone that was given."""
+    """The vehicle is inside the zone that a table assigns to a zone argument."""
 
     def __init__(self, cell: int, table: tuple[int, ...], space: SituationSpace) -> None:
         self._cell: Cell = (True, cell)
@@ -367,13 +368,13 @@ class VehicleInArgumentZone(Atom):
         self._each = {zone: VehicleInZone(table[zone], space) for zone in every if 0 <= zone < len(table)}
 
     def enter(self, box: ValueBox, space: SituationSpace) -> None:
-        """The zone that was given, and where the vehicle is with each that it may be."""
+        """Add the argument, and the values for each zone that it may be."""
         box.cells.setdefault(self._cell, initial(self._cell, space))
         for atom in self._each.values():
             atom.enter(box, space)
 
     def truth(self, box: ValueBox) -> Truth:
-        """All truths for all zones that may have been given."""
+        """Return the truth values for all zones that the argument may be."""
         truth = 0
         for zone in self._zones(box):
             atom = self._each.get(zone)
@@ -381,7 +382,7 @@ class VehicleInArgumentZone(Atom):
         return truth
 
     def split(self, box: ValueBox) -> list[ValueBox]:
-        """By the zone that was given, then by where the vehicle is."""
+        """Split by the argument, then by the place of the vehicle."""
         zones = self._zones(box)
         if len(zones) == 1:
             return self._each[zones[0]].split(box)
@@ -403,11 +404,11 @@ class NotCondition:
         self.operand = operand
 
     def truth(self, box: ValueBox) -> Truth:
-        """All truths that it may have in the box."""
+        """Return all truth values that it may have in the box."""
         return NOT[self.operand.truth(box)]
 
     def undecided(self, box: ValueBox) -> Atom:
-        """An atom that is to blame where it has more than one truth."""
+        """Return an atom that leaves the condition undecided."""
         return undecided(self.operand, box)
 
 
@@ -421,12 +422,12 @@ class Pair:
         self._table, self._decisive = (AND, FALSE) if both else (OR, TRUE)
 
     def truth(self, box: ValueBox) -> Truth:
-        """All truths that it may have in the box."""
+        """Return all truth values that it may have in the box."""
         left = self.left.truth(box)
         return left if left == self._decisive else self._table[left][self.right.truth(box)]
 
     def undecided(self, box: ValueBox) -> Atom:
-        """An atom that is to blame where it has more than one truth."""
+        """Return an atom that leaves the condition undecided."""
         left = self.left.truth(box)
         return undecided(self.left if left & (left - 1) else self.right, box)
 
@@ -435,12 +436,12 @@ Condition: TypeAlias = NotCondition | Pair | Atom
 
 
 def undecided(condition: Condition, box: ValueBox) -> Atom:
-    """An atom to split by, for a condition that has more than one truth in the box."""
+    """Return an atom by which to split a box that leaves the condition undecided."""
     return condition if isinstance(condition, Atom) else condition.undecided(box)
 
 
 def over_boxes(node: tree.Node, space: SituationSpace, box: ValueBox) -> Condition:
-    """A condition for boxes; what it reads is entered into the first one."""
+    """Return a condition over boxes, and add everything that it reads to the first box."""
     match node:
         case tree.Both(left, right):
             return Pair(over_boxes(left, space, box), over_boxes(right, space, box), both=True)
@@ -476,5 +477,5 @@ def _atom(node: tree.Node, space: SituationSpace) -> Atom:
             return MonitorAtom(monitor)
         case tree.InWindow() | tree.InWeek():
             return LocalTimeAtom(node, space)
-        case _:  # a connective, which is no atom
+        case _:  # a connective, not an atom
             raise AssertionError(node)

@@ -1,4 +1,4 @@
-"""What a step requires of the time of day, or of the week, at which its mission is issued, which is not known yet."""
+"""Requirements on the time of day or week at which a mission is issued, while that time is unknown."""
 
 from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
@@ -8,14 +8,14 @@ from rtshcua.diagnostics.span import Span as Where
 
 
 class Arc(NamedTuple):
-    """Moments of the day or of the week, in us of UTC: from `start` on, `length` of them."""
+    """An interval of the day or of the week in us of UTC, from `start` on, `length` us long."""
 
     start: int
     length: int
 
 
 class IssueRequirement(NamedTuple):
-    """One of these arcs of each `period` must hold all from `low` to `high` us after the issue; where it is written."""
+    """One of the arcs of a `period` must contain the time from `low` to `high` us after the issue."""
 
     arcs: tuple[Arc, ...]
     low: int
@@ -24,7 +24,7 @@ class IssueRequirement(NamedTuple):
     labels: tuple[tuple[Where, str], ...]
 
     def met(self, issue: int) -> bool:
-        """Whether that is so for a time of issue."""
+        """Whether a time of issue meets the requirement."""
         return any(
             arc.length >= self.period
             or (issue + self.low - arc.start) % self.period + self.high - self.low < arc.length
@@ -32,20 +32,23 @@ class IssueRequirement(NamedTuple):
         )
 
 
-def met_by_some(asked: Sequence[IssueRequirement]) -> bool:
-    """Whether some time of issue meets all; each is met from some moments on, so by one of these, or none."""
-    whole = max((one.period for one in asked), default=1)
+def met_by_some(requirements: Sequence[IssueRequirement]) -> bool:
+    """Whether some time of issue meets all requirements.
+
+    If one does, so does the begin of an arc: only these times are tried.
+    """
+    whole = max((one.period for one in requirements), default=1)
     issues = {0} | {
         issue % whole
-        for one in asked
+        for one in requirements
         for arc in one.arcs
         for issue in range(arc.start - one.low, arc.start - one.low + whole, one.period)
     }
-    return any(all(one.met(issue) for one in asked) for issue in issues)
+    return any(all(one.met(issue) for one in requirements) for issue in issues)
 
 
 def arcs_where(edges: Iterable[int], holds: Callable[[int], bool], period: int) -> tuple[Arc, ...]:
-    """When in a day or a week something holds that changes at some moments of it only."""
+    """Return the arcs of a day or week on which a condition holds that changes only at the `edges`."""
     ordered = sorted({edge % period for edge in edges})
     if not ordered:
         return (Arc(0, period),) if holds(0) else ()

@@ -1,7 +1,7 @@
-"""How far a condition reaches: bounds outside of which it cannot hold, and the conjunction that it is; and of many such
-bounds those that enclose others, by a k-d tree.
+"""Bounds outside which a condition cannot hold, conditions as alternatives of conjunctions, and a k-d tree of bounds.
 
-What many rules have in common is asked of these first, for comparing numbers costs a thousandth of a search over boxes.
+The comparison of many rules tries bounds first: comparing numbers takes a thousandth of the time of a search over
+boxes.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -16,40 +16,41 @@ from rtshcua.ground.analysis.box import Cell
 from rtshcua.model.flat.limits import MAX_MAGNITUDE
 from rtshcua.model.flat.zone import AREA, CIRCLE, Zone
 
-#: beyond every value
+#: a number beyond every value
 FAR: Final = 4 * MAX_MAGNITUDE
-#: of each cell that is named, the least and the greatest value; of any other, any
+#: the least and the greatest value of cells; other cells are unbounded
 Bounds: TypeAlias = Mapping[Cell, tuple[int, int]]
-#: the phase, as if it were a state slot
+#: the phase, treated as a state slot
 PHASE: Final[Cell] = (False, -1)
-#: the parts of an `or` beyond which their common bounds do
+#: most parts of an `or` that are kept apart; more are replaced by their common bounds
 _PARTS = 8
 
 
 class OtherCondition(NamedTuple):
-    """A condition that is no bounds. Its kind is told in `words`: nodes of two kinds with the same fields are equal."""
+    """A condition that is not a bound. `text` tells its kind: nodes of two kinds with the same fields are equal."""
 
-    words: str
+    text: str
     node: tree.Node
 
 
 class Conjunction(NamedTuple):
-    """Bounds that must hold, and other conditions that must."""
+    """Bounds and other conditions that must hold together."""
 
     bounds: Bounds
     others: frozenset[OtherCondition]
 
 
 def alternatives(node: tree.Node) -> tuple[Conjunction, ...]:
-    """Conjunctions of which a condition is exactly the `or`, also where something is unknown. Bounds that leave nothing
-    are kept, for what they are about may be missing.
+    """Return conjunctions whose `or` equals a condition, also if a value is unknown.
+
+    Empty bounds are kept, because their value may be missing.
     """
     found = _alternatives(node, holds=True)
     return (Conjunction({}, frozenset((OtherCondition(repr(node), node),))),) if found is None else tuple(found)
 
 
 def _alternatives(node: tree.Node, *, holds: bool) -> list[Conjunction] | None:
-    """The alternatives of a condition, or of its `not`; None where there are too many."""
+    """Return the alternatives of a condition, or of its negation if not `holds`; None if there are too many."""
     match node:
         case tree.Negation(operand):
             return _alternatives(operand, holds=not holds)
@@ -71,7 +72,7 @@ def _alternatives(node: tree.Node, *, holds: bool) -> list[Conjunction] | None:
 
 
 class Extents:
-    """The extents of conditions over the zones and sets of a policy."""
+    """Computes bounds of conditions over the zones and sets of a policy."""
 
     def __init__(self, tables: Tables, zones: tuple[Zone, ...]) -> None:
         self._tables = tables
@@ -79,8 +80,10 @@ class Extents:
         self._around: dict[int, tuple[int, int, int, int]] = {}
 
     def parts(self, node: tree.Node) -> list[Bounds]:
-        """Bounds in one of which every situation lies in which the condition is true; where what it reads is missing it
-        may be unknown too, in what is left of them. None at all where it cannot be true.
+        """Return bounds such that every situation in which the condition is true lies in one of them.
+
+        Missing values are ignored: where one is missing, the condition may be unknown within the bounds of the others.
+        Returns an empty list if the condition cannot be true.
         """
         return self._parts(node, holds=True)
 
@@ -121,7 +124,7 @@ class Extents:
 
 
 def _zone_bounds(zone: Zone) -> tuple[int, int, int, int]:
-    """West, south, east and north of a zone's ground plan."""
+    """Return west, south, east and north of a zone's ground plan."""
     if zone.shape == CIRCLE:
         x, y, square = zone.data
         reach = isqrt(square) + 1
@@ -135,7 +138,7 @@ def _hull(cell: Cell, members: frozenset[int]) -> Bounds:
 
 
 def _interval(node: tree.Node) -> tuple[Cell, int, int] | None:
-    """The one cell that a comparison is about, and its bounds; None for any other condition."""
+    """Return the cell of a comparison of one cell, and its bounds; None for any other condition."""
     match node:
         case tree.AtMost(terms, bound) if len(terms) == 1 and terms[0].factor:
             return _solved(terms[0], -FAR, bound)
@@ -148,7 +151,7 @@ def _interval(node: tree.Node) -> tuple[Cell, int, int] | None:
 
 
 def _sum_bounds(terms: tuple[tree.LinearTerm, ...], low: int, high: int) -> list[Bounds]:
-    """The bounds of a sum in `low`..`high`; any, where it is of several cells."""
+    """Return the bounds of a sum in `low`..`high`. A sum of several cells is unbounded."""
     moving = [term for term in terms if term.factor]
     if len(moving) != 1:
         return [{}]
@@ -157,7 +160,7 @@ def _sum_bounds(terms: tuple[tree.LinearTerm, ...], low: int, high: int) -> list
 
 
 def _solved(term: tree.LinearTerm, low: int, high: int) -> tuple[Cell, int, int]:
-    """The cell of a term, and between what its value is where the term is in `low`..`high`."""
+    """Return the cell of a term, and the bounds of its value if the term is in `low`..`high`."""
     size = abs(term.factor)
     if term.factor < 0:
         low, high = -high, -low
@@ -166,7 +169,7 @@ def _solved(term: tree.LinearTerm, low: int, high: int) -> tuple[Cell, int, int]
 
 
 def _overlap(one: Bounds, other: Bounds) -> dict[Cell, tuple[int, int]]:
-    """Both bounds of each cell."""
+    """Return the intersection of two bounds, which may be empty."""
     made = dict(one)
     for cell, (low, high) in other.items():
         least, most = made.get(cell, (-FAR, FAR))
@@ -175,13 +178,13 @@ def _overlap(one: Bounds, other: Bounds) -> dict[Cell, tuple[int, int]]:
 
 
 def _common(one: Bounds, other: Bounds) -> Bounds | None:
-    """What two have in common; None where nothing is."""
+    """Return the intersection of two bounds, or None if it is empty."""
     made = _overlap(one, other)
     return None if any(low > high for low, high in made.values()) else made
 
 
 def _few(parts: list[Bounds]) -> list[Bounds]:
-    """The parts; where there are very many, what is around them all."""
+    """Return the parts, or their common bounds if there are more than `_PARTS`."""
     if len(parts) <= _PARTS:
         return parts
     cells = set(parts[0]).intersection(*parts[1:])
@@ -194,7 +197,10 @@ _LEAF = 8
 
 
 class _Node:
-    """Some entries, or two nodes: the greatest number on each side, and the first and the last that are there."""
+    """A leaf with entries, or an inner node with two children.
+
+    `most` is the greatest number on each side; `first` and `last` are the least and the greatest entry below the node.
+    """
 
     __slots__ = ("children", "entries", "first", "last", "most", "parent")
 
@@ -215,7 +221,7 @@ class _Node:
         self.children = tuple(_Node(part, self, side + 1) for part in (entries[:middle], entries[middle:]))
 
     def _side(self, entries: list[tuple[int, Row]], depth: int) -> int | None:
-        """The side by which the entries are parted, each in its turn; None where all are alike."""
+        """Return the side by which to divide the entries, in rotation; None if all entries are equal."""
         sides = len(self.most)
         for turn in range(sides):
             side = (depth + turn) % sides
@@ -224,7 +230,7 @@ class _Node:
         return None
 
     def without(self, number: int) -> None:
-        """Take out an entry, and say so above."""
+        """Remove an entry, and update the nodes above."""
         del self.entries[number]
         node: _Node | None = self
         while node is not None:
@@ -238,7 +244,7 @@ class _Node:
 
 
 class EnclosingBoxes:
-    """The rows of numbered boxes; one number may have several. What was removed is not found any more."""
+    """A k-d tree of numbered boxes. A number may have several boxes."""
 
     def __init__(self, entries: Sequence[tuple[int, Row]]) -> None:
         self._root = _Node(list(entries), None, 0) if entries else None
@@ -251,12 +257,12 @@ class EnclosingBoxes:
                 self._leaves.setdefault(number, {})[node] = None
 
     def remove(self, number: int) -> None:
-        """Forget a box, if it is there."""
+        """Remove the boxes of a number, if there are any."""
         for leaf in self._leaves.pop(number, ()):
             leaf.without(number)
 
     def around(self, row: Row, after: int = -1) -> Iterator[int]:
-        """The numbers above `after` of the boxes that enclose a row, the least first, each once."""
+        """Yield the numbers above `after` of the boxes that enclose a row, in ascending order, each once."""
         heap: list[tuple[int, int, _Node | None]] = []
         count = 0
         last = after

@@ -1,4 +1,4 @@
-"""How the zones of a policy lie in the plane, and places that show it."""
+"""The relations of a policy's zones in the plane, and places with given relations to them."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import isqrt
@@ -9,9 +9,9 @@ from rtshcua.ground.geometry.polygons import Point, Ring
 from rtshcua.ground.geometry.shapes import Region, are_disjoint, bounds, lies_within, shape_of
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, MAX_COORDINATE, Zone
 
-#: straight pieces of a quarter circle, where floats draw one
+#: segments of a quarter circle in shapely
 _QUARTER = 64
-#: grid divisions per axis for the point search that is tried before shapely
+#: grid divisions per axis for the point search before shapely
 _GRID = 8
 _FAR: tuple[Point, ...] = (
     (0, 0),
@@ -21,7 +21,7 @@ _BESIDE = tuple((x, y) for x in (0, -1, 1, -2, 2) for y in (0, -1, 1, -2, 2))
 
 
 class _Prepared(Protocol):
-    """A zone that says whether it contains a place of the plane."""
+    """A zone whose shape can decide whether it contains a point."""
 
     @property
     def shape(self) -> "_Shape": ...
@@ -32,7 +32,7 @@ class _Shape(Protocol):
 
 
 class Plane:
-    """The ground plans of a policy's zones, by index; heights and times do not count here."""
+    """The ground plans of a policy's zones, by index. Heights and times are ignored."""
 
     def __init__(self, zones: Sequence[Zone], prepared: Sequence[_Prepared]) -> None:
         self._zones = zones
@@ -43,15 +43,15 @@ class Plane:
         self._found: dict[tuple[tuple[int, bool], ...], Point | None] = {}
 
     def zone(self, number: int) -> Zone:
-        """A zone as the policy has it."""
+        """Return a zone of the policy."""
         return self._zones[number]
 
     def within(self, inner: int, outer: int) -> bool:
-        """Whether it is proved that all of one zone belongs to another."""
+        """Whether it is proved that one zone lies within another."""
         return inner == outer or self._related(self._within, inner, outer, lies_within)
 
     def apart(self, one: int, other: int) -> bool:
-        """Whether it is proved that two zones have no place in common."""
+        """Whether it is proved that two zones are disjoint."""
         return one != other and self._related(self._apart, min(one, other), max(one, other), are_disjoint)
 
     def _related(
@@ -74,7 +74,7 @@ class Plane:
         return self._shapes[zone].shape.contains(*place)
 
     def place(self, sides: Mapping[int, bool], allowed: Callable[[Point], bool]) -> Point | None:
-        """A place that is inside each zone that `sides` says True of and outside all others; None: none was found."""
+        """Return a place inside the zones with True in `sides` and outside those with False; None if none is found."""
         key = tuple(sorted(sides.items()))
         if key not in self._found:
             self._found[key] = None
@@ -113,8 +113,9 @@ class Plane:
 
 
 def _inner(zones: Sequence[Zone], inside: list[int], outside: list[int]) -> Iterator[Point]:
-    """Places within what is left of some zones without others: one in each part, the largest part first. Floats find
-    them: each is only a guess, to be verified.
+    """Yield a place in each part of the intersection of zones without others, the largest part first.
+
+    Shapely computes them with floats, so the caller must verify each place.
     """
     import shapely  # noqa: PLC0415  it is slow to import
 
@@ -123,7 +124,7 @@ def _inner(zones: Sequence[Zone], inside: list[int], outside: list[int]) -> Iter
             x, y, square = zone.data
             return shapely.Point(x, y).buffer(square**0.5, quad_segs=_QUARTER)
         found = shapely.Polygon()
-        for ring in rings_of(zone):  # a hole takes away from what is around it, a part in a hole adds
+        for ring in rings_of(zone):  # a hole removes area, a part in a hole adds it again
             found = found.symmetric_difference(shapely.Polygon(ring))
         return found
 
@@ -139,18 +140,18 @@ def _inner(zones: Sequence[Zone], inside: list[int], outside: list[int]) -> Iter
 
 
 def _exact_region(zone: Zone) -> Region | None:
-    """The ground plan of a zone for the exact relations; None for a circle whose radius is no whole number."""
+    """Return the ground plan of a zone for the exact relations; None for a circle without an integer radius."""
     shape = shape_of(zone)
     return None if shape is None else Region(shape, LOWEST, HIGHEST)
 
 
 def rings_of(zone: Zone) -> tuple[Ring, ...]:
-    """The rings of a zone that is no circle."""
+    """Return the rings of a zone that is not a circle."""
     return tuple(outline(zone))
 
 
 def _bounds(zone: Zone) -> tuple[int, int, int, int]:
-    """West, south, east, north of a zone."""
+    """Return west, south, east and north of a zone."""
     region = _exact_region(zone)
     if region is not None:
         return bounds(region.shape)

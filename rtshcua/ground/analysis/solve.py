@@ -1,6 +1,4 @@
-"""Branch and bound over boxes, as the package's docstring describes it; questions about one policy, with the answers
-remembered; and whether a `confirm` rule can match a step at all.
-"""
+"""Branch and bound over boxes, as the package's docstring describes it, and a cache of questions about one policy."""
 
 from collections.abc import Callable, Hashable, Sequence
 from typing import Final, NamedTuple, TypeAlias
@@ -15,25 +13,25 @@ from rtshcua.ground.analysis.plane import Plane
 from rtshcua.ground.analysis.space import SituationSpace, space_of
 from rtshcua.ground.analysis.witness import Witness, halves, witness
 
-#: boxes that are looked at before a question is given up
+#: most boxes of a question before it stays undecided
 BUDGET: Final = 4_000
 
-#: a condition and the truths that will do
+#: a condition and its wanted truth values
 Goal: TypeAlias = tuple[tree.Node, Truth]
 
 
 class Yes(NamedTuple):
-    """There is a situation: this one."""
+    """There is a situation, the witness."""
 
     witness: Witness
 
 
 class No(NamedTuple):
-    """There is none."""
+    """It is proved that there is no situation."""
 
 
 class Undecided(NamedTuple):
-    """Nothing was found and nothing proved; `why` says what was too hard, for a person."""
+    """No situation was found, and its absence is not proved. `why` is the reason, as text for the user."""
 
     why: str
 
@@ -42,12 +40,12 @@ Answer: TypeAlias = Yes | No | Undecided
 
 
 def satisfiable(goals: Sequence[Goal], space: SituationSpace, budget: int = BUDGET) -> Answer:
-    """Whether a situation of the space gives each condition one of its truths."""
+    """Decide whether a situation of the space gives each condition one of its wanted truth values."""
     return search(goals, space, budget)[0]
 
 
 def search(goals: Sequence[Goal], space: SituationSpace, budget: int = BUDGET) -> tuple[Answer, int]:
-    """The same, and how many boxes were looked at."""
+    """As `satisfiable`, and also return the number of boxes."""
     most = budget
     first = ValueBox({}, {}, {}, {}, space.utc, space.phases, 0)
     conditions = [(over_boxes(node, space, first), wanted) for node, wanted in goals]
@@ -56,7 +54,7 @@ def search(goals: Sequence[Goal], space: SituationSpace, budget: int = BUDGET) -
     while waiting:
         budget -= 1
         if budget < 0:
-            return Undecided("there are too many cases to tell apart"), most
+            return Undecided("there are too many cases"), most
         box = waiting.pop()
         if not narrow(box, space.plane):
             continue
@@ -69,7 +67,7 @@ def search(goals: Sequence[Goal], space: SituationSpace, budget: int = BUDGET) -
                 return Yes(found), most - budget
             pieces = halves(box)
             if found is not None or not pieces:
-                doubt = "no place was found that lies so between the zones"
+                doubt = "no place with this relation to the zones was found"
             waiting += pieces
             continue
         waiting += reversed(undecided(open_, box).split(box))
@@ -77,7 +75,7 @@ def search(goals: Sequence[Goal], space: SituationSpace, budget: int = BUDGET) -
 
 
 def _look(conditions: list[tuple[Condition, Truth]], box: ValueBox) -> tuple[bool, Condition | None]:
-    """Whether a box may hold what is looked for, and the first condition that it leaves open."""
+    """Return whether a box may contain a solution, and the first condition that it leaves undecided."""
     open_: Condition | None = None
     for condition, wanted in conditions:
         truth = condition.truth(box)
@@ -89,7 +87,7 @@ def _look(conditions: list[tuple[Condition, Truth]], box: ValueBox) -> tuple[boo
 
 
 def implies(node: tree.Node, other: tree.Node, space: SituationSpace, budget: int = BUDGET) -> Answer:
-    """`No` where `other` is true wherever `node` is; else a situation in which `node` is true and `other` not."""
+    """Return `No` if `other` is true wherever `node` is, else a situation in which only `node` is true."""
     return satisfiable([(node, TRUE), (other, FALSE | UNKNOWN)], space, budget)
 
 
@@ -102,8 +100,9 @@ class StepInstance(NamedTuple):
 
 
 class Questions:
-    """Questions about a prepared policy. `instances` are, of each mission by name, its steps for each choice of its
-    parameters so far.
+    """Questions about a prepared policy, with cached answers.
+
+    `instances` are the steps of each mission, by its name, for each choice of its parameters so far.
     """
 
     def __init__(self, prepared: PreparedPolicy) -> None:
@@ -114,7 +113,7 @@ class Questions:
         self.instances: dict[str, list[tuple[StepInstance, ...]]] = {}
 
     def space(self, skill: int) -> SituationSpace:
-        """Any situation in which a skill, by its number, may be asked for."""
+        """Return all situations in which a skill, given by its number, may be requested."""
         found = self._spaces.get(skill)
         if found is None:
             contract = self._prepared.policy.contracts[skill]
@@ -123,31 +122,31 @@ class Questions:
         return found
 
     def ask(self, key: Hashable, goals: Callable[[], Sequence[Goal]], space: SituationSpace) -> Answer:
-        """The answer to a question; `key` says all that it depends on."""
+        """Answer a question. `key` must contain everything on which the answer depends."""
         found = self._answers.get(key)
         if found is None:
-            asked = goals()
-            answer, boxes = search(asked, space)
-            found = self._answers[key] = answer, boxes * len(asked)
+            wanted = goals()
+            answer, boxes = search(wanted, space)
+            found = self._answers[key] = answer, boxes * len(wanted)
         return found[0]
 
     def effort(self, key: Hashable) -> int:
-        """What a question took that was asked, whoever asked it first: boxes times conditions."""
+        """Return the effort of an answered question, in boxes times conditions."""
         return self._answers[key][1]
 
     def again(self) -> "Questions":
-        """For another program with the same policy: it shares all answers, and has no instances yet."""
+        """Return a copy for another program with the same policy. It shares all answers, but no instances."""
         other = Questions(self._prepared)
         other._plane, other._spaces, other._answers = self._plane, self._spaces, self._answers
         return other
 
     def known(self, key: Hashable) -> Answer | None:
-        """The answer to a question, if it was asked."""
+        """Return the answer to an earlier question, or None."""
         found = self._answers.get(key)
         return None if found is None else found[0]
 
     def forget(self) -> None:
-        """As before the first question."""
+        """Clear the cache."""
         self._plane = None
         self._spaces.clear()
         self._answers.clear()
@@ -155,9 +154,7 @@ class Questions:
 
 
 def may_match(of: PreparedInvocation, number: int) -> bool:
-    """Whether the condition of this rule can be true or unknown for the step, whatever the vehicle reports and
-    whenever it flies. One that was not decided may.
-    """
+    """Whether it is not proved that the condition of a rule is false for a step in every state and at every time."""
     prepared = of.policy
     rule = prepared.policy.rules[number]
     node = prepared.compiler.when(rule)

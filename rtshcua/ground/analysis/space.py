@@ -1,4 +1,4 @@
-"""What a situation may be: the start of every search. And what a signal as it is read on board may report."""
+"""The space of possible situations, the start of every search, and the possible values of signals."""
 
 from collections.abc import Iterator, Sequence
 from itertools import chain
@@ -22,12 +22,12 @@ from rtshcua.model.quantity import Dimension
 
 
 def means_unknown(signal: Signal, value: int) -> bool:
-    """Whether the value of an enumeration is one that each of its sources lists under `unknown at`."""
+    """Whether each source of an enumeration lists the value under `unknown at`."""
     return signal.kind == ENUMERATION and all(value in source.unknown for source in signal.sources)
 
 
 def reported_range(signal: Signal, dialect: Dialect) -> Extent:
-    """From the least to the greatest value of a number; open for what is none, or is read from an unknown message."""
+    """Return the least and the greatest value of a number; open for other kinds and for unknown messages."""
     if signal.kind != NUMBER or any(source.message not in dialect.messages for source in signal.sources):
         return OPEN
     carriers = (
@@ -37,15 +37,15 @@ def reported_range(signal: Signal, dialect: Dialect) -> Extent:
 
 
 ANYWHERE = interval(-MAX_COORDINATE, MAX_COORDINATE)
-#: dimensions in which nothing is below zero, and what is the most
+#: dimensions whose values lie between 0 and `FULL`
 _WHOLE = frozenset({Dimension.RATIO.value})
 
 
 class SituationSpace(NamedTuple):
     """A set of situations: a value for each argument cell and state slot, UTC and its error.
 
-    `phases` are the phases that the invocation may be in, as indexes into the policy's names; -1 stands for all that
-    the policy does not name. `monitors` has a set of truths for each temporal monitor.
+    `phases` are the phases that the invocation may be in, as indexes into the policy's names; -1 stands for all phases
+    that the policy does not name. `monitors` has the possible truth values of each temporal monitor.
     """
 
     arguments: tuple[Value, ...]
@@ -59,9 +59,9 @@ class SituationSpace(NamedTuple):
 
 
 def space_of(prepared: PreparedPolicy, contract: Contract | None, plane: Plane | None = None) -> SituationSpace:
-    """Any situation that an invocation of a skill may be met in; None: of any skill, without its arguments.
+    """Return all situations in which a skill may be invoked. With None they are those of any skill, without arguments.
 
-    Pass the `plane` of an earlier space of the policy, which remembers how its zones lie.
+    Pass the `plane` of an earlier space of the policy, which caches the relations of its zones.
     """
     policy = prepared.policy
     return SituationSpace(
@@ -77,7 +77,7 @@ def space_of(prepared: PreparedPolicy, contract: Contract | None, plane: Plane |
 
 
 def arguments_of(contract: Contract) -> tuple[Value, ...]:
-    """The range of each argument cell."""
+    """Return the range of each argument cell."""
     cells: dict[int, Value] = {}
     for parameter in contract.parameters:
         if parameter.kind == PLACE:
@@ -90,7 +90,7 @@ def arguments_of(contract: Contract) -> tuple[Value, ...]:
 
 
 def signals(policy: Policy) -> Sequence[Value]:
-    """One value a slot: whatever its signal may report, or nothing."""
+    """Return a value for each slot: all that its signal may report, or missing."""
     values: list[Value] = [MISSING] * policy.slots
     for signal in policy.signals:
         if signal.kind == POSITION:
@@ -102,18 +102,20 @@ def signals(policy: Policy) -> Sequence[Value]:
             values[signal.slot] = maybe(interval(0, FULL))
         else:
             least = 0 if all(len(source.fields) > 1 for source in signal.sources) else -MAX_VALUE
-            values[signal.slot] = maybe(interval(least, MAX_VALUE))  # what two components make is a magnitude
+            values[signal.slot] = maybe(interval(least, MAX_VALUE))  # two components form a magnitude
     return values
 
 
 def _reported(signal: Signal) -> list[int]:
-    """The members that an enumeration's signal may be: one that each of its sources lists as unknown is missing."""
+    """Return the possible members of an enumeration, without those that mean that the value is unknown."""
     return [value for value, _ in signal.labels if not means_unknown(signal, value)]
 
 
 def _moments(prepared: PreparedPolicy, contract: Contract | None) -> tuple[Span, ...]:
-    """Moments that show all that the time can do to a condition: of each stretch between two dates of zones a day, or a
-    week where a condition asks for some of its days; and the days in which the clocks are set, once each way.
+    """Return times that represent every effect of the time on conditions.
+
+    For each interval between two dates of zones, they contain a day, or a week if a condition reads the day of the
+    week, and the days around each kind of clock change.
     """
     policy, local = prepared.policy, prepared.tables.local
     period = WEEK if reads_days(policy, contract) else DAY
@@ -137,7 +139,7 @@ def _moments(prepared: PreparedPolicy, contract: Contract | None) -> tuple[Span,
 
 
 def _set_clocks(local: LocalTime, low: int, high: int) -> Iterator[Span]:
-    """A day before and a day after the clocks are set in a time, once for each way in which that is done."""
+    """Yield the days before and after the clock changes in an interval, once for each kind of change."""
     seen: set[tuple[int, int]] = set()
     for moment, before, after in local.changes():
         if low <= moment <= high and (before, after) not in seen:
@@ -146,7 +148,7 @@ def _set_clocks(local: LocalTime, low: int, high: int) -> Iterator[Span]:
 
 
 def reads_days(policy: Policy, contract: Contract | None = None) -> bool:
-    """Whether some condition, or a zone, asks for days of the week."""
+    """Whether some condition or zone depends on the day of the week."""
     contracts = policy.contracts if contract is None else (contract, *policy.contracts)
     clauses = (clause for one in contracts for clause in (*one.require, *one.assume, *one.maintain))
     whens = (rule.when for rule in policy.rules if rule.when is not None)

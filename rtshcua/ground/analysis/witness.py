@@ -1,5 +1,6 @@
-"""A single situation out of a box, its replay in the evaluator that decides on board, and its words, as in
-`battery = 20 % and wind.speed = 7 m/s`.
+"""Witnesses: a single situation from a box, its evaluation as on board, and its text.
+
+An example of the text is `battery = 20 % and wind.speed = 7 m/s`.
 """
 
 from collections.abc import Mapping
@@ -19,12 +20,12 @@ from rtshcua.model.flat.signal import ENUMERATION, POSITION, Signal
 from rtshcua.model.flat.zone import unproject
 from rtshcua.model.quantity import Dimension, display
 
-#: how many values of a cell are tried where sums tie it to others
+#: the number of values that are tried for a cell that sums tie to others
 _TRIES = 3
 
 
 class Witness(NamedTuple):
-    """A situation: `values` and `places` are what the conditions read, for words; `at` is all of it."""
+    """A situation. `cells` and `places` are the values that the conditions read, for the text; `at` is complete."""
 
     at: Environment
     cells: Mapping[Cell, int | None]
@@ -32,13 +33,13 @@ class Witness(NamedTuple):
     box: ValueBox
 
     def truth(self, node: tree.Node, space: SituationSpace) -> Truth:
-        """The truth of a condition in this situation."""
+        """Return the truth value of a condition in this situation."""
         self.at.place = None
         return build(node, space.tables)(self.at)
 
 
 def witness(box: ValueBox, space: SituationSpace) -> Witness | None:
-    """A situation in the box, which narrowing found nothing against; None where none was found."""
+    """Return a situation in a narrowed box, or None if none is found."""
     tied = {(term.argument, term.at) for form in box.forms for term in form}
     fixed = _fixed(box, space, [cell for cell in sorted(tied) if not box.cells[cell][2]])
     if fixed is None:
@@ -56,12 +57,12 @@ def witness(box: ValueBox, space: SituationSpace) -> Witness | None:
 
 
 def plain(space: SituationSpace) -> Environment:
-    """One situation of a space: of each value the plainest, and nothing of what may be missing."""
+    """Return one situation of a space: the plainest of each value, and no value that may be missing."""
     return _environment(ValueBox({}, {}, {}, {}, space.utc, space.phases, 0), {}, {}, space)
 
 
 def halves(box: ValueBox) -> list[ValueBox]:
-    """The box with the first half of the widest value that a sum ties to others, and with the other half."""
+    """Split a box at the middle of the widest value that a sum ties to others; empty if there is none."""
     tied = [
         cell for form in box.forms for cell in ((term.argument, term.at) for term in form) if not box.cells[cell][2]
     ]
@@ -75,7 +76,7 @@ def halves(box: ValueBox) -> list[ValueBox]:
 
 
 def plainest(value: Value) -> int:
-    """The value that is easiest to read: the roundest, and of these the one nearest to a bound."""
+    """Return the value that is easiest to read: the roundest, and of these the one nearest to a bound."""
     low, high, _, elements = value
     if elements is not None:
         return min(elements)
@@ -92,7 +93,7 @@ def plainest(value: Value) -> int:
 
 
 def _fixed(box: ValueBox, space: SituationSpace, tied: list[Cell]) -> ValueBox | None:
-    """The box with single values in the cells that sums tie together."""
+    """Return a box with single values in the cells that sums tie together, or None if none is found."""
     if not tied:
         return box
     cell, rest = tied[0], tied[1:]
@@ -141,19 +142,19 @@ def _environment(
 
 
 def _any(value: Value) -> Value:
-    """Any one of a value's, missing rather than something."""
+    """Return one of a value's possibilities, missing if possible."""
     low, high, gap, elements = value
     if gap != PRESENT:
         return MISSING
     return point(plainest((low, high, gap, elements)))
 
 
-#: what of a coordinate a person reads: 1e-7 degree in 1e-5, about a metre
+#: 1e-7 degree in a degree; text has 5 decimals, about a metre
 _DEGREE = 10_000_000
 
 
 def witness_text(witness: Witness, policy: Policy, contract: Contract | None) -> str:
-    """What the conditions read in a witness, in the order of arguments, signals and the rest."""
+    """Format the values that the conditions read: arguments, then signals, then the position."""
     found = [each for each in (_argument(witness, cell, policy, contract) for cell in _cells(contract)) if each]
     for signal in policy.signals:
         if signal.kind == POSITION:
@@ -219,7 +220,7 @@ _DAYS = ("Monday", "Tuesday", "Wednesday", "Thursday", "Friday", "Saturday", "Su
 
 
 def local_time_text(moment_us: int, local: LocalTime, *, day: bool = False) -> str:
-    """The local time of day of a moment of UTC, to the minute; with `day`, that of the week too."""
+    """Format a UTC time as local time of day, to the minute; with `day`, prefixed by the day of the week."""
     time_us = moment_us + local.offset(moment_us)
     minutes = time_us % DAY // 60_000_000
     return f"{_DAYS[time_of_week(time_us) // DAY] + ' ' if day else ''}{minutes // 60:02d}:{minutes % 60:02d}"

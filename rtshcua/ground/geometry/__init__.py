@@ -1,1 +1,1 @@
-"""Plane geometry in whole mm: polygons, offsets, ways around them, surveys; it knows no source and no policy."""
+"""Plane geometry in whole mm, without sources and policies: polygons, offsets and survey paths."""

@@ -1,9 +1,9 @@
-"""Grown and shrunk zones in whole millimetres, on the safe side; the same corners come out on every machine.
+"""Grown and shrunk zones in whole millimetres, rounded to the safe side. The result is the same on every machine.
 
-`inner(shape, margin)` never has a point that the true set lacks, `outer` lacks none that it has; a positive margin
-grows, a negative one shrinks. Most zones that people draw are convex: their edges are moved, and the result is proved.
-All others are grown and shrunk by a polygon that lies within the disc of the margin, or around it (a convolution), by
-a few mm less or more than what rounding may have moved. What may fall into parts or enclose holes does.
+`inner(shape, margin)` contains only points of the exact offset, and `outer` contains all of them. A positive margin
+grows, a negative one shrinks. The edges of a convex zone are moved, and the result is proved. Any other zone is grown
+or shrunk by a convolution with a polygon within or around the disc of the margin, smaller or larger by a few mm to
+allow for rounding. The result may have several parts and holes.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -37,24 +37,24 @@ from rtshcua.ground.geometry.polygons import (
 from rtshcua.ground.geometry.shapes import Polygonal, RoundArea, Shape, SimplePolygon, contains, edges, parts, polygonal
 from rtshcua.model.flat.zone import MAX_RINGS, MAX_VERTICES
 
-#: rounding moves a corner by at most 0.71 mm, hence an edge too
+#: rounding moves a corner, and so an edge, by at most 0.71 mm
 SNAP_MM = 2
 MANY_CORNERS = 128
-#: what an outline may have been moved by, and a millimetre more, mm
+#: largest displacements of an outline by rounding, plus 1 mm, in mm
 _SLACKS = (ROUNDED + 1, PULLED + 1, ROUNDS * PULLED + 1)
 
 
 class NoSuchOffset(Exception):
-    """There is no such zone: `reason` is `nothing`, `unproved`, `corners`, or `far`."""
+    """The offset does not exist or cannot be proved. `reason` is `nothing`, `unproved`, `corners` or `far`."""
 
     def __init__(self, reason: str) -> None:
         super().__init__(reason)
         self.reason = reason
 
 
-@lru_cache(maxsize=256)  # programs share zones, and an editor asks again at every change
+@lru_cache(maxsize=256)  # programs share zones, and an editor repeats the call at every change
 def inner(shape: Shape, margin: int) -> Shape:
-    """A region within the points nearer than `margin` to `shape` (or, negative, further than that from its outside)."""
+    """Return a subset of the points nearer than `margin` to `shape` (negative: farther than it from its outside)."""
     if margin == 0:
         return shape
     if isinstance(shape, RoundArea):
@@ -74,7 +74,7 @@ def inner(shape: Shape, margin: int) -> Shape:
 
 @lru_cache(maxsize=256)
 def outer(shape: Shape, margin: int) -> Shape:
-    """A region around the points nearer than `margin` to `shape` (or, negative, further than that from its outside)."""
+    """Return a superset of the points nearer than `margin` to `shape` (negative: farther than it from its outside)."""
     if margin == 0:
         return shape
     if isinstance(shape, RoundArea):
@@ -100,14 +100,14 @@ def _disc(shape: RoundArea, margin: int) -> RoundArea:
 
 
 def _fineness(shape: Polygonal) -> int:
-    """How fine the margin's disc is drawn: every corner of a zone may get an arc of it."""
+    """Return how finely the margin's disc is approximated: each corner of a zone may get an arc of it."""
     return COARSE if sum(map(len, shape.rings)) <= MANY_CORNERS else ROUGH
 
 
 def _made(
     make: Callable[[int], RoundedBoundary | None], proved: Callable[[Polygonal], bool] = lambda _: True
 ) -> Polygonal:
-    """The first result that was moved by less than the slack that it was made with, and is proved."""
+    """Return the first proved result whose displacement is below the slack with which it was made."""
     for slack in _SLACKS:
         try:
             made = make(slack)
@@ -143,7 +143,7 @@ def _convex_outer(shape: SimplePolygon, margin: int) -> SimplePolygon:
 def _search(
     margin: int, make: Callable[[int], list[Point]], proved: Callable[[SimplePolygon], bool], sign: int
 ) -> SimplePolygon:
-    """The first offset, of growing slack, that integers prove."""
+    """Return the first offset, with growing slack, that is proved in integers."""
     for slack in (SNAP_MM, SNAP_MM + margin // 64, SNAP_MM + margin // 16):
         kept = without_straight(make(margin + sign * slack))
         if not kept or doubled_area(kept) == 0:
@@ -161,7 +161,7 @@ def _search(
 def _clear(small: Polygonal, large: Polygonal, margin: int) -> bool:
     """Whether `small` lies in `large` and their boundaries are at least `margin` apart everywhere.
 
-    A ring that meets no boundary of the other area is all inside of it or all outside, so one corner of each tells.
+    A ring that meets no boundary of the other area lies wholly inside or outside it, so one corner of each is tested.
     """
     if not all(contains(large, ring[0]) for ring in small.rings):
         return False
@@ -171,7 +171,7 @@ def _clear(small: Polygonal, large: Polygonal, margin: int) -> bool:
 
 
 def _near(made: SimplePolygon, shape: SimplePolygon, margin: int) -> bool:
-    """Whether each edge of `made` has both its ends within `margin` of one edge of `shape`, hence all of it."""
+    """Whether each edge of `made` lies within `margin` of an edge of `shape`, because both its ends do."""
     ours, theirs = edges(made), edges(shape)
     proved: set[Segment] = set()
     for one, other in _close_pairs(ours, theirs, margin):
@@ -181,7 +181,7 @@ def _near(made: SimplePolygon, shape: SimplePolygon, margin: int) -> bool:
 
 
 def _close_pairs(ours: Sequence[Segment], theirs: Sequence[Segment], margin: int) -> Iterator[tuple[Segment, Segment]]:
-    """The pairs of edges whose extents are at most `margin` apart: a sweep from west to east."""
+    """Yield the pairs of edges whose bounding boxes are at most `margin` apart, by a sweep from west to east."""
     waiting = sorted(theirs, key=_west)
     active: list[Segment] = []
     at = 0
@@ -205,10 +205,10 @@ def _west(edge: Segment) -> int:
 
 # ------------------------------------------------------------------------------------------ edges that are moved
 
-#: a polygon with more corners is convolved: cutting takes the square of their number
+#: polygons with more corners are convolved, because cutting takes quadratic time
 MOST_CONVEX_CORNERS = 64
 
-#: a turn between two edges is rounded in steps of at most 22.5 degrees: the cosine, in thousandths
+#: cosine, in thousandths, of the largest step of an arc: 22.5 degrees
 _ARC_STEP = 924
 
 _Exact = tuple[Fraction, Fraction]
@@ -224,7 +224,7 @@ def is_convex(outline: SimplePolygon) -> bool:
 
 
 def _convex_rounded(outline: SimplePolygon, distance: int) -> list[Point]:
-    """Grown, with an inscribed arc around each corner."""
+    """Return the outline grown by `distance`, with an inscribed arc around each corner."""
     corners: list[Point] = []
     for corner, before, after in _corner_normals(outline, distance):
         corners += [(corner[0] + x, corner[1] + y) for x, y in (before, *_arc(before, after, distance), after)]
@@ -232,7 +232,7 @@ def _convex_rounded(outline: SimplePolygon, distance: int) -> list[Point]:
 
 
 def _convex_mitred(outline: SimplePolygon, distance: int) -> list[Point]:
-    """Grown, with the edges prolonged until they meet; a corner of less than 90 degrees is cut off across."""
+    """Return the outline grown by `distance`, with mitred corners; a corner below 90 degrees is cut off."""
     corners: list[Point] = []
     for corner, before, after in _corner_normals(outline, distance):
         normals = [before, after]
@@ -245,7 +245,7 @@ def _convex_mitred(outline: SimplePolygon, distance: int) -> list[Point]:
 
 
 def _convex_shrunk(outline: SimplePolygon, distance: int) -> list[Point]:
-    """What is at least `distance` away from every edge; no corners where there is nothing."""
+    """Return the corners of the region at least `distance` from every edge; none if it is empty."""
     left: list[_Exact] = [(Fraction(x), Fraction(y)) for x, y in outline.corners]
     for (ax, ay), (bx, by) in edges(outline):
         dx, dy = bx - ax, by - ay
@@ -257,7 +257,7 @@ def _convex_shrunk(outline: SimplePolygon, distance: int) -> list[Point]:
 
 
 def _cut(corners: Sequence[_Exact], dx: int, dy: int, least: int) -> list[_Exact]:
-    """The part of a convex polygon where `dx * y - dy * x >= least`."""
+    """Return the part of a convex polygon where `dx * y - dy * x >= least`."""
     kept: list[_Exact] = []
     for a, b in zip(corners, [*corners[1:], corners[0]], strict=True):
         over_a, over_b = dx * a[1] - dy * a[0] - least, dx * b[1] - dy * b[0] - least
@@ -270,13 +270,13 @@ def _cut(corners: Sequence[_Exact], dx: int, dy: int, least: int) -> list[_Exact
 
 
 def _corner_normals(outline: SimplePolygon, distance: int) -> Iterator[tuple[Point, Point, Point]]:
-    """Each corner with the outward normals, of length `distance`, of the edges before and after it."""
+    """Yield each corner with the outward normals, of length `distance`, of the edges before and after it."""
     normals = [scaled((b[1] - a[1], a[0] - b[0]), distance) for a, b in edges(outline)]
     return zip(outline.corners, [normals[-1], *normals[:-1]], normals, strict=True)
 
 
 def _arc(before: Point, after: Point, distance: int, halvings: int = 3) -> list[Point]:
-    """The vectors between two of length `distance`, at most a step apart."""
+    """Return vectors between two vectors of length `distance`, at most one arc step apart."""
     if not halvings or 1000 * dot(before, after) >= _ARC_STEP * distance * distance:
         return []
     middle = scaled((before[0] + after[0], before[1] + after[1]), distance)
@@ -288,7 +288,7 @@ def _arc(before: Point, after: Point, distance: int, halvings: int = 3) -> list[
 
 
 def _convolved_grown(shape: Polygonal, kernel: Ring) -> RoundedBoundary | None:
-    """All places that the kernel reaches from inside the shape; None where that has no outline in whole mm."""
+    """Return the boundary of all points that the kernel reaches from inside the shape; None if none is in whole mm."""
     groups: list[list[list[Point]]] = []
     areas: list[tuple[int, list[int]]] = []
     for outer, holes in parts(shape):
@@ -306,7 +306,7 @@ def _convolved_grown(shape: Polygonal, kernel: Ring) -> RoundedBoundary | None:
 
 
 def _convolved_shrunk(shape: Polygonal, kernel: Ring) -> RoundedBoundary | None:
-    """All places around which the whole kernel lies in the shape; None as for `_convolved_grown`."""
+    """Return the boundary of all points around which the kernel lies in the shape; None as for `_convolved_grown`."""
     groups: list[list[list[Point]]] = []
     areas: list[tuple[int, list[int]]] = []
     for outer, holes in parts(shape):
@@ -321,26 +321,28 @@ def _convolved_shrunk(shape: Polygonal, kernel: Ring) -> RoundedBoundary | None:
 
 
 def _has_room(ring: Ring, kernel: Ring) -> bool:
-    """Whether the kernel might lie in a ring: nothing lies in what is smaller than itself."""
+    """Whether a ring is larger than the kernel, so that the kernel might lie in it."""
     return abs(doubled_area(ring)) > doubled_area(kernel)
 
 
 def _convolution(ring: Ring, kernel: Ring) -> list[Point]:
-    """The convolution of a ring with a kernel K: a curve that runs along the ring, each edge moved by the corner of K
-    that lies furthest out, and at each corner along K's edges, forwards where the ring turns left and backwards where
-    it turns right.
+    """Return the convolution of a ring with a kernel K.
 
-    Around a point x it winds as often as the ring's inside has parts in x - K (Guibas, Ramshaw, Stolfi: A kinetic
-    framework for computational geometry, 1983), the ring's inside being on its left. K is symmetric, so x - K is x + K:
+    The curve runs along the ring, with each edge moved by the outermost corner of K. At each corner it runs along K's
+    edges, forwards if the ring turns left and backwards if it turns right.
 
-    - for a counter-clockwise ring, x + K meets its inside where the winding is above zero;
-    - for a clockwise ring, the winding is the number of parts of its *outside* in x + K, less one for all that is far
-      away. So x + K lies in the hole where the winding is below zero. Were the whole hole in x + K, the outside would
-      have a hole there and count the same; but then the hole has no room for K at all, and is left out.
+    Its winding around a point x is the number of parts of the ring's inside in x - K (Guibas, Ramshaw, Stolfi: A
+    kinetic framework for computational geometry, 1983), where the inside is on the ring's left. K is symmetric, so x -
+    K = x + K:
 
-    A connected set that has no point in an area lies in one of its holes, or outside of all outer rings. So an area
-    meets x + K where x + K meets the inside of an outer ring and lies in none of that ring's holes. To shrink an area
-    is to grow what is around it: all rings are turned about.
+    - For a counter-clockwise ring, x + K meets its inside if the winding is positive. - For a clockwise ring, the
+    winding is the number of parts of its *outside* in x + K, minus one. So x + K lies in the
+      hole if the winding is negative. If x + K contained the whole hole, the count would be the same, but such a hole
+      has no room for K and is skipped.
+
+    A connected set without a point in an area lies in one of its holes, or outside all outer rings. So x + K meets an
+    area if it meets the inside of an outer ring and lies in none of that ring's holes. To shrink an area, its
+    complement is grown: all rings are reversed.
     """
     count = len(kernel)
     following = (*ring[1:], ring[0])
@@ -359,7 +361,7 @@ def _convolution(ring: Ring, kernel: Ring) -> list[Point]:
 
 
 def _outermost(direction: Point, kernel: Sequence[Point]) -> int:
-    """The corner of the kernel furthest to the right of a direction; of two, the one that comes first."""
+    """Return the index of the kernel's corner farthest to the right of a direction; of two, the first."""
     dx, dy = direction
     reach = [dy * x - dx * y for x, y in kernel]
     first = reach.index(max(reach))
@@ -367,9 +369,9 @@ def _outermost(direction: Point, kernel: Sequence[Point]) -> int:
 
 
 # -------------------------------------------------------------------------------------------- discs as polygons
-# The corners come from halving a quarter turn with integer roots: the same on every machine.
+# The corners come from halving a quarter turn with integer roots, so they are the same on every machine.
 
-#: halvings of a quarter turn: 128 corners, between which an arc is at most 0.031 % of the radius from its chord
+#: halvings of a quarter turn: 128 corners; the arc is at most 0.031 % of the radius from its chord
 FINE = 5
 #: 64 corners: 0.121 %; 16 corners: 1.93 %
 COARSE, ROUGH = 4, 2
@@ -377,15 +379,13 @@ _SCALE = 1 << 40
 
 
 def within_disc(center: Point, radius: int, halvings: int = FINE) -> Ring:
-    """A polygon within a disc, counter-clockwise; no edge is further than 0.031 % of the radius and 2 mm inside."""
+    """Return a polygon in a disc, counter-clockwise. An edge is at most 0.031 % of the radius and 2 mm inside."""
     return _moved(_hull([_shrunk(each, radius) for each in _unit_circle(halvings)]), center)
 
 
 @cache
 def around_disc(radius: int, halvings: int = COARSE) -> Ring:
-    """A polygon around a disc at the origin: its corners are 0.13 % of the radius and a few mm further out, 2 % if it
-    is rough.
-    """
+    """Return a polygon around a disc at the origin, its corners 0.13 % of the radius (2 % if rough) and some mm outside."""
     reach = radius + radius // (800 if halvings > ROUGH else 50) + 2
     while True:
         ring = tuple(_hull([_shrunk(each, reach) for each in _unit_circle(halvings)]))
@@ -395,14 +395,14 @@ def around_disc(radius: int, halvings: int = COARSE) -> Ring:
 
 
 def _shrunk(unit: Point, radius: int) -> Point:
-    """A corner on a circle, rounded towards its centre."""
+    """Return a corner on a circle, rounded towards the centre."""
     x, y = abs(unit[0]) * radius // _SCALE, abs(unit[1]) * radius // _SCALE
     return (x if unit[0] >= 0 else -x), (y if unit[1] >= 0 else -y)
 
 
 @cache
 def _unit_circle(halvings: int) -> tuple[Point, ...]:
-    """The corners of a regular polygon in a circle of radius `_SCALE`, counter-clockwise from east."""
+    """Return the corners of a regular polygon in a circle of radius `_SCALE`, counter-clockwise from east."""
     quarter: list[Point] = [(_SCALE, 0), (0, _SCALE)]
     for _ in range(halvings):
         halved = [quarter[0]]
@@ -419,7 +419,7 @@ def _unit_circle(halvings: int) -> tuple[Point, ...]:
 
 
 def _hull(points: Sequence[Point]) -> list[Point]:
-    """The strictly convex hull, counter-clockwise (Andrew's monotone chain); one point for a single place."""
+    """Return the strictly convex hull, counter-clockwise (Andrew's monotone chain)."""
     ordered = sorted(set(points))
     if len(ordered) < 3:
         return ordered

@@ -1,15 +1,14 @@
-"""What closed curves in the integer plane enclose together: unions, differences, and any other rule on windings, with
-corners in whole millimetres.
+"""Overlay of closed curves in the integer plane: unions, differences, and other rules on windings, in whole mm.
 
-Every curve belongs to a group; the *winding* of a group at a point is how often its curves go around the point,
-counter-clockwise. The *arrangement* of all curves cuts their edges where they meet, in exact fractions. Between the
-pieces lie *faces*, each with one winding of every group. Going around a node from piece to piece carries the windings
-on, so only one point of each connected drawing is located by a ray.
+Each curve belongs to a group. The *winding* of a group at a point is the number of times that its curves go around the
+point, counter-clockwise. The *arrangement* cuts the edges of all curves where they meet, in exact fractions. The pieces
+bound *faces*, each with one winding for each group. The windings are propagated around each node from piece to piece,
+so only one point of each connected component is located by a ray.
 
-The boundary of an overlay runs between faces inside and outside. Rounding its corners moves it by less than 1 mm, hence
-no point further than that from it changes sides. Where boundaries touch, the corners are drawn apart; where rounding
-made edges meet, the result is laid over itself again. `RoundedBoundary.moved` bounds it all. No float: the same comes
-out on every machine.
+The boundary of an overlay separates faces inside from faces outside. Rounding its corners moves it by less than 1 mm,
+so no point farther than that changes sides. Corners at which boundaries touch are moved apart. If rounding made edges
+meet, the result is overlaid with itself again. `RoundedBoundary.moved` bounds the total displacement. Without floats,
+the result is the same on every machine.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -21,7 +20,7 @@ from math import isqrt
 
 from rtshcua.ground.geometry.polygons import Point, doubled_area, sides, touching_edges
 
-#: windings of the groups, in their order
+#: windings of the groups, in order
 Windings = tuple[int, ...]
 Curve = Sequence[Point]
 #: a place where pieces meet: integers, or fractions where edges cross
@@ -30,12 +29,12 @@ Node = tuple[int | Fraction, int | Fraction]
 Key = tuple[Node, Node]
 _Edge = tuple[Point, Point, int]
 
-#: curves that meet more often are no zone that anybody drew; they would take minutes
+#: most meetings of edges; real zones have far fewer, and more would take minutes
 MOST_MEETINGS = 1 << 18
 
 
 class _Crossing(Fraction):
-    """A coordinate of a place where edges cross; its hash, which is slow to compute, is asked for often."""
+    """A coordinate of a crossing. It caches its hash, which is slow to compute and often needed."""
 
     __slots__ = ("_hash",)
 
@@ -53,7 +52,7 @@ class TooManyPieces(Exception):
 
 @dataclass(slots=True)
 class EdgePiece:
-    """`turns` is what crossing it from right to left adds to the windings, seen from its lower to its upper end."""
+    """A piece of an edge, directed from its lower to its upper end. Crossing it from right to left adds `turns`."""
 
     direction: Point
     turns: list[int]
@@ -62,14 +61,14 @@ class EdgePiece:
 
 
 def faces(groups: Sequence[Sequence[Curve]]) -> Iterator[Windings]:
-    """The windings of every face, some of them more than once."""
+    """Yield the windings of every face, some more than once."""
     for piece in pieces_of(groups).values():
         yield piece.left
         yield piece.right
 
 
 def pieces_of(groups: Sequence[Sequence[Curve]]) -> dict[Key, EdgePiece]:
-    """The pieces that part faces of different windings, with the windings on both sides."""
+    """Return the pieces between faces of different windings, with the windings on both sides."""
     edges = [(a, b, group) for group, rings in enumerate(groups) for ring in rings for a, b in sides(ring) if a != b]
     pieces: dict[Key, EdgePiece] = {}
     for (a, b, group), cuts in zip(edges, _cuts(edges), strict=True):
@@ -87,7 +86,7 @@ def pieces_of(groups: Sequence[Sequence[Curve]]) -> dict[Key, EdgePiece]:
 
 
 def _cuts(edges: Sequence[_Edge]) -> list[list[Node]]:
-    """Where each edge meets others: a sweep by their west ends."""
+    """Return the points at which each edge meets others, by a sweep over their west ends."""
     found: list[list[Node]] = [[] for _ in edges]
     boxes = [(min(a[0], b[0]), max(a[0], b[0]), min(a[1], b[1]), max(a[1], b[1])) for a, b, _ in edges]
     active: list[int] = []
@@ -109,7 +108,7 @@ def _cuts(edges: Sequence[_Edge]) -> list[list[Node]]:
 
 
 def _common(one: _Edge, other: _Edge) -> list[Node]:
-    """The points that two segments have in common, but for shared ends; of a common stretch, its ends."""
+    """Return the common points of two segments except shared ends; for a common part, its ends."""
     a, b, _ = one
     c, d, _ = other
     ux, uy, vx, vy = b[0] - a[0], b[1] - a[1], d[0] - c[0], d[1] - c[1]
@@ -135,7 +134,7 @@ def _common(one: _Edge, other: _Edge) -> list[Node]:
 
 
 def _wind(pieces: dict[Key, EdgePiece], edges: Sequence[_Edge], groups: int) -> None:
-    """Give every piece the windings of both sides."""
+    """Set the windings on both sides of every piece."""
     at: dict[Node, list[Key]] = {}
     for key in pieces:
         at.setdefault(key[0], []).append(key)
@@ -165,7 +164,7 @@ def _wind(pieces: dict[Key, EdgePiece], edges: Sequence[_Edge], groups: int) -> 
 
 
 def turned(node: Node, keys: list[Key], pieces: dict[Key, EdgePiece]) -> list[Key]:
-    """The pieces at a node in the order of their directions, counter-clockwise."""
+    """Return the pieces at a node ordered by direction, counter-clockwise."""
     if len(keys) <= 2:
         return keys
 
@@ -185,7 +184,7 @@ def turned(node: Node, keys: list[Key], pieces: dict[Key, EdgePiece]) -> list[Ke
 
 
 def _locate(key: Key, piece: EdgePiece, edges: Sequence[_Edge], groups: int) -> None:
-    """The windings on both sides of a piece, by a ray from its middle: upwards, or eastwards from a vertical one."""
+    """Set the windings on both sides of a piece by a ray from its middle: upwards, or eastwards if it is vertical."""
     (ax, ay), (bx, by) = key
     x, y = Fraction(ax + bx) / 2, Fraction(ay + by) / 2
     scale = x.denominator * y.denominator
@@ -196,7 +195,7 @@ def _locate(key: Key, piece: EdgePiece, edges: Sequence[_Edge], groups: int) -> 
         low, high, level = (cx, dx, px) if upwards else (cy, dy, py)
         if (low * scale > level) == (high * scale > level):
             continue
-        side = (dx - cx) * (py - cy * scale) - (dy - cy) * (px - cx * scale)  # above zero where the place lies left
+        side = (dx - cx) * (py - cy * scale) - (dy - cy) * (px - cx * scale)  # positive if the place lies left
         rising = high > low
         if side and (side < 0) == (rising if upwards else not rising):
             beyond[group] += (-1 if rising else 1) if upwards else (1 if rising else -1)
@@ -207,18 +206,19 @@ def _locate(key: Key, piece: EdgePiece, edges: Sequence[_Edge], groups: int) -> 
         piece.left, piece.right = tuple(w + t for w, t in zip(near, piece.turns, strict=True)), near
 
 
-#: how often a result is laid over itself
+#: most rounds of overlaying a result with itself
 ROUNDS = 3
-#: how far corners that touch are drawn apart, mm
+#: distance by which touching corners are moved apart, mm
 PULL = 2
-#: what one round moves a boundary by at most, mm: with rounding, and with drawing apart besides
+#: largest displacement of a boundary in one round, mm: by rounding, and by rounding and moving apart
 ROUNDED, PULLED = 1, 1 + PULL
 
 
 @dataclass(frozen=True, slots=True)
 class RoundedBoundary:
-    """Simple rings without a common point: outer ones counter-clockwise, holes clockwise; and how far, in mm, their
-    boundary may lie from the true one at most.
+    """Simple rings without a common point: outer rings counter-clockwise, holes clockwise.
+
+    `moved` is the largest distance in mm between their boundary and the exact one.
     """
 
     rings: tuple[tuple[Point, ...], ...]
@@ -226,9 +226,9 @@ class RoundedBoundary:
 
 
 def rounded_boundary(groups: Sequence[Sequence[Curve]], inside: Callable[[Windings], bool]) -> RoundedBoundary | None:
-    """The boundary of the points whose windings `inside` accepts; None where it cannot be had in whole millimetres.
+    """Return the boundary of the points whose windings `inside` accepts; None if none is in whole millimetres.
 
-    Nothing that goes on for ever may be inside: `inside` refuses windings of 0.
+    `inside` must refuse windings of 0, so that the area is bounded.
     """
     moved = 0
     for _ in range(ROUNDS):
@@ -241,8 +241,10 @@ def rounded_boundary(groups: Sequence[Sequence[Curve]], inside: Callable[[Windin
 
 
 def nested(rings: Sequence[Curve]) -> bool:
-    """Whether simple rings without a common point are the boundary of an area: outer rings go counter-clockwise and
-    holes clockwise, and each outer ring lies in a hole or in nothing, each hole in an outer ring.
+    """Whether simple rings without a common point are the boundary of an area.
+
+    Outer rings must be counter-clockwise and lie in a hole or in no ring. Holes must be clockwise and lie in an outer
+    ring.
     """
     boxes = [_box(ring) for ring in rings]
     for number, ring in enumerate(rings):
@@ -257,7 +259,7 @@ def nested(rings: Sequence[Curve]) -> bool:
 
 
 def _around(ring: Curve, x: int, y: int) -> int:
-    """The winding of a ring at a place that is not on it."""
+    """Return the winding of a ring at a point that is not on it."""
     winding = 0
     for (ax, ay), (bx, by) in sides(ring):
         if (ay > y) != (by > y):
@@ -277,8 +279,9 @@ def _box(ring: Curve) -> tuple[int, int, int, int]:
 
 
 def _boundary(groups: Sequence[Sequence[Curve]], inside: Callable[[Windings], bool]) -> list[list[Node]]:
-    """The exact boundary: rings with the inside on their left. Where it touches itself, the rings go around the inside
-    on each side of the place, so that they touch and never cross.
+    """Return the exact boundary: rings with the inside on their left.
+
+    Where the boundary touches itself, the rings touch but do not cross.
     """
     pieces = pieces_of(groups)
     known: dict[Windings, bool] = {}
@@ -304,7 +307,7 @@ def _boundary(groups: Sequence[Sequence[Curve]], inside: Callable[[Windings], bo
             following[arriving[node][0]] = keys[0]
             continue
         order = turned(node, [*keys, *arriving[node]], pieces)
-        for number, key in enumerate(order):  # the inside lies clockwise of where a ring comes from
+        for number, key in enumerate(order):  # the inside lies clockwise of an arriving ring
             if ends[key][1] == node:
                 following[key] = order[number - 1]
     rings = []
@@ -319,12 +322,12 @@ def _boundary(groups: Sequence[Sequence[Curve]], inside: Callable[[Windings], bo
 
 
 def _rounded(ring: Sequence[Node]) -> list[Point]:
-    """A ring with corners in whole millimetres, without repetitions and without spikes; empty where nothing is left."""
+    """Return a ring with corners in whole millimetres, without repetitions and spikes; empty if nothing is left."""
     return without_straight([(round(x), round(y)) for x, y in ring])
 
 
 def without_straight(corners: Sequence[Point]) -> list[Point]:
-    """The corners without repetitions and spikes, and without those on a straight line between their neighbours."""
+    """Return the corners without repetitions, spikes, and corners on a straight line between their neighbours."""
     kept = list(corners)
     while True:
         kept = [b for a, b in zip([*kept[-1:], *kept[:-1]], kept, strict=True) if a != b]
@@ -340,7 +343,7 @@ def without_straight(corners: Sequence[Point]) -> list[Point]:
 
 
 def _apart(rings: Sequence[list[Point]]) -> tuple[list[list[Point]], bool]:
-    """The rings with corners that are visited more than once drawn to the inside, and whether there were any."""
+    """Return the rings with repeated corners moved to the inside, and whether there were any."""
     visits: dict[Point, int] = {}
     for ring in rings:
         for corner in ring:
@@ -355,7 +358,7 @@ def _apart(rings: Sequence[list[Point]]) -> tuple[list[list[Point]], bool]:
 
 
 def _drawn(a: Point, b: Point, c: Point) -> Point:
-    """A corner moved by at most `PULL` to the left of a ring that comes from `a` and goes on to `c`."""
+    """Return corner `b` moved by at most `PULL` to the left of a ring that runs from `a` to `c`."""
     (ux, uy), (vx, vy) = _unit(b, a), _unit(b, c)
     x, y = ux + vx, uy + vy
     if (b[0] - a[0]) * (c[1] - b[1]) < (b[1] - a[1]) * (c[0] - b[0]):
@@ -365,14 +368,14 @@ def _drawn(a: Point, b: Point, c: Point) -> Point:
 
 
 def _unit(a: Point, b: Point) -> Point:
-    """The direction from a to b, of a length of 2**20."""
+    """Return the direction from a to b, scaled to a length of 2**20."""
     x, y = b[0] - a[0], b[1] - a[1]
     length = isqrt((x * x + y * y) << 20) + 1
     return (x << 30) // length, (y << 30) // length
 
 
 def _part(value: int, length: int) -> int:
-    """`PULL * value / length`, towards zero after half a millimetre is added."""
+    """Return `PULL * value / length`, rounded to the nearest mm."""
     whole = (2 * PULL * abs(value) + length) // (2 * length)
     return whole if value >= 0 else -whole
 

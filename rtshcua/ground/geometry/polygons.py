@@ -1,46 +1,46 @@
-"""Points, segments and polygons with integer coordinates: exact predicates and distances, without a root or a float."""
+"""Points, segments and polygons with integer coordinates: exact predicates and distances, without floats."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from math import isqrt
 
-#: a place or a vector: x (east) and y (north), mm where nothing else is said
+#: a place or a vector: x (east) and y (north), in mm unless noted
 Point = tuple[int, int]
 #: the corners of a closed line; its last edge goes from the last corner to the first
 Ring = tuple[Point, ...]
-#: an edge, or any straight piece: from one end to the other
+#: a straight line from one end to the other
 Segment = tuple[Point, Point]
 
 
 def sides(ring: Sequence[Point]) -> Iterator[Segment]:
-    """The edges of a ring, from each corner to the next."""
+    """Yield the edges of a ring, from each corner to the next."""
     return zip(ring, (*ring[1:], ring[0]), strict=True)
 
 
 def doubled_area(corners: Sequence[Point]) -> int:
-    """Twice the signed area: above zero where the corners go counter-clockwise."""
+    """Return twice the signed area, positive if the corners are counter-clockwise."""
     return sum(x0 * y1 - x1 * y0 for (x0, y0), (x1, y1) in sides(corners))
 
 
 def counter_clockwise(corners: Sequence[Point]) -> list[Point]:
-    """The same polygon with its inside on the left, beginning at the same corner."""
+    """Return the polygon with counter-clockwise corners, beginning at the same corner."""
     return list(corners) if doubled_area(corners) > 0 else [corners[0], *reversed(corners[1:])]
 
 
 def crossing(corners: Sequence[Point]) -> tuple[int, int] | None:
-    """The numbers of two edges that meet where they should not, or None for a simple polygon. Edge i goes from corner i
-    to the next.
+    """Return the numbers of two edges that meet improperly, or None for a simple polygon.
+
+    Edge i goes from corner i to the next.
     """
     met = touching_edges([corners])
     return None if met is None else (met[0][1], met[1][1])
 
 
 def touching_edges(rings: Sequence[Sequence[Point]]) -> tuple[tuple[int, int], tuple[int, int]] | None:
-    """Two edges, each as the numbers of its ring and of its first corner, that meet where they should not; None where
-    all rings are simple and have no point in common.
+    """Return two edges that meet improperly, or None if all rings are simple and have no common point.
 
-    Neighbours may share their corner only, all others nothing. Edges are swept by their west ends, so that only those
-    are compared whose extents overlap.
+    An edge is given by the numbers of its ring and of its first corner. Neighbours may share only their corner, other
+    edges no point. A sweep over the west ends compares only edges whose bounding boxes overlap.
     """
     names = [(number, i) for number, ring in enumerate(rings) for i in range(len(ring))]
     edges = [edge for ring in rings for edge in sides(ring)]
@@ -72,7 +72,7 @@ def _meet_badly(
     second: tuple[int, int],
     count: int,
 ) -> bool:
-    """Whether two edges meet other than as neighbours do; `count` is the number of corners of the first one's ring."""
+    """Whether two edges meet improperly. `count` is the number of corners of the first edge's ring."""
     if first[0] == second[0]:
         i, j = first[1], second[1]
         if (i + 1) % count == j:
@@ -104,12 +104,12 @@ def meet(a: Point, b: Point, c: Point, d: Point) -> bool:
 
 
 def _side(a: Point, b: Point, p: Point) -> int:
-    """Above zero where p lies left of a-b, zero on its line."""
+    """Return a positive number if p lies left of a-b, 0 if on its line."""
     return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
 
 
 def _between(a: Point, b: Point, p: Point) -> bool:
-    """Whether p, which is on the line of a-b, is within its extent."""
+    """Whether p, a point on the line through a and b, lies between them."""
     return min(a[0], b[0]) <= p[0] <= max(a[0], b[0]) and min(a[1], b[1]) <= p[1] <= max(a[1], b[1])
 
 
@@ -119,7 +119,7 @@ def contains(corners: Sequence[Point], p: Point) -> bool:
 
 
 def contained(rings: Iterable[Sequence[Point]], p: Point) -> bool:
-    """Whether p is strictly inside an area: an odd number of edges of its rings lies east of it, and none on it."""
+    """Whether p is strictly inside an area: an odd number of edges lies east of it, and it is on no edge."""
     inside = False
     for corners in rings:
         for a, b in sides(corners):
@@ -132,17 +132,17 @@ def contained(rings: Iterable[Sequence[Point]], p: Point) -> bool:
 
 
 def path_length(points: Sequence[Point]) -> int:
-    """The length of a path in mm, rounded down leg by leg."""
+    """Return the length of a path in mm, each leg rounded down."""
     return sum(length(a, b) for a, b in pairwise(points))
 
 
 def length(a: Point, b: Point) -> int:
-    """The distance of two points in mm, rounded down."""
+    """Return the distance of two points in mm, rounded down."""
     return isqrt((a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2)
 
 
 def scaled(vector: Point, length: int) -> Point:
-    """The vector of that length in the same direction, its parts rounded towards zero."""
+    """Return a vector of the given length in the same direction, its components rounded towards zero."""
     x, y = vector
     root = isqrt((x * x + y * y) << 40) + 1
 
@@ -154,22 +154,22 @@ def scaled(vector: Point, length: int) -> Point:
 
 
 def dot(a: Point, b: Point) -> int:
-    """The inner product."""
+    """Return the inner product."""
     return a[0] * b[0] + a[1] * b[1]
 
 
 def square(a: Point, b: Point) -> int:
-    """The squared distance of two points."""
+    """Return the squared distance of two points."""
     return (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2
 
 
 def is_near(p: Point, edge: Segment, limit: int) -> bool:
-    """Whether p is at most `limit` (not negative) from a segment."""
+    """Whether p is at most `limit` (at least 0) from a segment."""
     return _compare(p, edge, limit) <= 0
 
 
 def are_apart(one: Segment, other: Segment, limit: int) -> bool:
-    """Whether two segments are at least `limit` (above zero) from each other everywhere."""
+    """Whether two segments are at least `limit` (above 0) apart."""
     if meet(*one, *other):
         return False
     return (
@@ -186,7 +186,7 @@ def is_beyond(p: Point, edge: Segment, limit: int) -> bool:
 
 
 def _compare(p: Point, edge: Segment, limit: int) -> int:
-    """The sign of the distance of p from a segment, less `limit`."""
+    """Return the sign of the distance of p from a segment minus `limit`."""
     (ax, ay), (bx, by) = edge
     ux, uy, vx, vy = bx - ax, by - ay, p[0] - ax, p[1] - ay
     along, square = ux * vx + uy * vy, ux * ux + uy * uy

@@ -1,7 +1,7 @@
-"""From WGS 84 to local millimetres: the two scales of `Projection`, in decimal arithmetic.
+"""The two scales of `Projection`, from WGS 84 to local millimetres, in decimal arithmetic.
 
-x is east, y is north of the vehicle's declared home. `decimal` with a fixed context gives the same digits on every
-machine; the C library's sine and cosine do not.
+x is east, y is north of the vehicle's declared home. `decimal` with a fixed context computes the same digits on every
+machine; the sine and cosine of the C library do not.
 """
 
 from decimal import ROUND_HALF_EVEN, Context, Decimal, localcontext
@@ -18,7 +18,7 @@ _CONTEXT = Context(prec=40, rounding=ROUND_HALF_EVEN)
 
 
 def projection_at(latitude: int, longitude: int) -> Projection:
-    """The local projection at a place in 1e-7 degree, for latitudes between 85 S and 85 N.
+    """Return the local projection at a place in 1e-7 degree, for latitudes between 85 S and 85 N.
 
     One degree of latitude is `M * pi / 180` and one of longitude `N * cos(latitude) * pi / 180`, with the meridional
     radius `M = a (1 - e2) / (1 - e2 sin2)^1.5` and the prime vertical radius `N = a / (1 - e2 sin2)^0.5`.
@@ -38,7 +38,7 @@ def projection_at(latitude: int, longitude: int) -> Projection:
 
 
 def _sine(angle: Decimal) -> Decimal:
-    """The Taylor series of the sine, to the precision of the context; `angle` in radians, of at most pi."""
+    """Return the sine by its Taylor series, to the precision of the context. `angle` is in radians, at most pi."""
     term = total = angle
     square = angle * angle
     n = 1

@@ -1,8 +1,7 @@
-"""Zones of the local plane while they are compiled, in mm: circles by their radius, all others by their corners; and
-whether one lies within another or is disjoint from it.
+"""Zones in the local plane while they are compiled, in mm, and exact tests whether one contains or misses another.
 
-Exact: integers and fractions. The rings of two areas part the plane into faces; each face is wholly inside an area or
-wholly outside.
+The tests use integers and fractions. The rings of two areas divide the plane into faces, and each face lies wholly
+inside or outside each area.
 """
 
 from collections.abc import Iterator
@@ -32,14 +31,15 @@ class SimplePolygon:
 
     @property
     def rings(self) -> tuple[Ring, ...]:
-        """Its one ring."""
+        """The single ring."""
         return (self.corners,)
 
 
 @dataclass(frozen=True, slots=True)
 class MultiPolygon:
-    """What lies inside of outer rings (counter-clockwise) and outside of holes (clockwise); the rings are simple and
-    have no point in common.
+    """The area inside outer rings (counter-clockwise) and outside holes (clockwise).
+
+    The rings are simple and have no common point.
     """
 
     rings: tuple[Ring, ...]
@@ -51,10 +51,10 @@ Shape = RoundArea | SimplePolygon | MultiPolygon
 
 @dataclass(frozen=True, slots=True)
 class Region:
-    """A shape with its floor and ceiling, in mm above home, and its times as `Zone` has them.
+    """A shape with its floor and ceiling, in mm above home, and its times as in `Zone`.
 
-    A floor or ceiling above sea is where the declared elevation of home puts it; `floor_within` and `ceiling_within`
-    say how far it may really be from there. All of one vehicle's bands are moved by the same error.
+    A floor or ceiling above sea level is computed from the declared elevation of home. `floor_within` and
+    `ceiling_within` are its largest error. The error is the same for all zones of a vehicle.
     """
 
     shape: Shape
@@ -67,16 +67,16 @@ class Region:
     weekly: tuple[int, ...] = ()
 
     def flat(self, name: str) -> Zone:
-        """The region as it is carried on board."""
+        """Return the region in the flat form."""
         kind, data = _flat(self.shape)
         return Zone(name, kind, self.floor, self.ceiling, data, self.daily, self.dates, self.weekly)
 
     def sure(self) -> bool:
-        """Whether its floor and ceiling are known exactly."""
+        """Whether the floor and the ceiling are known exactly."""
         return not self.floor_within and not self.ceiling_within
 
     def banded(self, *, smaller: bool) -> "Region | None":
-        """The band that is surely part of the region, or the one that it surely is part of; None where none is."""
+        """Return the band that the region certainly contains (`smaller`) or that certainly contains it, or None."""
         sign = 1 if smaller else -1
         floor = self.floor + sign * self.floor_within
         ceiling = self.ceiling - sign * self.ceiling_within
@@ -87,7 +87,7 @@ class Region:
 
 
 def _flat(shape: Shape) -> tuple[int, tuple[int, ...]]:
-    """The kind of a shape and its numbers, as `Zone` has them."""
+    """Return the kind of a shape and its numbers, as in `Zone`."""
     if isinstance(shape, RoundArea):
         return CIRCLE, (*shape.center, shape.radius * shape.radius)
     coordinates = tuple(c for corner in corners(shape) for c in corner)
@@ -97,7 +97,7 @@ def _flat(shape: Shape) -> tuple[int, tuple[int, ...]]:
 
 
 def shape_of(zone: Zone) -> Shape | None:
-    """The shape of a zone as it is carried on board; None for a circle whose radius is no whole number of mm."""
+    """Return the shape of a flat zone; None for a circle whose radius is not a whole number of mm."""
     if zone.shape != CIRCLE:
         return polygonal(tuple(outline(zone)))
     x, y, square = zone.data
@@ -106,7 +106,7 @@ def shape_of(zone: Zone) -> Shape | None:
 
 
 def polygonal(rings: tuple[Ring, ...]) -> Polygonal:
-    """The shape that some rings are the boundary of."""
+    """Return the shape bounded by rings."""
     return SimplePolygon(rings[0]) if len(rings) == 1 else MultiPolygon(rings)
 
 
@@ -116,19 +116,19 @@ def contains(shape: Polygonal, point: Point) -> bool:
 
 
 def edges(shape: Polygonal) -> list[tuple[Point, Point]]:
-    """The edges of all rings, from each corner to the next; the inside is on their left."""
+    """Return the edges of all rings, from each corner to the next. The inside is on their left."""
     return [edge for ring in shape.rings for edge in sides(ring)]
 
 
 def corners(shape: Polygonal) -> Iterator[Point]:
-    """The corners of all rings."""
+    """Yield the corners of all rings."""
     return (corner for ring in shape.rings for corner in ring)
 
 
 def parts(shape: Polygonal) -> list[tuple[Ring, tuple[Ring, ...]]]:
-    """Each outer ring with the holes that lie directly in it."""
+    """Return each outer ring with the holes directly in it."""
     outer = [ring for ring in shape.rings if doubled_area(ring) > 0]
-    around = sorted(outer, key=doubled_area)  # the smallest outer ring around a hole is the one that it is a hole of
+    around = sorted(outer, key=doubled_area)  # a hole belongs to the smallest outer ring around it
     holes: dict[Ring, list[Ring]] = {ring: [] for ring in outer}
     for ring in shape.rings:
         if doubled_area(ring) < 0:
@@ -137,7 +137,7 @@ def parts(shape: Polygonal) -> list[tuple[Ring, tuple[Ring, ...]]]:
 
 
 def bounds(shape: Shape) -> tuple[int, int, int, int]:
-    """West, south, east, north."""
+    """Return west, south, east and north."""
     if isinstance(shape, RoundArea):
         (x, y), r = shape.center, shape.radius
         return x - r, y - r, x + r, y + r
@@ -146,9 +146,9 @@ def bounds(shape: Shape) -> tuple[int, int, int, int]:
 
 
 def lies_within(inner: Region, outer: Region, *, surely: bool = True) -> bool:
-    """Whether every point of the open set `inner` is one of `outer`; a common boundary does no harm.
+    """Whether the open set `inner` is a subset of `outer`. A common boundary is allowed.
 
-    Surely: whatever the elevation of home; else with some. Times do not count.
+    With `surely` this holds for every possible elevation of home, else for some elevation. Times are ignored.
     """
     if not _above(inner.floor, outer.floor, inner.floor_within, outer.floor_within, surely):
         return False
@@ -161,12 +161,12 @@ def lies_within(inner: Region, outer: Region, *, surely: bool = True) -> bool:
 
 
 def _above(high: int, low: int, high_within: int, low_within: int, surely: bool) -> bool:
-    """Whether one height is at least another; two that hang on the elevation of home are moved by the same error."""
+    """Whether one height is at least another. Two heights that depend on the elevation of home have the same error."""
     slack = 0 if high_within and low_within else high_within + low_within
     return high - slack >= low if surely else high + slack >= low
 
 
-@lru_cache(maxsize=1024)  # programs share zones, and an editor asks again at every change
+@lru_cache(maxsize=1024)  # programs share zones, and an editor repeats the call at every change
 def _flat_within(inner: Shape, outer: Shape, surely: bool) -> bool:
     if isinstance(outer, RoundArea):
         if isinstance(inner, RoundArea):
@@ -184,7 +184,7 @@ def _flat_within(inner: Shape, outer: Shape, surely: bool) -> bool:
 
 
 def are_disjoint(one: Region, other: Region, *, surely: bool = True) -> bool:
-    """Whether two open sets are disjoint; touching boundaries do no harm. `surely` as above."""
+    """Whether two open sets are disjoint. Touching boundaries are allowed. `surely` is as for `lies_within`."""
     if _above(one.floor, other.ceiling, one.floor_within, other.ceiling_within, surely):
         return True
     if _above(other.floor, one.ceiling, other.floor_within, one.ceiling_within, surely):
@@ -211,5 +211,5 @@ def _flat_disjoint(one: Shape, other: Shape, surely: bool) -> bool:
 
 
 def _sides(one: Polygonal, other: Polygonal) -> Iterator[tuple[bool, bool]]:
-    """For each face: whether it belongs to either area."""
+    """Yield for each face whether it belongs to the first area, and whether it belongs to the second."""
     return ((first > 0, second > 0) for first, second in faces((one.rings, other.rings)))

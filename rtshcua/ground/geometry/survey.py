@@ -1,9 +1,9 @@
-"""Survey paths: where a `cover` motion flies within an area. Integers only, so the same path comes out everywhere.
+"""Survey paths: the path of a `cover` motion in an area, in integers, so that it is the same on every machine.
 
-The path keeps `inset` mm away from the area's edge. Lines are parallel to the longest edge and at most one flying
-height apart, which is what a camera of 53 degrees sees at once; never closer than `LEAST_SPACING` and never more than
-`MOST_LINES`. Where the straight way would leave the area, or go over a hole in it, the path follows the edge. A
-perimeter is that around the area, not those around its holes. An area in several parts has no path.
+The path stays `inset` mm away from the area's edge. Lines are parallel to the longest edge and at most one flying
+height apart, which is the view of a camera of 53 degrees, but at least `LEAST_SPACING` apart. There are at most
+`MOST_LINES`. If the straight line would leave the area or cross a hole, the path follows the edge. A perimeter runs
+around the area but not around its holes. An area in several parts has no path.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -27,16 +27,15 @@ from rtshcua.ground.geometry.shapes import RoundArea, Shape, parts
 
 #: the outer ring of an area, and its holes
 Rings = tuple[Ring, ...]
-#: a point on the edge, the number of its ring, and that of the edge in the ring
+#: a point on the edge, the number of its ring, and the number of the edge in the ring
 EdgePoint = tuple[Point, int, int]
 
 
 def path_within(rings: Rings, start: EdgePoint, end: EdgePoint) -> list[Point]:
-    """The corners of a way between two points on the edge of an area.
+    """Return the corners of a path between two points on the edge of an area.
 
-    It is straight where it can be. Where the straight way meets a ring, it follows that to where the straight way
-    leaves it for the last time: from there on, the straight way is on the right side of that ring. Both ends being in
-    the area, it meets each ring once.
+    The path is straight where possible. If the straight line meets a ring, the path follows the ring to the point where
+    the line leaves it for the last time. Both ends are in the area, so the path follows each ring at most once.
     """
     if _straight(rings, start, end):
         return []
@@ -55,7 +54,7 @@ def path_within(rings: Rings, start: EdgePoint, end: EdgePoint) -> list[Point]:
 
 
 def _crossings(rings: Rings, start: EdgePoint, end: EdgePoint) -> list[tuple[Fraction, EdgePoint]]:
-    """Where the straight way meets edges, with how far along it that is; both ends are among them."""
+    """Return the points where the straight line meets edges, each with its position on the line; both ends included."""
     (px, py), (qx, qy) = start[0], end[0]
     found = [(Fraction(0), start), (Fraction(1), end)]
     ux, uy = qx - px, qy - py
@@ -78,7 +77,7 @@ def _crossings(rings: Rings, start: EdgePoint, end: EdgePoint) -> list[tuple[Fra
 
 
 def _along(rings: Rings, start: EdgePoint, end: EdgePoint) -> list[Point]:
-    """The corners between two points of one ring, the shorter way round."""
+    """Return the corners between two points of one ring, in the shorter direction."""
     (p, ring, first), (q, _, last) = start, end
     corners, count = rings[ring], len(rings[ring])
     onward = [corners[(first + 1 + k) % count] for k in range((last - first) % count)]
@@ -87,8 +86,9 @@ def _along(rings: Rings, start: EdgePoint, end: EdgePoint) -> list[Point]:
 
 
 def _straight(rings: Rings, start: EdgePoint, end: EdgePoint) -> bool:
-    """Whether the way between two points on the edge is inside: it meets no other edge, and its middle is inside. Where
-    it begins or ends at a corner, both edges of that are its own.
+    """Whether the line between two points on the edge is inside: it meets no other edge, and its middle is inside.
+
+    Both edges at a corner at which it begins or ends are ignored.
     """
     p, q = start[0], end[0]
     if start[1:] == end[1:]:
@@ -104,14 +104,14 @@ def _straight(rings: Rings, start: EdgePoint, end: EdgePoint) -> bool:
 
 
 def numbered_edges(rings: Rings) -> Iterator[tuple[int, int, Segment]]:
-    """Every edge, with the number of its ring and its own."""
+    """Yield every edge with the number of its ring and its own number."""
     for number, ring in enumerate(rings):
         for at, edge in enumerate(sides(ring)):
             yield number, at, edge
 
 
 def interpolate(a: int, b: int, over: int, whole: int) -> int:
-    """`a + (b - a) * over / whole`, to the nearest integer."""
+    """Return `a + (b - a) * over / whole`, rounded to the nearest integer."""
     if whole < 0:
         over, whole = -over, -whole
     return a + (2 * (b - a) * over + whole) // (2 * whole)
@@ -134,7 +134,7 @@ CORNERS = (
 
 
 def survey(area: Shape, pattern: str, spacing: int, inset: int, start: Point | None) -> tuple[Point, ...] | None:
-    """The points of a path in `area`, beginning at the end nearer to `start`; None where the area is too small."""
+    """Return the points of a path in `area`, beginning at the end nearer to `start`; None if the area is too small."""
     try:
         shape = _inset(area, max(inset, LEAST_INSET))
     except NoSuchOffset:
@@ -154,12 +154,12 @@ def survey(area: Shape, pattern: str, spacing: int, inset: int, start: Point | N
 
 @lru_cache(maxsize=64)
 def _inset(area: Shape, by: int) -> Shape:
-    """An area without what is within `by` mm of its edge; the choices of a mission's parameters ask for the same."""
+    """Return an area shrunk by `by` mm. The cache serves the instances of a mission, which share areas."""
     return inner(area, -by)
 
 
 def _regular(center: Point, radius: int) -> tuple[Point, ...]:
-    """A regular 16-gon in a circle, rounded towards its centre."""
+    """Return a regular 16-gon in a circle, rounded towards the centre."""
     x, y = center
 
     def scale(share: int) -> int:
@@ -169,12 +169,12 @@ def _regular(center: Point, radius: int) -> tuple[Point, ...]:
 
 
 def _perimeter(rings: Rings, _: int) -> list[Point]:
-    """Once around along the edge."""
+    """Return the path once along the outer edge."""
     return [*rings[0], rings[0][0]]
 
 
 def _orbit(rings: Rings, _: int) -> list[Point] | None:
-    """Once around the centre of the area, on the largest circle within its outer edge; holes must be clear of it."""
+    """Return the largest circle around the centroid within the outer edge; None if it is too small or meets a hole."""
     outer, holes = rings[0], rings[1:]
     center = _centroid(outer)
     if not contained((outer,), center):
@@ -205,7 +205,7 @@ def _centroid(ring: Ring) -> Point:
 
 
 def _grid(rings: Rings, spacing: int) -> list[Point]:
-    """Back and forth on parallel lines, evenly spaced over the width of the area."""
+    """Return a path back and forth on parallel lines, evenly spaced over the width of the area."""
     a, b = max(sides(rings[0]), key=lambda edge: length(*edge))
     along = (b[0] - a[0], b[1] - a[1])
     across = (-along[1], along[0])
@@ -225,7 +225,7 @@ def _grid(rings: Rings, spacing: int) -> list[Point]:
 
 
 def _line(rings: Rings, across: Point, height: int) -> list[EdgePoint]:
-    """Where the line `across . p = height` enters and leaves the area."""
+    """Return the points where the line `across . p = height` enters and leaves the area."""
     met: list[EdgePoint] = []
     for ring, number, (a, b) in numbered_edges(rings):
         over_a = across[0] * a[0] + across[1] * a[1] - height

@@ -213,7 +213,7 @@ def _report_late(
         codes.NO_RESOLVER,
         span or deadline.span,
         f"`{contract.name}` waits at most {duration(contract.deadline_us)} for `{signal.name}`, but "
-        f"`{most_frequent(signal, often).message}` is sent every {every} at most",
+        f"`{most_frequent(signal, often).message}` is sent only every {every}",
         help=f"set the deadline to {every} or more, or read `{signal.name}` from a message that is sent more often",
         labels=[(proof.span(clause), "this condition waits for the signal")],
     )

@@ -341,8 +341,8 @@ _ACROSS = "the straight way"
 
 def _above(height: int) -> str:
     return (
-        f"with `return at {display(height, Dimension.ALTITUDE)}` the way home leads above it; set the autopilot to the "
-        "same height"
+        f"with `return at {display(height, Dimension.ALTITUDE)}` the way home leads above all zones on it; set the "
+        "autopilot to the same height"
     )
 
 

@@ -270,7 +270,7 @@ def _within(
         code, span = codes.MISSION_ENERGY, limit.span
         against = f"but declares at most {display(limit.value, Dimension.RATIO)}"
     else:
-        code, span, against = codes.OVER_CHARGE, declared.name.span, "which is more than 100 %"
+        code, span, against = codes.OVER_CHARGE, declared.name.span, "more than a battery holds"
         advice = "; remove steps, or split the mission in two"
     report.add(
         code,

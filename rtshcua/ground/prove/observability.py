@@ -189,12 +189,12 @@ def _stays_known(proof: ProofContext, watched: WatchedSignal, intervals: Mapping
     older = older_by(message, proof.context.dialect)
     if signal.stale_us >= often + older:
         return
-    aged = f" with measurements up to {duration(older)} old" if older else ""
+    aged = f", with measurements up to {duration(older)} old" if older else ""
     proof.report.add(
         codes.UNOBSERVABLE,
         proof.context.symbols.signals[signal.name].stale_after.span,
         f"`{signal.name}` is unknown between reports: it is stale after {duration(signal.stale_us)}, but `{message}` "
-        f"is sent every {duration(often)} at most{aged}",
+        f"is sent only every {duration(often)}{aged}",
         help=f"set `stale after` to {duration(2 * often + older)} or more",
         labels=[(span, reads)],
     )
@@ -212,7 +212,7 @@ def _windows(proof: ProofContext, intervals: Mapping[str, int]) -> None:
             proof.report.add(
                 codes.UNOBSERVABLE,
                 proof.span(monitor.when),
-                f"the window is {duration(monitor.window_us)}, but {names} is reported every {duration(often)} at most",
+                f"the window is {duration(monitor.window_us)}, but {names} is reported only every {duration(often)}",
                 help="use a longer window, or only the present value",
             )
 

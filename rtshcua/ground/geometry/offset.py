@@ -385,7 +385,10 @@ def within_disc(center: Point, radius: int, halvings: int = FINE) -> Ring:
 
 @cache
 def around_disc(radius: int, halvings: int = COARSE) -> Ring:
-    """Return a polygon around a disc at the origin, its corners 0.13 % of the radius (2 % if rough) and some mm outside."""
+    """Return a polygon around a disc at the origin.
+
+    Its corners are 0.13 % of the radius (2 % if rough) and a few mm outside the disc.
+    """
     reach = radius + radius // (800 if halvings > ROUGH else 50) + 2
     while True:
         ring = tuple(_hull([_shrunk(each, reach) for each in _unit_circle(halvings)]))

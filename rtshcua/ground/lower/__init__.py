@@ -1,1 +1,1 @@
-"""From checked sources to the flat form: `policy` lowers a policy, `mission` a mission under it."""
+"""Lower checked sources to the flat form: `policy` lowers a policy, `mission` a mission under it."""

@@ -1,17 +1,18 @@
-"""Conditions to postfix code (`rtshcua.model.flat.code`). What is lowered here was found well typed.
+"""Lower well-typed conditions to postfix code (`rtshcua.model.flat.code`).
 
-Which side is the safe one for a derived zone depends on what the condition is for, and on the `not` before it: a zone
-that must be flown in is never too large, one that must not be is never too small. `for the last`, `within the last` and
-`within ... of` are true the more, the more their condition is, so they keep the side; an edge reads no grown zone.
+A derived zone is rounded to the safe side, which depends on the purpose of the condition and on the `not` before it. A
+zone in which the vehicle must fly is never too large, and a zone that it must not enter is never too small. `for the
+last`, `within the last` and `within ... of` are monotonic, so they keep the side. An edge reads no grown zone.
 
-Numbers are linear forms with exact rational factors, or the largest or smallest of several. A comparison of forms is
-multiplied by what makes every factor whole, so nothing is ever rounded, and all stays within 64 bits. `max(a, b) <= c`
-is `a <= c and b <= c`, `max(a, b) >= c` is `a >= c or b >= c`, and `min` the other way round, so that one part which is
-known may decide alone. `==` is `<=` and `>=` there, `!=` is `<` or `>`.
+Numbers are linear forms with exact rational factors, or the maximum or minimum of several forms. A comparison of forms
+is multiplied so that every factor is an integer: nothing is rounded, and all values fit in 64 bits. `max(a, b) <= c`
+becomes `a <= c and b <= c`, `max(a, b) >= c` becomes `a >= c or b >= c`, and `min` is lowered correspondingly. So a
+single known part may decide the comparison. `==` of such forms becomes `<=` and `>=`, `!=` becomes `<` or `>`.
 
-Comparisons of enumerations and of the mission's phase ask whether a value is in a set, those of the local time whether
-it is in a part of the day. A window of the day includes both its ends, which are whole us: before 19:00 is up to the
-last us of it, after 19:00 from the next. One of some days of the week begins on these, and may end on the next.
+A comparison of an enumeration or of the mission's phase becomes a test whether the value is in a set, and a comparison
+of the local time a test whether it is in a window of the day. A window includes both its ends, in whole us: before
+19:00 ends with the last us before it, after 19:00 begins with the next us. A window on some days of the week begins on
+these days and may end on the day after.
 """
 
 import operator
@@ -93,7 +94,7 @@ _KEEPS = frozenset({Op.NOT, Op.SCALE})
 
 
 class CodeWriter:
-    """Instructions in the order in which they run, and how deep their stack gets."""
+    """Collects instructions in order, with the largest depth of their stack."""
 
     def __init__(self) -> None:
         self.integers: list[int] = []
@@ -119,11 +120,11 @@ class CodeWriter:
 
 
 class TooManyForms(Exception):
-    """A number is a choice among more sums than fit on board in one condition."""
+    """An expression of `min` and `max` has more combinations than a condition on board may have."""
 
 
 class FormVariable(NamedTuple):
-    """A state slot, or an argument cell."""
+    """A state slot or an argument cell."""
 
     argument: bool
     at: int
@@ -131,7 +132,7 @@ class FormVariable(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class LinearForm:
-    """The sum of `terms` and `constant`. A variable whose factor is 0 stays: without it the number is not known."""
+    """The sum of `terms` and `constant`. A variable with factor 0 is kept: if it is missing, the sum is unknown."""
 
     terms: Mapping[FormVariable, Fraction]
     constant: Fraction
@@ -141,7 +142,7 @@ class LinearForm:
 
 @dataclass(frozen=True, slots=True)
 class Extremum:
-    """The largest (`most`) or the smallest of several numbers; `leaves` counts the linear forms in it."""
+    """The maximum (`most`) or the minimum of several numbers. `leaves` counts its linear forms."""
 
     most: bool
     among: tuple["Form", ...]
@@ -152,12 +153,12 @@ Form: TypeAlias = LinearForm | Extremum
 
 
 def constant(value: Fraction) -> LinearForm:
-    """A number that is known."""
+    """Return a constant as a form."""
     return LinearForm({}, value)
 
 
 def extremum(most: bool, among: Sequence[Form]) -> Form:
-    """The largest or the smallest of some forms; of numbers that are all known, that number."""
+    """Return the maximum or the minimum of forms; of constants, the constant."""
     known = [form.constant for form in among if isinstance(form, LinearForm) and not form.terms]
     if len(known) == len(among):
         return constant(max(known) if most else min(known))
@@ -168,14 +169,14 @@ def extremum(most: bool, among: Sequence[Form]) -> Form:
 
 
 def scaled(form: Form, factor: Fraction) -> Form:
-    """`form` times a number; the largest of some becomes the smallest where that is negative."""
+    """Return `form` times a number. A negative factor turns a maximum into a minimum."""
     if isinstance(form, Extremum):
         return Extremum(form.most == (factor >= 0), tuple(scaled(each, factor) for each in form.among), form.leaves)
     return LinearForm({variable: term * factor for variable, term in form.terms.items()}, form.constant * factor)
 
 
 def plus(left: Form, right: Form) -> Form:
-    """`left + right`: a sum with the largest of some is the largest of the sums with each."""
+    """Return `left + right`. Adding to a maximum adds to each of its forms."""
     if isinstance(left, Extremum) or isinstance(right, Extremum):
         if left.leaves * right.leaves > MAX_INSTRUCTIONS:
             raise TooManyForms
@@ -193,10 +194,10 @@ def plus(left: Form, right: Form) -> Form:
 
 
 class ConditionPlace(NamedTuple):
-    """Where a condition stands: its scope, the first argument cell of each parameter, and which side is safe.
+    """The context of a condition: its scope, the first argument cell of each parameter, and the safe side.
 
-    `strict` holds where the condition must be TRUE for the vehicle to go on; it is false for what stops it (`forbid`,
-    `confirm`, `degrade`).
+    `strict` is true if the condition must be TRUE for the vehicle to continue, and false if it stops the vehicle
+    (`forbid`, `confirm`, `degrade`).
     """
 
     scope: Scope
@@ -205,7 +206,7 @@ class ConditionPlace(NamedTuple):
 
 
 class ConditionLowering:
-    """Lowers the conditions of one policy into shared slots, zones, sets and monitors."""
+    """Lowers the conditions of one policy, with shared slots, zones, sets and monitors."""
 
     def __init__(self, context: CheckContext, slots: SignalSlots, zones: ZoneTable, files: SourceTable) -> None:
         self._context = context
@@ -217,27 +218,27 @@ class ConditionLowering:
         self._monitored: dict[tuple[Condition, MonitorKind, int, bool], int] = {}
 
     def clause(self, node: Condition, place: ConditionPlace, at: Node | None = None) -> Clause:
-        """A condition with its text and place; `at` is what to quote, the condition itself if None."""
+        """Lower a condition, with its text and place. `at` is the node to quote, by default the condition itself."""
         code = CodeWriter()
         self._condition(code, node, place, place.strict)
         quoted = node if at is None else at
         if code.length > MAX_INSTRUCTIONS or code.deepest > MAX_STACK:
-            ranges = "comparisons of one value are shorter as a range, `a in low .. high`, or as a set, `a in {x, y}`"
+            ranges = "compare one value with a range, `a in low .. high`, or with a set, `a in {x, y}`"
             is_choice = isinstance(node, Junction) and node.operator == "or"
             self._context.report.add(
                 codes.CONDITION_SIZE,
                 node.span,
-                f"the condition takes {code.length} instructions on a stack of {code.deepest}, and on board fit "
-                f"{MAX_INSTRUCTIONS} on one of {MAX_STACK}",
-                help=f"in a policy, write a rule for each part of the `or`; or say less: {ranges}"
+                f"the condition takes {code.length} instructions and {code.deepest} stack entries, but at most "
+                f"{MAX_INSTRUCTIONS} and {MAX_STACK} fit on board",
+                help=f"in a policy, write a rule for each part of the `or`; or simplify the condition: {ranges}"
                 if is_choice
-                else f"say less: {ranges}",
+                else f"simplify the condition: {ranges}",
             )
         text, source, start, end = self.files.place(quoted.span)
         return Clause(text, source, start, end, tuple(code.integers))
 
     def monitors_of(self, operand: Condition, kind: MonitorKind, window_us: int) -> tuple[int, ...]:
-        """The monitors that keep an operand which was lowered: one for each safe side that is needed."""
+        """Return the monitors of an operand that is already lowered, one for each safe side in use."""
         keys = ((operand, kind, window_us, safe) for safe in (True, False))
         return tuple(sorted({self._monitored[key] for key in keys if key in self._monitored}))
 
@@ -258,7 +259,7 @@ class ConditionLowering:
             case Edge():
                 kind = MonitorKind.RISING if node.rising else MonitorKind.FALLING
                 self._monitor(code, kind, node.operand, 0, place, safe)
-            case Near():  # one of two is true now, and the other was at some moment of the window
+            case Near():  # one operand is true now, and the other was true at some time in the window
                 for now, before in ((node.left, node.right), (node.right, node.left)):
                     self._condition(code, now, place, safe)
                     self._monitor(code, MonitorKind.WITHIN_LAST, before, node.window.value, place, safe)
@@ -296,8 +297,8 @@ class ConditionLowering:
         smaller = safe != node.negated
         subject = place.scope.find(node.subject.name)
         if isinstance(subject, Argument) and subject.type == ZONE:
-            which = self.zones.disjoint if node.negated else self.zones.within
-            members = self.sets.of(which(region.name, margin, smaller=smaller, span=node.region.span))
+            matching = self.zones.disjoint if node.negated else self.zones.within
+            members = self.sets.of(matching(region.name, margin, smaller=smaller, span=node.region.span))
             code.add(Op.ARGUMENT_IN, place.cells[node.subject.name], members)
             for exists in self.zones.times(region.name, self.sets):
                 code.add(*exists)
@@ -317,7 +318,7 @@ class ConditionLowering:
             code.add(Op.NOT)
 
     def _known(self, code: CodeWriter, signal: str) -> None:
-        """Each slot of the signal has a value; a position has two."""
+        """Test that each slot of the signal has a value. A position has two slots."""
         slot = self.slots.of(signal)
         code.add(Op.KNOWN, slot)
         if self.slots.width(signal) > 1:
@@ -325,7 +326,7 @@ class ConditionLowering:
             code.add(Op.AND)
 
     def _one_of(self, code: CodeWriter, node: OneOf, place: ConditionPlace) -> None:
-        """`subject in {a, b}`."""
+        """Lower `subject in {a, b}`."""
         if is_about_phase(node):
             self._phase(code, [name.text for name in node.names])
             return
@@ -334,7 +335,7 @@ class ConditionLowering:
         self._member(code, node.subject, {members[1][name.text] for name in node.names}, place)
 
     def _comparison(self, code: CodeWriter, node: Comparison, place: ConditionPlace) -> None:
-        """`left operator right`, of times of day, phases, members of an enumeration, or numbers."""
+        """Lower `left operator right` for times of day, phases, members of an enumeration, or numbers."""
         if isinstance(node.right, TimeOfDay):
             _compare_time(code, node.operator, node.right.value)
             return
@@ -361,7 +362,7 @@ class ConditionLowering:
         self._numbers(code, node, node.left, _COMPARE[node.operator], node.right, place)
 
     def _range(self, code: CodeWriter, node: Within, place: ConditionPlace) -> None:
-        """`subject in low .. high`, both ends included."""
+        """Lower `subject in low .. high`, both ends included."""
         low, high = node.range.low, node.range.high
         if isinstance(low, TimeOfDay) and isinstance(high, TimeOfDay):
             self._time_window(code, low.value, high.value, node.days)
@@ -379,7 +380,7 @@ class ConditionLowering:
         code.add(Op.AND)
 
     def _time_window(self, code: CodeWriter, start: int, end: int, days: tuple[int, ...]) -> None:
-        """A window of the day, on some days of the week, or (none) on all."""
+        """Lower a window of the day on some days of the week; no days means every day."""
         if days:
             windows = weekly_windows(start, end, days)
             if windows != (0, WEEK):
@@ -392,7 +393,7 @@ class ConditionLowering:
         code.add(Op.PHASE_IN, 0, self.sets.of_phases(names))
 
     def _members(self, node: Value, place: ConditionPlace) -> tuple[frozenset[int], Mapping[str, int]] | None:
-        """All values of a name's enumeration, and the declared ones by name; None for what is no enumeration's."""
+        """Return all values of a name's enumeration, and the declared values by name; None if it has no enumeration."""
         found = place.scope.find(node.name) if isinstance(node, Reference) else None
         type = None if found is None else place.scope.type_of(found)
         if type is None or type.enumeration is None:
@@ -425,14 +426,15 @@ class ConditionLowering:
             report.add(
                 codes.CONDITION_SIZE,
                 node.span,
-                f"`{report.text(node.span)}` compares more than {MAX_INSTRUCTIONS} sums with each other",
-                help="a sum of `min` and `max` means each choice with each other: compare them apart",
+                f"`{report.text(node.span)}` compares more than {MAX_INSTRUCTIONS} combinations of sums",
+                help="a sum of several `min` and `max` multiplies their alternatives; split the comparison",
             )
             code.add(Op.CONST)
 
     def _form(self, node: Value, place: ConditionPlace) -> Form:
-        """The form of a number, in units that need no factor when they are multiplied (m, m/s, s, the whole). A signal
-        that is read for the first time gets a slot. Raises `TooManyForms`.
+        """Return the form of a number in coherent units (m, m/s, s, the whole).
+
+        A signal that is read for the first time gets a slot. Raises `TooManyForms`.
         """
         match node:
             case Quantity():
@@ -456,7 +458,7 @@ class ConditionLowering:
                 raise AssertionError(node.kind)
 
     def _parts(self, code: CodeWriter, node: Node, form: Form, op: Op) -> None:
-        """`form op 0`."""
+        """Lower `form op 0`."""
         if isinstance(form, LinearForm):
             left, right = LinearForm(form.terms, Fraction(0)), LinearForm({}, -form.constant)
             self._emit(code, node, left, op, right)
@@ -473,7 +475,7 @@ class ConditionLowering:
                     code.add(connect)
 
     def _emit(self, code: CodeWriter, node: Node, left: LinearForm, op: Op, right: LinearForm) -> None:
-        """`left op right`, multiplied by the positive number that makes all factors whole and as small as can be."""
+        """Lower `left op right`, multiplied by the positive number that makes all factors the least integers."""
         numbers = [*left.terms.values(), left.constant, *right.terms.values(), right.constant]
         whole = lcm(*(number.denominator for number in numbers))
         common = gcd(*(int(number * whole) for number in numbers)) or 1
@@ -492,19 +494,19 @@ class ConditionLowering:
             report.add(
                 codes.NUMBER_SIZE,
                 node.span,
-                f"`{report.text(node.span)}` may need a number that is larger than what is computed with on board",
-                help=f"made whole together, its factors add up to {factors:,}, and at most {most} fit: use rounder ones"
+                f"`{report.text(node.span)}` may exceed the range of numbers on board",
+                help=f"as integers, its factors add up to {factors:,}, but at most {most} fit; use rounder factors"
                 if factors > most
                 else "compare smaller numbers",
             )
 
 
 def _compare_time(code: CodeWriter, comparison: str, time: int) -> None:
-    """The local time compared with a time of day."""
+    """Lower a comparison of the local time with a time of day."""
     start, end = {">=": (time, DAY), ">": (time + 1, DAY), "<=": (0, time), "<": (0, time - 1)}[comparison]
     if end >= 0:
         code.add(Op.TIME_IN, start, end)
-    else:  # before 00:00: not at any time of the day
+    else:  # before 00:00 is never true
         code.add(Op.TIME_IN, 0, DAY)
         code.add(Op.NOT)
 
@@ -525,7 +527,7 @@ def _arithmetic(operation: str, left: Form, right: Form) -> Form:
 
 
 def _push(code: CodeWriter, terms: Mapping[FormVariable, int], constant: int) -> None:
-    """The sum of some terms and a constant."""
+    """Push the sum of terms and a constant."""
     first = True
     for variable, factor in terms.items():
         code.add(Op.ARGUMENT if variable.argument else Op.SIGNAL, variable.at)

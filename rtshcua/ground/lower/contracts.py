@@ -1,4 +1,4 @@
-"""Skill contracts and the links of chains, from the IR to the flat form. Everything here was checked before."""
+"""Lower checked skill contracts and the links of chains to the flat form."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -29,22 +29,22 @@ from rtshcua.model.ir.places import ZoneDecl
 from rtshcua.model.ir.skills import ClauseDecl as ClauseDecl
 from rtshcua.model.ir.skills import LinkDecl, SkillDecl
 
-#: how long a clause may be unknown where a skill does not say
+#: default of `grace`: how long a clause may be unknown, us
 DEFAULT_GRACE_US = 500_000
-#: what is recorded where a skill does not say
+#: default of `record`
 DEFAULT_RECORD = ("intent", "decision", "state", "authorization", "effect")
 
 
 def recorded(names: Iterable[str]) -> tuple[str, ...]:
-    """What a `record` clause means: kinds of evidence, all if it names none, and the word for how durable, if any."""
+    """Return the meaning of a `record` clause: the kinds of evidence (by default all), and the durability, if given."""
     named = tuple(dict.fromkeys(names))
     kinds = tuple(name for name in named if name not in WORDS) or DEFAULT_RECORD
-    words = [word for word in WORDS if word in named]
-    return (*kinds, *words[-1:])
+    durabilities = [word for word in WORDS if word in named]
+    return (*kinds, *durabilities[-1:])
 
 
 def cells_of(skill: SkillDecl) -> dict[str, int]:
-    """The first argument cell of each parameter; a place has two."""
+    """Return the first argument cell of each parameter. A place has two cells."""
     cells: dict[str, int] = {}
     cell = 0
     for parameter in skill.parameters:
@@ -54,7 +54,7 @@ def cells_of(skill: SkillDecl) -> dict[str, int]:
 
 
 class ContractLowering:
-    """Lowers the skills of one policy; `numbers` are their indexes, `left_out` the clauses left out."""
+    """Lowers the skills of one policy. `numbers` are their indexes, `left_out` the clauses that do not apply."""
 
     def __init__(
         self, context: CheckContext, numbers: Mapping[str, int], conditions: ConditionLowering, vehicle: VehicleLimits
@@ -66,7 +66,7 @@ class ContractLowering:
         self.left_out: list[LeftOut] = []
 
     def contract(self, skill: SkillDecl) -> Contract:
-        """One skill's contract, its defaults filled in."""
+        """Lower a skill's contract, with its defaults."""
         assert skill.motion is not None
         assert skill.timing_class is not None
         assert skill.deadline is not None
@@ -106,11 +106,11 @@ class ContractLowering:
         )
 
     def chain(self, links: Sequence[LinkDecl]) -> tuple[Link, ...]:
-        """The links of a chain, in order."""
+        """Lower the links of a chain, in order."""
         return tuple(self.link(link) for link in links)
 
     def link(self, link: LinkDecl) -> Link:
-        """One link, its arguments complete."""
+        """Lower a link with all its arguments."""
         text, source, start, end = self.conditions.files.place(link.span)
         return Link(
             skill=self.numbers[link.skill.text],
@@ -123,7 +123,7 @@ class ContractLowering:
         )
 
     def cells(self, bound: Sequence[Bound]) -> tuple[int, ...]:
-        """Arguments as integers: a zone by its index, a place by its local x and y in mm."""
+        """Return arguments as integers: a zone as its index, a place as its local x and y in mm."""
         cells: list[int] = []
         for argument in bound:
             if isinstance(argument, ZoneDecl):
@@ -137,7 +137,7 @@ class ContractLowering:
     def _clauses(
         self, part: str, clauses: Sequence[ClauseDecl], place: ConditionPlace, skill: SkillDecl
     ) -> tuple[Clause, ...]:
-        """The clauses that apply to the vehicle; the others are noted."""
+        """Lower the clauses that apply to the vehicle, and record the others in `left_out`."""
         without = frozenset(self.vehicle.without)
         for clause in clauses:
             if not applies(clause, without):

@@ -1,6 +1,6 @@
-"""Conditions that are lowered under a policy that is signed as it is, so that they may add nothing to its tables.
+"""Lower conditions under a signed policy, whose tables cannot grow.
 
-They may read the signals that the policy reads, and zones, sets and monitors that it has.
+The conditions may only read signals that the policy reads, and use its zones, sets and monitors.
 """
 
 from collections.abc import Iterator
@@ -24,15 +24,15 @@ from rtshcua.model.quantity import Dimension, display
 
 
 class MissingFromPolicy(NamedTuple):
-    """What a condition needs that the policy has not, where it is written, and what the policy has of that kind."""
+    """A need of a condition that the policy does not meet: its span, a description, and what the policy has instead."""
 
     span: Span
-    what: str
-    has: str
+    need: str
+    available: str
 
 
 class FixedTables:
-    """Lowers conditions under one policy; places are those of `files`."""
+    """Lowers conditions under one policy, with the source places of `files`."""
 
     def __init__(self, context: CheckContext, under: LoweredPolicy, files: SourceTable) -> None:
         self._context = context
@@ -43,7 +43,7 @@ class FixedTables:
     def clause(
         self, condition: Condition, place: ConditionPlace, span: Span
     ) -> Clause | list[MissingFromPolicy] | None:
-        """The condition lowered, or what the policy has not of what it needs; None after a finding."""
+        """Lower a condition, or return its needs that the policy does not meet; None after a finding."""
         unread, sound = self._unread(condition)
         if unread or not sound:
             return unread or None
@@ -53,14 +53,15 @@ class FixedTables:
         lowered = self._copy.clause(condition, place)
         lacking = next(_lacking(self._copy, self._under.policy), None)
         if lacking is not None:
-            self._copy = None  # what it gained is not the policy's
+            self._copy = None  # discard the additions to the copy
         if len(self._context.report.found) > before:
             return None
         return lowered if lacking is None else [MissingFromPolicy(span, *lacking)]
 
     def _unread(self, condition: Condition) -> tuple[list[MissingFromPolicy], bool]:
-        """The signals of a condition that the policy does not read; and whether it has all its zones, which is reported
-        where it has not.
+        """Return the signals of a condition that the policy does not read, and whether it has all the zones.
+
+        Reports each missing zone.
         """
         context, under = self._context, self._under
         signals = {signal.name for signal in under.policy.signals}
@@ -68,21 +69,21 @@ class FixedTables:
         for reference in references(condition):
             zone = reference.name.removesuffix(ENTRY)
             if reference.name in context.symbols.signals and reference.name not in signals:
-                what = f"reads the signal `{reference.name}`, which the policy does not"
-                unread.append(MissingFromPolicy(reference.span, what, _signals(under.policy)))
+                need = f"reads the signal `{reference.name}`, which the policy does not read"
+                unread.append(MissingFromPolicy(reference.span, need, _signals(under.policy)))
             elif zone in context.symbols.zones:
                 sound &= knows_zone(context, under, Name(span=reference.span, text=zone))
         return unread, sound
 
 
 def knows_zone(context: CheckContext, under: LoweredPolicy, zone: Name) -> bool:
-    """Whether a policy has a zone that is declared; reports it where it has not."""
+    """Whether a policy has a declared zone. Reports it otherwise."""
     if zone.text in under.zones.index:
         return True
     context.report.add(
         codes.NOT_IN_POLICY,
         zone.span,
-        f"the zone `{zone.text}` is not one that the policy `{under.policy.name}` imports",
+        f"the policy `{under.policy.name}` does not import the zone `{zone.text}`",
         help="its zones are " + ", ".join(f"`{name}`" for name in under.zones.index),
         labels=[(context.symbols.zones[zone.text].name.span, "declared here")],
     )
@@ -90,27 +91,27 @@ def knows_zone(context: CheckContext, under: LoweredPolicy, zone: Name) -> bool:
 
 
 def _copy(context: CheckContext, under: LoweredPolicy, files: SourceTable) -> ConditionLowering:
-    """The tables of the policy, copied: what conditions add to the copy is seen, and thrown away."""
-    # `deepcopy` asks by identity what to leave as it is
+    """Return a copy of the policy's tables, to which conditions may add entries."""
+    # `deepcopy` does not copy the objects in `memo`
     memo: dict[int, Any] = {id(each): each for each in (context, context.report, context.symbols)}
     memo[id(under.files)] = files
     return deepcopy(under.conditions, memo)
 
 
 def _lacking(copy: ConditionLowering, policy: Policy) -> Iterator[tuple[str, str]]:
-    """What a lowering has added to the tables of a policy, and what these have of its kind."""
+    """Yield descriptions of entries that a lowering added to the tables, each with what the policy has instead."""
     if copy.slots.count > policy.slots:
-        yield "reads a signal that the policy does not", _signals(policy)
+        yield "reads a signal that the policy does not read", _signals(policy)
     if len(copy.zones.flat()) > len(policy.zones) or len(copy.zones.tables) > len(policy.tables):
         grown = listed(dict.fromkeys(zone.name for zone in policy.zones[len(copy.zones.index) :]))
         yield "needs a grown zone that the policy does not have", f"it has {grown or 'none'}"
     if len(copy.sets.phases) > len(policy.phases):
-        yield "names a phase that no condition of the policy does", f"they name {listed(policy.phases) or 'none'}"
+        yield "names a phase that no condition of the policy names", f"they name {listed(policy.phases) or 'none'}"
     if len(copy.sets.all) > len(policy.sets):
-        yield "needs a set of values that no condition of the policy has", "a single value is compared with `==`"
+        yield "needs a set of values that no condition of the policy has", "compare a single value with `==`"
     if len(copy.monitors.all) > len(policy.monitors):
-        watched = listed(dict.fromkeys(_window(monitor) for monitor in policy.monitors))
-        yield "needs a temporal condition that the policy does not observe", f"it observes {watched or 'none'}"
+        monitored = listed(dict.fromkeys(_window(monitor) for monitor in policy.monitors))
+        yield "needs a temporal condition that the policy does not monitor", f"it monitors {monitored or 'none'}"
 
 
 def _signals(policy: Policy) -> str:
@@ -118,11 +119,11 @@ def _signals(policy: Policy) -> str:
 
 
 def _window(monitor: Monitor) -> str:
-    """A temporal condition as it is written."""
-    words = {
+    """Format a temporal condition as in sources."""
+    operator = {
         MonitorKind.FOR_LAST: "for the last",
         MonitorKind.WITHIN_LAST: "within the last",
     }.get(MonitorKind(monitor.kind))
-    if words is None:
+    if operator is None:
         return f"{MonitorKind(monitor.kind).name.lower()} {monitor.when.text}"
-    return f"{monitor.when.text} {words} {display(monitor.window_us, Dimension.DURATION)}"
+    return f"{monitor.when.text} {operator} {display(monitor.window_us, Dimension.DURATION)}"

@@ -1,11 +1,11 @@
 """The ground plans of declared zones, in whole millimetres of the local plane.
 
-A circle that is a zone by itself stays exact. In a union or a difference, and for the ends and bends of a corridor, a
-circle is a polygon of 128 corners within it, from which the ideal one differs by at most 0.031 % of the radius and
-2 mm. Unions and differences are computed in exact fractions; their corners are rounded, which moves an outline by at
-most 1 mm, or by up to 9 mm where it touches itself or comes nearer to itself than a millimetre.
+A circle that is a zone by itself is exact. In a union or a difference, and for the ends and bends of a corridor, a
+circle is replaced by an inscribed polygon of 128 corners, which differs from it by at most 0.031 % of the radius and
+2 mm. Unions and differences are computed in exact fractions. Their corners are rounded, which moves an outline by at
+most 1 mm, or by up to 9 mm where it touches itself or comes within a millimetre of itself.
 
-A union is what lies inside of the common outline: two shapes with a common edge are one, without a seam.
+A union is the area inside the common outline: two shapes with a common edge form one area.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -26,7 +26,7 @@ from rtshcua.model.ir.places import Shape as Declared
 
 
 class GroundPlans:
-    """The ground plan of each zone, computed once. What stands in the way is reported; then there is none."""
+    """Computes the ground plan of each zone, once. A zone with a finding has none."""
 
     def __init__(self, projection: Projection, zones: Mapping[str, ZoneDecl], data: DataFiles, report: Report) -> None:
         self._projection = projection
@@ -36,14 +36,14 @@ class GroundPlans:
         self._known: dict[str, Shape | None] = {}
 
     def of(self, zone: ZoneDecl) -> Shape | None:
-        """The ground plan of a zone."""
+        """Return the ground plan of a zone, or None after a finding."""
         name = zone.name.text
         if name not in self._known:
             self._known[name] = self._shape(zone.shape, zone)
         return self._known[name]
 
     def place(self, coordinates: Coordinates) -> Point | None:
-        """A place in the local plane; None, and reported, where it is too far from home."""
+        """Return a place in the local plane. Reports it and returns None if it is too far from home."""
         return self._projected(coordinates.longitude, coordinates.latitude, coordinates.span)
 
     def _projected(self, longitude: int, latitude: int, span: Span) -> Point | None:
@@ -54,12 +54,12 @@ class GroundPlans:
             codes.TOO_FAR,
             span,
             "this place is more than 500 km from the vehicle's home",
-            help="are latitude and longitude the right way round?",
+            help="check the order: latitude first, then longitude",
         )
         return None
 
     def _shape(self, shape: Declared, zone: ZoneDecl) -> Shape | None:
-        """A part of a zone; a reference stands for the zone that it names, which is declared and not this one."""
+        """Return a part of a zone. A reference is the ground plan of the zone that it names."""
         match shape:
             case Circle():
                 center = self.place(shape.center)
@@ -87,13 +87,13 @@ class GroundPlans:
             self._report.add(
                 codes.BAD_POLYGON,
                 zone.name.span,
-                f"the edges of `{zone.name.text}` touch each other when its corners are rounded to millimetres",
+                f"the edges of `{zone.name.text}` touch each other after its corners are rounded to millimetres",
             )
             return None
         return polygonal(tuple(rings))
 
     def _corridor(self, shape: Corridor, zone: ZoneDecl) -> Polygonal | None:
-        """A disc around each place, and between them rectangles: what any of them covers."""
+        """Return the union of a disc around each place and the rectangles between them."""
         placed = [self.place(point) for point in shape.points]
         points = [point for point in placed if point is not None]
         if len(points) < len(placed):
@@ -101,12 +101,12 @@ class GroundPlans:
         half = shape.width.value // 2
         curves: list[Curve] = [within_disc(point, half) for point in points]
         for (ax, ay), (bx, by) in pairwise(points):
-            x, y = scaled((by - ay, ax - bx), half)  # to the right of the way
+            x, y = scaled((by - ay, ax - bx), half)  # to the right of the corridor's axis
             curves.append(((ax + x, ay + y), (bx + x, by + y), (bx - x, by - y), (ax - x, ay - y)))
         return self._outlined([curves], lambda windings: windings[0] > 0, shape.span, zone)
 
     def _geojson(self, shape: GeoJson, zone: ZoneDecl) -> Polygonal | None:
-        """Each polygon without its holes, all together. Rings may touch each other there: RFC 7946 leaves it open."""
+        """Return the union of all polygons without their holes. RFC 7946 allows rings to touch each other."""
         area = self._data.area(shape)
         if not isinstance(area, tuple):
             return None
@@ -125,7 +125,7 @@ class GroundPlans:
         return self._outlined(groups, lambda windings: max(windings) > 0, shape.span, zone)
 
     def _all(self, ring: GeoRing, span: Span) -> Iterator[Point]:
-        """The corners in the local plane, up to the first that is too far from home."""
+        """Yield the corners in the local plane, up to the first that is too far from home."""
         for longitude, latitude in ring:
             point = self._projected(longitude, latitude, span)
             if point is None:
@@ -156,16 +156,16 @@ class GroundPlans:
             self._report.add(
                 codes.ZONE_SHAPE,
                 span,
-                f"the outline of `{zone.name.text}` cannot be proved in whole millimetres",
-                help="let its parts overlap or lie apart by some centimetres",
+                f"the outline of `{zone.name.text}` cannot be computed in whole millimetres",
+                help="let its parts overlap, or keep them some centimetres apart",
             )
             return None
         if not made.rings:
             self._report.add(
                 codes.EMPTY_ZONE,
                 span,
-                f"nothing is left of `{zone.name.text}`",
-                help="what is taken away from the first shape must leave some of it"
+                f"`{zone.name.text}` is empty",
+                help="the shapes that are subtracted must leave a part of the first shape"
                 if span != zone.shape.span or isinstance(zone.shape, Combination)
                 else None,
             )
@@ -173,20 +173,19 @@ class GroundPlans:
         return self._bounded(made.rings, span, zone)
 
     def _bounded(self, rings: tuple[Ring, ...], span: Span, zone: ZoneDecl) -> Polygonal | None:
-        """The shape, unless it is more than fits on board."""
+        """Return the shape. Reports it and returns None if it exceeds a limit."""
         count = sum(map(len, rings))
         if count > MAX_VERTICES or len(rings) > MAX_RINGS:
             many, most = (
                 (f"{count:,} corners", MAX_VERTICES) if count > MAX_VERTICES else (f"{len(rings)} rings", MAX_RINGS)
             )
-            self._report.add(
-                codes.TOO_MANY, span, f"the outline of `{zone.name.text}` has {many}, and at most {most:,} fit on board"
-            )
+            message = f"the outline of `{zone.name.text}` has {many}, but at most {most:,} fit on board"
+            self._report.add(codes.TOO_MANY, span, message)
             return None
         shape = polygonal(rings)
         if any(max(abs(x), abs(y)) > MAX_COORDINATE for x, y in corners(shape)):
             self._report.add(
-                codes.TOO_FAR, span, f"`{zone.name.text}` reaches further than 500 km from the vehicle's home"
+                codes.TOO_FAR, span, f"`{zone.name.text}` extends more than 500 km from the vehicle's home"
             )
             return None
         return shape
@@ -197,6 +196,6 @@ def _polygonal(shape: Shape) -> Polygonal:
 
 
 def _turned(ring: Sequence[Point], *, hole: bool) -> Ring:
-    """The ring counter-clockwise, or clockwise for a hole."""
+    """Return the ring counter-clockwise, or clockwise for a hole."""
     turned = counter_clockwise(ring)
     return (turned[0], *reversed(turned[1:])) if hole else tuple(turned)

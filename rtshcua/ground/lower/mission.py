@@ -1,8 +1,8 @@
-"""A mission to the flat form: one contract-bound invocation a step, still without its id and its binding.
+"""Lower a mission to the flat form: one invocation with a contract for each step, without its id and its binding.
 
-The contract of a step is its skill's, made tighter by what the step says of its own. The policy is signed once for all
-its missions, so a mission adds nothing to its tables: a step's own clauses may read the signals that the policy reads,
-and zones, sets and monitors that it has (E0622). Its plan is where it will take the vehicle: path, altitude and speed.
+The contract of a step is that of its skill, tightened by the step's own block. The policy is signed once for all its
+missions, so a mission cannot add to its tables: the step's own clauses may only read signals that the policy reads, and
+use its zones, sets and monitors (E0622). The plan of a step is its path, altitude and speed.
 """
 
 from collections.abc import Mapping, Sequence
@@ -35,7 +35,7 @@ from rtshcua.model.ir.skills import SkillDecl
 
 
 class LoweredMission(NamedTuple):
-    """A flat mission, and the files that its contracts' clauses refer to."""
+    """A flat mission, and the files to which the clauses of its contracts refer."""
 
     mission: Mission
     files: JointSourceTable
@@ -44,7 +44,7 @@ class LoweredMission(NamedTuple):
 def lower_mission(
     context: CheckContext, mission: MissionDecl, under: LoweredPolicy, names: Mapping[str, str], issued_at_us: int
 ) -> LoweredMission | None:
-    """The mission under its lowered policy, issued at a UTC time in us; None after a finding."""
+    """Lower a mission under its lowered policy, issued at a UTC time in us. Returns None after a finding."""
     assert mission.role is not None
     before = len(context.report.found)
     role = under.roles.get(mission.role.text)
@@ -52,9 +52,9 @@ def lower_mission(
         context.report.add(
             codes.NOT_PERMITTED,
             mission.role.span,
-            f"no rule of `{mission.policy.text}` is about the role `{mission.role.text}`",
+            f"no rule of `{mission.policy.text}` names the role `{mission.role.text}`",
             help=suggestion(mission.role.text, under.roles)
-            or "its rules are about " + ", ".join(f"`{each}`" for each in under.roles),
+            or "its roles are " + ", ".join(f"`{each}`" for each in under.roles),
             labels=[(under.declaration.name.span, "the policy is declared here")],
         )
     if not _fits(context, mission) or role is None:
@@ -85,7 +85,7 @@ def lower_mission(
 def _fits(context: CheckContext, mission: MissionDecl) -> bool:
     good = True
     steps = sum(len(phase.steps) for phase in mission.phases)
-    for code, count, limit, what in (
+    for code, count, limit, kind in (
         (codes.MISSION_STEPS, steps, MAX_INVOCATIONS, "steps"),
         (codes.TOO_MANY, len(mission.phases), MAX_PHASES, "phases"),
     ):
@@ -94,14 +94,14 @@ def _fits(context: CheckContext, mission: MissionDecl) -> bool:
             context.report.add(
                 code,
                 mission.name.span,
-                f"the mission has {count} {what}, and at most {limit} fit on board",
+                f"the mission has {count} {kind}, but at most {limit} fit on board",
                 help="split it into several missions",
             )
     return good
 
 
 def argument_span(context: CheckContext, step: Step, parameter: str) -> Span:
-    """Where the argument of a parameter is written in a step; the step itself where the default holds."""
+    """Return the span of the argument for a parameter in a step, or the span of the step if the default applies."""
     skill = context.symbols.skills[step.skill.text]
     for position, argument in enumerate(step.arguments):
         name = skill.parameters[position].name.text if argument.name is None else argument.name.text
@@ -111,7 +111,7 @@ def argument_span(context: CheckContext, step: Step, parameter: str) -> Span:
 
 
 class StepLowering:
-    """Lowers the steps of one mission; `files` are the policy's and the mission's."""
+    """Lowers the steps of one mission. `files` are those of the policy and of the mission."""
 
     def __init__(self, context: CheckContext, mission: MissionDecl, under: LoweredPolicy, files: SourceTable) -> None:
         self._context = context
@@ -121,7 +121,7 @@ class StepLowering:
         self._contracts: dict[tuple[str, Overrides], Contract | None] = {}
 
     def invocations(self, files: SourceTable, role: int, issued_at_us: int) -> list[Invocation]:
-        """The steps in order, with the mission's own `files`; those with a finding are left out."""
+        """Return the steps in order, without those that have a finding. `files` are the mission's own."""
         assert self._mission.source is not None
         source = int(SourceKind[self._mission.source.text.upper()])
         found: list[Invocation] = []
@@ -158,14 +158,14 @@ class StepLowering:
         return found
 
     def _known(self, step: Step) -> bool:
-        """Whether the policy knows the skill and all the zones of a step."""
+        """Whether the policy has the skill and all the zones of a step. Reports those that are missing."""
         policy = self._under.declaration
         if step.skill.text not in self._under.skills:
             self._context.report.add(
                 codes.NOT_PERMITTED,
                 step.skill.span,
-                f"no rule of `{policy.name.text}` is about `{step.skill.text}`",
-                help="its rules are about " + ", ".join(f"`{name}`" for name in self._under.skills),
+                f"no rule of `{policy.name.text}` names the skill `{step.skill.text}`",
+                help="its skills are " + ", ".join(f"`{name}`" for name in self._under.skills),
                 labels=[(policy.name.span, "the policy is declared here")],
             )
             return False
@@ -175,11 +175,11 @@ class StepLowering:
             for bound, parameter in zip(self._context.bound(step), skill.parameters, strict=True)
             if isinstance(bound, ZoneDecl)
         ]
-        known = [knows_zone(self._context, self._under, zone) for zone in zones]  # all, so that each is reported
+        known = [knows_zone(self._context, self._under, zone) for zone in zones]  # a list, to report every zone
         return all(known)
 
     def _in_phase(self, phase: Phase, step: Step, contract: Contract) -> bool:
-        """Whether the step stands in a phase in which its skill is valid."""
+        """Whether the step is in a phase for which its skill is valid. Reports it otherwise."""
         if not contract.phases or phase.name.text in contract.phases:
             return True
         skill = self._context.symbols.skills[step.skill.text]
@@ -191,7 +191,7 @@ class StepLowering:
             self._context.report.add(
                 codes.UNKNOWN_PHASE,
                 step.skill.span,
-                f"`{contract.name}` is valid only during {valid}, and the mission has no such phase",
+                f"`{contract.name}` is valid only during {valid}, but the mission has no such phase",
                 help=suggestion(contract.phases[0], names) or f"put the step into a phase `{contract.phases[0]}`",
                 labels=[*labels, *((each.name.span, "a phase of the mission") for each in self._mission.phases)],
             )
@@ -199,14 +199,14 @@ class StepLowering:
             self._context.report.add(
                 codes.STEP_OUTSIDE_PHASES,
                 step.skill.span,
-                f"`{contract.name}` is valid only during {valid}, and this step is in the phase `{phase.name.text}`",
-                help="move the step there",
+                f"`{contract.name}` is valid only during {valid}, but this step is in the phase `{phase.name.text}`",
+                help=f"move the step to {valid}",
                 labels=[*labels, (phase.name.span, "the step's phase")],
             )
         return False
 
     def _phases(self, contract: Contract) -> int:
-        """The phases in which a decision on the step means something, as a bit set."""
+        """Return the phases in which the step is valid, as a bit set."""
         return sum(
             1 << number
             for number, phase in enumerate(self._mission.phases)
@@ -216,11 +216,11 @@ class StepLowering:
     # ---------------------------------------------------------------- its contract
 
     def _contract(self, step: Step) -> Contract | None:
-        """The contract of a step, its skill's made tighter; None after a finding."""
+        """Return the contract of a step, tightened by its own block; None after a finding."""
         of_skill = self._under.policy.contracts[self._under.skills[step.skill.text]]
         if step.overrides is None:
             return of_skill
-        key = step.skill.text, step.overrides  # a repeated step has the same
+        key = step.skill.text, step.overrides  # repetitions of a step share a contract
         if key not in self._contracts:
             self._contracts[key] = self._tightened(step, step.overrides, of_skill)
         return self._contracts[key]
@@ -242,14 +242,14 @@ class StepLowering:
         )
 
     def _clauses(
-        self, own: Sequence[ClauseDecl], of_skill: tuple[Clause, ...], place: ConditionPlace, words: str
+        self, own: Sequence[ClauseDecl], of_skill: tuple[Clause, ...], place: ConditionPlace, kind: str
     ) -> tuple[Clause, ...] | None:
-        """The skill's clauses, and the step's own."""
+        """Return the skill's clauses and the step's own; None after a finding."""
         if own and len(own) + len(of_skill) > MAX_CLAUSES:
             self._context.report.add(
                 codes.TOO_MANY,
                 own[0].span.to(own[-1].span),
-                f"with its skill's the step has {len(own) + len(of_skill)} `{words}` clauses, and at most "
+                f"the step has {len(own) + len(of_skill)} `{kind}` clauses, including those of its skill, but at most "
                 f"{MAX_CLAUSES} fit on board",
             )
             return None
@@ -265,20 +265,20 @@ class StepLowering:
             self._report(*unobserved)
         return None
 
-    def _report(self, span: Span, what: str, has: str) -> None:
+    def _report(self, span: Span, need: str, available: str) -> None:
         policy = self._under.policy
         self._context.report.add(
             codes.NOT_OBSERVED,
             span,
-            f"a clause of a step {what}: `{policy.name}` is signed as it is for all its missions",
-            help=f"use what its rules and contracts use, or let one of them use this; {has}",
+            f"this clause of a step {need}, and a mission cannot add to the signed policy `{policy.name}`",
+            help=f"use what the policy's rules and contracts use, or add this to one of them; {available}",
             labels=[(self._under.declaration.name.span, "the policy is declared here")],
         )
 
     # ---------------------------------------------------------------- its plan
 
     def _plan(self, step: Step) -> Plan | None:
-        """The plan of a step; None after a finding."""
+        """Return the plan of a step, or None after a finding."""
         bound = self._context.bound(step)
         arguments = self._under.contracts.cells(bound)
         skill = self._context.symbols.skills[step.skill.text]
@@ -299,7 +299,7 @@ class StepLowering:
     def _survey_path(
         self, step: Step, skill: SkillDecl, bound: Sequence[Bound], altitude: int
     ) -> tuple[int, ...] | None:
-        """The survey path of a `cover` motion."""
+        """Return the survey path of a `cover` motion, or None after a finding."""
         assert skill.motion is not None
         names = [parameter.name.text for parameter in skill.parameters]
         zone = bound[names.index(_target(skill))]
@@ -319,13 +319,13 @@ class StepLowering:
             self._context.report.add(
                 codes.AREA_TOO_SMALL,
                 step.span,
-                f"`{zone.name.text}` is in {several} parts, and a path lies in one"
+                f"`{zone.name.text}` has {several} parts, but a survey path covers only one"
                 if several > 1
-                else f"`{zone.name.text}` is too small or too bent for the pattern `{pattern}`",
-                help="declare each part as a zone, and fly over one after the other"
+                else f"`{zone.name.text}` is too small or too curved for the pattern `{pattern}`",
+                help="declare each part as a zone, and survey one after the other"
                 if several > 1
-                else "the path keeps the vehicle's position error away from the edge; a `perimeter` needs the least "
-                "room",
+                else "use a `perimeter`, which needs the least room; the path stays the vehicle's position error away "
+                "from the edge",
                 labels=[(zone.name.span, "declared here")],
             )
             return None
@@ -333,7 +333,7 @@ class StepLowering:
             self._context.report.add(
                 codes.TOO_MANY,
                 step.span,
-                f"the path over `{zone.name.text}` has {len(points)} points, and at most {MAX_PATH} fit on board",
+                f"the path over `{zone.name.text}` has {len(points)} points, but at most {MAX_PATH} fit on board",
                 labels=[(zone.name.span, "declared here")],
             )
             return None
@@ -341,7 +341,7 @@ class StepLowering:
 
 
 def _timed(skills: Contract, own: Overrides) -> Contract:
-    """The contract with the step's own times, energy, phases and records."""
+    """Return a contract with the step's own times, energy, phases and records."""
     return replace(
         skills,
         deadline_us=skills.deadline_us if own.deadline is None else own.deadline.value,

@@ -1,7 +1,8 @@
-"""A policy and its whole closure to the flat form, for one vehicle.
+"""Lower a policy and all its imports to the flat form, for one vehicle.
 
-The policy holds every skill that its rules and chains name (where a permit is for any: all that its files declare),
-every signal that these read, and every zone that its files declare, for a mission may name any as an argument.
+The flat policy contains every skill that its rules and chains name (for `permit any`, every skill that its files
+declare), every signal that these read, and every zone that its files declare, since a mission may use any zone as an
+argument.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -43,13 +44,13 @@ from rtshcua.model.ir.policies import Delegation, PolicyDecl
 from rtshcua.model.ir.policies import RuleDecl as RuleDecl
 from rtshcua.model.ir.skills import LinkDecl, SkillDecl
 
-#: whoever flies the vehicle; a rule `by any` is about this role too, where no rule names it
+#: the role of the person who flies the vehicle; it exists even if no rule names it
 OPERATOR = "operator"
 
 
 @dataclass(frozen=True, slots=True)
 class LoweredPolicy:
-    """A flat policy with what its missions are lowered and checked by: indexes by name, tables, and files."""
+    """A flat policy, with the indexes, tables and files that the lowering and the proofs of its missions need."""
 
     policy: Policy
     declaration: PolicyDecl
@@ -60,20 +61,20 @@ class LoweredPolicy:
     conditions: ConditionLowering
     files: SourceTable
     written: Mapping[Rule, RuleDecl]  # each flat rule's declaration
-    rules: tuple[RuleDecl, ...]  # the same by the number of the flat rule
+    rules: tuple[RuleDecl, ...]  # the declarations by the number of the flat rule
 
     @property
     def zones(self) -> ZoneTable:
-        """Its zones, with the regions that they are made of."""
+        """The zones, with their regions."""
         return self.conditions.zones
 
 
 def lower_policy(
     context: CheckContext, policy: PolicyDecl, vehicle: VehicleDecl, files: frozenset[str], names: Mapping[str, str]
 ) -> LoweredPolicy | None:
-    """The policy for a vehicle; `files` is its import closure, `names` what a file is called in what is signed.
+    """Lower a policy for a vehicle. Returns None after a finding.
 
-    None after a finding.
+    `files` is its import closure. `names` maps files to their names in signed artefacts.
     """
     before = len(context.report.found)
     skills = _skills(context, policy, files)
@@ -138,7 +139,7 @@ def lower_policy(
 def _index_sources(
     context: CheckContext, sources: SourceTable, parts: Iterable[Node], skills: Sequence[SkillDecl]
 ) -> None:
-    """Name all the files that the policy rests on, quoted or not."""
+    """Add all files on which the policy depends to `sources`, quoted or not."""
     sizes = [context.symbols.sizes[each.name.text] for each in skills if each.name.text in context.symbols.sizes]
     parts = (*parts, *skills, *sizes)
     for part in parts:
@@ -153,13 +154,13 @@ def _index_sources(
 def _read_measured(
     context: CheckContext, vehicle: VehicleDecl, conditions: ConditionLowering, files: frozenset[str]
 ) -> None:
-    """Give slots to the signals that are watched where they are declared; last, so that the others keep theirs."""
+    """Give slots to the declared signals that supervision monitors, after all others, whose slots do not change."""
     if vehicle.cells is None and any(each.name == CELL for each in conditions.slots.signals):
         context.report.add(
             codes.WELL_KNOWN_SIGNAL,
             vehicle.name.span,
-            f"`{vehicle.name.text}` does not say how many cells its battery has, and a condition reads `{CELL}`",
-            help="write `cells 4` into the vehicle, or `without battery.cell` where nothing measures the voltage",
+            f"a condition reads `{CELL}`, but `{vehicle.name.text}` does not declare the number of its battery cells",
+            help="declare it in the vehicle, as in `cells 4`, or write `without battery.cell` if nothing measures it",
         )
     for name in sorted(MEASURED.keys() - {name.text for name in vehicle.without}):
         if _is_declared(context, name, files):
@@ -168,7 +169,7 @@ def _read_measured(
 
 
 def _skills(context: CheckContext, policy: PolicyDecl, files: frozenset[str]) -> list[SkillDecl]:
-    """The skills of a policy, sorted by name."""
+    """Return the skills of a policy, sorted by name."""
     table = context.symbols.skills
     links: list[LinkDecl] = [*policy.contingency, *(rule.target for rule in policy.rules if rule.target is not None)]
     waiting = [name.text for rule in policy.rules for name in rule.skills] + [link.skill.text for link in links]
@@ -184,19 +185,18 @@ def _skills(context: CheckContext, policy: PolicyDecl, files: frozenset[str]) ->
 
 
 def _roles(policy: PolicyDecl) -> tuple[str, ...]:
-    """The roles of a policy, sorted: those that its rules name, and the one that every vehicle has."""
+    """Return the roles of a policy, sorted: those that its rules name, and the operator."""
     named = {OPERATOR, *(role.text for rule in policy.rules for role in rule.roles)}
-    asked = {name.text for rule in policy.rules for name in (rule.approver, rule.another) if name is not None}
-    return tuple(sorted(named | asked))
+    approvers = {name.text for rule in policy.rules for name in (rule.approver, rule.another) if name is not None}
+    return tuple(sorted(named | approvers))
 
 
 def _well_known(context: CheckContext, policy: PolicyDecl, read: Mapping[str, Type], files: frozenset[str]) -> bool:
-    """Whether the signals are declared that every decision reads, or all supervision."""
+    """Whether the signals that every decision or the supervision reads are declared. Reports each that is not."""
     good = True
     declared = {name: type for name, type in {**MEASURED, **PER_CELL}.items() if _is_declared(context, name, files)}
     for name, type in (*read.items(), *declared.items()):
-        every = "every decision reads it" if name not in VELOCITY else "what brakes is watched by it"
-        needs = "every flight needs it" if name in WELL_KNOWN else "a vehicle that `brakes` is watched by it"
+        needs = "every flight needs it" if name in WELL_KNOWN else "supervision of a vehicle that `brakes` needs it"
         signal = context.symbols.signals.get(name)
         if signal is None or signal.span.file not in files:
             good = False
@@ -211,8 +211,10 @@ def _well_known(context: CheckContext, policy: PolicyDecl, read: Mapping[str, Ty
             context.report.add(
                 codes.WELL_KNOWN_SIGNAL,
                 signal.type.span,
-                f"the signal `{name}` must be {type.describe()}, for {every} as that",
-                help="give the signal another name, or read it from a fitting field",
+                f"the signal `{name}` must be {type.describe()}, because "
+                + ("every decision" if name not in VELOCITY else "supervision of braking")
+                + " reads it",
+                help="rename the signal, or read it from a field of that type",
             )
     return good
 
@@ -238,7 +240,7 @@ def _airspace(policy: PolicyDecl, zones: ZoneTable, files: SourceTable) -> Airsp
 
 
 class RuleLowering:
-    """Lowers the rules of one policy; `roles` are the indexes of its roles."""
+    """Lowers the rules of one policy. `roles` are the indexes of its roles."""
 
     def __init__(self, context: CheckContext, roles: Mapping[str, int], contracts: ContractLowering) -> None:
         self._context = context
@@ -249,8 +251,10 @@ class RuleLowering:
         self._without = frozenset(contracts.vehicle.without)
 
     def lowered(self, policy: PolicyDecl) -> tuple[tuple[Rule, RuleDecl], ...]:
-        """All rules in source order, with their declarations; one whose skills keep its arguments in different cells
-        becomes several, and one that does not apply to the vehicle none.
+        """Return the flat rules in source order, with their declarations.
+
+        A rule becomes several flat rules if its skills have an argument in different cells, and none if it does not
+        apply to the vehicle.
         """
         found: list[tuple[Rule, RuleDecl]] = []
         for rule in policy.rules:
@@ -300,7 +304,7 @@ class RuleLowering:
         )
 
     def _when(self, when: Condition, rule: RuleDecl, place: ConditionPlace) -> Clause:
-        """The condition of a rule; that of a delegated one is quoted with all that was added to it."""
+        """Lower the condition of a rule. A delegated rule is quoted with the conditions of its delegations."""
         clause = self._conditions.clause(when, place)
         if not any(isinstance(node, Delegation) for node in rule.origin) or not isinstance(when, Junction):
             return clause
@@ -318,8 +322,8 @@ def _is_choice(condition: Condition) -> bool:
 
 
 def _delegated(when: Condition) -> Iterator[Condition]:
-    """What a permit and its delegations say, in the order in which they were put together."""
-    if isinstance(when, Junction) and when.span == when.operands[-1].span:  # made, not written
+    """Yield the conditions of a permit and its delegations, in the order in which they were joined."""
+    if isinstance(when, Junction) and when.span == when.operands[-1].span:  # joined by a delegation, not written
         yield from _delegated(when.operands[0])
         yield when.operands[-1]
     else:
@@ -327,9 +331,9 @@ def _delegated(when: Condition) -> Iterator[Condition]:
 
 
 def _sources(rule: RuleDecl, kind: RuleKind) -> tuple[int, ...]:
-    """The sources that a rule is about: a permit to a role is to an operator, unless it says who may speak for them.
+    """Return the sources to which a rule applies.
 
-    What stops a skill stops it whoever speaks, unless the rule names its sources.
+    Without `through`, a permit to a role applies to an operator, and any other rule to all sources.
     """
     if rule.through:
         return tuple(sorted({int(SourceKind[name.text.upper()]) for name in rule.through}))

@@ -1,16 +1,15 @@
-"""What a policy must satisfy before it is signed for a vehicle.
+"""Checks of a policy before it is signed for a vehicle.
 
-E0207: what it flies by stands in its own files. Otherwise a mission could bring a zone, a signal or a skill of its own
-under a name that the policy relies on.
+E0207: all declarations on which the policy relies are in its own files. Otherwise a mission could import another zone,
+signal or skill under a name that the policy uses.
 
-E0413, E0517: nothing reads what the vehicle is without, the signal of a sensor or its local time. A signal that is
-declared is required: one that never comes is unknown, and nothing that reads it is ever permitted. So a vehicle says
-which sensors it is without, a clause or a rule says whether it applies only `where fitted`, and what reads such a
-signal all the same is refused. What is left out is kept in the policy, for people to read. A `permit` has no
-`where fitted`: without its condition it would permit more, and without itself nothing that a reader expects. The local
-time of a vehicle without a `clock` would be UTC in silence, hours from what the author meant.
+E0413, E0517: no condition reads a sensor that the vehicle lacks, or a local time that is not declared. A missing signal
+is unknown, so a step with a condition that reads it would never be permitted. A vehicle therefore declares the sensors
+that it is `without`, and a clause or rule declares whether it applies only `where fitted`. The policy keeps a record of
+clauses and rules that do not apply. A `permit` has no `where fitted`: without its condition it would permit more, and
+without the whole rule the skill would not be permitted. Without a `clock`, the local time would silently be UTC.
 
-E1001: what it needs fits on board. The tables there are sized once, by `rtshcua.model.flat.limits`.
+E1001: the policy fits in the fixed tables on board (`rtshcua.model.flat.limits`).
 """
 
 from collections.abc import Iterable, Iterator, Sequence
@@ -34,7 +33,7 @@ from rtshcua.model.ir.skills import ClauseDecl, LinkDecl, SkillDecl
 def is_self_contained(
     context: CheckContext, policy: PolicyDecl, skills: Sequence[SkillDecl], vehicle: VehicleDecl, files: frozenset[str]
 ) -> bool:
-    """Whether everything that a policy and its skills name is declared in its files; reports what is not, once each."""
+    """Whether all names in a policy and its skills are declared in its files. Reports each other name once."""
     foreign: dict[str, Span] = {}
 
     def note(name: str, span: Span) -> None:
@@ -61,14 +60,14 @@ def is_self_contained(
             codes.NOT_IN_POLICY,
             span,
             f"`{name}` is {WORDS[type(declared)]} that the policy `{policy.name.text}` does not import",
-            help="import its file in the policy's: a policy is signed with all that it relies on",
+            help="import its file in the policy's file; a policy is signed together with all that it uses",
             labels=[(declared.name.span, "declared here")],
         )
     return not [each for each in skills if not _own_sizes(context, policy, each, files)] and not foreign
 
 
 def _own_sizes(context: CheckContext, policy: PolicyDecl, skill: SkillDecl, files: frozenset[str]) -> bool:
-    """Whether what is said of a skill's sizes stands in the policy's files; reports what does not."""
+    """Whether the sizes of a skill are declared in the policy's files. Reports them otherwise."""
     sizes = context.symbols.sizes.get(skill.name.text)
     if sizes is None or sizes.span.file in files:
         return True
@@ -76,7 +75,7 @@ def _own_sizes(context: CheckContext, policy: PolicyDecl, skill: SkillDecl, file
         codes.NOT_IN_POLICY,
         sizes.skill.span,
         f"the policy `{policy.name.text}` does not import these sizes of `{skill.name.text}`",
-        help="import this file in the policy's: a policy is signed once for all its missions",
+        help="import this file in the policy's file; a policy is signed once for all its missions",
         labels=[(policy.name.span, "the policy is declared here")],
     )
     return False
@@ -117,7 +116,7 @@ def _names_of_condition(condition: Condition) -> Iterator[tuple[str, Span]]:
 
 
 def unfitted_signals(condition: Condition, without: frozenset[str]) -> dict[str, Span]:
-    """The signals that a condition reads and a vehicle is without, and where each is read first."""
+    """Return the signals that a condition reads and a vehicle lacks, with the span of the first use of each."""
     found: dict[str, Span] = {}
     for reference in references(condition):
         if reference.name in without:
@@ -126,12 +125,12 @@ def unfitted_signals(condition: Condition, without: frozenset[str]) -> dict[str,
 
 
 def applies(clause: ClauseDecl, without: frozenset[str]) -> bool:
-    """Whether a clause counts for a vehicle that is without these signals."""
+    """Whether a clause applies to a vehicle without these signals."""
     return not (clause.where_fitted and unfitted_signals(clause.condition, without))
 
 
 def rule_applies(rule: RuleDecl, without: frozenset[str]) -> bool:
-    """Whether a rule counts for a vehicle that is without these signals."""
+    """Whether a rule applies to a vehicle without these signals."""
     return not (rule.where_fitted and rule.when is not None and unfitted_signals(rule.when, without))
 
 
@@ -142,10 +141,10 @@ def check_fitted(
     skills: Iterable[SkillDecl],
     zones: Iterable[ZoneDecl],
 ) -> None:
-    """Report the rules and clauses of a policy, and its zones, that read what the vehicle is without."""
+    """Report rules, clauses and zones that read a sensor or a local time that the vehicle does not have."""
     for rule in policy.rules:
         if rule.when is not None and not rule.where_fitted:
-            help = "leave the signal out of the rule" if rule.kind == "permit" else "end the rule in `where fitted`"
+            help = "remove the signal from the rule" if rule.kind == "permit" else "end the rule with `where fitted`"
             with context.report.within(brought_about(rule)):
                 _sensors(context, vehicle, rule.when, help)
     clauses = [clause for skill in skills for clause in (*skill.require, *skill.assume, *skill.maintain)]
@@ -164,12 +163,12 @@ def check_fitted(
 
 
 def check_step_fitted(context: CheckContext, vehicle: VehicleDecl, own: Sequence[ClauseDecl]) -> bool:
-    """Whether a step's own clauses read only sensors that the vehicle has; reports what else they read."""
+    """Whether a step's own clauses read only sensors that the vehicle has. Reports the others."""
     for clause in own:
         _clock(context, vehicle, _timed(clause.condition))
     before = len(context.report.found)
     for clause in own:
-        _sensors(context, vehicle, clause.condition, "leave the clause out")
+        _sensors(context, vehicle, clause.condition, "remove the clause")
     return len(context.report.found) == before
 
 
@@ -179,21 +178,21 @@ def _sensors(context: CheckContext, vehicle: VehicleDecl, condition: Condition, 
         context.report.add(
             codes.NOT_FITTED,
             span,
-            f"this reads the signal `{name}`, which the vehicle `{vehicle.name.text}` is without",
-            help=f"{help}; or, if the vehicle has the sensor, take `{name}` out of its `without`",
-            labels=[(listed[name], "the vehicle is without it")],
+            f"this reads the signal `{name}`, but the vehicle `{vehicle.name.text}` has no sensor for it",
+            help=f"{help}; or, if the vehicle has the sensor, remove `{name}` from its `without`",
+            labels=[(listed[name], "declared here as not fitted")],
         )
 
 
 def _timed(condition: Condition) -> Iterator[Span]:
-    """Where a condition compares with a time of day."""
+    """Yield the spans at which a condition compares with a time of day."""
     for part in walk(condition):
         if isinstance(part, Comparison | Within) and any(isinstance(each, TimeOfDay) for each in walk(part)):
             yield part.span
 
 
 def _clock(
-    context: CheckContext, vehicle: VehicleDecl, spans: Iterable[Span], words: str = "this reads the local time"
+    context: CheckContext, vehicle: VehicleDecl, spans: Iterable[Span], reason: str = "this reads the local time"
 ) -> None:
     if vehicle.utc_offset is not None or vehicle.time_zone is not None:
         return
@@ -201,31 +200,31 @@ def _clock(
         context.report.add(
             codes.NO_CLOCK,
             span,
-            f"{words}, and `{vehicle.name.text}` does not say how far that is from UTC",
-            help='say so in the vehicle, as in `clock "Europe/Berlin"` or `clock utc +02:00`',
+            f"{reason}, but `{vehicle.name.text}` does not declare its offset from UTC",
+            help='declare it in the vehicle, as in `clock "Europe/Berlin"` or `clock utc +02:00`',
             labels=[(vehicle.name.span, "the vehicle, without `clock`")],
         )
 
 
-#: where there are too many, of what, how many, and how many fit
+#: span, kind, number and limit of something that a policy contains
 _Count = tuple[Span, str, int, int]
 
 
 def fits_on_board(context: CheckContext, policy: PolicyDecl, flat: Policy) -> bool:
-    """Whether a lowered policy fits on board; reports each number that does not."""
+    """Whether a lowered policy fits on board. Reports each exceeded limit."""
     good = True
     skills = ((contract, context.symbols.skills[contract.name].name.span) for contract in flat.contracts)
     counts = [
         *_counts_of_policy(policy.name.span, flat),
         *(count for skill, span in skills for count in _counts_of_skill(span, skill)),
     ]
-    for span, what, count, limit in counts:
+    for span, kind, count, limit in counts:
         if count > limit:
             good = False
             context.report.add(
                 codes.TOO_MANY,
                 span,
-                f"`{context.report.text(span)}` has {count:,} {what}, and at most {limit:,} fit on board",
+                f"`{context.report.text(span)}` has {count:,} {kind}, but at most {limit:,} fit on board",
             )
     return good
 
@@ -237,8 +236,8 @@ def _counts_of_policy(span: Span, flat: Policy) -> Iterator[_Count]:
     yield span, "roles", len(flat.roles), limits.MAX_ROLES
     yield span, "skills", len(flat.contracts), limits.MAX_CONTRACTS
     yield span, "state slots for the signals that it reads", flat.slots, limits.MAX_SLOTS
-    yield span, "zones, with those grown from others", len(flat.zones), limits.MAX_ZONES
-    yield span, "margins by which zones of arguments grow", len(flat.tables), limits.MAX_TABLES
+    yield span, "zones, including grown zones", len(flat.zones), limits.MAX_ZONES
+    yield span, "different margins of grown zone arguments", len(flat.tables), limits.MAX_TABLES
     yield span, "sets of values in its conditions", len(flat.sets), limits.MAX_SETS
     yield span, "temporal operators over different conditions", len(flat.monitors), limits.MAX_MONITORS
     yield span, "names of phases in its conditions", len(flat.phases), limits.MAX_PHASE_NAMES
@@ -251,9 +250,9 @@ def _counts_of_skill(span: Span, contract: Contract) -> Iterator[_Count]:
     cells = max((parameter.cell + 2 for parameter in contract.parameters), default=0)
     yield span, "parameters", len(contract.parameters), limits.MAX_PARAMETERS
     yield span, "argument cells", cells, limits.MAX_CELLS
-    for what, clauses in (
+    for kind, clauses in (
         ("`require` clauses", contract.require),
         ("`assume` clauses", contract.assume),
         ("`maintain` clauses", contract.maintain),
     ):
-        yield span, what, len(clauses), limits.MAX_CLAUSES
+        yield span, kind, len(clauses), limits.MAX_CLAUSES

@@ -1,8 +1,8 @@
-"""The survey path of a step that covers an area: what the planner works out, and whether a signed path is that.
+"""Compare the signed survey path of a step with the path that the planner computes.
 
-On board a path is held to lie in its zone, and no more: who signs a mission may choose it freely there. What is asked
-for is skill, zone and arguments, and from these the planner always makes the same path. It has no say in where the path
-begins, for a bundle does not carry the zone's entry: flown from its other end it is the same path.
+On board, only the containment of the path in its zone is checked, so the signer of a mission may choose any path there.
+The planner computes one path from skill, zone and arguments. Its start does not count, because a bundle does not carry
+the zone's entry: the reversed path is the same path.
 """
 
 from collections.abc import Iterator
@@ -18,10 +18,10 @@ from rtshcua.model.flat.policy import Policy
 
 
 class PlannedPath(NamedTuple):
-    """What the planner works out in the place of a signed path.
+    """The path that the planner computes instead of a signed one.
 
-    `points` are how many corners it has (0: it finds no path), `length` is in mm; `apart` is how far a corner of either
-    lies from the other, at most, in mm.
+    `points` is the number of its corners (0: no path), `length` its length in mm, and `apart` the Hausdorff distance of
+    the two paths in mm.
     """
 
     points: int
@@ -30,7 +30,7 @@ class PlannedPath(NamedTuple):
 
 
 def path_planned_otherwise(policy: Policy, one: Invocation) -> PlannedPath | None:
-    """What the planner works out for a step of a well-formed mission, where that is not the path that was signed."""
+    """Return the planner's path for a step of a well-formed mission if it differs from the signed path, else None."""
     if one.plan.kind != MotionKind.COVER:
         return None
     signed = tuple(zip(one.plan.path[::2], one.plan.path[1::2], strict=True))
@@ -43,8 +43,10 @@ def path_planned_otherwise(policy: Policy, one: Invocation) -> PlannedPath | Non
 
 
 def _patterns(policy: Policy, one: Invocation) -> Iterator[str]:
-    """What the arguments may call the pattern by: a choice among nothing but patterns. The flat form names no such
-    parameter; without one, it is the default.
+    """Yield the possible patterns of a step.
+
+    The flat form does not mark the parameter of the pattern, so each choice among only patterns counts. Without such a
+    parameter, the pattern is the default.
     """
     choices = [
         parameter

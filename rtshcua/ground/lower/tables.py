@@ -1,5 +1,6 @@
-"""The tables of a policy that its code refers to by index: sets of values, temporal monitors, state slots of signals,
-source files. Each entry is kept once.
+"""The tables of a policy to which its code refers by index: sets of values, monitors, slots of signals, source files.
+
+Each entry is stored once.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -22,7 +23,7 @@ from rtshcua.model.quantity import Dimension
 
 
 class ValueSets:
-    """Sets in the order in which they are first asked for, and the names of phases that they speak of."""
+    """Sets of values in the order of first use, and the names of phases in them."""
 
     def __init__(self) -> None:
         self._numbers: dict[tuple[int, ...], int] = {}
@@ -30,32 +31,32 @@ class ValueSets:
 
     @property
     def all(self) -> tuple[tuple[int, ...], ...]:
-        """The sets."""
+        """All sets."""
         return tuple(self._numbers)
 
     @property
     def phases(self) -> tuple[str, ...]:
-        """The names of phases."""
+        """The names of phases, by index."""
         return tuple(self._phases)
 
     def of(self, members: Iterable[int]) -> int:
-        """The index of a set."""
+        """Return the index of a set."""
         return self._numbers.setdefault(tuple(sorted(set(members))), len(self._numbers))
 
     def of_phases(self, names: Iterable[str]) -> int:
-        """The index of a set of phases, by the index of each name among the names."""
+        """Return the index of a set of phases, which contains the index of each name."""
         return self.of([self._phases.setdefault(name, len(self._phases)) for name in names])
 
 
 class MonitorTable:
-    """Monitors by what they remember, of how long, and of which code."""
+    """Monitors by kind, window and code."""
 
     def __init__(self) -> None:
         self.all: list[Monitor] = []
         self._numbers: dict[tuple[int, int, tuple[int, ...]], int] = {}
 
     def of(self, kind: MonitorKind, window_us: int, when: Clause) -> int:
-        """The index of a monitor; of two that read the same, the first tells where its condition is written."""
+        """Return the index of a monitor. Equal monitors share one, with the source place of the first."""
         key = (int(kind), window_us, when.code)
         number = self._numbers.setdefault(key, len(self.all))
         if number == len(self.all):
@@ -64,7 +65,7 @@ class MonitorTable:
 
 
 class SignalSlots:
-    """Slots in the order in which signals are first asked for; a position has two. `cells` are those of the battery."""
+    """Slots of signals in the order of first use. A position has two. `cells` is the number of battery cells."""
 
     def __init__(self, context: CheckContext, cells: int = 1) -> None:
         self._context = context
@@ -74,7 +75,7 @@ class SignalSlots:
         self.count = 0
 
     def of(self, name: str) -> int:
-        """The slot of a declared signal."""
+        """Return the slot of a declared signal."""
         slot = self._slots.get(name)
         if slot is None:
             slot = self._slots[name] = self.count
@@ -84,7 +85,7 @@ class SignalSlots:
         return slot
 
     def width(self, name: str) -> int:
-        """How many slots a signal has that was asked for."""
+        """Return the number of slots of a signal in the table."""
         slot = self._slots[name]
         return next(2 if each.kind == POSITION else 1 for each in self.signals if each.slot == slot)
 
@@ -138,7 +139,7 @@ class SignalSlots:
 
 
 def enum_labels(context: CheckContext, enum: EnumDecl) -> tuple[tuple[int, str], ...]:
-    """Every value of an enumeration with its name, by value: the declared ones, then what else the dialect knows."""
+    """Return every value of an enumeration with its name, in order. Declared names replace those of the dialect."""
     labels: dict[int, str] = {}
     if enum.dialect is not None:
         entries = context.dialect.enums[enum.dialect.text]
@@ -148,12 +149,12 @@ def enum_labels(context: CheckContext, enum: EnumDecl) -> tuple[tuple[int, str],
 
 
 def shortened(text: str) -> str:
-    """The text as it is carried on board."""
+    """Return a text shortened to the limit on board."""
     return text if len(text) <= MAX_TEXT else text[: MAX_TEXT - 3] + "..."
 
 
 class SourceTable:
-    """File names by index, in the order in which they are first referred to; `stable` are the names that are signed."""
+    """File names by index, in the order of first use. `stable` maps them to their names in signed artefacts."""
 
     def __init__(self, report: Report, stable: Mapping[str, str]) -> None:
         self._report = report
@@ -161,24 +162,24 @@ class SourceTable:
         self._index: dict[str, int] = {}
 
     def index(self, file: str) -> int:
-        """The index of a file."""
+        """Return the index of a file."""
         return self._index.setdefault(file, len(self._index))
 
     def place(self, span: Span) -> tuple[str, int, int, int]:
-        """A span as it is carried on board: its text, its file's index, its start and its end."""
+        """Return a span in the flat form: its text, the index of its file, its start and its end."""
         return shortened(self._report.text(span)), self.index(span.file), span.start, span.end
 
     def span(self, file: int, start: int, end: int) -> Span:
-        """The span that a place on board came from."""
+        """Return the span of a place in the flat form."""
         return Span(tuple(self._index)[file], start, end)
 
     def text(self, span: Span) -> str:
-        """All of the text under a span, on one line."""
+        """Return the whole text of a span, on one line."""
         return self._report.text(span)
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The files' names, as they are signed."""
+        """The names of the files in signed artefacts."""
         return tuple(self._stable.get(name, name) for name in self._index)
 
     @property
@@ -188,9 +189,9 @@ class SourceTable:
 
 
 class JointSourceTable(SourceTable):
-    """The files of a policy, and after them those of a mission: what a step's own clauses refer to.
+    """The files of a policy, followed by those of a mission, to which a step's own clauses refer.
 
-    On board, in bundles and in logs, a clause's `source` counts the policy's sources first, then its mission's.
+    On board, in bundles and in logs, the `source` of a clause is an index into both lists together.
     """
 
     def __init__(self, policy: SourceTable, mission: SourceTable) -> None:
@@ -199,11 +200,11 @@ class JointSourceTable(SourceTable):
         self._mission = mission
 
     def index(self, file: str) -> int:
-        """The index of a file."""
+        """Return the index of a file."""
         own = self._policy._index.get(file)
         return len(self._policy._index) + self._mission.index(file) if own is None else own
 
     def span(self, file: int, start: int, end: int) -> Span:
-        """The span that a place came from."""
+        """Return the span of a place in the flat form."""
         first = len(self._policy._index)
         return self._policy.span(file, start, end) if file < first else self._mission.span(file - first, start, end)

@@ -1,8 +1,7 @@
-"""The vehicle of a policy in the flat form, with the speeds that durations are proved by: those that it declares, and
-defaults.
+"""Lower the vehicle of a policy to the flat form, with its declared speeds and defaults for the others.
 
-The defaults are what a PX4 1.16 and an ArduCopter 4.7 keep as they come, the slower of both: docs/flying/speeds.md has
-the parameters and where they are documented. None is more than the vehicle says that it does at most.
+The defaults are the slower of the factory settings of PX4 1.16 and ArduCopter 4.7 (docs/flying/speeds.md lists the
+parameters and their documentation), limited by the vehicle's declared maxima.
 """
 
 from typing import Final
@@ -12,19 +11,19 @@ from rtshcua.ground.checker.checks.vehicles import deceleration, gained
 from rtshcua.model.flat.policy import Speeds, VehicleLimits
 from rtshcua.model.ir.places import VehicleDecl
 
-#: mm/s; below which height a landing is slow, mm; mm/s in a second
+#: default speeds in mm/s, the height in mm below which a landing is slow, and the acceleration in mm/s per second
 CRUISE: Final = 5_000
 CLIMB: Final = 1_500
 DESCENT: Final = 1_000
 LANDING: Final = 500
 LANDING_BELOW: Final = 10_000
 ACCELERATION: Final = 1_000
-#: the most wind that a vehicle is flown in which says nothing of it, mm/s
+#: default of the strongest wind in which a vehicle is flown, mm/s
 WIND: Final = 5_000
 
 
 def speeds_of(vehicle: VehicleDecl) -> Speeds:
-    """What a vehicle keeps at least, by its declaration and the defaults."""
+    """Return the least speeds of a vehicle, by its declaration and the defaults."""
     named = {each.name.text: each for each in vehicle.speeds}
     most = vehicle.speed.value
 
@@ -53,7 +52,7 @@ def speeds_of(vehicle: VehicleDecl) -> Speeds:
 def lower_vehicle(
     vehicle: VehicleDecl, position: int, height: int, battery: int, north: int = -1, east: int = -1, down: int = -1
 ) -> VehicleLimits:
-    """The vehicle in the flat form; the numbers are the slots of the signals that supervision reads, -1 for none."""
+    """Lower a vehicle. The numbers are the slots of the signals that supervision reads, -1 for none."""
     braking, zone = vehicle.braking, vehicle.time_zone
     return VehicleLimits(
         name=vehicle.name.text,

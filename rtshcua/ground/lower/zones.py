@@ -1,9 +1,9 @@
-"""The zones of a policy: declared ones in the local plane, and those derived from them for its conditions.
+"""The zones of a policy: declared zones in the local plane, and zones derived from them for conditions.
 
-`grow(zone, margin)` works on the ground plan; floor, ceiling and times stay. Where a condition permits or must hold,
-the derived zone is never too large; where it forbids, never too small. A band above sea is converted by the elevation
-of home. Where that is known to within an error only, the zone that a condition asks for is derived too: its band is
-narrower by the error, or wider.
+`grow(zone, margin)` changes the ground plan; floor, ceiling and times stay. A derived zone is never too large in a
+condition that permits or must hold, and never too small in one that forbids. Heights above sea level are converted with
+the elevation of home. If the elevation has an error, conditions use a derived zone whose band is narrower or wider by
+the error.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -30,14 +30,14 @@ from rtshcua.model.quantity import Datum, Dimension, display
 
 
 class ZoneHeights:
-    """Converts altitudes above sea by the elevation of a vehicle's home."""
+    """Converts altitudes above sea level with the elevation of a vehicle's home."""
 
     def __init__(self, vehicle: VehicleDecl | None, report: Report) -> None:
         self._vehicle = vehicle
         self._report = report
 
     def band(self, zone: ZoneDecl) -> tuple[int, int, int, int]:
-        """Floor and ceiling, and how far either may really be from there."""
+        """Return floor and ceiling in mm above home, and the largest error of each."""
         floor, floor_within = (LOWEST, 0) if zone.floor is None else self._above_home(zone.floor, zone)
         ceiling, ceiling_within = (HIGHEST, 0) if zone.ceiling is None else self._above_home(zone.ceiling, zone)
         if zone.floor is not None and zone.ceiling is not None and zone.floor.datum is not zone.ceiling.datum:
@@ -54,8 +54,8 @@ class ZoneHeights:
             self._report.add(
                 codes.NO_ELEVATION,
                 height.span,
-                f"`{zone.name.text}` reaches to an altitude above sea, and how high home is above sea is not known",
-                help="say so in the vehicle, as in `elevation 408 m above sea within 5 m`",
+                f"`{zone.name.text}` has an altitude above sea, but the elevation of home is not declared",
+                help="declare it in the vehicle, as in `elevation 408 m above sea within 5 m`",
                 labels=[] if vehicle is None else [(vehicle.name.span, "the vehicle")],
             )
             return height.value, 0
@@ -63,7 +63,7 @@ class ZoneHeights:
         return min(max(height.value - vehicle.elevation.value, LOWEST), HIGHEST), within
 
     def _crossed(self, zone: ZoneDecl, ceiling: Quantity, height: int) -> None:
-        """A floor and a ceiling of different datum compare only here."""
+        """Report a ceiling that is not above a floor of another datum; the checker cannot compare these."""
         assert zone.floor is not None
         if height <= 0:
             self._report.add(
@@ -79,22 +79,22 @@ class ZoneHeights:
         self._report.add(
             codes.EMPTY_ZONE,
             zone.name.span,
-            f"of `{zone.name.text}`, which is {display(height, Dimension.LENGTH)} high, there is no height at which "
-            "a vehicle would surely be inside",
-            help="make the band higher than twice the error of the elevation, or measure the elevation better",
-            labels=[(self._vehicle.elevation_within.span, "how far the real elevation may differ")],
+            f"`{zone.name.text}` is {display(height, Dimension.LENGTH)} high, and with the error of the elevation no "
+            "height is certainly inside",
+            help="make the zone higher than twice the error of the elevation, or measure the elevation more exactly",
+            labels=[(self._vehicle.elevation_within.span, "the error of the elevation")],
         )
 
 
-#: a zone that nothing is inside of, for it has no height, and one that everything is inside of
+#: an empty zone, without height, and a zone that contains everything
 NOWHERE = Zone("nowhere", CIRCLE, LOWEST, LOWEST, (0, 0, 1))
 EVERYWHERE = Zone("everywhere", CIRCLE, LOWEST, HIGHEST, (0, 0, MAX_COORDINATE * MAX_COORDINATE))
-#: stands for a zone that has no ground plan, after a finding
+#: replaces the ground plan of a zone after a finding
 _UNKNOWN = RoundArea((0, 0), 1)
 
 
 class ZoneTable:
-    """Zones by name and index; asking for a derived one makes it."""
+    """Zones by name and index. A derived zone is created when it is first used."""
 
     def __init__(
         self,
@@ -120,16 +120,16 @@ class ZoneTable:
         self._dated: dict[tuple[int, ...], int] = {}
 
     def flat(self) -> tuple[Zone, ...]:
-        """All zones, the declared ones first."""
+        """Return all zones in the flat form, the declared ones first."""
         names = (zone.name.text for zone in self._declarations)
         return (*(region.flat(name) for name, region in zip(names, self.regions, strict=True)), *self.derived)
 
     def place(self, coordinates: Coordinates) -> Point | None:
-        """A place in the local plane; None, and reported, where it is too far from home."""
+        """Return a place in the local plane. Reports it and returns None if it is too far from home."""
         return self._plans.place(coordinates)
 
     def zone(self, name: str, margin: int, *, smaller: bool, span: Span) -> int:
-        """The index of a declared zone grown by `margin` mm, or shrunk; `smaller` says which side is the safe one."""
+        """Return the index of a declared zone grown (or shrunk) by `margin` mm. `smaller` is the safe side."""
         number = self.index[name]
         if margin == 0 and self.regions[number].sure():
             return number
@@ -140,7 +140,7 @@ class ZoneTable:
         return found
 
     def table(self, margin: int, *, smaller: bool) -> int:
-        """The index of a table from each declared zone to the one derived from it."""
+        """Return the index of a table from each declared zone to its derived zone."""
         key = (margin, smaller)
         found = self._tables.get(key)
         if found is None:
@@ -150,8 +150,9 @@ class ZoneTable:
         return found
 
     def within(self, name: str, margin: int, *, smaller: bool, span: Span) -> tuple[int, ...]:
-        """The declared zones that lie within a zone grown by `margin` while it exists: where `smaller`, those that
-        surely do, else those that may.
+        """Return the declared zones within a zone grown by `margin`, which is taken to exist.
+
+        With `smaller` they are those that certainly lie within it, else those that may.
         """
         outside = self.region(name, margin, smaller=smaller, span=span)
         if outside is None:
@@ -159,8 +160,9 @@ class ZoneTable:
         return self._which(lambda region: lies_within(region, outside, surely=smaller))
 
     def disjoint(self, name: str, margin: int, *, smaller: bool, span: Span) -> tuple[int, ...]:
-        """The declared zones that have no point in common with a zone grown by `margin`, even while it exists: where
-        `smaller`, those that may have none, else those that surely have none.
+        """Return the declared zones disjoint from a zone grown by `margin`, which is taken to exist.
+
+        With `smaller` they are those that may be disjoint, else those that certainly are.
         """
         other = self.region(name, margin, smaller=smaller, span=span)
         if other is None:
@@ -168,7 +170,7 @@ class ZoneTable:
         return self._which(lambda region: are_disjoint(region, other, surely=not smaller))
 
     def region(self, name: str, margin: int, *, smaller: bool, span: Span) -> Region | None:
-        """A declared zone grown by `margin`, as a region of the plane; None, and reported, where nothing is left."""
+        """Return a declared zone grown by `margin` as a region. Reports it and returns None if there is none."""
         number = self.index[name]
         if number in self._broken:
             return None
@@ -179,7 +181,7 @@ class ZoneTable:
             return None
 
     def times(self, name: str, sets: ValueSets) -> Iterator[tuple[Op, int, int]]:
-        """Instructions that are true while a declared zone exists; none for one that always does."""
+        """Yield instructions that are true while a declared zone exists; none for a zone that always exists."""
         region = self.regions[self.index[name]]
         if region.daily:
             start, end = region.daily
@@ -216,7 +218,7 @@ class ZoneTable:
         return NOWHERE if sure is None else sure.flat(derived_name(name, margin, smaller=smaller))
 
     def _entry(self, number: int, margin: int, *, smaller: bool) -> int:
-        """Where a zone cannot be derived, the one that fails what asks for it."""
+        """Return the index of a derived zone for a table. If there is none, the zone makes the condition fail."""
         if margin == 0 and self.regions[number].sure():
             return number
         key = (number, margin, smaller)
@@ -240,33 +242,31 @@ class ZoneTable:
         done = f"{'grown' if margin > 0 else 'shrunk'} by {display(abs(margin), Dimension.LENGTH)}"
         labels = [(zone.name.span, "the zone is declared here")]
         if unshapely.reason == "nothing":
-            self._report.add(
-                codes.ZONE_VANISHES, span, f"nothing is left of `{zone.name.text}` when it is {done}", labels=labels
-            )
+            self._report.add(codes.ZONE_VANISHES, span, f"`{zone.name.text}` is empty when it is {done}", labels=labels)
             return
-        words = {
-            "far": "it reaches further than 500 km from home",
+        problem = {
+            "far": "it extends more than 500 km from home",
             "corners": "its outline has more corners than fit on board",
-            "unproved": "its outline cannot be proved in whole millimetres",
+            "unproved": "its outline cannot be computed in whole millimetres",
         }[unshapely.reason]
         self._report.add(
             codes.ZONE_SHAPE,
             span,
-            f"when `{zone.name.text}` is {done}, {words}",
-            help="declare a zone of the shape that you mean",
+            f"when `{zone.name.text}` is {done}, {problem}",
+            help="declare a zone of the wanted shape instead",
             labels=labels,
         )
 
 
 def derived_name(name: str, margin: int, *, smaller: bool) -> str:
-    """How a derived zone is called; one that is derived for the band's error alone is `surely` or `possibly` there."""
+    """Return the name of a derived zone: `grow(...)`, or `surely(...)` or `possibly(...)` for a margin of 0."""
     if margin == 0:
         return f"{'surely' if smaller else 'possibly'}({name})"
     return f"grow({name}, {display(margin, Dimension.LENGTH)})"
 
 
 def _hours(zone: ZoneDecl) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Its times of the day, or those of the week."""
+    """Return the windows of the day and of the week of a zone, one of which is empty."""
     hours = zone.daily
     if hours is None:
         return (), ()
@@ -283,7 +283,7 @@ def _contains(shape: Shape, point: Point) -> bool:
 
 
 def _grown(region: Region, margin: int, *, smaller: bool) -> Region:
-    """A region grown by `margin` on the safe side, as long as it stays within the local plane."""
+    """Return a region grown by `margin`, rounded to the safe side. Raises `NoSuchOffset`."""
     shape = inner(region.shape, margin) if smaller else outer(region.shape, margin)
     if max(map(abs, bounds(shape))) > MAX_COORDINATE:
         raise NoSuchOffset("far")
@@ -291,7 +291,7 @@ def _grown(region: Region, margin: int, *, smaller: bool) -> Region:
 
 
 def weekly_windows(start: int, end: int, days: Iterable[int]) -> tuple[int, ...]:
-    """Windows of the week, as `Zone.weekly` has them: from `start` to `end`, both included, or over midnight."""
+    """Return windows of the week as in `Zone.weekly`: from `start` to `end` inclusive, possibly over midnight."""
     after = end + 1 if start <= end else end + 1 + DAY
     spans = [(day * DAY + start, day * DAY + after) for day in days]
     within = [(low, min(high, WEEK)) for low, high in spans] + [(0, high - WEEK) for _, high in spans if high > WEEK]

@@ -191,8 +191,8 @@ class _Lowering:
             self._context.report.add(
                 codes.UNREAD_TRIGGER,
                 each.span,
-                f"the condition {each.what}",
-                help=f"use what the policy of the mission uses; {each.has}",
+                f"the condition {each.need}",
+                help=f"use what the policy of the mission uses; {each.available}",
                 labels=[(self._lowered.declaration.name.span, "the policy is declared here")],
             )
         return None

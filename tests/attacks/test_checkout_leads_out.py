@@ -184,7 +184,7 @@ def test_settings_bring_no_source_from_outside(here: Path, name: str, capsys: py
     (here / "a.rts").write_text("\n")
     (here / "link.rts").symlink_to("../mine.rts")
     code, text = said(["lint", "a.rts"], capsys)
-    assert (code, f"`{name}` in `with` lies outside of the project" in text) == (ExitCode.INPUT, True), text
+    assert (code, f"`{name}` in `with` lies outside the project" in text) == (ExitCode.INPUT, True), text
 
 
 @pytest.mark.parametrize("workspace", [True, False])

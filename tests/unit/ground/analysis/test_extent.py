@@ -1,4 +1,4 @@
-"""Bounds of conditions leave out no situation, and their alternatives say exactly the same."""
+"""Bounds of conditions contain every situation, and the alternatives are equivalent to the condition."""
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -77,7 +77,9 @@ def held(each: Conjunction, at: Environment) -> Truth:
 
 @settings(max_examples=settings().max_examples * 4)
 @given(NODES, SITUATIONS)
-def test_bounds_and_alternatives(node: tree.Node, situation: tuple[tuple[Value, ...], tuple[Value, ...], int]) -> None:
+def test_bounds_and_alternatives_agree_with_the_condition(
+    node: tree.Node, situation: tuple[tuple[Value, ...], tuple[Value, ...], int]
+) -> None:
     at = environment(situation)
     truth = build(node, TABLES)(at)
     parts = {kept(part, at) for part in Extents(TABLES, ZONES).parts(node)}
@@ -91,7 +93,7 @@ ROWS = st.lists(st.tuples(st.integers(0, 20), st.tuples(*[st.integers(0, 4)] * 3
 
 
 @given(ROWS, st.sets(st.integers(0, 20)), st.tuples(*[st.integers(0, 5)] * 3), st.integers(-1, 20))
-def test_what_encloses_is_found_in_order(
+def test_enclosing_boxes_are_found_in_order(
     rows: list[tuple[int, tuple[int, ...]]], removed: set[int], row: tuple[int, ...], after: int
 ) -> None:
     found = EnclosingBoxes(rows)

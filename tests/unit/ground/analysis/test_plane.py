@@ -1,4 +1,4 @@
-"""How zones lie: proved by exact relations, shown by places."""
+"""Relations of zones, proved exactly, and places that show them."""
 
 from rtshcua.decision.zones import PreparedZone
 from rtshcua.ground.analysis.plane import Plane
@@ -19,14 +19,14 @@ def anywhere(_: tuple[int, int]) -> bool:
     return True
 
 
-def test_a_hole_does_not_belong_to_a_zone() -> None:
+def test_hole_does_not_belong_to_a_zone() -> None:
     assert PLANE.apart(0, 1)
     assert not PLANE.within(1, 0)
     assert PLANE.within(2, 0)
     assert not PLANE.apart(2, 0)
 
 
-def test_a_place_is_found_wherever_there_is_room() -> None:
+def test_place_is_found_if_there_is_room() -> None:
     for sides in (
         {0: True, 2: False},
         {0: False, 1: True},
@@ -39,6 +39,6 @@ def test_a_place_is_found_wherever_there_is_room() -> None:
         assert {zone: PLANE.contains(zone, place) for zone in sides} == sides
 
 
-def test_no_place_is_made_up() -> None:
+def test_no_place_is_returned_if_there_is_none() -> None:
     assert PLANE.place({1: True, 0: True}, anywhere) is None
     assert PLANE.place({1: True}, lambda place: place[0] > 9_000) is None

@@ -1,4 +1,4 @@
-"""What E0722 proposes: a fix deletes copies, with their line; where a wider rule is the reason, that one is named."""
+"""Fixes and help of E0722: a fix deletes copies with their line; otherwise the help names the wider rule."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ GOTO = "permit goto by role operator"
 
 
 def redundant(rules: str) -> list[Diagnostic]:
-    """The E0722 on a policy with these rules."""
+    """Return the E0722 findings of a policy with these rules."""
     source = (HEAD + POLICY.format(rules)).encode()
 
     def read(path: str) -> bytes:
@@ -25,13 +25,13 @@ def redundant(rules: str) -> list[Diagnostic]:
     return [each for each in check_program(load(["x.rts"], read, LIBRARY), dialect.load()) if each.code.id == "E0722"]
 
 
-def test_a_wider_rule_is_named_first_and_no_fix_deletes_the_narrow_ones() -> None:
+def test_wider_rule_is_named_and_no_fix_deletes_the_narrower() -> None:
     wide = "permit goto by any"
     narrow = [f"{GOTO} when altitude < 20 m", "permit goto by role trainee when altitude < 10 m", GOTO]
     found = redundant("\n  ".join([wide, *narrow]))
     assert len(found) == 3
     assert {each.help for each in found} == {
-        f"look at `{wide}` first: if it permits too much, narrow it; else delete this rule"
+        f"look at `{wide}` first: if it permits too much, narrow it; otherwise delete this rule"
     }
     assert [each.fixes for each in found] == [(), (), ()]
 
@@ -45,12 +45,12 @@ def test_a_wider_rule_is_named_first_and_no_fix_deletes_the_narrow_ones() -> Non
         ("confirm goto by role a within 40 s", "confirm goto by role a within 30 s"),
     ],
 )
-def test_the_same_condition_alone_is_no_copy(one: str, other: str) -> None:
+def test_equal_condition_alone_makes_no_copy(one: str, other: str) -> None:
     assert all(not each.fixes for each in redundant(f"{other}\n  {one}"))
 
 
 @pytest.mark.parametrize("when", ["", " when altitude < 20 m", "\n          when altitude < 20 m"])
-def test_a_copy_is_deleted_with_its_line(when: str) -> None:
+def test_fix_deletes_a_copy_with_its_line(when: str) -> None:
     rules = f"// of the first\n  {GOTO}{when}\n  // of the last\n  {GOTO}{when}  // its own\n  // of what follows"
     (found,) = redundant(rules)
     (fix,) = found.fixes
@@ -68,7 +68,7 @@ def test_a_copy_is_deleted_with_its_line(when: str) -> None:
         ("", "b", "", ""),
     ],
 )
-def test_what_shares_its_line_leaves_it_to_the_others(before: str, part: str, behind: str, left: str) -> None:
+def test_fix_keeps_other_text_on_the_line(before: str, part: str, behind: str, left: str) -> None:
     text = before + part + behind
     gone = whole_line(text, Span("x", len(before), len(before) + len(part)))
     assert text[: gone.start] + text[gone.end :] == left

@@ -1,4 +1,4 @@
-"""Whatever rules are reported as dead, shadowed or redundant: without all of them authority is the same everywhere."""
+"""Deleting all rules reported as dead, shadowed or redundant changes no decision of authority."""
 
 from itertools import product
 from pathlib import Path
@@ -59,7 +59,7 @@ HEIGHTS = (0, 12_000, 50_000, None)
 
 
 def outcome(prepared: PreparedPolicy, kept: list[int], at: Environment) -> str:
-    """What authority says to an operator's `takeoff`, by the rules of these numbers."""
+    """Return the decision of authority on an operator's `takeoff`, by the rules with these numbers."""
     truths = [
         (prepared.policy.rules[each].kind, prepared.compiler.condition(prepared.policy.rules[each], each)(at))
         for each in kept
@@ -70,7 +70,7 @@ def outcome(prepared: PreparedPolicy, kept: list[int], at: Environment) -> str:
 
 
 @given(RULES)
-def test_what_is_reported_decides_nothing(rules: list[str]) -> None:
+def test_reported_rules_do_not_change_any_decision(rules: list[str]) -> None:
     text = TEXT.format("\n  ".join(rules))
     program = load(["x.rts"], lambda path: text.encode() if path == "x.rts" else Path(path).read_bytes(), LIBRARY)
     compiled = compile_program(program, dialect.load(), mission=None, issued_at_us=0)

@@ -1,4 +1,4 @@
-"""Findings on the rules of a policy and on what a skill asks for, beyond the twins of each code."""
+"""Findings about the rules of a policy and the contracts of skills, beyond the twins of each code."""
 
 from pathlib import Path
 
@@ -33,25 +33,25 @@ policy rules version 1 {{
 
 
 def read(text: str) -> tuple[Diagnostic, ...]:
-    """All findings on a text with the library's skills and site."""
+    """Return all findings of a text with the library's skills and site."""
     return check_program(program(text), dialect.load())
 
 
 def program(text: str):  # type: ignore[no-untyped-def]
-    """The text, loaded."""
+    """Load the text."""
     source = (HEAD + text).encode()
     return load(["x.rts"], lambda path: source if path == "x.rts" else Path(path).read_bytes(), LIBRARY)
 
 
 def found(rules: str) -> list[tuple[str, str]]:
-    """Code and quoted text of each finding on a policy with these rules."""
+    """Return code and quoted text of each finding about a policy with these rules."""
     text = HEAD + POLICY.format(rules)
     return [(each.code.id, text[each.span.start : each.span.end]) for each in read(POLICY.format(rules)) if each.span]
 
 
 GOTO = "permit goto by role operator"
 CASES = {
-    # alive, though each looks suspicious
+    # rules that look suspicious but have an effect
     "different roles": (f"{GOTO} when altitude < 20 m\npermit goto by role trainee when altitude < 20 m", []),
     "different sources": (f"{GOTO} when altitude < 20 m\n{GOTO} through agent when altitude < 20 m", []),
     "no single one": (
@@ -203,7 +203,7 @@ CASES = {
 
 @pytest.mark.slow
 @rows("name", CASES)
-def test_rules_are_told_apart(name: str) -> None:
+def test_rules_with_an_effect_are_not_reported(name: str) -> None:
     rules, expected = CASES[name]
     got = found(rules)
     assert got == expected or [code for code, _ in got] == expected, got
@@ -223,14 +223,14 @@ skill look(top: altitude in 5 m .. 20 m) {{
 """
 
 
-def test_the_smallest_contradiction_is_told() -> None:
+def test_smallest_contradiction_is_reported() -> None:
     clauses = "require height > top + 10 m and battery > 50 %\n  assume wind.speed < 5 m/s\n  maintain height < top"
     diagnostics = read(SKILL.format(clauses) + POLICY.format("permit look by role operator"))
     assert [each.code.id for each in diagnostics] == ["E1101"]
     assert [label.text for label in diagnostics[0].labels] == ["this is required", "the skill"]
 
 
-def test_a_skill_contradicts_the_airspace() -> None:
+def test_skill_that_contradicts_the_airspace_is_reported() -> None:
     policy = POLICY.format("permit look by role operator").replace(
         "contingency", "airspace inside city outside bridge_b\n  contingency"
     )
@@ -240,8 +240,8 @@ def test_a_skill_contradicts_the_airspace() -> None:
     assert read(SKILL.format("maintain position inside bridge_a") + policy) == ()
 
 
-def test_a_step_contradicts_itself_with_its_arguments() -> None:
-    """The skill alone does not, for other arguments would do."""
+def test_step_that_contradicts_itself_with_its_arguments_is_reported() -> None:
+    """The skill alone does not contradict itself: other arguments are possible."""
     mission = """
 mission m under rules@1 on quad {
   proposed by operator x for role operator
@@ -258,7 +258,7 @@ mission m under rules@1 on quad {
     ("fields", "codes"),
     [("WIND_COV.wind_x, WIND_COV.wind_y", ["E0720"]), ("WIND_COV.wind_x, WIND_COV.wind_y or WIND.speed", [])],
 )
-def test_what_two_components_make_is_not_below_zero(fields: str, codes: list[str]) -> None:
+def test_magnitude_of_two_components_is_not_negative(fields: str, codes: list[str]) -> None:
     signal = f"signal gust : speed = {fields} stale after 10 s\n"
     text = signal + POLICY.format("degrade any when gust < 0 m/s to return_home")
     assert [each.code.id for each in read(text)] == codes
@@ -275,7 +275,7 @@ EIGHT = 1_800_000_000 * 1_000_000 - 1_800_000_000 * 1_000_000 % 86_400_000_000 +
 
 
 @pytest.mark.parametrize(("minutes", "codes"), [(0, []), (53, []), (56, ["E0718"]), (59, ["E0718"])])
-def test_a_step_may_come_too_late_in_the_day(minutes: int, codes: list[str]) -> None:
+def test_step_that_may_begin_too_late_in_the_day_is_reported(minutes: int, codes: list[str]) -> None:
     text = POLICY.format("permit takeoff by role operator when local time in 08:00 .. 09:00") + HOURS
     issued = EIGHT + minutes * 60_000_000
     compiled = compile_program(program(text), dialect.load(), mission=None, issued_at_us=issued)
@@ -287,14 +287,14 @@ def test_a_step_may_come_too_late_in_the_day(minutes: int, codes: list[str]) -> 
     [("08:00 .. 09:00", []), ("23:57 .. 00:08", []), ("08:00 .. 08:03", ["E0718"]), ("08:00 .. 08:04", ["E0718"])],
 )
 @rows("permits", [1, 2])
-def test_some_time_of_issue_must_do(window: str, codes: list[str], permits: int) -> None:
+def test_one_time_of_issue_must_suit_all_steps(window: str, codes: list[str], permits: int) -> None:
     permit = "permit takeoff by role operator when "
     rules = [f"{permit}local time in {window}", f"{permit}altitude > 20 m or local time in 12:00 .. 12:02"][:permits]
     text = POLICY.format("\n".join(rules)) + HOURS
     assert [each.code.id for each in read(text)] == codes
 
 
-def test_a_parameter_has_values_that_are_not_permitted_between_those_that_are() -> None:
+def test_refused_value_between_permitted_values_is_reported() -> None:
     mission = HOURS.replace("mission m", "mission m(height: altitude in 5 m .. 40 m = 5 m)").replace("10 m", "height")
     rules = "permit takeoff by role operator when altitude < 15 m or altitude > 25 m"
     assert [each.code.id for each in read(POLICY.format(rules) + mission)] == ["E0703"]
@@ -308,17 +308,17 @@ DAY_SHIFT, NIGHT_SHIFT = "local time in 07:00 .. 19:00", "local time in 19:00 ..
 @rows(
     ("rules", "codes"),
     [
-        # a shift says nothing about the parameter, and the parameter nothing about the shift
+        # the window does not depend on the parameter, nor the parameter on the window
         (f"permit takeoff by role operator when {DAY_SHIFT}", []),
         (f"permit takeoff by role operator when altitude <= 40 m and {DAY_SHIFT}", []),
         (f"permit takeoff by role operator\nforbid takeoff by any when {NIGHT_SHIFT}", []),
-        # each altitude has a time of its own, though none suits all
+        # each altitude has a suitable time, but no time suits all
         (
             "permit takeoff by role operator "
             f"when altitude < 20 m and {DAY_SHIFT} or altitude >= 20 m and {NIGHT_SHIFT}",
             [],
         ),
-        # between the ends are altitudes that are permitted at no time, or not for long enough to start
+        # some altitudes between the ends are never permitted, or not for long enough to start
         (f"permit takeoff by role operator when {DAY_SHIFT} and (altitude < 15 m or altitude > 25 m)", ["E0703"]),
         (
             f"permit takeoff by role operator\nforbid takeoff by any when altitude in 15 m .. 25 m or {NIGHT_SHIFT}",
@@ -335,11 +335,11 @@ DAY_SHIFT, NIGHT_SHIFT = "local time in 07:00 .. 19:00", "local time in 19:00 ..
         ),
     ],
 )
-def test_shifts_and_the_range_of_a_parameter_go_together(rules: str, codes: list[str]) -> None:
+def test_time_windows_and_parameter_range_are_proved_together(rules: str, codes: list[str]) -> None:
     assert [each.code.id for each in read(POLICY.format(rules) + RANGE)] == codes
 
 
-def test_the_time_of_a_zone_and_the_range_of_a_parameter_go_together() -> None:
+def test_zone_times_and_parameter_range_are_proved_together() -> None:
     leg = "goto(47.39779 N, 8.54559 E, altitude = height)"
     mission = RANGE.replace("takeoff(altitude = height)", f"takeoff(altitude = 10 m) {leg}")
     permit = "permit takeoff by role operator permit goto by role operator"
@@ -353,13 +353,13 @@ def test_the_time_of_a_zone_and_the_range_of_a_parameter_go_together() -> None:
     assert [found.code.id for found in read(POLICY.format(refused) + mission)] == ["E0703"]
 
 
-def test_a_value_between_is_told_that_no_time_of_issue_suits() -> None:
+def test_value_without_any_time_of_issue_is_named() -> None:
     rules = "permit takeoff by role operator when altitude < 15 m or altitude > 25 m or local time in 12:00 .. 12:02"
     (finding,) = read(POLICY.format(rules) + RANGE)
     assert "with `altitude = 15" in finding.message, finding.message
 
 
-def test_a_value_between_is_told_that_the_time_of_issue_does_not_suit() -> None:
+def test_value_refused_at_the_known_time_of_issue_is_named() -> None:
     other = """
 mission n under rules@1 on quad {
   proposed by operator x for role operator

@@ -1,4 +1,4 @@
-"""The search against trying every situation of a small space."""
+"""The search, compared with an exhaustive search of a small space."""
 
 from collections.abc import Iterator
 from itertools import product
@@ -75,12 +75,12 @@ PLACES = st.one_of(
     st.builds(tree.InsideZone, st.integers(0, 3)),
     st.builds(tree.InsideArgument, st.just(2), st.integers(0, 1)),
     st.builds(tree.PointInside, st.just(3), st.integers(0, 3)),
-    st.just(tree.Both(tree.SlotKnown(2), tree.SlotKnown(3))),  # what `position is known` is lowered to
+    st.just(tree.Both(tree.SlotKnown(2), tree.SlotKnown(3))),  # the lowered form of `position is known`
 )
 
 
 def conditions(atoms: st.SearchStrategy[tree.Node]) -> st.SearchStrategy[tree.Node]:
-    """Conditions of a few atoms."""
+    """Draw conditions of a few atoms."""
 
     def grown(inner: st.SearchStrategy[tree.Node]) -> st.SearchStrategy[tree.Node]:
         return st.one_of(
@@ -94,14 +94,14 @@ GOALS = st.sampled_from((TRUE, FALSE, UNKNOWN, TRUE | UNKNOWN, FALSE | UNKNOWN))
 
 
 def each(value: Value) -> list[Value]:
-    """Every point of a value."""
+    """Yield every point of a value."""
     low, high, gap, elements = value
     there = [] if gap == 2 else [point(one) for one in (elements or range(low, high + 1))]
     return [*there, MISSING] if gap else there
 
 
 def situations(numeric: bool, placed: bool) -> Iterator[Environment]:
-    """Every situation of the space; what conditions do not read keeps one value."""
+    """Yield every situation of the space. Cells that the conditions do not read keep one value."""
     first = [each(value) if numeric else each(value)[:1] for value in (*ARGUMENTS[:2], SLOTS[0])]
     height = each(SLOTS[1])
     inner = [point(one) for one in range(-SIDE, SIDE + 1)]
@@ -114,7 +114,7 @@ def situations(numeric: bool, placed: bool) -> Iterator[Environment]:
 
 @pytest.mark.slow
 @given(st.lists(st.tuples(conditions(NUMERIC), GOALS), min_size=1, max_size=3))
-def test_numbers_are_decided_as_by_trying_all(goals: list[tuple[tree.Node, int]]) -> None:
+def test_answers_about_numbers_agree_with_exhaustive_search(goals: list[tuple[tree.Node, int]]) -> None:
     built = [(build(node, TABLES), wanted) for node, wanted in goals]
     exists = any(all(run(at) & wanted for run, wanted in built) for at in situations(numeric=True, placed=False))
     answer = satisfiable(goals, SPACE)
@@ -135,7 +135,9 @@ POINTS = st.builds(
 
 
 @given(st.lists(st.tuples(conditions(ALL), GOALS), min_size=1, max_size=3), st.lists(POINTS, min_size=1, max_size=20))
-def test_no_is_never_wrong_and_yes_is_confirmed(goals: list[tuple[tree.Node, int]], points: list[Environment]) -> None:
+def test_no_is_never_wrong_and_yes_has_a_valid_witness(
+    goals: list[tuple[tree.Node, int]], points: list[Environment]
+) -> None:
     answer = satisfiable(goals, SPACE)
     if isinstance(answer, Yes):
         for node, wanted in goals:
@@ -147,8 +149,8 @@ def test_no_is_never_wrong_and_yes_is_confirmed(goals: list[tuple[tree.Node, int
 
 
 @given(st.lists(st.tuples(conditions(st.builds(tree.InsideZone, st.integers(0, 3))), GOALS), min_size=1, max_size=3))
-def test_places_are_decided_as_by_trying_all(goals: list[tuple[tree.Node, int]]) -> None:
-    """At midnight; where no place of whole millimetres shows it and no relation rules it out, it stays open."""
+def test_answers_about_places_agree_with_exhaustive_search(goals: list[tuple[tree.Node, int]]) -> None:
+    """At midnight. If no place in whole millimetres exists and no relation excludes one, the answer is undecided."""
     space = SPACE._replace(utc=((0, 0),))
     built = [(build(node, TABLES), wanted) for node, wanted in goals]
     exists = any(all(run(at) & wanted for run, wanted in built) for at in situations(numeric=False, placed=True))
@@ -160,8 +162,8 @@ SUM = (tree.LinearTerm(False, 0, 1), tree.LinearTerm(True, 0, -1))
 
 
 @pytest.mark.parametrize(("bound", "holds"), [(4, True), (3, True), (-1, False)])
-def test_sums_of_the_same_form_are_compared_as_one(bound: int, holds: bool) -> None:
-    """`s - a <= 3` is ruled out by `s - a > 3` whatever s and a are: bisecting them would not end."""
+def test_sums_of_the_same_form_share_a_variable(bound: int, holds: bool) -> None:
+    """`s - a > 3` excludes `s - a <= 3` for all s and a; bisecting s and a would not terminate."""
     wide = (interval(-(1 << 50), 1 << 50), *ARGUMENTS[1:])
     slots = (interval(-(1 << 50), 1 << 50), *SLOTS[1:])
     space = SPACE._replace(arguments=wide, slots=slots)
@@ -170,7 +172,7 @@ def test_sums_of_the_same_form_are_compared_as_one(bound: int, holds: bool) -> N
     assert isinstance(answer, Yes if holds else No)
 
 
-def test_an_implication_has_a_situation_against_it_or_a_proof() -> None:
+def test_implication_has_a_counterexample_or_a_proof() -> None:
     low, high = (tree.AtMost((tree.LinearTerm(False, 0, 1),), bound) for bound in (0, 1))
     assert isinstance(implies(low, high, SPACE), No)
     against = implies(high, low, SPACE)
@@ -178,7 +180,7 @@ def test_an_implication_has_a_situation_against_it_or_a_proof() -> None:
     assert against.witness.cells[False, 0] == 1
 
 
-def test_what_is_too_hard_is_left_open() -> None:
+def test_question_over_the_budget_stays_undecided() -> None:
     terms = tuple(tree.LinearTerm(True, cell, factor) for cell, factor in ((0, 6), (1, 10)))
     space = SPACE._replace(arguments=(interval(-(1 << 40), 1 << 40), interval(-(1 << 40), 1 << 40), *ARGUMENTS[2:]))
     odd = (tree.Equal((*terms, tree.LinearTerm(False, 0, 15)), 1), TRUE)

@@ -71,7 +71,7 @@ CASES = [
     (rule("degrade any when phase > departure to return_home"), "E0323", "phase == inspection", None),
     (step("hover(5 s) { maintain position inside grow(city, -7 m) }"), "E0622", "`grow(school, 20 m)`", None),
     (step("hover(5 s) { require phase == inspection }"), "E0622", "they name none", None),
-    (step("hover(5 s) { require battery > 1 % for the last 7 s }"), "E0622", "it observes none", None),
+    (step("hover(5 s) { require battery > 1 % for the last 7 s }"), "E0622", "it monitors none", None),
     (step("hover(5 s) { energy at most 110 % }"), "E0614", "a full battery", None),
     ("zone w = corridor(47.3 N, 8.5 E, 47.4 N, 8.5 E, width 0 m)", "E0516", "at least `10 cm`", None),
     ("zone w = corridor(47.3 N, 8.5 E, 47.4 N, 8.5 E, width -1 m)", "E0319", None, None),
@@ -130,10 +130,10 @@ mission m under p@1 on quad {
 def test_out_of_scope_finding_shows_the_default() -> None:
     (found,) = check(IMPORTS + OBSERVE.replace("TIME", "10 s").replace("HOME", ""))
     assert found.code.id == "E0703"
-    assert found.message.startswith("`time = 20 s` is outside")
+    assert found.message.startswith("`time = 20 s` is not permitted")
     assert [label.text for label in found.labels] == [
         "this does not hold",
-        "the step says nothing, so this default holds",
+        "the step uses this default",
     ]
 
 

@@ -1,4 +1,4 @@
-"""Zones in the plane: what is computed in integers against naive and floating oracles."""
+"""Plane geometry in integers, compared with naive and floating-point oracles."""
 
 import math
 from collections.abc import Callable
@@ -44,7 +44,7 @@ RAW = st.lists(POINTS, min_size=3, max_size=8, unique=True)
 
 
 def star(radii: list[int], turn: int) -> SimplePolygon:
-    """A simple polygon around the origin, one corner for each radius."""
+    """Return a simple polygon around the origin with one corner for each radius."""
     corners = [
         (
             round(r * math.cos(2 * math.pi * (k + turn / 10) / len(radii))),
@@ -60,7 +60,7 @@ STARS = st.builds(star, st.lists(st.integers(5_000, 60_000), min_size=3, max_siz
 
 
 def polygon(shape: Shape) -> shapely.Geometry:
-    """The same region for shapely; a disc by a fine polygon."""
+    """Return the region for shapely, with a fine polygon for a disc."""
     if isinstance(shape, RoundArea):
         return shapely.Point(shape.center).buffer(shape.radius, quad_segs=64)
     return shapely.unary_union([shapely.Polygon(ring, holes) for ring, holes in parts(shape)])
@@ -69,7 +69,7 @@ def polygon(shape: Shape) -> shapely.Geometry:
 @pytest.mark.parametrize(
     ("latitude", "longitude"), [(473977400, 85455900), (0, 0), (-338688000, 1512093000), (850000000, 0)]
 )
-def test_the_projection_agrees_with_the_ellipsoid_in_floats(latitude: int, longitude: int) -> None:
+def test_projection_agrees_with_the_ellipsoid_in_floats(latitude: int, longitude: int) -> None:
     made = projection_at(latitude, longitude)
     a, f = 6_378_137_000.0, 1 / 298.257223563
     e2, phi = f * (2 - f), math.radians(latitude / 1e7)
@@ -80,7 +80,7 @@ def test_the_projection_agrees_with_the_ellipsoid_in_floats(latitude: int, longi
 
 
 @given(RAW)
-def test_a_simple_polygon_is_one_whose_edges_meet_nowhere_else(corners: list[Point]) -> None:
+def test_simple_polygon_test_agrees_with_shapely(corners: list[Point]) -> None:
     count = len(corners)
     lines = [(corners[i], corners[(i + 1) % count]) for i in range(count)]
     naive = all(
@@ -90,7 +90,7 @@ def test_a_simple_polygon_is_one_whose_edges_meet_nowhere_else(corners: list[Poi
 
 
 @given(RAW, POINTS)
-def test_inside_is_inside_and_the_edge_is_not(corners: list[Point], point: Point) -> None:
+def test_points_on_the_edge_are_outside(corners: list[Point], point: Point) -> None:
     assume(crossing(corners) is None)
     assert contains(corners, point) == shapely.Polygon(corners).contains_properly(shapely.Point(point))
 
@@ -108,7 +108,7 @@ def test_distances_compare_exactly(a: Point, b: Point, c: Point, d: Point, limit
 
 
 @given(STARS, st.sampled_from([15_000, 3_000, 200, -200, -3_000]))
-def test_the_inner_offset_is_within_the_true_one_and_the_outer_around_it(shape: SimplePolygon, margin: int) -> None:
+def test_offsets_are_on_the_safe_side(shape: SimplePolygon, margin: int) -> None:
     true = polygon(shape).buffer(margin, quad_segs=256)
     small, large = made(inner, shape, margin), made(outer, shape, margin)
     assert margin < 0 or (small is not None and large is not None)
@@ -120,7 +120,7 @@ def test_the_inner_offset_is_within_the_true_one_and_the_outer_around_it(shape: 
 
 
 def made(offset: Callable[[Shape, int], Shape], shape: Shape, margin: int) -> Shape | None:
-    """An offset zone, or None where a narrow one vanishes or falls into parts."""
+    """Return an offset zone, or None if it vanishes or has several parts."""
     try:
         return offset(shape, margin)
     except NoSuchOffset as unshapely:
@@ -129,14 +129,14 @@ def made(offset: Callable[[Shape, int], Shape], shape: Shape, margin: int) -> Sh
         raise
 
 
-def test_a_disc_grows_and_shrinks_exactly() -> None:
+def test_disc_grows_and_shrinks_exactly() -> None:
     assert inner(RoundArea((5, 6), 100), 20) == outer(RoundArea((5, 6), 100), 20) == RoundArea((5, 6), 120)
     assert inner(RoundArea((5, 6), 100), -20) == RoundArea((5, 6), 80)
     with pytest.raises(NoSuchOffset):
         inner(RoundArea((5, 6), 100), -100)
 
 
-def test_a_hole_is_never_flown_in_and_always_kept_out_of() -> None:
+def test_offsets_of_holes_are_on_the_safe_side() -> None:
     bay = SimplePolygon(
         (
             (0, 0),
@@ -174,7 +174,7 @@ def test_containment_and_disjointness_agree_with_shapely(one: Shape, other: Shap
     if isinstance(one, SimplePolygon) and isinstance(other, SimplePolygon):
         assert lies_within(a, b) == second.covers(first)
         assert are_disjoint(a, b) == (not first.relate_pattern(second, "T********"))
-    else:  # a disc is only nearly a polygon
+    else:  # the polygon only approximates the disc
         if lies_within(a, b):
             assert overlap > 0.99 * first.area
         if are_disjoint(a, b):
@@ -185,7 +185,7 @@ def test_containment_and_disjointness_agree_with_shapely(one: Shape, other: Shap
             assert not are_disjoint(a, b)
 
 
-def test_a_region_is_within_itself_and_height_counts() -> None:
+def test_region_lies_within_itself_and_height_counts() -> None:
     square = SimplePolygon(((0, 0), (10, 0), (10, 10), (0, 10)))
     assert lies_within(Region(square, 0, 10), Region(square, 0, 10))
     assert not lies_within(Region(square, 0, 11), Region(square, 0, 10))
@@ -194,7 +194,7 @@ def test_a_region_is_within_itself_and_height_counts() -> None:
 
 
 @given(STARS, st.sampled_from(["grid", "perimeter", "orbit"]), st.integers(5_000, 40_000), st.integers(0, 4_000))
-def test_a_survey_stays_in_its_area(shape: SimplePolygon, pattern: str, spacing: int, inset: int) -> None:
+def test_survey_stays_in_its_area(shape: SimplePolygon, pattern: str, spacing: int, inset: int) -> None:
     points = survey(shape, pattern, spacing, inset, None)
     assume(points is not None)
     assert points is not None
@@ -216,7 +216,7 @@ def test_a_survey_stays_in_its_area(shape: SimplePolygon, pattern: str, spacing:
     ),
     st.integers(5_000, 20_000),
 )
-def test_a_grid_leaves_no_place_further_than_its_spacing(shape: Shape, spacing: int) -> None:
+def test_grid_passes_every_place_within_its_spacing(shape: Shape, spacing: int) -> None:
     points = survey(shape, "grid", spacing, 1_000, None)
     assert points is not None
     covered = shapely.LineString(points).buffer(spacing)
@@ -233,7 +233,7 @@ AREAS = st.builds(
 
 
 @given(AREAS, st.sampled_from(["grid", "perimeter", "orbit"]), st.integers(5_000, 40_000), st.integers(0, 3_000))
-def test_a_survey_goes_around_holes(
+def test_survey_goes_around_holes(
     area: tuple[SimplePolygon, tuple[Point, ...]], pattern: str, spacing: int, inset: int
 ) -> None:
     outline, hole = area
@@ -248,7 +248,7 @@ def test_a_survey_goes_around_holes(
             assert all(are_apart((a, b), edge, max(inset, LEAST_INSET) - 3) for edge in edges(shape))
 
 
-def test_a_grid_covers_both_sides_of_a_hole_and_an_orbit_goes_around_it() -> None:
+def test_grid_covers_both_sides_of_a_hole() -> None:
     yard = MultiPolygon(
         (
             ((0, 0), (100_000, 0), (100_000, 100_000), (0, 100_000)),
@@ -264,24 +264,24 @@ def test_a_grid_covers_both_sides_of_a_hole_and_an_orbit_goes_around_it() -> Non
     assert shapely.Polygon(orbit).contains(shapely.Polygon(yard.rings[1]))
 
 
-def test_an_area_in_parts_has_no_path() -> None:
+def test_area_in_parts_has_no_path() -> None:
     square = ((0, 0), (90_000, 0), (90_000, 90_000), (0, 90_000))
     assert survey(MultiPolygon((square, tuple((x + 100_000, y) for x, y in square))), "grid", 10_000, 0, None) is None
 
 
-def test_an_orbit_keeps_clear_of_holes() -> None:
+def test_orbit_avoids_holes() -> None:
     ring = ((0, 0), (100_000, 0), (100_000, 100_000), (0, 100_000))
     hole = ((95_000, 40_000), (95_000, 60_000), (97_000, 60_000), (97_000, 40_000))
     assert survey(MultiPolygon((ring, hole)), "orbit", 10_000, 0, None) is None
 
 
-def test_a_survey_begins_at_the_end_that_is_nearer() -> None:
+def test_survey_begins_at_the_nearer_end() -> None:
     area = SimplePolygon(((0, 0), (100_000, 0), (100_000, 20_000), (0, 20_000)))
     assert survey(area, "grid", 20_000, 0, (99_000, 10_000)) == ((98_998, 10_000), (1_002, 10_000))
     assert survey(area, "grid", 20_000, 0, (1_000, 10_000)) == ((1_002, 10_000), (98_998, 10_000))
 
 
-def test_a_disc_is_surveyed_too() -> None:
+def test_disc_is_surveyed() -> None:
     for pattern in ("grid", "perimeter", "orbit"):
         points = survey(RoundArea((0, 0), 50_000), pattern, 10_000, 3_000, None)
         assert points is not None

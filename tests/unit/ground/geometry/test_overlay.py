@@ -1,4 +1,4 @@
-"""Unions, differences and offsets of areas, in exact fractions, against shapely's floats and against counting."""
+"""Unions, differences and offsets of areas in exact fractions, compared with shapely and with counting."""
 
 import math
 from collections.abc import Callable
@@ -48,7 +48,7 @@ def simple(corners: list[Point]) -> bool:
 
 
 def star(radii: list[int], turn: int, center: Point) -> Ring:
-    """A simple polygon around a place, one corner for each radius."""
+    """Return a simple polygon around a place with one corner for each radius."""
     steps = [(r, 2 * math.pi * (k + turn / 10) / len(radii)) for k, r in enumerate(radii)]
     corners = [(center[0] + round(r * math.cos(a)), center[1] + round(r * math.sin(a))) for r, a in steps]
     assume(simple(corners))
@@ -71,7 +71,7 @@ def geometry(shape: Polygonal) -> shapely.Geometry:
 
 @st.composite
 def areas(draw: st.DrawFn) -> Polygonal:
-    """Two polygons without some others: parts, bays and holes."""
+    """Return two polygons minus others, with parts, bays and holes."""
     whole = [draw(LARGE), draw(LARGE)]
     gone = draw(st.lists(stars(15_000, 40_000), max_size=3))
     made = rounded_boundary(
@@ -92,10 +92,10 @@ RULES: list[tuple[str, Rule]] = [
 
 @pytest.mark.parametrize(("name", "rule"), RULES)
 @given(one=st.one_of(TINY, LARGE), other=st.one_of(TINY, LARGE))
-def test_what_is_outlined_is_what_shapely_says(name: str, rule: Rule, one: Ring, other: Ring) -> None:
+def test_outlines_agree_with_shapely(name: str, rule: Rule, one: Ring, other: Ring) -> None:
     true = getattr(shapely.Polygon(one), name)(shapely.Polygon(other))
     made = rounded_boundary([[one], [other]], rule)
-    assume(made is not None)  # in a plane of a few millimetres, rounding may leave nothing that is simple
+    assume(made is not None)  # within a few millimetres, rounding may leave no simple ring
     assert made is not None
     mine = geometry(polygonal(made.rings)) if made.rings else shapely.Polygon()
     assert mine.symmetric_difference(true).buffer(-made.moved).area < 1e-6
@@ -103,7 +103,7 @@ def test_what_is_outlined_is_what_shapely_says(name: str, rule: Rule, one: Ring,
 
 
 def well_formed(made: RoundedBoundary) -> None:
-    """By the predicate of the ground, and by the one that loading has."""
+    """Check rings with the predicates of the ground and of loading."""
     assert touching_edges(made.rings) is None
     assert nested(made.rings)
     assert not list(problems(made.rings))
@@ -116,7 +116,7 @@ def test_zones_of_usual_size_can_always_be_outlined(one: Ring, other: Ring) -> N
 
 
 @given(st.lists(TINY, min_size=1, max_size=3), st.lists(SMALL, min_size=1, max_size=5))
-def test_faces_have_the_windings_of_all_places(rings: list[Ring], places: list[Point]) -> None:
+def test_windings_of_faces_agree_with_points(rings: list[Ring], places: list[Point]) -> None:
     there = set(faces([[ring] for ring in rings]))
     for place in places:
         on_edge = any(not is_beyond(place, edge, 1) for ring in rings for edge in edges(SimplePolygon(ring)))
@@ -124,7 +124,7 @@ def test_faces_have_the_windings_of_all_places(rings: list[Ring], places: list[P
             assert tuple(int(contains(ring, place)) for ring in rings) in there | {(0,) * len(rings)}
 
 
-def test_squares_that_touch_at_a_corner_are_drawn_apart() -> None:
+def test_squares_that_touch_at_a_corner_are_moved_apart() -> None:
     squares = [(((0, 0), (100, 0), (100, 100), (0, 100)),), (((100, 100), (200, 100), (200, 200), (100, 200)),)]
     made = rounded_boundary(squares, lambda w: max(w) > 0)
     assert made is not None
@@ -133,7 +133,7 @@ def test_squares_that_touch_at_a_corner_are_drawn_apart() -> None:
     well_formed(made)
 
 
-def test_a_hole_that_touches_the_edge_is_opened() -> None:
+def test_hole_that_touches_the_edge_is_opened() -> None:
     square, hole = ((0, 0), (100, 0), (100, 100), (0, 100)), ((0, 50), (50, 25), (50, 75))
     made = rounded_boundary([[square], [hole]], lambda w: w[0] > 0 >= w[1])
     assert made is not None
@@ -141,28 +141,28 @@ def test_a_hole_that_touches_the_edge_is_opened() -> None:
     well_formed(made)
 
 
-def test_neighbours_with_a_common_edge_are_one() -> None:
+def test_union_of_neighbours_has_no_seam() -> None:
     made = rounded_boundary(
         [[((0, 0), (10, 0), (10, 10), (0, 10))], [((10, 0), (20, 0), (20, 10), (10, 10))]], lambda w: max(w) > 0
     )
     assert made == RoundedBoundary((((0, 0), (20, 0), (20, 10), (0, 10)),), 1)
 
 
-def test_what_takes_all_away_leaves_nothing() -> None:
+def test_difference_with_a_superset_is_empty() -> None:
     square = ((0, 0), (10, 0), (10, 10), (0, 10))
     made = rounded_boundary([[square], [square]], lambda w: w[0] > 0 >= w[1])
     assert made is not None
     assert not made.rings
 
 
-def test_spikes_and_straight_corners_go() -> None:
+def test_spikes_and_straight_corners_are_removed() -> None:
     kept = without_straight([(0, 0), (5, 0), (10, 0), (10, 10), (10, 20), (10, 10), (0, 10), (0, 0)])
     assert kept == [(10, 0), (10, 10), (0, 10), (0, 0)]
     assert without_straight([(0, 0), (5, 0), (9, 0)]) == []
 
 
 @given(st.integers(3, 2_000_000))
-def test_a_disc_lies_between_its_polygons(radius: int) -> None:
+def test_disc_lies_between_its_polygons(radius: int) -> None:
     small, large = within_disc((0, 0), radius), around_disc(radius)
     assert all(x * x + y * y <= radius * radius for x, y in small)
     assert all(is_beyond((0, 0), edge, radius) for edge in edges(SimplePolygon(large)))
@@ -175,12 +175,12 @@ def test_a_disc_lies_between_its_polygons(radius: int) -> None:
 @settings(max_examples=settings().max_examples // 2)
 @given(areas(), st.sampled_from([20_000, 3_000, 200, -200, -1_500, -4_000]))
 def test_areas_grow_and_shrink_on_the_safe_side(shape: Polygonal, margin: int) -> None:
-    """Holes shrink when an area grows, and vanish; parts flow together, and fall apart."""
+    """When an area grows, its holes shrink and vanish and its parts merge; when it shrinks, it splits."""
     true = geometry(shape).buffer(margin, quad_segs=128)
     small, large = made(inner, shape, margin), made(outer, shape, margin)
     loose = abs(margin) * 0.004 + 20
     if isinstance(shape, SimplePolygon) and is_convex(shape):
-        loose = abs(margin)  # its round corners are cut in fewer steps, or not at all
+        loose = abs(margin)  # its rounded corners have fewer segments or none
     if small is not None:
         assert geometry(small).difference(true.buffer(1 + abs(margin) * 2e-4)).area < 1
         assert geometry(shape).buffer(margin - loose).difference(geometry(small)).area < 1
@@ -217,17 +217,17 @@ YARD = MultiPolygon(
 )
 
 
-def test_a_hole_closes_when_its_area_grows_over_it() -> None:
+def test_hole_closes_when_its_area_grows() -> None:
     for offset in (inner, outer):
         assert len(rings(offset(YARD, 9_000))) == 2
         assert len(rings(offset(YARD, 11_000))) == 1
         assert len(rings(offset(YARD, -9_000))) == 2
         with pytest.raises(NoSuchOffset, match="nothing"):
             offset(YARD, -15_000)
-        assert len(rings(offset(YARD, -11_000))) == 4  # its corners are further than that from the hole
+        assert len(rings(offset(YARD, -11_000))) == 4  # its corners are farther than that from the hole
 
 
-def test_an_area_falls_apart_when_it_shrinks() -> None:
+def test_area_splits_when_it_shrinks() -> None:
     bar = ((0, 0), (40_000, 0), (40_000, 18_000), (60_000, 18_000), (60_000, 0), (100_000, 0), (100_000, 40_000))
     dumbbell = SimplePolygon(
         (*bar, (60_000, 40_000), (60_000, 22_000), (40_000, 22_000), (40_000, 40_000), (0, 40_000))
@@ -251,7 +251,7 @@ def test_relations_of_areas_agree_with_shapely(one: Polygonal, other: Polygonal)
     assert apart == (first.intersection(second).area == 0) or first.intersection(second).area < 1e-3
 
 
-def test_what_fills_a_hole_is_not_within_and_has_nothing_in_common() -> None:
+def test_area_that_fills_a_hole_is_disjoint() -> None:
     hole = Region(SimplePolygon(YARD.rings[1][::-1]), 0, 10)
     yard = Region(YARD, 0, 10)
     assert not lies_within(hole, yard)
@@ -261,7 +261,7 @@ def test_what_fills_a_hole_is_not_within_and_has_nothing_in_common() -> None:
     assert not lies_within(Region(SimplePolygon(YARD.rings[0]), 0, 10), yard)
 
 
-def test_bands_that_hang_on_one_elevation_move_together() -> None:
+def test_bands_above_sea_share_one_elevation_error() -> None:
     square = SimplePolygon(((0, 0), (10, 0), (10, 10), (0, 10)))
     sea, home = Region(square, 0, 100, 5, 5), Region(square, 0, 100)
     assert lies_within(sea, sea)
@@ -275,6 +275,6 @@ def test_bands_that_hang_on_one_elevation_move_together() -> None:
 
 
 @given(areas(), st.tuples(st.integers(-90_000, 90_000), st.integers(-90_000, 90_000)))
-def test_inside_an_area_is_inside_an_odd_number_of_rings(shape: Polygonal, place: Point) -> None:
+def test_point_in_an_area_is_in_an_odd_number_of_rings(shape: Polygonal, place: Point) -> None:
     assert contained(shape.rings, place) == geometry(shape).contains_properly(shapely.Point(place))
     assert all(a != b for ring in shape.rings for a, b in pairwise((*ring, ring[0])))

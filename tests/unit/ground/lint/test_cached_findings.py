@@ -1,4 +1,4 @@
-"""Remembered findings: exactly those come back, and of anything else nothing."""
+"""Cached findings survive a round trip, and malformed lists are refused."""
 
 import json
 
@@ -22,7 +22,7 @@ WHOLE = Diagnostic(
 LEAST = Diagnostic(codes.NAMING, "it is so")
 
 
-def test_there_and_back() -> None:
+def test_findings_survive_a_round_trip() -> None:
     assert findings_from_lists(json.loads(json.dumps(findings_as_lists((WHOLE, LEAST))))) == (WHOLE, LEAST)
 
 
@@ -37,7 +37,7 @@ def test_there_and_back() -> None:
     ],
     ids=str,
 )  # fmt: skip
-def test_any_others_are_none(harm: dict[int, object]) -> None:
+def test_malformed_lists_are_refused(harm: dict[int, object]) -> None:
     (lists,) = json.loads(json.dumps(findings_as_lists((WHOLE,))))
     for place, found in harm.items():
         lists[place] = found

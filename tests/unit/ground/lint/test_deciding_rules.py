@@ -1,4 +1,4 @@
-"""The rules about what a policy decides: what they find, and above all what they leave alone."""
+"""Lint rules about the decisions of a policy: their findings, and cases without a finding."""
 
 import pytest
 
@@ -43,17 +43,17 @@ ALL = "permit takeoff by any when altitude <= 40 m permit takeoff by any when al
         (f"{ALL} confirm takeoff when altitude > 20 m by role supervisor within 30 s", True),
         (f"{ALL} degrade any when battery < 25 % to return_home", True),
         ("permit takeoff by any when wind.speed < 9 m/s permit takeoff by any when wind.speed >= 9 m/s", False),
-        (f"{ALL} permit goto by role operator when altitude <= 30 m", True),  # another skill is gated
-        ("", True),  # nothing that moves is permitted at all
+        (f"{ALL} permit goto by role operator when altitude <= 30 m", True),  # another skill is restricted
+        ("", True),  # no moving skill is permitted
         ("permit takeoff by any when altitude >= 0 m and altitude <= 60 m", False),
-        ("permit takeoff by any when altitude > 3 m", True),  # 3 m is the least that it can be asked for
+        ("permit takeoff by any when altitude > 3 m", True),  # 3 m is the least possible value
         ("permit goto by any when target inside wide", False),
         ("permit goto by any when target inside world and height < 9 km", False),
         ("permit goto by any when target inside wide or target inside city", False),
         ("permit goto by any when target inside city", True),
         ("permit goto by any when not target inside world", True),
         ("permit goto by any when position inside wide", False),
-        ("permit goto by any when position inside world", True),  # its ceiling: 3.2 km is what the vehicle climbs
+        ("permit goto by any when position inside world", True),  # the vehicle climbs at most 3.2 km
         ("permit goto by any when position inside near", True),
         ("permit takeoff by any when wind.speed >= 0 m/s", False),
         ("permit takeoff by any when wind.speed > 0 m/s", True),
@@ -71,19 +71,19 @@ ALL = "permit takeoff by any when altitude <= 40 m permit takeoff by any when al
         ("permit takeoff by any when battery > 0 % forbid takeoff by any when height > 90 km", False),
         ("permit takeoff by any when battery > 0 % for the last 5 s", True),
         ("permit takeoff by any when phase is departure", True),
-        ("permit takeoff by any when gps.fix >= fix_3d", False),  # lesser fixes count as missing
+        ("permit takeoff by any when gps.fix >= fix_3d", False),  # lower fix types count as unknown
         ("permit takeoff by any when gps.fix >= rtk_fixed", True),
         (f"{ALL} airspace inside wide", False),
         (f"{ALL} airspace inside wide outside school", True),
         (f"{ALL} airspace inside near", True),
     ],
 )
-def test_a_policy_that_gates_nothing(rules: str, gates: bool) -> None:
+def test_policy_that_restricts_nothing_is_reported(rules: str, gates: bool) -> None:
     found = codes(rules, WORLD)
     assert ("E1306" not in found) == gates, found
 
 
-def test_the_last_minute_of_a_day_counts_as_its_own_by_no_clock() -> None:
+def test_last_minute_of_the_day_is_ignored() -> None:
     world = WORLD.replace("clock utc +02:00", 'clock "Europe/Zurich"')
     for times, gates in (("in 00:00 .. 23:59", False), ("in 00:01 .. 23:59", True), ("on monday .. sunday", False)):
         assert ("E1306" not in codes(f"permit takeoff by any when local time {times}", world)) == gates, times
@@ -130,7 +130,7 @@ WIDE = "polygon(46.7 N, 7.5 E, 46.7 N, 9.5 E, 48.0 N, 9.5 E, 48.0 N, 7.5 E)"
         ("difference(wide, city)", "inside city outside far", True),
     ],
 )
-def test_zones_of_an_airspace_that_make_no_difference(zone: str, airspace: str, idle: bool) -> None:
+def test_airspace_zones_without_effect_are_reported(zone: str, airspace: str, idle: bool) -> None:
     others = f"zone wide = {WIDE} zone home = circle(47.3977 N, 8.5456 E, 1 km)"
     found = codes(f"permit takeoff by role operator airspace {airspace}", f"{others} zone far = {zone}")
     assert ("E1307" in found) == idle, found
@@ -147,10 +147,10 @@ def test_zones_of_an_airspace_that_make_no_difference(zone: str, airspace: str, 
         ("permit inspect_area by role operator airspace outside school", False),
         ("permit goto by role operator airspace inside city", True),
         ("permit goto by role operator when target inside city", True),
-        ("permit goto by role operator when battery > 50 %", True),  # bounded by something: that is for its author
+        ("permit goto by role operator when battery > 50 %", True),  # any bound is accepted
         ("permit goto by role operator forbid goto by any when target inside school", True),
         ("permit goto by role operator forbid any by any when battery < 40 %", True),
-        ("permit takeoff by role operator", True),  # it is told no place
+        ("permit takeoff by role operator", True),  # it has no place argument
         ("permit goto by role operator airspace inside wide", False),
         ("permit goto by role operator airspace inside wide, city", True),
         ("permit goto by role operator when altitude >= 0 m", False),
@@ -173,7 +173,7 @@ def test_zones_of_an_airspace_that_make_no_difference(zone: str, airspace: str, 
         ("permit goto, inspect_area by role operator when altitude <= 60 m", False),
     ],
 )
-def test_a_permit_to_fly_anywhere(rules: str, bounded: bool) -> None:
+def test_permit_without_a_bound_on_the_place_is_reported(rules: str, bounded: bool) -> None:
     found = codes(rules, WORLD)
     assert ("E1308" not in found) == bounded, found
 
@@ -196,7 +196,7 @@ SITTING = "skill sit() { motion land class tactical deadline 9 s valid for 9 min
         ("degrade any when wind.speed > 9 m/s to hover degrade any when battery < 25 % to return_home", 2),
     ],
 )
-def test_a_degrade_that_keeps_from_landing(rules: str, how_many: int) -> None:
+def test_degrade_that_replaces_a_landing_is_reported(rules: str, how_many: int) -> None:
     assert codes(f"permit sit by any {rules}", SITTING).count("E1312") == how_many
 
 
@@ -220,7 +220,7 @@ def test_a_degrade_that_keeps_from_landing(rules: str, how_many: int) -> None:
         ("permit takeoff by role operator delegate any by role operator to role trainee when battery > 50 %", False),
     ],
 )
-def test_authority_that_is_broader_than_anyone_means(rules: str, broad: bool) -> None:
+def test_broad_permit_is_reported_with_lowered_policies(rules: str, broad: bool) -> None:
     assert ("E1303" in codes(f"{rules} airspace inside city", WORLD)) == broad
 
 
@@ -241,7 +241,7 @@ ON = "vehicle equipped"  # tuned to estimate the wind
         ("permit takeoff by role operator forbid takeoff by any when wind.speed > 8 m/s and altitude > 30 m", False),
         ("permit takeoff by role operator forbid goto by any when wind.speed > 8 m/s", False),
         ("permit takeoff by role operator forbid takeoff by any when battery < 50 %", False),
-        ("permit takeoff by role operator forbid takeoff by any", False),  # it never flies, and says so
+        ("permit takeoff by role operator forbid takeoff by any", False),  # it never flies, by another rule
         ("permit takeoff by role operator degrade takeoff when wind.speed > 8 m/s to return_home", True),
         ("permit takeoff by role operator degrade takeoff when wind.speed > 8 m/s to return_home where fitted", True),
         ("permit goto by role operator degrade goto when wind.speed > 8 m/s to return_home", False),
@@ -280,7 +280,7 @@ ON = "vehicle equipped"  # tuned to estimate the wind
         ),
     ],
 )
-def test_what_waits_on_the_ground_for_the_wind(rules: str, grounded: bool) -> None:
+def test_rule_that_prevents_every_take_off_is_reported(rules: str, grounded: bool) -> None:
     found = codes(rules, WORLD)
     assert ("E1313" in found) == grounded, found
 
@@ -294,7 +294,7 @@ def test_what_waits_on_the_ground_for_the_wind(rules: str, grounded: bool) -> No
         ("require wind.speed < 8 m/s or height < 5 m where fitted", False),
     ],
 )
-def test_a_contract_that_waits_on_the_ground_for_the_wind(clause: str, grounded: bool) -> None:
+def test_contract_that_prevents_every_take_off_is_reported(clause: str, grounded: bool) -> None:
     rise = (
         "skill rise(top: altitude in 5 m .. 50 m) { motion climb to top class tactical deadline 5 s valid for 40 min "
         f"lasts at most 1 min {clause} fallback return_home, emergency_land energy at most 5 % }}"

@@ -1,4 +1,4 @@
-"""Comments that ignore: `filter_findings` says what a naive reading says, of any text and any findings."""
+"""Comments that ignore findings, compared with a naive reading of the same text."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -26,7 +26,7 @@ TEXTS = st.lists(PIECES, max_size=24).map("".join)
 
 
 @given(TEXTS, st.lists(st.tuples(st.sampled_from(CODES), st.integers(0, 400)), max_size=8))
-def test_as_a_naive_reading_has_it(text: str, places: list[tuple[codes.Code, int]]) -> None:
+def test_ignores_agree_with_a_naive_reading(text: str, places: list[tuple[codes.Code, int]]) -> None:
     source = Source("x", text)
     found = {Diagnostic(code, "it is so", Span("x", min(at, len(text)), len(text))) for code, at in places}
     sifted = filter_findings(found, {"x": source}, ["x"], {})
@@ -35,7 +35,7 @@ def test_as_a_naive_reading_has_it(text: str, places: list[tuple[codes.Code, int
 
 
 @given(TEXTS)
-def test_what_stands_in_comments(text: str) -> None:
+def test_comments_agree_with_a_naive_reading(text: str) -> None:
     found = [(each.inside.rstrip("\r"), each.alone, not each.begun) for each in comments(Source("x", text))]
     naive = [(each.text.rstrip("\r"), each.alone, each.at_top) for each in ignoring.remarks(text)]
     assert found == naive
@@ -44,7 +44,7 @@ def test_what_stands_in_comments(text: str) -> None:
 
 
 @given(TEXTS)
-def test_a_fix_takes_an_ignore_out_and_nothing_else(text: str) -> None:
+def test_fix_removes_only_the_unused_ignore(text: str) -> None:
     source = Source("x", text)
     for each in ignores(source).valid:
         start, end = each.fix.span.start, each.fix.span.end
@@ -69,7 +69,7 @@ def test_a_fix_takes_an_ignore_out_and_nothing_else(text: str) -> None:
         ("a\n{}", 3),
     ],
 )
-def test_the_line_that_an_ignore_is_about(comment: str, line: int) -> None:
+def test_ignore_applies_to_the_next_line_with_code(comment: str, line: int) -> None:
     for marks in ("// {}", "/* {} */"):
         text = comment.format(marks.format("rtshcua: ignore E1302 because it is so"))
         (given,) = ignores(Source("x", text)).valid
@@ -83,7 +83,7 @@ def test_the_line_that_an_ignore_is_about(comment: str, line: int) -> None:
         ("...", False), ("`\u200b`", False), ("---", False), ("2019", False), ("\u200b" * 3, False), ("ok", False),
     ],
 )  # fmt: skip
-def test_a_reason_has_letters(reason: str, says_why: bool) -> None:
+def test_reason_must_contain_letters(reason: str, says_why: bool) -> None:
     read = ignores(Source("x", f"// rtshcua: ignore E1302 because {reason}\n"))
     assert [each.code.id for each in read.faults] == ([] if says_why else ["E1310"])
 
@@ -91,7 +91,7 @@ def test_a_reason_has_letters(reason: str, says_why: bool) -> None:
 @rows("blank", ["", " ", "\t", "\u00a0", "\u3000", "\x0b", "\x1c", "\u2028"])
 @rows("word", ["ignore", "ignore-file", "ignored", "ignore,"])
 @rows("marks", ["//{}", "/*{}*/"])
-def test_the_formatter_means_the_same_comments(blank: str, word: str, marks: str) -> None:
+def test_formatter_recognizes_the_same_comments(blank: str, word: str, marks: str) -> None:
     comment = marks.format(f"{blank}rtshcua:{blank}{word} E1302 because it is so")
     (row,) = gap_of(f"\n{comment}\n", at_start=True, at_end=False).comments
     given = ignores(Source("x", f"{comment}\n")).valid

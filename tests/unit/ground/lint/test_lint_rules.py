@@ -1,4 +1,4 @@
-"""The rules of habit: what they find, and above all what they leave alone."""
+"""Lint rules about sources: their findings, and cases without a finding."""
 
 from pathlib import Path
 
@@ -18,19 +18,19 @@ SHIPPED = sorted(
 )
 
 
-#: what pyproject.toml ignores, each with its reason: the rules of a policy that ships change with its version only
+#: the findings that pyproject.toml ignores, with reasons: a shipped policy changes only with its version
 KNOWN = {"policies/bridge_inspection.rts": ["E1312"], "policies/training_field.rts": ["E1312"]}
 
 
 @pytest.mark.parametrize("path", SHIPPED, ids=str)
-def test_nothing_that_ships_has_a_finding_but_those_that_are_known(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_shipped_sources_have_only_the_expected_findings(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(CHECKOUT)
     one = load([str(path)], lambda file: Path(file).read_bytes(), str(CHECKOUT))
     left = lint(one)
     assert [each.code.id for each in left] == KNOWN.get(str(path), []), render(left, one.sources)
 
 
-def test_a_program_with_an_error_is_left_alone() -> None:
+def test_program_with_an_error_is_not_linted() -> None:
     assert found("zone Broken = circle(") == []
     assert found('import "lib:nowhere.rts"\nzone Loud = circle(47 N, 8 E, 10 m)') == []
 
@@ -46,12 +46,12 @@ def test_a_program_with_an_error_is_left_alone() -> None:
         "template low(top: altitude) { permit return_home by any when height <= top }",
     ],
 )
-def test_what_a_policy_declares_and_nothing_uses(declaration: str) -> None:
+def test_unused_declarations_of_a_policy_file_are_reported(declaration: str) -> None:
     name = declaration.split("(")[0].split()[1]
     assert found(f"{HEAD}{declaration}\n{POLICY}") == [("E1301", name)]
 
 
-def test_a_skill_that_no_rule_names() -> None:
+def test_skill_without_a_rule_is_reported() -> None:
     skill = RISE.replace(", tag: one of a, b = a", "")
     assert found(HEAD + skill + POLICY) == [("E1301", "rise")]
     assert found(HEAD + skill + POLICY.replace("permit ret", "permit rise by role operator permit ret")) == []
@@ -62,12 +62,12 @@ def test_a_skill_that_no_rule_names() -> None:
     ] == ["E1303"]
 
 
-def test_a_file_without_a_mission_or_a_policy_is_there_to_be_imported() -> None:
+def test_declarations_of_an_importable_file_are_not_reported() -> None:
     assert found("zone a = circle(47 N, 8 E, 10 m)\nenum mode = GPS_FIX_TYPE { none = 0 }") == []
     assert found(HEAD + RISE) == []
 
 
-def test_what_a_policy_offers_to_missions_elsewhere() -> None:
+def test_zones_and_vehicles_of_a_policy_file_are_not_reported() -> None:
     zone = "zone yard = circle(47.3977 N, 8.5456 E, 10 m)\n"
     mission = "mission m under p@1 on quad { proposed by agent x for role operator phase a { return_home() } }"
     assert found(HEAD + zone + POLICY) == []
@@ -78,7 +78,7 @@ def test_what_a_policy_offers_to_missions_elsewhere() -> None:
     ]
 
 
-def test_parameters() -> None:
+def test_unused_parameters_are_reported() -> None:
     rise = "permit rise by role operator"
     assert found(HEAD + RISE + POLICY.replace("permit ret", f"{rise} permit ret")) == [("E1301", "tag")]
     assert found(HEAD + RISE + POLICY.replace("permit ret", f"{rise} when tag == b permit ret")) == []
@@ -89,7 +89,7 @@ def test_parameters() -> None:
     assert found(HEAD + RISE.replace(", tag: one of a, b = a", "") + template + used) == [("E1301", "altitude")]
 
 
-def test_only_what_was_asked_for() -> None:
+def test_only_requested_files_are_linted() -> None:
     other = HEAD + "enum mode = GPS_FIX_TYPE { none = 0 }\nzone Loud = circle(47 N, 8 E, 1 m)\n" + POLICY
     steps = "{ proposed by agent x for role operator phase a { return_home() } }"
     mission = f'import "policy.rts"\nmission m under p@1 on quad {steps}'
@@ -99,7 +99,7 @@ def test_only_what_was_asked_for() -> None:
     assert {each.code.id for each in both} == {"E1301", "E1302"}
 
 
-def test_programs_that_share_a_file_agree_or_say_nothing() -> None:
+def test_finding_needs_the_agreement_of_all_programs_with_the_file() -> None:
     policy = HEAD + "template low(top: altitude) { permit return_home by any when height <= top }\n" + POLICY
     user = (
         'import "policy.rts"\n'
@@ -130,19 +130,19 @@ def test_programs_that_share_a_file_agree_or_say_nothing() -> None:
         ("a__b", "a_b"),
     ],
 )
-def test_names(name: str, better: str) -> None:
+def test_misnamed_declarations_are_reported(name: str, better: str) -> None:
     one = program({"main.rts": f"zone {name} = circle(47 N, 8 E, 10 m)"})
     (finding,) = lint(one)
     assert (finding.code.id, finding.help) == ("E1302", f"write it as `{better}`")
     assert lint(program({"main.rts": f"zone {better} = circle(47 N, 8 E, 10 m)"})) == ()
 
 
-def test_the_parts_of_a_signals_name() -> None:
+def test_each_part_of_a_signal_name_is_checked() -> None:
     assert found("signal gps.Fix : count = GPS_RAW_INT.fix_type stale after 2 s") == [("E1302", "gps.Fix")]
     assert found("signal gps.fix_type : count = GPS_RAW_INT.fix_type stale after 2 s") == []
 
 
-def test_names_of_things_outside_stay_as_they_are() -> None:
+def test_names_of_roles_and_mavlink_members_are_not_reported() -> None:
     assert found("enum fix = GPS_FIX_TYPE { NO_GPS = 0, NoFix = 1 }") == [("E1302", "NoFix")]
     mission = "mission m under p@1 on quad { proposed by agent OpenClaw for role Chief phase a { return_home() } }"
     assert found(HEAD + POLICY.replace("permit ret", "permit return_home by role Chief permit ret") + mission) == []
@@ -151,7 +151,7 @@ def test_names_of_things_outside_stay_as_they_are() -> None:
 # ---------------------------------------------------------------------------------------------------- E1303
 
 
-def test_broad_authority() -> None:
+def test_broad_permits_are_reported() -> None:
     skill = RISE.replace(", tag: one of a, b = a", "")
 
     def permitted(rule: str) -> list[tuple[str, str]]:
@@ -168,7 +168,7 @@ def test_broad_authority() -> None:
         assert permitted(rule) == [], rule
 
 
-def test_a_link_must_be_permitted_to_whoever_needs_it() -> None:
+def test_permits_of_links_are_not_broad() -> None:
     skill = RISE.replace("top: altitude in 5 m .. 50 m, tag: one of a, b = a", "top: altitude in 5 m .. 50 m = 9 m")
     rule = POLICY.replace("permit ret", "permit rise by any permit ret")
     assert found(HEAD + skill + rule) == [("E1303", "rise")]
@@ -182,7 +182,7 @@ def test_a_link_must_be_permitted_to_whoever_needs_it() -> None:
 # ---------------------------------------------------------------------------------------------------- E1304
 
 
-def test_repeated_numbers() -> None:
+def test_repeated_numbers_are_reported() -> None:
     def when(*conditions: str) -> list[tuple[str, str]]:
         rules = " ".join(f"forbid return_home by any when {each}" for each in conditions)
         return found(HEAD + 'import "lib:skills/signals.rts"\n' + POLICY.replace("permit ret", f"{rules} permit ret"))
@@ -200,12 +200,12 @@ def test_repeated_numbers() -> None:
     assert when("height < 12 m", "height < 1200 cm", "height > 12 m") == [("E1304", "12 m")]
 
 
-def test_repeated_numbers_of_a_skill_and_of_a_template() -> None:
+def test_help_for_repeated_numbers_suggests_a_parameter() -> None:
     skill = RISE.replace(
         "fallback", "require battery > 30 % and height < 9 m assume battery > 30 % maintain battery > 30 % fallback"
     )
     skill = skill.replace("top: altitude in 5 m .. 50 m, tag: one of a, b = a", "top: altitude in 5 m .. 50 m")
     one = program({"main.rts": HEAD + skill})
     assert [each.help for each in lint(one)] == [
-        "give the skill a parameter with `30 %` as its default, so that it is written once"
+        "write the number once: give the skill a parameter with `30 %` as its default"
     ]

@@ -1,4 +1,4 @@
-"""Near longitude 180 everything is as it is anywhere else: a program there is the same one, moved around the globe."""
+"""A program near longitude 180 is lowered like the same program at any other longitude."""
 
 import json
 from pathlib import Path
@@ -31,7 +31,7 @@ KM = 1_000_000
     st.integers(-500 * KM, 500 * KM),
     st.integers(-500 * KM, 500 * KM),
 )
-def test_there_and_back(latitude: int, longitude: int, x: int, y: int) -> None:
+def test_projection_round_trip_across_longitude_180(latitude: int, longitude: int, x: int, y: int) -> None:
     here = projection_at(latitude, longitude)
     place = unproject(here, x, y)
     assert abs(place[1]) <= HALF_TURN
@@ -42,7 +42,7 @@ def test_there_and_back(latitude: int, longitude: int, x: int, y: int) -> None:
 
 
 def degrees(longitude: int) -> str:
-    """A longitude as a source writes it; 180 degrees are written as west, where the two sides differ."""
+    """Format a longitude as in sources; 180 degrees are written as west."""
     wrapped = (longitude + HALF_TURN) % TURN - HALF_TURN
     return f"{abs(wrapped) // 10**7}.{abs(wrapped) % 10**7:07d} {'E' if wrapped >= 0 else 'W'}"
 
@@ -85,7 +85,7 @@ mission m under p@1 on quad {
 
 
 def reef(home: int, middle: int) -> bytes:
-    """An area in two parts that share an edge, `middle` from home; of which each has it on its own side of 180."""
+    """Return an area in two parts with a common edge, one on each side of longitude 180."""
 
     def ring(west: int, east: int) -> list[list[list[float]]]:
         def written(offset: int, other: int) -> float:
@@ -117,7 +117,7 @@ def compiled(home: int, middle: int) -> tuple[Policy, Mission]:
 
 
 @pytest.mark.parametrize("home", [DATE_LINE - 2500, -DATE_LINE + 1500])
-def test_a_program_at_longitude_180_is_that_of_any_other_longitude(home: int) -> None:
+def test_program_at_longitude_180_equals_one_at_any_other_longitude(home: int) -> None:
     east = home % TURN  # within 0 .. 360 degrees
     there, flown = compiled(east, DATE_LINE - east)
     here, expected = compiled(ELSEWHERE, DATE_LINE - east)
@@ -129,7 +129,7 @@ def test_a_program_at_longitude_180_is_that_of_any_other_longitude(home: int) ->
     assert len(seam.data) == 8, "the two parts are joined, without a seam"
 
 
-def test_a_place_on_the_other_side_is_reached_and_simulated() -> None:
+def test_place_beyond_longitude_180_is_reached_and_simulated() -> None:
     near = arrived(-168_500_000, -HALF_TURN + 10, 20_000)
     there = {"latitude": -168_500_000, "height": 20_000, "located": True, "levelled": True}
     assert near(ObservedVehicle(longitude=HALF_TURN - 10, **there))

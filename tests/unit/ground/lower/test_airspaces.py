@@ -1,4 +1,4 @@
-"""E1101, E0107, E0709: airspaces of which nothing is left, vehicles without a name, and who proposes missions."""
+"""Empty airspaces, vehicles without an identity, and the sources of missions."""
 
 from reference.sources import findings, mission, policy, program
 from virtual.rows import rows
@@ -31,7 +31,7 @@ zone once = circle(47.39774 N, 8.54559 E, 400 m) active "2026-01-01T00:00Z" .. "
         ("outside a, all, far", []),
     ],
 )
-def test_an_airspace_of_which_nothing_is_left_is_a_finding(airspace: str, conflict: list[str]) -> None:
+def test_empty_airspace_is_reported(airspace: str, conflict: list[str]) -> None:
     text = program(ZONES, policy(f"airspace {airspace}"))
     found = [each for each in findings(text) if each.code.id == "E1101"]
     assert [text[each.span.start : each.span.end] for each in found if each.span] == [f"airspace {airspace}"] * bool(
@@ -41,7 +41,7 @@ def test_an_airspace_of_which_nothing_is_left_is_a_finding(airspace: str, confli
 
 
 @rows(("name", "expected"), [("", ["E0107"]), (" ", ["E0107"]), ("quad-1", [])])
-def test_a_vehicle_has_a_name(name: str, expected: list[str]) -> None:
+def test_vehicle_needs_an_identity(name: str, expected: list[str]) -> None:
     vehicle = (
         f'vehicle v {{ identity "{name}"  home 47.39774 N, 8.54559 E within 50 m  speed at most 12 m/s\n'
         "climb at most 3 m/s  position error 3 m  energy 100 % = 18 min hover  reserve 15 %  clock utc +02:00 }\n"
@@ -53,6 +53,6 @@ def test_a_vehicle_has_a_name(name: str, expected: list[str]) -> None:
 
 
 @rows(("source", "expected"), [("agent", []), ("operator", []), ("onboard", ["E0709"]), ("reflex", ["E0709"])])
-def test_missions_are_proposed_by_agents_and_operators(source: str, expected: list[str]) -> None:
+def test_mission_must_be_proposed_by_an_agent_or_operator(source: str, expected: list[str]) -> None:
     flight = mission("takeoff(altitude = 20 m)", "return_home()").replace("by agent", f"by {source}")
     assert [each.code.id for each in findings(program(policy(), flight))] == expected

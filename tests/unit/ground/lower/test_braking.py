@@ -1,4 +1,4 @@
-"""What a vehicle says of how it brakes: what is accepted, and what it comes to."""
+"""The `brakes` clause of a vehicle: what is accepted, and its lowered form."""
 
 import pytest
 
@@ -41,12 +41,12 @@ mission flight under rules@1 on quad {{
 """
 
 
-def test_it_is_accepted() -> None:
+def test_braking_is_accepted() -> None:
     assert found(program()) == []
     assert found(program("")) == []
 
 
-def test_it_comes_to_a_deceleration_rounded_down_and_the_slots_of_its_signals() -> None:
+def test_braking_is_lowered_to_a_deceleration_and_slots() -> None:
     compiled, _ = compile_sources([library.root() / "missions" / "short.rts"], mission=None, issued_at_us=0)
     assert compiled.policy is not None
     vehicle = compiled.policy.vehicle
@@ -73,12 +73,12 @@ def test_it_comes_to_a_deceleration_rounded_down_and_the_slots_of_its_signals() 
         (f"{BRAKES} {BRAKES}", "E0106"),
     ],
 )
-def test_what_makes_no_sense_is_refused(brakes: str, code: str) -> None:
+def test_inconsistent_braking_is_refused(brakes: str, code: str) -> None:
     assert [each for each, _ in found(program(brakes))] == [code]
 
 
 @pytest.mark.parametrize("name", ["velocity.north", "velocity.east", "velocity.down"])
-def test_what_brakes_needs_its_velocity(name: str) -> None:
+def test_braking_vehicle_needs_velocity_signals(name: str) -> None:
     without = "".join(line for line in SIGNALS.splitlines(keepends=True) if name not in line) + BATTERY
     assert found(program(signals=without)) == [
         ("E0410", f"the policy `rules` neither declares nor imports a signal `{name}`")
@@ -86,7 +86,7 @@ def test_what_brakes_needs_its_velocity(name: str) -> None:
     assert found(program("", without)) == []
 
 
-def test_a_velocity_of_another_type_is_refused() -> None:
+def test_velocity_signal_of_another_type_is_refused() -> None:
     wrong = (SIGNALS + BATTERY).replace(
         "velocity.down : speed = GLOBAL_POSITION_INT.vz", "velocity.down : length = GLOBAL_POSITION_INT.alt"
     )

@@ -1,4 +1,4 @@
-"""What conditions are lowered to: whole factors, temporal monitors each kept once, phases, the safe side of a zone."""
+"""The code of lowered conditions: integer factors, shared monitors, phases, and the safe side of a zone."""
 
 from pathlib import Path
 
@@ -53,7 +53,7 @@ def compiled(condition: str, rule: str = "up < 90 m", step: str = LAND) -> Compi
 
 
 def lowered(condition: str) -> tuple[Policy, Contract]:
-    """The policy with that condition, which is taken on board, and its skill's contract."""
+    """Compile a policy with a condition, check that it loads, and return it with its skill's contract."""
     found = compiled(condition)
     assert found.policy is not None, found.diagnostics
     assert isinstance(prepare(found.policy), PreparedPolicy)
@@ -61,7 +61,7 @@ def lowered(condition: str) -> tuple[Policy, Contract]:
 
 
 def shown(code: tuple[int, ...], policy: Policy) -> str:
-    """Code in words: names of signals, numbers, operations."""
+    """Format code as names of signals, numbers and operations."""
     names = {signal.slot: signal.name for signal in policy.signals}
     words = []
     for op, a, b in zip(code[::3], code[1::3], code[2::3], strict=True):
@@ -137,7 +137,7 @@ CODE = [
 
 
 @rows(("condition", "code"), CODE)
-def test_code(condition: str, code: str) -> None:
+def test_conditions_are_lowered_to_the_expected_code(condition: str, code: str) -> None:
     policy, contract = lowered(condition)
     (clause,) = contract.maintain
     assert shown(clause.code, policy) == code
@@ -150,7 +150,7 @@ def monitors(policy: Policy) -> list[tuple[str, int, str, str]]:
     ]
 
 
-def test_what_is_inside_another_monitor_comes_first_and_each_is_kept_once() -> None:
+def test_nested_monitors_come_first_and_are_shared() -> None:
     policy, contract = lowered(
         "(battery > 30 % for the last 3 s) within the last 5 s"
         " and (battery > 1 m / 1 m * 30 % for the last 3000 ms or rising height > 3 m)"
@@ -170,13 +170,13 @@ def test_rules_and_skills_share_monitors() -> None:
     assert [MonitorKind(each.kind) for each in found.policy.monitors] == [MonitorKind.FOR_LAST, MonitorKind.FALLING]
 
 
-def test_a_contract_reads_what_its_monitors_read() -> None:
+def test_contract_reads_the_slots_of_its_monitors() -> None:
     policy, contract = lowered("(wind.speed < 5 m/s for the last 3 s) within the last 5 s")
     slots = {signal.name: signal.slot for signal in policy.signals}
     assert contract.reads == (slots["wind.speed"],)
 
 
-def test_a_monitor_keeps_the_side_on_which_a_zone_is_safe() -> None:
+def test_monitor_keeps_the_safe_side_of_a_zone() -> None:
     inside = "position inside grow(bridge_a, 20 m)"
     policy, _ = lowered(
         f"({inside} for the last 3 s) or not ({inside} for the last 3 s) or not (not ({inside}) within the last 3 s)"
@@ -191,7 +191,7 @@ def distinct(number: int) -> str:
     return " and ".join(f"(battery > 30 % for the last {each} s)" for each in range(1, number + 1))
 
 
-def test_as_many_monitors_as_fit_on_board() -> None:
+def test_number_of_monitors_is_limited() -> None:
     policy, _ = lowered(distinct(32))
     assert len(policy.monitors) == 32
     found = compiled(distinct(33))
@@ -210,11 +210,11 @@ TOO_LARGE = [
 
 
 @rows(("condition", "code"), TOO_LARGE)
-def test_what_does_not_fit_on_board_says_so(condition: str, code: str) -> None:
+def test_condition_that_does_not_fit_on_board_is_reported(condition: str, code: str) -> None:
     assert {each.code.id for each in compiled(condition).diagnostics} == {code}
 
 
-def test_the_nearest_accepted_argument_is_found_through_functions() -> None:
+def test_nearest_accepted_argument_is_found_through_functions() -> None:
     found = compiled(
         "battery > 5 %", "abs(up - 10 m) <= 5 m and min(pace, 3 m/s) > 2 m/s", "probe(up = 30 m, pace = 4 m/s)"
     )
@@ -227,26 +227,24 @@ AUTHORITY = [
     ("phase == a", []),
     ("phase in {b, c}", ["E0703"]),
     ("phase != a", ["E0703"]),
-    ("battery > 50 % for the last 3 s and rising height > 3 m", ["E0717"]),  # a first step, and none waits
+    ("battery > 50 % for the last 3 s and rising height > 3 m", ["E0717"]),  # the first step, which does not wait
     ("battery > 50 % within 3 s of height > 3 m and up < 20 m", ["E0703"]),
 ]
 
 
 @pytest.mark.parametrize(("rule", "codes"), AUTHORITY)
-def test_a_permit_is_proved_by_phases_and_arguments_and_the_past_is_left_for_on_board(
-    rule: str, codes: list[str]
-) -> None:
+def test_permit_proof_ignores_temporal_conditions(rule: str, codes: list[str]) -> None:
     found = compiled("battery > 5 %", rule, "probe(up = 30 m, pace = 4 m/s)")
     assert [each.code.id for each in found.diagnostics if each.code.id.startswith("E07")] == codes
 
 
-def test_factors_that_are_too_fine_are_counted() -> None:
+def test_factors_beyond_the_range_of_numbers_are_reported() -> None:
     (found,) = compiled("obstacle.distance < wind.speed * 333 ms").diagnostics
     assert found.code.id == "E1003"
-    assert found.help == "made whole together, its factors add up to 1,333, and at most 512 fit: use rounder ones"
+    assert found.help == "as integers, its factors add up to 1,333, but at most 512 fit; use rounder factors"
 
 
-def test_how_deep_the_stack_gets_counts_every_atom() -> None:
+def test_stack_depth_counts_every_atom() -> None:
     code = CodeWriter()
     for op in (Op.WEEK_IN, Op.TIME_IN, Op.PHASE_IN, Op.MONITOR, Op.KNOWN):
         code.add(op)

@@ -1,7 +1,7 @@
-"""The meaning of expressions: random well-typed ones, checked and lowered, evaluated on board, against a naive reading.
+"""Random well-typed expressions, lowered and evaluated as on board, agree with a naive reading.
 
-A history of observations is fed to the monitors on board; what a condition says at the last of them is compared with
-its definition over fractions. What does not fit on board is not counted.
+The monitors receive a history of observations. The value of a condition at the last observation is compared with its
+definition over fractions. Conditions that do not fit on board are not counted.
 """
 
 from collections.abc import Sequence
@@ -82,7 +82,7 @@ LETTERS = {TRUE: "T", FALSE: "F", UNKNOWN: "U"}
 
 
 class Circles:
-    """The zones of the flat form, as far as conditions ask for them."""
+    """The zones of the flat form, as far as conditions use them."""
 
     flat = tuple(Zone(name, CIRCLE, LOWEST, HIGHEST, (x, y, r * r)) for name, (x, y, r) in CIRCLES.items())
 
@@ -92,7 +92,7 @@ class Circles:
 
 
 class Lowered(NamedTuple):
-    """A condition on board: its code, and what it is evaluated by."""
+    """A lowered condition: its code and its evaluator."""
 
     policy: Any
     condition: Any
@@ -107,13 +107,13 @@ def declared() -> tuple[Symbols, Any]:
 
 
 def lowered(node: Condition) -> Lowered | None:
-    """A well typed condition, lowered; None where it does not fit on board, or asks for what never is."""
+    """Lower a well-typed condition; None if it does not fit on board or uses an impossible value."""
     symbols, known = declared()
     report = Report({})
     context = CheckContext(symbols, report, known)
     scope = Scope(symbols, report, context.arguments(symbols.skills["probe"]))
     check_condition(scope, node)
-    if report.found:  # it asks for a value that a signal never has
+    if report.found:  # it uses a value that the signal never has
         assert {found.code.id for found in report.found} == {"E0325"}, (node, report.found)
         return None
     slots = SignalSlots(context)
@@ -158,7 +158,7 @@ def lowered(node: Condition) -> Lowered | None:
 
 
 def histories(random: Random) -> list[World]:
-    """Up to four observations; a signal is missing now and then, arguments never are, and never change."""
+    """Draw up to four observations. Signals are sometimes missing; arguments are always present and constant."""
     arguments = {name: random.randint(-4, 8) * STEP[DIMENSIONS[name]] for name in ARGUMENTS if name != "look"}
     look = random.randrange(3)
     at_us = 0
@@ -190,7 +190,7 @@ def state_of(world: World, policy: Any) -> State:
 
 
 def on_board(found: Lowered, history: Sequence[World], phase: str | None) -> str:
-    """What the condition says after the monitors saw the whole history."""
+    """Return the value of the condition after the monitors received the whole history."""
     flat, memory, truths = found.policy.policy, initial(found.policy), ()
     for world in history:
         now = Now(monotonic_us=world.at_us, utc_us=world.utc_us, utc_error_us=0)
@@ -210,9 +210,7 @@ SAMPLE = 400
 
 
 def campaign(seed: int, expressions: int) -> tuple[int, dict[str, int]]:
-    """Compares that many expressions that fit on board, each in three histories; how many there were, and of what
-    truths.
-    """
+    """Compare a number of expressions that fit on board, each in three histories. Return the counts by truth value."""
     random = Random(seed)
     maker = Maker(random)
     done = 0
@@ -231,7 +229,7 @@ def campaign(seed: int, expressions: int) -> tuple[int, dict[str, int]]:
     return done, truths
 
 
-def test_an_expression_means_on_board_what_it_says() -> None:
+def test_lowered_expressions_agree_with_a_naive_reading() -> None:
     done, truths = campaign(1, SAMPLE)
     assert done == SAMPLE
     assert min(truths.values()) > SAMPLE // 4, truths
@@ -239,7 +237,7 @@ def test_an_expression_means_on_board_what_it_says() -> None:
 
 @pytest.mark.soak
 @pytest.mark.parametrize("part", range(10))
-def test_200_000_expressions_mean_on_board_what_they_say(part: int) -> None:
+def test_200_000_lowered_expressions_agree_with_a_naive_reading(part: int) -> None:
     done, truths = campaign(100 + part, 20_000)
     assert done == 20_000
     assert sum(truths.values()) == 60_000

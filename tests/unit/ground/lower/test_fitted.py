@@ -1,4 +1,4 @@
-"""Sensors that a vehicle is without: what is left out, what is refused, and what is kept to be read."""
+"""Sensors that a vehicle lacks: omitted clauses, refused conditions, and the record in the policy."""
 
 from pathlib import Path
 
@@ -63,7 +63,7 @@ def codes(made: Compiled) -> list[str]:
     return [found.code.id for found in made.diagnostics]
 
 
-def test_a_clause_where_fitted_is_left_out_of_the_contract_and_kept_as_text() -> None:
+def test_clause_for_a_missing_sensor_is_omitted_and_recorded() -> None:
     made = compiled(NO_EYES, "assume wind.speed < 9 m/s  assume height < 90 m and obstacle.distance > 4 m where fitted")
     assert made.policy is not None, made.diagnostics
     assert made.policy.vehicle.without == ("obstacle.distance",)
@@ -85,7 +85,7 @@ RULES = {
 
 
 @pytest.mark.parametrize("kind", RULES)
-def test_a_rule_where_fitted_is_left_out_and_kept_as_text(kind: str) -> None:
+def test_rule_for_a_missing_sensor_is_omitted_and_recorded(kind: str) -> None:
     without, with_it = compiled(NO_EYES, rule=RULES[kind]), compiled(rule=RULES[kind])
     assert without.policy is not None, without.diagnostics
     assert with_it.policy is not None, with_it.diagnostics
@@ -96,16 +96,16 @@ def test_a_rule_where_fitted_is_left_out_and_kept_as_text(kind: str) -> None:
     assert not isinstance(prepare(without.policy), Refusal)
 
 
-def test_a_permit_has_no_where_fitted() -> None:
-    """Left out it would permit less, and without its condition more: neither is what one reads."""
+def test_where_fitted_is_refused_for_a_permit() -> None:
+    """Without the rule the policy would permit less, and without its condition more than it states."""
     made = compiled(NO_EYES, rule="permit goto by role trainee when obstacle.distance > 2 m where fitted")
     assert codes(made) == ["E0101"]
     (found,) = compiled(NO_EYES, rule="permit goto by role trainee when obstacle.distance > 2 m").diagnostics
     assert found.help is not None
-    assert found.help.startswith("leave the signal out of the rule")
+    assert found.help.startswith("remove the signal from the rule")
 
 
-def test_where_the_sensor_is_fitted_the_clause_counts() -> None:
+def test_clause_applies_if_the_sensor_is_fitted() -> None:
     policy = compiled(clause="assume obstacle.distance > 4 m where fitted").policy
     assert policy is not None
     watch = next(each for each in policy.contracts if each.name == "watch")
@@ -113,7 +113,7 @@ def test_where_the_sensor_is_fitted_the_clause_counts() -> None:
     assert policy.left_out == ()
 
 
-def test_clauses_of_several_lines_all_count_in_their_order() -> None:
+def test_clauses_on_several_lines_keep_their_order() -> None:
     policy = compiled(clause="require gps.fix >= fix_3d  maintain height < 50 m  require height < 40 m").policy
     assert policy is not None
     watch = next(each for each in policy.contracts if each.name == "watch")
@@ -134,7 +134,7 @@ def test_clauses_of_several_lines_all_count_in_their_order() -> None:
         {"block": "{ require obstacle.distance > 4 m }"},
     ],
 )
-def test_what_reads_a_sensor_that_is_not_fitted_is_refused(parts: dict[str, str]) -> None:
+def test_condition_on_a_missing_sensor_is_refused(parts: dict[str, str]) -> None:
     made = compiled(NO_EYES, **parts)
     assert codes(made) == ["E0413"]
     (found,) = made.diagnostics
@@ -156,25 +156,25 @@ def test_what_reads_a_sensor_that_is_not_fitted_is_refused(parts: dict[str, str]
         ("without link.quality  without obstacle.distance", "E0106"),
     ],
 )
-def test_what_a_vehicle_cannot_be_without(without: str, code: str) -> None:
+def test_required_signal_cannot_be_declared_missing(without: str, code: str) -> None:
     assert codes(compiled(without)) == [code]
 
 
-def test_a_misspelt_signal_is_told_with_the_nearest() -> None:
+def test_misspelt_signal_gets_a_suggestion() -> None:
     (found,) = compiled("without obstacle.distanse").diagnostics
     assert "obstacle.distance" in str(found.help)
 
 
-def test_a_velocity_that_nothing_reads_may_be_missing() -> None:
+def test_unread_velocity_may_be_missing() -> None:
     assert codes(compiled("without velocity.down")) == []
 
 
-def test_a_step_does_not_say_where_fitted() -> None:
+def test_where_fitted_is_refused_in_a_step() -> None:
     assert codes(compiled(block="{ require height < 90 m where fitted }")) == ["E0101"]
 
 
-def test_a_vehicle_without_the_sensors_flies_on_what_it_has() -> None:
-    """GPS, barometer and battery: and wind, which the shipped skills ask for."""
+def test_shipped_skills_compile_for_a_stock_copter() -> None:
+    """GPS, barometer and battery, and wind, which the shipped skills read."""
     made = compiled("without obstacle.distance, link.quality")
     assert made.policy is not None, made.diagnostics
     assert made.mission is not None
@@ -191,7 +191,7 @@ def test_a_vehicle_without_the_sensors_flies_on_what_it_has() -> None:
 @pytest.mark.parametrize(
     ("missing", "holds"), [((), True), (("gps.fix",), True), (("position",), False), (("height",), False)]
 )
-def test_to_hold_as_a_link_needs_the_position_and_no_fix(missing: tuple[str, ...], holds: bool) -> None:
+def test_hold_as_a_link_needs_the_position_but_no_fix(missing: tuple[str, ...], holds: bool) -> None:
     made = compiled()
     assert made.policy is not None
     policy = prepare(made.policy)

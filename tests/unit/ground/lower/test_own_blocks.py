@@ -1,4 +1,4 @@
-"""The checks of a contract see what a step's own block makes of it, and what chains make of links."""
+"""Contracts are proved with a step's own block, and links with the limits of their chain."""
 
 from pathlib import Path
 
@@ -58,7 +58,7 @@ mission m under rules@1 on quad {{
 
 
 def findings(chain: str = "return_home", rule: str = "", own: str = "", skip: str = "") -> list[Diagnostic]:
-    """All findings on a mission of three steps."""
+    """Return all findings of a mission of three steps."""
     source = (HEAD + TEXT.format(chain=chain, rule=rule, own=own, skip=skip)).encode()
     read = load(["x.rts"], lambda path: source if path == "x.rts" else Path(path).read_bytes(), LIBRARY)
     return list(check_program(read, dialect.load()))
@@ -83,7 +83,7 @@ def quoted(found: Diagnostic, **parts: str) -> str:
         ("{ require time >= 2 s }", "E0616", "watch(1 s) { require time >= 2 s }"),
     ],
 )
-def test_a_block_is_held_to_what_its_skill_is(own: str, code: str | None, at: str) -> None:
+def test_own_block_is_proved_like_its_skill(own: str, code: str | None, at: str) -> None:
     found = {each.code.id: quoted(each, own=own) for each in findings(own=own)}
     assert code in found if code else not found
     if code:
@@ -101,11 +101,11 @@ def test_a_block_is_held_to_what_its_skill_is(own: str, code: str | None, at: st
         ({"rule": "confirm watch by role operator within 2 s"}, None, ""),
     ],
 )
-def test_links_and_approvals_can_be_what_they_say(parts: dict[str, str], code: str | None, at: str) -> None:
+def test_links_and_approvals_must_be_feasible(parts: dict[str, str], code: str | None, at: str) -> None:
     found = findings(**parts)
     assert [(each.code.id, quoted(each, **parts)) for each in found] == ([(code, at)] if code else [])
 
 
-def test_a_step_on_the_ground_is_told_by_the_step_that_may_be_skipped() -> None:
+def test_message_names_the_skipped_step_that_leaves_the_vehicle_down() -> None:
     [found] = findings(skip="on inadmissible skip")
     assert (found.code.id, found.labels[-1].text) == ("E0619", "this step may be skipped")

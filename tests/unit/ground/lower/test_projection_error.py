@@ -1,4 +1,4 @@
-"""How far distances in the local plane are from those on the ellipsoid: the bound of docs/adr/0011-zones.md.
+"""The error of distances in the local plane against the ellipsoid: the bound of docs/adr/0011-zones.md.
 
 The oracle is the chord between two places in earth-centred coordinates. A geodesic of length s whose curvature is
 nowhere above k has a chord of at least 2 / k * sin(s k / 2), hence `chord <= s <= chord * (1 + chord^2 k^2 / 23)` for
@@ -21,7 +21,7 @@ KM = 1_000_000
 
 
 def bound(latitude: float, reach: float) -> float:
-    """By how much, relative to it, a distance within `reach` mm of home may be wrong."""
+    """Return the largest relative error of a distance within `reach` mm of home."""
     turn = reach / LEAST_RADIUS
     return (math.tan(math.radians(abs(latitude))) + 0.011) * turn + 2 / math.cos(math.radians(latitude)) ** 2 * turn**2
 
@@ -34,13 +34,13 @@ def centred(latitude: int, longitude: int) -> tuple[float, float, float]:
 
 
 def geodesic(one: tuple[int, int], other: tuple[int, int]) -> tuple[float, float]:
-    """Between what the length of the geodesic lies, mm."""
+    """Return a lower and an upper bound of the length of the geodesic in mm."""
     chord = math.dist(centred(*one), centred(*other))
     return chord, chord * (1 + chord**2 / LEAST_RADIUS**2 / 23)
 
 
 def deviation(latitude: int, longitude: int, a: tuple[int, int], b: tuple[int, int]) -> tuple[float, float, float]:
-    """The distance of two places in the plane, less the least and the most that it may really be; and the latter."""
+    """Return the plane distance of two places minus the two bounds of the true one, and the upper bound."""
     plane = projection_at(latitude, longitude)
     least, most = geodesic(unproject(plane, *a), unproject(plane, *b))
     flat = math.dist(project(plane, *unproject(plane, *a)), project(plane, *unproject(plane, *b)))
@@ -56,7 +56,7 @@ def deviation(latitude: int, longitude: int, a: tuple[int, int], b: tuple[int, i
     st.floats(0, 2 * math.pi),
     st.floats(0, 2 * math.pi),
 )
-def test_distances_in_the_plane_are_true_to_within_the_stated_bound(
+def test_distances_in_the_plane_are_within_the_stated_bound(
     latitude: int, longitude: int, reach: int, r: float, s: float, t: float, u: float
 ) -> None:
     a, b = ((round(reach * f * math.cos(w)), round(reach * f * math.sin(w))) for f, w in ((r, t), (s, u)))
@@ -70,8 +70,8 @@ def test_distances_in_the_plane_are_true_to_within_the_stated_bound(
     ("latitude", "km", "stated"),
     [(0, 0.5, 1), (0, 5, 1), (47.4, 0.5, 9), (47.4, 2, 35), (47.4, 5, 87), (47.4, 10, 175), (60, 5, 139), (70, 5, 221)],
 )
-def test_the_table_of_the_decision_record(latitude: float, km: float, stated: int) -> None:
-    """Parts in 100,000 by which a distance within so many km of home is wrong at most: measured, and near the bound."""
+def test_table_of_the_decision_record_matches_the_measurement(latitude: float, km: float, stated: int) -> None:
+    """The largest error, in parts in 100,000, within some km of home: measured, and close to the bound."""
     reach = round(km * KM)
     home = (round(latitude * 10**7), 0)
     worst = 0.0
@@ -80,7 +80,7 @@ def test_the_table_of_the_decision_record(latitude: float, km: float, stated: in
         for step in ((100_000, 0), (0, 100_000), (70_000, 70_000)):
             low, high, length = deviation(*home, at, (at[0] + step[0], at[1] + step[1]))
             worst = max(worst, abs(low) / length, abs(high) / length)
-    worst -= 3 / 100_000  # what rounding to millimetres is worth over the 100 m that were measured
+    worst -= 3 / 100_000  # the effect of rounding to millimetres over the measured 100 m
     assert worst <= bound(latitude, reach)
     assert worst * 1e5 <= stated
     assert bound(latitude, reach) * 1e5 <= stated + 1

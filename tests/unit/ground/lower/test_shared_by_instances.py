@@ -1,4 +1,4 @@
-"""A mission with many parameters is checked for many values of them; what these have in common is done once."""
+"""The instances of a mission with parameters share work: each common part is computed once."""
 
 from collections import Counter
 
@@ -37,7 +37,7 @@ mission m(
 """
 
 
-def test_a_step_is_prepared_once_for_all_that_have_the_same_arguments(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_steps_with_equal_arguments_are_prepared_once(monkeypatch: pytest.MonkeyPatch) -> None:
     prepared: Counter[tuple[int, tuple[int, ...]]] = Counter()
 
     def counted(invocation: Invocation, *others: object) -> object:
@@ -50,7 +50,7 @@ def test_a_step_is_prepared_once_for_all_that_have_the_same_arguments(monkeypatc
     assert len(prepared) <= 3 + 3 * 3 + 3 + 3 + 1, "of 64 missions with 5 steps each"
 
 
-def test_an_area_is_shrunk_once() -> None:
+def test_area_is_shrunk_once() -> None:
     survey._inset.cache_clear()
     square = RoundArea((0, 0), 40_000)
     for height in range(10_000, 20_000, 1_000):

@@ -1,4 +1,4 @@
-"""A survey path is worked out again from what a bundle carries: the compiler's own is recognised, any other is told."""
+"""Signed survey paths, compared with the path that the planner computes from the bundle."""
 
 from functools import cache
 from pathlib import Path
@@ -28,14 +28,14 @@ AREAS = {
 
 
 def shipped(name: str) -> str:
-    """A source that ships; its survey may last so long, and take so much, that each of these can be flown."""
+    """Return a shipped source with enough time and energy for every survey of these tests."""
     text = Path(name).read_text(encoding="utf-8")
     return text.replace("30 min = 2 min", "30 min = 8 min").replace("= 13 %", "= 40 %")
 
 
 SHIPPED = {name: shipped(str(CHECKOUT / name)) for name in
            ("skills/inspect_area.rts", "policies/bridge_inspection.rts")}  # fmt: skip
-#: the skill that ships with more time and charge, as the areas here are large; and one without a choice of pattern
+#: the shipped skill with more time and energy, since these areas are large; and one without a choice of pattern
 LOOK = SHIPPED["skills/inspect_area.rts"].replace("skill inspect_area", "skill look")
 SWEEP = (
     LOOK.replace("skill look", "skill sweep")
@@ -91,7 +91,7 @@ def along(one: Invocation, *path: int) -> Invocation:
 
 @pytest.mark.slow
 @rows("call", CALLS)
-def test_the_compilers_own_path_is_the_planners_from_either_end(call: str) -> None:
+def test_compiled_path_matches_the_planner_in_both_directions(call: str) -> None:
     policy, one = compiled(call)
     assert path_planned_otherwise(policy, one) is None
     points = list(zip(one.plan.path[::2], one.plan.path[1::2], strict=True))
@@ -105,7 +105,7 @@ def test_the_compilers_own_path_is_the_planners_from_either_end(call: str) -> No
     assert moved.apart <= 1
 
 
-def test_another_pattern_than_the_argument_is_told() -> None:
+def test_path_of_another_pattern_is_reported() -> None:
     policy, grid = compiled(CALLS[3])
     _, perimeter = compiled(CALLS[4])
     found = path_planned_otherwise(policy, along(grid, *perimeter.plan.path))
@@ -115,7 +115,7 @@ def test_another_pattern_than_the_argument_is_told() -> None:
     assert found.length > 100_000
 
 
-def test_one_point_is_a_path_too() -> None:
+def test_signed_path_of_one_point_is_compared() -> None:
     policy, grid = compiled(CALLS[3])
     found = path_planned_otherwise(policy, along(grid, *grid.plan.path[:2]))
     assert found is not None
@@ -123,8 +123,8 @@ def test_one_point_is_a_path_too() -> None:
 
 
 @pytest.mark.parametrize("pattern", [-1, 3])
-def test_where_nothing_can_be_planned_any_path_is_another(pattern: int) -> None:
-    """What is out of range is for the vehicle to refuse; what has no path has none that was chosen by us."""
+def test_any_path_differs_if_the_planner_finds_none(pattern: int) -> None:
+    """The vehicle refuses values out of range. If the planner finds no path, the signer chose it."""
     policy, one = compiled(CALLS[3])
     area, altitude, _, speed = one.arguments
     none = PlannedPath(0, 0, 0)
@@ -136,13 +136,13 @@ def test_where_nothing_can_be_planned_any_path_is_another(pattern: int) -> None:
     assert path_planned_otherwise(replace(policy, zones=zones), one) == none, "no compiler makes such a circle"
 
 
-def test_a_step_that_covers_nothing_has_no_path_to_choose() -> None:
+def test_step_without_a_survey_is_not_compared() -> None:
     policy, one = compiled(CALLS[3])
     assert path_planned_otherwise(policy, replace(one, plan=replace(one.plan, kind=4, path=(0, 0)))) is None
 
 
-def test_a_survey_that_is_compared_with_too_many_edges_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What would be refused on board is a finding of the compiler."""
+def test_survey_with_too_many_edge_comparisons_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The compiler reports a mission that would be refused on board."""
     monkeypatch.setattr(prepare, "MAX_COMPARED", 3)
     program = load([str(CHECKOUT / "missions" / "standard.rts")], lambda name: Path(name).read_bytes(), str(CHECKOUT))
     found = compile_program(program, dialect.load(), mission=None, issued_at_us=0)

@@ -1,4 +1,4 @@
-"""Declared zones down to what is carried on board: shapes, bands above sea, times, files that zones are read from."""
+"""Lowering of declared zones: shapes, altitudes above sea, times, and GeoJSON files."""
 
 import subprocess
 import sys
@@ -43,7 +43,7 @@ TALL = """vehicle tall {
 
 
 def compiled(*parts: str, files: Mapping[str, bytes] | None = None) -> Compiled:
-    """A mission of one step under a policy, after some parts."""
+    """Compile a mission of one step under a policy, after some parts."""
     text = program(*parts, policy(), mission("takeoff(10 m)")) if "policy " not in "".join(parts) else program(*parts)
     inside = {"probe.rts": text.encode(), **(files or {})}
 
@@ -73,7 +73,7 @@ def holds(policy: Policy, name: str, place: tuple[int, int]) -> bool:
     return prepared.along(project(policy.projection, *place), (0, 0, 0, 0)) == TRUE
 
 
-def test_a_polygon_with_a_hole_is_an_area() -> None:
+def test_polygon_with_a_hole_is_an_area() -> None:
     made = lowered(f"{YARD}\n")
     assert zone(made, "yard").shape == AREA
     assert zone(made, "yard").data[:3] == (2, 4, 4)
@@ -82,7 +82,7 @@ def test_a_polygon_with_a_hole_is_an_area() -> None:
     assert not holds(made, "yard", edge)
 
 
-def test_a_corridor_is_all_that_is_near_its_line() -> None:
+def test_corridor_contains_all_points_near_its_line() -> None:
     made = lowered("zone way = corridor(47.397 N, 8.544 E, 47.397 N, 8.548 E, 47.399 N, 8.548 E, width 40 m)\n")
     assert zone(made, "way").shape == POLYGON
     one, bend = project(made.projection, 473970000, 85440000), project(made.projection, 473970000, 85480000)
@@ -95,11 +95,11 @@ def test_a_corridor_is_all_that_is_near_its_line() -> None:
     assert not near(one[0] - 20_001, one[1])
     assert near(one[0] + 1_000, one[1] + 19_998)
     assert not near(one[0] + 1_000, one[1] + 20_001)
-    assert near(bend[0] + 14_130, bend[1] - 14_130)  # round on the outside of the bend
+    assert near(bend[0] + 14_130, bend[1] - 14_130)  # the outside of the bend is round
     assert not near(bend[0] + 14_160, bend[1] - 14_160)
 
 
-def test_a_corridor_that_crosses_itself_has_a_hole() -> None:
+def test_corridor_that_crosses_itself_has_a_hole() -> None:
     made = lowered(
         "zone loop = corridor(47.397 N, 8.544 E, 47.397 N, 8.548 E, 47.399 N, 8.548 E, 47.396 N, 8.545 E, width 10 m)\n"
     )
@@ -113,7 +113,7 @@ zone nest = difference(union(yard, tower), circle(47.3985 N, 8.5470 E, 20 m), to
 """
 
 
-def test_unions_and_differences_name_other_zones() -> None:
+def test_unions_and_differences_combine_other_zones() -> None:
     made = lowered(f"{YARD}\n{COMBINED}")
     assert zone(made, "tower").shape == CIRCLE
     assert not holds(made, "open", INSIDE)
@@ -124,7 +124,7 @@ def test_unions_and_differences_name_other_zones() -> None:
     assert zone(made, "nest").data == zone(made, "open").data
 
 
-def test_what_a_zone_is_made_of_may_be_declared_after_it() -> None:
+def test_parts_of_a_zone_may_be_declared_after_it() -> None:
     assert lowered(f"zone rest = difference(yard, circle(47.3985 N, 8.5470 E, 30 m))\n{YARD}\n")
 
 
@@ -137,7 +137,7 @@ def test_grown_areas_keep_their_holes_or_close_them() -> None:
     assert zone(made, "grow(yard, 600 m)").shape == POLYGON
 
 
-def test_times_are_carried_and_inherited() -> None:
+def test_derived_zones_inherit_times() -> None:
     text = f'{YARD} active 08:00 .. 18:00 active "2026-05-01T08:00Z" .. "2026-05-02T18:00Z"\n'
     made = lowered(text, skill("probe()", maintain="position inside grow(yard, -4 m)"))
     for name in ("yard", "grow(yard, -4 m)"):
@@ -150,7 +150,7 @@ def tall(elevation: str) -> str:
 
 
 def flown(*parts: str) -> list[str]:
-    """What flies the vehicle `tall`."""
+    """Return the parts of a program that flies the vehicle `tall`."""
     return [*parts, policy(), mission("takeoff(10 m)").replace("on quad", "on tall")]
 
 
@@ -163,7 +163,7 @@ def test_altitudes_above_sea_are_converted_by_the_elevation_of_home() -> None:
     assert len([each for each in made.zones if "yard" in each.name]) == 1
 
 
-def test_a_band_of_unsure_height_is_narrower_where_one_must_be_and_wider_where_one_must_not() -> None:
+def test_uncertain_band_is_rounded_to_the_safe_side() -> None:
     probe = skill("probe()", maintain="position inside yard or position outside grow(yard, 5 m)")
     text = flown(BAND, tall("elevation 408 m above sea within 5 m"), probe)
     text[-2] = policy("airspace outside yard")
@@ -176,7 +176,7 @@ def test_a_band_of_unsure_height_is_narrower_where_one_must_be_and_wider_where_o
     assert [made.zones[each].name for each in made.airspace.outside] == ["possibly(yard)"]
 
 
-def test_arguments_stand_for_zones_of_unsure_height_too() -> None:
+def test_uncertain_band_is_rounded_for_zone_arguments() -> None:
     probe = skill("probe(area: zone)", maintain="position inside area")
     made = lowered(*flown(BAND, tall("elevation 408 m above sea within 5 m"), probe))
     (table,) = made.tables
@@ -184,7 +184,7 @@ def test_arguments_stand_for_zones_of_unsure_height_too() -> None:
     assert names[table[names.index("yard")]] == "surely(yard)"
 
 
-def test_what_lies_within_a_timed_zone_does_while_it_exists() -> None:
+def test_zone_is_within_a_timed_zone_only_while_it_exists() -> None:
     others = "zone part = circle(47.3985 N, 8.5470 E, 30 m)\nzone gone = circle(47.40 N, 8.54 E, 30 m)\n"
     hours, dates = "active 08:00 .. 18:00", 'active "2026-05-01T08:00Z" .. "2026-05-02T18:00Z"'
     for times, ops in (
@@ -205,7 +205,7 @@ def test_what_lies_within_a_timed_zone_does_while_it_exists() -> None:
         assert list(table.times("yard", ValueSets())) == list(table.times("yard", ValueSets()))
 
 
-def test_a_rule_about_a_timed_zone_asks_whether_it_exists() -> None:
+def test_rule_about_a_timed_zone_tests_its_existence() -> None:
     rules = policy(
         "permit probe by role operator through agent when area inside market",
         "forbid probe by any when area outside market",
@@ -217,7 +217,7 @@ def test_a_rule_about_a_timed_zone_asks_whether_it_exists() -> None:
     assert codes == [(*window, Op.AND, 0, 0), (*window, Op.NOT, 0, 0, Op.OR, 0, 0)]
 
 
-def test_what_a_policys_zone_is_made_of_is_imported_by_the_policy() -> None:
+def test_policy_must_import_the_parts_of_its_zones() -> None:
     rules = program("zone rest = union(city, other)\n", policy())
     text = 'import "rules.rts"\nzone other = circle(47.40 N, 8.54 E, 30 m)\n' + mission("takeoff(10 m)")
 
@@ -240,8 +240,8 @@ SITE = b"""{"type": "FeatureCollection", "features": [
 
 
 @pytest.mark.parametrize("feature", ["", ' feature "yard"'])
-def test_a_zone_is_read_from_geojson(feature: str) -> None:
-    """Its two parts touch at a corner, and are drawn apart there; the file is among what the policy is signed with."""
+def test_zone_is_read_from_geojson(feature: str) -> None:
+    """Its two parts touch at a corner and are moved apart; the policy is signed with the file."""
     made = lowered(f'zone site from "maps/site.geojson"{feature} ceiling 60 m\n', files={"maps/site.geojson": SITE})
     assert zone(made, "site").shape == AREA
     assert zone(made, "site").data[0] == 3
@@ -251,7 +251,7 @@ def test_a_zone_is_read_from_geojson(feature: str) -> None:
     assert (zone(made, "site").floor, zone(made, "site").ceiling) == (LOWEST, 60_000)
 
 
-def test_a_floor_and_no_ceiling_go_up_to_the_highest() -> None:
+def test_zone_without_a_ceiling_extends_to_the_highest_altitude() -> None:
     assert zone(lowered(f"{YARD} floor 5 m\n"), "yard").ceiling == HIGHEST
 
 
@@ -271,8 +271,8 @@ def test_a_floor_and_no_ceiling_go_up_to_the_highest() -> None:
         ("zone one = union(two, city)\nzone two = difference(city, one)", "E0510", "`one` -> `two`"),
         ("zone one = union(yrd, city)", "E0201", "`yrd` is not declared; expected a zone"),
         ("zone one = union(quad, city)", "E0204", "`quad` is a vehicle"),
-        ("zone none = difference(school, city)", "E0512", "nothing is left of `none`"),
-        (f"{YARD} floor 420 m above sea", "E0511", "how high home is above sea is not known"),
+        ("zone none = difference(school, city)", "E0512", "`none` is empty"),
+        (f"{YARD} floor 420 m above sea", "E0511", "the elevation of home is not declared"),
         (f"{YARD} entry 47.3978 N, 8.5455 E", "E0504", "the entry of `yard` is not inside the zone"),
         ("zone one = union(school, meadow) entry 47.38 N, 8.54 E", "E0504", "the entry of `one`"),
         ("zone one = circle(47.397 N, 8.544 E, 20 m) entry 47.38 N, 8.54 E", "E0504", "the entry of `one`"),
@@ -289,7 +289,7 @@ def test_a_floor_and_no_ceiling_go_up_to_the_highest() -> None:
         ('zone one from "nothing.geojson"', "E0108", "cannot read `nothing.geojson`"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_with_a_shape_is_said_once(text: str, code: str, words: str) -> None:
+def test_fault_of_a_shape_is_reported_once(text: str, code: str, words: str) -> None:
     told = found(program(f"{text}\n", policy()))
     assert {each for each, _ in told} == {code}
     assert words in told[0][1]
@@ -305,23 +305,23 @@ def test_what_is_wrong_with_a_shape_is_said_once(text: str, code: str, words: st
         ("floor 20 m ceiling 425 m above sea", "elevation 40800 m above sea", "E1003", "is too large"),
     ],
 )
-def test_what_is_wrong_with_a_band_is_said(band: str, elevation: str, code: str, words: str) -> None:
+def test_fault_of_a_height_band_is_reported(band: str, elevation: str, code: str, words: str) -> None:
     told = found(program(*flown(f"{YARD} {band}\n", tall(elevation))))
     assert {each for each, _ in told} == {code}, told
     assert words in told[0][1]
 
 
-def test_an_area_in_parts_is_not_surveyed_in_one_go() -> None:
+def test_survey_of_an_area_in_parts_is_refused() -> None:
     text = program(
         'import "lib:skills/inspect_area.rts"\n',
         "zone both = union(circle(47.3985 N, 8.5457 E, 30 m), circle(47.3975 N, 8.5444 E, 30 m))\n",
         policy(),
         mission("takeoff(10 m)", "inspect_area(both, altitude = 20 m)"),
     )
-    assert ("E0509", "`both` is in 2 parts, and a path lies in one") in found(text)
+    assert ("E0509", "`both` has 2 parts, but a survey path covers only one") in found(text)
 
 
-def test_a_file_that_is_no_geojson_is_named_where_it_is_asked_for() -> None:
+def test_invalid_geojson_is_reported_at_its_reference() -> None:
     text = program('zone site from "site.geojson"\n', policy())
     for data, code in ((b"{}", "E0112"), (b'{"type": "Point", "coordinates": [1, 2]}', "E0113")):
 
@@ -337,8 +337,8 @@ def test_a_file_that_is_no_geojson_is_named_where_it_is_asked_for() -> None:
 
 
 @pytest.mark.slow
-def test_no_zone_needs_shapely() -> None:
-    """It is a third of a second to import, and its floats differ between machines."""
+def test_compiling_zones_does_not_import_shapely() -> None:
+    """Importing it takes a third of a second, and its floats differ between machines."""
     script = (
         "import sys\n"
         f"sys.path[:0] = [{str(CHECKOUT / 'tests')!r}, {str(Path(__file__).parent)!r}]\n"

@@ -1,4 +1,4 @@
-"""E0618, E0717, E0806 to E0808, E1201 to E1203: what the text of a contract and of a policy says by itself."""
+"""Proofs of contracts: last links, times, deferrals, reactions and observability."""
 
 import pytest
 
@@ -17,7 +17,7 @@ def codes(*parts: str) -> list[str]:
     return [code for code, _ in found(program(*parts))]
 
 
-def test_the_figures_are_those_of_what_flies() -> None:
+def test_proof_constants_match_those_of_the_adapters() -> None:
     assert observability.DECIDE_US == CONSERVATIVE_US
     assert observability.ACTUATE_US == manoeuvre.RETRY_US
     assert dialect.load().messages.keys() >= COMMAND_MESSAGES
@@ -33,11 +33,11 @@ def test_the_figures_are_those_of_what_flies() -> None:
         ({"energy": "at most 15 %"}, []),
         ({"energy": "at most 16 %"}, ["E0618"]),
         ({"maintain": "height < 100 m"}, ["E0618"]),
-        ({"maintain": "local time in 08:00 .. 18:00"}, []),  # that is known without any signal
+        ({"maintain": "local time in 08:00 .. 18:00"}, []),  # known without any signal
     ],
 )
 @rows("place", ["contingency", "fallback"])
-def test_a_last_link_can_when_nothing_is_known_and_only_the_reserve_is_left(
+def test_last_link_works_without_signals_and_with_only_the_reserve(
     parts: dict[str, str], expected: list[str], place: str
 ) -> None:
     down = skill("come_down()", **{**LAND, **parts})
@@ -48,14 +48,14 @@ def test_a_last_link_can_when_nothing_is_known_and_only_the_reserve_is_left(
         assert codes(down, skill("probe()", fallback=chain), policy()) == expected
 
 
-def test_a_last_link_of_two_chains_is_reported_once() -> None:
+def test_last_link_of_two_chains_is_reported_once() -> None:
     down = skill("come_down()", **{**LAND, "energy": "at most 20 %"})
     assert codes(down, skill("probe()", fallback="come_down"), policy(contingency="come_down")) == ["E0618"]
 
 
 @pytest.mark.parametrize(("seconds", "expected"), [(68, []), (67, ["E0618"])])
-def test_a_last_link_comes_down_from_the_highest_step(seconds: int, expected: list[str]) -> None:
-    """50 m at 1.5 m/s and 10 m at 0.5 m/s, with what stopping, speeding up and switching off take."""
+def test_last_link_must_descend_from_the_highest_step_in_time(seconds: int, expected: list[str]) -> None:
+    """50 m at 1.5 m/s and 10 m at 0.5 m/s, plus the time to stop, accelerate and switch off."""
     down = skill("come_down()", **{**LAND, "lasts": f"at most {seconds} s"})
     flight = mission("takeoff(altitude = 40 m)", "goto(47.39799 N, 8.54559 E, 60 m)", "return_home()")
     assert codes(down, policy(contingency="return_home, come_down"), flight) == expected
@@ -73,7 +73,7 @@ def test_a_last_link_comes_down_from_the_highest_step(seconds: int, expected: li
         ({"grace": "1 min"}, []),
         ({"grace": "61 s"}, ["E0806"]),
         ({"lasts": "at most 500 ms"}, []),
-        ({"lasts": "at most 400 ms"}, ["E0806"]),  # the grace that is not written is 500 ms
+        ({"lasts": "at most 400 ms"}, ["E0806"]),  # the default grace is 500 ms
         ({"lasts": "at most 400 ms", "grace": "400 ms"}, []),
         ({"deadline": "31 s"}, ["E0807"]),
         ({"deadline": "31 s", "class": "semantic"}, []),
@@ -82,12 +82,12 @@ def test_a_last_link_comes_down_from_the_highest_step(seconds: int, expected: li
         ({"deadline": "5 m"}, ["E0310"]),  # no time at all
     ],
 )
-def test_the_times_of_a_contract_agree(parts: dict[str, str], expected: list[str]) -> None:
+def test_times_of_a_contract_must_be_consistent(parts: dict[str, str], expected: list[str]) -> None:
     assert codes(skill("probe()", **parts)) == expected
 
 
 @pytest.mark.parametrize(("within", "expected"), [(40, []), (41, ["E0806"])])
-def test_an_approval_is_not_awaited_for_longer_than_the_decision_is_valid(within: int, expected: list[str]) -> None:
+def test_approval_timeout_longer_than_the_validity_is_refused(within: int, expected: list[str]) -> None:
     rule = f"confirm probe by role supervisor within {within} min"
     assert codes(skill("probe()"), policy(rule)) == expected
 
@@ -96,11 +96,11 @@ def test_an_approval_is_not_awaited_for_longer_than_the_decision_is_valid(within
     ("block", "expected"),
     [
         ("deadline 2 s valid for 10 min lasts at most 1 min", []),
-        ("valid for 30 s", ["E0806"]),  # shorter than what the skill lasts
+        ("valid for 30 s", ["E0806"]),  # shorter than the skill
         ("lasts at most 400 ms", ["E0806"]),
     ],
 )
-def test_a_step_of_its_own_times_is_looked_at_too(block: str, expected: list[str]) -> None:
+def test_step_with_its_own_times_is_proved_again(block: str, expected: list[str]) -> None:
     flight = mission("takeoff(altitude = 20 m)", f"probe() {{ {block} }}", "return_home()")
     assert [code for code in codes(skill("probe()"), policy(), flight) if code != "E0801"] == expected
 
@@ -123,12 +123,14 @@ SLOW = "signal slow : speed = WIND.speed stale after {}\n"
         ("58481 ms", "1 min", ["E0808"]),
     ],
 )
-def test_a_breach_and_a_loss_are_noticed_while_the_skill_runs(stale: str, lasts: str, expected: list[str]) -> None:
+def test_violation_and_signal_loss_must_be_noticed_while_the_skill_runs(
+    stale: str, lasts: str, expected: list[str]
+) -> None:
     probe = skill("probe()", assume="slow < 9 m/s", lasts=f"at most {lasts}")
     assert codes(SLOW.format(stale), probe, policy()) == expected
 
 
-def test_what_is_only_required_is_not_watched() -> None:
+def test_require_clauses_are_not_monitored() -> None:
     assert codes(SLOW.format("10 min"), skill("probe()", require="slow < 9 m/s"), policy()) == []
 
 
@@ -138,8 +140,8 @@ def test_what_is_only_required_is_not_watched() -> None:
 @rows(
     ("parts", "expected"),
     [
-        ({"deadline": "50 ms", "require": "wind.speed < 9 m/s"}, []),  # asked for as often as it needs it
-        ({"deadline": "49 ms", "require": "wind.speed < 9 m/s"}, ["E0717"]),  # nothing comes more often
+        ({"deadline": "50 ms", "require": "wind.speed < 9 m/s"}, []),  # requested as often as needed
+        ({"deadline": "49 ms", "require": "wind.speed < 9 m/s"}, ["E0717"]),  # no message is sent more often
         ({"deadline": "49 ms", "assume": "wind.speed < 9 m/s"}, ["E0717"]),
         ({"deadline": "50 ms", "require": "gps.fix >= fix_3d and landed == on_ground and battery > 20 %"}, []),
         ({"deadline": "1 s", "require": "heard > 20 %"}, []),  # a radio reports once a second
@@ -151,7 +153,7 @@ def test_what_is_only_required_is_not_watched() -> None:
         ({"require": "told < 9 m/s", "maintain": "told < 9 m/s"}, ["E1201"]),
     ],
 )
-def test_what_a_step_waits_for_can_come(parts: dict[str, str], expected: list[str]) -> None:
+def test_deferral_must_be_able_to_end_before_the_deadline(parts: dict[str, str], expected: list[str]) -> None:
     told = (
         "signal told : count = COMMAND_LONG.command stale after 2 s\n"
         "signal heard : ratio = RADIO_STATUS.txbuf stale after 5 s\n"
@@ -161,20 +163,20 @@ def test_what_a_step_waits_for_can_come(parts: dict[str, str], expected: list[st
     assert codes(told, skill("probe()", **clauses), policy()) == expected
 
 
-def test_what_a_forbid_waits_for_counts_for_its_skills() -> None:
+def test_deferral_by_a_forbid_counts_only_for_its_skills() -> None:
     heard, quick = "signal heard : ratio = RADIO_STATUS.txbuf stale after 5 s\n", skill("quick()", deadline="900 ms")
     assert codes(heard, quick, policy("forbid quick by any when heard < 9 %")) == ["E0717"]
     assert codes(heard, quick, policy("forbid takeoff by any when heard < 9 %")) == []
 
 
-def test_nobody_approves_a_reflex() -> None:
+def test_confirm_rule_for_a_reflex_is_refused() -> None:
     rule = policy("confirm probe by role supervisor within 30 s")
     assert codes(skill("probe()", **{"class": "reflex", "deadline": "100 ms"}), rule) == ["E0717"]
     assert codes(skill("probe()"), rule) == []
 
 
 @pytest.mark.parametrize(("window", "expected"), [("5 s", []), ("6 s", ["E0717"]), ("5 min", ["E0717"])])
-def test_what_takes_longer_to_observe_than_the_flight_lasts_is_never_known(window: str, expected: list[str]) -> None:
+def test_window_longer_than_the_flight_before_the_step_is_refused(window: str, expected: list[str]) -> None:
     probe = skill("probe()", require=f"battery > 20 % and (height < 90 m for the last {window})", motion="land",
                   fallback="")  # fmt: skip
     assert codes(probe, policy(), mission("probe()")) == expected
@@ -186,13 +188,13 @@ def test_what_takes_longer_to_observe_than_the_flight_lasts_is_never_known(windo
     ("to", "message"),
     [
         ("45 m", []),
-        ("45001 mm", ["`rise` lasts at most 37.5 s, and the step takes up to 1 ms longer"]),
-        ("45600 mm", ["`rise` lasts at most 37.5 s, and the step takes up to 400 ms longer"]),
-        ("50 m", ["the step takes up to 41 s, and `rise` lasts at most 37.5 s"]),
+        ("45001 mm", ["`rise` lasts at most 37.5 s, but the step takes up to 1 ms longer"]),
+        ("45600 mm", ["`rise` lasts at most 37.5 s, but the step takes up to 400 ms longer"]),
+        ("50 m", ["the step takes up to 41 s, but `rise` lasts at most 37.5 s"]),
     ],
 )
-def test_by_how_much_a_plan_takes_too_long(to: str, message: list[str]) -> None:
-    """At 1.5 m/s, with 1.5 s for speeding up and 6 s from the command to leaving the ground."""
+def test_message_states_by_how_much_a_step_is_too_long(to: str, message: list[str]) -> None:
+    """At 1.5 m/s, with 1.5 s of acceleration and 6 s from the command to lift-off."""
     rise = skill("rise(to: altitude in 5 m .. 60 m)", motion="climb to to", lasts="at most 37500 ms")
     said = found(program(rise, policy(), mission(f"rise({to})", "return_home()")))
     assert [words for code, words in said if code == "E0804"] == message
@@ -205,7 +207,7 @@ RARE = "battery > 20 % within the last {}"
 @rows(
     ("permits", "expected"),
     [
-        ([LONG.format("1 ms")], ["E0717"]),  # no step waits for a permit: the first is denied at once
+        ([LONG.format("1 ms")], ["E0717"]),  # no step waits for a permit, so the first is denied at once
         ([LONG.format("11 s")], ["E0717"]),
         ([LONG.format("6 min")], ["E0717"]),
         ([f"altitude < 30 m and ({LONG.format('6 min')} or {LONG.format('7 min')})"], ["E0717"]),
@@ -217,10 +219,10 @@ RARE = "battery > 20 % within the last {}"
         ([LONG.format("6 min"), f"altitude < 10 m or {LONG.format('7 min')}"], ["E0717"]),
         ([LONG.format("6 min"), f"altitude < 30 m and {LONG.format('3 s')}"], ["E0717"]),
         ([LONG.format("6 min"), f"altitude < 30 m and {RARE.format('3 s')}"], []),
-        ([LONG.format("6 min"), f"altitude < 10 m and {LONG.format('3 s')}"], ["E0717"]),  # not of this step
+        ([LONG.format("6 min"), f"altitude < 10 m and {LONG.format('3 s')}"], ["E0717"]),  # not a permit of this step
     ],
 )
-def test_a_permit_of_a_step_can_be_known_before_it(permits: list[str], expected: list[str]) -> None:
+def test_permit_that_cannot_be_known_at_the_release_is_refused(permits: list[str], expected: list[str]) -> None:
     rules = [f"permit takeoff by role operator through agent when {when}" for when in permits]
     lines = [*rules, "permit hover, return_home, emergency_land by any", "contingency return_home, emergency_land"]
     text = "policy rules version 1 {\n" + "\n".join(lines) + "\n}\n"
@@ -231,7 +233,7 @@ def test_a_permit_of_a_step_can_be_known_before_it(permits: list[str], expected:
 
 
 @pytest.mark.parametrize(("window", "expected"), [("70 s", []), ("71 s", ["E0717"])])
-def test_a_permit_of_a_later_step_is_known_by_its_release(window: str, expected: list[str]) -> None:
+def test_permit_of_a_later_step_may_observe_until_its_release(window: str, expected: list[str]) -> None:
     goto = f"permit goto by role operator through agent when {LONG.format(window)}"
     text = (
         "policy rules version 1 {\n  permit takeoff by role operator through agent\n"
@@ -247,16 +249,16 @@ def test_a_permit_of_a_later_step_is_known_by_its_release(window: str, expected:
 @pytest.mark.parametrize(
     ("source", "stale", "expected"),
     [
-        ("WIND.speed", "150 ms", []),  # every 50 ms, and without a stamp as old as the position before it
+        ("WIND.speed", "150 ms", []),  # every 50 ms, but without a timestamp as old as the position before it
         ("WIND.speed", "149 ms", ["E1201"]),
-        ("LOCAL_POSITION_NED.vx", "50 ms", []),  # it says when it was measured
+        ("LOCAL_POSITION_NED.vx", "50 ms", []),  # it has a timestamp
         ("LOCAL_POSITION_NED.vx", "49 ms", ["E1201"]),
-        ("GPS_RAW_INT.vel", "267 ms", []),  # its stamp is that of the fix, of which there are five a second
+        ("GPS_RAW_INT.vel", "267 ms", []),  # its timestamp is that of the fix, five times a second
         ("GPS_RAW_INT.vel", "266 ms", ["E1201"]),
-        ("COMMAND_LONG.param1", "1 ms", None),  # never comes, which is said in its own words
+        ("COMMAND_LONG.param1", "1 ms", None),  # never sent, which has its own message
     ],
 )
-def test_a_signal_comes_before_it_is_stale(source: str, stale: str, expected: list[str] | None) -> None:
+def test_signal_must_be_reported_before_it_is_stale(source: str, stale: str, expected: list[str] | None) -> None:
     kind, limit = ("count", "9") if expected is None else ("speed", "9 m/s")
     signal = f"signal here : {kind} = {source} stale after {stale}\n"
     if expected is None:
@@ -271,7 +273,7 @@ def test_a_signal_comes_before_it_is_stale(source: str, stale: str, expected: li
 
 @pytest.mark.parametrize(("window", "expected"), [("1 s", []), ("999 ms", ["E1201"])])
 @pytest.mark.parametrize("kind", ["for the last", "within the last"])
-def test_a_window_holds_more_than_one_report(window: str, kind: str, expected: list[str]) -> None:
+def test_window_shorter_than_the_report_interval_is_refused(window: str, kind: str, expected: list[str]) -> None:
     probe = skill("probe()", assume=f"wind.speed < 9 m/s {kind} {window}")
     assert codes(probe, policy()) == expected
 
@@ -287,7 +289,7 @@ def test_a_window_holds_more_than_one_report(window: str, kind: str, expected: l
         ("phase == departure", ["E1203"]),
     ],
 )
-def test_what_is_maintained_can_change(clause: str, expected: list[str]) -> None:
+def test_maintain_clause_that_cannot_change_is_reported(clause: str, expected: list[str]) -> None:
     parts = {"motion": "climb to up", "maintain": clause}
     assert codes(skill("probe(up: altitude in 5 m .. 50 m)", **parts), policy()) == expected
 
@@ -314,5 +316,5 @@ def test_what_is_maintained_can_change(clause: str, expected: list[str]) -> None
         ("reflex", "buffered, written", ["E1205"]),
     ],
 )
-def test_what_is_recorded_suffices_to_derive_a_decision_again(timing: str, record: str, expected: list[str]) -> None:
+def test_record_must_suffice_to_derive_a_decision_again(timing: str, record: str, expected: list[str]) -> None:
     assert codes(skill("probe()", **{"class": timing, "deadline": "200 ms", "record": record})) == expected

@@ -1,4 +1,4 @@
-"""What compiles can fly: in good conditions each step is allowed where its predecessor ended."""
+"""Compiled missions can fly: in good conditions, each step is allowed where the step before it ends."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -36,8 +36,9 @@ def flat(name: str) -> tuple[Policy, Mission]:
 
 
 def flown(policy: Policy, mission: Mission, conditions: dict[str, int], *, drained: bool = False) -> list[Decision]:
-    """The decision on each step, the vehicle being where the step before it was planned to end; `drained`: with what
-    is left of the charge when each took all that it may.
+    """Return the decision on each step with the vehicle at the planned end of the step before it.
+
+    With `drained`, each earlier step has used its whole energy.
     """
     prepared = prepare(policy)
     assert isinstance(prepared, PreparedPolicy), prepared
@@ -72,21 +73,21 @@ def flown(policy: Policy, mission: Mission, conditions: dict[str, int], *, drain
 
 
 @pytest.mark.parametrize("name", MISSIONS)
-def test_in_good_conditions_every_step_is_allowed(name: str) -> None:
+def test_every_step_is_allowed_in_good_conditions(name: str) -> None:
     policy, mission = flat(name)
     decisions = flown(policy, mission, GOOD)
     assert [(each.outcome, each.reason) for each in decisions if each.outcome is not Outcome.ALLOW] == []
 
 
 @pytest.mark.parametrize("name", MISSIONS)
-def test_with_the_least_charge_that_the_proofs_count_with_every_step_is_allowed(name: str) -> None:
+def test_every_step_is_allowed_with_the_least_proved_charge(name: str) -> None:
     policy, mission = flat(name)
     decisions = flown(policy, mission, {**GOOD, "battery": FULL}, drained=True)
     assert {each.outcome for each in decisions} == {Outcome.ALLOW}
 
 
 @pytest.mark.parametrize("name", MISSIONS)
-def test_a_low_battery_ends_every_step_in_a_link_that_the_proofs_know(name: str) -> None:
+def test_low_battery_ends_every_step_in_a_proved_link(name: str) -> None:
     policy, mission = flat(name)
     for decision in flown(policy, mission, {**GOOD, "battery": 2_000}):
         assert decision.outcome in (Outcome.FALLBACK, Outcome.ALLOW)
@@ -96,7 +97,7 @@ def test_a_low_battery_ends_every_step_in_a_link_that_the_proofs_know(name: str)
 
 
 @pytest.mark.parametrize("name", MISSIONS)
-def test_from_anywhere_on_its_way_the_vehicle_may_come_home(name: str) -> None:
+def test_return_is_allowed_from_everywhere_on_the_path(name: str) -> None:
     policy, mission = flat(name)
     prepared = prepare(policy)
     assert isinstance(prepared, PreparedPolicy), prepared

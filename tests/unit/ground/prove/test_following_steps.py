@@ -1,4 +1,4 @@
-"""E0619 to E0621: the vehicle is followed from step to step, by where each leaves it and by what charge is left."""
+"""Proofs that follow the vehicle from step to step, by its place and by its charge (E0619 to E0621)."""
 
 import pytest
 
@@ -21,7 +21,7 @@ def codes(*steps: str, skills: str = "") -> list[str]:
         ((UP, HOME), []),
         ((UP, GOTO, HOME), []),
         ((UP, "emergency_land()"), []),
-        ((HOME,), []),  # on the ground, coming home is nothing
+        ((HOME,), []),  # a return on the ground does nothing
         ((GOTO, HOME), ["E0619"]),
         (("hover()", UP, HOME), ["E0619"]),
         ((UP, HOME, GOTO, HOME), ["E0619"]),
@@ -34,7 +34,7 @@ def codes(*steps: str, skills: str = "") -> list[str]:
         ((UP, HOME + SKIP, UP, HOME), ["E0619"]),
     ],
 )
-def test_steps_follow_each_other(steps: tuple[str, ...], expected: list[str]) -> None:
+def test_step_must_be_able_to_begin_where_the_previous_one_ends(steps: tuple[str, ...], expected: list[str]) -> None:
     assert codes(*steps) == expected
 
 
@@ -45,13 +45,13 @@ def test_steps_follow_each_other(steps: tuple[str, ...], expected: list[str]) ->
         ("height > 20 m", ["E0619"]),
         ("position inside meadow", []),
         ("position inside school", ["E0619"]),
-        ("position inside school or battery > 50 %", []),  # who knows
+        ("position inside school or battery > 50 %", []),  # the battery may be above 50 %
         ("landed == in_air", []),
         ("landed in {on_ground, landing}", ["E0619"]),
     ],
 )
 @rows("kind", ["require", "assume"])
-def test_clauses_over_what_motions_determine_must_be_able_to_hold(clause: str, expected: list[str], kind: str) -> None:
+def test_clause_must_be_able_to_hold_at_the_start_of_the_step(clause: str, expected: list[str], kind: str) -> None:
     assert codes(UP, "probe()", HOME, skills=skill("probe()", **{kind: clause})) == expected
 
 
@@ -64,31 +64,31 @@ def test_clauses_over_what_motions_determine_must_be_able_to_hold(clause: str, e
         ("height < 15 m", ""),  # it fails wherever the vehicle is
     ],
 )
-def test_a_clause_that_cannot_hold_all_along_says_near_where(clause: str, where: str) -> None:
+def test_message_names_the_place_where_a_clause_fails(clause: str, where: str) -> None:
     top = "top: altitude in 5 m .. 30 m"
     over = skill(f"over(aim: position, {top})", motion="fly to aim at top", maintain=clause, lasts="at most 3 min")
     [(code, message), *_] = found(program(over, policy(), mission(UP, "over(47.39729 N, 8.54771 E, 20 m)", HOME)))
     assert code == "E0616"
-    assert message.partition("along this step")[2] == where
+    assert message.partition("during the whole step")[2] == where
 
 
-def test_the_message_tells_what_may_be_skipped() -> None:
+def test_message_names_a_step_that_may_be_skipped() -> None:
     higher = f"goto(47.39799 N, 8.54559 E, 30 m){SKIP}"
     probe = skill("probe()", require="height > 25 m")
     [(code, message)] = found(program(policy(), probe, mission(UP, higher, "probe()", HOME)))
     assert code == "E0619"
-    assert message == "it needs `height > 25 m`, and when this step begins the vehicle may be 20 m up, at home"
+    assert message == "it needs `height > 25 m`, but when this step begins the vehicle may be 20 m up, at home"
 
 
-def test_skipping_is_a_choice_as_long_as_the_step_is_possible_somewhere() -> None:
+def test_skippable_step_must_be_possible_at_one_place() -> None:
     higher = f"goto(47.39799 N, 8.54559 E, 30 m){SKIP}"
     probe = skill("probe()", require="height > 25 m")
     assert codes(UP, higher, "probe()" + SKIP, HOME, skills=probe) == []
     assert codes(UP, "probe()" + SKIP, HOME, skills=probe) == ["E0619"]
-    assert codes(UP + SKIP, GOTO + SKIP, HOME) == ["E0619"]  # nothing on board refuses to fly from the ground
+    assert codes(UP + SKIP, GOTO + SKIP, HOME) == ["E0619"]  # on board nothing refuses this flight from the ground
 
 
-def test_a_way_that_leads_out_from_one_of_several_places_is_what_skip_is_for() -> None:
+def test_skippable_step_may_leave_the_airspace_from_one_of_several_places() -> None:
     around = [f"goto({place}, altitude = 20 m){SKIP}" for place in ("47.39840 N, 8.54820 E", "47.39860 N, 8.54970 E")]
     rules = policy("airspace inside city outside school", contingency="emergency_land")
     east = skill(
@@ -104,7 +104,7 @@ def test_a_way_that_leads_out_from_one_of_several_places_is_what_skip_is_for() -
     assert [code for code, _ in found(program(east, rules, mission(UP, *around, beyond, last)))] == ["E0508"]
 
 
-def test_the_way_from_where_a_skipped_step_would_have_begun_is_looked_at_too() -> None:
+def test_path_from_the_start_of_a_skipped_step_is_proved() -> None:
     around = [f"goto({place}, altitude = 20 m)" for place in ("47.39840 N, 8.54820 E", "47.39860 N, 8.54970 E")]
     city = policy("airspace inside city outside school")
     south = "goto(47.39700 N, 8.54980 E, altitude = 20 m)"
@@ -114,7 +114,7 @@ def test_the_way_from_where_a_skipped_step_would_have_begun_is_looked_at_too() -
 
 
 @pytest.mark.parametrize(("energy", "times", "expected"), [(10, 5, []), (10, 9, ["E0620"]), (1, 40, [])])
-def test_charge_is_counted_down_step_by_step(energy: int, times: int, expected: list[str]) -> None:
+def test_charge_is_consumed_step_by_step(energy: int, times: int, expected: list[str]) -> None:
     skills = skill("probe()", energy=f"at most {energy} %", lasts="at most 1 s", deadline="1 s", grace="100 ms")
     assert codes(UP, *["probe()"] * times, HOME, skills=skills) == expected
 
@@ -126,17 +126,17 @@ def test_charge_is_counted_down_step_by_step(energy: int, times: int, expected: 
         ("degrade any when battery < 27 % to return_home", ["E0620"]),
         ("degrade any when battery < 27 % and wind.speed > 5 m/s to return_home", []),  # the wind may be calm
         ("forbid hover by any when battery < 27 %", ["E0620"]),
-        ("forbid hover by any when battery > 99 %", []),  # that is no want of charge
+        ("forbid hover by any when battery > 99 %", []),  # not for lack of charge
     ],
 )
-def test_rules_about_the_battery_count(rule: str, expected: list[str]) -> None:
+def test_rules_about_the_battery_are_evaluated_with_the_remaining_charge(rule: str, expected: list[str]) -> None:
     text = program(
         policy(rule), skill("probe()", energy="at most 70 %"), mission(UP, "probe()", "hover(1 s)", HOME)
     )  # fmt: skip
     assert [code for code, _ in found(text) if code == "E0620"] == expected
 
 
-def test_a_permit_that_the_charge_takes_away() -> None:
+def test_step_without_a_permit_at_the_remaining_charge_is_refused() -> None:
     rules = """policy rules version 1 {
   permit any by any through agent, operator, onboard, reflex when battery > 50 %
   permit return_home, emergency_land by any
@@ -145,24 +145,24 @@ def test_a_permit_that_the_charge_takes_away() -> None:
 """
     text = program(rules, skill("probe()", energy="at most 50 %"), mission(UP, "probe()", "hover(1 s)", HOME))
     assert [each for each in found(text) if each[0] == "E0620"] == [
-        ("E0620", "46 % of the charge may be left when this step begins, and no rule then permits it")
+        ("E0620", "only 46 % of the charge may be left when this step begins, and no rule then permits it")
     ]
 
 
-def test_a_step_that_may_be_skipped_is_not_gained_and_not_refused() -> None:
+def test_skippable_step_counts_as_flown_but_is_not_refused() -> None:
     skills = skill("probe()", energy="at most 50 %") + skill("late()", require="battery > 50 %")
     assert codes(UP, "probe()" + SKIP, "late()", HOME, skills=skills) == ["E0620"]
     assert codes(UP, "probe()", "late()" + SKIP, HOME, skills=skills) == []
     assert codes(UP, "probe()", "late() on inadmissible hold", HOME, skills=skills) == ["E0620"]
 
 
-def test_a_step_that_may_be_skipped_counts_for_what_a_full_charge_must_be_enough_for() -> None:
-    """The step alone finds what it needs; with it and the chain after it, the mission may take more than there is."""
+def test_skippable_step_counts_for_the_energy_of_the_mission() -> None:
+    """The step alone has enough charge, but with the chain after it the mission may need more than a full charge."""
     skills = skill("probe()", energy="at most 70 %")
     assert codes(UP, "probe()", GOTO + SKIP, HOME, skills=skills) == ["E0812"]
 
 
-def test_more_places_than_are_followed_are_left_undecided() -> None:
+def test_too_many_start_places_are_reported_as_undecided() -> None:
     gotos = [f"goto(47.397{number} N, 8.54559 E, altitude = 20 m){SKIP}" for number in range(60, 80)]
     assert codes(UP, *gotos[:10], HOME) == []
     assert "E1103" in codes(UP, *gotos, HOME)

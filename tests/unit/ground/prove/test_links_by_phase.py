@@ -1,4 +1,4 @@
-"""E0705: a link is permitted in every phase in which a step may need it, and need not be in others."""
+"""E0705: a link must be permitted in every phase in which a step may need it, and only there."""
 
 import pytest
 
@@ -12,7 +12,7 @@ BASE = """
 
 
 def refused(*rules: str, valid: str = "for 40 min", base: str = BASE) -> list[str]:
-    """What is said of links, where `search` falls back to `listen`."""
+    """Return the findings about links for a policy in which `search` falls back to `listen`."""
     listen = skill("listen()")
     search = skill("search(at: altitude in 5 m .. 50 m)", fallback="listen, return_home, emergency_land", valid=valid)
     lines = "\n".join(f"  {rule}" for rule in rules)
@@ -41,7 +41,7 @@ ALWAYS = "the link `listen` is not always permitted to `rescuer` through `operat
         ("phase == search", "phase == departure or phase == search", []),
     ],
 )
-def test_a_link_is_permitted_in_the_phases_of_its_step(search: str, listen: str, expected: list[str]) -> None:
+def test_link_must_be_permitted_in_the_phases_of_its_step(search: str, listen: str, expected: list[str]) -> None:
     assert refused(SEARCH.format(search), LISTEN.format(listen)) == expected
 
 
@@ -53,17 +53,17 @@ def test_a_link_is_permitted_in_the_phases_of_its_step(search: str, listen: str,
         ("for 40 min during departure", [ALWAYS]),
     ],
 )
-def test_a_step_flies_in_the_phases_for_which_its_skill_is_valid(valid: str, expected: list[str]) -> None:
+def test_only_phases_for_which_the_skill_is_valid_count(valid: str, expected: list[str]) -> None:
     assert refused("permit search by role rescuer", LISTEN.format("phase == search"), valid=valid) == expected
 
 
-def test_a_forbid_counts_in_its_phase_alone() -> None:
+def test_forbid_counts_only_in_its_phase() -> None:
     both = "permit search, listen by role rescuer when phase == search"
     assert refused(both, "forbid listen by any when phase == departure") == []
     assert refused(both, "forbid listen by any when phase == search") == [ALWAYS]
 
 
-def test_the_target_of_a_degrade_rule_is_permitted_where_the_rule_applies() -> None:
+def test_degrade_target_must_be_permitted_where_the_rule_applies() -> None:
     both = "permit search, listen by role rescuer when phase == search"
     land = "permit takeoff by role rescuer"
     degrade = "degrade takeoff when battery < 30 % and phase == {} to listen"
@@ -71,6 +71,6 @@ def test_the_target_of_a_degrade_rule_is_permitted_where_the_rule_applies() -> N
     assert refused(both, land, degrade.format("departure")) == [f"{ALWAYS}"]
 
 
-def test_the_contingency_flies_in_any_phase() -> None:
+def test_contingency_must_be_permitted_in_every_phase() -> None:
     base = "permit return_home, emergency_land by any when phase != search\ncontingency return_home, emergency_land\n"
     assert [message.endswith("in `search`") for message in refused(base=base)] == [True, True]

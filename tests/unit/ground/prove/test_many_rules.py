@@ -1,4 +1,4 @@
-"""Holding the rules of a policy against each other takes steps in proportion to the rules, and has a limit."""
+"""The effort of comparing the rules of a policy is linear in their number, and limited."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -22,7 +22,7 @@ Check = Callable[[str], tuple[int, tuple[Diagnostic, ...]]]
 
 @pytest.fixture
 def effort(monkeypatch: pytest.MonkeyPatch) -> Check:
-    """What the rules of a source took, and what was found."""
+    """Return the effort for the rules of a source, and the findings."""
     made: list[Ruleset] = []
 
     class Kept(Ruleset):
@@ -42,13 +42,13 @@ def effort(monkeypatch: pytest.MonkeyPatch) -> Check:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
-def test_effort_grows_with_the_rules_not_with_their_pairs(effort: Check, kind: str) -> None:
+def test_effort_is_linear_in_the_number_of_rules(effort: Check, kind: str) -> None:
     few, _ = effort(policy(kind, FEW))
     many, _ = effort(policy(kind, FEW * TIMES))
     assert many <= max(few, FEW // 4) * TIMES * GROWTH
 
 
-def test_so_many_that_the_effort_is_limited_are_told(effort: Check, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_exceeded_effort_limit_is_reported(effort: Check, monkeypatch: pytest.MonkeyPatch) -> None:
     text = policy("nested", FEW)
     took, whole = effort(text)
     assert "E1103" not in [each.code.id for each in whole]
@@ -56,6 +56,7 @@ def test_so_many_that_the_effort_is_limited_are_told(effort: Check, monkeypatch:
     monkeypatch.setattr(rule_checks, "MOST_EFFORT", took // 2)
     _, found = effort(text)
     assert [each.message for each in found if each.code.id == "E1103"] == [
-        f"the rules of `many` were not all compared with each other: after {took // 2} steps that is given up"
+        "the rules of `many` were not all compared with each other: the analysis stopped at its limit of "
+        f"{took // 2} steps"
     ]
     assert len(found) < len(whole)

@@ -1,4 +1,4 @@
-"""The compiler's proofs against an oracle by dense sampling: no false "no errors", no false refusal (ADR 55)."""
+"""The compiler's proofs compared with an oracle by dense sampling: no missed error, no false error (ADR 55)."""
 
 import ast
 from collections.abc import Iterable
@@ -20,8 +20,9 @@ from rtshcua.model.flat.contract import MotionKind
 
 
 def refused_on_board(program: Drawn) -> list[str] | None:
-    """From where, of a program without an error, the boundary would refuse the return that was proved; zones that exist
-    at times set aside. None where there is an error.
+    """Return the places from which the boundary would refuse the proved return of a program; None if it has errors.
+
+    Zones that exist only at times are ignored.
     """
 
     def read(path: str) -> bytes:
@@ -54,7 +55,7 @@ def refused_on_board(program: Drawn) -> list[str] | None:
 
 
 @pytest.mark.slow
-def test_a_return_that_is_proved_is_let_through_on_board_from_all_along_the_way() -> None:
+def test_proved_return_is_allowed_on_board_from_the_whole_path() -> None:
     found = {seed: refused_on_board(draw(seed)) for seed in range(40)}
     accepted = {seed: wrong for seed, wrong in found.items() if wrong is not None}
     assert len(accepted) > 5
@@ -62,7 +63,7 @@ def test_a_return_that_is_proved_is_let_through_on_board_from_all_along_the_way(
 
 
 def errors(program: Drawn) -> list[str]:
-    """The errors that compiling it for its time of issue finds, or checking it without one."""
+    """Return the errors found by compiling a program for its time of issue, or by checking it without one."""
 
     def read(path: str) -> bytes:
         return program.text.encode() if path == "probe.rts" else Path(path).read_bytes()
@@ -77,7 +78,7 @@ def errors(program: Drawn) -> list[str]:
 
 
 def compared(seeds: Iterable[int]) -> tuple[list[bool | None], list[str]]:
-    """How the oracle judges the programs of these seeds, and what is wrong about them."""
+    """Return the verdicts of the oracle on the programs of seeds, and the disagreements."""
     judgements, wrong = [], []
     for seed in seeds:
         program = draw(seed)
@@ -89,7 +90,7 @@ def compared(seeds: Iterable[int]) -> tuple[list[bool | None], list[str]]:
 
 
 @pytest.mark.slow
-def test_some_programs_are_judged_as_dense_sampling_judges_them() -> None:
+def test_proofs_agree_with_dense_sampling_on_some_programs() -> None:
     judgements, wrong = compared(range(25))
     assert judgements.count(True) > 5
     assert judgements.count(False) > 5
@@ -98,11 +99,11 @@ def test_some_programs_are_judged_as_dense_sampling_judges_them() -> None:
 
 @pytest.mark.soak
 @pytest.mark.parametrize("hundred", range(50))
-def test_5000_programs_are_judged_as_dense_sampling_judges_them(hundred: int) -> None:
+def test_proofs_agree_with_dense_sampling_on_5000_programs(hundred: int) -> None:
     assert compared(range(100 * hundred, 100 * hundred + 100))[1] == []
 
 
-def test_the_oracle_shares_nothing_with_the_proofs() -> None:
+def test_oracle_shares_no_code_with_the_proofs() -> None:
     tree = ast.parse(Path(flown_densely.__file__).read_text())
     imported = [each for each in ast.walk(tree) if isinstance(each, ast.Import | ast.ImportFrom)]
     names = {each.module if isinstance(each, ast.ImportFrom) else each.names[0].name for each in imported}

@@ -1,4 +1,4 @@
-"""E0804, E0814: what each step is proved to take, by which speeds, against which wind, and what follows it."""
+"""Proved bounds of steps and links, by declared speeds and wind (E0804, E0814, E0815)."""
 
 from pathlib import Path
 
@@ -23,7 +23,7 @@ EAST = "aim: position, top: altitude in 5 m .. 50 m"
 
 
 def compiled(*parts: str) -> Compiled:
-    """A program, compiled."""
+    """Compile a program."""
 
     def read(path: str) -> bytes:
         return program(*parts).encode() if path == "probe.rts" else Path(path).read_bytes()
@@ -32,14 +32,14 @@ def compiled(*parts: str) -> Compiled:
 
 
 def bounds(*parts: str) -> tuple[StepBound, ...]:
-    """What the steps of a program are proved to take."""
+    """Return the proved bounds of the steps of a program."""
     made = compiled(*parts)
     assert made.bounds is not None, made.diagnostics
     return made.bounds.steps
 
 
 def seconds(clauses: dict[str, str], *rules: str, speed: str = "12 m/s") -> int:
-    """How long 200 m take at most, in seconds rounded down, beyond the commands."""
+    """Return the bound for a flight of 200 m in whole seconds, without the time for commands."""
     fast = skill(
         f"fast({EAST}, pace: speed in 1 m/s .. 12 m/s)", motion="fly to aim at top speed pace", **LONG, **clauses
     )
@@ -52,21 +52,23 @@ def seconds(clauses: dict[str, str], *rules: str, speed: str = "12 m/s") -> int:
     [
         ({}, [], 33),  # at 8 m/s, for it flies 16 m/s against 8 m/s of wind, and 8 s to come to speed and to stop
         ({"assume": "wind.speed < 4 m/s"}, [], 28),  # at 12 m/s
-        ({"assume": "wind.speed < 13 m/s"}, [], 33),  # more than it is flown in
+        ({"assume": "wind.speed < 13 m/s"}, [], 33),  # above the limit of the vehicle
         ({}, ["degrade fast when wind.speed > 4 m/s to return_home"], 28),
         ({}, ["degrade hover when wind.speed > 4 m/s to return_home"], 33),
     ],
 )
-def test_wind_counts_as_far_as_the_step_goes_on_in_it(clauses: dict[str, str], rules: list[str], expected: int) -> None:
+def test_wind_counts_up_to_the_limit_at_which_the_step_continues(
+    clauses: dict[str, str], rules: list[str], expected: int
+) -> None:
     assert seconds(clauses, *rules) == expected
 
 
-def test_a_step_is_no_faster_than_it_asks_for() -> None:
+def test_step_flies_at_most_at_its_own_speed() -> None:
     assert seconds({}, speed="2 m/s") == 102
 
 
-def test_a_return_counts_the_slowest_speed_that_was_asked_for() -> None:
-    """A PX4 goes on with it."""
+def test_return_may_keep_the_slowest_speed_of_the_steps_before() -> None:
+    """PX4 keeps a speed that was set."""
     goto = "goto(47.39819 N, 8.54559 E, 20 m, speed = {} m/s)"
     quick = bounds(policy(), mission(UP, goto.format(5), HOME))[-1]
     slow = bounds(policy(), mission(UP, goto.format(2), HOME))[-1]
@@ -82,16 +84,16 @@ def test_a_return_counts_the_slowest_speed_that_was_asked_for() -> None:
         ("goto(47.39799 N, 8.54559 E, altitude = 60 m)", []),
         (
             "goto(47.39999 N, 8.54559 E, altitude = 20 m, speed = 2 m/s)",
-            ["`goto`, a link of this step's chains, takes up to 233 s, and `goto` lasts at most 2 min"],
+            ["`goto`, a link of this step's chains, takes up to 233 s, but `goto` lasts at most 2 min"],
         ),
         ("rise(45 m)", []),
         (
             "rise(50 m)",
-            ["`rise`, a link of this step's chains, takes up to 27 s, and `rise` lasts at most 24 s"],
+            ["`rise`, a link of this step's chains, takes up to 27 s, but `rise` lasts at most 24 s"],
         ),
     ],
 )
-def test_a_link_is_proved_from_the_farthest_place_of_the_step(link: str, expected: list[str]) -> None:
+def test_link_is_proved_from_the_farthest_place_of_the_step(link: str, expected: list[str]) -> None:
     rise = skill("rise(to: altitude in 5 m .. 60 m)", motion="climb to to", lasts="at most 24 s")
     away = skill(f"away({EAST})", motion="fly to aim at top", fallback=f"{link}, return_home, emergency_land", **LONG)
     text = program(rise, away, policy(), mission(UP, f"away({NORTH}, 20 m)", HOME))
@@ -99,8 +101,8 @@ def test_a_link_is_proved_from_the_farthest_place_of_the_step(link: str, expecte
 
 
 @rows(("speed", "expected"), [(3, []), (1, ["E0804"])])
-def test_a_return_counts_the_speed_of_the_link_before_it(speed: int, expected: list[str]) -> None:
-    """220 m, and 50 m that home may be away: at 1 m/s it takes longer than a return may."""
+def test_return_may_keep_the_speed_of_the_link_before(speed: int, expected: list[str]) -> None:
+    """220 m plus 50 m position error of home: at 1 m/s this exceeds the duration of the return."""
     chain = f"near(47.39974 N, 8.54559 E, 20 m, {speed} m/s), return_home, emergency_land"
     near = skill(
         "near(aim: position, top: altitude in 5 m .. 50 m, pace: speed in 1 m/s .. 8 m/s)",
@@ -114,9 +116,9 @@ def test_a_return_counts_the_speed_of_the_link_before_it(speed: int, expected: l
     assert all(message.startswith("`return_home`, a link of this step's chains") for _, message in late)
 
 
-@pytest.mark.parametrize(("energy", "told"), [(2, True), (11, False)])
-def test_a_return_in_a_chain_that_takes_more_than_its_skill_says_is_told_once(energy: int, told: bool) -> None:
-    """It is never refused for want of charge, and the mission flies all the same."""
+@pytest.mark.parametrize(("energy", "reported"), [(2, True), (11, False)])
+def test_return_above_its_energy_is_reported_once(energy: int, reported: bool) -> None:
+    """A return is never refused for lack of charge, so this is only a warning."""
     back = skill(
         "back()", motion="home", fallback="emergency_land", lasts="at most 5 min", energy=f"at most {energy} %"
     )
@@ -125,15 +127,15 @@ def test_a_return_in_a_chain_that_takes_more_than_its_skill_says_is_told_once(en
     made = compiled(back, away, policy("permit back by any"), steps)
     assert made.bounds is not None
     warned = [each.message for each in made.diagnostics if each.code is codes.RETURN_ENERGY]
-    assert len(warned) == told
-    assert all(each.startswith("the return, a link of this step's chains, takes up to 10.6 %") for each in warned), (
+    assert len(warned) == reported
+    assert all(each.startswith("the return, a link of this step's chains, needs up to 10.6 %") for each in warned), (
         warned
     )
 
 
 @pytest.mark.parametrize("top", ["6 m", "45 m"])
-def test_the_nearest_height_that_is_in_time_is_named(top: str) -> None:
-    """100 m north of home, and down or up at 1 m/s or 1.5 m/s from 20 m."""
+def test_fix_names_the_nearest_height_that_is_reached_in_time(top: str) -> None:
+    """100 m north of home, from 20 m down at 1 m/s or up at 1.5 m/s."""
     near = skill(f"near({EAST})", motion="fly to aim at top", lasts="at most 37 s", energy="at most 9 %")
     text = program(near, policy(), mission(UP, f"near(47.39864 N, 8.54559 E, {top})", HOME))
     [late] = [each for each in findings(text) if each.code.id == "E0804"]
@@ -147,7 +149,7 @@ def test_the_nearest_height_that_is_in_time_is_named(top: str) -> None:
 
 
 def prepared_steps(*parts: str) -> tuple[PreparedInvocation, ...]:
-    """The steps of a program, as on board."""
+    """Return the steps of a program, prepared as on board."""
     made = compiled(*parts)
     assert made.policy is not None
     assert made.mission is not None, made.diagnostics
@@ -158,8 +160,8 @@ def prepared_steps(*parts: str) -> tuple[PreparedInvocation, ...]:
     return steps
 
 
-def test_on_board_the_way_home_counts_the_slowest_speed_that_was_asked_for() -> None:
-    """As the proofs count it, or the boundary would admit what they refuse."""
+def test_way_home_on_board_uses_the_slowest_speed_set_before() -> None:
+    """The proofs use the same speed, or the boundary would admit steps that they refuse."""
     goto = "goto(47.398{}9 N, 8.54559 E, 20 m, speed = {} m/s)"
     legs = [goto.format(1, 4), goto.format(2, 2), goto.format(1, 5), "hover()"]
     steps = prepared_steps(policy(), mission(UP, *legs, HOME))
@@ -171,8 +173,8 @@ def test_on_board_the_way_home_counts_the_slowest_speed_that_was_asked_for() -> 
     assert two == five == hover == slow > four
 
 
-def test_the_charge_of_a_mission_is_proved_as_on_board() -> None:
-    """E0620: with what the steps before may have taken, a step that comes after a slow one finds too little."""
+def test_charge_proof_agrees_with_the_decision_on_board() -> None:
+    """E0620: after a slow step, the next step may lack charge."""
     far = "goto(47.40100 N, 8.54559 E, 20 m, speed = {} m/s)"
     near = "goto(47.39864 N, 8.54559 E, 20 m, speed = {} m/s)"
     long = skill(

@@ -1,4 +1,4 @@
-"""Local times by the name of a time zone: held against a clock on the wall, minute by minute, and what proofs say."""
+"""Local times of named time zones, compared minute by minute with `zoneinfo`, and the proofs about them."""
 
 import re
 from datetime import UTC, datetime, timedelta
@@ -29,7 +29,7 @@ ZONES = ("Europe/Berlin", "America/New_York", "Australia/Lord_Howe", "Asia/Kolka
 
 @cache
 def on_the_wall(name: str) -> ZoneInfo:
-    """The zone as Python has it, from the same package."""
+    """Return the zone of Python, from the same package."""
     with Path(tzdata.__file__).with_name("zoneinfo").joinpath(*name.split("/")).open("rb") as data:
         return ZoneInfo.from_file(data)
 
@@ -44,7 +44,7 @@ def utc(text: str) -> int:
 
 @cache
 def nights(name: str) -> tuple[datetime, ...]:
-    """The days of 2026 in which the clocks are set, found day by day; of a zone without, one as good as any."""
+    """Return the days of 2026 with a clock change, found day by day; one other day if there is none."""
     zone = on_the_wall(name)
     days = [datetime(2026, 1, 1, tzinfo=UTC) + timedelta(days=number) for number in range(365)]
     return tuple(
@@ -61,7 +61,7 @@ def nights(name: str) -> tuple[datetime, ...]:
     st.sampled_from(ZONES), st.integers(0, 1), st.integers(0, 1439), st.integers(0, 1439),
     st.one_of(st.just(frozenset[int]()), st.frozensets(st.integers(0, 6), min_size=1)),
 )  # fmt: skip
-def test_a_window_holds_whenever_a_clock_on_the_wall_shows_a_time_in_it(
+def test_window_holds_exactly_while_the_local_time_is_in_it(
     name: str, number: int, start: int, end: int, days: frozenset[int]
 ) -> None:
     local = LocalTime(0, time_zones.offsets(name))
@@ -82,7 +82,7 @@ def test_a_window_holds_whenever_a_clock_on_the_wall_shows_a_time_in_it(
 
 
 @rows("name", ZONES)
-def test_offsets_are_those_of_the_package(name: str) -> None:
+def test_offsets_equal_those_of_the_tzdata_package(name: str) -> None:
     local = LocalTime(0, time_zones.offsets(name))
     for hour in range(0, 3 * 8766, 5):
         moment = datetime(2025, 6, 1, 0, 30, tzinfo=UTC) + timedelta(hours=hour)
@@ -91,8 +91,8 @@ def test_offsets_are_those_of_the_package(name: str) -> None:
         assert local.offset(us(moment)) == shown // timedelta(microseconds=1)
 
 
-def test_what_is_known_is_the_same_whenever_it_is_asked() -> None:
-    """Of a version of the data, and of nothing else: so compiling again gives the same bytes."""
+def test_offsets_do_not_depend_on_the_present_time() -> None:
+    """They depend only on the version of the data, so that compiling again produces the same bytes."""
     year = int(tzdata.IANA_VERSION[:4])
     assert time_zones.VERSION == tzdata.IANA_VERSION
     known = LocalTime(0, time_zones.offsets("Europe/Berlin")).known()
@@ -100,7 +100,7 @@ def test_what_is_known_is_the_same_whenever_it_is_asked() -> None:
     assert time_zones.offsets("Europe/Berlin")[:5:2] == (known[0], utc("2025-03-30T01:00"), utc("2025-10-26T01:00"))
 
 
-def test_the_machines_own_zones_are_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_time_zones_of_the_operating_system_are_not_read(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("zoneinfo.TZPATH", ("/nowhere",))
     time_zones.offsets.cache_clear()
     assert len(time_zones.offsets("Asia/Kolkata")) == 3
@@ -121,7 +121,7 @@ def test_the_machines_own_zones_are_not_read(monkeypatch: pytest.MonkeyPatch) ->
         (H, H, (0,), (H, H + 1)),
     ],
 )
-def test_windows_of_a_week(start: int, end: int, days: range, windows: tuple[int, ...]) -> None:
+def test_weekly_windows_hold_on_their_days(start: int, end: int, days: range, windows: tuple[int, ...]) -> None:
     assert weekly_windows(start, end, days) == windows
 
 
@@ -134,7 +134,7 @@ BERLIN = 'clock "Europe/Berlin"'
 
 
 def source(*parts: str, clock: str = BERLIN) -> str:
-    """The library's site, whose vehicle has another clock, and parts."""
+    """Return the library's site with another clock of its vehicle, followed by parts."""
     imports = IMPORTS.replace('import "lib:policies/site.rts"\n', "")
     site, count = re.subn(r"clock +utc \+02:00", clock, SITE)
     assert count == 1
@@ -142,7 +142,7 @@ def source(*parts: str, clock: str = BERLIN) -> str:
 
 
 def codes(text: str, issued: str | None = None) -> list[str]:
-    """What checking finds, or compiling for a time of issue."""
+    """Return the codes found by checking a source, or by compiling it for a time of issue."""
 
     def read(path: str) -> bytes:
         return text.encode() if path == "probe.rts" else Path(path).read_bytes()
@@ -157,13 +157,13 @@ def codes(text: str, issued: str | None = None) -> list[str]:
 
 @cache
 def latest() -> int:
-    """How many seconds after the issue the goto comes at the latest, as a finding says it."""
+    """Return the latest begin of the goto in seconds after the issue, as stated in a finding."""
     text = source(permitting("local time in 08:00 .. 08:02"), FLIGHT)
     loaded = load(
         ["probe.rts"], lambda path: text.encode() if path == "probe.rts" else Path(path).read_bytes(), LIBRARY
     )
     (found,) = check_program(loaded, dialect.load())
-    told = re.search(r"at once or up to (\d+) s after", found.message)
+    told = re.search(r"it begins up to (\d+) s after", found.message)
     assert told is not None
     return int(told[1])
 
@@ -199,10 +199,10 @@ def permitting(condition: str) -> str:
         ("local time in 02:00 .. 02:59", "2026-10-25T01:30", []),
         ("local time in 02:00 .. 02:59", "2026-03-29T00:59", ["E0718"]),
         ("local time in 02:00 .. 02:59", "2026-03-29T01:00", ["E0718"]),
-        ("local time in 08:00 .. 18:00", "2046-06-01T08:00", ["E0703"]),  # nobody knows the local time then
+        ("local time in 08:00 .. 18:00", "2046-06-01T08:00", ["E0703"]),  # the local time is unknown then
     ],
 )
-def test_when_a_step_may_come(condition: str, issued: str | None, expected: list[str]) -> None:
+def test_step_must_be_permitted_whenever_it_may_begin(condition: str, issued: str | None, expected: list[str]) -> None:
     assert codes(source(permitting(condition), FLIGHT), issued) == expected
 
 
@@ -230,7 +230,9 @@ def test_when_a_step_may_come(condition: str, issued: str | None, expected: list
         ),
     ],
 )  # fmt: skip
-def test_a_zone_on_days_of_the_week(active: str, airspace: str, issued: str | None, expected: list[str]) -> None:
+def test_zone_on_days_of_the_week_counts_at_its_times(
+    active: str, airspace: str, issued: str | None, expected: list[str]
+) -> None:
     works = f"zone works = circle({AT}, {30 if 'outside' in airspace else 300} m) {active}\n"
     assert codes(source(works, policy(f"airspace {airspace}"), FLIGHT), issued) == expected
 
@@ -246,18 +248,18 @@ def test_a_zone_on_days_of_the_week(active: str, airspace: str, issued: str | No
         ('clock "Europe/Berlin"', "on mondag .. friday", ["E0101"]),
     ],
 )
-def test_names(clock: str, days: str, expected: list[str]) -> None:
+def test_names_of_time_zones_and_days_are_checked(clock: str, days: str, expected: list[str]) -> None:
     text = source(permitting(f"local time in 08:00 .. 18:00 {days}"), FLIGHT, clock=clock)
     assert codes(text) == expected
 
 
-def test_only_the_local_time_is_on_days() -> None:
+def test_days_are_accepted_only_for_the_local_time() -> None:
     assert codes(source(permitting("battery in 10 % .. 20 % on monday"), FLIGHT)) == ["E0314"]
     for condition in ("battery on monday", "position on friday"):
         assert codes(source(permitting(condition), FLIGHT)) == ["E0101"], condition
 
 
-def test_rules_that_days_make_dead_or_not() -> None:
+def test_dead_rules_are_found_across_days_of_the_week() -> None:
     def of(first: str, second: str) -> list[str]:
         rules = (
             "policy rules version 1 {\n  permit goto, takeoff, hover, return_home, emergency_land by any\n"
@@ -273,7 +275,7 @@ def test_rules_that_days_make_dead_or_not() -> None:
     assert of("local time on monday and local time on tuesday", "local time < 09:00") != []
 
 
-def test_nothing_is_known_outside_of_what_the_data_are_for() -> None:
+def test_local_time_is_unknown_outside_the_years_of_the_data() -> None:
     window = daily(8 * H, 18 * H, LocalTime(0, time_zones.offsets("Asia/Kolkata")))
     assert window.truth(((utc("2046-06-01T08:00"),) * 2,), (0, 0)) == UNKNOWN
 
@@ -284,7 +286,7 @@ def test_nothing_is_known_outside_of_what_the_data_are_for() -> None:
     st.sampled_from(ZONES), st.integers(0, 1), st.integers(-90, 1530), st.integers(0, 299), st.integers(1, 200),
     st.sampled_from(["", " on saturday", " on sunday", " on saturday, sunday"]),
 )  # fmt: skip
-def test_a_time_of_issue_is_refused_where_the_clock_on_the_wall_leaves_the_window_before_the_step_comes(
+def test_issue_time_is_refused_if_the_window_closes_before_the_step(
     name: str, number: int, minute: int, start: int, length: int, days: str
 ) -> None:
     found = nights(name)
@@ -293,7 +295,7 @@ def test_a_time_of_issue_is_refused_where_the_clock_on_the_wall_leaves_the_windo
     condition = f"local time in {start // 60:02}:{start % 60:02} .. {end // 60:02}:{end % 60:02}{days}"
     text = source(permitting(condition), FLIGHT, clock=f'clock "{name}"')
     refused = codes(text, issued.strftime("%Y-%m-%dT%H:%M")) != []
-    # what is shown changes on whole minutes, and the last one of a window is part of it
+    # the local time changes at whole minutes, and a window includes its last minute
     looked = [
         issued + timedelta(seconds=second, microseconds=late)
         for second in range(0, latest() + 1, 15)

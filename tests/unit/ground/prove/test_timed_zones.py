@@ -1,4 +1,4 @@
-"""Zones that exist at times only: what a proof says of them, with and without a time of issue."""
+"""Proofs about zones that exist only at times, with and without a time of issue."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -29,7 +29,7 @@ def zone(at: str = TO, radius: int = 30, name: str = "works", active: str = "") 
 
 
 def codes(text: str, issued_at_us: int = 0) -> list[str]:
-    """What compiling for a time of issue finds, or checking without one."""
+    """Return the codes found by compiling for a time of issue, or by checking without one."""
 
     def read(path: str) -> bytes:
         return text.encode() if path == "probe.rts" else Path(path).read_bytes()
@@ -56,16 +56,16 @@ OLD_DATES = 'active "2020-01-01T00:00Z" .. "2021-01-01T00:00Z"'
         ("", 0, ["E0508"]),
         (ALL_DATES, EIGHT, ["E0508"]),
         (OLD_DATES, EIGHT, []),
-        (ALL_DATES, 0, []),  # the dates are left for the time of issue
+        (ALL_DATES, 0, []),  # dates are not considered without a time of issue
         ("active 08:00 .. 16:00", EIGHT, ["E0508"]),
-        ("active 08:06 .. 16:00", EIGHT, ["E0508"]),  # before the goto must have ended, not when it begins
+        ("active 08:06 .. 16:00", EIGHT, ["E0508"]),  # it begins before the goto must have ended
         ("active 17:00 .. 07:00", EIGHT, []),
         ("active 17:00 .. 07:59", EIGHT, []),
-        ("active 08:00 .. 16:00", 0, []),  # issued at another time it flies
-        ("active 08:05 .. 08:01", 0, ["E0718"]),  # no time of issue leaves it the minutes that it needs
+        ("active 08:00 .. 16:00", 0, []),  # another time of issue suits
+        ("active 08:05 .. 08:01", 0, ["E0718"]),  # the window is too short for any time of issue
     ],
 )
-def test_a_zone_to_stay_out_of_is_there_whenever_it_may_be(active: str, issued: int, expected: list[str]) -> None:
+def test_outside_zone_counts_whenever_it_may_exist(active: str, issued: int, expected: list[str]) -> None:
     assert codes(under("inside city outside works", zone(active=active)), issued) == expected
 
 
@@ -82,13 +82,13 @@ def test_a_zone_to_stay_out_of_is_there_whenever_it_may_be(active: str, issued: 
         ("active 09:00 .. 09:05", 0, ["E0718"]),
     ],
 )
-def test_a_zone_to_stay_inside_of_is_away_whenever_it_may_be(active: str, issued: int, expected: list[str]) -> None:
+def test_inside_zone_is_missing_whenever_it_may_not_exist(active: str, issued: int, expected: list[str]) -> None:
     assert codes(under("inside works", zone(radius=300, active=active)), issued) == expected
 
 
 @rows("active", [ALL_DATES, "active 08:00 .. 16:00", "active 08:12 .. 16:00"])
-def test_a_zone_counts_for_the_way_home(active: str) -> None:
-    # from the second place the straight way home leads through the zone, which the steps fly around
+def test_timed_zone_counts_for_the_way_home(active: str) -> None:
+    # the steps fly around the zone, but the straight way home from the second place crosses it
     around = mission(
         "takeoff(20 m)",
         "goto(47.39864 N, 8.54659 E, 20 m)",
@@ -111,25 +111,27 @@ def test_a_zone_counts_for_the_way_home(active: str) -> None:
         ("permit goto by any when target inside works", OLD_DATES, 0, []),
         ("permit goto by any when target inside works", "active 07:00 .. 16:00", EIGHT, []),
         ("permit goto by any when target inside works", "active 09:00 .. 16:00", EIGHT, ["E0718"]),
-        # an unrelated zone with dates says nothing of the hours of another
+        # dates of an unrelated zone do not affect the hours of another
         ("permit goto by any when target inside works and local time in 08:00 .. 08:02", ALL_DATES, 0, ["E0718"]),
     ],
 )
-def test_permits_read_the_times_of_zones(rule: str, active: str, issued: int, expected: list[str]) -> None:
+def test_permit_about_a_timed_zone_depends_on_the_time_of_issue(
+    rule: str, active: str, issued: int, expected: list[str]
+) -> None:
     permits = f"permit takeoff, hover, return_home, emergency_land by any\n  {rule}"
     rules = f"policy rules version 1 {{\n  {permits}\n  contingency return_home, emergency_land\n}}\n"
     assert codes(program(zone(active=active), rules, FLIGHT), issued) == expected
 
 
 def ranging(*steps: str) -> str:
-    """A mission with a height from 5 m to 40 m."""
+    """Return a mission with a height from 5 m to 40 m."""
     return mission(*steps).replace("mission flight", "mission flight(height: altitude in 5 m .. 40 m = 5 m)")
 
 
 @rows(
     ("airspace", "active", "expected"),
     [
-        # by night all heights are permitted, by day not those between: the airspace asks for one of the two
+        # at night all heights are permitted, by day not those between; the airspace requires one of the two
         ("inside works", "active 18:00 .. 08:00", []),
         ("inside works", "active 08:00 .. 18:00", ["E0718"]),
         ("inside city outside works", "active 08:00 .. 18:00", []),
@@ -137,7 +139,7 @@ def ranging(*steps: str) -> str:
         ("inside works", ALL_DATES, []),
     ],
 )
-def test_one_time_of_issue_suits_the_range_of_a_parameter_and_the_airspace(
+def test_parameter_range_and_airspace_need_a_common_time_of_issue(
     airspace: str, active: str, expected: list[str]
 ) -> None:
     rules = f"""policy rules version 1 {{
@@ -155,12 +157,12 @@ def test_one_time_of_issue_suits_the_range_of_a_parameter_and_the_airspace(
     ("active", "expected"),
     [
         (ALL_DATES, []),
-        (OLD_DATES, []),  # the dates are left for the time of issue
+        (OLD_DATES, []),  # dates are not considered without a time of issue
         ("active 07:00 .. 16:00", []),
         ("active 08:00 .. 08:02", ["E0718"]),
     ],
 )
-def test_the_times_of_a_zone_are_asked_for_the_values_between(active: str, expected: list[str]) -> None:
+def test_zone_times_apply_to_values_between_instances(active: str, expected: list[str]) -> None:
     rules = """policy rules version 1 {
   permit takeoff, hover, return_home, emergency_land by any
   permit goto by any when altitude < 15 m or altitude > 25 m or target inside works
@@ -173,8 +175,8 @@ def test_the_times_of_a_zone_are_asked_for_the_values_between(active: str, expec
 
 @rows("band", ["ceiling 25 m", "floor 30 m ceiling 60 m"])
 @rows("hours", ["19:00 .. 07:00", "09:00 .. 17:00"])
-def test_a_zone_on_the_way_of_one_value_counts_for_those_between(band: str, hours: str) -> None:
-    # the lowest or the greatest height is in the zone; those between need the night, or the day
+def test_zone_on_the_path_of_one_value_applies_to_values_between(band: str, hours: str) -> None:
+    # only the lowest or the greatest height is in the zone; the heights between need the night or the day
     rules = f"""policy rules version 1 {{
   permit takeoff, hover, return_home, emergency_land by any
   permit goto by any when altitude < 6 m or altitude > 39 m or local time in {hours}
@@ -203,7 +205,7 @@ skill probe(over: zone, up: altitude in 5 m .. 50 m) {
 
 @rows("active", ["", "active 08:00 .. 16:00", ALL_DATES])
 @rows("issued", [0, EIGHT])
-def test_an_unrelated_zone_silences_nothing(active: str, issued: int) -> None:
+def test_unrelated_zone_hides_no_finding(active: str, issued: int) -> None:
     flight = mission("probe(yard, 40 m)", "return_home()")
     yard, elsewhere = zone(radius=200, name="yard"), zone("47.3999 N, 8.5500 E", 20, "elsewhere", active)
     assert codes(program(yard, elsewhere, PROBE, policy(), flight), issued) == ["E0616"]
@@ -211,7 +213,7 @@ def test_an_unrelated_zone_silences_nothing(active: str, issued: int) -> None:
     assert codes(program(yard, elsewhere, PROBE, policy(), ground), issued) == ["E0616"]
 
 
-def test_what_is_maintained_reads_its_own_zone_at_its_times() -> None:
+def test_maintain_clause_uses_the_times_of_its_own_zone() -> None:
     flight = mission("probe(yard, 20 m)", "return_home()")
 
     def of(active: str, issued: int) -> list[str]:
@@ -223,8 +225,8 @@ def test_what_is_maintained_reads_its_own_zone_at_its_times() -> None:
     assert of(OLD_DATES, 0) == []
 
 
-def test_a_signal_beside_a_place_does_not_hide_the_place() -> None:
-    """What the state may bring about is taken to be so, and where the path leads is known."""
+def test_signal_in_a_condition_does_not_hide_a_known_place() -> None:
+    """The signal is assumed to favour the step, but the place of the path is known."""
     skill = PROBE.replace("position inside over and height <= 30 m", "position inside over or battery > 99 %")
     flight = mission("probe(yard, 20 m)", "return_home()")
     assert codes(program(zone(radius=20, name="yard"), skill, policy(), flight)) == []
@@ -251,9 +253,7 @@ ISSUED = st.sampled_from([0, EIGHT, MIDNIGHT])
 @pytest.mark.hypothesis
 @settings(deadline=None, max_examples=8)
 @given(FLIGHTS, PLACES, st.integers(10, 90), ACTIVE, ISSUED)
-def test_times_of_a_zone_to_stay_out_of_hide_nothing(
-    flight: str, at: str, radius: int, active: str, issued: int
-) -> None:
+def test_times_of_an_outside_zone_hide_no_finding(flight: str, at: str, radius: int, active: str, issued: int) -> None:
     without = codes(under("inside city outside school", flight=flight), issued)
     timed = codes(under("inside city outside school, works", zone(at, radius, active=active), flight=flight), issued)
     always = codes(under("inside city outside school, works", zone(at, radius), flight=flight), issued)
@@ -264,9 +264,7 @@ def test_times_of_a_zone_to_stay_out_of_hide_nothing(
 @pytest.mark.hypothesis
 @settings(deadline=None, max_examples=8)
 @given(FLIGHTS, PLACES, st.integers(60, 400), ACTIVE, ISSUED)
-def test_times_of_a_zone_to_stay_inside_of_hide_nothing(
-    flight: str, at: str, radius: int, active: str, issued: int
-) -> None:
+def test_times_of_an_inside_zone_hide_no_finding(flight: str, at: str, radius: int, active: str, issued: int) -> None:
     without = codes(under("inside city", flight=flight), issued)
     timed = codes(under("inside city, works", zone(at, radius, active=active), flight=flight), issued)
     always = codes(under("inside city, works", zone(at, radius), flight=flight), issued)

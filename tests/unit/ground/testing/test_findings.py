@@ -89,9 +89,9 @@ ASKED = [
     ("inspect_area(bridge_a, 3 s)", "E0310", "expected an altitude above home; `3 s` is a duration"),
     ("inspect_area(bridge_a, 3 m, zigzag)", "E0313", "`zigzag` is not a value of `pattern`"),
     ("inspect_area(bridge_a, 3 m) through ajent", "E0709", "unknown source of requests `ajent`"),
-    ("inspect_area(bridge_a, 3 m) by operater", "E0702", "no rule of `bridge_inspection` is about the role `operater`"),
-    ("spin()", "E0702", "no rule of `bridge_inspection` is about `spin`"),
-    ("inspect_area(own, 20 m)", "E0207", "the zone `own` is not one that the policy `bridge_inspection` imports"),
+    ("inspect_area(bridge_a, 3 m) by operater", "E0702", "no rule of `bridge_inspection` names the role `operater`"),
+    ("spin()", "E0702", "no rule of `bridge_inspection` names the skill `spin`"),
+    ("inspect_area(own, 20 m)", "E0207", "the policy `bridge_inspection` does not import the zone `own`"),
 ]
 
 SPIN = """skill spin() {

@@ -290,7 +290,7 @@ WRONG: Sequence[tuple[str, str, str, str | None]] = [
     (
         "when position inside elsewhere kill()",
         "E0207",
-        "the zone `elsewhere` is not one that the policy `bridge_inspection` imports",
+        "the policy `bridge_inspection` does not import the zone `elsewhere`",
         None,
     ),
     ("at 2 s kil()", "E1601", "unknown fault `kil`", "did you mean `kill`?"),
@@ -372,7 +372,7 @@ WRONG: Sequence[tuple[str, str, str, str | None]] = [
     (
         "expect lands in elsewhere",
         "E0207",
-        "the zone `elsewhere` is not one that the policy `bridge_inspection` imports",
+        "the policy `bridge_inspection` does not import the zone `elsewhere`",
         None,
     ),
 ]

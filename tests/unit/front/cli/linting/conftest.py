@@ -1,4 +1,4 @@
-"""`rtshcua lint` in a folder of its own."""
+"""Fixtures that run `rtshcua lint` in a temporary folder."""
 
 import json
 from pathlib import Path
@@ -19,7 +19,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def lint(capsys: pytest.CaptureFixture[str]) -> Lint:
-    """Runs `rtshcua lint --json` with words: how it ends, and the code and file of each finding."""
+    """Run `rtshcua lint --json` with arguments; return the exit code, and the code and file of each finding."""
 
     def run(*words: str) -> tuple[int, list[tuple[str, str]]]:
         code = main(["lint", *words, "--json"])

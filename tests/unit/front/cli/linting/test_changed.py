@@ -1,4 +1,4 @@
-"""`--changed`: what git says has changed, and what imports it."""
+"""`--changed`: lint the files that changed in git, and the files that import them."""
 
 import os
 import subprocess
@@ -26,7 +26,7 @@ def repository(here: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return here
 
 
-def test_what_changed_and_what_imports_it(repository: Path, lint: Lint) -> None:
+def test_changed_files_and_their_importers_are_linted(repository: Path, lint: Lint) -> None:
     assert lint(".", "--changed") == (ExitCode.OK, [])
     put({"two.rts": f"{MISSION}\n"})
     assert lint(".", "--changed") == (ExitCode.DIAGNOSTICS, HABITS[1:])
@@ -38,12 +38,12 @@ def test_what_changed_and_what_imports_it(repository: Path, lint: Lint) -> None:
     assert lint("one.rts", "--changed") == (ExitCode.DIAGNOSTICS, HABITS[:1])
 
 
-def test_an_import_that_was_deleted(repository: Path, lint: Lint) -> None:
+def test_deleted_import_counts_as_a_change(repository: Path, lint: Lint) -> None:
     Path("policy.rts").unlink()
     assert lint("one.rts", "--changed") == (ExitCode.DIAGNOSTICS, [("E0108", "one.rts")])
 
 
-def test_since_a_branch_was_left(repository: Path, lint: Lint) -> None:
+def test_changes_since_the_merge_base_are_linted(repository: Path, lint: Lint) -> None:
     git("checkout", "-b", "mine")
     put({"two.rts": f"{MISSION}\n"})
     git("commit", "-am", "mine")
@@ -59,12 +59,12 @@ def test_since_a_branch_was_left(repository: Path, lint: Lint) -> None:
     assert not Path("x").exists()
 
 
-def test_before_the_first_commit(here: Path, lint: Lint, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_changed_works_before_the_first_commit(here: Path, lint: Lint, monkeypatch: pytest.MonkeyPatch) -> None:
     git("init")
     assert lint(".", "--changed") == (ExitCode.DIAGNOSTICS, HABITS)
 
 
-def test_without_a_repository_or_git(here: Path, lint: Lint, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_changed_without_repository_or_git_is_refused(here: Path, lint: Lint, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("GIT_CEILING_DIRECTORIES", str(here.parent))
     code, found = lint(".", "--changed")
     assert (code, found[0][0]) == (ExitCode.INPUT, "changed")
@@ -74,7 +74,7 @@ def test_without_a_repository_or_git(here: Path, lint: Lint, monkeypatch: pytest
     assert (code, found) == (ExitCode.INPUT, [("changed", "`git`, which knows the changes, is not installed")])
 
 
-def test_through_links_and_from_elsewhere(
+def test_changed_works_through_links_and_from_other_folders(
     repository: Path, lint: Lint, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     put({"real/policy.rts": POLICY, "real/one.rts": MISSION})
@@ -95,7 +95,7 @@ def test_through_links_and_from_elsewhere(
         assert (code, [each for each, _ in found]) == (ExitCode.DIAGNOSTICS, ["E1302"])
 
 
-def test_of_another_repository_than_that_of_the_working_folder(
+def test_changed_uses_the_repository_of_the_files(
     repository: Path, lint: Lint, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     put({"one.rts": f"{MISSION}\n"})
@@ -103,11 +103,11 @@ def test_of_another_repository_than_that_of_the_working_folder(
     monkeypatch.chdir(other)
     git("init")
     assert [each for each, _ in lint(str(repository / "one.rts"), "--changed")[1]] == ["E1302"]
-    monkeypatch.setenv("GIT_DIR", str(other / ".git"))  # as a hook has it
+    monkeypatch.setenv("GIT_DIR", str(other / ".git"))  # as in a git hook
     assert [each for each, _ in lint(str(repository / "one.rts"), "--changed")[1]] == ["E1302"]
 
 
-def test_outside_of_any_repository(
+def test_file_outside_of_a_repository_is_refused(
     repository: Path, lint: Lint, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     outside = tmp_path_factory.mktemp("outside")
@@ -117,7 +117,7 @@ def test_outside_of_any_repository(
     assert (code, found[0][0]) == (ExitCode.INPUT, "changed")
     assert "not in a git repository" in found[0][1]
     Path("one.rts").unlink()
-    Path("one.rts").symlink_to(outside / "policy.rts")  # what nobody can tell of is linted
+    Path("one.rts").symlink_to(outside / "policy.rts")  # a file outside of all repositories is linted
     git("add", ".")
     git("commit", "-m", "second")
     assert lint("one.rts", "--changed")[1] == [("E0108", "")]
@@ -125,7 +125,7 @@ def test_outside_of_any_repository(
     assert lint("one.rts", "--changed")[1] == [("E1305", "one.rts")]
 
 
-def test_what_changed_in_a_submodule(
+def test_changes_in_a_submodule_are_found(
     repository: Path, lint: Lint, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path_factory.mktemp("part"))

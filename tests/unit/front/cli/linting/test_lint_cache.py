@@ -1,4 +1,4 @@
-"""The cache of `lint`: whatever is in it, whatever changed, the answer is that of a run without it."""
+"""The cache of `lint`: with any content, the result is that of a run without a cache."""
 
 import os
 import subprocess
@@ -16,13 +16,13 @@ from rtshcua.diagnostics.exits import ExitCode
 
 
 def folder() -> Path:
-    """The user's cache of this program."""
+    """Return the user's cache folder of this program."""
     return Path(os.environ["RTSHCUA_DATA_DIR"], "cache")
 
 
 @pytest.fixture
 def examined(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The programs that were examined anew, by their first file."""
+    """Record the programs that are checked again, by their first file."""
     names: list[str] = []
     plain = examine.find
 
@@ -39,7 +39,7 @@ def entries() -> list[Path]:
     return sorted(path for path in checkout.iterdir() if not path.name.startswith("."))
 
 
-def test_only_what_changed_is_examined_again(here: Path, lint: Lint, examined: list[str]) -> None:
+def test_only_changed_programs_are_checked_again(here: Path, lint: Lint, examined: list[str]) -> None:
     assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
     assert examined == ["one.rts", "two.rts"]
     assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
@@ -54,7 +54,7 @@ def test_only_what_changed_is_examined_again(here: Path, lint: Lint, examined: l
     assert examined[5:] == ["one.rts", "two.rts"]
 
 
-def test_a_zone_from_a_file(here: Path, lint: Lint, examined: list[str]) -> None:
+def test_changed_geojson_file_invalidates_the_entry(here: Path, lint: Lint, examined: list[str]) -> None:
     square = [[[8.5450, 47.3970], [8.5462, 47.3970], [8.5462, 47.3985], [8.5450, 47.3985], [8.5450, 47.3970]]]
     shape = f'{{"type": "Polygon", "coordinates": {square}}}'
     put({"policy.rts": POLICY.replace("\npolicy", '\nzone pad from "pad.geojson"\npolicy'), "pad.geojson": shape})
@@ -65,7 +65,7 @@ def test_a_zone_from_a_file(here: Path, lint: Lint, examined: list[str]) -> None
     assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
 
 
-def test_what_was_missing_is_found_when_it_is_there(here: Path, lint: Lint) -> None:
+def test_missing_file_is_not_cached(here: Path, lint: Lint) -> None:
     put({"one.rts": MISSION.replace("policy.rts", "polices.rts").replace("Look", "look")})
     for _ in range(2):
         assert lint("one.rts") == (ExitCode.DIAGNOSTICS, [("E0108", "one.rts")])
@@ -76,7 +76,7 @@ def test_what_was_missing_is_found_when_it_is_there(here: Path, lint: Lint) -> N
 
 
 @pytest.mark.parametrize("harm", ["cut", "flipped", "emptied", "swapped", "a folder", "no entry"])
-def test_a_damaged_cache_is_no_cache(here: Path, lint: Lint, harm: str) -> None:
+def test_damaged_cache_is_ignored(here: Path, lint: Lint, harm: str) -> None:
     lint(".")
     first, second = entries()[:2]
     data = bytearray(first.read_bytes())
@@ -97,24 +97,24 @@ def test_a_damaged_cache_is_no_cache(here: Path, lint: Lint, harm: str) -> None:
     assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
 
 
-def test_another_set_of_files_and_another_program_version(
+def test_other_files_or_another_version_invalidate_the_entry(
     here: Path, lint: Lint, examined: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert lint("one.rts") == (ExitCode.DIAGNOSTICS, [("E1302", "one.rts")])
-    assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)  # now also what is said of the policy
+    assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)  # now the policy is linted too
     count = len(examined)
     monkeypatch.setattr("rtshcua.app.lint.session.mark", lambda: "another")
     assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
     assert len(examined) == count + 2
 
 
-def test_where_it_cannot_be_written(here: Path, lint: Lint) -> None:
+def test_unwritable_cache_is_ignored(here: Path, lint: Lint) -> None:
     folder().write_text("I am a file")
     assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
     assert folder().read_text() == "I am a file"
 
 
-def test_where_it_stands_and_what_it_says_of_itself(here: Path, lint: Lint) -> None:
+def test_cache_is_outside_the_project_with_one_folder_a_project(here: Path, lint: Lint) -> None:
     before = sorted(here.rglob("*"))
     lint(".")
     assert sorted(here.rglob("*")) == before
@@ -130,21 +130,19 @@ def test_where_it_stands_and_what_it_says_of_itself(here: Path, lint: Lint) -> N
     assert not any(entry.is_file() for entry in (folder() / "lint/3").rglob("*"))
 
 
-def test_it_is_the_users_cache_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cache_is_in_the_users_cache_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("RTSHCUA_DATA_DIR")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     assert cache_folder() == tmp_path / "rtshcua"
 
 
-def test_a_cache_folder_that_is_relative_counts_for_nothing(
-    here: Path, lint: Lint, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_relative_cache_folder_is_ignored(here: Path, lint: Lint, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RTSHCUA_DATA_DIR", "data")
     assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
     assert not (here / "data").exists()
 
 
-def test_an_entry_in_the_place_of_another_is_none(here: Path, lint: Lint, examined: list[str]) -> None:
+def test_moved_cache_entry_is_ignored(here: Path, lint: Lint, examined: list[str]) -> None:
     lint(".")
     first, second = entries()[:2]
     first.replace(second)
@@ -153,7 +151,7 @@ def test_an_entry_in_the_place_of_another_is_none(here: Path, lint: Lint, examin
 
 
 @pytest.mark.slow
-def test_runs_at_the_same_time_agree(here: Path) -> None:
+def test_concurrent_runs_agree(here: Path) -> None:
     words = [sys.executable, "-m", "rtshcua", "lint", ".", "--format", "github"]
     runs = [subprocess.Popen(words, stdout=subprocess.PIPE, cwd=here) for _ in range(2)]
     said = {run.communicate()[0] for run in runs}
@@ -161,7 +159,7 @@ def test_runs_at_the_same_time_agree(here: Path) -> None:
     assert said.pop().count(b"::warning") == len(HABITS)
 
 
-def test_a_warm_run_imports_nothing_that_parses(here: Path, lint: Lint) -> None:
+def test_cached_run_does_not_import_the_parser(here: Path, lint: Lint) -> None:
     lint(".")
     heavy = [
         "pydantic",

@@ -1,4 +1,4 @@
-"""`rtshcua lint`: what it finds, in which form it says so, and how it ends."""
+"""`rtshcua lint`: findings, report formats and exit codes."""
 
 import json
 import os
@@ -12,19 +12,19 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.app import main
 
 
-def test_habits_in_what_was_asked_for(here: Path, lint: Lint) -> None:
+def test_only_requested_files_are_linted(here: Path, lint: Lint) -> None:
     assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)
     assert lint("one.rts") == (ExitCode.DIAGNOSTICS, [("E1302", "one.rts")])
     assert lint("one.rts", "policy.rts") == (ExitCode.DIAGNOSTICS, [("E1302", "one.rts"), ("E1305", "policy.rts")])
 
 
-def test_everything_that_check_finds_and_no_habits_beside_errors(here: Path, lint: Lint) -> None:
+def test_findings_of_check_are_reported_and_errors_hide_habits(here: Path, lint: Lint) -> None:
     put({"one.rts": MISSION.replace("hover(5 s)", "hover(5 s) takeoff()")})
     code, found = lint("one.rts")
     assert (code, {each for each, _ in found}) == (ExitCode.DIAGNOSTICS, {"E0603"})
 
 
-def test_a_rule_about_what_a_policy_decides(here: Path, lint: Lint) -> None:
+def test_rule_about_decisions_of_a_policy_is_run(here: Path, lint: Lint) -> None:
     put({"policy.rts": POLICY.replace("inside meadow", "inside meadow outside airfield").replace(
         "\npolicy", "\nzone airfield = circle(46.3978 N, 8.5456 E, 1 km)\npolicy")})  # fmt: skip
     assert ("E1307", "policy.rts") in lint(".")[1]
@@ -33,7 +33,7 @@ def test_a_rule_about_what_a_policy_decides(here: Path, lint: Lint) -> None:
 @pytest.mark.parametrize(
     ("level", "code"), [("error", 0), ("warning", 1), ("note", 1), ("never", 0)]
 )  # fmt: skip
-def test_the_level_that_fails(here: Path, lint: Lint, level: str, code: int) -> None:
+def test_fail_on_sets_the_level_that_fails(here: Path, lint: Lint, level: str, code: int) -> None:
     assert lint(".", "--fail-on", level) == (code, HABITS)
     put({"rtshcua.toml": f'lint.fail-on = "{level}"'})
     assert lint(".") == (code, HABITS)
@@ -47,20 +47,20 @@ def test_the_level_that_fails(here: Path, lint: Lint, level: str, code: int) -> 
         (["--fail-on", "x"], ExitCode.USAGE, "accepted: `error`, `warning`"),
         (["--config", "nowhere.toml"], ExitCode.INPUT, "nowhere.toml: cannot be read"),
         (["--config", "policy.rts"], ExitCode.INPUT, "policy.rts:1: not valid toml"),
-        (["--isolated", "--config", "x.toml"], ExitCode.USAGE, "exclude each other"),
+        (["--isolated", "--config", "x.toml"], ExitCode.USAGE, "cannot be combined"),
         (["nowhere.rts"], ExitCode.INPUT, "cannot read `nowhere.rts`"),
         (["--bogus"], ExitCode.USAGE, "no such option"),
         (["--output", "nowhere/x.json", "--format", "json"], ExitCode.INPUT, "no such file or directory"),
     ],
 )
-def test_a_command_line_that_cannot_be_followed(
+def test_invalid_command_line_is_refused(
     here: Path, capsys: pytest.CaptureFixture[str], words: list[str], code: ExitCode, said: str
 ) -> None:
     assert main(["lint", ".", *words]) == code
     assert said in capsys.readouterr().err.lower().replace("no such option:", "no such option")
 
 
-def test_a_configuration_that_is_malformed_ends_the_run(here: Path, lint: Lint) -> None:
+def test_malformed_configuration_is_refused(here: Path, lint: Lint) -> None:
     put({"rtshcua.toml": "[lint]\nexlude = []"})
     code, found = lint(".")
     assert (code, found[0][0]) == (ExitCode.INPUT, "configuration")
@@ -68,7 +68,7 @@ def test_a_configuration_that_is_malformed_ends_the_run(here: Path, lint: Lint) 
     assert lint(".", "--isolated") == (ExitCode.DIAGNOSTICS, HABITS)
 
 
-def test_files_that_are_left_out(here: Path, lint: Lint, capsys: pytest.CaptureFixture[str]) -> None:
+def test_excluded_files_are_not_linted(here: Path, lint: Lint, capsys: pytest.CaptureFixture[str]) -> None:
     put({"rtshcua.toml": 'lint.exclude = ["t*.rts"]'})
     assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS[:2])
     assert lint("two.rts") == (ExitCode.OK, [])
@@ -76,17 +76,17 @@ def test_files_that_are_left_out(here: Path, lint: Lint, capsys: pytest.CaptureF
     assert "1 file left out" in capsys.readouterr().out
 
 
-def test_further_sources_of_a_configuration(here: Path, lint: Lint) -> None:
+def test_further_sources_of_a_configuration_are_read(here: Path, lint: Lint) -> None:
     put({"one.rts": MISSION.replace('import "policy.rts"\n', "").replace("Look", "look")})
     assert lint("one.rts")[0] == ExitCode.DIAGNOSTICS
     put({"rtshcua.toml": 'lint.with = ["policy.rts"]'})
     assert lint("one.rts") == (ExitCode.OK, [])
 
 
-def test_what_a_person_reads(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_human_report(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["lint", ".", "--statistics"]) == ExitCode.DIAGNOSTICS
     said = capsys.readouterr()
-    assert "warning[E1302]: `Look` is not written" in said.err
+    assert "warning[E1302]: `Look` violates the naming convention" in said.err
     assert "3 warnings; `rtshcua explain E1302` tells more" in said.err
     assert said.out == "    2  E1302 naming\n    1  E1305 unused-import\n"
     put({"one.rts": MISSION.replace("Look", "look"), "two.rts": MISSION.replace("Look", "look")})
@@ -96,7 +96,7 @@ def test_what_a_person_reads(here: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert (said.out, said.err) == ("nothing found in 3 files, 1 ignored\n", "")
 
 
-def test_forms_for_machines(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_machine_readable_reports(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["lint", ".", "--format", "github"]) == ExitCode.DIAGNOSTICS
     said = capsys.readouterr()
     assert [line.split("title=")[1][:5] for line in said.out.splitlines()] == [code for code, _ in HABITS]
@@ -107,7 +107,7 @@ def test_forms_for_machines(here: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert main(["lint", ".", "--format", "junit", "--output", "report.xml"]) == ExitCode.DIAGNOSTICS
     root = ElementTree.parse("report.xml").getroot()
     assert {suite.get("name") for suite in root.iter("testsuite")} == {"one.rts", "policy.rts", "two.rts"}
-    assert "warning[E1305]" in capsys.readouterr().err  # for the log of the run
+    assert "warning[E1305]" in capsys.readouterr().err  # in the log of the CI run
     assert main(["lint", "--output", "report.txt"]) == ExitCode.DIAGNOSTICS
     assert Path("report.txt").read_text().startswith("warning[E1302]")
     assert main(["lint", ".", "--format", "github", "--output", "/dev/null"]) == ExitCode.DIAGNOSTICS
@@ -117,13 +117,13 @@ def test_forms_for_machines(here: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert (told["files"], told["exit"], told["ignored"]) == (3, "diagnostics", [])
 
 
-def test_a_specification_is_linted_with_its_policy(checkout: Path, here: Path, lint: Lint) -> None:
+def test_specification_is_linted_with_its_policy(checkout: Path, here: Path, lint: Lint) -> None:
     proposal = (checkout / "missions" / "proposal.json").read_text(encoding="utf-8")
     put({"proposal.json": proposal})
     assert lint("proposal.json") == (ExitCode.OK, [])
 
 
-def test_a_report_goes_where_a_link_leads(here: Path) -> None:
+def test_report_is_written_through_a_symbolic_link(here: Path) -> None:
     (here / "reports").mkdir()
     Path("report.txt").symlink_to("reports/real.txt")
     for _ in range(2):
@@ -134,11 +134,9 @@ def test_a_report_goes_where_a_link_leads(here: Path) -> None:
 
 @pytest.mark.parametrize(
     ("further", "said"),
-    [(".", "is a folder"), ("/dev/zero", "lies outside"), ("pipe", "is no file"), ("x.rts", "is not")],
+    [(".", "is a folder"), ("/dev/zero", "lies outside"), ("pipe", "is not a file"), ("x.rts", "does not exist")],
 )
-def test_a_further_source_that_is_none_is_the_fault_of_the_configuration(
-    here: Path, lint: Lint, further: str, said: str
-) -> None:
+def test_invalid_further_source_is_refused(here: Path, lint: Lint, further: str, said: str) -> None:
     put({"rtshcua.toml": f'[lint]\nwith = ["{further}"]'})
     os.mkfifo("pipe")
     code, found = lint(".")
@@ -147,7 +145,7 @@ def test_a_further_source_that_is_none_is_the_fault_of_the_configuration(
     assert said in found[0][1]
 
 
-def test_a_report_for_a_person_is_as_wide_as_what_is_printed(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_written_human_report_has_the_width_of_the_terminal(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "60")
     (here / "long.rts").write_text("skill look() { require wind.sped < 5 m/s and batery > 20 % and altitude < 20 m }")
     assert main(["lint", "long.rts", "--output", "report.txt"]) == ExitCode.DIAGNOSTICS

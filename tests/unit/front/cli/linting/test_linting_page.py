@@ -1,4 +1,4 @@
-"""docs/linting.md is true."""
+"""docs/linting.md matches the program."""
 
 import re
 from pathlib import Path
@@ -12,13 +12,13 @@ def page(checkout: Path) -> str:
     return (checkout / "docs" / "linting.md").read_text(encoding="utf-8")
 
 
-def test_the_table_has_every_rule(checkout: Path) -> None:
+def test_table_lists_every_rule(checkout: Path) -> None:
     rows = re.findall(r"^\| (E\d+) \| `([a-z-]+)` \|", page(checkout), re.MULTILINE)
     rules = [code for code in codes.REGISTRY.values() if code.id.startswith("E13")] + [codes.NOT_FORMATTED]
     assert rows == [(code.id, code.slug) for code in rules]
 
 
-def test_the_configuration_that_it_shows_is_one(checkout: Path) -> None:
+def test_shown_configuration_is_valid(checkout: Path) -> None:
     shown = re.search(r"^```toml\n(.*?)^```$", page(checkout), re.DOTALL | re.MULTILINE)
     assert shown is not None
     found = parse_settings(shown[1], "rtshcua.toml")
@@ -26,6 +26,6 @@ def test_the_configuration_that_it_shows_is_one(checkout: Path) -> None:
     assert [each.pattern for each in found.lint.ignored] == [None, "missions/**"]
 
 
-def test_the_formats_that_it_tells_of(checkout: Path) -> None:
+def test_page_lists_the_formats(checkout: Path) -> None:
     told = page(checkout).split("| `--format` | is |")[1]
     assert tuple(re.findall(r"^\| `(\w+)` \|", told, re.MULTILINE)) == FORMATS

@@ -1,4 +1,4 @@
-"""E0514, E0515: what lies on the straight ways from a step; the fan against shapely, and whole missions."""
+"""Ways of fallbacks (E0514, E0515): hull sweeps compared with shapely, and whole missions."""
 
 from math import hypot
 from typing import Any
@@ -20,7 +20,7 @@ POINTS = st.tuples(st.integers(-40, 40), st.integers(-40, 40))
 
 
 class Zones(Landmarks):
-    """The landmarks of zones without a policy around them."""
+    """Landmarks of zones without a policy."""
 
     def __init__(self, *zones: Zone) -> None:
         self._zones = zones
@@ -32,8 +32,8 @@ def zone(shape: int, data: tuple[int, ...]) -> Zone:
 
 
 def answer(flat: Zone, points: list[tuple[int, int]], error: int) -> int:
-    fan = HullSweep(points, (-error, -error, error, error), Zones(flat))
-    return fan.within(PreparedZone(0, flat))
+    sweep = HullSweep(points, (-error, -error, error, error), Zones(flat))
+    return sweep.within(PreparedZone(0, flat))
 
 
 def ring(west: int, south: int, east: int, north: int, *, hole: bool = False) -> tuple[int, ...]:
@@ -51,7 +51,7 @@ SHAPES: dict[str, tuple[Zone, Any]] = {
 
 @pytest.mark.parametrize("name", SHAPES)
 @given(points=st.lists(POINTS, min_size=1, max_size=5), error=st.integers(0, 6))
-def test_a_fan_says_of_a_zone_what_the_plane_says(name: str, points: list[tuple[int, int]], error: int) -> None:
+def test_hull_sweep_of_a_zone_agrees_with_shapely(name: str, points: list[tuple[int, int]], error: int) -> None:
     flat, shape = SHAPES[name]
     corners = [(x + dx, y + dy) for x, y in points for dx in (-error, error) for dy in (-error, error)]
     swept = convex_hull(Polygon([*corners, corners[0], corners[0]]) if len(set(corners)) > 2 else Polygon())
@@ -64,7 +64,7 @@ def test_a_fan_says_of_a_zone_what_the_plane_says(name: str, points: list[tuple[
 
 
 @given(points=st.lists(POINTS, min_size=1, max_size=6), error=st.integers(0, 6), radius=st.integers(1, 60))
-def test_a_fan_says_of_a_circle_what_its_distances_say(points: list[tuple[int, int]], error: int, radius: int) -> None:
+def test_hull_sweep_of_a_circle_agrees_with_distances(points: list[tuple[int, int]], error: int, radius: int) -> None:
     got = answer(zone(CIRCLE, (3, -2, radius * radius)), points, error)
     corners = [(x + dx, y + dy) for x, y in points for dx in (-error, error) for dy in (-error, error)]
     farthest = max(hypot(x - 3, y + 2) for x, y in corners)
@@ -73,11 +73,11 @@ def test_a_fan_says_of_a_circle_what_its_distances_say(points: list[tuple[int, i
     if got == FALSE:
         assert distance >= radius
     elif got == TRUE | FALSE:
-        assert distance <= radius + 5  # what is clear by more is said to be
+        assert distance <= radius + 5  # a larger distance is reported as clear
 
 
 @given(radius=st.integers(1, 1 << 20))
-def test_a_disc_holds_its_circle(radius: int) -> None:
+def test_disc_polygon_contains_its_circle(radius: int) -> None:
     corners = hull(disc(radius))
     for (ax, ay), (bx, by) in zip(corners, [*corners[1:], corners[0]], strict=True):
         length = hypot(bx - ax, by - ay)
@@ -85,7 +85,7 @@ def test_a_disc_holds_its_circle(radius: int) -> None:
     assert max(hypot(x, y) for x, y in corners) <= radius * 1.03 + 2
 
 
-def test_the_hull_of_nothing_much() -> None:
+def test_hull_of_degenerate_point_sets() -> None:
     assert hull([(1, 1), (1, 1)]) == [(1, 1)]
     assert hull([(0, 0), (2, 2), (1, 1)]) == [(0, 0), (2, 2)]
     assert disc(0) == [(0, 0)]
@@ -100,7 +100,7 @@ def goto(place: str) -> str:
 
 
 def other(within: int) -> str:
-    """A vehicle whose real home may be so far from its declared one."""
+    """Return a vehicle whose home may be this far from its declared place."""
     return f"""vehicle other {{
   identity "o"  home 47.39774 N, 8.54559 E within {within} m  speed at most 12 m/s  climb at most 3 m/s
   position error 3 m  energy 100 % = 18 min hover  reserve 15 %
@@ -108,8 +108,8 @@ def other(within: int) -> str:
 """
 
 
-def test_a_way_home_through_the_midst_of_a_zone_that_no_leg_touches() -> None:
-    """The corners of the path are fine, and so are the ways from these: what lies between them is not."""
+def test_way_home_through_a_zone_that_no_leg_touches_is_reported() -> None:
+    """The corners of the path and the ways from them avoid the zone, but a way from between them does not."""
     post = "zone post = circle(47.39900 N, 8.54559 E, 6 m)\n"
     legs = [goto("47.40000 N, 8.54480 E"), goto("47.40000 N, 8.54640 E"), goto("47.39800 N, 8.54700 E")]
     rules = policy("airspace inside city outside post")
@@ -120,7 +120,7 @@ def test_a_way_home_through_the_midst_of_a_zone_that_no_leg_touches() -> None:
 
 
 @pytest.mark.parametrize(("within", "expected"), [(5, []), (40, ["E0514"])])
-def test_where_home_may_really_be_counts(within: int, expected: list[str]) -> None:
+def test_position_error_of_home_counts_for_the_way_home(within: int, expected: list[str]) -> None:
     pole = "zone pole = circle(47.39855 N, 8.54590 E, 15 m)\n"
     flight = mission(UP, goto("47.39950 N, 8.54540 E"), HOME).replace("on quad", "on other")
     rules = policy("airspace inside city outside pole")
@@ -128,22 +128,24 @@ def test_where_home_may_really_be_counts(within: int, expected: list[str]) -> No
 
 
 @rows("within", [5, 20, 26, 30, 60, 200, 2000])
-def test_the_less_is_known_of_home_the_more_is_found(within: int) -> None:
+def test_home_disc_outside_the_airspace_is_reported(within: int) -> None:
     yard = "zone yard = circle(47.39774 N, 8.54559 E, 30 m)\n"
     flight = mission(UP, "hover()", HOME).replace("on quad", "on other")
     findings = found(program(other(within), yard, policy("airspace inside yard"), flight))
     if within < 26:  # with 3 m of position error, and a corner of the polygon around the disc
         assert findings == []
     else:
-        code, message = next(each for each in findings if each[0] != "E0804")  # so far is not flown in time either
+        code, message = next(
+            each for each in findings if each[0] != "E0804"
+        )  # with so large an error the return also takes too long
         assert (code, message.split(",")[0]) == (
             "E0508",
-            f"home may lie up to {within} m from where it is declared",
+            f"home may lie up to {within} m from its declared place",
         )
 
 
 def towered(ceiling: int, returns: str, *steps: str, inside: str = "city") -> list[tuple[str, str, str]]:
-    """The errors of a mission around a tower 195 m north of home: code, message and help."""
+    """Return code, message and help of each error of a mission around a tower 195 m north of home."""
     vehicle = other(5).replace("reserve 15 %", f"reserve 15 %  {returns}")
     tower = f"zone tower = circle(47.39950 N, 8.54559 E, 15 m)  ceiling {ceiling} m above home\n"
     around = "zone around = circle(47.39950 N, 8.54559 E, 40 m)  entry 47.39920 N, 8.54559 E\n"
@@ -168,13 +170,13 @@ ORBIT = (goto("around.entry"), "look(around)", goto("around.entry"))
     ("ceiling", "returns", "expected", "help"),
     [
         (28, "return at 30 m", [], ""),
-        (29, "return at 30 m", ["E0514"], "with `return at 31 m` the way home leads above it"),
-        (28, "", ["E0514"], "with `return at 30 m` the way home leads above it"),
-        (38, "return at 20 m", ["E0514"], "with `return at 40 m` the way home leads above it"),
-        (16, "", [], ""),  # it flies above it all the while
+        (29, "return at 30 m", ["E0514"], "with `return at 31 m` the way home leads above all zones on it"),
+        (28, "", ["E0514"], "with `return at 30 m` the way home leads above all zones on it"),
+        (38, "return at 20 m", ["E0514"], "with `return at 40 m` the way home leads above all zones on it"),
+        (16, "", [], ""),  # it always flies above the tower
     ],
 )
-def test_the_way_home_from_around_a_tower_leads_above_it(
+def test_return_altitude_above_an_obstacle_is_suggested(
     ceiling: int, returns: str, expected: list[str], help: str
 ) -> None:
     found = towered(ceiling, returns, *ORBIT)
@@ -186,14 +188,14 @@ def test_the_way_home_from_around_a_tower_leads_above_it(
 
 
 @rows(("ceiling", "help"), [(32, "`return at 34 m`"), (33, "")])
-def test_no_return_altitude_is_named_that_leaves_the_airspace(ceiling: int, help: str) -> None:
+def test_return_altitude_outside_the_airspace_is_not_suggested(ceiling: int, help: str) -> None:
     ((code, _, helps),) = towered(ceiling, "return at 30 m", *ORBIT, inside="low")
     assert code == "E0514"
     assert help in helps
     assert ("return at" in helps) == bool(help)
 
 
-def test_the_return_altitude_that_a_finding_names_is_enough() -> None:
+def test_suggested_return_altitude_is_the_least_sufficient() -> None:
     for ceiling in (21, 33, 38):
         ((_, _, help),) = towered(ceiling, "", *ORBIT)
         named = int(help.split("`return at ")[1].split(" m`")[0])
@@ -201,11 +203,11 @@ def test_the_return_altitude_that_a_finding_names_is_enough() -> None:
         assert towered(ceiling, f"return at {named - 1} m", *ORBIT) != []
 
 
-def test_a_mission_that_returns_from_behind_a_tower_is_told_the_height_too() -> None:
+def test_return_altitude_is_suggested_for_a_returning_step() -> None:
     behind = (goto("47.39860 N, 8.54700 E"), goto("47.40000 N, 8.54620 E"), goto("47.40000 N, 8.54559 E"))
     codes = {code: help for code, _, help in towered(33, "return at 30 m", *behind)}
     assert sorted(codes) == ["E0508", "E0514"]
-    assert all("with `return at 35 m` the way home leads above it" in help for help in codes.values())
+    assert all("with `return at 35 m` the way home leads above all zones on it" in help for help in codes.values())
     assert towered(33, "return at 35 m", *behind) == []
 
 
@@ -216,8 +218,8 @@ def test_a_mission_that_returns_from_behind_a_tower_is_told_the_height_too() -> 
         ("47.39795 N, 8.54559 E", []),  # 23 m
     ],
 )
-def test_near_home_the_way_home_may_be_low(place: str, expected: list[str]) -> None:
-    """A hedge north of home, gone around; from just behind it a return may not climb."""
+def test_way_home_may_be_low_near_home(place: str, expected: list[str]) -> None:
+    """The steps fly around a hedge north of home; a return from close behind it may not climb."""
     hedge = (
         "zone hedge = polygon(47.397840 N, 8.54545 E, 47.397840 N, 8.54573 E, 47.397850 N, 8.54573 E, "
         "47.397850 N, 8.54545 E)  ceiling 25 m above home\n"
@@ -230,8 +232,8 @@ def test_near_home_the_way_home_may_be_low(place: str, expected: list[str]) -> N
     assert found == expected
 
 
-def test_the_climb_and_the_descent_of_the_way_home_keep_the_airspace() -> None:
-    """A roof over a part of the way, and one over where home may be."""
+def test_climb_and_descent_of_the_way_home_are_proved() -> None:
+    """A roof over a part of the way, and a roof over the possible places of home."""
     roof = "zone roof = circle(47.39950 N, 8.54559 E, 15 m)  floor 24 m ceiling 50 m above home\n"
     vehicle = other(12).replace("reserve 15 %", "reserve 15 %  return at 55 m")
     under = mission(UP, goto("47.39950 N, 8.54559 E"), HOME).replace("on quad", "on other")
@@ -248,7 +250,7 @@ def test_the_climb_and_the_descent_of_the_way_home_keep_the_airspace() -> None:
     assert any(message.startswith("the descent at the end of the way home") for message in messages)
 
 
-def test_zones_with_times_are_left_for_on_board() -> None:
+def test_timed_zones_do_not_refuse_a_mission_without_an_issue_time() -> None:
     night = "zone night = circle(47.39860 N, 8.54559 E, 20 m) active 22:00 .. 06:00\n"
     vehicle_clock = mission(UP, goto("47.39950 N, 8.54559 E"), HOME)
     assert found(program(night, policy("airspace inside city outside night"), vehicle_clock)) == []
@@ -265,14 +267,14 @@ def test_zones_with_times_are_left_for_on_board() -> None:
         ("rise(60 m)", ["E0515"]),
     ],
 )
-def test_links_that_fly_keep_the_airspace(link: str, expected: list[str]) -> None:
+def test_flying_links_must_stay_in_the_airspace(link: str, expected: list[str]) -> None:
     rise = skill("rise(up: altitude in 5 m .. 60 m)", motion="climb to up")
     probe = skill("probe()", fallback=f"{link}, return_home, emergency_land")
     rules = policy("airspace inside meadow")
     assert [code for code, _ in found(program(rise, probe, rules, mission(UP, "probe()", HOME)))] == expected
 
 
-def test_the_way_home_from_where_a_link_flew_counts() -> None:
+def test_way_home_from_the_end_of_a_link_is_proved() -> None:
     flown = f"{goto('47.39760 N, 8.54970 E')}, return_home, emergency_land"
     rules = policy(CITY, contingency="emergency_land")
     north = goto("47.39860 N, 8.54970 E")

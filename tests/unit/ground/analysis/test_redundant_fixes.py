@@ -31,7 +31,7 @@ def test_wider_rule_is_named_and_no_fix_deletes_the_narrower() -> None:
     found = redundant("\n  ".join([wide, *narrow]))
     assert len(found) == 3
     assert {each.help for each in found} == {
-        f"look at `{wide}` first: if it permits too much, narrow it; otherwise delete this rule"
+        f"check `{wide}` first: if it permits too much, narrow it; otherwise delete this rule"
     }
     assert [each.fixes for each in found] == [(), (), ()]
 

@@ -278,7 +278,7 @@ WRONG: Sequence[tuple[str, str, str, str | None]] = [
     (
         "when satellites > 3 kill()",
         "E1607",
-        "the condition reads the signal `satellites`, which the policy does not",
+        "the condition reads the signal `satellites`, which the policy does not read",
         None,
     ),
     (

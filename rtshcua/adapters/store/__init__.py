@@ -1,1 +1,1 @@
-"""Files on this machine's disk: how they are replaced, and how what others may have put there is opened."""
+"""Files on this machine's disk: replace them atomically, and safely open files that others may have placed there."""

@@ -1,7 +1,6 @@
-"""How far a path may lead by links that others put in its way: to the edge of its checkout.
-
-A checkout may be a stranger's: a pull request, an unpacked archive. A link that leads out of it is not followed, so
-that no file of ours is read or written under a name of theirs.
+"""Limit how far symbolic links may lead a path: to the edge of its checkout. A checkout may be from a stranger: a pull
+request, an unpacked archive. A link that leads out of it is not followed, so that no file of the user is read or
+written under a name in it.
 """
 
 import os
@@ -9,17 +8,17 @@ from errno import EACCES
 from pathlib import Path
 from typing import Final
 
-#: what the folder of a project has in it
+#: files that mark the folder of a project
 PROJECT: Final = ("rtshcua.toml", "pyproject.toml")
 REPOSITORY: Final = ".git"
 
 
 class OutsideCheckout(PermissionError):
-    """A path that leads, by itself or by links, to where it has no business."""
+    """A path that leads out of its checkout, by itself or by links."""
 
 
 def checkout_of(path: str | Path) -> str | None:
-    """The folder of the repository that a path lies in as it is written; else of the nearest project; else None."""
+    """The folder of the repository that a path lies in as written; else of the nearest project; else None."""
     project = None
     for folder in _above(path):
         if os.path.lexists(os.path.join(folder, REPOSITORY)):  # noqa: PTH118  for each source of a run
@@ -30,11 +29,11 @@ def checkout_of(path: str | Path) -> str | None:
 
 
 def expect_inside(path: Path) -> tuple[Path, Path | None]:
-    """Where a file is to be written, free of links, and the folder below which that is. Who writes opens it from there
-    without following links: one may be put in its way after this was asked.
+    """Where to write a file, with links resolved, and the folder that contains it. The writer opens the file below that
+    folder without following links, because a link may be placed after this check.
 
-    Raises `OutsideCheckout` where links lead out of its project, or, if it lies in none, out of the working folder:
-    what is named otherwise is its writer's own business (None).
+    Raises `OutsideCheckout` where links lead out of the path's project or, outside of a project, out of the working
+    folder. The folder is None for a path outside of both, which is the caller's own decision.
     """
     real = os.path.realpath(path)
     here = Path.cwd()
@@ -51,7 +50,7 @@ def expect_inside(path: Path) -> tuple[Path, Path | None]:
 
 
 def lies_in(real: str, folder: str) -> bool:
-    """Whether a path is a folder or lies below it; both are absolute, and free of links."""
+    """Whether a path is a folder or lies below it; both are absolute and free of links."""
     return real == folder or real.startswith(folder.rstrip(os.sep) + os.sep)
 
 

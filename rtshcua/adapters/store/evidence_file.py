@@ -1,7 +1,7 @@
-"""How evidence reaches the disk: the file of a log, the disk (which tests replace), and the thread that writes.
+"""Write evidence to the disk: the file of a log, the disk (which tests replace), and the writing thread.
 
-All evidence that is written in flight, the log and the raw frames, passes `Disk`. The flying thread never waits for the
-disk: it hands lines to `EvidenceWriter`, whose thread owns the file (docs/adr/0016).
+All evidence of a flight, the log and the raw frames, passes `Disk`. The flying thread never waits for the disk: it
+hands lines to `EvidenceWriter`, whose thread owns the file (docs/adr/0016).
 """
 
 import errno
@@ -19,7 +19,7 @@ from rtshcua.adapters.store.writing import open_existing, open_new, sync_data, s
 from rtshcua.evidence.records import is_signed
 from rtshcua.model.durability import BUFFERED, SYNC_US, SYNCED, SYNCED_FIRST, WRITTEN
 
-#: as many buffered lines are written together at the latest
+#: the most buffered lines that are written together
 MOST_BUFFERED = 256
 
 
@@ -27,16 +27,16 @@ class LogFile(Protocol):
     """An open file. Each method raises OSError when the system refuses."""
 
     def write(self, data: bytes | memoryview, /) -> int:
-        """Appends bytes, as many as the system takes at once; how many that were."""
+        """Append bytes; return how many the system accepted."""
 
     def sync(self) -> None:
-        """Returns when what was written is on the disk."""
+        """Return once the written data is on the disk."""
 
     def truncate(self, length: int, /) -> None:
-        """Cuts the file off after `length` bytes."""
+        """Cut the file off after `length` bytes."""
 
     def close(self) -> None:
-        """Closes it; what was not synced may be lost with the power."""
+        """Close the file; data that was not synced may be lost in a power failure."""
 
 
 class SystemFile:
@@ -46,7 +46,7 @@ class SystemFile:
 
     def __init__(self, handle: int) -> None:
         self._handle = handle
-        self.write = partial(os.write, handle)  # no call of ours in between: this is where most of the time goes
+        self.write = partial(os.write, handle)  # no Python call in between: most of the time is spent here
         self.sync = partial(sync_data, handle)
         self.truncate = partial(os.ftruncate, handle)
 
@@ -56,18 +56,18 @@ class SystemFile:
 
 
 class Disk:
-    """The disks of this machine; a test's does worse."""
+    """The disks of this machine; tests replace it by faulty ones."""
 
     def create(self, path: Path) -> LogFile:
-        """A file that did not exist before, its name on the disk. Raises FileExistsError, and OSError."""
+        """Create a file, its name synced. Raises FileExistsError, and OSError."""
         return SystemFile(open_new(path))
 
     def reopen(self, path: Path) -> LogFile:
-        """A file that exists, to be gone on with at its end. Raises FileNotFoundError, and OSError."""
+        """Open an existing file, to append to it. Raises FileNotFoundError, and OSError."""
         return SystemFile(open_existing(path))
 
     def sync_folder(self, folder: Path) -> None:
-        """Returns when the names in `folder` are on the disk."""
+        """Return once the names in `folder` are on the disk."""
         sync_folder(folder)
 
 
@@ -75,17 +75,17 @@ SYSTEM = Disk()
 
 
 def write_all(file: LogFile, data: bytes) -> None:
-    """Writes every byte, however often the system takes only some of them."""
+    """Write every byte, in as many calls as the system needs."""
     view = memoryview(data)
     while view:
         view = view[file.write(view) :]
 
 
 class EvidenceFile:
-    """A log that is only ever appended to, and never replaces another: raises FileExistsError when `path` is there.
+    """A log that is only ever appended to and never replaces another: raises FileExistsError when `path` exists.
 
-    The disk may refuse a line. It is then kept, so that the chain has no hole, and written before the next one or when
-    the file is closed. What the disk took of a refused line is cut off again, so the log ends between two records.
+    A line that the disk refuses is kept, so that the chain has no gap, and written before the next one or when the file
+    is closed. The written part of a refused line is cut off again, so the log ends between two records.
     """
 
     __slots__ = ("_file", "_length", "_open", "_sync_error", "_taken", "_waiting", "_write", "path")
@@ -95,8 +95,8 @@ class EvidenceFile:
         self._file = disk.create(path)
         self._write = self._file.write
         self._open = True
-        self._length = 0  # of the whole lines in the file
-        self._taken = 0  # bytes of the first waiting line that stand after them
+        self._length = 0  # the size of the whole lines in the file
+        self._taken = 0  # the bytes of the first waiting line that are already in the file
         self._waiting: list[bytes] = []
         self._sync_error: OSError | None = None
 
@@ -106,11 +106,11 @@ class EvidenceFile:
         return len(self._waiting)
 
     def append(self, line: bytes, durability: int) -> None:
-        """Takes one line over, and returns when it is as durable as this class of `evidence.durability` says: buffered,
-        written, or (synced first) on the disk. To sync what class `SYNCED` promises is the caller's part.
+        """Take over one line, and return when it is as durable as its class of `evidence.durability` requires:
+        buffered, written, or (synced first) on the disk. The caller has to sync lines of class `SYNCED`.
 
-        Raises OSError when this line or one before it could not be written, and, for one to be synced, from the first
-        sync that failed on: what the system then reports of the disk cannot be believed any more.
+        Raises OSError when this line or one before it could not be written and, for a line to be synced, after any
+        failed sync: later reports of the system about this disk are not reliable.
         """
         if self._waiting or durability == BUFFERED:
             self._waiting.append(line)
@@ -133,7 +133,7 @@ class EvidenceFile:
             self.sync()
 
     def flush(self) -> None:
-        """Writes what waits. Raises OSError where the disk refuses it still."""
+        """Write the waiting lines. Raises OSError where the disk still refuses."""
         waiting = self._waiting
         while waiting:
             data = self._together()
@@ -144,7 +144,7 @@ class EvidenceFile:
                 raise
 
     def _together(self) -> bytes:
-        """What is written at once of what waits: up to the next signed record."""
+        """The waiting lines to write at once: up to the next signed record."""
         batch = self._waiting[:MOST_BUFFERED]
         if is_signed(batch[0]):
             self.settle()
@@ -153,14 +153,14 @@ class EvidenceFile:
         return b"".join(batch[:signed])
 
     def settle(self) -> None:
-        """Syncs what is in the file, before a signed record is: recovery counts on it that a power cut leaves no damage
-        before one. A disk that refuses does not stop the record; it is told at the next sync.
+        """Sync the file before a signed record: recovery relies on it that a power failure damages nothing before one.
+        A refusal does not stop the record; the next sync reports it.
         """
         with suppress(OSError):
             self.sync()
 
     def _count(self, taken: int) -> None:
-        """So many more bytes of what waits are in the file."""
+        """Note that this many more bytes of the waiting lines are in the file."""
         taken += self._taken
         whole = 0
         for line in self._waiting:
@@ -173,14 +173,14 @@ class EvidenceFile:
         del self._waiting[:whole]
 
     def _cut(self) -> None:
-        """Takes the beginning of a refused line off again; where even that is refused, the line goes on from there."""
+        """Cut the beginning of a refused line off; where that is refused too, the line is continued from there."""
         if self._taken:
             with suppress(OSError):
                 self._file.truncate(self._length)
                 self._taken = 0
 
     def sync(self) -> None:
-        """Returns when what was written is on the disk. Raises OSError, and from the first time on always."""
+        """Return once the written lines are on the disk. Raises OSError, and after the first failure always."""
         if self._sync_error is not None:
             raise self._sync_error
         try:
@@ -190,7 +190,7 @@ class EvidenceFile:
             raise
 
     def close(self) -> None:
-        """Writes what waits, syncs, and closes, also when the first two fail. Closing twice does nothing."""
+        """Write the waiting lines, sync and close, even if the first two fail. Closing twice does nothing."""
         if not self._open:
             return
         try:
@@ -205,18 +205,17 @@ class EvidenceFile:
 #: the flight comes down, up to `TIMES_MOST` times as many may wait.
 MOST_WAITING = 1_000
 TIMES_MOST = 64
-#: What was written is synced once nothing has come for this time, in seconds, so that a sync stands in nobody's way.
+#: Written lines are synced after this many idle seconds, so that a sync delays nothing.
 SYNC_S = 0.2
-#: a disk that hangs is waited for this long at the end, in seconds
+#: how long to wait for a hanging disk at the end, in seconds
 CLOSE_S = 10.0
-#: A line of class `SYNCED` is synced this long after it was taken at the latest, in seconds: half of what is promised,
-#: for the sync takes its time too.
+#: The latest sync of a line of class `SYNCED`, in seconds after it was taken over: half of the promised time, because
+#: the sync takes time too.
 SYNC_AFTER_S = SYNC_US / 1e6 / 2
-#: A line that was to be on the disk within `SYNC_US` and is not is told; when it is not after this time, in seconds,
-#: the disk counts as failed: it hangs.
+#: A line that is not on the disk within `SYNC_US` is reported; after this time, in seconds, the disk counts as failed.
 STUCK_S = 5.0
-#: Who looks after a longer time than this, in seconds, stood still meanwhile, and with it the thread that writes: that
-#: says nothing of the disk. A loop that goes on looks far more often.
+#: A check after a longer pause than this, in seconds, proves nothing about the disk: the process stood still, and the
+#: writing thread with it. A running loop checks far more often.
 STOOD_S = 1.0
 
 _BEHIND = OSError(errno.ENOBUFS, "the disk is too slow for the log")
@@ -224,8 +223,8 @@ _OVER = OSError(errno.ENOSPC, "the disk did not keep up: the log ends before thi
 
 
 class EvidenceWriter:
-    """The `EvidenceSink` over a file. Lines are written in the order in which they were appended, each as soon as the
-    disk lets it, those that wait together with one sync.
+    """The `EvidenceSink` over a file. Lines are written in order, as soon as the disk allows, and waiting lines are
+    synced together.
 
     `append`, `trouble`, `late` and `close` are for one thread. `SimpleQueue.put` takes no lock that the writer might
     hold.
@@ -260,12 +259,12 @@ class EvidenceWriter:
 
     @property
     def waiting(self) -> int:
-        """How many lines were taken over, or should have been, and are not kept."""
+        """How many lines were taken over, or should have been, and are not in the file."""
         return self._given - self._keeper.written
 
     def append(self, line: bytes, durability: int) -> int:
-        """Takes one line over; see `EvidenceSink`. Raises OSError when too many wait: it is written all the same,
-        unless so many wait that the log must end, and then before the first that was not taken over.
+        """Take over one line; see `EvidenceSink`. Raises OSError when too many lines wait. The line is written all the
+        same, unless so many wait that the log must end; then it ends before the first line that was not taken over.
         """
         self._given += 1
         waiting = self.waiting
@@ -279,13 +278,13 @@ class EvidenceWriter:
         return self._given
 
     def trouble(self) -> str | None:
-        """Why lines are not kept, once for each failure of the disk."""
-        if not self._keeper.troubles.empty():  # nobody else takes from it
+        """Why lines are not written, once for each failure of the disk."""
+        if not self._keeper.troubles.empty():  # only this thread takes from it
             return self._keeper.troubles.get_nowait()
         return self._overdue(self._lateness.stuck)
 
     def late(self) -> str | None:
-        """That a line was not on the disk in time, once for each time that it falls behind."""
+        """That a line was not on the disk in time, once each time the disk falls behind."""
         return self._overdue(self._lateness.late)
 
     def _overdue(self, judge: Callable[[int, float], str | None]) -> str | None:
@@ -295,7 +294,7 @@ class EvidenceWriter:
         return judge(keeper.synced, monotonic())
 
     def settle(self) -> None:
-        """Waits until all that was given is on the disk. Raises OSError when it is not, or not in time."""
+        """Wait until all lines are on the disk. Raises OSError when they are not, or not in time."""
         until_s = monotonic() + self._close_s
         while self._keeper.synced < self._given:
             if self._keeper.failing:
@@ -308,8 +307,8 @@ class EvidenceWriter:
         return OSError(errno.ETIMEDOUT, f"the disk has not answered for {self._close_s:g} s")
 
     def close(self) -> None:
-        """Waits until all that can be written is, and closes the file. Raises OSError, also when the disk does not
-        answer: what is left is then left to the thread, and not counted as kept. Closing twice does nothing.
+        """Wait until all possible lines are written, and close the file. Raises OSError, also when the disk does not
+        answer: the remaining lines are then left to the thread, and do not count as kept. Closing twice does nothing.
         """
         if self._thread is None:
             return
@@ -320,7 +319,7 @@ class EvidenceWriter:
         if self._last_error is not None:
             raise self._last_error
 
-    # -------------------------------------------------------- in the thread
+    # -------------------------------------------------------- in the writing thread
 
     def _run(self) -> None:
         keeper = self._keeper
@@ -340,7 +339,7 @@ class EvidenceWriter:
             self._over.set()
 
     def _next(self) -> tuple[list[tuple[bytes, int]], bool]:
-        """All lines that wait, after at least one came or something is due; False when no more will come."""
+        """The waiting lines, after at least one came or something is due; False when no more will come."""
         batch: list[tuple[bytes, int]] = []
         with suppress(Empty):
             item = self._queue.get(timeout=self._sync_s if self._keeper.busy else None)
@@ -352,10 +351,10 @@ class EvidenceWriter:
 
 
 class Keeper:
-    """Feeds one evidence file. `written` and `synced` count lines from the first on, and never more than is certain.
+    """Writes one evidence file. `written` and `synced` count lines from the first on, and never more than is certain.
+    Another thread may read them. `troubles` holds the disk's errors, each once.
 
-    They may be read in another thread. `troubles` is what the disk refused, in its words, each refusal once. It neither
-    waits nor looks at a clock: the writer's thread does, or a test.
+    It neither waits nor reads a clock: the writer's thread does, or a test.
     """
 
     def __init__(self, file: EvidenceFile, *, sync_after_s: float = SYNC_AFTER_S) -> None:
@@ -364,25 +363,24 @@ class Keeper:
         self.troubles: SimpleQueue[str] = SimpleQueue()
         self._sync_after_s = sync_after_s
         self._taken = 0
-        self._unsynced = False  # something was written since the last sync
-        self._promised_s: float | None = None  # since when a line waits that is to be synced
-        self._refused = False  # lines wait that the disk did not take
-        self._doubtful = False  # a sync failed: what is durable is not known any more
+        self._unsynced = False  # lines were written since the last sync
+        self._promised_s: float | None = None  # since when a line waits to be synced
+        self._refused = False  # lines wait that the disk refused
+        self._doubtful = False  # a sync failed: it is unknown what is durable
 
     @property
     def busy(self) -> bool:
-        """Whether something is left to be written or synced."""
+        """Whether lines are left to write or sync."""
         return self._unsynced or self.file.waiting > 0
 
     @property
     def failing(self) -> bool:
-        """Whether the disk refused something, and not all of that was made good."""
+        """Whether a refused line is not written yet."""
         return self._doubtful or self._refused
 
     def take(self, batch: Sequence[tuple[bytes, int]], now_s: float) -> None:
-        """Takes lines over, each with its class of durability, in their order; syncs if one asks for it, or it is time.
-
-        Without lines: nothing came for a while, and all that is left is written and synced.
+        """Take over lines, each with its durability class, in order; sync if one requires it, or if it is time. Without
+        lines nothing came for a while, and everything left is written and synced.
         """
         self._taken += len(batch)
         highest = WRITTEN
@@ -396,7 +394,7 @@ class Keeper:
             except OSError as error:
                 refused = error
         if not batch:
-            with suppress(OSError):  # it was told when it was refused first
+            with suppress(OSError):  # the refusal was reported already
                 self.file.flush()
         if refused is not None:
             self._tell(refused)
@@ -409,12 +407,12 @@ class Keeper:
             self._sync(now_s)
 
     def fail(self, reason: str) -> None:
-        """Nothing that comes from here on can be believed."""
+        """Note that later results are not reliable."""
         self._doubtful = True
         self.troubles.put(reason)
 
     def close(self) -> None:
-        """Writes and syncs what it can, and closes the file. Raises OSError."""
+        """Write and sync what is possible, and close the file. Raises OSError."""
         try:
             self.file.close()
         finally:
@@ -449,38 +447,38 @@ class Keeper:
 
 
 class Lateness:
-    """Watches over the sync of lines, one at a time: the next is the last that was given when the one before came true.
+    """Supervises the sync of lines, one at a time: after a line was synced, the last one taken over is next.
 
-    Times are in seconds of the caller's clock, which never goes back. A time in which nobody looked does not count: the
-    whole process stood still.
+    Times are in seconds of the caller's clock, which never goes back. Time between two distant calls does not count:
+    the whole process stood still.
     """
 
     def __init__(self, late_s: float = SYNC_US / 1e6, stuck_s: float = STUCK_S) -> None:
         self._late_s, self._stuck_s = late_s, stuck_s
-        self._promised = 0  # the last line that is to be synced,
-        self._watched = 0  # the one that is watched,
-        self._since_s = 0.0  # since when,
-        self._told_s = 0.0  # and after how long it was told to be late
-        self._looked_s = 0.0  # when somebody looked last
+        self._promised = 0  # the last line to be synced
+        self._watched = 0  # the supervised line
+        self._since_s = 0.0  # since when it is supervised
+        self._told_s = 0.0  # the delay that was last reported
+        self._looked_s = 0.0  # the time of the last call
 
     def given(self, number: int, durability: int) -> None:
-        """Line `number`, counted from 1, was given to the disk."""
+        """Note that line `number`, counted from 1, was handed to the disk."""
         if durability >= SYNCED:
             self._promised = number
 
     def kept(self, synced: int) -> bool:
-        """Whether all that was promised came true: then neither `late` nor `stuck` has anything to say."""
+        """Whether every promised sync is done: then `late` and `stuck` have nothing to report."""
         return self._promised <= synced
 
     def late(self, synced: int, now_s: float) -> str | None:
-        """That a line is late, once for each time that the disk falls behind; `synced` lines are on it."""
+        """That a line is late, once each time the disk falls behind; `synced` lines are on the disk."""
         if self._told_s or self._waited_s(synced, now_s) <= self._late_s:
             return None
         self._told_s = self._late_s
         return f"a write did not reach the disk within {SYNC_US // 1_000} ms"
 
     def stuck(self, synced: int, now_s: float) -> str | None:
-        """That the disk hangs, once for each time that it does."""
+        """That the disk hangs, once each time it does."""
         if self._waited_s(synced, now_s) <= self._stuck_s or self._told_s >= self._stuck_s:
             return None
         self._told_s = self._stuck_s

@@ -1,4 +1,4 @@
-"""Where this program keeps what belongs to its user."""
+"""The folders in which this program keeps its user's files."""
 
 import os
 from pathlib import Path
@@ -13,11 +13,11 @@ def data_folder() -> Path:
 
 
 def cache_folder() -> Path:
-    """The user's cache folder (on Linux below XDG_CACHE_HOME), for what may be deleted at any time."""
+    """The user's cache folder (on Linux below XDG_CACHE_HOME), for files that may be deleted at any time."""
     chosen = os.environ.get("RTSHCUA_DATA_DIR")
     return Path(chosen) / "cache" if chosen else platformdirs.user_cache_path("rtshcua", appauthor=False)
 
 
 def state_folder() -> Path:
-    """Where the replay state is kept, unless `--state-dir` says otherwise."""
+    """The folder of the replay state, unless `--state-dir` sets another."""
     return data_folder() / "state"

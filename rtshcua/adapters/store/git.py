@@ -1,4 +1,4 @@
-"""Which files git says have changed: since where this branch left another, or since the last commit."""
+"""Find the files that changed according to git: since this branch left another, or since the last commit."""
 
 import os
 import subprocess
@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-#: seconds for one question: the index may be a pipe, for which git waits
+#: seconds for one git command: the index may be a pipe, for which git waits
 PATIENCE = 120.0
-#: what of git's environment serves whoever runs the command, and starts nothing; the rest says which repository is
-#: meant, whatever the folder, or names programs
+#: the environment variables of git that are kept: they serve whoever runs the command and start nothing; others select
+#: a repository whatever the folder is, or name programs
 _KEPT = frozenset(
     {
         "GIT_CEILING_DIRECTORIES",
@@ -19,10 +19,10 @@ _KEPT = frozenset(
         "GIT_CONFIG_SYSTEM",
     }
 )
-#: and of a hook's repository, where no other is found
+#: and those of a hook's repository, where no other is found
 _TOLD = ("GIT_DIR", "GIT_WORK_TREE", "GIT_INDEX_FILE", "GIT_PREFIX", "GIT_COMMON_DIR", "GIT_OBJECT_DIRECTORY")
-#: The settings of a checkout may name programs. Whatever of them git would start to say what has changed is off.
-#: Filters are found by their names, and turned off one by one: see `_filters`.
+#: The settings of a checkout may name programs. Those that git would run to find changes are off. Filters are found by
+#: name and turned off one by one: see `_filters`.
 _OFF = {
     "core.fsmonitor": "false",
     "core.hooksPath": os.devnull,
@@ -46,15 +46,15 @@ _QUIET = {
     "GIT_PAGER": "cat", "GIT_ASKPASS": "false", "LC_ALL": "C",
 }  # fmt: skip
 
-#: the settings of a filter, and what they are where there is none
+#: the settings that turn a filter off
 _NO_FILTER = {"required": "false"}
 
-#: an environment to ask git in
+#: environment variables for git
 _Around = tuple[tuple[str, str], ...]
 
 
 class NoChanges(Exception):
-    """It cannot be said what has changed; `help` says what to do."""
+    """The changed files cannot be found; `help` says what to do."""
 
     def __init__(self, message: str, help: str | None = None) -> None:
         super().__init__(message)
@@ -62,8 +62,8 @@ class NoChanges(Exception):
 
 
 class GitChanges(NamedTuple):
-    """What differs in the repositories whose folders are `tops`: files, deleted ones included, and whole folders, such
-    as submodules and what a link to a folder leads to. All paths are absolute, and free of links but for the last part.
+    """The changes in the repositories with the folders `tops`: files, deleted ones included, and whole folders, such as
+    submodules and the targets of links to folders. All paths are absolute, with links resolved except in the last part.
     """
 
     files: frozenset[str]
@@ -71,7 +71,7 @@ class GitChanges(NamedTuple):
     tops: tuple[str, ...]
 
     def touch(self, path: str) -> bool | None:
-        """Whether a file has changed, under its own name, or where that leads; None where no repository tells."""
+        """Whether a file has changed, under its own name or its target's; None outside of any repository."""
         folder, name = os.path.split(os.path.abspath(path))  # noqa: PTH100  a Path costs as much as the answer
         places = {os.path.join(os.path.realpath(folder), name), os.path.realpath(path)}  # noqa: PTH118
         if any(place in self.files or _is_below(place, self.folders) for place in places):
@@ -80,10 +80,9 @@ class GitChanges(NamedTuple):
 
 
 def changed_files(paths: Iterable[Path], base: str | None = None) -> GitChanges:
-    """What differs from `base`, or is not known to git yet, in the repositories that `paths` lie in.
-
-    With a `base`, what counts is the commit at which this branch left it; without one, the last commit. Raises
-    NoChanges where there is no git, no such base, or a path that lies in no repository.
+    """The changes since `base`, and files unknown to git, in the repositories of `paths`. With a `base`, they count
+    from the commit at which this branch left it; without one, from the last commit. Raises NoChanges where there is no
+    git, no such base, or a path outside of any repository.
     """
     tops = {top: None for asked in dict.fromkeys(map(_folders, paths)) for top in _tops(asked)}
     files: set[str] = set()
@@ -98,7 +97,7 @@ def changed_files(paths: Iterable[Path], base: str | None = None) -> GitChanges:
 
 
 def _names(top: str, around: _Around, base: str | None) -> list[str]:
-    """The names of what differs in one repository; of a submodule its own."""
+    """The names of the changes in one repository, including those in its submodules."""
     since = "HEAD" if base is None else _merge_base(base, top, around)
     if _known(since, top, around):
         words = (
@@ -121,7 +120,7 @@ def _names(top: str, around: _Around, base: str | None) -> list[str]:
 
 
 def _folders(path: Path) -> tuple[str, ...]:
-    """The folders to ask about a path: itself, or the nearest above it that is there; also of what it leads to."""
+    """The folders to ask about a path: itself or its nearest existing parent, and the same for its target."""
     found: dict[str, None] = {}
     for place in (Path(os.path.realpath(path.parent), path.name), Path(os.path.realpath(path))):
         above = next(each for each in (place, *place.parents) if each.is_dir())
@@ -143,7 +142,7 @@ def _tops(folders: tuple[str, ...]) -> list[tuple[str, _Around]]:
 
 
 def _top(folder: str) -> tuple[str, _Around]:
-    """The top of the repository that a folder lies in, and the environment to ask about it in."""
+    """The top of a folder's repository, and the environment for git in it."""
     above = [Path(folder), *Path(folder).parents]
     here = any((each / ".git").exists() for each in above)
     kept = _KEPT if here else _KEPT.union(_TOLD)
@@ -154,7 +153,7 @@ def _top(folder: str) -> tuple[str, _Around]:
 
 
 def _filters(folder: str, around: _Around) -> _Around:
-    """Turns off what a repository's settings have contents pass through, as settings in the environment."""
+    """Turn off a repository's content filters, by settings in the environment."""
     try:
         named = _git("config", "--null", "--name-only", "--get-regexp", r"^filter\..*", folder=folder, around=around)
     except NoChanges:  # there are none

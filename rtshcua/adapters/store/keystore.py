@@ -1,11 +1,10 @@
-"""The user's signing keys and trust root: `<data folder>/keys/`, one file a key, `root.trust`, and the roots before it,
-`root-1.trust` and so on: who missed some is given them in order. What was revoked lies there as `revoked-<kid>.key`.
+"""The user's signing keys and trust root: `<data folder>/keys/` with one file for each key, `root.trust`, and its
+predecessors `root-1.trust` and so on, for whoever missed some. Revoked keys are kept as `revoked-<kid>.key`.
 
-A mission key is for one source: `mission-agent.key` signs what agents propose, `mission-operator.key` what people do.
-An approval key is of one person in one role, as `approval-ada-supervisor.key`.
-
-A key file is readable by its owner alone and encrypted, unless its key is for development. The folder appears whole,
-with every key and the root that names them, or not at all.
+A mission key belongs to one source: `mission-agent.key` signs what agents propose, `mission-operator.key` what people
+do. An approval key belongs to one person in one role, like `approval-ada-supervisor.key`. A key file is readable by its
+owner alone and encrypted, unless its key is for development. The folder appears complete, with every key and the root
+that names them, or not at all.
 """
 
 from collections import Counter
@@ -28,16 +27,16 @@ from rtshcua.wire.untrusted import Untrusted
 
 ROOT = "root.trust"
 
-#: who proposes missions, with a key each
+#: the sources of missions, with one key each
 PROPOSERS = ("agent", "operator")
-#: the role that both speak for, where no other is named
+#: the role of both sources by default
 OPERATOR = "operator"
-#: whoever made the keys, where nobody is named
+#: the name of the person with the first approval key, by default
 OWNER = "owner"
 
 
 class KeyStoreError(Untrusted):
-    """A key store that does not serve: `no-keys`, `exists`, `exposed`, `too-large`."""
+    """A key store that cannot be used: `no-keys`, `exists`, `exposed`, `too-large`."""
 
 
 class KeyStore:
@@ -47,16 +46,16 @@ class KeyStore:
         self.folder = data / "keys"
 
     def exists(self) -> bool:
-        """Whether keys were made here."""
+        """Whether the folder holds keys."""
         return self.folder.is_dir()
 
     def key_path(self, duty: Duty, number: int = 1, *, whose: str = "") -> Path:
-        """Where the key of a duty is: of a mission key `whose` is its source. There may be several alike."""
+        """The file of the key of a duty; for a mission key `whose` is its source. A duty may have several keys."""
         stem = f"{duty}-{whose}" if whose else str(duty)
         return self.folder / (f"{stem}.key" if number == 1 else f"{stem}-{number}.key")
 
     def paths(self, root: TrustRoot) -> dict[bytes, Path]:
-        """Where the key of each `kid` in the root is, if it is here: they are numbered as the root names them."""
+        """The file of each `kid` in the root that is here: files are numbered in the order of the root."""
         counts: Counter[tuple[Duty, str]] = Counter()
         found = {}
         for key in root.keys:
@@ -66,9 +65,8 @@ class KeyStore:
         return found
 
     def chain(self) -> list[bytes]:
-        """The signed trust roots, as many as are kept here without a gap, from the oldest to the one in force.
-
-        Raises `KeyStoreError` (`no-keys`).
+        """The signed trust roots without a gap, from the oldest that is kept to the one in force. Raises
+        `KeyStoreError` (`no-keys`).
         """
         found = [self.root()]
         version = _claimed(found[0]).version
@@ -77,12 +75,12 @@ class KeyStore:
         return found
 
     def earlier_path(self, version: int) -> Path:
-        """Where the signed trust root of a version is, after another took its place."""
+        """The file of the signed trust root of a version that was replaced."""
         return self.folder / f"root-{version}.trust"
 
     @property
     def root_path(self) -> Path:
-        """Where the signed trust root is."""
+        """The file of the signed trust root."""
         return self.folder / ROOT
 
     def create(
@@ -99,13 +97,13 @@ class KeyStore:
         policies: Sequence[str] = (ANY,),
         approver: str = OWNER,
     ) -> TrustRoot:
-        """Makes a key for each duty, from 32 secret bytes of `seed` each, and the root that names them.
+        """Make a key for each duty, from 32 secret bytes of `seed` each, and the root that names them.
 
-        There is a mission key for what agents propose and another for what people do; the root trusts them for `roles`
-        and under `policies` (names, or any). The one approval key is of `approver` in the role `operator`: it recalls,
-        and `add` makes more. So many `witnesses` have a key each; what `witness_threshold` of them cosigned counts as
-        anchored. All are for every vehicle.
-        Raises `KeyStoreError` (`exists`), and `KeyFileError` for keys that are neither encrypted nor for development.
+        There is one mission key for agents and another for people; the root trusts them for `roles` and under
+        `policies` (names, or any). The one approval key belongs to `approver` in the role `operator`: it can recall,
+        and `add` makes more keys. `witnesses` is the number of witness keys; a checkpoint that `witness_threshold` of
+        them cosigned is anchored. All keys apply to every vehicle. Raises `KeyStoreError` (`exists`), and
+        `KeyFileError` for keys that are neither encrypted nor for development.
         """
         if self.exists():
             raise KeyStoreError("exists", f"`{self.folder}` already holds keys")
@@ -144,11 +142,9 @@ class KeyStore:
         self, seed: bytes, named: Callable[[SigningKey], VerificationKey], *, duty: Duty, passphrase: bytes | None,
         signer: SigningKey, now_us: int,
     ) -> TrustRoot:  # fmt: skip
-        """Makes one key more, of 32 secret bytes, and the next version of the root, which names it as `named` says and
-        which the root key `signer` signs.
-
-        Who pinned the root key trusts that root too. Raises `KeyStoreError` (`no-keys`, `exists`), `KeyFileError`, and
-        `RootError` for a root that would not be accepted.
+        """Make another key, from 32 secret bytes, and the next version of the root, which names it as in `named` and is
+        signed by the root key `signer`. Whoever pinned the root key trusts that root too. Raises `KeyStoreError`
+        (`no-keys`, `exists`), `KeyFileError`, and `RootError` for an invalid root.
         """
         root = open_root(self.root(), pinned=self.pin(), now_us=now_us)
         key = SigningKey.from_seed(seed, duty=duty, development=root.development)
@@ -158,16 +154,16 @@ class KeyStore:
         return self._put(root, newer, signer, key, passphrase)
 
     def revoke(self, names: Sequence[bytes], *, signer: SigningKey, now_us: int) -> TrustRoot:
-        """Makes the next version of the root, which trusts none of these keys ever again: the `kid` of keys that it
-        names, or the fingerprints of links' keys. Raises as `add`; a root key is changed by `rotate` alone.
+        """Make the next version of the root, which revokes these keys for ever: the `kid` of keys in it, or the
+        fingerprints of link keys. Raises as `add`; a root key is only changed by `rotate`.
         """
         root = open_root(self.root(), pinned=self.pin(), now_us=now_us)
         keys = tuple(key for key in root.keys if key.kid not in names)
         return self._put(root, _next(root, now_us, keys=keys, revoked=_revoked(root, names)), signer)
 
     def renew(self, kid: bytes, seed: bytes, *, passphrase: bytes | None, signer: SigningKey, now_us: int) -> TrustRoot:
-        """Makes a key that takes the place of another, for the same duty and with the same bounds, and the next version
-        of the root, which revokes the other. Raises as `add`.
+        """Replace a key by a new one with the same duty and bounds, and make the next version of the root, which
+        revokes the old one. Raises as `add`.
         """
         root = open_root(self.root(), pinned=self.pin(), now_us=now_us)
         old = next(key for key in root.keys if key.kid == kid)
@@ -179,8 +175,9 @@ class KeyStore:
     def rotate(
         self, seed: bytes, *, passphrase: bytes | None, signer: SigningKey, now_us: int, expires_us: int | None = None
     ) -> TrustRoot:
-        """Changes the root key, in two versions of the root: the first names both keys, and the old one signs it; the
-        second revokes the old one, and the new one signs it. An expired root may be changed so. Raises as `add`.
+        """Change the root key, in two versions of the root: the first names both keys and is signed by the old one; the
+        second revokes the old one and is signed by the new one. An expired root can be changed like this. Raises as
+        `add`.
         """
         root = open_root(self.root(), pinned=self.pin(), now_us=0)
         key = SigningKey.from_seed(seed, duty=Duty.ROOT, development=root.development)
@@ -198,8 +195,8 @@ class KeyStore:
         self, root: TrustRoot, newer: TrustRoot, signer: SigningKey, fresh: SigningKey | None = None,
         passphrase: bytes | None = None,
     ) -> TrustRoot:  # fmt: skip
-        """Puts a root in the place of another, which is kept, with the file of a key that is new. Files of keys that
-        are revoked now are set aside, and those of others follow the numbers that they have in the new root.
+        """Replace a root, which is kept, and write the file of a new key. Files of revoked keys are renamed, and those
+        of others follow their numbers in the new root.
         """
         signed, before, after = newer.sign(signer), self.paths(root), self.paths(newer)
         made = None if fresh is None else dump_signing_key(fresh, passphrase=passphrase)
@@ -212,25 +209,25 @@ class KeyStore:
         return newer
 
     def provisioned(self, vehicle: str) -> bytes | None:
-        """The name of the boundary's key that a folder was provisioned with for a vehicle, empty for none and where
-        that is not known; None where no folder was. Raises OSError.
+        """The name of the boundary key that a vehicle's folder was provisioned with, empty for none or if unknown; None
+        without such a folder. Raises OSError.
         """
         data = read_if_there(self._provisioned_path(vehicle), MAX_KEY_FILE)
         if data is None:
             return None
         try:
             return bytes.fromhex(data.decode())
-        except ValueError:  # it was, whatever became of the file
+        except ValueError:  # it was provisioned, even if the file is damaged
             return b""
 
     def provision(self, vehicle: str, boundary_key: bytes) -> None:
-        """Remember that a folder is provisioned for a vehicle, with the boundary's key of this name. Raises OSError."""
+        """Record that a folder is provisioned for a vehicle, with the boundary key of this name. Raises OSError."""
         path = self._provisioned_path(vehicle)
         make_folder(path.parent, mode=PRIVATE_FOLDER)
         write_file(path, boundary_key.hex().encode() + b"\n", mode=PRIVATE_FILE)
 
     def provision_again(self, vehicle: str, boundary_key: bytes | None) -> None:
-        """Remember what was before: no folder at all, for None. Raises OSError."""
+        """Restore the earlier record: none, for None. Raises OSError."""
         if boundary_key is None:
             self._provisioned_path(vehicle).unlink(missing_ok=True)
         else:
@@ -240,9 +237,8 @@ class KeyStore:
         return self.folder.parent / "provisioned" / f"vehicle-{vehicle}"
 
     def signing_key(self, duty: Duty, *, passphrase: bytes | None = None, whose: str = "") -> SigningKey:
-        """The key of a duty: of mission keys that of the source `whose`, of approval keys that of the person and role.
-
-        Raises `KeyStoreError`, `KeyFileError` (`passphrase-needed`, ...) and `WrongDuty`.
+        """The key of a duty: a mission key of the source `whose`, an approval key of the person and role. Raises
+        `KeyStoreError`, `KeyFileError` (`passphrase-needed`, ...) and `WrongDuty`.
         """
         self._expect()
         return read_key(self.key_path(duty, whose=whose), duty, passphrase=passphrase)
@@ -270,7 +266,7 @@ def _revoked(root: TrustRoot, names: Sequence[bytes]) -> tuple[bytes, ...]:
 
 
 def _move(path: Path, to: Path) -> None:
-    """Gives a file another name; it may not be here at all, for keys are kept elsewhere too."""
+    """Rename a file, if it exists: keys may be kept elsewhere too."""
     data = None if path == to else read_if_there(path, MAX_KEY_FILE)
     if data is not None:
         write_new(to, data, mode=PRIVATE_FILE)
@@ -278,12 +274,12 @@ def _move(path: Path, to: Path) -> None:
 
 
 def _claimed(data: bytes) -> TrustRoot:
-    """What a root says. Raises `Untrusted`."""
+    """The unverified content of a root. Raises `Untrusted`."""
     return open_root(data, pinned=cose.unverified(data, limit=MAX_ROOT).kid, now_us=0)
 
 
 def whose(key: VerificationKey) -> str:
-    """Whose a key is among those of its duty, as its file is named: a source, or a person in a role."""
+    """The owner of a key among those of its duty, as in its file name: a source, or a person in a role."""
     if key.duty is Duty.APPROVAL:
         return f"{key.person}-{key.roles[0]}"
     return key.sources[0] if key.duty is Duty.MISSION and len(key.sources) == 1 else ""
@@ -296,7 +292,8 @@ def read_key(path: Path, duty: Duty, *, passphrase: bytes | None) -> SigningKey:
     told = KeyStoreError("exposed", f"other users may read the key `{path}`: {why}")
     if why is not None and recognised(data) is KEY:
         raise told
-    key = load_signing_key(data, duty=duty, passphrase=passphrase)  # what is no key is told as that, not by its mode
+    # a file without a key is reported as that, not by its mode
+    key = load_signing_key(data, duty=duty, passphrase=passphrase)
     if why is not None:
         raise told
     return key

@@ -1,4 +1,4 @@
-"""Sets of files that are laid whole or not at all."""
+"""Write sets of files completely or not at all."""
 
 import os
 import shutil
@@ -13,7 +13,9 @@ from rtshcua.adapters.store.writing import replace as put
 
 
 class Taken(NamedTuple):
-    """Why nothing was laid: these names are taken, by files (`replaceable`), or by what no file can replace."""
+    """Why nothing was written: these names are taken, by files (`replaceable`) or by something that no file can
+    replace.
+    """
 
     paths: tuple[Path, ...]
     replaceable: bool
@@ -21,7 +23,7 @@ class Taken(NamedTuple):
 
 @contextmanager
 def appearing(folder: Path) -> Iterator[Path]:
-    """A folder that its owner alone may look into; it takes its place once it is filled, and is gone if that fails."""
+    """A folder that only its owner may look into; it takes its place once it is filled, and is removed on failure."""
     fresh = Path(mkdtemp(prefix=UNFINISHED, dir=folder.parent))  # mode 0700
     try:
         yield fresh
@@ -33,10 +35,10 @@ def appearing(folder: Path) -> Iterator[Path]:
 
 
 def lay(files: Mapping[str, bytes], folder: Path, *, replace: bool = False) -> Taken | None:
-    """Write `files`, by their paths below `folder`, which is made where it is missing. None: all of them are there.
+    """Write `files`, by their paths below `folder`, which is made if missing. None: all of them are written.
 
-    Nothing that is there already is touched, unless `replace`, and then only files of the same names. When anything
-    fails, a full disk say, what was laid is taken away again, what was replaced is put back, and OSError rises.
+    Existing files are left alone, unless `replace`, and then only files of the same names are replaced. On any failure,
+    such as a full disk, written files are removed, replaced ones are restored, and OSError is raised.
     """
     targets = {folder / name: data for name, data in files.items()}
     blocked = _blocked(targets, folder)
@@ -45,7 +47,7 @@ def lay(files: Mapping[str, bytes], folder: Path, *, replace: bool = False) -> T
     taken = tuple(target for target in targets if os.path.lexists(target))
     if taken and not replace:
         return Taken(taken, replaceable=True)
-    with ExitStack() as undo:  # Ctrl-C too
+    with ExitStack() as undo:  # also on Ctrl-C
         for target in targets:
             _make_folders(target.parent, undo)
         aside = Path(mkdtemp(prefix=UNFINISHED, dir=folder))
@@ -63,7 +65,7 @@ def lay(files: Mapping[str, bytes], folder: Path, *, replace: bool = False) -> T
 
 
 def _blocked(targets: Mapping[Path, bytes], folder: Path) -> tuple[Path, ...]:
-    """What stands where a folder must be, or is a folder where a file must be."""
+    """Files where a folder must be, and folders where a file must be."""
     above = {parent for target in targets for parent in target.parents}
     places = [place for place in above if os.path.lexists(place) and not place.is_dir()]
     return (*sorted(places), *(target for target in targets if target.is_dir() and not target.is_symlink()))
@@ -77,10 +79,10 @@ def _make_folders(folder: Path, undo: ExitStack) -> None:
 
 
 def _remove(folder: Path) -> None:
-    with suppress(OSError):  # somebody put something there
+    with suppress(OSError):  # another program put something there
         folder.rmdir()
 
 
 def _put_back(old: Path, target: Path) -> None:
-    with suppress(FileNotFoundError):  # it never was away
+    with suppress(FileNotFoundError):  # it was never moved away
         old.rename(target)

@@ -1,10 +1,9 @@
-"""What `lint` remembers from run to run: one file an entry, in the user's cache folder, by the path of the checkout.
-
-It may be deleted at any time. No checkout says where it lies, and nothing is kept in one: strangers may write there (a
-pull request, an archive). So nothing but the system guards the entries: where others than the user could write to
-the folder, nothing is remembered. An entry is written beside its place and moved there, so that runs at the same
-time read either the old one or the new one. Whatever cannot be read or written is as if it were not there: a cache is
-never a reason to fail. Below the cache folder no link is followed.
+"""The cache of `lint` between runs: one file for each entry, in the user's cache folder, by the path of the checkout.
+It may be deleted at any time. A checkout neither determines its place nor contains it, because strangers may write
+there (a pull request, an archive). So entries are protected only by the system: if other users can write to the folder,
+nothing is cached. An entry is written to a temporary file and renamed, so that concurrent runs read either the old or
+the new one. An entry that cannot be read or written counts as missing: the cache never causes a failure. Below the
+cache folder no link is followed.
 """
 
 import os
@@ -18,7 +17,7 @@ from rtshcua.adapters.store.reading import opened_folder, read_regular
 from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, make_folder, replace, write_new
 
 FOLDER: Final = "lint"
-#: of the form of entries; what has another is not looked at
+#: the version of the entries; others are ignored
 _FORM: Final = "3"
 _LARGEST: Final = 16 << 20
 _TAG: Final = (
@@ -28,21 +27,20 @@ _TAG: Final = (
 
 
 class LintCache:
-    """Entries by name, of one checkout, below the user's cache folder, which is made when the first one is kept.
-
-    A `fresh` one gives nothing but what was kept in it during this run.
+    """Entries by name, of one checkout, below the user's cache folder, which is made for the first one. A `fresh` cache
+    returns only entries of this run.
     """
 
     def __init__(self, user: Path, checkout: Path, *, fresh: bool = False) -> None:
         self._root = user
         self._place = user / FOLDER / _FORM / sha256(os.fsencode(os.path.realpath(checkout))).hexdigest()[:40]
-        self._works = user.is_absolute()  # XDG Base Directory Specification: others are ignored
+        self._works = user.is_absolute()  # XDG Base Directory Specification: relative paths are ignored
         self._fresh = fresh
         self._kept: dict[str, bytes] = {}
         self._ours: bool | None = None
 
     def get(self, name: str) -> bytes | None:
-        """An entry as it was kept, or None."""
+        """An entry, or None."""
         if name in self._kept:
             return self._kept[name]
         if self._fresh or not self._works:
@@ -52,11 +50,11 @@ class LintCache:
             trusted = self._trusted()
         except OSError:
             return None
-        digest, _, entry = data.partition(b"\n")  # a loss of power may leave anything: none is synced
+        digest, _, entry = data.partition(b"\n")  # entries are not synced, so a power failure may leave anything
         return entry if trusted and digest == _digest(entry) else None
 
     def put(self, name: str, entry: bytes) -> None:
-        """Keep an entry, if the system lets us; after the first that it does not, no further one is tried."""
+        """Keep an entry if possible; after the first failure no further one is tried."""
         self._kept[name] = entry
         if not self._works or len(entry) + 65 > _LARGEST:
             return
@@ -68,7 +66,7 @@ class LintCache:
             self._works = False
 
     def _prepare(self) -> None:
-        """Make the folder, and say in it what it is, for backups. Raises OSError for one that others may write to."""
+        """Make the folder, with a tag for backup programs. Raises OSError for one that other users can write to."""
         if self._ours:
             return
         make_folder(self._root)
@@ -79,7 +77,7 @@ class LintCache:
             raise PermissionError("other users can write to the cache")
 
     def _trusted(self) -> bool:
-        """Whether the folder of the checkout, and those above it up to the user's, are the user's own."""
+        """Whether the folder of the checkout, and those above it up to the user's, belong to the user alone."""
         if self._ours is None:
             self._ours = all(map(self._is_ours, (self._root, *self._place.parents, self._place)))
         return self._ours

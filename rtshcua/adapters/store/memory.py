@@ -1,4 +1,4 @@
-"""A few octets of memory that outlive this process, and not the machine's start: no disk is ever waited for."""
+"""A few octets of memory that outlive this process until the machine restarts: they never wait for a disk."""
 
 import mmap
 import os
@@ -14,14 +14,13 @@ _FOLDER: Final = Path("/dev/shm")
 
 
 def memory_file(name: str) -> Path:
-    """Where such memory of this user lies."""
+    """The file of such memory of this user."""
     return _FOLDER / f"rtshcua-{os.geteuid()}-{name}"
 
 
 def open_memory(name: str, octets: int) -> mmap.mmap | None:
-    """The memory of this name, with what was written there since the machine started; None where the system has none.
-
-    None too where something else lies there, or another user's file: nobody else may read or change it.
+    """The memory of this name, with its content since the machine started; None where the system has none. None too for
+    another kind of file or another user's, which others could read or change.
     """
     try:
         handle = os.open(memory_file(name), os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | UNAWAITED, PRIVATE_FILE)
@@ -32,7 +31,7 @@ def open_memory(name: str, octets: int) -> mmap.mmap | None:
         if not stat.S_ISREG(found.st_mode) or found.st_uid != os.geteuid() or found.st_nlink != 1:
             return None
         os.fchmod(handle, PRIVATE_FILE)
-        # written, so that the pages are there: a map of a file with holes would end the process where memory is short
+        # written, so that the pages exist: a map of a sparse file would end the process when memory is short
         os.pwrite(handle, os.pread(handle, octets, 0).ljust(octets, b"\0"), 0)
         return mmap.mmap(handle, octets)
     except (OSError, ValueError):

@@ -1,4 +1,4 @@
-"""Finds the configuration that counts for a file: the nearest upward, `rtshcua.toml` before `pyproject.toml`."""
+"""Find the configuration for a file: the nearest one upwards, `rtshcua.toml` before `pyproject.toml`."""
 
 from dataclasses import dataclass
 from os.path import normpath, relpath
@@ -9,31 +9,31 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.project.file_patterns import matches
 from rtshcua.ground.project.project_settings import NAMES, SHARED, ProjectSettings, misconfigured, parse_settings
 
-#: a configuration is a page or two; more than this of it is not read
+#: the limit for a configuration, which is a page or two
 LARGEST = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
 class Project:
-    """Settings, the file that they stand in (None: the defaults), and the folder that its paths are relative to."""
+    """Settings, their file (None: the defaults), and the folder that their paths are relative to."""
 
     settings: ProjectSettings
     root: Path
     file: Path | None = None
 
     def excludes(self, path: Path, patterns: tuple[str, ...]) -> bool:
-        """Whether one of these patterns of the configuration means a file."""
+        """Whether one of these patterns of the configuration matches a file."""
         return any(self.means(pattern, path) for pattern in patterns)
 
     def means(self, pattern: str, path: Path) -> bool:
-        """Whether a pattern of the configuration means a file; none means a file that lies outside of its folder."""
+        """Whether a pattern of the configuration matches a file; never one outside of its folder."""
         place = Path(relpath(normpath(path.absolute()), self.root)).as_posix()
         return not place.startswith("../") and matches(pattern, place)
 
 
 class Projects:
-    """The configurations of a run: each file has that which is nearest to it, unless one is given for all (`config`),
-    or none is to count (`isolated`). What was found is remembered by folder.
+    """The configurations of a run: each file has the nearest one, unless one is set for all (`config`), or none is used
+    (`isolated`). Results are cached by folder.
     """
 
     def __init__(self, config: Path | None = None, *, isolated: bool = False) -> None:
@@ -45,7 +45,7 @@ class Projects:
         self._by_folder: dict[Path, Project | Refusal] = {}
 
     def of(self, path: Path) -> Project | Refusal:
-        """The configuration that counts for a file or a folder."""
+        """The configuration for a file or a folder."""
         if self._given is not None:
             return self._given
         place = _absolute(path)

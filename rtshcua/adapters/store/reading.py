@@ -1,4 +1,4 @@
-"""Opening what others may have put there: a regular file or nothing, and it is never waited for."""
+"""Open files that others may have placed there: only regular files, and without waiting for them."""
 
 import os
 import stat
@@ -9,23 +9,22 @@ from io import BufferedReader
 from pathlib import Path
 from typing import BinaryIO, Final
 
-#: without O_NONBLOCK a pipe without a writer would be waited for; with O_NOCTTY no terminal becomes ours
+#: without O_NONBLOCK opening a pipe without a writer would block; with O_NOCTTY no terminal becomes the controlling one
 UNAWAITED: Final = os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC
 _FOLDER: Final = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
 
 
-#: the user who may read whatever there is
+#: the user who may read everything
 ROOT = 0
 
 
 class NotRegular(OSError):
-    """Something else than a regular file: a pipe, a device, a socket, a folder; or a link where none is followed."""
+    """Not a regular file: a pipe, a device, a socket or a folder; or a link where none is followed."""
 
 
 def open_regular(path: str | Path, root: Path | None = None) -> BufferedReader:
-    """A regular file, or a link to one, opened to be read. Below `root`, where one is given, no link is followed.
-
-    Raises `NotRegular` for everything else, and OSError as the system does.
+    """Open a regular file, or a link to one, for reading. Below `root`, if given, no link is followed. Raises
+    `NotRegular` for anything else, and OSError as the system does.
     """
     try:
         if root is None:
@@ -44,7 +43,7 @@ def open_regular(path: str | Path, root: Path | None = None) -> BufferedReader:
 
 @contextmanager
 def unfollowed(path: str | Path) -> Iterator[None]:
-    """What is opened here without following links: raises `NotRegular` for one."""
+    """Opening files in this block without following links raises `NotRegular` for a link."""
     try:
         yield
     except OSError as error:
@@ -54,8 +53,7 @@ def unfollowed(path: str | Path) -> Iterator[None]:
 
 
 def read_regular(path: str | Path, most: int, root: Path | None = None) -> bytes:
-    """What a regular file holds, but no more than one octet above `most`: who gets so many knows that it is too large.
-
+    """The content of a regular file, at most one octet more than `most`: that many octets show that it is too large.
     Raises as `open_regular`.
     """
     with open_regular(path, root) as file:
@@ -63,7 +61,7 @@ def read_regular(path: str | Path, most: int, root: Path | None = None) -> bytes
 
 
 def read_if_there(path: Path, most: int) -> bytes | None:
-    """What `read_regular` gives; None where there is no file."""
+    """The result of `read_regular`; None without a file."""
     try:
         return read_regular(path, most)
     except FileNotFoundError:
@@ -71,15 +69,15 @@ def read_if_there(path: Path, most: int) -> bytes | None:
 
 
 def expect_regular(handle: int, path: str | Path) -> None:
-    """Closes a descriptor that is not of a regular file, and raises `NotRegular`."""
+    """Close a descriptor that is not of a regular file, and raise `NotRegular`."""
     if not stat.S_ISREG(os.fstat(handle).st_mode):
         os.close(handle)
         raise NotRegular(ENXIO, "not a regular file", str(path))
 
 
 def exposed(file: BinaryIO) -> str | None:
-    """Why others may read, write or run an open file, in words: its mode, or whose it is; None where nobody may but who
-    runs this (and root, who may anything).
+    """Why other users may read, write or run an open file, in words: its mode or its owner; None where only this user
+    (and root) may.
     """
     found = os.fstat(file.fileno())
     mode = stat.S_IMODE(found.st_mode)
@@ -92,10 +90,8 @@ def exposed(file: BinaryIO) -> str | None:
 
 @contextmanager
 def opened_folder(folder: Path, root: Path | None = None, *, make: int | None = None) -> Iterator[int]:
-    """A descriptor of a folder. Below `root` no link is followed, whoever puts one there and whenever, and, where a
-    mode is given to `make` them with, folders that are missing are made, each synced.
-
-    Without a root, links are followed. Raises OSError.
+    """A descriptor of a folder. Below `root` no link is followed, whenever it was placed there, and with a mode for
+    `make` missing folders are made and synced. Without a root, links are followed. Raises OSError.
     """
     handle = os.open(root or folder, _FOLDER)
     try:
@@ -115,13 +111,11 @@ def opened_folder(folder: Path, root: Path | None = None, *, make: int | None = 
 
 
 def walk(folder: str | Path, *, every: bool = False) -> Iterator[tuple[str, list[str], list[str]]]:
-    """Each folder from this one down, with the names of the folders and of all else in it, as of `os.walk`: what is
-    taken out of the first is not gone into, no link is, nor what cannot be read. However deep they are: that one goes
-    as deep into itself as they do, and a stranger's may be deeper.
-
-    With `every`, raises OSError for a folder that is there and cannot be read.
+    """Each folder from this one down, with the names of its folders and other entries, like `os.walk`: names removed
+    from the first list, links and unreadable folders are skipped. It is not recursive, because a stranger's folders may
+    be nested deeply. With `every`, raises OSError for an existing folder that cannot be read.
     """
-    passed_over = FileNotFoundError if every else OSError  # one that was removed meanwhile
+    passed_over = FileNotFoundError if every else OSError  # one that was removed in the meantime
     waiting = [os.fspath(folder)]
     while waiting:
         place = waiting.pop()

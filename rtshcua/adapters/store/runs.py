@@ -17,9 +17,8 @@ _PLAIN = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz01234567
 
 
 def logs_of(given: Path) -> list[Path]:
-    """The logs that are meant: the file itself, that in the folder of a run, or those in all folders below.
-
-    Raises OSError for a folder that cannot be read.
+    """The logs that a path means: the file itself, the log in a run's folder, or the logs in all folders below. Raises
+    OSError for a folder that cannot be read.
     """
     if not given.is_dir():
         return [given]
@@ -30,8 +29,8 @@ def logs_of(given: Path) -> list[Path]:
 
 
 def lines_below(folder: Path) -> list[Path]:
-    """The files in a folder and all below it that may be logs by their suffix, whatever their names. Raises OSError for
-    a folder that cannot be read.
+    """The files in a folder and below with the suffix of logs, whatever their names. Raises OSError for a folder that
+    cannot be read.
     """
     suffix = Path(LOG).suffix
     return sorted(
@@ -43,8 +42,8 @@ def lines_below(folder: Path) -> list[Path]:
 
 
 class RunFolder:
-    """A new folder that holds the bundle, and makes room for its log, its telemetry and its summary. It is gone again
-    where the bundle cannot be written.
+    """A new folder with the bundle, for the log, the telemetry and the summary of a run. It is removed again where the
+    bundle cannot be written.
     """
 
     def __init__(self, runs: Path, *, name: str, bundle: bytes, utc_us: int) -> None:
@@ -57,15 +56,15 @@ class RunFolder:
             raise
 
     def log(self, disk: Disk = SYSTEM) -> EvidenceFile:
-        """The evidence log, opened for its first line; once."""
+        """Create the evidence log; to be called once."""
         return EvidenceFile(self.path / LOG, disk)
 
     def telemetry(self, disk: Disk = SYSTEM) -> TelemetryFile:
-        """The telemetry log, opened for its first frame; once."""
+        """Create the telemetry log; to be called once."""
         return TelemetryFile(self.path / TELEMETRY, disk)
 
     def write_summary(self, summary: dict[str, object]) -> None:
-        """Writes the summary, for a person and for scripts; it proves nothing, the log does."""
+        """Write the summary, for people and scripts; only the log proves anything."""
         replace(self.path / SUMMARY, msgspec.json.format(msgspec.json.encode(summary), indent=2) + b"\n")
 
 
@@ -76,7 +75,7 @@ def _folder_name(name: str, utc_us: int) -> str:
 
 
 def _new_folder(runs: Path, name: str) -> Path:
-    """A folder that was not there before: the second run within a second gets `-2`."""
+    """A new folder: the second run within a second gets `-2`."""
     make_folder(runs)
     number = 1
     while True:

@@ -1,7 +1,5 @@
 """Which files may be read as sources: the inputs, their project, the library, packs, and folders that the user allows.
-
-An import may be a stranger's. What it names outside of these is not opened, and the refusal does not tell whether the
-file exists.
+An import may be a stranger's: files elsewhere are not opened, and the refusal does not reveal whether they exist.
 """
 
 import os
@@ -14,13 +12,13 @@ from rtshcua.adapters.store.checkout import OutsideCheckout, checkout_of, lies_i
 from rtshcua.adapters.store.reading import NotRegular, read_regular
 from rtshcua.ground.language.size_limits import MAX_SIZE
 
-#: folders that imports may lead to besides, parted as in PATH: the user's to say, and no checkout's
+#: further folders for imports, separated as in PATH: set by the user, never by a checkout
 ALLOWED: Final = "RTSHCUA_IMPORTS"
 _WHY: Final = f"it is outside of the project (`{ALLOWED}` names further folders)"
 
 
 class ReadableSources:
-    """Folders, that of the `library` first, and files that were asked for themselves; `folders` may change."""
+    """The readable folders, the `library` first, and files that were named themselves; `folders` may change."""
 
     def __init__(self, library: str, asked: Iterable[str | Path] = ()) -> None:
         allowed = [each for each in os.environ.get(ALLOWED, "").split(os.pathsep) if os.path.isabs(each)]  # noqa: PTH117
@@ -33,8 +31,8 @@ class ReadableSources:
             self.ask(path)
 
     def ask(self, path: str | Path) -> None:
-        """A file that somebody names on the command line, or opens: what is in its project may be read too; where it is
-        in none, what is in the working folder, or else in its own.
+        """Allow a file that the user names or opens, and its project; outside of a project, the working folder or else
+        the file's own folder.
         """
         folder = os.path.dirname(os.path.abspath(path))  # noqa: PTH100, PTH120  without following links
         if folder not in self._edges:
@@ -48,19 +46,18 @@ class ReadableSources:
 
     @property
     def edges(self) -> tuple[str, ...]:
-        """All folders that may be read from."""
+        """All readable folders."""
         return (*self._always, *self.folders)
 
     def read(self, name: str) -> bytes:
-        """At most one octet more than the parser takes, so that it is the parser who says that a file is too large.
-
-        Raises `OutsideCheckout`, and OSError as `read_regular`.
+        """The content, at most one octet more than the parser accepts, so that the parser reports files that are too
+        large. Raises `OutsideCheckout`, and OSError as `read_regular`.
         """
         real, edge = self._placed(name)
         try:
             return read_regular(real, MAX_SIZE, edge)
         except FileNotFoundError:
-            if edge is None and Path(name).exists():  # a pipe by `/dev/stdin`, which leads to no path
+            if edge is None and Path(name).exists():  # a pipe through `/dev/stdin`, which has no path
                 raise NotRegular(ENXIO, "not a regular file", name) from None
             raise
 
@@ -69,7 +66,7 @@ class ReadableSources:
         return os.listdir(self._placed(name or ".")[0])  # noqa: PTH208
 
     def pack(self, name: str) -> str | None:
-        """The folder of an installed pack, from which may be read from then on; None where there is none."""
+        """The folder of an installed pack, which becomes readable; None without such a pack."""
         if name not in self._packs:
             from rtshcua.adapters.packs import folder  # noqa: PLC0415  slow, and few sources ask for a pack
 
@@ -79,7 +76,7 @@ class ReadableSources:
         return self._packs[name]
 
     def _placed(self, name: str) -> tuple[Path, Path | None]:
-        """Where a name leads, free of links, and the folder below which it stays."""
+        """The path of a name with links resolved, and the folder that contains it."""
         real = os.path.realpath(name)
         if real in self._asked:
             return Path(real), None

@@ -1,4 +1,4 @@
-"""The raw frames of a flight, as every MAVLink tool reads them."""
+"""Write the raw frames of a flight in a format that every MAVLink tool reads."""
 
 import errno
 import shutil
@@ -12,31 +12,31 @@ from rtshcua.adapters.store.evidence_file import SYSTEM, Disk, write_all
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.mavlink import tlog
 
-#: frames kept for a disk that does not keep up
+#: the most frames that wait for a slow disk
 MOST_WAITING = 100_000
-#: Bytes on the disk that frames leave free, for the log and the summary: a flight's log is a few hundred KB.
+#: Free bytes on the disk that are reserved for the log and the summary: a flight's log is a few hundred KB.
 LEFT_TO_THE_LOG = 4 << 20
 _EVERY_S = 0.1
-#: a disk that hangs is waited for this long at the end, in seconds
+#: how long to wait for a hanging disk at the end, in seconds
 FINISH_S = 10.0
 
 
 def free_bytes(folder: Path) -> int:
-    """How much room the disk of `folder` has for us."""
+    """The free space on the disk of `folder`."""
     return shutil.disk_usage(folder).free
 
 
 class TelemetryFile:
-    """A tlog in the making. Telemetry explains a flight and does not decide it: a full disk ends it, not the flight.
+    """A tlog during a flight. Telemetry explains a flight but does not decide it: a full disk ends the tlog, not the
+    flight.
 
-    A thread of its own writes, a few times a second, so that who keeps a frame neither waits for the disk nor wakes
-    anybody.
+    A thread writes a few times a second, so that keeping a frame neither waits for the disk nor wakes a thread.
     """
 
     def __init__(self, path: Path, disk: Disk = SYSTEM) -> None:
         self.path = path
         self.error: OSError | None = None
-        self.lost = 0  # frames that are not in the file; after an error, of all once it is finished
+        self.lost = 0  # frames that are not in the file; after an error, the final number once it is finished
         self._given = 0
         self._file = disk.create(path)
         self._waiting: deque[tuple[int, bytes]] = deque()
@@ -45,7 +45,7 @@ class TelemetryFile:
         self._thread.start()
 
     def write(self, utc_us: int, frame: bytes) -> None:
-        """Keeps a frame that arrived at `utc_us`; after the first error, which stays in `error`, nothing more."""
+        """Keep a frame that arrived at `utc_us`; nothing more after the first error, which is kept in `error`."""
         self._given += 1
         if self.error is None and len(self._waiting) < MOST_WAITING:
             self._waiting.append((utc_us, frame))
@@ -53,9 +53,8 @@ class TelemetryFile:
             self.lost += 1
 
     def finish(self, within_s: float = FINISH_S) -> bytes:
-        """Closes the file and gives the SHA-256 of what is on the disk; `lost` then says how much that is not.
-
-        Raises OSError, also when the disk does not answer in time: what is there then is not known.
+        """Close the file and return the SHA-256 of its content on the disk; `lost` then counts the missing frames.
+        Raises OSError, also when the disk does not answer in time: its content is then unknown.
         """
         self._over.set()
         self._thread.join(within_s)
@@ -71,7 +70,7 @@ class TelemetryFile:
             return file_digest(file, "sha256").digest()
 
     def _whole(self) -> int:
-        """How many whole frames the file holds; what a full disk took of one more is cut off."""
+        """The number of whole frames in the file; a frame that a full disk cut off is removed."""
         count = 0
         try:
             with open_regular(self.path) as file:

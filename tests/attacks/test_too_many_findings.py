@@ -24,7 +24,7 @@ def test_findings_beyond_limit_are_counted(
     assert app.main([command, "a.rts"]) == ExitCode.DIAGNOSTICS
     said = capsys.readouterr().err
     assert said.count("error[E0108]") == MOST_SHOWN
-    assert "1000 errors; `rtshcua explain E0108` tells more" in said
+    assert "1000 errors; run `rtshcua explain E0108` for details" in said
     assert f"{MANY - MOST_SHOWN} of them are not shown, the least severe: `--json` has all" in said
     assert len(said) < 100_000
     assert app.main([command, "a.rts", "--json"]) == ExitCode.DIAGNOSTICS

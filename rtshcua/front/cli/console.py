@@ -1,4 +1,4 @@
-"""What a flight tells whoever started it in a terminal, and what it asks there."""
+"""The console of a flight started from a terminal: its output, and its passphrase prompts."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,7 +18,7 @@ from rtshcua.wire.keys import Duty, SigningKey
 
 @dataclass(frozen=True)
 class TerminalConsole:
-    """A terminal or a pipe, in one style. `data`: where the key store is."""
+    """A terminal or a pipe with one output style. `data`: the folder of the key store."""
 
     style: Literal["screen", "lines", "json"]
     data: Path
@@ -26,30 +26,30 @@ class TerminalConsole:
 
     @property
     def as_json(self) -> bool:
-        """A program reads what is told."""
+        """Whether the output is JSON for a program."""
         return self.style == "json"
 
     @property
     def live(self) -> bool:
-        """The view is drawn anew all the time."""
+        """Whether the view is redrawn continuously."""
         return self.style == "screen"
 
     def say(self, text: str) -> None:
-        """A line on the standard error."""
+        """Print a line on standard error."""
         faults.say(text)
 
     def emit(self, event: Mapping[str, object]) -> None:
-        """A line of JSON on the standard output."""
+        """Print a line of JSON on standard output."""
         out_json(msgspec.json.encode(event).decode(), flush=True)
 
     def view(self) -> Feed:
-        """The view, in a process of its own."""
+        """Start the view in its own process."""
         return Feed(self.style)
 
     def detail_of(self, event: str, detail: str) -> str:
-        """As `show` and `why` word it."""
+        """Return the text that `show` and `why` print for this event."""
         return log.detail_of(event, detail)
 
     def unlock(self, duty: Duty, path: Path | None) -> SigningKey:
-        """From a file or the key store; the passphrase is asked for where one is needed."""
+        """Return a key from a file or the key store; prompts for the passphrase if the key has one."""
         return unlock(KeyStore(self.data), duty, path=path, passphrase_file=self.passphrase_file)

@@ -1,4 +1,4 @@
-"""Documents that are signed for a flight: what they are about, and where they go. Without typer: a recall hurries."""
+"""Write signed flight documents to a file or send them to the flight. No typer here: a recall must start fast."""
 
 import json
 from collections.abc import Mapping
@@ -13,9 +13,9 @@ from rtshcua.front.cli.faults import error_object, fail
 from rtshcua.front.cli.stdout import out, out_json
 
 NO_HELP: Mapping[str, str] = MappingProxyType({})
-#: help for what a document may be handed to
-WHOSE = "give `--flight` (32 hexadecimal digits, or a socket of the flight)"
-WHERE = "give `--to` (a socket of the flight) or `--output`"
+#: help for a missing flight, and for a missing destination
+WHOSE = "add `--flight ID` (32 hexadecimal digits, or a socket of the flight)"
+WHERE = "add `--to SOCKET` (a socket of the flight) or `--output FILE`"
 
 
 def deliver(
@@ -27,8 +27,9 @@ def deliver(
     as_json: bool,
     help: Mapping[str, str] = NO_HELP,
 ) -> ExitCode:
-    """Write a document, or hand it to the flight, and say what became of it; `help` says what to do about what the
-    flight answers, by slug. Raises OSError.
+    """Write a document to `output` or send it to the flight at `to`, and print the result.
+
+    `help`: the hint for each slug with which the flight may refuse. Raises OSError.
     """
     if output is not None:
         write_out(output, document, mode=PRIVATE_FILE)
@@ -41,7 +42,7 @@ def deliver(
 
 
 def _say(code: ExitCode, slug: str, text: str, *, as_json: bool, help: str | None = None) -> ExitCode:
-    text = visible(text)  # names of the mission's, of files, and the words of who listens at the socket
+    text = visible(text)  # it contains names from the mission and text from the socket, which are untrusted
     if as_json:
         error = {} if code is ExitCode.OK else error_object(code, text, help, slug=slug)
         out_json(json.dumps({"slug": slug, "text": text, "exit": code.slug} | error, ensure_ascii=False))

@@ -1,17 +1,17 @@
-"""How `rtshcua` is started: from the first moment Ctrl-C ends the process by the signal itself, in silence.
+"""The entry point of `rtshcua`: from the start, Ctrl-C ends the process by the signal itself, without output.
 
-Python makes an exception of it, wherever it comes: amid imports, or in code of C that does not expect one. A process
-that dies of SIGINT loses nothing that one loses which is killed, and a shell counts it as 130. A command that has
-something to put in order looks at a flag that the signal sets (`front/cli/interrupts.py`, `app/fly/stop_wishes.py`), or
-asks for the exception (`stop_wishes.breakable`). Nothing may be imported here that takes time.
+Python would raise KeyboardInterrupt at any point, also during imports or in C code that does not expect it. Commands
+are safe to kill, so the default action of SIGINT is enough, and a shell reports it as 130. A command that must clean up
+checks a flag that the signal sets (`front/cli/interrupts.py`, `app/fly/stop_wishes.py`), or enables the exception
+(`stop_wishes.breakable`). This module must import nothing slow.
 """
 
 import signal
 
 
 def main() -> int:
-    """Runs the command of the process's own command line, and gives its exit code back, for `sys.exit`."""
-    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # else whoever started us has it ignored
+    """Run the command in `sys.argv` and return its exit code."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # otherwise the parent process ignores SIGINT
         signal.signal(signal.SIGINT, signal.SIG_DFL)
     from rtshcua.front.cli.app import main as run
 

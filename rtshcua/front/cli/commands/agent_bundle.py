@@ -45,7 +45,7 @@ def agent_bundle(
     mission_key: Annotated[Path | None, typer.Option(help="the agent's mission key [default: the key store's]")] = None,
     passphrase_file: Annotated[Path | None, typer.Option(help="a file with the key's passphrase")] = None,
     force: Annotated[bool, typer.Option("--force", help="replace files of the same names; others stay")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")] = False,
 ) -> ExitCode:
     """Make a plug-in for hosts of agents, OpenClaw and Claude's: the MCP server, a skill that says how to use it, and a
     hook that keeps the model out of the key store and the socket.

@@ -1,4 +1,4 @@
-"""`rtshcua campaign`: thousands of flights of a mission, with faults that chance draws, in virtual time."""
+"""`rtshcua campaign`: fly a mission many times in virtual time, with random faults."""
 
 import os
 import re
@@ -41,9 +41,9 @@ from rtshcua.virtual.flight import LATER_US
 
 app = typer.Typer(add_completion=False)
 
-#: of so many different failures the smallest flight is looked for
+#: the number of different failures that are shrunk to a smallest flight
 _SHRUNK: Final = 8
-#: as Dask writes them; without a scheme it is `tcp`
+#: a scheduler address as Dask writes it; without a scheme it is `tcp`
 _SCHEDULER: Final = re.compile(r"([a-z]+://)?[^\s/:]+:\d{1,5}", re.ASCII)
 _CLEAR: Final = "\r\033[K"
 
@@ -51,37 +51,38 @@ _CLEAR: Final = "\r\033[K"
 @app.command()
 def campaign(
     source: Annotated[Path, typer.Argument(help="a source with a mission (.rts), or a mission specification (.json)")],
-    flights: Annotated[int, typer.Option(min=1, max=10_000_000, help="how many in all")] = 200,
-    seed: Annotated[int, typer.Option(min=0, help="of the campaign: the same seed, the same flights")] = 1,
-    mission: Annotated[str | None, typer.Option(help="which mission, where the source has several")] = None,
+    flights: Annotated[int, typer.Option(min=1, max=10_000_000, help="number of flights")] = 200,
+    seed: Annotated[int, typer.Option(min=0, help="seed of the campaign; the same seed gives the same flights")] = 1,
+    mission: Annotated[str | None, typer.Option(help="the mission to use if the source has several")] = None,
     with_: Annotated[
-        list[Path] | None, typer.Option("--with", help="further sources: a specification's policy (repeatable)")
+        list[Path] | None,
+        typer.Option("--with", help="additional sources, such as a specification's policy (repeatable)"),
     ] = None,
     flavour: Annotated[
-        list[AutopilotKind] | None, typer.Option(help="this autopilot alone (repeatable) [default: both]")
+        list[AutopilotKind] | None, typer.Option(help="only this autopilot (repeatable) [default: both]")
     ] = None,
     fault: Annotated[
-        list[str] | None, typer.Option(metavar="KIND", help="faults of this kind alone (repeatable) [default: all]")
+        list[str] | None, typer.Option(metavar="KIND", help="only faults of this kind (repeatable) [default: all]")
     ] = None,
-    approve: Annotated[
-        bool, typer.Option("--approve", help="in every flight, whoever is asked for an approval gives it")
-    ] = False,
+    approve: Annotated[bool, typer.Option("--approve", help="grant every approval that a flight requests")] = False,
     at: Annotated[str | None, typer.Option(help="time of issue, such as 2026-01-31T08:00:00Z [default: now]")] = None,
-    jobs: Annotated[int | None, typer.Option("--jobs", "-j", min=1, help="processes [default: one a core]")] = None,
+    jobs: Annotated[
+        int | None, typer.Option("--jobs", "-j", min=1, help="number of processes [default: one for each core]")
+    ] = None,
     cluster: Annotated[
         str | None,
-        typer.Option(metavar="tcp://HOST:PORT", help="a Dask scheduler, whose workers fly (extra `cluster`)"),
+        typer.Option(metavar="tcp://HOST:PORT", help="fly on the workers of this Dask scheduler (extra `cluster`)"),
     ] = None,
     output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="its folder [default: runs/campaign-MISSION-SEED]")
+        Path | None, typer.Option("--output", "-o", help="folder of the campaign [default: runs/campaign-MISSION-SEED]")
     ] = None,
-    quickly: Annotated[bool, typer.Option("--no-shrink", help="leave failures as they were drawn")] = False,
-    as_json_: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    quickly: Annotated[bool, typer.Option("--no-shrink", help="do not shrink failing flights")] = False,
+    as_json_: Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")] = False,
 ) -> ExitCode:
-    """Fly a mission thousands of times, each with other faults, and judge each flight by what really happened.
+    """Fly a mission many times with random faults, and judge each flight by the true state of the simulated vehicle.
 
-    A campaign that was interrupted goes on where it stopped, when the same is asked for again. Ends with 0 where no
-    flight failed, 13 where one did. docs/flying/campaigns.md has it all.
+    Repeat the command to continue an interrupted campaign. Exit codes: 0 no flight failed; 13 at least one failed.
+    Details: docs/flying/campaigns.md.
     """
     findings = Findings(json=as_json_)
     kinds = _kinds(fault or ())
@@ -110,7 +111,7 @@ def campaign(
     if begun is not None and begun != identity:
         return findings.end(_other(folder, begun, identity))
     if not as_json_:
-        say(f"without faults first, on {' and '.join(flavours)}")
+        say(f"first flight without faults, on {' and '.join(flavours)}")
     space = _space(field, compiled.policy, compiled.mission, flavours, kinds, approve)
     if isinstance(space, Refusal):
         return findings.end(space)
@@ -121,7 +122,7 @@ def campaign(
         )
     except ImportError:
         help = "install it with the extra: `pip install 'rtshcua[cluster]'`"
-        return findings.refuse(ExitCode.USAGE, "usage", "`--cluster` needs Dask, which is not installed", help)
+        return findings.refuse(ExitCode.USAGE, "usage", "`--cluster` requires Dask, which is not installed", help)
     with closing(workers), stop:
         if begun is None:
             try:
@@ -153,11 +154,17 @@ def campaign(
 
 
 def _misused(source: Path, cluster: str | None, jobs: int | None) -> Refusal | None:
-    """What makes no sense of what was asked for, before anything is read or flown."""
+    """Return the refusal for options that conflict or are malformed; None if they are valid."""
     if cluster is not None and jobs is not None:
-        return Refusal("usage", "`--jobs` is for this machine, and `--cluster` for others")
+        return Refusal(
+            "usage",
+            "`--jobs` and `--cluster` cannot be combined",
+            "the cluster's workers decide how many flights run at once",
+        )
     if cluster is not None and not _SCHEDULER.fullmatch(cluster):
-        return Refusal("usage", f"`{cluster}` is no address of a Dask scheduler", "write it as `tcp://10.0.0.1:8786`")
+        return Refusal(
+            "usage", f"`{cluster}` is not the address of a Dask scheduler", "write it as `tcp://10.0.0.1:8786`"
+        )
     return no_source(source)
 
 
@@ -169,23 +176,23 @@ def _kinds(names: Sequence[str]) -> frozenset[type] | Refusal:
     unknown = [name for name in names if name.replace("_", "-") not in KINDS]
     if unknown:
         near = nearest(unknown[0], KINDS)
-        help = f"did you mean `{near}`?" if near else f"there are {', '.join(KINDS)}"
+        help = f"did you mean `{near}`?" if near else f"accepted: {', '.join(KINDS)}"
         return Refusal("usage", f"no such fault: `{unknown[0]}`", help)
     return frozenset(KINDS[name.replace("_", "-")] for name in names) or frozenset(KINDS.values())
 
 
 def _other(folder: CampaignFolder, begun: CampaignIdentity, asked: CampaignIdentity) -> Refusal:
     words = {
-        "bundle": "another bundle (its sources changed)",
-        "flavours": "other kinds of autopilots",
-        "kinds": "other kinds of faults",
-        "version": "another version of this program",
-        "issued_at_us": "another time of issue",
-        "approved": "another choice of `--approve`",
+        "bundle": "a different bundle (its sources changed)",
+        "flavours": "different autopilots",
+        "kinds": "different kinds of faults",
+        "version": "a different version of this program",
+        "issued_at_us": "a different time of issue",
+        "approved": "a different setting of `--approve`",
     }
     differ = [name for name in CampaignIdentity.__struct_fields__ if getattr(begun, name) != getattr(asked, name)]
-    what = " and ".join(words.get(name, f"another {name}") for name in differ)
-    help = "give another folder with `-o`, or take this one away"
+    what = " and ".join(words.get(name, f"a different {name}") for name in differ)
+    help = "choose another folder with `-o`, or remove this one"
     return Refusal("usage", f"`{folder.path}` holds a campaign with {what}", help)
 
 
@@ -197,20 +204,23 @@ def _space(
     kinds: frozenset[type],
     approve: bool,
 ) -> FaultSpace | Refusal:
-    """What is drawn from: how long the mission takes where nothing goes wrong, on each kind of autopilot."""
+    """Return the space that faults are drawn from, or a refusal if the mission fails without faults.
+
+    Flies the mission once without faults on each autopilot.
+    """
     lasts = {}
     roles = sorted({policy.roles[role] for rule in policy.rules for role in (rule.approver, rule.second) if role >= 0})
     asked = tuple(answers_of(policy, mission))
     answers = asked if approve else ()
     for each in flavours:
         calm = field.fly(CampaignFlight(0, Scenario("nothing goes wrong", (each,), 1, 1, Start(), answers, ())))
-        wrong = f"fails even if nothing goes wrong: {calm.failures[0].text}" if calm.failures else None
+        wrong = f"fails without faults: {calm.failures[0].text}" if calm.failures else None
         if wrong is None and calm.ending != Ending.COMPLETED:
-            wrong = f"ends as `{calm.ending}` even if nothing goes wrong"
+            wrong = f"ends as `{calm.ending}` without faults"
         if wrong is not None:
-            help = "see it with `rtshcua run`; a campaign looks for what faults do to a flight that is good without"
+            help = "reproduce it with `rtshcua run`; a campaign requires a mission that succeeds without faults"
             if asked and not approve:
-                help += ". Nobody approves anything in it; with `--approve` whoever is asked does"
+                help += ". No approval was granted; `--approve` grants all"
             return Refusal("not-flown", f"on {each} the mission {wrong}", help)
         lasts[each] = calm.flown_us
     skills = tuple(policy.contracts[each.skill].name for each in mission.invocations)
@@ -219,7 +229,7 @@ def _space(
 
 
 def _imported(source: Path, folder: CampaignFolder) -> str:
-    """How a scenario in the folder imports the mission."""
+    """Return the import path of the mission for scenarios in the folder."""
     shipped = library.root().resolve()
     path = source.resolve()
     if path.is_relative_to(shipped):
@@ -232,7 +242,7 @@ def _shrink(
     folder: CampaignFolder,
     identity: CampaignIdentity, imported: str, progress: "_Progress",
 ) -> None:  # fmt: skip
-    """Keep the smallest flight of each failure as a scenario, if none is kept yet."""
+    """Save the smallest flight of each failure as a scenario, unless one is saved already."""
     first: dict[str, int] = {}
     for number in sorted(wanted):
         for failed in wanted[number].failures:
@@ -249,13 +259,13 @@ def _shrink(
         small, _ = shrink(scenario, order.space.skills, still)
         small = replace(small, start=replace(small.start, utc_us=identity.issued_at_us + LATER_US))
         failed = next(each for each in wanted[number].failures if each.slug == slug)
-        comment = f"{slug}: {failed.text}\nFlight {number} of campaign {order.seed}, as small as it still fails."
+        comment = f"{slug}: {failed.text}\nFlight {number} of campaign {order.seed}, shrunk."
         folder.save(slug, scenario_text(small, identity.mission, imported, comment))
     progress.clear()
 
 
 def _summary(identity: CampaignIdentity, past: Mapping[int, CampaignResult], folder: CampaignFolder) -> CampaignSummary:
-    """Of all that the folder has, also where fewer are asked for this time."""
+    """Return the summary of all flights in the folder, also if fewer are requested now."""
     slugs = {failed.slug for result in past.values() for failed in result.failures}
     kept = {slug: f"failures/{slug}.rts" for slug in slugs if folder.scenario(slug).exists()}
     return summarise(identity.mission, identity.seed, past, kept)
@@ -282,11 +292,11 @@ def _told(summary: CampaignSummary, folder: CampaignFolder) -> list[str]:
 
 @dataclass
 class _Progress:
-    """How far it is, for a person who waits: on a terminal a line that changes, else one for each tenth."""
+    """Shows the progress: one updated line on a terminal, otherwise one line for each tenth."""
 
     flights: int
     before: int
-    """How many were flown when it began."""
+    """Number of flights kept from an earlier run."""
     quiet: bool
     stop: StopRequest
     failed: int = 0
@@ -300,12 +310,12 @@ class _Progress:
         self._changes = self._shows and sys.stderr.isatty()
 
     def begun(self, folder: CampaignFolder) -> None:
-        """What was flown before is told."""
+        """Print the number of flights kept from an earlier run."""
         if self._shows and 0 < self.before < self.flights:
-            say(f"{self.before} of {self.flights} flights are kept in `{folder.path}`: it goes on behind them")
+            say(f"{self.before} of {self.flights} flights are kept in `{folder.path}`; continuing with the next")
 
     def flown(self, result: CampaignResult, folder: CampaignFolder) -> None:
-        """A flight is over; it is kept. Raises Stopped."""
+        """Keep the result of a finished flight. Raises Stopped."""
         folder.keep(result)
         self.done += 1
         self.failed += bool(result.failures)
@@ -316,13 +326,13 @@ class _Progress:
         self.stop.look()
 
     def shrinks(self, slug: str) -> None:
-        """Another flight is flown to make a failure small. Raises Stopped."""
+        """Show that a failure is being shrunk. Raises Stopped."""
         self.stop.look()
         if self._changes:
-            self._say(f"{slug}: looking for the smallest flight that fails so")
+            self._say(f"{slug}: searching for the smallest flight with this failure")
 
     def clear(self) -> None:
-        """Nothing more is to be said."""
+        """Remove the progress line."""
         if self._changes:
             sys.stderr.write(_CLEAR)
             sys.stderr.flush()

@@ -1,4 +1,4 @@
-"""`rtshcua check`: report everything that is wrong with sources."""
+"""`rtshcua check`: report the errors in sources and mission specifications."""
 
 from pathlib import Path
 from typing import Annotated
@@ -15,40 +15,43 @@ app = typer.Typer(add_completion=False)
 def check(
     paths: Annotated[
         list[Path] | None,
-        typer.Argument(help="sources (.rts), folders of them (this one), or a mission specification (.json) first"),
+        typer.Argument(help="sources (.rts), folders (default: here), or first a mission specification (.json)"),
     ] = None,
     since: Annotated[
-        Path | None, typer.Option(help="an earlier bundle, source or folder: a policy that differs needs a new version")
+        Path | None, typer.Option(help="an earlier bundle, source or folder; a changed policy needs a new version")
     ] = None,
     with_: Annotated[
-        list[Path] | None, typer.Option("--with", help="further sources: a specification's policy (repeatable)")
+        list[Path] | None,
+        typer.Option("--with", help="additional sources, such as a specification's policy (repeatable)"),
     ] = None,
     map_: Annotated[
-        Path | None, typer.Option("--map", metavar="FILE.html", help="draw the missions: zones, way, where it fails")
+        Path | None, typer.Option("--map", metavar="FILE.html", help="draw zones, routes and errors of the missions")
     ] = None,
     at: Annotated[
         str | None,
-        typer.Option(metavar="TIME", help="as if the missions were issued then, UTC: the dates of zones count"),
+        typer.Option(metavar="TIME", help="assume this time of issue (UTC) and apply the dates of zones"),
     ] = None,
-    deny_warnings: Annotated[bool, typer.Option("--deny-warnings", help="warnings are errors; notes are not")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    deny_warnings: Annotated[
+        bool, typer.Option("--deny-warnings", help="treat warnings as errors; notes stay notes")
+    ] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")] = False,
 ) -> ExitCode:
-    """Report everything that is wrong with sources and what they import. Needs no keys, and writes nothing but --map.
+    """Report all errors in sources and in what they import. Needs no keys, and writes no file except --map.
 
-    Each source is a program of its own with what it imports; one that another of them imports is checked with that. A
-    mission specification takes all other sources as its policy's. What is worth a second look besides, and how to
-    ignore, fix and report it in CI: `rtshcua lint`.
+    Each source and its imports form one program. A source that another one imports is checked as part of it. With a
+    mission specification, all other sources belong to its policy. `rtshcua lint` also reports warnings about code that
+    compiles, and can fix, ignore and export findings.
 
-    Without --at, hours count and the dates of zones do not, so that no check fails because of another day; where such a
-    zone exists now, it is told what would be refused now.
+    Without --at, the hours of zones are checked and their dates are not, so that the result does not depend on today's
+    date. If a zone with dates is in force now, the command also prints what would be refused now.
 
-    With --map the missions are drawn as one HTML page, whether or not they are refused, as far as their way is planned.
+    With --map, the missions are drawn on one HTML page as far as their routes are planned, also if they have errors.
 
-    With --since some policy here must have an earlier version there, by its name and vehicle: else nothing was
-    compared, which is an error (3). An earlier policy that none here was compared with is told.
+    With --since, at least one policy must have an earlier version of the same name and vehicle there; otherwise
+    nothing was compared, which is an error (3). Earlier policies without a counterpart here are listed.
 
-    Ends with 0 where there are no errors, 1 where there are, 2 where the command line is wrong, 3 where a file cannot
-    be read or nothing was compared, 4 where --since names a bundle of a version that is not known here.
+    Exit codes: 0 no errors; 1 errors; 2 wrong command line; 3 a file cannot be read, or nothing was compared; 4 the
+    format version of the --since bundle is unknown.
     """
     return check_sources(
         paths or [Path()],

@@ -33,41 +33,41 @@ app = typer.Typer(add_completion=False)
 MissionSource = Annotated[
     Path, typer.Argument(help="a source with a mission (.rts), or a mission specification (.json)")
 ]
-Output = Annotated[Path | None, typer.Option("-o", "--output", help="the bundle [default: SOURCE.bundle]")]
-MissionName = Annotated[str | None, typer.Option(help="which mission, where the source has several")]
+Output = Annotated[Path | None, typer.Option("-o", "--output", help="the bundle to write [default: SOURCE.bundle]")]
+MissionName = Annotated[str | None, typer.Option(help="the mission to use if the source has several")]
 Parameters = Annotated[
-    list[str] | None, typer.Option("--set", help='a parameter of the mission, as in height="20 m" (repeatable)')
+    list[str] | None, typer.Option("--set", help='set a parameter of the mission, as in height="20 m" (repeatable)')
 ]
 IssuedAt = Annotated[str | None, typer.Option(help="time of issue, such as 2026-01-31T08:00:00Z [default: now]")]
 PolicyKey = Annotated[Path | None, typer.Option(help="the policy key [default: the key store's]")]
 MissionKey = Annotated[Path | None, typer.Option(help="the mission key [default: the key store's]")]
 PassphraseFile = Annotated[Path | None, typer.Option(help="a file with the keys' passphrase")]
 FurtherSources = Annotated[
-    list[Path] | None, typer.Option("--with", help="further sources: a specification's policy (repeatable)")
+    list[Path] | None, typer.Option("--with", help="additional sources, such as a specification's policy (repeatable)")
 ]
 Proposer = Annotated[
     str | None,
-    typer.Option("--source", metavar="agent|operator", help="who proposes it [default: its word; .json: agent]"),
+    typer.Option("--source", metavar="agent|operator", help="the proposer [default: its own claim; .json: agent]"),
 ]
-Role = Annotated[str | None, typer.Option(help="the role that it is for [default: what it says]")]
+Role = Annotated[str | None, typer.Option(help="the role it is proposed for [default: its own claim]")]
 PolicyPin = Annotated[
     str | None,
-    typer.Option(metavar="NAME[@VERSION]", help="the policy that it is under [default: its word; .json: --with]"),
+    typer.Option(metavar="NAME[@VERSION]", help="the policy it flies under [default: its own claim; .json: --with]"),
 ]
 Replaces = Annotated[
     list[Path] | None,
-    typer.Option(help="the bundle that flies, then what replaced it since: make a replacement (repeatable)"),
+    typer.Option(help="make a replacement for this flying bundle; name earlier replacements too (repeatable)"),
 ]
 FirstStep = Annotated[
     int | None,
-    typer.Option("--from", min=1, help="with --replaces: the number of the first step that is another one"),
+    typer.Option("--from", min=1, help="with --replaces: the number of the first replaced step"),
 ]
 Flight = Annotated[
-    str | None, typer.Option(metavar="ID", help="with --replaces: the flight, by its id or a socket of it")
+    str | None, typer.Option(metavar="ID", help="with --replaces: the flight, as its id or one of its sockets")
 ]
-Root = Annotated[Path | None, typer.Option(help="with --replaces: the signed trust root (the key store's)")]
-DenyWarnings = Annotated[bool, typer.Option("--deny-warnings", help="warnings are errors")]
-AsJson = Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")]
+Root = Annotated[Path | None, typer.Option(help="with --replaces: the signed trust root (default: the key store's)")]
+DenyWarnings = Annotated[bool, typer.Option("--deny-warnings", help="treat warnings as errors")]
+AsJson = Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")]
 
 
 @app.command()
@@ -91,14 +91,14 @@ def compile(
     deny_warnings: DenyWarnings = False,
     as_json: AsJson = False,
 ) -> ExitCode:
-    """Check a mission and sign it into a bundle that can fly. Nothing is written when there are errors.
+    """Check a mission and sign it into a bundle that can fly. If there are errors, nothing is written.
 
-    With --replaces it is signed for a flight that is under way, under the policy that it flies under: the steps before
-    --from stay as they are. `rtshcua replace` hands it in.
+    With --replaces, the mission is signed as a replacement for a flight under way, under the same policy. The steps
+    before --from stay unchanged. `rtshcua replace` sends it to the flight.
 
-    What a mission says of its own source, role and policy gives it no authority: what it claims beyond --source, --role
-    and --policy is an error. A specification (.json) is an agent's unless --source says otherwise, and its policy is
-    named by --policy or handed in by --with.
+    The source, role and policy in a mission are claims and give no authority: a claim that exceeds --source, --role or
+    --policy is an error. The source of a specification (.json) is an agent unless --source says otherwise; its policy
+    is named with --policy or passed with --with.
     """
     findings = Findings(json=as_json, deny_warnings=deny_warnings)
     issued_at = time.time_ns() // 1_000 if at is None else moment(at)
@@ -108,7 +108,7 @@ def compile(
     if isinstance(pins, Refusal):
         return findings.end(pins)
     if len({first is None, flight is None, not replaces}) > 1:
-        return findings.refuse(ExitCode.USAGE, "usage", "`--replaces`, `--from` and `--flight` go together")
+        return findings.refuse(ExitCode.USAGE, "usage", "`--replaces`, `--from` and `--flight` require each other")
     suffix = ".replacement" if replaces else ".bundle"
     request = CompileRequest(source, with_ or (), output, suffix, pins, issued_at, mission, tuple(set_ or ()))
     made = compile_mission(request)

@@ -1,4 +1,4 @@
-"""`rtshcua completion`: a script that lets a shell complete what is typed after `rtshcua`."""
+"""`rtshcua completion`: print a completion script for a shell."""
 
 import sys
 from enum import Enum
@@ -13,14 +13,14 @@ app = typer.Typer(add_completion=False)
 
 
 class Shell(Enum):
-    """The shells that scripts are for."""
+    """The supported shells."""
 
     BASH = "bash"
     ZSH = "zsh"
     FISH = "fish"
 
 
-#: where each shell looks for a script by itself
+#: where each shell finds the script
 PLACES = {
     Shell.BASH: "~/.local/share/bash-completion/completions/rtshcua",
     Shell.ZSH: "~/.zfunc/_rtshcua",
@@ -31,13 +31,13 @@ _ZSH = "and in ~/.zshrc, before `compinit`: fpath+=~/.zfunc"
 
 
 @app.command()
-def completion(shell: Annotated[Shell, typer.Argument(help="which shell the script is for")]) -> ExitCode:
-    """Print a script by which a shell completes commands, options, their values, codes and files. It starts nothing.
+def completion(shell: Annotated[Shell, typer.Argument(help="the shell")]) -> ExitCode:
+    """Print a shell script that completes commands, options, values, codes and files. It runs no program.
 
-    Keep it where the shell looks for it: bash in ~/.local/share/bash-completion/completions/rtshcua, fish in
-    ~/.config/fish/completions/rtshcua.fish, zsh under the name _rtshcua in a folder of its `fpath`.
+    Save it where the shell finds it: bash: ~/.local/share/bash-completion/completions/rtshcua; fish:
+    ~/.config/fish/completions/rtshcua.fish; zsh: as _rtshcua in a folder of `fpath`.
 
-    The script is of this version: print it again after an update.
+    The script is for this version: print it again after an update.
     """
     import shtab
 

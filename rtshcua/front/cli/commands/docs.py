@@ -1,4 +1,4 @@
-"""`rtshcua docs`: skills and policies as one page that a person can read and sign off on."""
+"""`rtshcua docs`: render skills and policies as one page for review and sign-off."""
 
 import sys
 import time
@@ -25,29 +25,30 @@ app = typer.Typer(add_completion=False)
 def docs(
     paths: Annotated[list[Path], typer.Argument(help="sources (.rts), or folders of them")],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="the page [default: SOURCE.html, or standard output if piped]")
+        Path | None,
+        typer.Option("-o", "--output", help="the page to write [default: SOURCE.html, or standard output if piped]"),
     ] = None,
-    title: Annotated[str | None, typer.Option(help="what the page is called [default: its policies' names]")] = None,
+    title: Annotated[str | None, typer.Option(help="title of the page [default: the names of its policies]")] = None,
     at: Annotated[
-        str | None, typer.Option(help="the date of the page, such as 2026-01-31T08:00:00Z [default: now]")
+        str | None, typer.Option(help="date of the page, such as 2026-01-31T08:00:00Z [default: now]")
     ] = None,
     since: Annotated[
-        Path | None, typer.Option(help="an earlier bundle, source or folder: mark what a policy says otherwise")
+        Path | None, typer.Option(help="an earlier bundle, source or folder: highlight policy changes")
     ] = None,
     as_json: Annotated[
-        bool, typer.Option("--json", help="what the page says, as one JSON object, and no page")
+        bool, typer.Option("--json", help="print the contents of the page as one JSON object; write no page")
     ] = False,
 ) -> ExitCode:
-    """Render skills and policies as one HTML page that a non-programmer can sign off on.
+    """Render skills and policies as one HTML page that a non-programmer can review and sign off.
 
-    It has everything in plain words: who may do what, the rules one by one, maps of the zones, what the vehicle does
-    when something goes wrong, and the digest of what is signed. It needs no network and no script, and prints on A4.
-    With the same sources and the same --at it has the same bytes.
+    The page describes in plain words who may do what, each rule, the zones with maps, the reactions of the vehicle to
+    faults, and the digest to sign. It needs no network and no script, prints on A4, and is reproducible: the same
+    sources and the same --at give the same bytes.
 
-    The tests of the sources are decided while the page is made, and it says what came out of each.
+    The tests of the sources are run, and the page shows the result of each.
 
-    Ends with 1, and writes nothing, where the sources have errors, or --since shows that a policy differs and its
-    version is not higher; with 13, and writes nothing, where a test fails.
+    Exit codes: 0 done; 1 the sources have errors, or --since shows that a policy changed without a higher version; 13 a
+    test failed. With 1 and 13, nothing is written.
     """
     findings = Findings(json=as_json)
     made_at = time.time_ns() // 1_000 if at is None else moment(at)
@@ -63,7 +64,7 @@ def docs(
     if isinstance(book, Refusal):
         return findings.end(book)
     if since is not None and not any(chapter.since for chapter in book.chapters) and not as_json:
-        say(f"nothing in {since} is an earlier version of a policy here")
+        say(f"{since} contains no earlier version of these policies")
     if as_json:
         return findings.finish(ExitCode.OK, handbook=asdict(book))
     from rtshcua.ground.report.html_page import page
@@ -80,7 +81,7 @@ def docs(
 
 
 def _target(output: Path | None, first: Path, as_json: bool) -> Path | None:
-    """Where the page goes; None for the standard output."""
+    """Return the file to write; None for standard output."""
     if output is not None:
         return None if str(output) == "-" else output
     if as_json or not sys.stdout.isatty():

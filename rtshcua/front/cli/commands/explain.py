@@ -1,4 +1,4 @@
-"""`rtshcua explain`: the page of a diagnostic code, and what a finding of `verify-log` means."""
+"""`rtshcua explain`: print the page of a diagnostic code, or the meaning of a finding of `verify-log`."""
 
 import json
 import re
@@ -21,12 +21,14 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 def explain(
-    code: Annotated[str | None, typer.Argument(help="a code (E0310), its name, or a finding of verify-log")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    code: Annotated[
+        str | None, typer.Argument(help="a code (E0310), its name, or a finding of verify-log (seal/missing)")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")] = False,
 ) -> ExitCode:
-    """Print what a diagnostic code means, why it matters, a bad and a good example; without a code, list all.
+    """Print what a diagnostic code means, why it matters, and a bad and a good example. Without a code, list all codes.
 
-    Of a finding of `verify-log` (`seal/missing`): what was found, what it means, the exit code, and what to do.
+    For a finding of `verify-log`, print what was found, what it means, the exit code, and what to do.
     """
     if code is None:
         _list(as_json)
@@ -39,9 +41,11 @@ def explain(
             each for each in REGISTRY if re.fullmatch("[eE][0-9]{1,3}", code) and each.startswith(code.upper())
         )
         if begun:
-            return fail(ExitCode.USAGE, f"`{code}` is the beginning of {len(begun)} codes", f"they are {listed(begun)}")
+            return fail(
+                ExitCode.USAGE, f"`{code}` is ambiguous: {len(begun)} codes begin with it", f"accepted: {listed(begun)}"
+            )
         near = nearest(code, [*REGISTRY, *(each.slug for each in REGISTRY.values())])
-        help = f"did you mean `{near}`?" if near is not None else "`rtshcua explain` lists all codes"
+        help = f"did you mean `{near}`?" if near is not None else "run `rtshcua explain` to list all codes"
         return fail(ExitCode.USAGE, f"there is no code `{code}`", help)
     page = read_page(found)
     if as_json:
@@ -54,14 +58,14 @@ def explain(
 
 
 def _of_log(word: str, *, as_json: bool) -> ExitCode:
-    """What a finding about a log means."""
+    """Print what a finding about a log means."""
     from rtshcua.front.cli.render import log_slugs
 
     found = log_slugs.find(word)
     if found is None:
         near = nearest(word, list(log_slugs.every()))
         help = "" if near is None else f"did you mean `{near}`?"
-        return fail(ExitCode.USAGE, f"`verify-log` finds nothing that is called `{word}`", help)
+        return fail(ExitCode.USAGE, f"`verify-log` has no finding `{word}`", help)
     if as_json:
         said = found._asdict() | {"exit_code": int(found.exit_code)}
         out_json(json.dumps(said, indent=2, ensure_ascii=False))
@@ -75,7 +79,7 @@ def _of_log(word: str, *, as_json: bool) -> ExitCode:
 
 
 def _find(word: str) -> Code | None:
-    """A code by its id or its name, however it is written: `E0310`, `e310`, `310`, `dimension-mismatch`."""
+    """Return a code by its id or name: `E0310`, `e310`, `310` or `dimension-mismatch`."""
     digits = word.upper().removeprefix("E")
     if digits.isascii() and digits.isdigit():
         return REGISTRY.get(f"E{digits.zfill(4)}")
@@ -104,7 +108,7 @@ def _draw(text: str) -> None:
 
 
 def _reflowed(text: str) -> str:
-    """A page in lines of a terminal; examples and tables stay as they are."""
+    """Wrap the paragraphs of a page for a terminal; examples and tables stay unchanged."""
     lines: list[str] = []
     paragraph: list[str] = []
     fenced = False

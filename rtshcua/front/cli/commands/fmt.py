@@ -1,4 +1,4 @@
-"""`rtshcua fmt`: lay sources out in the one style."""
+"""`rtshcua fmt`: format sources."""
 
 import sys
 from collections.abc import Sequence
@@ -31,40 +31,43 @@ STANDARD_INPUT = Path("-")
 @app.command()
 def fmt(
     paths: Annotated[
-        list[Path] | None, typer.Argument(help="sources (.rts), folders of them (this one), or - for standard input")
+        list[Path] | None, typer.Argument(help="sources (.rts), folders (default: here), or - for standard input")
     ] = None,
-    check: Annotated[bool, typer.Option("--check", help="write nothing; 1 where a file is not formatted")] = False,
+    check: Annotated[
+        bool, typer.Option("--check", help="write nothing; exit code 1 if a file is not formatted")
+    ] = False,
     diff: Annotated[
-        bool, typer.Option("--diff", help="write nothing; show what would change, and 1 where anything would")
+        bool, typer.Option("--diff", help="write nothing; print the changes; exit code 1 if there are any")
     ] = False,
     stdin_filename: Annotated[
-        Path | None, typer.Option(help="what standard input is called, and which configuration counts for it")
+        Path | None, typer.Option(help="file name of the standard input, which selects its configuration")
     ] = None,
-    config: Annotated[Path | None, typer.Option(help="the configuration, instead of the nearest one")] = None,
-    isolated: Annotated[bool, typer.Option("--isolated", help="take no configuration")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    config: Annotated[Path | None, typer.Option(help="use this configuration, not the nearest")] = None,
+    isolated: Annotated[bool, typer.Option("--isolated", help="ignore all configuration files")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")] = False,
 ) -> ExitCode:
-    """Lay sources out in the one style, in place; comments stay what and where they are (docs/formatting.md).
+    """Format sources in place, in one style; comments keep their text and place (docs/formatting.md).
 
-    A file is replaced in one step, and only where the result says the same with the same comments. One with a syntax
-    error is left as it is, and the others are laid out all the same. With - what is read from the standard input goes
-    to the standard output.
+    A file is replaced atomically, and only if the result has the same meaning and the same comments. A file with a
+    syntax error is left unchanged; the other files are formatted. With -, the standard input is formatted to the
+    standard output.
 
-    Ends with 0 where all is well, 1 where a file has errors, or with --check or --diff is not formatted, 2 where the
-    command line is wrong, 3 where a file cannot be read, 70 where laying it out would change what it says:
-    please report that.
+    Exit codes: 0 done; 1 a file has errors, or (--check, --diff) is not formatted; 2 wrong command line; 3 a file
+    cannot be read; 70 the formatter would change the meaning, which is a defect: please report it.
     """
     findings = Findings(json=as_json)
     given = paths or [Path()]
     if STANDARD_INPUT in given:
         if len(given) > 1 or (as_json and not check):
             message = (
-                "with `-` nothing else can be formatted" if len(given) > 1 else "`--json` has no place for the text"
+                "`-` cannot be combined with other paths" if len(given) > 1 else "`--json` requires `--check` with `-`"
             )
             return findings.refuse(ExitCode.USAGE, "usage", message, "`rtshcua fmt - <old.rts >new.rts`")
         return _standard_input(findings, stdin_filename, Projects(config, isolated=isolated), check=check, diff=diff)
     if stdin_filename is not None:
-        return findings.refuse(ExitCode.USAGE, "usage", "`--stdin-filename` is for `-`", "leave it out, or write `-`")
+        return findings.refuse(
+            ExitCode.USAGE, "usage", "`--stdin-filename` requires `-`", "leave it out, or pass `-` as path"
+        )
     skipped = [path for path in given if path.suffix.lower() == SPECIFICATION and not path.is_dir()]
     files = source_files([path for path in given if path not in skipped])
     if isinstance(files, Refusal):
@@ -72,7 +75,7 @@ def fmt(
     if not as_json:
         for path in skipped:
             kind = kind_of(path)
-            say(f"skipped {path}: it is {'JSON' if kind is None else kind.name}, for which others have formatters")
+            say(f"skipped {path}: it is {'JSON' if kind is None else kind.name}, which `fmt` does not format")
     wide = _widths(files, Projects(config, isolated=isolated))
     if isinstance(wide, Refusal):
         return findings.end(wide)
@@ -85,7 +88,7 @@ def fmt(
 
 
 def _widths(files: Sequence[Path], projects: Projects) -> list[tuple[Path, int]] | Refusal:
-    """The files that no configuration excludes, and how wide their lines may be; before anything is written."""
+    """Return the files that no configuration excludes, with their line widths."""
     found = []
     for path in files:
         project = projects.of(path)
@@ -113,7 +116,7 @@ def _standard_input(findings: Findings, name: Path | None, projects: Projects, *
 
 
 def _told(findings: Findings, laid: list[Laid], *, check: bool, diff: bool, quiet: bool, as_json: bool) -> ExitCode:
-    """Say what was done, what would be, and what is wrong."""
+    """Report the findings and the changed files, and return the exit code."""
     changed = [each for each in laid if each.changed and each.error is None]
     found = [finding for each in laid for finding in each.diagnostics]
     if as_json and check:
@@ -132,7 +135,7 @@ def _told(findings: Findings, laid: list[Laid], *, check: bool, diff: bool, quie
 
 
 def _counted(laid: list[Laid], changed: list[Laid], *, check: bool) -> None:
-    """The files that changed, and how many there are of each kind."""
+    """Print the changed files and the counts."""
     for each in changed:
         out(f"{'not formatted' if check else 'formatted'}: {each.name}")
     rest = sum(each.before == each.after for each in laid)
@@ -141,7 +144,7 @@ def _counted(laid: list[Laid], changed: list[Laid], *, check: bool) -> None:
 
 
 def _code(laid: list[Laid], forbidden: list[Laid]) -> ExitCode:
-    """How it ends, the worst first; `forbidden` are files that should have been formatted."""
+    """Return the exit code of the worst result; `forbidden`: files that should have been formatted already."""
     if any(finding.code is UNSAFE_FORMAT for each in laid for finding in each.diagnostics):
         return ExitCode.FAULT
     errors = [each.error for each in laid if each.error is not None]
@@ -154,13 +157,13 @@ def _code(laid: list[Laid], forbidden: list[Laid]) -> ExitCode:
 
 
 def _object(laid: Laid) -> dict[str, object]:
-    """One file for a program; `error` says why what changed could not be written."""
+    """Return the JSON object of one file; `error` is the reason why it could not be written."""
     error = None if laid.error is None else words_of(laid.error)
     return {"file": laid.name, "changed": laid.changed, "refused": laid.after is None, "error": error}
 
 
 def _count(changed: int, rest: int, *, check: bool) -> str:
-    """The last line: how many files there are of each kind."""
+    """Return the last line: the number of changed and of unchanged files."""
     if not changed:
         return f"{many(rest, 'file')} already formatted"
     done = "would be formatted" if check else "formatted"

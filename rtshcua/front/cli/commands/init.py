@@ -1,4 +1,4 @@
-"""`rtshcua init`: a project of one's own, which passes its own lint and tests at once."""
+"""`rtshcua init`: create a project that passes its own lint and tests."""
 
 import json
 import re
@@ -19,10 +19,10 @@ from rtshcua.library import root
 
 app = typer.Typer(add_completion=False)
 
-#: the name of the shipped example, which stands in its files wherever the project's own goes
+#: the name of the shipped example; in its files it is replaced by the name of the project
 EXAMPLE = "starter"
 
-#: what a project is made of; the order is that in which somebody would read it
+#: the files of a project, in reading order
 FILES = (
     "README.md",
     "site.rts",
@@ -42,40 +42,41 @@ _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
 
 @app.command()
 def init(
-    directory: Annotated[Path, typer.Argument(help="the folder to make it in")] = Path(),
-    name: Annotated[str | None, typer.Option(help="its policy's name [default: after the folder]")] = None,
-    force: Annotated[bool, typer.Option("--force", help="replace files of the same names; others stay")] = False,
-    keep: Annotated[
-        bool, typer.Option("--keep", help="keep files of the same names as they are, and make the others")
-    ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    directory: Annotated[Path, typer.Argument(help="folder of the new project")] = Path(),
+    name: Annotated[str | None, typer.Option(help="name of its policy [default: from the folder]")] = None,
+    force: Annotated[bool, typer.Option("--force", help="replace existing files of the project")] = False,
+    keep: Annotated[bool, typer.Option("--keep", help="keep existing files and create the missing ones")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")] = False,
 ) -> ExitCode:
-    """Make a project of your own: a site with its vehicle, a policy, a skill, a mission, tests, settings and CI.
+    """Create a project: a site with its vehicle, a policy, a skill, a mission, tests, settings and CI.
 
-    It passes `rtshcua fmt --check`, `lint` and `test` as it is, and flies on the simulated vehicle; put your own
-    places, rules and tests in. Nothing that is there already is touched; when it fails, nothing is left behind. In a
-    repository that has its README.md, .gitignore or a LICENSE, --keep makes what is missing.
+    The project passes `rtshcua fmt --check`, `lint` and `test`, and its mission flies on the simulated vehicle. Replace
+    its places, rules and tests with your own. Existing files are not changed, and a failed run leaves nothing behind.
+    In a repository that already has a README.md, .gitignore or LICENSE, use --keep.
 
-    Ends with 0 where it was made, 2 where the name cannot name a policy or --force and --keep are both given, 3 where
-    files of the same names are there, 74 where they cannot be written.
+    Exit codes: 0 created; 2 the name cannot be a policy's name, or both --force and --keep are used; 3 files of these
+    names exist; 74 they cannot be written.
     """
     if force and keep:
-        return fail(ExitCode.USAGE, "`--force` replaces what `--keep` keeps", "choose one of them")
+        return fail(ExitCode.USAGE, "`--force` and `--keep` cannot be combined", "choose one of them")
     chosen = name if name is not None else _named_after(directory)
     if not _NAME.fullmatch(chosen):
-        help = "small letters, digits and `_`, a letter first, 40 at most"
-        return fail(ExitCode.USAGE, f"`{chosen}` cannot be the name of a policy", help, slug="name")
+        help = "accepted: at most 40 lower-case letters, digits and `_`, beginning with a letter"
+        return fail(ExitCode.USAGE, f"`{chosen}` is not a valid policy name", help, slug="name")
     files = project(chosen)
     wrong = _first_finding(files)
     if wrong is not None:
         return fail(
-            ExitCode.USAGE, f"the project cannot be called `{chosen}`: {wrong}", "--name chooses another", slug="name"
+            ExitCode.USAGE,
+            f"`{chosen}` cannot be the name of the project: {wrong}",
+            "choose another with `--name`",
+            slug="name",
         )
     kept = tuple(file for file in files if keep and (directory / file).is_file())
     made = {file: data for file, data in files.items() if file not in kept}
     try:
         taken = lay(made, directory, replace=force)
-    except OSError as error:  # whatever it is: what was asked for is there to be written
+    except OSError as error:  # whatever the error, the fault is in writing
         return fail(ExitCode.FULL, f"cannot write to `{directory}`: {words_of(error)}")
     if taken is not None:
         return _is_there(taken)
@@ -84,38 +85,38 @@ def init(
 
 
 def _is_there(taken: Taken) -> ExitCode:
-    """Files of the same names are there, or what is no file."""
+    """Fail because files of the project exist, or because something that is not a file is in the way."""
     there = ", ".join(f"`{path}`" for path in taken.paths)
     if not taken.replaceable:
-        text = f"nothing was made, for a file or a folder is in the way: {there}"
+        text = f"no file was created, because a file or folder is in the way: {there}"
         return fail(ExitCode.INPUT, text, slug="in-the-way")
-    help = "--keep keeps these and makes the rest, --force replaces just these; or choose an empty folder"
-    return fail(ExitCode.INPUT, f"nothing was made, for these are there: {there}", help, slug="exists")
+    help = "`--keep` keeps them and creates the rest; `--force` replaces them; or choose an empty folder"
+    return fail(ExitCode.INPUT, f"no file was created, because these exist: {there}", help, slug="exists")
 
 
 def project(name: str) -> dict[str, bytes]:
-    """Every file of a new project by its path in it."""
+    """Return the files of a new project by their relative paths."""
     place = root() / "examples" / EXAMPLE
     word = re.compile(rf"\b{EXAMPLE}\b")
     return {file: word.sub(name, (place / file).read_text(encoding="utf-8")).encode() for file in FILES}
 
 
 def _named_after(directory: Path) -> str:
-    """A name from the folder's: `My-Site 2` is `my_site_2`."""
+    """Return a policy name made from the folder's name: `My-Site 2` gives `my_site_2`."""
     word = re.sub(r"[^a-z0-9]+", "_", directory.absolute().resolve().name.lower()).strip("_")
     return (word if re.match("[a-z]", word) else f"site_{word}")[:40].rstrip("_")
 
 
 def _renamed(directory: Path, chosen: str) -> str | None:
-    """Why the policy has another name than the folder; None where it has the same."""
+    """Return a note if the policy's name differs from the folder's; None if they are equal."""
     folder = directory.absolute().resolve().name
     if folder == chosen:
         return None
-    return f"the folder's name `{folder}` cannot name a policy, so it is called `{chosen}`; `--name` chooses another"
+    return f"`{folder}` is not a valid policy name, so the policy is named `{chosen}`; choose another with `--name`"
 
 
 def _first_finding(files: Mapping[str, bytes]) -> str | None:
-    """What the checker says of it: a name may be a word of the language, or that of something else."""
+    """Return the first error of the new project, for example if its name is a keyword or already used; None if none."""
     from rtshcua.app.check import EarlierPolicies, check_all
     from rtshcua.app.files import source_files
     from rtshcua.app.programs import programs
@@ -135,11 +136,11 @@ def _tell(
         told = {"name": name, "folder": str(directory), "files": files, "kept": [*kept], "renamed": renamed}
         out_json(json.dumps(told, ensure_ascii=False))
         return
-    out(f"made {name} in {directory.absolute()}:")
+    out(f"created {name} in {directory.absolute()}:")
     for path in files:
         out(f"  {path}")
     if renamed is not None:
         out(renamed)
     if kept:
-        out(f"kept as they were: {', '.join(kept)}")
-    out("next, in there: `rtshcua lint .`, `rtshcua test .`, and what README.md says")
+        out(f"kept unchanged: {', '.join(kept)}")
+    out("next, in this folder: `rtshcua lint .`, `rtshcua test .`, and see README.md")

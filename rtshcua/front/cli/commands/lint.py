@@ -1,4 +1,4 @@
-"""`rtshcua lint`: everything that `check` finds, and what is worth a second look."""
+"""`rtshcua lint`: report what `check` reports, and warnings about code that compiles."""
 
 from pathlib import Path
 from typing import Annotated
@@ -16,42 +16,41 @@ app = typer.Typer(add_completion=False)
 def lint(
     paths: Annotated[
         list[Path] | None,
-        typer.Argument(help="sources (.rts), folders of them (this one), or a mission specification (.json) first"),
+        typer.Argument(help="sources (.rts), folders (default: here), or first a mission specification (.json)"),
     ] = None,
-    format: Annotated[str, typer.Option(help="human, json, sarif, github or junit")] = "human",
-    output: Annotated[
-        Path | None, typer.Option("--output", "-o", help="write the report of that format to a file instead")
-    ] = None,
+    format: Annotated[str, typer.Option(help="format of the report: human, json, sarif, github or junit")] = "human",
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="write the report to this file")] = None,
     fail_on: Annotated[
-        str | None, typer.Option(help="error, warning, note or never: from which level on the run fails (warning)")
+        str | None, typer.Option(help="lowest level that fails: error, warning (default), note or never")
     ] = None,
     with_: Annotated[
-        list[Path] | None, typer.Option("--with", help="further sources: a specification's policy (repeatable)")
+        list[Path] | None,
+        typer.Option("--with", help="additional sources, such as a specification's policy (repeatable)"),
     ] = None,
     changed: Annotated[
-        bool, typer.Option("--changed", help="only what git says has changed, and what imports it")
+        bool, typer.Option("--changed", help="only files changed according to git, and files that import them")
     ] = False,
-    base: Annotated[str | None, typer.Option(help="--changed, and since this branch left that one")] = None,
-    fix: Annotated[bool, typer.Option("--fix", help="make the fixes that keep your meaning")] = False,
-    unsafe_fixes: Annotated[
-        bool, typer.Option("--unsafe-fixes", help="make also those that need your judgement; look at --diff first")
-    ] = False,
-    diff: Annotated[bool, typer.Option("--diff", help="print what fixes would change, and change nothing")] = False,
-    config: Annotated[
-        Path | None, typer.Option(help="this configuration for all files, instead of the nearest to each")
+    base: Annotated[
+        str | None, typer.Option(help="like --changed, compared with the merge base of this branch")
     ] = None,
-    isolated: Annotated[bool, typer.Option("--isolated", help="no configuration at all")] = False,
-    no_cache: Annotated[bool, typer.Option("--no-cache", help="examine everything anew, and remember nothing")] = False,
-    statistics: Annotated[bool, typer.Option("--statistics", help="say how often each code was found")] = False,
+    fix: Annotated[bool, typer.Option("--fix", help="apply the fixes that preserve the meaning")] = False,
+    unsafe_fixes: Annotated[
+        bool, typer.Option("--unsafe-fixes", help="apply also fixes that need review; see --diff first")
+    ] = False,
+    diff: Annotated[bool, typer.Option("--diff", help="print the changes of the fixes without applying them")] = False,
+    config: Annotated[Path | None, typer.Option(help="use this configuration for all files, not the nearest")] = None,
+    isolated: Annotated[bool, typer.Option("--isolated", help="ignore all configuration files")] = False,
+    no_cache: Annotated[bool, typer.Option("--no-cache", help="neither read nor write the cache")] = False,
+    statistics: Annotated[bool, typer.Option("--statistics", help="count the findings by code")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="the same as --format json")] = False,
 ) -> ExitCode:
-    """Report everything that `check` finds, and what is worth a second look in the sources that were asked for.
+    """Report what `check` reports, and warnings about code that compiles.
 
     Rules, configuration (rtshcua.toml), ignores with a reason, fixes and the cache: docs/linting.md.
 
-    Ends with 0 where nothing was found of the level that fails, 1 where something was (with --diff: where a fix would
-    change something), 2 where the command line is wrong, 3 where a file or a configuration cannot be read, or git
-    cannot say what has changed, 74 where a fix or a report cannot be written.
+    Exit codes: 0 no finding at or above the level of --fail-on; 1 at least one (with --diff: a fix would change a
+    file); 2 wrong command line; 3 a file or configuration cannot be read, or git fails; 74 a fix or report cannot be
+    written.
     """
     return run(
         LintOptions(

@@ -14,17 +14,15 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 def lsp(
-    tcp: Annotated[
-        int | None, typer.Option(help="listen on this port of 127.0.0.1 for one editor, instead of the streams")
-    ] = None,
-    stdio: Annotated[bool, typer.Option("--stdio", help="speak over the standard streams, as without options")] = False,
+    tcp: Annotated[int | None, typer.Option(help="listen on this port of 127.0.0.1 for one editor")] = None,
+    stdio: Annotated[bool, typer.Option("--stdio", help="use the standard streams (default)")] = False,
 ) -> ExitCode:
-    """Serve an editor: findings while you write, hover, definitions, renaming, completion, formatting.
+    """Run the language server: live diagnostics, hover, definitions, renaming, completion and formatting.
 
-    Speaks the Language Server Protocol over the standard streams until the editor ends; docs/editor.md says how to set
-    editors up. Needs the extra `editor`. Runs nothing that a workspace holds.
+    It speaks the Language Server Protocol over the standard streams until the editor ends the session. Editor setup:
+    docs/editor.md. Requires the extra `editor`. It runs no code from the workspace.
 
-    Ends with 0, with 2 where the command line is wrong or the extra is missing.
+    Exit codes: 0 the session ended; 2 wrong command line, or the extra is missing.
     """
     try:
         from rtshcua.front.lsp.server import serve
@@ -35,7 +33,7 @@ def lsp(
             ExitCode.USAGE, "the language server is not installed", 'in the checkout: `pip install ".[editor]"`'
         )
     if tcp is not None and (stdio or not 0 < tcp < 1 << 16):
-        return fail(ExitCode.USAGE, "`--tcp` takes a port from 1 to 65535, and goes without `--stdio`")
+        return fail(ExitCode.USAGE, "`--tcp` requires a port from 1 to 65535, and cannot be combined with `--stdio`")
     with breakable():
         serve(str(root()), tcp)
     return ExitCode.OK

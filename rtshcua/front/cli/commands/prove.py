@@ -37,7 +37,7 @@ def prove(
     passphrase_file: Annotated[Path | None, typer.Option(help="a file with the key's passphrase")] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="the file [default: record-N.tlog-proof]")]
     = None,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")] = False,
 ) -> ExitCode:  # fmt: skip
     """Prove one record of a log to someone who has nothing but the file and your root key.
 

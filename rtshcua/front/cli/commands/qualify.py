@@ -69,7 +69,7 @@ def qualify(
     only: Annotated[
         list[str] | None, typer.Option(metavar="SORTIE", help="fly these sorties alone (repeatable)")
     ] = None,
-    mission: Annotated[str | None, typer.Option(help="which mission, where the source has several")] = None,
+    mission: Annotated[str | None, typer.Option(help="the mission to use if the source has several")] = None,
     speed: Annotated[float, typer.Option(min=0.1, max=50, help="seconds of flight in a second; in simulation")] = 1.0,
     passphrase_file: Annotated[Path | None, typer.Option(help="a file with the keys' passphrase")] = None,
     signing_key: LinkKey = None,

@@ -23,7 +23,7 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 def recall(
-    bundle: Annotated[Path | None, typer.Argument(help="the bundle that flies")] = None,
+    bundle: Annotated[Path | None, typer.Argument(help="the bundle that is flying")] = None,
     policy: Annotated[bool, typer.Option("--policy", help="all that fly under its policy on this vehicle")] = False,
     seconds: Annotated[int, typer.Option("--for", min=1, max=MOST_S, help="how many seconds the recall is good")]
     = recalling.GOOD_S,

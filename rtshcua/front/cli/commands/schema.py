@@ -1,4 +1,4 @@
-"""`rtshcua schema`: the JSON Schema of a mission specification, and tools for agents that are made of it."""
+"""`rtshcua schema`: print the JSON Schema of a mission specification, or a tool definition for agents."""
 
 import json
 from pathlib import Path
@@ -21,27 +21,25 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 def schema(
-    form: Annotated[str, typer.Option(help=f"what is made of it: {', '.join(FORMS)}")] = "schema",
+    form: Annotated[str, typer.Option(help=f"output format: {', '.join(FORMS)}")] = "schema",
     policy: Annotated[
-        Path | None, typer.Option(help="a source with one policy: only what an agent may be permitted under it fits")
+        Path | None, typer.Option(help="a source with one policy: limit the schema to what it permits to an agent")
     ] = None,
-    name: Annotated[str | None, typer.Option(help="which policy, where the source has several")] = None,
+    name: Annotated[str | None, typer.Option(help="the policy to use if the source has several")] = None,
 ) -> ExitCode:
-    """Print the JSON Schema (draft 2020-12) of a mission specification, as `rtshcua compile` takes it.
+    """Print the JSON Schema (draft 2020-12) of a mission specification for `rtshcua compile`.
 
-    With --policy it is narrowed to the skills, zones and ranges that the policy permits to an agent. With --form it is
-    the definition of a tool: for OpenAI (Responses API, or openai-chat for Chat Completions), for Anthropic, or for the
-    Model Context Protocol; strict, where a policy narrows it. What fits a schema is still checked when it is handed in.
+    --policy limits it to the skills, zones and ranges that the policy permits to an agent. --form prints a tool
+    definition instead: for OpenAI (Responses API, or openai-chat for Chat Completions), Anthropic, or the Model Context
+    Protocol; with --policy it is strict. A specification that matches the schema is still checked when it is submitted.
     """
     findings = Findings(json=False)
     if form not in FORMS:
         near = nearest(form, FORMS)
         help = f"did you mean `{near}`?" if near else f"accepted: {', '.join(FORMS)}"
-        return findings.refuse(ExitCode.USAGE, "usage", f"there is no form `{form}`", help)
+        return findings.refuse(ExitCode.USAGE, "usage", f"unknown form `{form}`", help)
     if policy is None and name is not None:
-        return findings.refuse(
-            ExitCode.USAGE, "usage", "`--name` is not used without `--policy`", "name its source too"
-        )
+        return findings.refuse(ExitCode.USAGE, "usage", "`--name` requires `--policy`", "add `--policy SOURCE`")
     if policy is None:
         found: Schema | ExitCode = mission_schema()
     else:
@@ -53,7 +51,7 @@ def schema(
 
 
 def _narrowed(path: Path, name: str | None, findings: Findings) -> Schema | ExitCode:
-    """The schema under the policy of a source; or how the command ends without one."""
+    """Return the schema limited by the policy of a source, or the exit code of a reported error."""
     from rtshcua.app.programs import examine, read_sources
     from rtshcua.ground.agent.narrowed_schema import narrowed
 
@@ -76,6 +74,6 @@ def _narrowed(path: Path, name: str | None, findings: Findings) -> Schema | Exit
 
 
 def _shipped(program: Program) -> str | None:
-    """What a specification imports to have the policy; None where the policy is named on the command line."""
+    """Return the `lib:` path by which a specification imports the policy; None if the policy is not in the library."""
     path = program.stable.get(program.units[0].file, "")
     return path if path.startswith("lib:") else None

@@ -39,7 +39,7 @@ def show(
         Path,
         typer.Argument(metavar="FILE", help="a bundle, document, key, trust root, record or log, or a run's folder"),
     ],
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")] = False,
 ) -> ExitCode:
     """Print what a file says, whatever kind it is, with nothing left unsaid. Showing is not verifying."""
     page = for_terminal()

@@ -1,4 +1,4 @@
-"""`rtshcua test`: run the tests of sources, say what they cover, and write tests for every limit of a policy."""
+"""`rtshcua test`: run the tests of sources, measure coverage, and generate tests for the limits of a policy."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -37,48 +37,45 @@ _REPORT = "a report"
 
 @app.command()
 def run_tests(
-    paths: Annotated[list[Path] | None, typer.Argument(help="sources (.rts), folders of them (default: here)")] = None,
-    chosen: Annotated[str, typer.Option("-k", metavar="TEXT", help="only the cases whose name has this in it")] = "",
-    coverage: Annotated[
-        bool, typer.Option("--coverage", help="say what of the policies is covered, by clause")
-    ] = False,
+    paths: Annotated[list[Path] | None, typer.Argument(help="sources (.rts) or folders (default: here)")] = None,
+    chosen: Annotated[str, typer.Option("-k", metavar="TEXT", help="only cases whose name contains this text")] = "",
+    coverage: Annotated[bool, typer.Option("--coverage", help="report the coverage of the policies by clause")] = False,
     fail_under: Annotated[
-        int | None, typer.Option(min=0, max=100, metavar="N", help="fail where less than N % is covered")
+        int | None, typer.Option(min=0, max=100, metavar="N", help="fail if coverage is below N %")
     ] = None,
     verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="also each row of a table, each covered clause")
+        bool, typer.Option("--verbose", "-v", help="list also the rows of tables and the covered clauses")
     ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")] = False,
     junit_file: Annotated[
-        Path | None, typer.Option("--junit", metavar="FILE", help="write a JUnit report, over an earlier one")
+        Path | None, typer.Option("--junit", metavar="FILE", help="write a JUnit report; an existing one is replaced")
     ] = None,
     generating: Annotated[
-        bool, typer.Option("--generate", help="write tests for both sides of every limit of a policy")
+        bool, typer.Option("--generate", help="generate tests for both sides of every limit of a policy")
     ] = False,
-    policy: Annotated[str | None, typer.Option(help="--generate: of which policy, where there are several")] = None,
-    skill: Annotated[list[str] | None, typer.Option(help="--generate: for this skill alone (repeatable)")] = None,
+    policy: Annotated[str | None, typer.Option(help="--generate: the policy, if there are several")] = None,
+    skill: Annotated[list[str] | None, typer.Option(help="--generate: only for this skill (repeatable)")] = None,
     nominal: Annotated[
-        str | None, typer.Option(help="--generate: the nominal to start from (default: the first)")
+        str | None, typer.Option(help="--generate: the nominal state to start from (default: the first)")
     ] = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="--generate: into this file")] = None,
-    force: Annotated[bool, typer.Option("--force", help="--generate: replace the file if it exists")] = False,
-    config: Annotated[Path | None, typer.Option(help="the configuration, in place of the nearest")] = None,
-    isolated: Annotated[bool, typer.Option("--isolated", help="without any configuration")] = False,
+    output: Annotated[Path | None, typer.Option("--output", "-o", help="--generate: the file to write")] = None,
+    force: Annotated[bool, typer.Option("--force", help="--generate: replace an existing file")] = False,
+    config: Annotated[Path | None, typer.Option(help="use this configuration, not the nearest")] = None,
+    isolated: Annotated[bool, typer.Option("--isolated", help="ignore all configuration files")] = False,
 ) -> ExitCode:
-    """Run the `test` blocks of sources, fly their scenarios in virtual time, and say what of their policies they cover.
+    """Run the `test` blocks of sources, fly their scenarios in virtual time, and report what they cover.
 
-    A file's tests run where the file itself is asked for, not where it is imported. What fails is shown with the clause
-    that decided, and the nearest value that would have met what was expected. Coverage counts clauses and outcomes,
-    never lines. docs/testing.md has it all.
+    The tests of a file run if the file is named or found in a folder, not if it is only imported. A failure names the
+    clause that decided and the nearest value that gives the expected result. Coverage counts clauses and outcomes, not
+    lines. Details: docs/testing.md.
 
-    Ends with 0 where all passed, 13 where a test failed, none was found, or less is covered than is asked
-    (`--fail-under`, or `fail-under` of the configuration), 1 where sources have errors, 2 where the command line is
-    wrong, 3 where a file cannot be read.
+    Exit codes: 0 all passed; 13 a test failed, no test was found, or coverage is below `--fail-under` (also
+    `fail-under` in the configuration); 1 the sources have errors; 2 wrong command line; 3 a file cannot be read.
     """
     findings = Findings(json=as_json)
     if not generating and any([policy, skill, nominal, output, force]):
-        help = "`--policy`, `--skill`, `--nominal`, `--output` and `--force` go with `--generate`"
-        return findings.refuse(ExitCode.USAGE, "usage", "there is nothing to write without `--generate`", help)
+        help = "add `--generate`, or leave out `--policy`, `--skill`, `--nominal`, `--output` and `--force`"
+        return findings.refuse(ExitCode.USAGE, "usage", "`--generate` is missing", help)
     projects, here = Projects(config, isolated=isolated), paths or [Path()]
     files = select_files(here, projects, keep=generating)
     if isinstance(files, Refusal):
@@ -89,7 +86,7 @@ def run_tests(
     refused = None if junit_file is None else overwriting_a_source(junit_file, files, _REPORT)
     if refused is not None:
         return findings.end(refused)
-    whole = not chosen and all(path.is_dir() for path in here)  # of a part, nobody asked for a share
+    whole = not chosen and all(path.is_dir() for path in here)  # the required coverage applies to whole folders only
     least = fail_under if fail_under is not None or not whole else least_share(here, projects)
     with_coverage = coverage or least is not None
     done = run_all(files, chosen, with_coverage=with_coverage, progress=watched, say=counting(quiet=as_json))
@@ -114,7 +111,7 @@ def run_tests(
 
 
 def _generate(files: Sequence[Path], request: GenerateRequest, findings: Findings, *, quiet: bool) -> ExitCode:
-    """Write the tests of one policy; quiet: as a field of the JSON object."""
+    """Generate the tests of one policy; `quiet`: only as a member of the JSON object."""
     done = generate(files, request)
     if isinstance(done, Refusal):
         return findings.end(done)
@@ -129,9 +126,9 @@ def _generate(files: Sequence[Path], request: GenerateRequest, findings: Finding
             out_source(done.text)
         where = "" if request.output is None else f", in {request.output}"
         counted = f"{many(made.cases, 'case')} on {many(len(made.limits), 'limit')} of {done.policy}"
-        say(f"{counted}{where}: read them before you keep them")  # the text may be on the standard output
+        say(f"{counted}{where}: review them before you keep them")  # the text may be on the standard output
         for label in made.without:
-            say(f"nothing was found that makes `{label}` allowed; it has one case, as it is")
+            say(f"no state was found that permits `{label}`; it has one case, with its present result")
         for each in made.unreached:
             say(f"not reached: {each.words}")
     return findings.finish(

@@ -40,8 +40,8 @@ def why(
     approved: Annotated[
         bool, typer.Option("--approved", help="whoever a `confirm` asks approved, when the step was released")
     ] = False,
-    mission: Annotated[str | None, typer.Option(help="which mission, where the source has several")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object on the standard output")] = False,
+    mission: Annotated[str | None, typer.Option(help="the mission to use if the source has several")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")] = False,
 ) -> ExitCode:
     """Show a decision step by step: what each step looked at, what decided, and what would have passed.
 

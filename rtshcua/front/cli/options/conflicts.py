@@ -1,4 +1,4 @@
-"""Options that make no sense together, of the commands that fly, as one table."""
+"""One table of the conflicts between options of the commands that fly."""
 
 from typing import Final, NamedTuple
 
@@ -11,7 +11,7 @@ from rtshcua.onboard.enforcement.load import EnforcementMode
 
 
 class Conflict(NamedTuple):
-    """Options of a command of which one is given, together with one of `among`, or without all of `without`."""
+    """A conflict: one of the options `given` with one of `among`, or without any of `without`."""
 
     command: str
     given: tuple[str, ...]
@@ -23,9 +23,9 @@ class Conflict(NamedTuple):
 
 _CONNECT: Final = ("--connect",)
 _LISTENS: Final = ("--boundary-socket",)
-_UNKEYED: Final = "`--unsigned-radio` goes with `--signing-key`: without a key nothing is signed"
-_OWN: Final = "the boundary there has keys of its own, sets no parameters, and rehearses nothing"
-#: what a boundary that listens is told in its own command line, or does not do
+_UNKEYED: Final = "`--unsigned-radio` requires `--signing-key`: without a key nothing is signed"
+_OWN: Final = "the listening boundary has its own keys, sets no parameters, and supports no dry run"
+#: options that a listening boundary takes on its own command line or does not support
 _NOT_THERE: Final = {
     "--signing-key": _OWN,
     "--boundary-user": _OWN,
@@ -34,75 +34,75 @@ _NOT_THERE: Final = {
     "--boundary-key": _OWN,
     "--passphrase-file": _OWN,
     "--dry-run": _OWN,
-    "--utc-error": "the boundary there tells the time itself; it is told in its own command line, `--utc-error US`",
+    "--utc-error": "the listening boundary has its own clock; set `--utc-error US` on its command line",
 }
 
 
 def _other_modes(command: str) -> list[Conflict]:
     return [
         Conflict(
-            command, _LISTENS, f"`--boundary-socket` goes with `--mode process`, not with `{mode}`",
+            command, _LISTENS, f"`--boundary-socket` requires `--mode process`, not `{mode}`",
             among=(f"--mode {mode}",),
         )
         for mode in EnforcementMode if mode is not EnforcementMode.PROCESS
     ]  # fmt: skip
 
 
-#: of each command, in the order in which they are looked for
+#: the conflicts of all commands; the first that applies is reported
 CONFLICTS: Final = (
     Conflict(
-        "run", OF_SIMULATOR, "options of the simulated vehicle do not go with `--connect`",
-        "`rtshcua sim` takes them, where it is the vehicle that you connect to", among=_CONNECT,
+        "run", OF_SIMULATOR, "options of the simulated vehicle cannot be combined with `--connect`",
+        "if you connect to `rtshcua sim`, pass them to `rtshcua sim`", among=_CONNECT,
     ),
     Conflict(
-        "run", _CONNECT, "`--connect` needs `--vehicle`: which vehicle is it?",
-        "its identity, as its policy says it: a bundle for another vehicle is refused then", without=("--vehicle",),
+        "run", _CONNECT, "`--connect` requires `--vehicle ID`",
+        "the vehicle's identity as in its policy; a bundle for another vehicle is refused", without=("--vehicle",),
     ),
     Conflict(
-        "run", ("--scenario",), "`--scenario` is for the simulated vehicle, and does not go with `--connect`",
+        "run", ("--scenario",), "`--scenario` requires the simulated vehicle and cannot be combined with `--connect`",
         among=_CONNECT,
     ),
     Conflict(
-        "run", ("--scenario",), "`--scenario` says how the vehicle starts and what goes wrong",
-        "with it go `--flavour` and `--seed`; `--battery`, `--wind`, `--fault` and `--dry-run` do not",
+        "run", ("--scenario",), "`--scenario` conflicts with `--battery`, `--wind`, `--fault` and `--dry-run`",
+        "the scenario sets the initial state and the faults; `--flavour` and `--seed` are accepted",
         among=("--battery", "--wind", "--fault", "--dry-run"),
     ),
-    Conflict("run", ("--wait-for",), "`--wait-for` goes with `--wait`", without=("--wait",)),
+    Conflict("run", ("--wait-for",), "`--wait-for` requires `--wait`", without=("--wait",)),
     Conflict(
-        "run", ("--wait",), "`--wait` needs `--agent-socket`: where is the bundle handed in?",
+        "run", ("--wait",), "`--wait` requires `--agent-socket PATH`, where an agent submits the bundle",
         without=("--agent-socket",),
     ),
     Conflict(
-        "run", ("--wait",), "`--wait` does not go with `--dry-run` and `--scenario`, which know the mission before",
+        "run", ("--wait",), "`--wait` conflicts with `--dry-run` and `--scenario`, which need the mission at the start",
         among=("--dry-run", "--scenario"),
     ),
-    Conflict("run", _LISTENS, "`--boundary-socket` goes with `--connect`", without=_CONNECT),
+    Conflict("run", _LISTENS, "`--boundary-socket` requires `--connect`", without=_CONNECT),
     *_other_modes("run"),
     *(
-        Conflict("run", (option,), f"`{option}` does not go with `--boundary-socket`: {why}", among=_LISTENS)
+        Conflict("run", (option,), f"`{option}` cannot be combined with `--boundary-socket`: {why}", among=_LISTENS)
         for option, why in _NOT_THERE.items()
     ),
     Conflict(
-        "run", ("--system",), "`--system` goes with `--connect`: the simulated vehicle is alone", without=_CONNECT
+        "run", ("--system",), "`--system` requires `--connect`: there is only one simulated vehicle", without=_CONNECT
     ),
     Conflict(
-        "run", ("--utc-error",), "`--utc-error` goes with `--connect`: a simulation has this machine's time",
+        "run", ("--utc-error",), "`--utc-error` requires `--connect`: a simulation uses the time of this machine",
         without=_CONNECT,
     ),
     Conflict(
-        "run", ("--fresh-state",), "`--fresh-state` is for the simulated vehicle, and without `--state-dir`",
+        "run", ("--fresh-state",), "`--fresh-state` requires the simulated vehicle and conflicts with `--state-dir`",
         among=("--state-dir", "--connect"),
     ),
     Conflict("run", ("--unsigned-radio",), _UNKEYED, without=("--signing-key", "--boundary-socket")),
     Conflict("doctor", ("--unsigned-radio",), _UNKEYED, without=("--signing-key",)),
     Conflict(
         "doctor", ("--utc-error",),
-        "`--utc-error` does not go with `--boundary-socket`: the boundary there is told in its own command line",
+        "`--boundary-socket` excludes `--utc-error`: set it on the boundary's command line",
         among=_LISTENS,
     ),
     *_other_modes("doctor"),
     Conflict(
-        "qualify", ("--takeover",), "`--takeover` requires `--pilot`: in a simulation takeovers are always tried",
+        "qualify", ("--takeover",), "`--takeover` requires `--pilot`: in a simulation takeovers are always tested",
         among=("--sitl",),
     ),
     Conflict(
@@ -110,8 +110,8 @@ CONFLICTS: Final = (
     ),
     *(
         Conflict(
-            "mcp", (option,), "`--http` and `--token-file` go together", "or neither: the standard streams",
-            without=(other,),
+            "mcp", (option,), "`--http` and `--token-file` require each other",
+            "leave out both to use the standard streams", without=(other,),
         )
         for option, other in (("--http", "--token-file"), ("--token-file", "--http"))
     ),
@@ -119,8 +119,9 @@ CONFLICTS: Final = (
 
 
 def conflict_of(context: typer.Context, *, only: tuple[str, ...] = ()) -> ExitCode | None:
-    """Fails for the first conflict between the options of a command line, of those about one of `only`, if any is
-    named; None where there is none.
+    """Report the first conflict between the options of a command line and return its exit code; None if there is none.
+
+    `only`: if not empty, look only at conflicts about these options.
     """
     given = {
         f"--mode {context.params['mode']}" if option == "--mode" else option

@@ -1,4 +1,4 @@
-"""What `rtshcua check` does, however its command line was read."""
+"""Run `rtshcua check` from parsed options and print the result."""
 
 import textwrap
 import time
@@ -31,7 +31,7 @@ def check_sources(
     deny_warnings: bool = False,
     as_json: bool = False,
 ) -> ExitCode:
-    """Report everything that is wrong with sources; see `rtshcua.front.cli.commands.check`."""
+    """Check sources and print the findings; `rtshcua.front.cli.commands.check` describes the options."""
     findings = Findings(json=as_json, deny_warnings=deny_warnings)
     issued_at_us = 0 if at is None else moment(at)
     if issued_at_us is None:
@@ -44,7 +44,7 @@ def check_sources(
     root = found.programs[0]
     alone = len(root.asked) == 1 and not with_ and root.name.lower().endswith(SPECIFICATION)
     if alone and not as_json and any(each.code is UNKNOWN_NAME for each in found.diagnostics):
-        say(" help: what a specification speaks of stands in its policy's sources: `--with FILE` names them")
+        say(" help: the names in a specification are declared in its policy's sources; pass them with `--with FILE`")
     if code is ExitCode.OK and not as_json:
         _tell(found, since, request.now_us)
     if map_ is not None:
@@ -58,7 +58,7 @@ def check_sources(
 
 
 def _as_json(found: CheckResult) -> dict[str, object]:
-    """What else the object of `--json` holds."""
+    """Return the members that `check` adds to the object of `--json`."""
     versions = [
         {
             "policy": each.name,
@@ -78,7 +78,7 @@ def _as_json(found: CheckResult) -> dict[str, object]:
 
 
 def _tell(found: CheckResult, since: Path | None, now_us: int) -> None:
-    """What is said of sources in which nothing is wrong."""
+    """Print the result for sources without errors."""
     empty = [name for name, source in found.sources.items() if not source.text.strip()]
     out(f"no errors in {len(found.sources)} file{'s' * (len(found.sources) > 1)}")
     for name in empty:
@@ -90,29 +90,29 @@ def _tell(found: CheckResult, since: Path | None, now_us: int) -> None:
     for left_out in found.left_out:
         out(left_out.told())
     for refused in found.now:
-        out(f"issued now, it would be refused: {refused.code.id}, {refused.message}")
+        out(f"if issued now, it would be refused: {refused.code.id}, {refused.message}")
     if found.now:
         at = utc(now_us).replace(" ", "T")
-        out(f"the dates of zones count from the time of issue: `rtshcua check --at {at}` shows where")
+        out(f"the dates of zones apply at the time of issue; run `rtshcua check --at {at}` for the locations")
     for each in found.versions:
-        same = "" if each.changes else "; they mean the same"
+        same = "" if each.changes else "; no change in meaning"
         out(f"{each.name}: version {each.version}, and {each.earlier} in {since}{same}")
         for change in each.changes:
             _tell_change(change)
     for name in found.not_here if found.versions else ():
-        out(f"{name}: in {since}, and compared with no policy here")
+        out(f"{name}: only in {since}; no policy here to compare with")
 
 
 def _tell_change(change: ChangeView) -> None:
-    """One difference: which way it goes, and its words then and now."""
+    """Print one change of a policy: its direction, and its text before and now."""
     out_wrapped(f"  {change.direction:<11}  ", change.what)
     for what, lines in (("before", change.before), ("now", change.after)):
-        for line in lines or ("there was none" if what == "before" else "there is none",):
+        for line in lines or ("(absent)" if what == "before" else "(removed)",):
             out_wrapped(f"  {'':11}    {what:<6}  ", line)
 
 
 def out_wrapped(head: str, text: str) -> None:
-    """A line of at most 80 columns, and what does not fit beneath, under its text."""
+    """Print text wrapped at 80 columns, with continuation lines indented to the width of `head`."""
     body = " ".join(text.split())
     beneath = " " * len(head)
     for line in textwrap.wrap(body, 80, initial_indent=head, subsequent_indent=beneath, break_on_hyphens=False):
@@ -120,6 +120,6 @@ def out_wrapped(head: str, text: str) -> None:
 
 
 def _named(mission: CheckedMission, missions: tuple[CheckedMission, ...]) -> str:
-    """A mission's name; with its file, where another has the same."""
+    """Return a mission's name, with its file if another mission has the same name."""
     alone = sum(each.name == mission.name for each in missions) == 1
     return mission.name if alone else f"{mission.name} ({mission.file})"

@@ -1,4 +1,4 @@
-"""How a list of claims, and other styled lines, are shown to a person."""
+"""Print lists of claims and other styled lines."""
 
 import os
 import sys
@@ -11,7 +11,7 @@ from rtshcua.front.cli.width import fitted
 
 
 def listed(title: str, style: str, mark: str, claims: Sequence[Claim]) -> list[tuple[str, str]]:
-    """Claims under a title, each behind a mark, as (style, line); nothing where there are none."""
+    """Return claims below a title, each after a mark, as pairs (style, line); empty if there are no claims."""
     if not claims:
         return []
     lines = [("", ""), ("bold", title)]
@@ -21,7 +21,7 @@ def listed(title: str, style: str, mark: str, claims: Sequence[Claim]) -> list[t
 
 
 def write(lines: Iterable[tuple[str, str]]) -> None:
-    """Prints (style, line): in colour on a terminal, unless NO_COLOR is set."""
+    """Print pairs (style, line), in colour on a terminal unless NO_COLOR is set."""
     if not sys.stdout.isatty() or "NO_COLOR" in os.environ:
         out(*(text for _, text in lines))
         return

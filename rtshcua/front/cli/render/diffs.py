@@ -1,4 +1,4 @@
-"""What formatting changes, as a unified diff that `patch` takes."""
+"""Unified diffs of formatted files, as `patch` accepts them."""
 
 import os
 import sys
@@ -13,18 +13,18 @@ _END = "\033[0m"
 
 
 def difference(laid: Laid) -> str:
-    """The diff of one file, empty where nothing changes; in colour on a terminal."""
+    """Return the diff of one file, coloured on a terminal; empty if nothing changes."""
     if laid.after is None or not laid.changed:
         return ""
     colour = sys.stdout is not None and sys.stdout.isatty() and not os.environ.get("NO_COLOR")
-    made = unified(laid.name, laid.before, laid.after, "as it is", "formatted")
+    made = unified(laid.name, laid.before, laid.after, "current", "formatted")
     return "".join(map(_coloured, made) if colour else made)
 
 
 def unified(name: str, before: bytes, after: bytes, was: str = "", now: str = "") -> Iterator[str]:
-    """The lines of a unified diff of two texts in UTF-8, byte for byte; `was` and `now` say of each what it is.
+    """Yield the lines of a unified diff of two UTF-8 texts; `was` and `now` label the two sides.
 
-    Of a source that holds what hides others there is none, for it is refused; a file's name may hold anything.
+    Only the file name is escaped: a source with control or bidirectional characters is refused before.
     """
     name = visible(name)
     for line in unified_diff(_lines(before.decode("utf-8")), _lines(after.decode("utf-8")), name, name, was, now):
@@ -32,7 +32,7 @@ def unified(name: str, before: bytes, after: bytes, was: str = "", now: str = ""
 
 
 def _lines(text: str) -> list[str]:
-    """The lines with their ends; only a line feed ends one."""
+    """Split at line feeds only, and keep the line ends."""
     lines = text.split("\n")
     return [f"{line}\n" for line in lines[:-1]] + lines[-1:] * bool(lines[-1])
 

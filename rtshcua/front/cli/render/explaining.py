@@ -1,4 +1,4 @@
-"""`rtshcua verify-log --explain N`: an audit of the log, and record N in words."""
+"""`rtshcua verify-log --explain N`: audit a log and describe its record N."""
 
 import json
 from pathlib import Path
@@ -14,10 +14,10 @@ from rtshcua.front.cli.stdout import out_json, out_rendered
 
 
 def explained(logs: list[Path], number: int, request: VerifyRequest, *, as_json: bool) -> ExitCode:
-    """Prints record `number` of one log; the exit code is that of the log's audit."""
+    """Print record `number` of one log, and return the exit code of the log's audit."""
     logs = logs_meant(logs)
     if len(logs) != 1:
-        return fail(ExitCode.USAGE, "`--explain` tells of a record of one log", f"{len(logs)} logs were given")
+        return fail(ExitCode.USAGE, "`--explain` requires exactly one log", f"found {len(logs)} logs; pass one of them")
     path = log_of(logs[0])
     if not is_log(path):
         return fail(ExitCode.INPUT, *no_log(log_of(logs[0]), logs[0], NO_LOG_HELP))

@@ -83,7 +83,7 @@ def _count(found: tuple[Diagnostic, ...]) -> str:
     numbers = ((severity.value, sum(each.severity is severity for each in found)) for severity in Severity)
     parts = [f"{number} {word}{'s' * (number > 1)}" for word, number in numbers if number]
     first = next((each.code.id for each in found if each.severity is not Severity.NOTE), found[0].code.id)
-    return f"{', '.join(parts)}; `rtshcua explain {first}` tells more"
+    return f"{', '.join(parts)}; run `rtshcua explain {first}` for details"
 
 
 def _wants_colour() -> bool:

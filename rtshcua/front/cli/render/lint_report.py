@@ -1,4 +1,4 @@
-"""`rtshcua lint` without typer: runs the service, and shows what it found to a person or a machine."""
+"""Run `rtshcua lint` without typer: call the service and print or write its report."""
 
 import json
 from collections import Counter
@@ -23,7 +23,7 @@ from rtshcua.front.cli.width import columns
 
 
 def run(options: LintOptions) -> ExitCode:
-    """Lint, and fix where that is asked for."""
+    """Lint, apply fixes if requested, and print the report."""
     done = lint(options)
     if isinstance(done, Refusal):
         return Findings(json=options.form == "json" and options.output is None).end(done)
@@ -52,10 +52,10 @@ def run(options: LintOptions) -> ExitCode:
 
 
 def _show(done: LintRun) -> None:
-    """What a run found, for a person."""
+    """Print the findings for a person."""
     found = done.findings
     for name in () if done.fixed is None else done.fixed.refused:
-        say(f"note: the fixes of `{name}` would bring an error, so they were not made")
+        say(f"note: the fixes of `{name}` were not applied, because they would cause an error")
     Findings(json=False).report(found.found, found.sources)
     files = 0 if done.fixed is None else len(done.fixed.files)
     if files:
@@ -69,7 +69,7 @@ def _show(done: LintRun) -> None:
 
 
 def _written(done: LintRun, code: ExitCode) -> str:
-    """The report in one of the forms, for a file or a machine, ending in a newline, unless it is empty."""
+    """Return the report in the requested format; it ends in a newline unless it is empty."""
     here, form, told, asked = str(Path.cwd()), done.options.form, done.findings, done.names
     if form == "human":
         return laid_out(render(folded(told.found), told.sources, columns()))
@@ -108,7 +108,7 @@ def _sarif(told: LintFindings, code: ExitCode, here: str) -> dict[str, Any]:
 
 
 def _summary(told: LintFindings, files: int, left_out: int) -> str:
-    """What a run found, in a line: only where there is nothing to show."""
+    """Return the summary line of a run without findings to show."""
     parts = [f"nothing found in {files} file{'s' * (files != 1)}"]
     if told.ignored:
         parts.append(f"{len(told.ignored)} ignored")
@@ -118,7 +118,7 @@ def _summary(told: LintFindings, files: int, left_out: int) -> str:
 
 
 def _statistics(told: LintFindings) -> str:
-    """How often each code was found, the most frequent first, and how often it was ignored."""
+    """Return one line for each code, most frequent first: findings, and how many of them are ignored."""
     found = Counter(each.code for each in told.found)
     ignored = Counter(each.diagnostic.code for each in told.ignored)
     rows = sorted(found.keys() | ignored.keys(), key=lambda code: (-found[code], -ignored[code], code.id))

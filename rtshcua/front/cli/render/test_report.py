@@ -1,4 +1,4 @@
-"""What tests found, for a person: a line a test, what they cover by clause, and a line that sums it up."""
+"""Print test results for a person: one line for each test, the coverage by clause, and a summary."""
 
 import os
 import sys
@@ -23,9 +23,9 @@ _WIDTH = 100
 
 
 class TestReport:
-    """Prints what was found, coloured where the standard output is a terminal; nothing if `quiet`."""
+    """Prints results, coloured if standard output is a terminal; prints nothing if `quiet`."""
 
-    __test__ = False  # no class of pytest's
+    __test__ = False  # pytest collects classes named Test*
 
     def __init__(self, done: TestResults, chosen: str, *, verbose: bool, quiet: bool) -> None:
         self._done = done
@@ -36,11 +36,11 @@ class TestReport:
         self._colours = terminal and not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
 
     def results(self) -> None:
-        """A line for each test and scenario, below its file."""
+        """Print one line for each test and scenario, below its file."""
         self._print((*self._tests(self._done.ran), *self._scenarios(self._done.flown)))
 
     def summary(self, least: int | None) -> None:
-        """What is covered, how many there were and how they ended, and whether less is covered than is asked."""
+        """Print the coverage, the number of tests and failures, and whether coverage is below `least` percent."""
         if self._quiet:
             return
         done, covered = self._done, self._done.covered or ()
@@ -48,7 +48,7 @@ class TestReport:
         out_rendered(self._counts() if done.ran or done.flown else self._none())
         if done.falls_short(least):
             found = share(sum(one.coverage.covered for one in covered), sum(one.coverage.total for one in covered))
-            out(f"{found} is covered, less than {least} % (`--fail-under`, or `fail-under` of the configuration)")
+            out(f"coverage is {found}, below the required {least} % (`--fail-under`, or `fail-under` configured)")
 
     def _print(self, lines: Iterable[str]) -> None:
         for line in () if self._quiet else lines:
@@ -58,16 +58,16 @@ class TestReport:
     def _none(self) -> str:
         done = self._done
         if has_errors(done.diagnostics):
-            return "no test could be run: the sources have errors"
+            return "no test was run: the sources have errors"
         if done.left_out:
             by_word = {word: name for name in sorted(done.names) for word in (*name.split(), name)}
             near = nearest(self._chosen, by_word)
             help = "" if near is None else f"; the nearest is `{by_word[near]}`"
-            return f"no test was run: none of {done.left_out} has `{self._chosen}` in its name{help}"
-        return "no test was found; docs/testing.md says how to write one"
+            return f"no test was run: no name of {done.left_out} contains `{self._chosen}`{help}"
+        return "no test was found; see docs/testing.md for how to write one"
 
     def _tests(self, ran: Sequence[CaseResult]) -> Iterator[str]:
-        """A line a test, below its file; with `verbose` also one for each row."""
+        """Yield one line for each test, below its file; if verbose, one for each table row too."""
         for file, of_file in groupby(ran, lambda each: each.case.span.file):
             yield self._painted(visible(file), _BOLD)
             for _, group in groupby(of_file, lambda each: each.case.test.span):
@@ -77,7 +77,7 @@ class TestReport:
                     yield from (f"      {self._word(each.met)}  {visible(_row(each))}" for each in cases)
 
     def _scenarios(self, flown: Sequence[ScenarioResult]) -> Iterator[str]:
-        """A line a scenario, below its file; with `verbose` also how its flights ended, and what was excused."""
+        """Yield one line for each scenario, below its file; if verbose, also the endings and the excused events."""
         for file, of_file in groupby(flown, lambda each: each.scenario.declaration.span.file):
             yield self._painted(visible(file), _BOLD)
             for each in of_file:
@@ -90,7 +90,7 @@ class TestReport:
                     yield from (f"      excused: {visible(text)}" for text in excused)
 
     def _coverage(self, covered: Sequence[PolicyCoverage]) -> Iterator[str]:
-        """What is missing, clause by clause; with `verbose` also what is not."""
+        """Yield the uncovered clauses; if verbose, the covered ones too."""
         for one in covered:
             yield from self._policy(one)
         if len(covered) > 1:
@@ -98,7 +98,7 @@ class TestReport:
             yield f"\ncoverage of all: {share(reached, total)}, {reached} of {total}"
 
     def _counts(self) -> str:
-        """How many there were, and how they ended."""
+        """Return the line with the numbers of tests, cases and failures."""
         ran, flown, left_out = self._done.ran, self._done.flown, self._done.left_out
         found = summary_json(ran)
         counts = [many(found["tests"], "test")] if ran or not flown else []
@@ -136,7 +136,7 @@ class TestReport:
                 missing = ["never decided" if goal is Goal.DECIDED else f"never {goal.value}" for goal in line.missing]
                 yield f"      {', '.join(missing)}" if missing else "      covered"
         if found.undecided:
-            yield f"  {many(len(found.undecided), 'clause')} never decided: no test would notice if they said otherwise"
+            yield f"  {many(len(found.undecided), 'clause')} never decided: no test would detect a change of them"
 
     def _place(self, span: Span | None) -> str:
         if span is None or span.file not in self._done.sources:
@@ -148,5 +148,5 @@ class TestReport:
 
 
 def _row(ran: CaseResult) -> str:
-    """The cells of a row, which stand behind the name of its test."""
+    """Return the cells of a row: a case's name without the name of its test."""
     return ran.case.name.removeprefix(ran.case.test.name.text).strip()

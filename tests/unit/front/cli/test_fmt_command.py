@@ -67,7 +67,7 @@ def test_the_diff_is_one_that_patch_takes(here: Path, capsys: pytest.CaptureFixt
     assert main(["fmt", "--diff", "."]) == ExitCode.DIAGNOSTICS
     out, err = said(capsys)
     assert err == ""
-    assert out.startswith("--- a.rts\tas it is\n+++ a.rts\tformatted\n@@ ")
+    assert out.startswith("--- a.rts\tcurrent\n+++ a.rts\tformatted\n@@ ")
     assert "\\ No newline at end of file\n" in out
     assert Path("a.rts").read_text() == BAD.rstrip("\n")
     assert main(["fmt", "--diff", "--check", "."]) == ExitCode.DIAGNOSTICS

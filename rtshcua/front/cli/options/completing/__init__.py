@@ -1,1 +1,1 @@
-"""What `rtshcua completion` knows of the other commands."""
+"""Completion data for `rtshcua completion`."""

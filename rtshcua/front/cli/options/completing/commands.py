@@ -1,4 +1,4 @@
-"""All commands as one argparse parser, which is what shtab makes completion scripts of. Imports every command."""
+"""Build one argparse parser of all commands, from which shtab generates completion scripts."""
 
 import argparse
 from enum import Enum
@@ -14,14 +14,14 @@ from rtshcua.front.cli.table import COMMANDS
 
 
 def parser() -> argparse.ArgumentParser:
-    """A parser that knows what may stand where; nothing is ever parsed with it."""
+    """Return a parser of all commands, options and values; it is not used for parsing. Imports every command."""
     root = argparse.ArgumentParser("rtshcua")
     root.add_argument("-V", "--version", action="store_true", help="the version")
     commands = root.add_subparsers(required=True, metavar="COMMAND")
     for row in COMMANDS:
         made = commands.add_parser(row.name, help=_help(row.help), description=row.help)
         _fill(made, row.name, get_command(import_module(row.module).app))
-    helping = commands.add_parser("help", help="explain a command", description="explain a command")
+    helping = commands.add_parser("help", help="print the help of a command", description="print the help of a command")
     helping.add_argument("command", nargs="?", choices=words("help", "command"), help="a command")
     return root
 
@@ -39,7 +39,7 @@ def _fill(made: argparse.ArgumentParser, name: str, command: Any) -> None:
 
 
 def _add(made: argparse.ArgumentParser, command: str, parameter: Any) -> None:
-    """Adds one option or argument of typer's."""
+    """Add one typer option or argument."""
     help = _help(getattr(parameter, "help", None) or parameter.name)
     if parameter.param_type_name == "argument":
         action = made.add_argument(parameter.name, nargs=_count(parameter), help=help)
@@ -59,7 +59,7 @@ def _add(made: argparse.ArgumentParser, command: str, parameter: Any) -> None:
 
 
 def _describe(action: argparse.Action, command: str, parameter: Any) -> None:
-    """Says what may stand for it."""
+    """Set the choices or the file patterns of an argument."""
     kind = parameter.type_descriptor.annotation
     while get_origin(kind) is list:
         (kind,) = get_args(kind)
@@ -87,5 +87,5 @@ def _dashed(names: list[str]) -> list[str]:
 
 
 def _help(text: str) -> str:
-    """As argparse takes it."""
+    """Return a help text on one line, escaped for argparse."""
     return " ".join(text.split()).replace("%", "%%")

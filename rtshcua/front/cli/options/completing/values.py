@@ -1,4 +1,4 @@
-"""What may stand for an option or an argument, where its type does not say so: files of some kind, codes, shells."""
+"""Completion values of options and arguments that their types do not define: file patterns, codes, formats."""
 
 from collections.abc import Sequence
 from typing import Final
@@ -11,7 +11,7 @@ from rtshcua.ground.project.project_settings import LEVELS
 
 _SOURCES, _BUNDLE, _LOGS, _ROOTS = ("*.rts",), ("*.bundle",), ("*.jsonl",), ("*.trust",)
 
-#: which files are meant, by the name of the parameter, or by command and parameter where that has a meaning of its own
+#: file patterns by parameter name, or by command and parameter name
 FILES: Final[dict[str, Sequence[str]]] = {
     "paths": _SOURCES,
     "with_": _SOURCES,
@@ -32,12 +32,12 @@ FILES: Final[dict[str, Sequence[str]]] = {
     "why path": ("*.rts", "*.json", "*.bundle", "*.jsonl"),
 }
 
-#: parameters that are folders
+#: parameters that take folders
 FOLDERS: Final = frozenset({"directory", "folder", "runs", "state_dir", "archive"})
 
 
 def words(command: str, parameter: str) -> tuple[str, ...]:
-    """The words that an argument may be, for a parameter that takes any text; none where nobody knows."""
+    """Return the known values of a text parameter; empty if there are none."""
     if (command, parameter) == ("explain", "code"):
         return (*REGISTRY, *(code.slug for code in REGISTRY.values()))
     if (command, parameter) == ("help", "command"):
@@ -50,5 +50,5 @@ def words(command: str, parameter: str) -> tuple[str, ...]:
 
 
 def patterns(command: str, parameter: str) -> Sequence[str]:
-    """The patterns of files that are meant; none where any file may be."""
+    """Return the file patterns of a parameter; empty if any file is accepted."""
     return FILES.get(f"{command} {parameter}", FILES.get(parameter, ()))

@@ -87,7 +87,7 @@ def test_human_report(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["lint", ".", "--statistics"]) == ExitCode.DIAGNOSTICS
     said = capsys.readouterr()
     assert "warning[E1302]: `Look` violates the naming convention" in said.err
-    assert "3 warnings; `rtshcua explain E1302` tells more" in said.err
+    assert "3 warnings; run `rtshcua explain E1302` for details" in said.err
     assert said.out == "    2  E1302 naming\n    1  E1305 unused-import\n"
     put({"one.rts": MISSION.replace("Look", "look"), "two.rts": MISSION.replace("Look", "look")})
     put({"policy.rts": POLICY.replace(UNUSED, f"{UNUSED}  // rtshcua: ignore unused-import because of later")})

@@ -159,7 +159,7 @@ def earlier_policies(path: Path) -> EarlierPolicies | Refusal:
         checked = examine(each.reading)
         if has_errors(checked.diagnostics):
             message = f"`{each.name}` has errors, so nothing can be held against it"
-            return Refusal("since", message, f"`rtshcua check {path}` shows them")
+            return Refusal("since", message, f"run `rtshcua check {path}`")
         policies += [lowered.policy for lowered in checked.policies]
     return EarlierPolicies(str(path), tuple(policies))
 

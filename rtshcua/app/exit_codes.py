@@ -23,7 +23,7 @@ _INPUT = {
 
 #: what to do about what is not to be trusted, by slug
 _REMEDIES = {
-    "no-keys": "`rtshcua keys init` makes a development root",
+    "no-keys": "run `rtshcua keys init` to create a development root",
     "malformed": "it was cut off or damaged, or is another kind of file: make it again, or copy it again",
     "exposed": "`chmod 600` it; replace what others may have read: `rtshcua keys replace`, or another passphrase",
 }

@@ -37,13 +37,13 @@ from rtshcua.wire.untrusted import Untrusted
 SHORTEST: Final = 12
 DAY_US: Final = 86_400_000_000
 
-#: where a project has its sources (`rtshcua init`)
+#: the source folders of a project (`rtshcua init`)
 _FOLDERS: Final = (Path(), Path("policies"), Path("missions"))
-#: of more sources than these nothing is said: it is no project, or takes too long
+#: with more sources than this, roles are not checked: it is not a project, or checking takes too long
 _MOST: Final = 40
 _KEY_ID: Final = re.compile(r"[0-9a-f]{8,32}")
 _LINK_ID: Final = re.compile(r"[0-9a-f]{16}")
-#: what the name of a socket and of its unit may be, unescaped and within the length of a socket's address
+#: valid names of a socket and its unit: they need no escaping and fit into a socket address
 _SERVED: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,79}")
 _ROLE: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_.]{0,99}")
 _NO_PASSPHRASE: Final = Refusal(
@@ -108,7 +108,7 @@ def refused(error: Untrusted) -> Refusal:
 
 
 def trust_root(store: KeyStore) -> TrustRoot | Refusal:
-    """The store's own root, also an expired one: it is here to be looked at."""
+    """Return the key store's trust root, even if it has expired, because it is only displayed."""
     return _opened(lambda: _root(store))
 
 
@@ -148,7 +148,7 @@ def _now_us() -> int:
 def create(store: KeyStore, new: NewStore, secret: Secrets) -> Refusal | None:
     """Make a key for each duty, and the trust root that names them. Raises OSError."""
     if store.exists():
-        text = f"there are keys already in `{store.folder}`"
+        text = f"keys already exist in `{store.folder}`"
         return Refusal("exists", text, f"{_LISTS} them", ExitCode.INPUT)
     if new.witness_threshold > max(1, new.witnesses):
         text = f"`--witness-threshold {new.witness_threshold}` is more than the {new.witnesses} of `--witnesses`"
@@ -190,7 +190,7 @@ def mission_key(
 ) -> Callable[[SigningKey], VerificationKey] | Refusal:
     """What names a mission key for one source."""
     if source not in PROPOSERS:
-        return Refusal("usage", f"`{source}` proposes no missions", f"accepted: {' or '.join(PROPOSERS)}")
+        return Refusal("usage", f"unknown source `{source}`", f"accepted: {' or '.join(PROPOSERS)}")
     return _misnamed(roles, policies) or (
         lambda key: key.verification(
             roles=tuple(roles), sources=(source,), vehicles=tuple(vehicles), policies=tuple(policies)
@@ -225,7 +225,7 @@ def revoke(store: KeyStore, keys: Sequence[str], links: Sequence[str], secret: S
             if isinstance(found, Refusal):
                 return found
             if found.duty is Duty.ROOT:
-                return Refusal("usage", "a root key is not revoked alone", "`rtshcua keys rotate-root` changes it")
+                return Refusal("usage", "a root key cannot be revoked alone", "use `rtshcua keys rotate-root`")
             names.append(found.kid)
         for text in links:
             name = _link_named(text)
@@ -235,7 +235,7 @@ def revoke(store: KeyStore, keys: Sequence[str], links: Sequence[str], secret: S
                 return _revoked_already(text)
             names.append(name)
         if not names:
-            return Refusal("usage", "no key was named", f"{_LISTS} them")
+            return Refusal("usage", "KEY is missing", f"{_LISTS} them")
         store.revoke(names, signer=signer, now_us=_now_us())
         return None
 
@@ -250,7 +250,7 @@ def replace_key(store: KeyStore, text: str, secret: Secrets) -> Refusal | None:
         if isinstance(found, Refusal):
             return found
         if found.duty is Duty.ROOT:
-            return Refusal("usage", "a root key has its own command", "`rtshcua keys rotate-root` changes it")
+            return Refusal("usage", "a root key cannot be replaced this way", "use `rtshcua keys rotate-root`")
         own = None if root.development else secret.new_passphrase()
         if own is None and not root.development:
             return _NO_PASSPHRASE
@@ -300,10 +300,10 @@ def provision(store: KeyStore, request: ProvisionRequest, secret: Secrets) -> Pr
     place = request.folder / request.vehicle
     if _SERVED.fullmatch(request.vehicle) is None:
         text = f"`{visible(request.vehicle)}` names no socket that a boundary listens at"
-        help = "accepted: an identity of 1 to 80 letters, digits, `_`, `.` and `-`, not first `.` or `-`"
+        help = "accepted: 1 to 80 letters, digits, `_`, `.` and `-`, not beginning with `.` or `-`"
         return Refusal("usage", text, help)
     if os.path.lexists(place):
-        help = "what is kept there is of a vehicle that flies: move it away, or only copy"
+        help = "it may hold the state of a vehicle in use: move it away, or back it up"
         return Refusal("refused", f"there is a folder `{place}` already", help, ExitCode.REFUSED)
     try:
         return _opened(lambda: _provisioned(store, request, place, secret))
@@ -320,8 +320,8 @@ def _provisioned(
     named = root.keys_for(Duty.LOG).get(log.kid)
     slug = "unknown-key" if named is None else key_refusal(named, vehicle=vehicle, now_us=now_us)
     if slug is not None:
-        text = f"the trust root lets no log key {log.kid.hex()} speak for `{vehicle}` now"
-        return Refusal(slug, text, "`--log-key` gives one that it names", ExitCode.UNTRUSTED)
+        text = f"the trust root does not accept log key {log.kid.hex()} for `{vehicle}` now"
+        return Refusal(slug, text, "choose a key that the root names with `--log-key`", ExitCode.UNTRUSTED)
     own = attested_key(root, vehicle, now_us, secret.unlock, request.boundary_key)
     if isinstance(own, Refusal):
         return own
@@ -346,7 +346,7 @@ def _provisioned(
 
 @contextmanager
 def _marked_only_if_made(store: KeyStore, vehicle: str, before: bytes | None) -> Iterator[None]:
-    """Where no folder could be made, it is remembered as it was `before` which one was."""
+    """Restore the record of provisioning to `before` if the folder cannot be created."""
     try:
         yield
     except OSError:
@@ -356,13 +356,13 @@ def _marked_only_if_made(store: KeyStore, vehicle: str, before: bytes | None) ->
 
 
 def _provisioned_before(vehicle: str, own: SigningKey | None, *, again: bool) -> Refusal:
-    """Why no second folder is made."""
+    """Fail because a second folder is not allowed."""
     if not again or own is None:
-        text = f"a folder for `{vehicle}` was provisioned before: a second one does not know which bundles that opened"
-        help = "`--again` where that one is lost, and another boundary key: `rtshcua keys replace` makes it"
+        text = f"a folder for `{vehicle}` was provisioned before; a second one would not know which bundles it opened"
+        help = "if the first one is lost, make a new boundary key with `rtshcua keys replace`, and use `--again`"
         return Refusal("provisioned-before", text, help, ExitCode.REFUSED)
-    text = f"the folder of `{vehicle}` before has the boundary key {own.kid.hex()} too: no log would tell them apart"
-    help = f"`rtshcua keys replace {own.kid.hex()[:8]}` makes another, and revokes it"
+    text = f"boundary key {own.kid.hex()} is also in the earlier folder of `{vehicle}`: logs could not tell them apart"
+    help = f"replace and revoke it with `rtshcua keys replace {own.kid.hex()[:8]}`"
     return Refusal("same-instance", text, help, ExitCode.REFUSED)
 
 
@@ -409,10 +409,10 @@ def effect_of(seen: SetUp) -> Refusal | None:
     if seen.insists:
         return None
     if seen.signs and seen.answers_signed:
-        help = "over USB that may be so: the same command on the link that it flies with looks there, and sends nothing"
-        text = "it has the key, and obeys on this link without it"
+        help = "this is normal over USB: repeat the command on the link used in flight; it then sends no key"
+        text = "the vehicle has the key, but accepts unsigned commands on this link"
         return Refusal("not-insisted", text, help, ExitCode.REFUSED)
-    text, help = "the key has no effect on this link", "it was refused, or is not known there"
+    text, help = "the key has no effect on this link", "the vehicle refused it, or does not support signing"
     return Refusal("no-effect", text, help, ExitCode.REFUSED)
 
 
@@ -427,7 +427,7 @@ def unknown_roles(roles: Iterable[str]) -> list[str]:
     known = _known()
     names = ", ".join(f"`{name}`" for name in sorted(known))
     strange = sorted(set(roles) - known) if known else ()
-    return [f"warning: no policy here knows the role `{role}`; its roles are {names}" for role in strange]
+    return [f"warning: no policy here declares the role `{role}`; declared roles: {names}" for role in strange]
 
 
 def _known() -> set[str]:
@@ -458,7 +458,7 @@ def _named(store: KeyStore, root: TrustRoot, text: str) -> VerificationKey | Ref
         return found[0]
     if digits is not None and any(name.hex().startswith(digits) for name in root.revocations):
         return _revoked_already(text)
-    what = "means several keys" if found else "is no key that the trust root names"
+    what = "names several keys" if found else "is not a key of the trust root"
     return Refusal("usage", f"`{text}` {what}", f"{_LISTS} them: an id, or the name of its file")
 
 
@@ -467,7 +467,7 @@ def _revoked_already(text: str) -> Refusal:
 
 
 def _link_named(text: str) -> bytes | None:
-    """The name of a link's key: 16 hexadecimal digits, or that of the key in a file. Raises OSError."""
+    """Return the id of a link key, from 16 hexadecimal digits or from its file; None if invalid. Raises OSError."""
     if _LINK_ID.fullmatch(text.lower()):
         return bytes.fromhex(text)
     try:
@@ -486,11 +486,11 @@ def _misnamed(roles: Sequence[str], policies: Sequence[str]) -> Refusal | None:
 
 
 def _no_name(name: str, what: str) -> Refusal:
-    return Refusal("usage", f"`{visible(name)}` is no {what}", "accepted: a name, as policies write it")
+    return Refusal("usage", f"`{visible(name)}` is not a valid {what} name", "accepted: a name as in a policy")
 
 
 def _no_person(name: str) -> Refusal | None:
     if PERSON.fullmatch(name):
         return None
-    text = f"`{visible(name)}` is no name of a person"
+    text = f"`{visible(name)}` is not a valid name of a person"
     return Refusal("usage", text, "accepted: up to 64 lower-case letters, digits, `.`, `_` and `-`")

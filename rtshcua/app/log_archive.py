@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 _EXTRAS: Final = {"duckdb": "archive", "distributed": "cluster"}
 _INPUT: Final = frozenset({"malformed", "no-archive", "archive-version", "archive-path", "archive-index"})
 _HELPS: Final = {
-    "archive-index": "`rtshcua archive verify --reindex` makes it anew",
-    "no-archive": "`rtshcua archive add LOG...` makes one; `--archive` says where it is",
+    "archive-index": "rebuild it with `rtshcua archive verify --reindex`",
+    "no-archive": "create one with `rtshcua archive add LOG...`, or name its folder with `--archive`",
 }
 #: the values that conditions may have
 _KNOWN: Final[Mapping[str, Sequence[str]]] = {
@@ -54,7 +54,7 @@ class ArchiveRequest(NamedTuple):
 
 
 class Skipped(NamedTuple):
-    """A file below a folder that is not taken in, and why."""
+    """A file in a folder that is not a readable log, and why."""
 
     path: Path
     why: str
@@ -91,7 +91,7 @@ class ArchiveResult(NamedTuple):
         was not closed.
         """
         if not self.done and self.others:
-            return ExitCode.UNTRUSTED  # none rests on this root: nothing was verified
+            return ExitCode.UNTRUSTED  # no log was verified under this root
         codes = [code_of(each.entry.status, each.entry.finding) for each in self.done]
         mine = {each.entry.log for each in self.done}
         if any({one, other} & mine for one, other, _ in self.pairs):
@@ -129,18 +129,18 @@ def logs_in(paths: Iterable[Path]) -> LogsFound | Refusal:
         root = path if path.is_dir() else None
         below = logs_of(path)
         if not below:
-            return Refusal("input", f"there is no `{LOG}` in `{path}` or below it")
+            return Refusal("input", f"no `{LOG}` found in `{path}`")
         for log in below:
             wrong = _no_log(log, root)
             if wrong is None:
                 found.logs.append(LogSource(log, root))
             elif root is None:
-                return Refusal("input", *no_log(log, log, "name logs, or folders of runs"))
+                return Refusal("input", *no_log(log, log, "name logs or run folders"))
             else:
                 found.skipped.append(Skipped(log, wrong))
     if not found.logs:
         first = found.skipped[0]
-        return Refusal("input", f"`{first.path}` is not taken in: {first.why}")
+        return Refusal("input", f"cannot add `{first.path}`: {first.why}")
     return found
 
 
@@ -192,7 +192,9 @@ def _verified(
     try:
         pinned = pin(request.root)
     except Untrusted as error:
-        return Refusal(error.slug, str(error), "`--root` takes the trust root of whoever flew, or its public key")
+        return Refusal(
+            error.slug, str(error), "name the trust root of the flight's operator, or its public key, with `--root`"
+        )
     folder = ArchiveFolder(where, make=skipped is not None)
     done: list[Done] = []
     try:
@@ -274,7 +276,7 @@ def questions() -> "list[Canned] | Refusal":
 def question_of(query: ArchiveQuery) -> "Canned | Refusal | None":
     """The question that ships which a query names; None where it brings its own."""
     if query.sql is not None and query.name is not None:
-        return Refusal("usage", "either a question that ships or `--sql`, not both")
+        return Refusal("usage", "a shipped query and `--sql` cannot be combined")
     unknown = _unknown(query.conditions)
     if unknown is not None:
         return unknown
@@ -294,7 +296,7 @@ def ask(query: ArchiveQuery) -> "QueryRows | Refusal":
     if isinstance(conditions, Refusal):
         return conditions
     if question is not None and not question.filtered and any(value is not None for value in conditions):
-        return Refusal("usage", f"`{question.name}` is not about decisions, and takes no conditions on them")
+        return Refusal("usage", f"`{question.name}` does not query decisions, so filters on decisions do not apply")
     sql = query.sql if question is None else question.sql
     return answered(lambda: _ask(query.archive, sql or "", conditions, query.limit))
 
@@ -311,7 +313,7 @@ def _conditions(values: Mapping[str, str | None]) -> "DecisionQuery | Refusal":
     policy = values.get("policy") or ""
     name, _, version = policy.partition("@")
     if version and not (version.isascii() and version.isdigit()):
-        return Refusal("usage", f"`{policy}` names no version of a policy", "`bridge_inspection@7`")
+        return Refusal("usage", f"`{policy}` has no valid version", "accepted: as in `bridge_inspection@7`")
     get, number = values.get, int(version) if version else None
     return DecisionQuery(
         get("vehicle"), get("mission"), get("skill"), get("outcome"), get("reason"), get("rule"), get("clause"),
@@ -329,7 +331,7 @@ def _unknown(values: Mapping[str, str | None]) -> Refusal | None:
 
 
 def _time_of(text: str) -> int | None:
-    """UTC in us of a day (its beginning) or of a time with an offset, in ISO 8601; None for what is neither."""
+    """Return UTC in us of an ISO 8601 day (its beginning) or time with an offset; None if it is neither."""
     try:
         day = date.fromisoformat(text)
     except ValueError:
@@ -353,8 +355,8 @@ def answered(work: Callable[[], T | Refusal]) -> T | Refusal:
         extra = _EXTRAS.get((error.name or "").partition(".")[0])
         if extra is None:
             raise
-        help = f"`pip install '.[{extra}]'`, in the checkout, brings it"
-        return Refusal("input", f"this needs the package `{error.name}`, which is not installed", help)
+        help = f"run `pip install '.[{extra}]'` in the checkout"
+        return Refusal("input", f"the package `{error.name}` is required and not installed", help)
     except Untrusted as error:
         if error.slug not in _INPUT:
             return untrusted(error)

@@ -22,7 +22,7 @@ from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, key_refusal, open_root
 from rtshcua.wire.untrusted import Untrusted
 
-#: how long it waits at most before it looks whether it is to stop
+#: longest wait between checks of the stop request, s
 _SERVE_S: Final = 0.5
 
 #: takes what happened, for a program and for a person
@@ -58,15 +58,15 @@ def open_witness(
 ) -> FileWitness | Refusal:
     """The witness, with what it cosigned before; its store is closed by the stack. Raises OSError."""
     for path in request.paths:
-        path.stat()  # so that what is missing is told as such
+        path.stat()  # raise an error for a missing path
     store = KeyStore(data_folder())
     try:
         signed = store.root() if request.root is None else read_root(request.root)
         trust = open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=_now_us())
         own = unlock(store)
         if own.kid not in trust.keys_for(Duty.WITNESS):
-            text = f"the trust root names no witness key {own.kid.hex()}: nobody would believe it"
-            return Refusal("unknown-key", text, "`--key` gives one that it names", ExitCode.UNTRUSTED)
+            text = f"witness key {own.kid.hex()} is not in the trust root, so its signatures would not be trusted"
+            return Refusal("unknown-key", text, "choose a key of the trust root with `--key`", ExitCode.UNTRUSTED)
         memory = WitnessStore(request.state or state_folder(), own)
     except Untrusted as error:
         return _refused(error)
@@ -89,11 +89,13 @@ def _refused(error: Untrusted) -> Refusal:
     found = untrusted(error)
     if not isinstance(error, WitnessError) or error.slug != "in-use":
         return found
-    return found._replace(help="end that one, or give another witness key with `--key`", code=ExitCode.REFUSED)
+    return found._replace(
+        help="stop the other process, or use a different witness key with `--key`", code=ExitCode.REFUSED
+    )
 
 
 class _Witnessing:
-    """What a witness is asked, and what it tells. `code` is the gravest that happened."""
+    """Cosigns logs in paths and requests from a socket, and reports each event."""
 
     def __init__(
         self, witness: FileWitness, request: WitnessRequest, say: Say, look_for_stop: Callable[[], None]
@@ -106,7 +108,7 @@ class _Witnessing:
         self._due_s = 0.0
 
     def work(self) -> WitnessResult:
-        """Look at the paths, once or again and again."""
+        """Check the paths, once or repeatedly."""
         code = self._look()
         if self._watch is None:
             return WitnessResult(code, [path for path in self._paths if not logs_in(path)])
@@ -115,14 +117,14 @@ class _Witnessing:
             self._look()
 
     def _rest(self, seconds: float) -> None:
-        """Wait, in short parts, for a signal cuts none short."""
+        """Wait in short intervals, because a signal does not interrupt the sleep."""
         while seconds > 0:
             time.sleep(min(seconds, _SERVE_S))
             self._look_for_stop()
             seconds -= _SERVE_S
 
     def serve(self, at: tuple[str, int], stack: ExitStack) -> Refusal:
-        """Answer at an address, and look at the paths meanwhile."""
+        """Answer requests at an address, and check the paths in between."""
         try:
             link = WitnessLink(at, self._consider)
         except OSError as error:
@@ -138,7 +140,7 @@ class _Witnessing:
                 self._look()
 
     def _look(self) -> ExitCode:
-        """Look at each log that has changed since it was looked at last."""
+        """Check each log that has changed since the last check."""
         code = ExitCode.OK
         self._due_s = time.monotonic() + (self._watch or 0)
         for path in self._paths:
@@ -147,8 +149,8 @@ class _Witnessing:
                 try:
                     found = self._looked_at(log, path)
                 except FileNotFoundError:
-                    continue  # taken away again since the folder was listed
-                except OSError as error:  # one log that cannot be read, or its anchors written, keeps no other waiting
+                    continue  # removed since the folder was listed
+                except OSError as error:  # continue with the other logs
                     code = max(code, self._not_read(log, error))
                     continue
                 self._unread.pop(log, None)
@@ -156,16 +158,16 @@ class _Witnessing:
         return code
 
     def _not_read(self, log: Path, error: OSError) -> ExitCode:
-        """Told once; it is tried again whenever the paths are looked at."""
+        """Report an unreadable log once; it is tried again at each check."""
         reason = (error.strerror or str(error)).lower()
         if self._unread.get(log) != reason:
             self._unread[log] = reason
             said: dict[str, object] = {"event": "unread", "log": str(log), "slug": "file", "text": reason}
-            self._say(said, f"{log}: not looked at: {reason}")
+            self._say(said, f"{log}: cannot be read: {reason}")
         return exit_code_of(error)
 
     def _looked_at(self, log: Path, given: Path) -> Cosigned | NotCosigned | None:
-        """What became of a log; None where it is as it was. Raises OSError."""
+        """Cosign a log; None if it has not changed. Raises OSError."""
         state = log.stat()
         if self._looked.get(log) == (state.st_size, state.st_mtime_ns):
             return None
@@ -191,13 +193,13 @@ class _Witnessing:
             self._say(said, f"{origin}: cosigned {many(int(size) + 1, 'record')}")
             return found
         proof = self._witness.store.contradicted(request.note) if found.contradiction else None
-        if found.contradiction or found.size == 0:  # else it asks where we stand, as whoever was away does
+        if found.contradiction or found.size == 0:  # otherwise a normal request for our position after a break
             slug = f"witness/{found.status}"
             self._refused("origin", visible(origin[:200]), slug, visible(found.text[:200]), found.contradiction, proof)
         return found
 
     def _refused(self, what: str, name: str, slug: str, text: str, contradiction: bool, proof: Path | None) -> None:
-        kept = "" if proof is None else f"; the note that shows it: {proof}"
+        kept = "" if proof is None else f"; proof: {proof}"
         said: dict[str, object] = {"event": "refused", what: name, "slug": slug, "text": text}
         said |= {"contradiction": contradiction, "proof": None if proof is None else str(proof)}
         self._say(said, f"{name}: not cosigned: {text}{kept}")

@@ -1,7 +1,7 @@
-"""`rtshcua why` on a log: one decision on a step or a link, from the inputs that it records, and what ended the flight.
+"""`rtshcua why` on a log: explain one decision on a step or fallback from its recorded inputs, and the flight's end.
 
-Without a number it begins with the cause, where the flight ended early, and goes on with the last decision on a step
-that was not `allow`, else the last on a step.
+Without a record number: the cause of an early end, then the last decision on a step that was not `allow`, or else the
+last decision on a step.
 """
 
 from collections.abc import Callable
@@ -28,19 +28,19 @@ from rtshcua.onboard.runtime.link import STOOD_STILL
 from rtshcua.wire.permit import WITHDRAWN
 from rtshcua.wire.request import STEP
 
-#: effects that turn a flight homeward, or end it
+#: effects that abort a mission or end a flight
 _TURNS = frozenset({
     "violated", "failed", "taken-over", "interrupted", "recall", "cancellation", "gap", "link-lost", "long-silence",
     "crashed", "stranded", "not-landed", "resumed", "already-airborne", "left", "refused", "undecided", "stood-down",
     "boundary-lost", STOOD_STILL,
 })  # fmt: skip
-#: of these, what only says how it went on after the cause
+#: those of them that only follow from a cause
 _FOLLOWS = frozenset({"stood-down", "not-landed", "stranded", "left", "resumed", "already-airborne"})
-#: what is over when something else is recorded
+#: effects that end earlier ones
 _OVER = {"link-back": ("link-lost", "long-silence"), "gap-over": ("gap",), "fresh": (STOOD_STILL,)}
-#: what says that the computer stood still
+#: effects that report a stalled computer
 _STALLS = (STOOD_STILL, STALLED)
-#: how a condition and a decision say that they failed for want of what is known
+#: how violated conditions and decisions report unknown inputs
 _UNKNOWN, _FOR_UNKNOWN = ": unknown for longer than its grace", ("state/unknown", "safety/unknown")
 _NO_SLACK = Reason.NO_SLACK.value
 
@@ -52,7 +52,7 @@ class RecordWords(Protocol):
         """Takes the next record: after a replacement the steps have other words."""
 
     def tell(self, record: AnyRecord) -> str:
-        """A record in one line."""
+        """A record as one line of text."""
 
 
 class StepExplained(NamedTuple):
@@ -73,7 +73,7 @@ class LinkExplained(NamedTuple):
 
 
 class RecordLine(NamedTuple):
-    """A record in one line."""
+    """A record as one line of text."""
 
     seq: int
     at_us: int
@@ -81,22 +81,22 @@ class RecordLine(NamedTuple):
 
 
 class LoggedDecision:
-    """What a log holds that an explanation needs, read once; `number` is the record that is asked for."""
+    """The parts of a log that an explanation needs, read once; `number`: the requested record."""
 
     def __init__(self, path: Path, number: int | None, words: Callable[[Genesis], RecordWords]) -> None:
         self.start_us = 0
         self.chosen: DecisionRecord | Effect | Close | Recover | Seal | None = None
-        self.what = ""  # that record in one line
+        self.what = ""  # that record as one line
         self.subject: Subject | None = None  # the mission in force when the chosen record was written
-        self.aloft = False  # something was sent before the chosen record that may have lifted it off
+        self.aloft = False  # a command before the chosen record may have started a take-off
         self.ended: list[RecordLine] = []
         self.answers: list[tuple[int, RecordLine]] = []  # approvals, by their step
-        self.allowed: RecordLine | None = None  # the same step, after the chosen record did not allow it
-        self.stalls: list[RecordLine] = []  # when the computer stood still
-        self.cause: RecordLine | None = None  # why it ended early, if it did
-        self._caused_by = ""  # the event of that
-        self._falls = False  # a link flies: what comes now is no cause any more
-        self._late = False  # what came too late was the cause, as far as nothing else is
+        self.allowed: RecordLine | None = None  # a later decision that allowed the same step
+        self.stalls: list[RecordLine] = []  # when the computer stalled
+        self.cause: RecordLine | None = None  # the cause of an early end
+        self._caused_by = ""  # the event of the cause
+        self._falls = False  # a fallback flies: later records are not the cause
+        self._late = False  # a late permit is the cause unless another one is found
         self._path, self._number, self._words_of = path, number, words
         self._words: RecordWords | None = None
         self._in_force: Subject | None = None
@@ -104,7 +104,7 @@ class LoggedDecision:
 
     @property
     def begun(self) -> bool:
-        """Whether its first record could be read."""
+        """Whether the first record could be read."""
         return self._in_force is not None
 
     def read(self) -> Refusal | None:
@@ -153,8 +153,9 @@ class LoggedDecision:
         return None
 
     def _find_cause(self, record: DecisionRecord | Effect | Close | Recover | Seal) -> None:
-        """The last thing that turned the mission away from its steps, before a link flew: a step that is admitted
-        later says that it went on all the same. What is not known because the computer stood still, that caused.
+        """Find the last event that aborted the mission, before a fallback flew.
+
+        A step admitted later shows that the mission continued. Unknown inputs after a stall count as caused by it.
         """
         if self._caused_by == STOOD_STILL and _for_unknown(record):
             return
@@ -167,7 +168,7 @@ class LoggedDecision:
                 self.cause, self._caused_by = self._tell(record), "decision"
         elif isinstance(record, Effect) and not self._falls:
             if record.event == "refused" and record.detail == WITHDRAWN:
-                self._late = True  # and its time may be over by now: why it came too late was told before
+                self._late = True  # the step's time may be over by now; the cause is in an earlier record
             elif record.event in _TURNS - _FOLLOWS:
                 self.cause, self._caused_by = self._tell(record), record.event
             elif self._caused_by in _OVER.get(record.event, ()):
@@ -197,7 +198,7 @@ class LoggedDecision:
 
 
 def _for_unknown(record: DecisionRecord | Effect | Close | Recover | Seal) -> bool:
-    """Whether it says that something failed for want of what is known."""
+    """Return whether a record reports a failure because of unknown inputs."""
     if isinstance(record, DecisionRecord):
         return record.kind == STEP and record.reason in _FOR_UNKNOWN
     return isinstance(record, Effect) and record.event == "violated" and _UNKNOWN in record.detail
@@ -215,8 +216,8 @@ def read_decision(path: Path, number: int | None, words: Callable[[Genesis], Rec
     if not log.begun:
         return Refusal("genesis/missing", f"`{path}`: {CUT_AT_FIRST}", "", ExitCode.EVIDENCE)
     if log.chosen is None or log.subject is None:
-        what = "no decision on a step" if number is None else f"no record {number} that can be explained"
-        return Refusal("input", f"`{path}` has {what}", "`rtshcua show` lists the records with their numbers")
+        what = "no decision on a step" if number is None else f"no explainable record {number}"
+        return Refusal("input", f"`{path}` has {what}", "run `rtshcua show` for the records and their numbers")
     if number is not None:
         log.cause = None
     return log
@@ -226,7 +227,7 @@ def explained(chosen: DecisionRecord, subject: Subject) -> StepExplained | LinkE
     """A recorded decision, derived again from the inputs in its record."""
     state = state_of(chosen)
     if len(state.values) != subject.policy.policy.slots or len(state.ages) != len(state.values):
-        return Refusal("input", f"record {chosen.seq} has a state of another policy")
+        return Refusal("input", f"the state in record {chosen.seq} does not match the policy")
     there = 0 <= chosen.step < len(subject.invocations)
     if chosen.kind == STEP and there:
         invocation, context, now = subject.invocations[chosen.step], context_of(chosen), now_of(chosen)
@@ -236,4 +237,4 @@ def explained(chosen: DecisionRecord, subject: Subject) -> StepExplained | LinkE
         found = trace_link(chosen, of, subject.policy)
         if found is not None:
             return LinkExplained(found, of)
-    return Refusal("input", f"record {chosen.seq} decides on a step or link that the bundle does not have")
+    return Refusal("input", f"record {chosen.seq} decides on a step or fallback that is not in the bundle")

@@ -64,7 +64,11 @@ def trusted(given: str | None, revocations: Iterable[Path] = ()) -> Pin | Refusa
         roots = (*found.roots, *map(read_root, revocations))
         RevokedKeys(roots)
     except Untrusted as error:
-        help = "`--root` takes the trust root of whoever flew, or its public key" if error.slug == "no-keys" else ""
+        help = (
+            "name the trust root of the flight's operator, or its public key, with `--root`"
+            if error.slug == "no-keys"
+            else ""
+        )
         return Refusal(error.slug, f"no root to trust: {error}", help or remedy(error))
     return found._replace(roots=roots)
 

@@ -1,4 +1,4 @@
-"""A mission under its policy, ready to be decided on, and how it is had from a bundle that nobody verifies here."""
+"""A mission prepared for decisions under its policy, also from an unverified bundle."""
 
 from typing import NamedTuple
 
@@ -11,7 +11,7 @@ from rtshcua.wire.untrusted import Untrusted
 
 
 class Subject(NamedTuple):
-    """A mission under its policy, ready to be decided on."""
+    """A mission prepared for decisions under its policy."""
 
     policy: PreparedPolicy
     mission: Mission
@@ -34,7 +34,7 @@ def unpacked(data: bytes, name: str) -> Subject | Refusal:
 
 
 def prepared(policy: Policy, mission: Mission) -> Subject | Refusal:
-    """A policy and a mission, made ready as on board."""
+    """Return a policy and a mission, prepared as on board."""
     ready = prepare(policy)
     if isinstance(ready, Refusal):
         return _refused(ready)
@@ -47,17 +47,18 @@ def _under(ready: PreparedPolicy, mission: Mission) -> Subject | Refusal:
 
 
 def _refused(refusal: Refusal) -> Refusal:
-    return Refusal("input", f"this would be refused on board: {refusal.text}")
+    return Refusal("input", f"the vehicle would refuse this: {refusal.text}")
 
 
 def after(subject: Subject, detail: str) -> Subject | Refusal:
-    """The mission after a recorded replacement. The steps that stay are those that were made ready first, as on board:
-    they may mean something in phases that the new mission does not have.
+    """Return the mission after a recorded replacement.
+
+    The kept steps stay as prepared first, as on board: they may refer to phases that the new mission does not have.
     """
     try:
         said = recorded_replacement(detail)
     except Untrusted as error:
-        return Refusal("input", f"a replacement in the log: {error}")
+        return Refusal("input", f"invalid replacement in the log: {error}")
     newer = _under(subject.policy, said.mission)
     if isinstance(newer, Refusal):
         return newer

@@ -15,8 +15,8 @@ from rtshcua.evidence.proofs.file import MAX_PROOF
 #: what a proof proves, or why it is refused
 ProofResult: TypeAlias = Proven | ReceiptClaim | Flaw
 
-_PROOFS = "`rtshcua prove` makes one"
-_MAX_NOTE = 1 << 16  # bytes of a file with a checkpoint
+_PROOFS = "make one with `rtshcua prove`"
+_MAX_NOTE = 1 << 16  # limit of a checkpoint file, bytes
 _INPUT = {"proof/malformed", "proof/extra", "proof/too-long"}
 
 
@@ -33,7 +33,7 @@ def verify_proof(path: Path, key: bytes, kept: str | None) -> ProofResult:
         result = _same(result, kept) or result
     kind = recognised(data, path.name)
     if isinstance(result, Flaw) and result.slug == "proof/malformed" and kind is not None and kind is not PROOF:
-        result = result._replace(text=f"it is {kind.name}, and no proof: {kind.help or _PROOFS}")
+        result = result._replace(text=f"the file is {kind.name}, not a proof: {kind.help or _PROOFS}")
     return result
 
 
@@ -49,17 +49,17 @@ def exit_code(result: ProofResult) -> ExitCode:
 
 
 def _same(result: ProofResult, kept: str) -> Flaw | None:
-    """What is wrong when the checkpoint that somebody kept should be one of the proof's."""
+    """Return the flaw if the kept checkpoint does not match a checkpoint of the proof; None if it matches."""
     text, _ = split(kept)
     head = parse(text)
     if isinstance(head, Flaw):
-        return Flaw("proof/malformed", f"the checkpoint that was kept is none: {head.text}")
+        return Flaw("proof/malformed", f"the kept checkpoint is malformed: {head.text}")
     heads = (result.checkpoint, result.older) if isinstance(result, Proven) else ()
     if head in heads:
         return None
     for mine in heads:
         if mine is not None and (mine.origin, mine.size) == (head.origin, head.size):
-            words = f"at {head.size} records the log that you kept the checkpoint of was another one"
+            words = f"the kept checkpoint has a different tree root at {head.size} records"
             return Flaw("anchor/root", words, mine.root.hex(), head.root.hex())
-    words = "the proof says nothing about the checkpoint that you kept"
+    words = "the proof does not contain the kept checkpoint"
     return Flaw("proof/checkpoint", words, expected=f"{head.origin} at {head.size} records")

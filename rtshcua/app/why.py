@@ -92,11 +92,11 @@ def decide_assumed(subject: Subject, case: AssumedCase) -> AssumedDecision | Ref
     """The decision on a step, in a state in which its contract's conditions hold but for what the case says."""
     policy, step = subject.policy, case.step
     if step is None or not 1 <= step <= len(subject.invocations):
-        what = "say which step" if step is None else f"there is no step {step}"
+        what = "`--step` is missing" if step is None else f"the mission has no step {step}"
         steps = "; ".join(
             f"{number_of(each.invocation.step)} {each.invocation.contract.name}" for each in subject.invocations
         )
-        return Refusal("usage", what, f"--step takes one of: {steps}")
+        return Refusal("usage", what, f"accepted: {steps}")
     index = index_of(step)
     invocation = subject.invocations[index]
     flat = invocation.invocation
@@ -120,7 +120,7 @@ def _state(subject: Subject, index: int, signals: Sequence[str], now: Now) -> St
         return settings
     spoken = dialect.load()
     state = nominal(subject.invocations, index, policy, now)
-    for last in (False, True):  # what is set over time outweighs what follows from what is set of signals
+    for last in (False, True):  # settings of temporal conditions override what follows from the signals
         for setting in settings:
             changed = overridden(state, setting, policy.policy, spoken)
             if isinstance(changed, Refusal):
@@ -132,7 +132,7 @@ def _state(subject: Subject, index: int, signals: Sequence[str], now: Now) -> St
 
 
 def _approvals(invocation: PreparedInvocation) -> tuple[ConfirmAnswer, ...]:
-    """A grant of each role that a `confirm` asks, by as many people."""
+    """Return an approval for each role of the step's `confirm` rules, each by a different person."""
     return tuple(
         ConfirmAnswer(confirm.number, role, 1, 0, person)
         for confirm in invocation.candidates.confirms

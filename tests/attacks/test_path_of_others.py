@@ -70,7 +70,7 @@ def test_changed_path_is_not_approved_by_plain_yes(sign: Sign, capsys: pytest.Ca
         assert main([*APPROVE, *words]) == ExitCode.REFUSED
         err = capsys.readouterr().err
         assert "along 40 points, 0.0 m in all" in err
-        assert "chose another path than the planner does: its has 5 points, " in err
+        assert "differs from the planner's: the planner's path has 5 points, " in err
         assert "--other-path" in err
     assert main([*APPROVE, "--json"]) == ExitCode.REFUSED
     assert json.loads(capsys.readouterr().out)["error"]["slug"] == "other-path"
@@ -82,8 +82,8 @@ def test_changed_path_needs_explicit_confirmation(words: str, sign: Sign, capsys
     sign(near_the_entry)
     assert main([*APPROVE, words]) == ExitCode.OK
     said = capsys.readouterr()
-    assert "chose another path than the planner does" in said.err
-    assert "a path that is not the planner's" in said.out
+    assert "the path in the mission differs from the planner's" in said.err
+    assert "a path that differs from the planner's" in said.out
     assert Path("yes").exists()
 
 
@@ -97,7 +97,7 @@ def test_planner_path_needs_no_extra_confirmation(sign: Sign, capsys: pytest.Cap
 def test_any_path_counts_as_changed_without_planner_path(sign: Sign, capsys: pytest.CaptureFixture[str]) -> None:
     sign(lambda one, _: replace(one, arguments=(*one.arguments[:2], 7, *one.arguments[3:])))
     assert main([*APPROVE]) == ExitCode.REFUSED
-    assert "it finds none there" in capsys.readouterr().err
+    assert "the planner finds none there" in capsys.readouterr().err
 
 
 def unknown_skill(one: Invocation, policy: Policy) -> Invocation:

@@ -23,7 +23,7 @@ def test_link_key_is_set_over_udp(tmp_path: Path, capsys: pytest.CaptureFixture[
     with Simulator(["--port", str(port), "--flavour", "ardupilot"]):
         assert app.main(["keys", "link", str(path), "--connect", AT.format(port), "--trusted-link"]) == ExitCode.OK
     told = capsys.readouterr()
-    assert "ardupilot 4.7.0, system 1: disarmed, on the ground: the key was sent" in told.out
+    assert "ardupilot 4.7.0, system 1: disarmed, on the ground; the key was sent" in told.out
     assert "answers an unsigned request   no" in told.out
     assert "SERIAL0" in told.out
     key = read_link_key(path)
@@ -37,7 +37,11 @@ SEEN = SetUp("ardupilot", 1, (4, 7, 0), False, True, True, False, ("\x1b[2Jhello
     ("seen", "code", "slug"),
     [
         (SEEN, ExitCode.OK, None),
-        (SEEN._replace(answers_unsigned=True), ExitCode.REFUSED, "it has the key, and obeys on this link without it"),
+        (
+            SEEN._replace(answers_unsigned=True),
+            ExitCode.REFUSED,
+            "the vehicle has the key, but accepts unsigned commands on this link",
+        ),
         (SEEN._replace(signs=False, answers_unsigned=True), ExitCode.REFUSED, "the key has no effect on this link"),
         (SEEN._replace(answers_signed=False, answers_unsigned=True), ExitCode.REFUSED, "no effect"),
         (SEEN._replace(release=None, already=True), ExitCode.OK, None),

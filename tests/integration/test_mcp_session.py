@@ -311,7 +311,7 @@ def test_key_with_other_roles_is_refused(ground: Any, base: str, place: Path) ->
     run = ground.start("mcp", base, "--to", str(place), "--with", str(POLICY), "--mission-key", str(key))
     out, err = run.process.communicate()
     assert run.process.returncode == 4, (out, err)
-    assert b"an agent's key alone" in err
+    assert b"requires a key for agents only" in err
 
 
 def test_key_without_a_trust_root_is_refused(ground: Any, base: str, place: Path) -> None:

@@ -250,7 +250,7 @@ def test_doctor_examines_the_boundary_without_side_effects(ground: Any, made: Li
 
 
 WRONG = [
-    (("--boundary-socket", "s"), "goes with `--connect`"),
+    (("--boundary-socket", "s"), "requires `--connect`"),
     (("--boundary-socket", "s", "--connect", "udpin:127.0.0.1:1", "--vehicle", "v", "--mode", "software"), "software"),
     *(
         (("--boundary-socket", "s", "--connect", "udpin:127.0.0.1:1", "--vehicle", "v", name, *value), f"`{name}` does")

@@ -181,7 +181,7 @@ def test_simulated_vehicle_that_cannot_start_is_reported(
 def test_connected_vehicle_must_be_named(ground: Any, capfd: Any, port: int) -> None:
     code, err = refused(capfd, ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}")
     assert code == 2
-    assert "`--connect` needs `--vehicle`" in err
+    assert "`--connect` requires `--vehicle ID`" in err
 
 
 def test_bundle_for_another_connected_vehicle_is_refused(ground: Any, capfd: Any, port: int) -> None:

@@ -74,7 +74,7 @@ def test_rehearsal_uses_the_clock_of_the_flights_boundary(ground: Any, capfd: An
     ("words", "said"),
     [
         (["--utc-error", "soon", "--connect", "udpin:127.0.0.1:1", "--vehicle", "quad-07"], "is no time"),
-        (["--utc-error", "1s"], "goes with `--connect`"),
+        (["--utc-error", "1s"], "requires `--connect`"),
     ],
 )
 def test_invalid_clock_bound_is_refused(ground: Any, capfd: Any, words: list[str], said: str) -> None:

@@ -241,7 +241,7 @@ def _untrusted_log_key(key: SigningKey | VerificationKey, root: TrustRoot) -> Re
         return Refusal(REVOKED, text, "`--log-key` gives the one that took its place", ExitCode.UNTRUSTED)
     if key.kid not in root.keys_for(Duty.LOG):
         text = f"the trust root names no log key {key.kid.hex()}: nobody could verify the log"
-        return Refusal("unknown-key", text, "`--log-key` gives one that it names", ExitCode.UNTRUSTED)
+        return Refusal("unknown-key", text, "choose a key that the root names with `--log-key`", ExitCode.UNTRUSTED)
     return None
 
 

@@ -1,4 +1,4 @@
-"""Calling a flight home: signing a recall, and handing in one that was signed before. Without typer: it hurries."""
+"""Sign a recall, or send one signed earlier. No typer here: a recall must start fast."""
 
 import time
 from pathlib import Path
@@ -18,28 +18,28 @@ from rtshcua.wire.keys import SigningKey
 from rtshcua.wire.recall import RecallDocument, sign_recall
 from rtshcua.wire.untrusted import Untrusted
 
-#: how long a recall is good for, in s, where nobody says
+#: default validity of a recall, s
 GOOD_S: Final = 300
-#: where another mission flies: one that an agent handed in has a bundle of its own
-HELP: Final = {"other-mission": "`--policy` calls home whatever flies under the policy of this bundle"}
-_SENT_HELP: Final = HELP | {"expired": "sign another one: `rtshcua recall BUNDLE --to SOCKET`"}
+#: help if another mission flies: one that an agent submitted has its own bundle
+HELP: Final = {"other-mission": "`--policy` recalls every mission under the policy of this bundle"}
+_SENT_HELP: Final = HELP | {"expired": "sign a new one: `rtshcua recall BUNDLE --to SOCKET`"}
 
 
 class Recalled(NamedTuple):
-    """What is called home: the bundle that flies, the id of the flight, or empty for all under the policy."""
+    """What a recall covers: the flying bundle, and the id of the flight, or empty for all flights under its policy."""
 
     flying: Bundle
     flight: bytes
 
     @property
     def name(self) -> str:
-        """What a person calls it."""
+        """A description for messages."""
         flying = self.flying
         what = f"`{flying.mission.name}`" if self.flight else f"all under `{flying.policy.name}`"
         return f"{what} on `{flying.policy.vehicle.identity}`"
 
     def sign(self, key: SigningKey, now_us: int, seconds: int) -> bytes:
-        """The signed recall, good from now on for so many seconds. Raises `Untrusted`."""
+        """Return the signed recall, valid for `seconds` from now. Raises `Untrusted`."""
         flying = self.flying
         digests = (flying.mission_digest, b"") if self.flight else (b"", flying.policy_digest)
         vehicle = flying.policy.vehicle.identity
@@ -53,22 +53,24 @@ def recall(
     person: str | None = None, approval_key: Path | None = None, passphrase_file: Path | None = None,
     as_json: bool = False,
 ) -> ExitCode:  # fmt: skip
-    """`rtshcua recall`. Raises OSError."""
+    """Run `rtshcua recall`. Raises OSError."""
     if send is not None:
         return _send(send, to, alone=bundle is None and output is None, as_json=as_json)
     if bundle is None:
-        return fail(ExitCode.USAGE, "which flight is called home?", "give its bundle, or `--send` one signed before")
+        return fail(
+            ExitCode.USAGE, "BUNDLE is missing", "name the flying bundle, or send a signed recall with `--send FILE`"
+        )
     if to is None and output is None:
-        return fail(ExitCode.USAGE, "the recall has to go somewhere", WHERE)
+        return fail(ExitCode.USAGE, "no destination for the recall", WHERE)
     now_us = time.time_ns() // 1000
-    from rtshcua.adapters.store.keystore import KeyStore  # loads what opens keys, which `--send` does without
+    from rtshcua.adapters.store.keystore import KeyStore  # slow to import, and not needed for `--send`
     from rtshcua.front.cli.unlock import unlock_person
 
     try:
         flying = bundle_in_flight(bundle, [], root, now_us, stops=True)
         named = b"" if policy else flight_id(flight, to)
         if named is None:
-            return fail(ExitCode.USAGE, "the recall of a mission is for one flight", f"{WHOSE}, or `--policy`")
+            return fail(ExitCode.USAGE, "the flight of the recall is unknown", f"{WHOSE}, or `--policy`")
         recalled = Recalled(flying, named)
         key = unlock_person(KeyStore(data_folder()), person, None, path=approval_key, passphrase_file=passphrase_file)
         document = recalled.sign(key, now_us, seconds)
@@ -78,16 +80,16 @@ def recall(
 
 
 def _send(path: Path, to: Path | None, *, alone: bool, as_json: bool) -> ExitCode:
-    """Hand in a recall that was signed before. The flight verifies it: here it is only looked at."""
+    """Send a recall signed earlier. Only its kind is checked here; the flight verifies it."""
     if not alone or to is None:
-        text = "`--send` hands in a recall that was signed before"
-        return fail(ExitCode.USAGE, text, "it goes with `--to SOCKET`, without a bundle and without `--output`")
+        text = "`--send` requires `--to SOCKET`, and conflicts with BUNDLE and `--output`"
+        return fail(ExitCode.USAGE, text, "`rtshcua recall --send FILE --to SOCKET`")
     document = read_regular(path, MAX_DOCUMENT)
     try:
         kind = kind_of(document)
     except Untrusted as error:
         return refuse(untrusted(error))
     if kind is not names.RECALL:
-        text = f"`{path}` is no recall"
-        return fail(ExitCode.INPUT, text, "`rtshcua recall BUNDLE --flight ID -o FILE` signs one")
+        text = f"`{path}` is not a recall"
+        return fail(ExitCode.INPUT, text, "sign one with `rtshcua recall BUNDLE --flight ID -o FILE`")
     return deliver(document, f"sent `{path}`", to=to, output=None, as_json=as_json, help=_SENT_HELP)

@@ -1,4 +1,4 @@
-"""`rtshcua compile --replaces`: a mission signed for a flight that is under way."""
+"""`rtshcua compile --replaces`: sign a mission as a replacement for a flight under way."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -21,12 +21,12 @@ from rtshcua.wire.document import MAX_DOCUMENT, DocumentError
 from rtshcua.wire.replacement import sign_replacement
 from rtshcua.wire.untrusted import Untrusted
 
-_SAME_POLICY = "a replacement flies under the policy in force: compile it with the same sources of the policy"
+_SAME_POLICY = "a replacement must fly under the policy in force: compile it with the same policy sources"
 
 
 class Replacing(NamedTuple):
-    """What was asked for: the bundle and its replacements so far, the index of the first step that changes, the flight,
-    and where it goes.
+    """The request: the bundle and its replacements so far, the index of the first replaced step, the flight, the keys
+    and the file to write.
     """
 
     replaces: list[Path]
@@ -41,7 +41,7 @@ class Replacing(NamedTuple):
 
 
 def warned(warnings: list[str], findings: Findings, *, deny: bool) -> bool:
-    """Says that a key is one that the trust root does not name; whether it is signed with it all the same."""
+    """Print warnings about keys that the trust root does not name; return False if `deny` makes them an error."""
     if warnings and deny:
         findings.refuse(ExitCode.UNTRUSTED, "unknown-key", warnings[0], "sign with keys that the root names")
         return False
@@ -53,15 +53,17 @@ def warned(warnings: list[str], findings: Findings, *, deny: bool) -> bool:
 def replace_with(
     policy: Policy, mission: Mission, order: Replacing, store: KeyStore, findings: Findings, *, quiet: bool
 ) -> ExitCode:
-    """Sign a compiled mission as the replacement of another, if it leaves alone what stays. The policy stays too."""
+    """Sign a compiled mission as a replacement, if it keeps the policy and the steps before `--from`."""
     try:
         over = bundle_in_flight(order.replaces[0], order.replaces[1:], order.root, order.issued_at_us)
         flown = len(over.mission.invocations)
         if order.first > flown:
-            text = f"`--from {number_of(order.first)}`: the mission that flies has {flown} steps"
+            text = f"`--from {number_of(order.first)}` is out of range: the flying mission has {flown} steps"
             return findings.refuse(ExitCode.USAGE, "usage", text, f"accepted: 1 to {number_of(flown)}")
         if policy_digest(policy_payload(policy)) != over.policy_digest:
-            text = f"the sources make another policy than the `{over.policy.name}@{over.policy.version}` that is flown"
+            text = (
+                f"the policy of the sources differs from `{over.policy.name}@{over.policy.version}`, which is in force"
+            )
             return findings.refuse(ExitCode.REFUSED, "wrong-policy", text, _SAME_POLICY)
         name = flight_id(order.flight, None)
         assert name is not None
@@ -70,12 +72,14 @@ def replace_with(
         warnings = strangers(store, [key], policy.vehicle.identity, order.issued_at_us)
         document = sign_replacement(mission, over=over, flight=name, kept=order.first, key=key)
     except DocumentError as error:
-        return findings.refuse(ExitCode.REFUSED, error.slug, str(error), "the steps before `--from` stay as they fly")
+        return findings.refuse(
+            ExitCode.REFUSED, error.slug, str(error), "the steps before `--from` must stay unchanged"
+        )
     except Untrusted as error:
-        help = "`rtshcua keys init` makes a development root" if error.slug == "no-keys" else None
+        help = "run `rtshcua keys init` to create a development root" if error.slug == "no-keys" else None
         return findings.refuse(code_of(error.slug), error.slug, str(error), help)
     if len(document) > MAX_DOCUMENT:
-        text = f"the replacement has {len(document)} bytes, and a flight reads {MAX_DOCUMENT} at most"
+        text = f"the replacement is {len(document)} bytes; the limit is {MAX_DOCUMENT}"
         return findings.refuse(ExitCode.REFUSED, "too-large", text)
     if not warned(warnings, findings, deny=order.deny_warnings):
         return ExitCode.UNTRUSTED

@@ -1,4 +1,4 @@
-"""`run --scenario FILE:NAME`: the scenario that is meant."""
+"""`run --scenario FILE:NAME`: find the scenario."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from rtshcua.mavlink import dialect
 
 
 def chosen(text: str, issued_at_us: int) -> ScenarioFlight | Refusal:
-    """The scenario that `FILE` or `FILE:NAME` means. Raises OSError for a file that cannot be read."""
+    """Return the scenario that `FILE` or `FILE:NAME` names. Raises OSError if the file cannot be read."""
     path, name = _split(text)
     program = read_sources([path]).program
     found = scenarios(program, dialect.load(), issued_at_us)
@@ -21,14 +21,14 @@ def chosen(text: str, issued_at_us: int) -> ScenarioFlight | Refusal:
         code = exit_code(found.diagnostics)
         if code is ExitCode.INPUT:
             return Refusal("input", found.diagnostics[0].message, found.diagnostics[0].help or "", code)
-        return Refusal("sources", f"`{path}` has errors", f"`rtshcua check {path}` shows them", code)
+        return Refusal("sources", f"`{path}` has errors", f"run `rtshcua check {path}`", code)
     names = [each.scenario.name for each in found.found]
     fits = [each for each in found.found if name in ("", each.scenario.name)]
     if len(fits) == 1:
         return fits[0]
     listed = ", ".join(f'"{each}"' for each in names) or "none"
     what = f"no scenario `{name}`" if name else "no scenario" if not names else f"{len(names)} scenarios"
-    help = f"name one, as in `{path}:NAME`; there are {listed}"
+    help = f"name one, as in `{path}:NAME`; accepted: {listed}"
     return Refusal("usage", f"`{path}` has {what}", help, ExitCode.USAGE)
 
 

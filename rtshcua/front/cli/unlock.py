@@ -1,4 +1,4 @@
-"""Signing keys for commands: from the key store or a file, with a passphrase asked for only where one is needed."""
+"""Load signing keys for commands from the key store or a file; prompt for a passphrase only if the key has one."""
 
 import sys
 from getpass import getpass
@@ -14,17 +14,17 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.wire.key_file import KeyFileError
 from rtshcua.wire.keys import Duty, SigningKey
 
-#: octets of a passphrase, in a file
+#: limit of a passphrase file, bytes
 _LONGEST = 4096
 
 
 def unlock(
     store: KeyStore, duty: Duty, *, path: Path | None = None, passphrase_file: Path | None = None, whose: str = ""
 ) -> SigningKey:
-    """The key of a duty, from `path` or else the store; of several of a duty the one of `whose`.
+    """Return the key of a duty from `path` or the store; `whose` selects one of several keys of the duty.
 
-    An encrypted key is opened with the content of `passphrase_file` without its line ending, or with what a person
-    types at the terminal. Raises `Untrusted` (`no-keys`, `exposed`, `passphrase-needed`, ...) and OSError.
+    An encrypted key is decrypted with the content of `passphrase_file`, without its line ending, or with a passphrase
+    typed at the terminal. Raises `Untrusted` (`no-keys`, `exposed`, `passphrase-needed`, ...) and OSError.
     """
     given = None if passphrase_file is None else read_passphrase(passphrase_file)
     try:
@@ -32,7 +32,7 @@ def unlock(
     except KeyFileError as error:
         if error.slug != "passphrase-needed" or given is not None or not terminal():
             raise
-    with breakable():  # the terminal shows again what is typed
+    with breakable():  # Ctrl-C raises, so that getpass restores the terminal's echo
         typed = getpass(f"passphrase of the `{duty}` key: ").encode()
     return _load(store, duty, path, typed, whose)
 
@@ -45,9 +45,7 @@ def unlock_for(
     passphrase_file: Path | None = None,
     policy: Policy | None = None,
 ) -> SigningKey:
-    """The mission key that is for what this mission's source proposes; under a `policy`, the first of the store's keys
-    that may sign it, if one may.
-    """
+    """Return the mission key for the mission's source; with `policy`, the first key of the store that may sign it."""
     if path is None and policy is not None:
         path = fitting_key(store, policy, mission)
     source = next((SourceKind(each.source).name.lower() for each in mission.invocations), PROPOSERS[0])
@@ -62,7 +60,7 @@ def unlock_person(
     path: Path | None = None,
     passphrase_file: Path | None = None,
 ) -> SigningKey:
-    """The approval key of a person (None: of the only one) in a role (None: in whatever one), from `path` or the store.
+    """Return the approval key of a person (None: the only one) in a role (None: any) from `path` or the store.
 
     Raises `Untrusted` (`no-approver`, `several-approvers`, ...) and OSError.
     """
@@ -73,16 +71,16 @@ def unlock_person(
 
 
 def read_passphrase(path: Path) -> bytes:
-    """The passphrase in a file, or from a pipe, that nobody else may read: its content without the line ending.
+    """Return the passphrase in a file or pipe that no other user may read, without its line ending.
 
     Raises `KeyStoreError` (`exposed`, `too-large`) and OSError.
     """
     with path.open("rb") as file:
         if why := exposed(file):
-            raise KeyStoreError("exposed", f"others may read the passphrase in `{path}`: {why}")
+            raise KeyStoreError("exposed", f"other users can read the passphrase in `{path}`: {why}")
         data = file.read(_LONGEST + 1)
     if len(data) > _LONGEST:
-        raise KeyStoreError("too-large", f"`{path}` is longer than any passphrase, {_LONGEST} octets")
+        raise KeyStoreError("too-large", f"the passphrase in `{path}` exceeds {_LONGEST} bytes")
     return data.rstrip(b"\r\n")
 
 
@@ -93,5 +91,5 @@ def _load(store: KeyStore, duty: Duty, path: Path | None, passphrase: bytes | No
 
 
 def terminal() -> bool:
-    """Whether a person can be asked."""
+    """Return whether a person can be prompted."""
     return sys.stdin is not None and sys.stdin.isatty()

@@ -1,4 +1,4 @@
-"""The vehicle as its agent socket tells of it, followed in a thread: only its first word is waited for."""
+"""Follow a vehicle through its agent socket, in a thread."""
 
 import json
 import socket
@@ -41,7 +41,7 @@ class _Mission(msgspec.Struct):
 
 
 class _Decided(msgspec.Struct):
-    """What is asked of a decision beyond its record's types."""
+    """Requirements on a decision beyond the types of its record."""
 
     binding: _Octets
     invocation: _Octets
@@ -78,9 +78,7 @@ _TYPES: Final[Mapping[str, type[msgspec.Struct]]] = {
 
 
 def understood(told: Any) -> dict[str, Any]:
-    """A line that has a type which is read here, else an empty one. Raises msgspec.ValidationError for one whose fields
-    are not those of its type.
-    """
+    """Return a line of a known type, or an empty dictionary. Raises msgspec.ValidationError for invalid fields."""
     found: dict[str, Any] = told if isinstance(told, dict) else {}
     kind = found.get("type")
     fields = _TYPES.get(kind) if isinstance(kind, str) else None
@@ -92,23 +90,23 @@ def understood(told: Any) -> dict[str, Any]:
     return found
 
 
-#: how long until it is tried again to follow, in seconds
+#: delay before reconnecting, s
 AGAIN_S: Final = 0.3
-#: how long the first answer about it waits for its first word, in seconds
+#: how long the first answer waits for the connection, s
 FIRST_S: Final = 1.0
-#: how many lines are kept, and how much they may weigh, in octets and for each value some more; the oldest let go first
+#: limits of the kept lines: their number, and their size in bytes plus `VALUE` for each value; the oldest are dropped
 MOST_LINES: Final = 5_000
 MOST_KEPT: Final = 16 << 20
 VALUE: Final = 128
-#: a line that is longer, in octets, or has more values, is none of a flight's: a replacement's has 350 KB
+#: limits of one line in bytes and values; the longest line of a flight, a replacement's, has 350 KB
 LONGEST: Final = 2 << 20
 MOST_VALUES: Final = 1 << 16
 
 
 class Following:
-    """What was told since the connection that stands, or the last one that did. Every field is replaced, never changed.
+    """The lines received on the current or last connection. Fields are replaced, never modified in place.
 
-    `turn` counts the lines, and wakes whoever waits.
+    `turn` is notified for each line.
     """
 
     def __init__(self, path: Path) -> None:
@@ -116,22 +114,22 @@ class Following:
         self.turn = threading.Condition()
         self.heard = 0
         self.connected = False
-        self._attempts = 0  # that ended, or that connected
+        self._attempts = 0  # connections that ended or failed
         self.hello: dict[str, Any] = {}
         self.waiting: dict[str, Any] = {}
         self.vehicle: dict[str, Any] = {}
         self.mission: dict[str, Any] = {}
         self.close: dict[str, Any] = {}
         self.records: deque[dict[str, Any]] = deque(maxlen=MOST_LINES)
-        self._weights: deque[int] = deque()  # of these
-        self._kept = 0  # and their sum
+        self._weights: deque[int] = deque()  # the sizes of the records
+        self._kept = 0  # the sum of the sizes
         self._ended = threading.Event()
         self._link: socket.socket | None = None
         threading.Thread(target=self._follow, daemon=True).start()
 
     @property
     def stage(self) -> str:
-        """Where it stands, in a word."""
+        """The stage of the vehicle."""
         if self.close:
             return "ended"
         if not self.connected:
@@ -139,7 +137,7 @@ class Following:
         return "flying" if self.mission else "waiting"
 
     def await_first(self) -> None:
-        """Wait until it told who it is, or cannot be reached, for a short time."""
+        """Wait for a short time until the vehicle has identified itself or cannot be reached."""
         with self.turn:
             self.turn.wait_for(lambda: self.connected or self._attempts > 0, FIRST_S)
 
@@ -155,7 +153,7 @@ class Following:
             )
 
     def end(self) -> None:
-        """Follow no more."""
+        """Stop following."""
         self._ended.set()
         with self.turn:
             self.turn.notify_all()
@@ -170,7 +168,7 @@ class Following:
                     self._link = link
                     self._read(link)
             except (OSError, ValueError, RecursionError):
-                pass  # it is gone, or says what no flight says
+                pass  # the flight is gone, or the peer is not a flight
             with self.turn:
                 self.connected = False
                 self._attempts += 1
@@ -182,7 +180,7 @@ class Following:
             while line := lines.readline(LONGEST):
                 bare = without_texts(line, MOST_VALUES)
                 if bare is None:
-                    raise ValueError("no line of a flight")
+                    raise ValueError("not a line of a flight")
                 told = understood(json.loads(line))
                 with self.turn:
                     self._take(told, len(line) + VALUE * values_of(bare))

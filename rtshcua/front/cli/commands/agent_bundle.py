@@ -1,4 +1,4 @@
-"""`rtshcua agent-bundle`: a plug-in by which hosts of agents have the MCP server, a skill that says how, and a hook."""
+"""`rtshcua agent-bundle`: make a plug-in for agent hosts with the MCP server, a skill and a hook."""
 
 import json
 import os
@@ -25,36 +25,36 @@ from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
 
-#: what the plug-in is called, and its server: hosts put it before the names of the tools
+#: the name of the plug-in and its server; hosts prefix the tool names with it
 NAME: Final = "rtshcua"
-#: what is shipped as it is, below `examples/agent`
+#: files copied unchanged from `examples/agent`
 COPIED: Final = (f"skills/{NAME}/SKILL.md", "hooks/keep_out.py")
-#: tools of a host that may reach for files
+#: tools of a host that can access files
 _REACHING: Final = "Bash|Read|Edit|Write|NotebookEdit"
 _DATA: Final = "RTSHCUA_DATA_DIR"
-#: what tells where the user's data lies, and hosts do not hand on to the servers that they start
+#: variables that locate the user's data, which hosts do not pass to the servers they start
 _CHOOSING: Final = (_DATA, "XDG_DATA_HOME")
 
 
 @app.command("agent-bundle")
 def agent_bundle(
-    directory: Annotated[Path, typer.Argument(help="the folder to make it in")],
-    bundle: Annotated[Path, typer.Option(help="the bundle that `rtshcua run --wait` has: its policy is in force")],
-    to: Annotated[Path, typer.Option(metavar="SOCKET", help="the agent socket of the vehicle that waits")],
-    with_: Annotated[list[Path], typer.Option("--with", help="the sources of that policy (repeatable)")],
+    directory: Annotated[Path, typer.Argument(help="folder of the new plug-in")],
+    bundle: Annotated[Path, typer.Option(help="the bundle of `rtshcua run --wait`, whose policy is in force")],
+    to: Annotated[Path, typer.Option(metavar="SOCKET", help="agent socket of the waiting vehicle")],
+    with_: Annotated[list[Path], typer.Option("--with", help="sources of that policy (repeatable)")],
     mission_key: Annotated[Path | None, typer.Option(help="the agent's mission key [default: the key store's]")] = None,
-    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the key's passphrase")] = None,
-    force: Annotated[bool, typer.Option("--force", help="replace files of the same names; others stay")] = False,
+    passphrase_file: Annotated[Path | None, typer.Option(help="file with the passphrase of the key")] = None,
+    force: Annotated[bool, typer.Option("--force", help="replace existing files of the plug-in")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")] = False,
 ) -> ExitCode:
-    """Make a plug-in for hosts of agents, OpenClaw and Claude's: the MCP server, a skill that says how to use it, and a
-    hook that keeps the model out of the key store and the socket.
+    """Make a plug-in for agent hosts (OpenClaw, Claude): the MCP server, a skill that explains it, and a hook that
+    blocks the model's access to the key store and the socket.
 
-    It names BUNDLE, SOCKET, the sources and the key by whole paths, and holds no key, no passphrase and no bundle.
-    docs/agents.md says how a host takes it up. The sources must make the very policy that BUNDLE has.
+    The plug-in refers to BUNDLE, SOCKET, the sources and the key by absolute paths, and contains no key, passphrase or
+    bundle. Installation: docs/agents.md. The sources must compile to exactly the policy of BUNDLE.
 
-    Ends with 0 where it was made, 3 where a file cannot be read or is damaged, the policy is another one, or files of
-    the same names are there, 74 where it cannot be written.
+    Exit codes: 0 created; 3 a file cannot be read or is damaged, the policy differs, or files of these names exist; 74
+    the files cannot be written.
     """
     from rtshcua.app.propose import Missions, NoPolicy
 
@@ -68,11 +68,9 @@ def agent_bundle(
     try:
         policy = Missions(with_).policy
     except NoPolicy as error:
-        return fail(ExitCode.INPUT, str(error), "`rtshcua check` says what is wrong with them", slug="no-policy")
+        return fail(ExitCode.INPUT, str(error), "run `rtshcua check` on them", slug="no-policy")
     if policy_digest(policy_payload(policy)) != signed:
-        text = (
-            f"the sources make another policy than `{bundle}` has: `{policy.name}@{policy.version}`, or changed since"
-        )
+        text = f"the policy of the sources, `{policy.name}@{policy.version}`, differs from the policy of `{bundle}`"
         return fail(ExitCode.INPUT, text, "compile BUNDLE from these sources", slug="wrong-policy")
     words = ["mcp", _whole(bundle), "--to", _whole(to), *(word for path in with_ for word in ("--with", _whole(path)))]
     for option, key in (("--mission-key", mission_key), ("--passphrase-file", passphrase_file)):
@@ -84,18 +82,23 @@ def agent_bundle(
         return fail(ExitCode.FULL, f"cannot write to `{directory}`: {words_of(error)}")
     if taken is not None:
         there = ", ".join(f"`{path}`" for path in taken.paths)
-        return fail(ExitCode.INPUT, f"nothing was made, for these are there: {there}", "--force", slug="exists")
+        return fail(
+            ExitCode.INPUT,
+            f"no file was created, because these exist: {there}",
+            "use `--force` to replace them",
+            slug="exists",
+        )
     if as_json:
         out_json(json.dumps({"folder": _whole(directory), "files": [*files]}, ensure_ascii=False))
         return ExitCode.OK
-    out(f"made a plug-in for {policy.vehicle.name} under {policy.name}@{policy.version} in {directory.absolute()}")
+    out(f"created a plug-in for {policy.vehicle.name} under {policy.name}@{policy.version} in {directory.absolute()}")
     out(f"Claude Code: claude --plugin-dir {shlex.quote(_whole(directory))}")
     out(f"OpenClaw:    openclaw plugins install {shlex.quote(_whole(directory))}")
     return ExitCode.OK
 
 
 def plugin(words: list[str], socket: str, policy: str, vehicle: str) -> dict[str, bytes]:
-    """Every file of a plug-in whose server is started with these words, by its path in it."""
+    """Return the files of a plug-in by their relative paths; `words`: the arguments of its server."""
     script = Path(sys.executable).parent / NAME
     command = [str(script)] if script.is_file() else [sys.executable, "-P", "-m", "rtshcua"]
     server: dict[str, object] = {"command": command[0], "args": [*command[1:], *words]}
@@ -115,7 +118,7 @@ def plugin(words: list[str], socket: str, policy: str, vehicle: str) -> dict[str
     return {
         ".claude-plugin/plugin.json": _json(manifest),
         ".mcp.json": _json({"mcpServers": {NAME: server}}),
-        "hooks/hooks.json": _json({"description": "keeps the model to the tools of the server", "hooks": hooks}),
+        "hooks/hooks.json": _json({"description": "limits the model to the tools of the server", "hooks": hooks}),
         **{name: (shipped / name).read_bytes() for name in COPIED},
     }
 

@@ -1,4 +1,4 @@
-"""`rtshcua approve`: answer a step that asks for confirmation."""
+"""`rtshcua approve`: approve or refuse a step that requires confirmation."""
 
 import time
 from pathlib import Path
@@ -41,52 +41,52 @@ NAME_SHOWN: Final = 80
 app = typer.Typer(add_completion=False)
 
 OTHER: Final = "other-path"
-AGREE: Final = "`--refuse` says no; `--other-path` agrees to it; ask who signed it, or compile the mission again"
+AGREE: Final = "refuse with `--refuse`, or accept the path with `--other-path`; or compile the mission again"
 
 
 @app.command()
 def approve(
     bundle: FlyingBundle,
-    step: Annotated[int, typer.Option(min=1, help="the number of the step, from 1")],
-    role: Annotated[str | None, typer.Option(help="who you are, where several are asked")] = None,
-    refused: Annotated[bool, typer.Option("--refuse", help="say no: the step is denied, whoever else agrees")] = False,
-    seconds: Annotated[int, typer.Option("--for", min=1, max=MOST_S, help="how many seconds the answer is good")]
+    step: Annotated[int, typer.Option(min=1, help="number of the step, from 1")],
+    role: Annotated[str | None, typer.Option(help="your role, if several roles must confirm the step")] = None,
+    refused: Annotated[bool, typer.Option("--refuse", help="refuse: the step is denied even if others agree")] = False,
+    seconds: Annotated[int, typer.Option("--for", min=1, max=MOST_S, help="validity of the answer in seconds")]
     = 300,
     replacement: Annotated[
-        list[Path] | None, typer.Option(help="a replacement that is in force since, in order (repeatable)")
+        list[Path] | None, typer.Option(help="a replacement in force, in order (repeatable)")
     ] = None,
     to: FlightSocket = None,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="write the signed answer here")] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="write the signed answer to this file")] = None,
     root: SignedRoot = None,
     flight: FlightId = None,
     person: Person = None,
     approval_key: ApprovalKey = None,
     passphrase_file: PassphraseFile = None,
     other_path: Annotated[
-        bool, typer.Option("--other-path", help="agree also to a path that is not the planner's for what is asked")
+        bool, typer.Option("--other-path", help="accept a path that differs from the planner's path")
     ] = False,
-    yes: Annotated[bool, typer.Option("--yes", help="sign without asking, at a terminal too; for scripts")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="sign without a prompt; for scripts")] = False,
     as_json: AsJson = False,
 ) -> ExitCode:  # fmt: skip
-    """Answer the `confirm` rules that ask you about one step of one mission: yes, or no.
+    """Approve or refuse one step of a mission for which a `confirm` rule requires your role.
 
-    What you answer is told first, from the step's skill and arguments, each zone with its size and its way from home;
-    at a terminal you are then asked whether to sign it. Without a terminal it is told and signed. A path in a zone is
-    worked out again from zone and arguments: where another one is to be flown, a yes takes `--other-path`.
+    The command verifies the bundle, then prints the step: its skill and arguments, and each zone with its size and its
+    position relative to home. At a terminal it asks before it signs; without one it signs at once. It plans the path in
+    a zone again; if the mission's path differs, an approval requires `--other-path`.
 
-    The bundle is verified first, so that you sign what it says. The answer is good for that step of that mission alone,
-    on its vehicle, and for a bounded time; a step that flies already is not recalled by it.
+    The answer is valid for this step of this mission on its vehicle, and for a limited time. It does not stop a step
+    that is already flying.
     """
     if to is None and output is None:
-        return fail(ExitCode.USAGE, "the answer has to go somewhere", WHERE)
+        return fail(ExitCode.USAGE, "no destination for the answer", WHERE)
     now_us = time.time_ns() // 1000
     try:
         flying = bundle_in_flight(bundle, replacement or [], root, now_us, stops=refused)
-        # a no is told in our words too, which nonsense has not
+        # a refusal describes the step too, which requires a valid mission
         (ready,) = prepare_missions(flying.policy, [flying.mission])
         steps = flying.mission.invocations
         if step > len(steps):
-            return fail(ExitCode.USAGE, f"there is no step {step}", f"accepted: 1 to {len(steps)}")
+            return fail(ExitCode.USAGE, f"the mission has no step {step}", f"accepted: 1 to {len(steps)}")
         about = steps[index_of(step)]
         asked = _roles(ready[index_of(step)])
         if role is None and len(asked) == 1:
@@ -95,7 +95,7 @@ def approve(
             return _not_asked(ready[index_of(step)], role, asked)
         name = flight_id(flight, to)
         if name is None:
-            return fail(ExitCode.USAGE, "the answer is for one flight", WHOSE)
+            return fail(ExitCode.USAGE, "the flight of the answer is unknown", WHOSE)
         said = ApprovalDocument(
             flight=name,
             mission=flying.mission_digest,
@@ -108,18 +108,22 @@ def approve(
             expires_at_us=now_us + seconds * 1_000_000,
         )
         told = words.step(flying.policy, about)
-        mission = shorten(flying.mission.name, NAME_SHOWN)  # the proposer's word: it pushes nothing out of sight
+        mission = shorten(
+            flying.mission.name, NAME_SHOWN
+        )  # chosen by the proposer: it must not push the rest out of sight
         say(f"step {step} of `{mission}` on `{said.vehicle}`: `{told}`")
         planned = path_planned_otherwise(flying.policy, about)
         if planned is not None:
-            told += ", a path that is not the planner's"
-            say(f"who signed the mission chose another path than the planner does: {_other(planned)}")
+            told += ", a path that differs from the planner's"
+            say(f"warning: the path in the mission differs from the planner's: {_other(planned)}")
             if not refused and not other_path:
-                return fail(ExitCode.REFUSED, "nothing was signed: the path is not the planner's", AGREE, slug=OTHER)
+                return fail(
+                    ExitCode.REFUSED, "nothing was signed: the path differs from the planner's", AGREE, slug=OTHER
+                )
         store = KeyStore(data_folder())
         if approval_key is None:
-            person_key(store, person, role)  # nobody is asked to sign what their key may not
-        question = visible(f"sign that {_answer(refused)} as {role}?")
+            person_key(store, person, role)  # fail before the prompt if the key may not sign for this role
+        question = visible(f"sign as {role} that {_answer(refused)}?")
         if not yes and terminal() and not typer.confirm(question, err=True):
             return fail(ExitCode.REFUSED, "nothing was signed", slug="not-signed")
         key = unlock_person(store, person, role, path=approval_key, passphrase_file=passphrase_file)
@@ -132,17 +136,17 @@ def approve(
 
 def _other(planned: PlannedPath) -> str:
     if not planned.points:
-        return "it finds none there"
-    apart = f"the two are up to {words.length(planned.apart)} apart"
-    return f"its has {planned.points} points, {words.length(planned.length)} in all, and {apart}"
+        return "the planner finds none there"
+    apart = f"up to {words.length(planned.apart)} from the mission's path"
+    return f"the planner's path has {planned.points} points, is {words.length(planned.length)} long, and lies {apart}"
 
 
 def _answer(refused: bool) -> str:
-    return "it is refused" if refused else "it may be flown"
+    return "the step is refused" if refused else "the step may be flown"
 
 
 def _roles(of: PreparedInvocation) -> list[str]:
-    """Who may be asked: by a rule whose condition can hold for the step's arguments."""
+    """Return the roles of the `confirm` rules whose conditions can hold for the step's arguments."""
     policy = of.policy.policy
     return [
         name
@@ -158,8 +162,12 @@ def _not_asked(of: PreparedInvocation, role: str | None, asked: list[str]) -> Ex
         help = None
         if rules:
             text = " and ".join(f"`{policy.rules[each].text}`" for each in sorted(rules))
-            help = f"{text} cannot hold for the arguments of the step"
-        return fail(ExitCode.USAGE, f"no `confirm` of the policy asks anybody about step {step}", help)
+            help = f"{text} cannot hold for the step's arguments"
+        return fail(ExitCode.USAGE, f"no `confirm` rule of the policy applies to step {step}", help)
     names = ", ".join(f"`{name}`" for name in asked)
-    what = f"several roles are asked about step {step}" if role is None else f"`{role}` is not asked about step {step}"
+    what = (
+        f"several roles must confirm step {step}"
+        if role is None
+        else f"step {step} requires no confirmation by `{role}`"
+    )
     return fail(ExitCode.USAGE, what, f"accepted: --role {names}")

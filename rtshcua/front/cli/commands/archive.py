@@ -1,4 +1,4 @@
-"""`rtshcua archive`: keep many logs, verified, and ask them questions."""
+"""`rtshcua archive`: store many verified logs and query them."""
 
 import sys
 from pathlib import Path
@@ -19,27 +19,27 @@ if TYPE_CHECKING:
 
 app = typer.Typer(add_completion=False)
 
-Archive = Annotated[Path, typer.Option("--archive", "-a", metavar="FOLDER", help="the archive's folder")]
+Archive = Annotated[Path, typer.Option("--archive", "-a", metavar="FOLDER", help="folder of the archive")]
 Root = Annotated[
-    str | None, typer.Option(metavar="FILE|KEY", help="the trust root or its key [default: your key store's]")
+    str | None, typer.Option(metavar="FILE|KEY", help="trust root or its public key [default: the key store's]")
 ]
-Audit = Annotated[bool, typer.Option("--audit", help="derive every decision again, too")]
-Jobs = Annotated[int | None, typer.Option(min=1, metavar="N", help="processes that verify [default: one a core]")]
-Cluster = Annotated[str | None, typer.Option(metavar="ADDRESS", help="verify on this Dask cluster, tcp://HOST:PORT")]
-Json = Annotated[bool, typer.Option("--json", help="JSON on the standard output")]
-Csv = Annotated[bool, typer.Option("--csv", help="CSV on the standard output")]
-Limit = Annotated[int | None, typer.Option(min=1, metavar="N", help="no more rows than this")]
-Vehicle = Annotated[str | None, typer.Option(help="decisions on this vehicle")]
-Mission = Annotated[str | None, typer.Option(help="in this mission")]
-Skill = Annotated[str | None, typer.Option(help="on this skill")]
-Outcome = Annotated[str | None, typer.Option(help="allow, deny, defer or fallback")]
-Reason = Annotated[str | None, typer.Option(help="for this reason, or its beginning: `safety`")]
-Clause = Annotated[str | None, typer.Option(help="by a clause with this in it")]
-Rule = Annotated[str | None, typer.Option(help="by this rule: integrity, authority, state, safety, ...")]
-Policy = Annotated[str | None, typer.Option(metavar="NAME[@VERSION]", help="under this policy")]
-Since = Annotated[str | None, typer.Option(metavar="TIME", help="from this day (UTC) or time on")]
-Until = Annotated[str | None, typer.Option(metavar="TIME", help="before this day (UTC) or time")]
-Witness = Annotated[str | None, typer.Option(help="witnessed or unwitnessed")]
+Audit = Annotated[bool, typer.Option("--audit", help="also recompute every decision")]
+Jobs = Annotated[int | None, typer.Option(min=1, metavar="N", help="number of processes [default: one for each core]")]
+Cluster = Annotated[str | None, typer.Option(metavar="ADDRESS", help="verify on this Dask cluster (tcp://HOST:PORT)")]
+Json = Annotated[bool, typer.Option("--json", help="print JSON")]
+Csv = Annotated[bool, typer.Option("--csv", help="print CSV")]
+Limit = Annotated[int | None, typer.Option(min=1, metavar="N", help="maximum number of rows")]
+Vehicle = Annotated[str | None, typer.Option(help="only decisions on this vehicle")]
+Mission = Annotated[str | None, typer.Option(help="only in this mission")]
+Skill = Annotated[str | None, typer.Option(help="only on this skill")]
+Outcome = Annotated[str | None, typer.Option(help="only with this outcome: allow, deny, defer or fallback")]
+Reason = Annotated[str | None, typer.Option(help="only for reasons with this prefix, such as `safety`")]
+Clause = Annotated[str | None, typer.Option(help="only by clauses that contain this text")]
+Rule = Annotated[str | None, typer.Option(help="only by this rule: integrity, authority, state, safety, ...")]
+Policy = Annotated[str | None, typer.Option(metavar="NAME[@VERSION]", help="only under this policy")]
+Since = Annotated[str | None, typer.Option(metavar="TIME", help="from this UTC day or time")]
+Until = Annotated[str | None, typer.Option(metavar="TIME", help="before this UTC day or time")]
+Witness = Annotated[str | None, typer.Option(help="only witnessed or unwitnessed decisions")]
 
 _DEFAULT: Final = Path("archive")
 _LISTED: Final = "log, vehicle, begun_us, mission, policy, policy_version, records, anchored, status, finding"
@@ -47,12 +47,12 @@ _LISTED: Final = "log, vehicle, begun_us, mission, policy, policy_version, recor
 
 @app.callback()
 def archive() -> None:
-    """Keep many logs, verified, and ask them questions."""
+    """Store many verified logs and query them."""
 
 
 @app.command()
 def add(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="logs, folders of runs, or folders of these")],
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="logs, run folders, or parents of these")],
     archive: Archive = _DEFAULT,
     root: Root = None,
     audit: Audit = False,
@@ -60,11 +60,11 @@ def add(
     cluster: Cluster = None,
     as_json: Json = False,
 ) -> ExitCode:
-    """Copy logs into an archive, verify them there, and index those that are to be believed.
+    """Copy logs into an archive, verify them there, and index those that verify.
 
-    Of a log that fails nothing is indexed but that it fails, and why. The exit code is what `rtshcua verify-log` says
-    of the first that fails; else 9 where logs contradict each other, 3 where a folder also holds what is no log, 10
-    where a log was not closed.
+    For a log that fails, only the failure is indexed. Exit code: that of `rtshcua verify-log` for the first log that
+    fails; otherwise 9 if logs contradict each other, 3 if a folder also contains files that are not logs, 10 if a log
+    was not closed.
     """
     found = service.logs_in(logs)
     if isinstance(found, Refusal):
@@ -80,12 +80,12 @@ def verify(
     audit: Audit = False,
     jobs: Jobs = None,
     cluster: Cluster = None,
-    anew: Annotated[bool, typer.Option("--reindex", help="and make the index anew from the logs")] = False,
+    anew: Annotated[bool, typer.Option("--reindex", help="also rebuild the index from the logs")] = False,
     as_json: Json = False,
 ) -> ExitCode:
-    """Verify all logs of an archive once more, where they lie: those that were verified under this root.
+    """Verify again, in place, the logs of an archive that were verified under this trust root.
 
-    The exit code is that of `add`; 4 where none rests on this root.
+    Exit code: as for `add`; 4 if no log was verified under this root.
     """
     request = ArchiveRequest(archive, root, audit, jobs, cluster)
     return _shown(service.verify(request, _progress, reindex=anew), as_json=as_json)
@@ -94,8 +94,10 @@ def verify(
 @app.command(name="list")
 def list_(
     archive: Archive = _DEFAULT,
-    vehicle: Annotated[str | None, typer.Option(help="of this vehicle")] = None,
-    status: Annotated[str | None, typer.Option(help="verified, incomplete or failed")] = None,
+    vehicle: Annotated[str | None, typer.Option(help="only logs of this vehicle")] = None,
+    status: Annotated[
+        str | None, typer.Option(help="only logs with this status: verified, incomplete or failed")
+    ] = None,
     limit: Limit = None,
     as_json: Json = False,
     as_csv: Csv = False,
@@ -108,10 +110,12 @@ def list_(
 
 @app.command()
 def query(
-    name: Annotated[str | None, typer.Argument(metavar="[QUESTION]", help="one that ships; none lists them")] = None,
+    name: Annotated[
+        str | None, typer.Argument(metavar="[QUESTION]", help="name of a shipped query; without it, list them")
+    ] = None,
     archive: Archive = _DEFAULT,
-    sql: Annotated[str | None, typer.Option(metavar="SELECT", help="a question of your own")] = None,
-    show_sql: Annotated[bool, typer.Option("--show-sql", help="print the question's SQL instead")] = False,
+    sql: Annotated[str | None, typer.Option(metavar="SELECT", help="run your own query")] = None,
+    show_sql: Annotated[bool, typer.Option("--show-sql", help="print the SQL of the query without running it")] = False,
     vehicle: Vehicle = None,
     mission: Mission = None,
     skill: Skill = None,
@@ -127,9 +131,9 @@ def query(
     as_json: Json = False,
     as_csv: Csv = False,
 ) -> ExitCode:
-    """Ask an archive a question: one that ships, or one SELECT of your own over logs, decided, happened, seals.
+    """Query an archive with a shipped query, or with your own SELECT over the tables logs, decided, happened, seals.
 
-    Only logs that verified answer. Times are UTC in microseconds but in tables.
+    Only verified logs are included. Times are in UTC microseconds, except in printed tables.
     """
     shape = _shape(as_json, as_csv)
     if sql is None and name is None:
@@ -154,7 +158,7 @@ def query(
 
 @app.command()
 def stats(archive: Archive = _DEFAULT, as_json: Json = False, as_csv: Csv = False) -> ExitCode:
-    """Count what an archive holds."""
+    """Print the number of logs and records of an archive."""
     return _told(service.statistics(archive), _shape(as_json, as_csv))
 
 

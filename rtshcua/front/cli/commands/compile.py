@@ -41,7 +41,7 @@ Parameters = Annotated[
 IssuedAt = Annotated[str | None, typer.Option(help="time of issue, such as 2026-01-31T08:00:00Z [default: now]")]
 PolicyKey = Annotated[Path | None, typer.Option(help="the policy key [default: the key store's]")]
 MissionKey = Annotated[Path | None, typer.Option(help="the mission key [default: the key store's]")]
-PassphraseFile = Annotated[Path | None, typer.Option(help="a file with the keys' passphrase")]
+PassphraseFile = Annotated[Path | None, typer.Option(help="file with the passphrase of the keys")]
 FurtherSources = Annotated[
     list[Path] | None, typer.Option("--with", help="additional sources, such as a specification's policy (repeatable)")
 ]

@@ -1,4 +1,4 @@
-"""`rtshcua doctor`: what a vehicle supports, and what would stop a mission. It asks and listens, and moves nothing."""
+"""`rtshcua doctor`: report what a vehicle supports and what would stop a mission, without moving anything."""
 
 import os
 import pwd
@@ -79,34 +79,34 @@ app = typer.Typer(add_completion=False)
 
 _HEARTBEAT_S = 10.0
 _POLL_US = 50_000
-_SOFTWARE = "a run with `--mode software` decides in its own process, in reach of whoever takes it over"
-_EXAMPLE = "missions/short.rts"  # its policy reads every signal that ships
+_SOFTWARE = "a run with `--mode software` decides in its own process, where an attacker of the process can interfere"
+_EXAMPLE = "missions/short.rts"  # its policy reads every shipped signal
 
 
 @app.command()
 def doctor(
     context: typer.Context,
     connect: Connect,
-    bundle: Annotated[Path | None, typer.Argument(help="a mission that it is to fly; else the signals that ship")]
+    bundle: Annotated[Path | None, typer.Argument(help="the bundle to fly (default: check the shipped signals)")]
     = None,
-    seconds: Annotated[float, typer.Option(min=3, max=600, help="how long to listen")] = 10.0,
+    seconds: Annotated[float, typer.Option(min=3, max=600, help="listening time")] = 10.0,
     signing_key: LinkKey = None,
     unsigned_radio: UnsignedRadio = False,
     system: System = None,
     agent_user: Annotated[
-        str | None, typer.Option(metavar="USER", help="who the agent runs as: is it told apart from operators?")
+        str | None, typer.Option(metavar="USER", help="user of the agent: check that it differs from operators")
     ] = None,
     set_: MeantSettings = None,
     utc_error: UtcError = None,
     boundary_socket: Annotated[
-        Path | None, typer.Option(metavar="PATH", help="where a boundary listens that is to decide: look at that one")
+        Path | None, typer.Option(metavar="PATH", help="socket of a listening boundary: check that one")
     ] = None,
     mode: DecidesIn = None,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object")] = False,
 ) -> ExitCode:  # fmt: skip
-    """Say what a vehicle supports, and what would stop a mission. Nothing is armed, moved, set or uploaded.
+    """Report what a vehicle supports and what would stop a mission. Arms, moves, sets and uploads nothing.
 
-    Ends with 5 when something would stop a mission, with 8 when no vehicle is heard.
+    Exit codes: 0 nothing would stop a mission; 5 something would; 8 no vehicle answered.
     """
     try:
         link = address.parse(connect)
@@ -119,7 +119,7 @@ def doctor(
     try:
         agents = [] if agent_user is None else [told_apart(agent_user, pwd.getpwnam(agent_user).pw_uid, os.geteuid())]
     except KeyError:
-        return fail(ExitCode.USAGE, f"there is no user `{agent_user}`")
+        return fail(ExitCode.USAGE, f"unknown user `{agent_user}`")
     clock = SystemClock()
     try:
         wanted = _wanted(bundle, clock.now().utc_us)
@@ -177,26 +177,24 @@ def doctor(
 
 
 def _boundary(mode: EnforcementMode, socket: Path | None = None) -> list[VehicleFinding]:
-    """Where a run in this mode decides, or one that calls the boundary at this socket, and which measures that keep
-    others out of a process of its own that would be without.
-    """
+    """Return findings about where a run decides, and which isolation measures its boundary process lacks."""
     slug = "boundary/process"
     if mode is EnforcementMode.NONE:
-        text, help = "a run with `--mode none` flies the simulated vehicle only", "without `--mode`"
-        return [VehicleFinding(slug, MissionVerdict.STOP, text, "a process of its own", help)]
+        text, help = "a run with `--mode none` flies only the simulated vehicle", "leave out `--mode`"
+        return [VehicleFinding(slug, MissionVerdict.STOP, text, "a separate process", help)]
     if mode is EnforcementMode.SOFTWARE:
         built = program() is not None
-        text, help = (_SOFTWARE, "without `--mode`") if built else (UNBUILT, UNBUILT_HELP)
-        return [VehicleFinding(slug, MissionVerdict.WARN, text, "a process of its own", help)]
+        text, help = (_SOFTWARE, "leave out `--mode`") if built else (UNBUILT, UNBUILT_HELP)
+        return [VehicleFinding(slug, MissionVerdict.WARN, text, "a separate process", help)]
     try:
         if socket is None:
-            here, where = measures_here(None), "a run decides in a process of its own (`run --mode process`)"
+            here, where = measures_here(None), "a run decides in a separate process (`run --mode process`)"
         else:
             listening = ListeningBoundary(socket)
             listening.close()
             here, where = listening.measures, f"a boundary listens at `{socket}`"
     except BoundaryError as error:
-        return [VehicleFinding(slug, MissionVerdict.STOP, str(error), "a process of its own", error.help)]
+        return [VehicleFinding(slug, MissionVerdict.STOP, str(error), "a separate process", error.help)]
     found = [VehicleFinding(slug, MissionVerdict.OK, where)]
     for measure, text in MISSING.items():
         if measure not in here:
@@ -206,21 +204,19 @@ def _boundary(mode: EnforcementMode, socket: Path | None = None) -> list[Vehicle
 
 
 def _time_of_day(socket: Path | None, stated_us: int | None, *, keyed: bool, apart: bool) -> TimeSources:
-    """What a run would take the time of day from: one as it begins by itself, with a boundary `apart` or in its own
-    process, or one by the boundary that listens.
-    """
+    """Return the time sources of a run: of its own boundary (`apart`: a separate process), or of the listening one."""
     if socket is None:
         return TimeSources(kernel_error_us(), vehicle_counts(apart=apart, keyed=keyed), stated_us)
     try:
         listening = ListeningBoundary(socket)
-    except BoundaryError:  # nothing flies by it, and that was said
+    except BoundaryError:  # `_boundary` has reported it
         return TimeSources(kernel_error_us(), listens=True)
     try:
         has_key = listening.link_name is not None
         said = Caller(listening.call, signs=has_key).time(settle=True)
     finally:
         listening.close()
-    if isinstance(said, Refusal) or said.source is ClockSource.SHARED:  # it has none of its own: that of the run counts
+    if isinstance(said, Refusal) or said.source is ClockSource.SHARED:  # it has no clock: the run's applies
         return TimeSources(kernel_error_us(), listens=True)
     error_us, counts = said.now.utc_error_us, vehicle_counts(apart=True, keyed=has_key)
     return TimeSources(
@@ -230,7 +226,7 @@ def _time_of_day(socket: Path | None, stated_us: int | None, *, keyed: bool, apa
 
 
 def _expired(policy: Policy, mission: Mission, now: Now, time: TimeSources) -> list[VehicleFinding]:
-    """That the mission is too old, where this machine's time of day is known well enough to say so."""
+    """Return a finding if the mission has expired, as far as this machine's time is known."""
     error_us = time.stated_us if time.machine_us is None else time.machine_us
     known = Now(now.monotonic_us, now.utc_us, UTC_UNKNOWN_US if error_us is None else error_us)
     late = too_old(policy, mission.invocations, known)
@@ -240,20 +236,23 @@ def _expired(policy: Policy, mission: Mission, now: Now, time: TimeSources) -> l
 
 
 def _owed(debts: OwedParameters) -> list[VehicleFinding]:
-    """What a run that broke off has left in the vehicle's parameters."""
+    """Return a finding about parameters that an interrupted run has not restored."""
     slug = "settings/owed"
     if debts.trouble is not None:
         return [
-            VehicleFinding(slug, MissionVerdict.WARN, debts.trouble, "", "look at the file; without it nothing is owed")
+            VehicleFinding(
+                slug, MissionVerdict.WARN, debts.trouble, "", "inspect the file; if it is deleted, nothing is restored"
+            )
         ]
     listed = ", ".join(f"{name} from {shown(each.value)} to {shown(each.before)}" for name, each in debts.left.items())
-    found = f"a run that broke off set parameters, and the next one puts them back: {listed}"
+    found = f"an interrupted run left changed parameters, which the next run restores: {listed}"
     return [VehicleFinding(slug, MissionVerdict.WARN, found)] if listed else []
 
 
 def _wanted(bundle: Path | None, utc_us: int) -> tuple[Policy, Mission | None, TrustRoot | None] | Refusal:
-    """The policy whose signals count, the mission to fly, and the root that it is trusted by. Raises Untrusted, and
-    OSError.
+    """Return the policy whose signals are checked, the mission to fly, and its trust root.
+
+    Raises Untrusted and OSError.
     """
     if bundle is None:
         compiled, _ = compile_sources([library.root() / _EXAMPLE], mission=None, issued_at_us=utc_us)
@@ -269,17 +268,17 @@ def _wanted(bundle: Path | None, utc_us: int) -> tuple[Policy, Mission | None, T
     return opened.policy, opened.mission, root
 
 
-#: how long a vehicle that has just been switched on is waited for, longer than was asked for
+#: extra time for a vehicle that has just been switched on
 _SETTLES_S: Final = 60.0
 
 
 def _settle(socket: ConnectedVehicle, vehicle: ExaminingDriver, clock: SystemClock) -> list[VehicleFinding]:
-    """Wait for what comes by itself, such as a fix, and say so."""
+    """Wait for a condition that resolves itself, such as a GPS fix, and return a finding about it."""
     what = settling(vehicle)
     if what is None:
         return []
     if sys.stderr is not None:
-        print(f"waiting for {what}, {_SETTLES_S:.0f} s at the most", file=sys.stderr, flush=True)
+        print(f"waiting for {what}, at most {_SETTLES_S:.0f} s", file=sys.stderr, flush=True)
     begun = time.monotonic()
     still: str | None = what
     while still is not None and time.monotonic() < begun + _SETTLES_S:
@@ -289,7 +288,7 @@ def _settle(socket: ConnectedVehicle, vehicle: ExaminingDriver, clock: SystemClo
 
 
 def _listen(socket: ConnectedVehicle, vehicle: ExaminingDriver, clock: SystemClock, seconds: float) -> bool:
-    """Wait for a heartbeat, then listen for so long; whether there was one."""
+    """Wait for a heartbeat, then listen for `seconds`; return whether there was a heartbeat."""
     begun = time.monotonic()
     until = begun + _HEARTBEAT_S
     heard = False
@@ -320,7 +319,7 @@ _MARKS = {
 
 
 def _print(findings: Sequence[VehicleFinding]) -> None:
-    """A line a finding; what is wrong, with what is needed and what to do about it."""
+    """Print one line for each finding; for problems also what is needed and what to do."""
     width = max(len(each.slug) for each in findings)
     for each in findings:
         out(f"{_MARKS[each.verdict]:<5} {each.slug:<{width}}  {each.found}")

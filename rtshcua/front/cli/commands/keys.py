@@ -30,47 +30,51 @@ from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
 
-# the options that its commands share
-Vehicles = Annotated[list[str] | None, typer.Option(help="the identity of a vehicle [default: any] (repeatable)")]
-RootPassphrase = Annotated[Path | None, typer.Option(help="a file with the root key's passphrase")]
-OwnPassphrase = Annotated[Path | None, typer.Option(help="a file with the passphrase to encrypt the new key with")]
+Vehicles = Annotated[list[str] | None, typer.Option(help="identity of a vehicle [default: any] (repeatable)")]
+RootPassphrase = Annotated[Path | None, typer.Option(help="file with the passphrase of the root key")]
+OwnPassphrase = Annotated[Path | None, typer.Option(help="file with the passphrase for the new key")]
 
 _MOST_WITNESSES = 16
 
 
 @app.callback()
 def keys() -> None:
-    """Make, list, replace and revoke signing keys, and the trust root."""
+    """Create, list, replace and revoke signing keys, and manage the trust root."""
 
 
 @app.command()
 def init(
-    if_missing: Annotated[bool, typer.Option("--if-missing", help="do nothing where there are keys already")] = False,
+    if_missing: Annotated[bool, typer.Option("--if-missing", help="do nothing if keys exist")] = False,
     development: Annotated[
-        bool, typer.Option("--development/--encrypted", help="unencrypted keys for trying out, or encrypted ones")
+        bool, typer.Option("--development/--encrypted", help="unencrypted keys for development, or encrypted keys")
     ] = True,
-    days: Annotated[int, typer.Option(min=1, max=3660, help="how long the trust root is valid")] = 365,
-    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the passphrase to encrypt with")] = None,
-    witnesses: Annotated[int, typer.Option(min=0, max=_MOST_WITNESSES, help="how many keys for witnesses")] = 1,
+    days: Annotated[int, typer.Option(min=1, max=3660, help="validity of the trust root")] = 365,
+    passphrase_file: Annotated[Path | None, typer.Option(help="file with the passphrase for the keys")] = None,
+    witnesses: Annotated[int, typer.Option(min=0, max=_MOST_WITNESSES, help="number of witness keys")] = 1,
     witness_threshold: Annotated[
-        int, typer.Option(min=1, max=_MOST_WITNESSES, help="how many of them must cosign what counts as anchored")
+        int,
+        typer.Option(
+            min=1, max=_MOST_WITNESSES, help="number of witnesses that must cosign a record for it to be anchored"
+        ),
     ] = 1,
     role: Annotated[
-        list[str] | None, typer.Option(help="a role that missions may be for [default: operator] (repeatable)")
+        list[str] | None, typer.Option(help="role allowed in missions [default: operator] (repeatable)")
     ] = None,
     policy: Annotated[
         list[str] | None,
-        typer.Option(help="a policy that missions may be under; encrypted keys need one [default: any] (repeatable)"),
+        typer.Option(help="policy allowed for missions; required for encrypted keys [default: any] (repeatable)"),
     ] = None,
-    owner: Annotated[str, typer.Option("--approver", help="who may recall, and answer as operator")] = OWNER,
+    owner: Annotated[
+        str, typer.Option("--approver", help="name of the person who may recall flights and answer as operator")
+    ] = OWNER,
     as_json: AsJson = False,
 ) -> ExitCode:
-    """Make a key for each duty, and the trust root that names them.
+    """Create a key for each duty, and the trust root that names them.
 
-    There are two mission keys: one signs what agents propose, and nothing else, the other what people do. The approval
-    key is one person's, and `rtshcua keys approver` makes those of others. A development
-    root says so of itself: its keys lie unencrypted in your data folder, readable by you alone. A witness is worth
-    something only away from the vehicle: move its key to where `rtshcua witness` runs, and the log's aboard.
+    There are two mission keys: one signs only missions proposed by agents, the other missions proposed by people. The
+    approval key belongs to one person; `rtshcua keys approver` creates keys for others. A development root is marked as
+    such; its keys are unencrypted in your data folder and readable only by you. A witness is useful only away from the
+    vehicle: move its key to where `rtshcua witness` runs, and the log key to the vehicle.
     """
     store = service.key_store()
     if not (if_missing and store.exists()):
@@ -85,17 +89,17 @@ def init(
 
 @app.command()
 def approver(
-    name: Annotated[str, typer.Argument(help="the person: lower-case letters, digits, `.`, `_`, `-`")],
-    role: Annotated[str, typer.Option(help="the role in which they answer")],
+    name: Annotated[str, typer.Argument(help="name of the person: lower-case letters, digits, `.`, `_`, `-`")],
+    role: Annotated[str, typer.Option(help="role in which this person approves")],
     vehicle: Vehicles = None,
     passphrase_file: RootPassphrase = None,
     own_passphrase_file: OwnPassphrase = None,
     as_json: AsJson = False,
 ) -> ExitCode:
-    """Make an approval key for one person in one role, and the next version of the trust root, which names it.
+    """Create an approval key for one person in one role, and the next version of the trust root, which names it.
 
-    The same name is the same person: where a rule asks two people, two keys of one name are one. Hand the key file
-    over, and keep it nowhere else. Who pinned the root key trusts the new root too.
+    The name identifies the person: if a rule requires two people, two keys of one name count as one person. Give the
+    key file to the person and keep no copy. Clients that pinned the root key also trust the new root.
     """
     named = service.approver_key(name, role, vehicle or (ANY,))
     if isinstance(named, Refusal):
@@ -111,10 +115,10 @@ def boundary(
     own_passphrase_file: OwnPassphrase = None,
     as_json: AsJson = False,
 ) -> ExitCode:
-    """Make a key for the enforcement boundary, and the next version of the trust root, which names it.
+    """Create a key for the enforcement boundary, and the next version of the trust root, which names it.
 
-    `init` makes one; this is for a trust root without one. From then on each flight signs with it what was decided,
-    and a log without that signature does not verify.
+    `init` creates one; use this command for a trust root without one. From then on, the boundary signs its decisions in
+    each flight, and a log without that signature does not verify.
     """
     return _added(
         Duty.BOUNDARY,
@@ -127,24 +131,25 @@ def boundary(
 
 @app.command()
 def provision(
-    folder: Annotated[Path, typer.Argument(help="where the vehicle's folder is made: `/var/lib/rtshcua-boundary`")],
-    vehicle: Annotated[str, typer.Option(metavar="IDENTITY", help="the vehicle's identity, which its folder is named")],
-    signing_key: Annotated[Path | None, typer.Option(metavar="FILE", help="the key of its link, if it has one")] = None,
-    log_key: Annotated[Path | None, typer.Option(help="the key that signs the log (the key store's)")] = None,
+    folder: Annotated[Path, typer.Argument(help="parent of the new folder: `/var/lib/rtshcua-boundary`")],
+    vehicle: Annotated[str, typer.Option(metavar="IDENTITY", help="identity of the vehicle, and name of its folder")],
+    signing_key: Annotated[Path | None, typer.Option(metavar="FILE", help="key of its link, if it has one")] = None,
+    log_key: Annotated[Path | None, typer.Option(help="key that signs the log (default: the key store's)")] = None,
     boundary_key: Annotated[
-        Path | None, typer.Option(help="the key that the enforcement boundary signs with (the key store's)")
+        Path | None, typer.Option(help="key of the enforcement boundary (default: the key store's)")
     ] = None,
-    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the passphrase of these keys")] = None,
+    passphrase_file: Annotated[Path | None, typer.Option(help="file with the passphrase of these keys")] = None,
     again: Annotated[
-        bool, typer.Option("--again", help="in place of a folder that was provisioned before, which flies no more")
+        bool, typer.Option("--again", help="replace an earlier provisioned folder, which must not be used again")
     ] = False,
     as_json: AsJson = False,
 ) -> ExitCode:  # fmt: skip
-    """Make the folder of a boundary that listens (`run --boundary-socket`): its keys, unlocked, and the trust root.
+    """Create the folder of a listening boundary (`run --boundary-socket`): its decrypted keys and the trust root.
 
-    The folder appears whole, readable by its owner alone, or not at all; one that is there is left alone. It goes to
-    the user of the boundary, and these keys to nobody else aboard. It knows of no bundle that an earlier one opened: it
-    flies none that was issued before it was made, and a second one needs `--again` and another boundary key.
+    The folder is created atomically, readable only by its owner; an existing one is not changed. Give it to the user of
+    the boundary, and keep these keys nowhere else on the vehicle. A new folder does not know which bundles an earlier
+    one opened. It therefore refuses bundles issued before its creation, and a second folder for the same vehicle
+    requires `--again` and a new boundary key.
     """
     request = ProvisionRequest(folder, vehicle, signing_key, log_key, boundary_key, again)
     store = service.key_store()
@@ -158,26 +163,26 @@ def provision(
     out(
         f"{made.place}: the boundary of `{vehicle}`, under trust root version {made.trust_root}",
         f"  log key        {made.log_key}",
-        f"  boundary key   {made.boundary_key or 'none: the trust root names none for it'}",
+        f"  boundary key   {made.boundary_key or 'none: the trust root has none for it'}",
         f"  link key       {made.link_key or 'none'}",
-        "give it to the boundary's user: `chown -R rtshcua-boundary:` it, and keep these keys nowhere else aboard",
+        "give it to the boundary's user (`chown -R rtshcua-boundary:`); keep these keys nowhere else on the vehicle",
     )
     return ExitCode.OK
 
 
 @app.command()
 def mission(
-    source: Annotated[str, typer.Argument(metavar="agent|operator", help="who proposes what it signs")],
-    role: Annotated[list[str], typer.Option(help="a role that missions are for (repeatable)")],
-    policy: Annotated[list[str], typer.Option(help="a policy that missions are under (repeatable)")],
+    source: Annotated[str, typer.Argument(metavar="agent|operator", help="who proposes the missions it signs")],
+    role: Annotated[list[str], typer.Option(help="role of the missions (repeatable)")],
+    policy: Annotated[list[str], typer.Option(help="policy of the missions (repeatable)")],
     vehicle: Vehicles = None,
     passphrase_file: RootPassphrase = None,
     own_passphrase_file: OwnPassphrase = None,
     as_json: AsJson = False,
 ) -> ExitCode:
-    """Make a mission key for one source, bound to roles and policies, and the next version of the trust root.
+    """Create a mission key for one source, bound to roles and policies, and the next version of the trust root.
 
-    `rtshcua compile` signs with the first key of the store that may, or with that of `--mission-key FILE`.
+    `rtshcua compile` signs with the first permitted key of the key store, or with `--mission-key FILE`.
     """
     named = service.mission_key(source, role, policy, vehicle or (ANY,))
     if isinstance(named, Refusal):
@@ -189,20 +194,20 @@ def mission(
 @app.command()
 def revoke(
     key: Annotated[
-        list[str] | None, typer.Argument(metavar="KEY", help="its id, or the first 8 digits, or the name of its file")
+        list[str] | None, typer.Argument(metavar="KEY", help="the key's id, its first 8 digits, or its file name")
     ] = None,
     link: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="ID", help="the key of a link: what `rtshcua keys link` printed, or its file (repeatable)"
+            metavar="ID", help="key of a link: the id printed by `rtshcua keys link`, or its file (repeatable)"
         ),
     ] = None,
     passphrase_file: RootPassphrase = None,
     as_json: AsJson = False,
 ) -> ExitCode:
-    """Make the next version of the trust root, by which keys are never trusted again.
+    """Create the next version of the trust root, which revokes keys permanently.
 
-    A vehicle refuses what they sign from when it accepts that root: `rtshcua keys accept`, or its next flight under it.
+    A vehicle refuses their signatures as soon as it accepts that root, by `rtshcua keys accept` or by its next flight.
     """
     store = service.key_store()
     refused = service.revoke(store, key or (), link or (), _secrets(store, passphrase_file, None))
@@ -211,14 +216,14 @@ def revoke(
 
 @app.command(name="replace")
 def replace_(
-    key: Annotated[str, typer.Argument(help="its id, or the first 8 digits, or the name of its file")],
+    key: Annotated[str, typer.Argument(help="the key's id, its first 8 digits, or its file name")],
     passphrase_file: RootPassphrase = None,
     own_passphrase_file: OwnPassphrase = None,
     as_json: AsJson = False,
 ) -> ExitCode:
-    """Revoke a key, and make another that may speak for the same: an agent's, an approver's, a vehicle's log key.
+    """Revoke a key and create a new one with the same duty, roles and limits.
 
-    The old file is set aside. Hand the new one to whoever had it, and the trust root to the vehicles.
+    The old file is moved aside. Give the new file to the holder of the old one, and the trust root to the vehicles.
     """
     store = service.key_store()
     refused = service.replace_key(store, key, _secrets(store, passphrase_file, own_passphrase_file))
@@ -228,16 +233,16 @@ def replace_(
 @app.command()
 def rotate_root(
     days: Annotated[
-        int | None, typer.Option(min=1, max=3660, help="how long the new root is valid [default: as the old one]")
+        int | None, typer.Option(min=1, max=3660, help="validity of the new root [default: as the old root]")
     ] = None,
     passphrase_file: RootPassphrase = None,
     own_passphrase_file: OwnPassphrase = None,
     as_json: AsJson = False,
 ) -> ExitCode:
-    """Change the root key, in two versions of the trust root: one names both keys, the next one revokes the old.
+    """Change the root key in two versions of the trust root: one names both keys, the next one revokes the old key.
 
-    Vehicles go from the one to the other by themselves; whoever audits by the root key's pin is given the new one
-    (`rtshcua keys show`). A root that has expired is renewed so.
+    Vehicles follow from one to the other. Auditors that pin the root key need the new pin (`rtshcua keys show`). This
+    command also renews an expired root.
     """
     store = service.key_store()
     refused = service.rotate_root(store, days, _secrets(store, passphrase_file, own_passphrase_file))
@@ -246,15 +251,17 @@ def rotate_root(
 
 @app.command()
 def accept(
-    roots: Annotated[list[Path], typer.Argument(metavar="ROOT", help="signed trust roots, from the oldest on")],
-    vehicle: Annotated[str, typer.Option(metavar="IDENTITY", help="who this vehicle is")],
-    state_dir: Annotated[Path | None, typer.Option(help="where the vehicle's state is kept (the data folder)")] = None,
+    roots: Annotated[list[Path], typer.Argument(metavar="ROOT", help="signed trust roots, oldest first")],
+    vehicle: Annotated[str, typer.Option(metavar="IDENTITY", help="identity of this vehicle")],
+    state_dir: Annotated[
+        Path | None, typer.Option(help="folder of the vehicle's state (default: the data folder)")
+    ] = None,
     as_json: AsJson = False,
 ) -> ExitCode:
-    """On the vehicle: take a newer trust root, which may revoke keys. No older one is taken again.
+    """On the vehicle: accept a newer trust root, which may revoke keys. Older roots are refused from then on.
 
-    Each root follows from the one before, without a gap: a vehicle that missed some is given those between too, which
-    may have expired. The first that a vehicle ever takes is trusted for being named here.
+    The versions must be consecutive: if the vehicle missed some, name them too; these may have expired. The first root
+    of a vehicle is trusted because it is named here.
     """
     taken = service.accept(roots, vehicle, state_dir)
     if isinstance(taken, Refusal):
@@ -276,7 +283,7 @@ def accept(
 def list_(
     as_json: AsJson = False,
 ) -> ExitCode:
-    """List the keys of the key store, and what the trust root trusts them for."""
+    """List the keys of the key store and what the trust root permits them to sign."""
     return _listed(service.key_store(), as_json=as_json)
 
 
@@ -284,7 +291,7 @@ def list_(
 def show(
     as_json: AsJson = False,
 ) -> ExitCode:
-    """Print the pin of the trust root: what an auditor gives to `rtshcua verify-log --root`."""
+    """Print the pin of the trust root, for `rtshcua verify-log --root`."""
     found = service.root_key(service.key_store())
     if isinstance(found, Refusal):
         return refuse(found)
@@ -298,29 +305,29 @@ def show(
 
 @app.command()
 def link(
-    file: Annotated[Path, typer.Argument(help="the file to make; with --connect it may be there")],
+    file: Annotated[Path, typer.Argument(help="file to create; with --connect it may exist")],
     passphrase_file: Annotated[
         Path | None,
-        typer.Option(help="make the key of this passphrase, as ground stations do, instead of a random one"),
+        typer.Option(help="derive the key from this passphrase, as ground stations do (default: a random key)"),
     ] = None,
     connect: Annotated[
         str | None,
-        typer.Option(metavar="ADDRESS", help="put the key on the vehicle there, and look what comes of it"),
+        typer.Option(metavar="ADDRESS", help="install the key on the vehicle at this address, and test it"),
     ] = None,
     trusted_link: Annotated[
         bool,
-        typer.Option("--trusted-link", help="you vouch that nobody else hears this link: the key crosses it in clear"),
+        typer.Option("--trusted-link", help="confirm that nobody else can read this link: the key is sent in clear"),
     ] = False,
     system: System = None,
 ) -> ExitCode:
-    """Make a key for MAVLink 2 signing: `rtshcua run --signing-key FILE`, and the same key in the vehicle.
+    """Create a key for MAVLink 2 signing, for `rtshcua run --signing-key FILE` and for the vehicle.
 
-    With `--connect` the vehicle gets it too (SETUP_SIGNING), over a link that you vouch for, disarmed, on the ground.
-    It is then seen whether signed frames are answered, and unsigned ones are not; code 0 means that. A vehicle that
-    has the key gets nothing, and is looked at only. One key a vehicle.
+    With `--connect`, the command installs the key on the vehicle (SETUP_SIGNING), over a trusted link, disarmed and on
+    the ground. It then tests that the vehicle answers signed frames and ignores unsigned ones (exit code 0). If the
+    vehicle already has the key, nothing is sent except the test. Use one key for each vehicle.
     """
     if connect is None and (trusted_link or system is not None):
-        return fail(ExitCode.USAGE, "`--trusted-link` and `--system` are about the link of `--connect`")
+        return fail(ExitCode.USAGE, "`--trusted-link` and `--system` require `--connect`")
     if connect is not None and not trusted_link:
         help = "a cable, or a network of its own; `--trusted-link` says that you vouch for it"
         return fail(ExitCode.USAGE, "the key would cross the link in clear: nobody vouches for it", help)
@@ -347,7 +354,7 @@ def _make_link_key(file: Path, passphrase_file: Path | None) -> ExitCode:
 
 
 def _set_up(file: Path, address: Address, system: int | None) -> ExitCode:
-    """Put a link key on the vehicle at an address, and say what was seen."""
+    """Install a link key on the vehicle at an address, and print the result of the test."""
     seen = service.set_up_link(file, address, system)
     if isinstance(seen, Refusal):
         return refuse(seen)
@@ -364,7 +371,7 @@ def _added(
     *,
     as_json: bool,
 ) -> ExitCode:
-    """Make a key more, and say what the root trusts now."""
+    """Add a key, and print the new trust root."""
     store = service.key_store()
     refused = service.add_key(store, duty, named, _secrets(store, passphrase_file, own_passphrase_file))
     return _handed(store, refused, as_json=as_json)
@@ -383,13 +390,13 @@ def _warn_of_unknown(roles: Iterable[str]) -> None:
 
 
 def _handed(store: KeyStore, refused: Refusal | None, *, as_json: bool) -> ExitCode:
-    """Say what the root trusts now, and how vehicles get it: with those before, which some may have missed."""
+    """Print the trust root, and the command by which vehicles accept it and the versions before it."""
     if refused is not None:
         return refuse(refused)
     code = _listed(store, as_json=as_json)
     if code is ExitCode.OK and not as_json:
         words = ("rtshcua", "keys", "accept", *map(str, service.root_files(store)), "--vehicle", "IDENTITY")
-        out("", "hand it to each vehicle:")
+        out("", "run this on each vehicle:")
         for line in typed(words, columns() - 2):
             out_rendered(f"  {visible(line)}")
     return code
@@ -408,7 +415,7 @@ def _new_passphrase(path: Path | None) -> bytes | None:
         given = read_passphrase(path)
     elif sys.stdin is not None and sys.stdin.isatty():
         given = getpass("new passphrase: ").encode()
-        if getpass("once more: ").encode() != given:
+        if getpass("repeat it: ").encode() != given:
             return None
     else:
         return None

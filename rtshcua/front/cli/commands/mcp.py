@@ -1,4 +1,4 @@
-"""`rtshcua mcp`: an agent proposes missions to a vehicle that waits, over the Model Context Protocol."""
+"""`rtshcua mcp`: an MCP server through which an agent proposes missions to a waiting vehicle."""
 
 import gc
 import socket
@@ -34,29 +34,28 @@ _AGENT = "agent"
 @app.command()
 def mcp(
     context: typer.Context,
-    bundle: Annotated[Path, typer.Argument(help="the bundle that `rtshcua run --wait` has: its policy is in force")],
-    to: Annotated[Path, typer.Option(metavar="SOCKET", help="the agent socket of the vehicle that waits")],
-    with_: Annotated[list[Path], typer.Option("--with", help="the sources of that policy (repeatable)")],
+    bundle: Annotated[Path, typer.Argument(help="the bundle of `rtshcua run --wait`, whose policy is in force")],
+    to: Annotated[Path, typer.Option(metavar="SOCKET", help="agent socket of the waiting vehicle")],
+    with_: Annotated[list[Path], typer.Option("--with", help="sources of that policy (repeatable)")],
     mission_key: Annotated[Path | None, typer.Option(help="the agent's mission key [default: the key store's]")] = None,
-    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the key's passphrase")] = None,
+    passphrase_file: Annotated[Path | None, typer.Option(help="file with the passphrase of the key")] = None,
     http: Annotated[
         int | None,
-        typer.Option(metavar="PORT", min=0, max=65_535, help="serve HTTP on this machine alone, 0: any port"),
+        typer.Option(metavar="PORT", min=0, max=65_535, help="serve HTTP on this port of 127.0.0.1; 0: any free port"),
     ] = None,
     token_file: Annotated[
-        Path | None, typer.Option(help="the token that a host has to send, made where missing")
+        Path | None, typer.Option(help="with --http: file of the token that hosts must send; created if missing")
     ] = None,
 ) -> ExitCode:
-    """Serve an agent's host (MCP), over the standard streams or HTTP: check and propose missions, follow them, replan.
+    """Run an MCP server, over the standard streams or HTTP, with tools to check, propose, follow and replace missions.
 
-    It signs with one key, the agent's mission key, and has no other. It reaches nothing but SOCKET, and no tool arms,
-    sets a parameter, opens a link or takes a key. Needs the extra `mcp`. docs/agents.md says how to set hosts up.
+    The server signs with the agent's mission key and has no other key. It connects only to SOCKET. No tool arms the
+    vehicle, sets a parameter, opens a link or accepts a key. Requires the extra `mcp`. Host setup: docs/agents.md.
 
-    With --http it answers at http://127.0.0.1:PORT/mcp whoever sends the token in the file as `Authorization: Bearer`.
+    With --http, it serves http://127.0.0.1:PORT/mcp to clients that send the token as `Authorization: Bearer`.
 
-    Ends with 0 with the host, 2 where the command line is wrong or the extra is missing, 3 where a file cannot be read
-    or the port is taken, 4 for a key that is not an agent's, or a token that others may read, 74 where nothing can be
-    written.
+    Exit codes: 0 the host ended the session; 2 wrong command line, or the extra is missing; 3 a file cannot be read, or
+    the port is in use; 4 the key is not an agent's, or other users can read the token; 74 output cannot be written.
     """
     try:
         with _loading():
@@ -77,14 +76,14 @@ def mcp(
     except Untrusted as error:
         return distrust(error)
     if sources != (_AGENT,):
-        speaks = f"may speak for {', '.join(sources)}" if sources else "is no mission key of the key store's trust root"
-        text = f"key {key.kid.hex()} {speaks}, and an agent's host gets an agent's key alone"
-        help = "`--mission-key mission-agent.key`; the trust root, which is no secret, lies in the key store beside it"
+        what = f"is for {', '.join(sources)}" if sources else "is not a mission key in the key store's trust root"
+        text = f"key {key.kid.hex()} {what}; the MCP server requires a key for agents only"
+        help = "use `--mission-key mission-agent.key`, with the trust root (not secret) in the key store beside it"
         return fail(ExitCode.UNTRUSTED, text, help)
     for path in with_:
         read_regular(path, 1)
 
-    with _loading():  # before the host is greeted: it may call a tool at once, and that has 100 ms
+    with _loading():  # before the handshake: the host may call a tool at once, and that must take under 100 ms
         from rtshcua.app.propose import Missions
         from rtshcua.front.mcp.flight import Following
         from rtshcua.front.mcp.tools import Signer, Tools
@@ -97,7 +96,7 @@ def mcp(
         return offered
 
     if not to.exists():
-        say(f"note: `{to}` does not exist yet: `rtshcua run BUNDLE --wait --agent-socket {to}` makes it")
+        say(f"note: `{to}` does not exist yet; `rtshcua run BUNDLE --wait --agent-socket {to}` creates it")
     if http is None or token_file is None:
         with breakable():
             serve(make)
@@ -105,7 +104,7 @@ def mcp(
     try:
         token = token_of(token_file)
     except BadToken as error:
-        return fail(ExitCode.UNTRUSTED, str(error), f"`chmod 600 {token_file}`, and a new token")
+        return fail(ExitCode.UNTRUSTED, str(error), f"run `chmod 600 {token_file}` and replace the token")
     with socket.socket() as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -113,7 +112,7 @@ def mcp(
             listener.listen()
         except OSError as error:
             return fail(ExitCode.INPUT, f"cannot listen at {HOST}:{http}: {words_of(error)}", "choose another port")
-        say(f"serves http://{HOST}:{listener.getsockname()[1]}{PATH} to whoever sends the token in `{token_file}`")
+        say(f"serving http://{HOST}:{listener.getsockname()[1]}{PATH} to clients that send the token in `{token_file}`")
         with breakable():
             serve_http(make, listener, token)
     return ExitCode.OK
@@ -121,7 +120,7 @@ def mcp(
 
 @contextmanager
 def _loading() -> Iterator[None]:
-    """While something is loaded that stays: to look through it for garbage takes a tenth of the start."""
+    """Disable garbage collection while modules load: the objects stay, and collecting takes 10 % of the start."""
     collecting = gc.isenabled()
     gc.disable()
     try:
@@ -132,9 +131,9 @@ def _loading() -> Iterator[None]:
 
 
 def _sources(store: KeyStore, key: SigningKey) -> tuple[str, ...]:
-    """For whom the key may speak, by the key store's trust root; nothing where that does not name it.
+    """Return the sources that the key store's trust root binds to the key; empty if the root does not name the key.
 
-    Raises `KeyStoreError` where there is no root: then nobody can tell.
+    Raises `KeyStoreError` if there is no root.
     """
     named = open_root(store.root(), pinned=store.pin(), now_us=0).keys_for(Duty.MISSION).get(key.kid)
     return () if named is None else named.sources

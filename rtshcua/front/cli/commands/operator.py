@@ -1,4 +1,4 @@
-"""`rtshcua operator`: follow a flight from a terminal, with its recall at hand."""
+"""`rtshcua operator`: follow a flight in a terminal, and recall it at once if needed."""
 
 import json
 import os
@@ -45,14 +45,14 @@ from rtshcua.wire.bundle import Bundle
 from rtshcua.wire.keys import SigningKey
 from rtshcua.wire.untrusted import Untrusted
 
-_HELP: Final = "recall: call this flight home · policy: all under its policy · quit: leave it flying"
-#: what a person types, with Enter: what it calls home, by whether all under the policy
+_HELP: Final = "recall: recall this flight · policy: recall all under its policy · quit: leave it flying"
+#: the commands that recall, and whether each recalls all flights under the policy
 _RECALLS: Final = {"r": False, "recall": False, "p": True, "policy": True}
 _QUITS: Final = frozenset({"q", "quit", "exit"})
 _CHUNK: Final = 4_096
-#: so far ahead of ours is the clock of a flight that is sped up, us
+#: a flight whose clock is further ahead than this is sped up, us
 _AHEAD_US: Final = 5_000_000
-#: of a line that is no command
+#: how much of an unknown command is printed
 _SHOWN: Final = 40
 
 app = typer.Typer(add_completion=False)
@@ -62,7 +62,7 @@ app = typer.Typer(add_completion=False)
 def operator(
     bundle: FlyingBundle,
     to: Annotated[Path, typer.Option(metavar="SOCKET", help="the flight's operator or agent socket")],
-    seconds: Annotated[int, typer.Option("--for", min=1, max=MOST_S, help="how many seconds a recall is good")]
+    seconds: Annotated[int, typer.Option("--for", min=1, max=MOST_S, help="validity of a recall in seconds")]
     = GOOD_S,
     root: SignedRoot = None,
     person: Person = None,
@@ -70,13 +70,13 @@ def operator(
     passphrase_file: PassphraseFile = None,
     as_json: AsJson = False,
 ) -> ExitCode:  # fmt: skip
-    """Follow a flight, and hold its recall ready: `recall` and Enter calls it home within milliseconds.
+    """Follow a flight; type `recall` and Enter to recall it within milliseconds.
 
-    The key is unlocked at the start, and held in memory until the end. The flight goes on when this ends. A connection
-    that is lost is made again for a minute, and a recall that was not answered is sent again then.
+    The key is unlocked at the start and kept in memory until the end. The flight continues when this command ends. If
+    the connection is lost, the command reconnects for up to a minute, and then repeats an unanswered recall.
 
-    Ends with 0 where the flight closed its log or somebody left it, 5 where it refused the last recall, 8 where a
-    recall was not answered, or the connection was lost and stayed so.
+    Exit codes: 0 the flight closed its log, or you quit; 5 the flight refused the last recall; 8 a recall was not
+    answered, or the connection could not be restored.
     """
     try:
         flying = bundle_in_flight(bundle, [], root, time.time_ns() // 1000, stops=True)
@@ -95,22 +95,22 @@ def operator(
 
 
 class Patience(NamedTuple):
-    """How long the console waits, in seconds."""
+    """The time limits of the console, in seconds."""
 
-    #: between two tries to connect again, and for each
+    #: between two attempts to reconnect, and for each attempt
     again_s: float = 0.5
-    #: until a connection that is lost is given up; a run that is begun again after a kill is there in some seconds
+    #: for all attempts to reconnect; a run restarted after a kill is back within seconds
     lost_s: float = 60.0
-    #: for the answer to a recall, until that is told
+    #: for the answer to a recall, before the console warns
     answer_s: float = 2.0
-    #: for anything at all, until that is told: a flight seals its log each 10 s
+    #: for any record, before the console warns; a flight seals its log every 10 s
     silent_s: float = 30.0
-    #: for whoever reads what is told, at the end
+    #: for the reader of the remaining output, at the end
     drain_s: float = 1.0
 
 
 class _Told(msgspec.Struct):
-    """What is read of a line that is no record."""
+    """The members read from a line that is not a record."""
 
     type: str = ""
     digest: str = ""
@@ -120,10 +120,10 @@ _read_told = msgspec.json.Decoder(_Told).decode
 
 
 class OperatorConsole:
-    """What a person sees at the descriptor `output` and types at `typing`. `seconds`: how long a recall that is sent is
-    good; `bundle`: the file of what flies, for the commands that are told.
+    """The console on the descriptors `output` and `typing`.
 
-    Nothing in it waits for one thing alone: neither a flight nor a terminal that does not read keeps a recall back.
+    `seconds`: validity of each recall; `bundle`: the file of the flying bundle, for the commands that are printed.
+    Nothing blocks on a single descriptor: neither a slow flight nor a slow terminal can delay a recall.
     """
 
     def __init__(
@@ -139,20 +139,20 @@ class OperatorConsole:
         self._follower: FlightFollower | None = follower
         self._flight = follower.flight
         self._output = NewestLines(
-            output, lambda count: self._line("left-out", f"{count} lines: nobody read them in time")
+            output, lambda count: self._line("left-out", f"{count} lines: they were not read in time")
         )
         self._typing = typing
-        self._names: Names | None = None  # until the flight tells its mission
+        self._names: Names | None = None  # None until the flight reports its mission
         self._replaced = 0
         self._typed = b""
         self._code = ExitCode.OK
-        #: a recall that was not answered yet: whether it is for all under the policy
+        #: an unanswered recall: whether it covers all flights under the policy
         self._unanswered: bool | None = None
         self._sent_s = self._heard_s = self._lost_s = time.monotonic()
         self._told_silence = self._told_unanswered = False
 
     def follow(self, stop: StopRequest) -> ExitCode:
-        """Until the flight is over, somebody leaves it (also by a signal), or the connection is lost for too long."""
+        """Run until the flight ends, the user quits (also by a signal), or the connection cannot be restored."""
         self._greet()
         self.tell("ready", _HELP)
         code: ExitCode | None = None
@@ -167,19 +167,19 @@ class OperatorConsole:
         return code
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         if self._follower is not None:
             self._follower.close()
 
     def _leave(self) -> ExitCode:
-        self.tell("left", "the flight goes on")
+        self.tell("left", "the flight continues")
         return self._left()
 
     def _left(self) -> ExitCode:
         return self._code if self._unanswered is None else ExitCode.LINK
 
     def _turn(self) -> ExitCode | None:
-        """Wait for what comes first, and do what is to be done; how it ended, once it did."""
+        """Wait for the next event and handle it; return the exit code once the flight has ended."""
         follower = self._follower
         reads = [each for each in (self._typing, follower) if each is not None]
         writes: list[NewestLines | FlightFollower] = [self._output] if self._output.waiting else []
@@ -195,7 +195,7 @@ class OperatorConsole:
                 over = follower in readable and self._hear(follower)
             except OSError as error:
                 if isinstance(error, ConnectionError) and error.errno is None:
-                    raise  # it is no flight
+                    raise  # the peer is not a flight
                 over = self._lose()
             if over:
                 return self._left()
@@ -204,24 +204,26 @@ class OperatorConsole:
         return self._wait()
 
     def _wait(self) -> ExitCode | None:
-        """Tell what is waited for in vain; how it ended, where that was too long."""
+        """Warn about time limits that have passed; return the exit code if reconnecting took too long."""
         now_s = time.monotonic()
         if self._follower is None:
             if now_s - self._lost_s < self._patience.lost_s:
                 return None
-            self.tell("gone", "the flight was not reached again: it is not known whether it is over")
+            self.tell("gone", "could not reconnect to the flight; it is unknown whether it has ended")
             return ExitCode.LINK
         if now_s - self._heard_s >= self._patience.silent_s and not self._told_silence:
             self._told_silence = True
-            self.tell("silent", f"nothing was heard of the flight for {now_s - self._heard_s:.0f} s")
+            self.tell("silent", f"no data from the flight for {now_s - self._heard_s:.0f} s")
         waits = self._unanswered is not None and now_s - self._sent_s >= self._patience.answer_s
         if waits and not self._told_unanswered:
             self._told_unanswered = True
-            self.tell("unanswered", "the flight does not answer the recall: bring it home by other means if it must be")
+            self.tell(
+                "unanswered", "the flight does not answer the recall; if the vehicle must return, use other means"
+            )
         return None
 
     def _connect(self) -> None:
-        """Try once to reach the flight again."""
+        """Try once to reconnect."""
         try:
             self._follower = FlightFollower(self._to, patience_s=self._patience.again_s)
         except (ConnectionError, FileNotFoundError, TimeoutError, BlockingIOError) as error:
@@ -251,7 +253,7 @@ class OperatorConsole:
         return False
 
     def _hear(self, follower: FlightFollower) -> bool:
-        """Tell what the flight says; whether it is over."""
+        """Print what the flight sent; return whether the flight has ended."""
         lines = follower.receive()
         if lines is None:
             return self._lose()
@@ -272,14 +274,14 @@ class OperatorConsole:
                 if isinstance(record, DecisionRecord) and record.reason == Reason.AWAITING_APPROVAL.value:
                     self._tell_whom(record, names)
             elif isinstance(record, Close):
-                self.tell("over", f"the flight is over: {record.ending}")
+                self.tell("over", f"the flight has ended: {record.ending}")
                 return True
         return False
 
     def _tell_whom(self, record: DecisionRecord, names: Names) -> None:
-        """Whom a step waits for, how long, and what they type: as `run` tells it."""
+        """Print whose approval a step waits for, how long, and the commands to answer, as `run` does."""
         ahead = record.utc_us > time.time_ns() // 1000 + _AHEAD_US
-        # an agent's mission flies under the same policy, but its bundle lies elsewhere
+        # an agent's mission flies under the same policy, but its bundle file is unknown here
         answering = Answering(self._bundle if names.whole else "BUNDLE", str(self._to), ahead)
         released_us = record.context.released_us
         whom = asks(
@@ -298,7 +300,7 @@ class OperatorConsole:
 
     def _answered(self, answer: FlightReply) -> None:
         accepted = answer.slug == "accepted"
-        # one that was sent again finds the flight recalled by the first, whose answer was lost
+        # `recalled`: the first recall took effect, but its answer was lost
         self._code = ExitCode.OK if accepted or answer.slug == "recalled" else ExitCode.REFUSED
         self._unanswered = None
         help = HELP.get(answer.slug)
@@ -306,7 +308,7 @@ class OperatorConsole:
         self.tell("accepted" if accepted else "refused", text if accepted else f"{text} ({answer.slug})")
 
     def _meet(self, line: bytes) -> None:
-        """The mission that flies first, which need not be the bundle's: an agent may have handed in one of its own."""
+        """Read which mission flies first; it may differ from the bundle's if an agent submitted one."""
         if self._names is not None:
             return
         try:
@@ -321,39 +323,39 @@ class OperatorConsole:
             self._names = Names(Claimed(flying.policy, flying.mission, flying.digest, flying.policy_digest, *keys))
         else:
             self._names = Names(None)
-            self.tell("other", "another mission than the bundle's flies: `policy` calls that home")
+            self.tell("other", "a different mission than the bundle's is flying; type `policy` to recall it")
 
     def _type(self) -> bool:
-        """Do what was typed; whether that is to leave."""
+        """Execute typed commands; return whether one of them was to quit."""
         assert self._typing is not None
         data = os.read(self._typing, _CHUNK)
         if not data:
             self._typing = None
-            self.tell("ready", "nobody types any more: the flight is followed to its end")
+            self.tell("ready", "end of input; following the flight to its end")
         self._typed += data or (b"\n" if self._typed else b"")
         *lines, self._typed = self._typed.split(b"\n")
         self._typed = self._typed[-_CHUNK:]
         return any(self._leaves(line.decode(errors="replace").strip().lower()) for line in lines)
 
     def _leaves(self, word: str) -> bool:
-        """Do what was typed in a line; whether that is to leave."""
+        """Execute one command; return whether it was to quit."""
         if word in _QUITS:
             return True
         under_policy = _RECALLS.get(word)
         if under_policy is None:
             near = nearest(word, [*_RECALLS, *_QUITS]) if word else None
             meant = f", did you mean `{near}`?" if near else ""
-            self.tell("ready", f"`{word[:_SHOWN]}` is no command{meant} · {_HELP}" if word else _HELP)
+            self.tell("ready", f"unknown command `{word[:_SHOWN]}`{meant} · {_HELP}" if word else _HELP)
         else:
             self._recall(under_policy=under_policy)
         return False
 
     def _recall(self, *, under_policy: bool) -> None:
-        """Sign a recall and send it; it is sent again where the connection is lost before it was answered."""
+        """Sign and send a recall; it is sent again if the connection is lost before the answer."""
         self._unanswered, self._sent_s, self._told_unanswered = under_policy, time.monotonic(), False
         recalled = self._recalled(under_policy=under_policy)
         if self._follower is None:
-            self.tell("kept", f"the recall of {recalled.name}: it is sent once the flight is reached again")
+            self.tell("kept", f"the recall of {recalled.name} is sent after reconnecting")
             return
         document = recalled.sign(self._key, time.time_ns() // 1000, self._seconds)
         try:
@@ -362,12 +364,12 @@ class OperatorConsole:
             self._lose()
             return
         if self._follower.unsent:
-            self.tell("kept", f"the recall of {recalled.name}: it is sent once the flight reads")
+            self.tell("kept", f"the recall of {recalled.name} is sent as soon as the flight reads")
         else:
             self.tell("sent", f"the recall of {recalled.name}")
 
     def tell(self, event: str, text: str) -> None:
-        """One event, in a line."""
+        """Print one event on a line."""
         line = self._line(event, text)
         for each in [line] if self._as_json else fitted(line):
             self._output.tell(each)

@@ -1,4 +1,4 @@
-"""`rtshcua qualify`: a flight test of the autopilot itself, and the signed record of it."""
+"""`rtshcua qualify`: flight-test an autopilot and sign a record of the result."""
 
 import tempfile
 import time
@@ -46,44 +46,44 @@ from rtshcua.wire.untrusted import Untrusted
 app = typer.Typer(add_completion=False)
 
 _CONSENT_HELP: Final = (
-    "`--sitl`: it is a simulation, and a second ground station takes it over; `--pilot NAME`: it is a real vehicle, "
-    "and this pilot consents, with the mode switch in hand"
+    "`--sitl`: a simulation, which a second ground station takes over; `--pilot NAME`: a real vehicle, and this pilot "
+    "consents and holds the mode switch"
 )
 
 
 @app.command()
 def qualify(
     context: typer.Context,
-    source: Annotated[Path, typer.Argument(help="a source with a mission (.rts): the sorties fly under its policy")],
+    source: Annotated[Path, typer.Argument(help="a source with a mission (.rts), under whose policy the sorties fly")],
     connect: Connect,
-    vehicle: Annotated[str, typer.Option(metavar="IDENTITY", help="who this vehicle is, as its policy says")],
+    vehicle: Annotated[str, typer.Option(metavar="IDENTITY", help="identity of this vehicle, as in its policy")],
     sitl: Annotated[
-        bool, typer.Option("--sitl", help="it is a simulation: a second ground station takes it over")
+        bool, typer.Option("--sitl", help="the vehicle is simulated: a second ground station takes over")
     ] = False,
     pilot: Annotated[
-        str | None, typer.Option(metavar="NAME", help="it is a real vehicle, and this pilot consents, switch in hand")
+        str | None, typer.Option(metavar="NAME", help="the vehicle is real: this pilot consents and holds the switch")
     ] = None,
     takeover: Annotated[
-        bool, typer.Option("--takeover", help="with --pilot: ask the pilot to take over, and wait for it")
+        bool, typer.Option("--takeover", help="with --pilot: ask the pilot to take over, and wait")
     ] = False,
     only: Annotated[
-        list[str] | None, typer.Option(metavar="SORTIE", help="fly these sorties alone (repeatable)")
+        list[str] | None, typer.Option(metavar="SORTIE", help="fly only this sortie (repeatable)")
     ] = None,
     mission: Annotated[str | None, typer.Option(help="the mission to use if the source has several")] = None,
-    speed: Annotated[float, typer.Option(min=0.1, max=50, help="seconds of flight in a second; in simulation")] = 1.0,
-    passphrase_file: Annotated[Path | None, typer.Option(help="a file with the keys' passphrase")] = None,
+    speed: Annotated[float, typer.Option(min=0.1, max=50, help="speed-up of the simulated flight")] = 1.0,
+    passphrase_file: Annotated[Path | None, typer.Option(help="file with the passphrase of the keys")] = None,
     signing_key: LinkKey = None,
     unsigned_radio: UnsignedRadio = False,
     system: System = None,
     no_fence: NoFence = False,
     utc_error: UtcError = None,
-    runs: Annotated[Path, typer.Option(help="where the folders of the sorties are made")] = Path("runs"),
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object an event, the record last")] = False,
+    runs: Annotated[Path, typer.Option(help="folder in which the folders of the sorties are created")] = Path("runs"),
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object per event, the record last")] = False,
 ) -> ExitCode:  # fmt: skip
-    """Fly a short test of the autopilot: does it do what the adapters assume? Sign a record of the result.
+    """Fly a short test of whether the autopilot meets the assumptions of its adapter, and sign a record of the result.
 
-    It flies, so somebody has to consent: `--sitl` or `--pilot NAME`. Ends with 0 when every check that was made holds,
-    with 13 when one does not.
+    The vehicle flies, so consent is required: `--sitl` or `--pilot NAME`. Exit codes: 0 every check passed; 13 a check
+    failed.
     """
     if sitl and pilot is not None:
         return fail(ExitCode.USAGE, "`qualify` requires consent: `--sitl` or `--pilot NAME`, not both", _CONSENT_HELP)
@@ -161,7 +161,7 @@ def _qualify(plan: Qualifying, request: FlightRequest, console: TerminalConsole)
 
 
 def _show(result: QualificationResult, *, as_json: bool) -> None:
-    """Print the table, and where the record is."""
+    """Print the results and the path of the record."""
     record, broken_off, path, code = result
     if as_json:
         about = {"record": None if path is None else str(path), "exit_code": int(code)}
@@ -171,7 +171,7 @@ def _show(result: QualificationResult, *, as_json: bool) -> None:
     if path is not None:
         out(f"the record is in {path}")
     elif broken_off is None:
-        out("no record is made of it: that of the whole qualification before stays")
+        out("no record was written; the record of the last complete qualification stays")
 
 
 _PERMIT_HELP: Final = "permit takeoff to 6 or 10 m, goto 30 or 50 m from home at 2 to 5 m/s, hover, return and landing"

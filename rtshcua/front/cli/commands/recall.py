@@ -24,12 +24,12 @@ app = typer.Typer(add_completion=False)
 @app.command()
 def recall(
     bundle: Annotated[Path | None, typer.Argument(help="the bundle that is flying")] = None,
-    policy: Annotated[bool, typer.Option("--policy", help="all that fly under its policy on this vehicle")] = False,
-    seconds: Annotated[int, typer.Option("--for", min=1, max=MOST_S, help="how many seconds the recall is good")]
+    policy: Annotated[bool, typer.Option("--policy", help="recall all missions under its policy")] = False,
+    seconds: Annotated[int, typer.Option("--for", min=1, max=MOST_S, help="validity of the recall in seconds")]
     = recalling.GOOD_S,
     to: FlightSocket = None,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="write the signed recall here")] = None,
-    send: Annotated[Path | None, typer.Option(metavar="FILE", help="hand in a recall that was signed before")] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="write the signed recall to this file")] = None,
+    send: Annotated[Path | None, typer.Option(metavar="FILE", help="send a recall signed earlier")] = None,
     root: SignedRoot = None,
     flight: FlightId = None,
     person: Person = None,
@@ -37,10 +37,10 @@ def recall(
     passphrase_file: PassphraseFile = None,
     as_json: AsJson = False,
 ) -> ExitCode:  # fmt: skip
-    """Call a flight home: the mission ends, and in the air the policy's contingency flies.
+    """Recall a flight: the mission ends, and if the vehicle is in the air, the policy's contingency flies.
 
-    One for the mission reaches it also when it was replaced since. `-o FILE` signs one ahead of time, and `--send FILE
-    --to SOCKET` hands it in, without a key. `rtshcua operator` holds one ready.
+    A recall of a mission also covers its replacements. `-o FILE` signs a recall in advance, and `--send FILE --to
+    SOCKET` sends it without a key. `rtshcua operator` keeps the key unlocked for an immediate recall.
     """
     return recalling.recall(
         bundle, policy=policy, seconds=seconds, to=to, output=output, send=send, root=root, flight=flight,

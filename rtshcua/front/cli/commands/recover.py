@@ -1,4 +1,4 @@
-"""`rtshcua recover`: end the log of a flight that broke off."""
+"""`rtshcua recover`: close the log of an interrupted flight."""
 
 import json
 from pathlib import Path
@@ -23,30 +23,30 @@ from rtshcua.wire.keys import Duty
 
 app = typer.Typer(add_completion=False)
 
-_KEPT = "nothing was changed: every byte of it is where it was"
+_KEPT = "the log was not changed"
 _HELPS = {
-    LogState.TAMPERED: f"{_KEPT}; `rtshcua verify-log` says more",
-    LogState.FOREIGN: f"{_KEPT}; `--log-key` takes the key that the flight was made with",
-    LogState.UNBEGUN: f"{_KEPT}; the flight broke off before it began",
+    LogState.TAMPERED: f"{_KEPT}; run `rtshcua verify-log` for details",
+    LogState.FOREIGN: f"{_KEPT}; name the log key of the flight with `--log-key`",
+    LogState.UNBEGUN: f"{_KEPT}; the flight was interrupted before it began",
 }
 
 
 @app.command("recover")
 def recover_logs(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="logs, folders of runs, or folders of these")],
-    log_key: Annotated[Path | None, typer.Option(help="the key that signs logs (the key store's)")] = None,
-    passphrase_file: Annotated[Path | None, typer.Option(help="a file with that key's passphrase")] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="say what would be kept and discarded; no key needed")]
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="logs, run folders, or parents of these")],
+    log_key: Annotated[Path | None, typer.Option(help="key that signs logs (default: the key store's)")] = None,
+    passphrase_file: Annotated[Path | None, typer.Option(help="file with the passphrase of that key")] = None,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="only print what would be kept (no key needed)")]
     = False,
-    state_dir: Annotated[Path | None, typer.Option(help="where it is kept which logs were closed (the data folder)")]
+    state_dir: Annotated[Path | None, typer.Option(help="folder that records closed logs (default: the data folder)")]
     = None,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object a log on the standard output")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object for each log")] = False,
 ) -> ExitCode:  # fmt: skip
-    """End the log of a flight that broke off: keep what is whole, sign it, and close it as `recovered`.
+    """Close the log of an interrupted flight: keep the complete records, sign them, and close the log as `recovered`.
 
-    What a crash left behind the last whole record is moved to `log.discarded`. A log that was tampered with, that was
-    closed before and has lost its end since, or of which a witness saw more (`*.anchors` beside it), is left as it
-    is. It is safe to interrupt, and to repeat. With several logs the exit code is the first that is not 0.
+    Data after the last complete record is moved to `log.discarded`. A log is left unchanged if it was tampered with, if
+    it was closed before and has lost its end, or if a witness saw more of it (`*.anchors` in the same folder). The
+    command can be interrupted and repeated safely. With several logs, the exit code is the first that is not 0.
     """
     signer = None
     if not dry_run:
@@ -62,7 +62,7 @@ def _recover(path: Path, signer: LogEnder | None, state: Path, *, as_json: bool)
     try:
         done = recover_log(path, signer, state)
     except InUse as busy:
-        return fail(ExitCode.INPUT, str(busy), "a flight ends its log itself", slug="in-use")
+        return fail(ExitCode.INPUT, str(busy), "a running flight closes its log itself", slug="in-use")
     code = ExitCode.OK if done.done else recovery_code(done.found)
     if as_json:
         out_json(json.dumps(_object(path, done, code), ensure_ascii=False), flush=True)
@@ -78,12 +78,12 @@ def _why(found: FoundLog) -> str:
     where = "" if reason is None else f"record {reason.record}, octet {reason.offset}: {reason.text}"
     match found.state:
         case LogState.TAMPERED:
-            return f"this was no crash, and it is not signed: {where}"
+            return f"the damage was not caused by a crash, so the log is not signed: {where}"
         case LogState.FOREIGN:
-            return "its flight was made with another log key"
+            return "its flight used a different log key"
         case _:
             none = "it is not a log of this program" if recovery_code(found) is ExitCode.INPUT else ""
-            return f"{none or 'there is no first record to go on from'}: {where or 'it is empty'}"
+            return f"{none or 'the first record is missing'}: {where or 'the file is empty'}"
 
 
 def _told(path: Path, done: Recovered) -> list[str]:
@@ -93,10 +93,10 @@ def _told(path: Path, done: Recovered) -> list[str]:
     loose = found.records - found.sealed
     said = [f"{path}: {'recovered' if done.done else 'can be recovered'}, {many(found.records, 'record')} kept"]
     if loose:
-        said.append(f"  the last {loose} were not sealed yet: nothing but the chain speaks for them before this")
+        said.append(f"  the last {loose} were not sealed: until now only the hash chain covered them")
     if found.reason is not None:
         where = "" if done.discarded is None else f" are in {done.discarded.name}"
-        said.append(f"  {found.discarded} octets behind them{where}: {found.reason.text}")
+        said.append(f"  {found.discarded} bytes after them{where}: {found.reason.text}")
     return said
 
 

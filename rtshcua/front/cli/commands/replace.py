@@ -1,4 +1,4 @@
-"""`rtshcua replace`: hand a flight the mission that takes the place of its own."""
+"""`rtshcua replace`: send a replacement mission to a flight."""
 
 from pathlib import Path
 from typing import Annotated
@@ -19,19 +19,19 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 def replace(
-    replacement: Annotated[Path, typer.Argument(help="what `rtshcua compile --replaces` made")],
+    replacement: Annotated[Path, typer.Argument(help="a replacement from `rtshcua compile --replaces`")],
     to: Annotated[Path, typer.Option(metavar="SOCKET", help="the flight's operator or agent socket")],
     as_json: AsJson = False,
 ) -> ExitCode:
-    """Hand a flight a signed replacement: steps that were not released yet become those of another mission.
+    """Send a signed replacement to a flight: it replaces the steps that have not been released yet.
 
-    It is verified on board like the mission itself, under the same policy. `rtshcua compile --replaces` makes one.
+    The vehicle verifies it like the mission, under the same policy. `rtshcua compile --replaces` makes one.
     """
     document = read_regular(replacement, MAX_DOCUMENT)
     try:
         kind = kind_of(document)
     except Untrusted as error:
-        return fail(ExitCode.INPUT, f"`{replacement}` is no replacement: {error}")
+        return fail(ExitCode.INPUT, f"`{replacement}` is not a replacement: {error}")
     if kind is not names.REPLACEMENT:
-        return fail(ExitCode.INPUT, f"`{replacement}` is no replacement, but `{kind.name}`")
+        return fail(ExitCode.INPUT, f"`{replacement}` is not a replacement but `{kind.name}`")
     return deliver(document, f"replaced by `{replacement}`", to=to, output=None, as_json=as_json)

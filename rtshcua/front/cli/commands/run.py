@@ -1,4 +1,4 @@
-"""`rtshcua run`: fly a bundle, on the simulated vehicle or on another one."""
+"""`rtshcua run`: fly a bundle on the simulated vehicle or on a connected one."""
 
 import grp
 import os
@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 
 app = typer.Typer(add_completion=False)
 
-#: up to this many times as fast as life, what a permit for parameters lasts leaves the machine enough
+#: up to this speed-up, the validity of a permit for parameters leaves the machine enough time
 _FASTEST_SET = 5
-#: how long `--wait` waits, where nobody says
+#: the default of `--wait-for`
 _WAIT_US = 3_600_000_000
 
 
@@ -77,10 +77,10 @@ def run(
     plain: options.Plain = False,
     as_json: options.AsJson = False,
 ) -> ExitCode:
-    """Fly a bundle, once. Every step is decided before it is sent, watched while it flies, and recorded.
+    """Fly a bundle, once. Each step is decided before it is sent, monitored while it flies, and recorded.
 
-    Without `--connect` a simulated vehicle is started for it. Ctrl-C falls back and lands first. With `--wait` BUNDLE
-    says the policy alone: the mission that flies is handed in by an agent, once, and admitted as BUNDLE would be.
+    Without `--connect`, the command starts a simulated vehicle. Ctrl-C triggers a fallback and lands the vehicle first.
+    With `--wait`, BUNDLE provides only the policy: an agent submits one mission, which is admitted like BUNDLE's.
     """
     words = simulator_words(flavour=flavour, battery=battery, wind=wind, faults=fault, seed=seed)
     link = _links(context, connect, witness)
@@ -101,7 +101,7 @@ def run(
     if too_fast is not None:
         return fail(ExitCode.USAGE, *too_fast)
     with ExitStack() as stack:
-        # what comes from now on is kept by the system: a heartbeat need not be waited for once all is loaded
+        # open the port before the slow imports: the system then buffers the first heartbeat
         transport = _listening(address_, stack)
         from rtshcua.app.fly.dry_run import FlightRehearsal
         from rtshcua.app.fly.flight_request import FlightRequest
@@ -158,7 +158,7 @@ def run(
 def _links(
     context: typer.Context, connect: str | None, witness: list[str] | None
 ) -> tuple[Address | None, tuple[Address, ...] | AddressError] | ExitCode:
-    """Where the vehicle and the witnesses are, if the options make sense together."""
+    """Return the addresses of the vehicle and of the witnesses, or the exit code of a reported conflict."""
     problem = conflict_of(context, only=options.OF_SIMULATOR)
     if problem is not None:
         return problem
@@ -176,8 +176,9 @@ def _links(
 
 
 def _listening(link: Address | None, stack: ExitStack) -> Transport | None:
-    """The port at which a vehicle is heard, until the stack is closed, if it can be had; else whoever flies opens it,
-    and says why not.
+    """Open the UDP port of the vehicle until the stack is closed; None if it cannot be opened.
+
+    In that case the flight tries again and reports the error.
     """
     if link is None or link.way is not LinkCarrier.UDP_IN:
         return None
@@ -198,41 +199,41 @@ def _incidents(text: str, flavour: "AutopilotKind | None", seed: int | None) -> 
 
 
 def _too_fast(link: Address | None, speed: float, *, sets: bool) -> tuple[str, str] | None:
-    """Why nothing flies at this speed, and what helps."""
+    """Return the message and the help if the vehicle cannot fly at this speed; None if it can."""
     if link is not None and speed != 1 and not link.is_loopback:
-        text = f"`--speed` requires a simulated vehicle on this machine: at `{link}` a second is a second"
-        return text, "`rtshcua sim --speed N`, and `--connect udpin:127.0.0.1:14550`"
+        text = f"`--speed` requires a simulated vehicle on this machine, not one at `{link}`"
+        return text, "start `rtshcua sim --speed N` and use `--connect udpin:127.0.0.1:14550`"
     if sets and speed > _FASTEST_SET:
-        text = f"`--set` goes with a `--speed` of {_FASTEST_SET} at most"
-        return text, "a permit to set something lasts 30 s of flight: too short for this machine at a higher speed"
+        text = f"`--set` requires a `--speed` of at most {_FASTEST_SET}"
+        return text, "a permit to set a parameter lasts 30 s of flight time, which is too short at a higher speed"
     return None
 
 
 def _boundary_user(name: str | None, mode: EnforcementMode) -> tuple[int, int] | str | None:
-    """The ids of the user and group that the boundary's process runs as; what is wrong, in words."""
+    """Return the user and group ids for the boundary's process, None, or an error message."""
     if mode is not EnforcementMode.PROCESS:
-        return None if name is None else "`--boundary-user` goes with `--mode process`"
+        return None if name is None else "`--boundary-user` requires `--mode process`"
     if name is None:
         return None
     try:
         found = pwd.getpwnam(name)
     except KeyError:
-        return f"there is no user `{name}`"
+        return f"unknown user `{name}`"
     if os.geteuid() != 0:
-        return "`--boundary-user` needs root: only root may start what runs as somebody else"
+        return "`--boundary-user` requires root: only root can start a process as another user"
     return found.pw_uid, found.pw_gid
 
 
 def _group(agent_socket: Path | None, operator_socket: Path | None, name: str | None) -> int | str | None:
-    """The id of the group whose users may open the agent socket, if there is one; a text where that makes no sense."""
+    """Return the id of the group that may open the agent socket, None, or an error message."""
     if agent_socket is not None and agent_socket == operator_socket:
-        return "agents and operators have a socket each: give `--operator-socket` another path"
+        return "`--agent-socket` and `--operator-socket` must be different paths"
     if name is not None and agent_socket is None:
-        return "`--agent-group` goes with `--agent-socket`"
+        return "`--agent-group` requires `--agent-socket`"
     try:
         return None if name is None else grp.getgrnam(name).gr_gid
     except KeyError:
-        return f"there is no group `{name}`"
+        return f"unknown group `{name}`"
 
 
 def _style(*, plain: bool, as_json: bool) -> Literal["screen", "lines", "json"]:

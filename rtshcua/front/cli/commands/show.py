@@ -1,4 +1,4 @@
-"""`rtshcua show`: print a bundle, a document for a flight, a key, a trust root or a log for a person."""
+"""`rtshcua show`: print the contents of a bundle, document, key, trust root or log."""
 
 import json
 import time
@@ -37,27 +37,27 @@ _ENVELOPE = b"\xd2"  # COSE_Sign1
 def show(
     path: Annotated[
         Path,
-        typer.Argument(metavar="FILE", help="a bundle, document, key, trust root, record or log, or a run's folder"),
+        typer.Argument(
+            metavar="FILE", help="a bundle, document, key, trust root, qualification record or log, or a run folder"
+        ),
     ],
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")] = False,
 ) -> ExitCode:
-    """Print what a file says, whatever kind it is, with nothing left unsaid. Showing is not verifying."""
+    """Print the complete contents of a file. Nothing is verified."""
     page = for_terminal()
     file = path / LOG if path.is_dir() else path
     if file is not path and not file.exists():
-        return fail(
-            ExitCode.INPUT, f"there is no `{LOG}` in the folder `{path}`", "name a file, or the folder of one run"
-        )
+        return fail(ExitCode.INPUT, f"no `{LOG}` in the folder `{path}`", "name a file or a run folder")
     try:
         shown = _show(page, file)
     except Untrusted as error:
         return distrust(error, where=f"`{path}`: ")
     if shown is None:
-        help = "sources are shown by any editor; `rtshcua check` reports on them"
+        help = "open sources in an editor; `rtshcua check` checks them"
         kind = kind_of(file)
         if kind is not None:
-            return fail(ExitCode.INPUT, f"`{path}` is {kind.name}, which is not shown", kind.help or None)
-        return fail(ExitCode.INPUT, f"`{path}` is no bundle, document, key, trust root or log of this program", help)
+            return fail(ExitCode.INPUT, f"`{path}` is {kind.name}, which `show` does not support", kind.help or None)
+        return fail(ExitCode.INPUT, f"`{path}` is not a bundle, document, key, trust root or log of this program", help)
     if shown["kind"] == "log" and not shown["records"]:
         return fail(ExitCode.EVIDENCE, f"`{path}`: {CUT_AT_FIRST}", slug="genesis/missing")
     if as_json:
@@ -68,7 +68,7 @@ def show(
 
 
 def _show(page: TextPage, path: Path) -> dict[str, object] | None:
-    """Adds what the file holds to the page; None for what nobody here knows. Raises `Untrusted`."""
+    """Add the contents of a file to the page and return them; None for an unknown kind. Raises `Untrusted`."""
     now_us = time.time_ns() // 1000
     with open_regular(path) as file:
         head = file.read(_SNIFF)

@@ -1,4 +1,4 @@
-"""`rtshcua sim`: the simulated vehicle alone, for any ground station that speaks MAVLink."""
+"""`rtshcua sim`: start the simulated vehicle alone, for any MAVLink ground station."""
 
 import json
 import shlex
@@ -26,8 +26,8 @@ _FIRST_STEPS = {
     AutopilotKind.PX4: ("arm throttle", "long NAV_TAKEOFF -1 0 0 nan nan nan nan", "long NAV_RETURN_TO_LAUNCH"),
     AutopilotKind.ARDUPILOT: ("mode GUIDED", "arm throttle", "takeoff 10", "mode RTL"),
 }
-"""What to type in MAVProxy for a first flight. For PX4, `takeoff 10` would be 10 m above the sea: no climb at all; and
-MAVProxy cannot pack PX4's modes (`mode RTL`)."""
+"""Commands for a first flight in MAVProxy. With PX4, `takeoff 10` means 10 m above sea level, so the vehicle would not
+climb; and MAVProxy cannot encode PX4's modes (`mode RTL`)."""
 
 app = typer.Typer(add_completion=False)
 
@@ -35,49 +35,49 @@ app = typer.Typer(add_completion=False)
 @app.command()
 def sim(
     flavour: simulated.Flavour = None,
-    port: Annotated[int | None, typer.Option(min=1, max=65_535, help=f"UDP port to send to ({PORT})")] = None,
-    connect: Annotated[str | None, typer.Option(metavar="udpout:HOST:PORT", help="the same, written as a link")] = None,
-    speed: Annotated[float, typer.Option(min=0.1, max=200, help="seconds of flight in a second")] = 1.0,
-    system: Annotated[int, typer.Option(min=1, max=255, help="its MAVLink system id")] = 1,
+    port: Annotated[int | None, typer.Option(min=1, max=65_535, help=f"UDP port to send to (default: {PORT})")] = None,
+    connect: Annotated[
+        str | None, typer.Option(metavar="udpout:HOST:PORT", help="the port to send to, as a link address")
+    ] = None,
+    speed: Annotated[float, typer.Option(min=0.1, max=200, help="speed-up of the simulation")] = 1.0,
+    system: Annotated[int, typer.Option(min=1, max=255, help="MAVLink system id")] = 1,
     battery: simulated.Battery = None,
     wind: simulated.Wind = None,
     fault: simulated.Faults = None,
     seed: simulated.Seed = None,
     home: simulated.Home = None,
-    boot: Annotated[
-        Boot, typer.Option(help="sensors come up in a second, or as recorded: PX4 5 s, ArduCopter 42 s")
-    ] = (Boot.FAST),
-    answers: Annotated[
-        Answers, typer.Option(help="it obeys and answers at once, or after as long as was recorded")
-    ] = Answers.RECORDED,
+    boot: Annotated[Boot, typer.Option(help="sensor start-up: 1 s, or as recorded (PX4 5 s, ArduCopter 42 s)")] = (
+        Boot.FAST
+    ),
+    answers: Annotated[Answers, typer.Option(help="response delays: none, or as recorded")] = Answers.RECORDED,
     estimate: Annotated[
-        Estimate, typer.Option(help="it knows where it is within centimetres, or as with a real receiver")
+        Estimate, typer.Option(help="position estimate: within centimetres, or as with a real receiver")
     ] = Estimate.CLOSE,
     signing_key: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="it obeys only what is signed with this key (keys link)")
+        Path | None, typer.Option(metavar="FILE", help="accept only frames signed with this key (see `keys link`)")
     ] = None,
     stock: Annotated[
-        bool, typer.Option("--stock", help="GPS, barometer and battery alone: no radio, range finder, wind or voltage")
+        bool, typer.Option("--stock", help="only GPS, barometer and battery: no radio, range finder, wind or voltage")
     ] = False,
     parameter: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=VALUE", help="a parameter as its owner has set it; repeatable")
+        list[str] | None, typer.Option(metavar="NAME=VALUE", help="set an autopilot parameter (repeatable)")
     ] = None,
     usb: Annotated[
-        bool, typer.Option("--usb", help="it takes this link for USB: ArduCopter obeys anyone there, key or not")
+        bool, typer.Option("--usb", help="treat the link as USB, where ArduCopter accepts unsigned commands")
     ] = False,
     release: Annotated[
         str | None,
         typer.Option(
             metavar="MAJOR.MINOR",
             callback=simulated.release,
-            help="what it says it is, and takes keys as: PX4 1.16 (no keys), 1.17 or 1.18",
+            help="firmware release to simulate: PX4 1.16 (no signing), 1.17 or 1.18",
         ),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="say what was started as one JSON object")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object about the started vehicle")] = False,
 ) -> ExitCode:
-    """Start the simulated vehicle, until Ctrl-C. It sends to a UDP port of this machine and obeys what answers."""
+    """Run the simulated vehicle until Ctrl-C. It sends to a UDP port of this machine and obeys its peer there."""
     if port is not None and connect is not None:
-        return fail(ExitCode.USAGE, "`--port` and `--connect` say the same thing: give one")
+        return fail(ExitCode.USAGE, "`--port` and `--connect` cannot be combined: both set the port")
     if connect is not None:
         try:
             link = address.parse(connect, (LinkCarrier.UDP_OUT,))
@@ -86,8 +86,8 @@ def sim(
         if not link.is_loopback:
             return fail(
                 ExitCode.USAGE,
-                f"`{connect}` is not for the simulated vehicle",
-                "it speaks to this machine alone: `udpout:127.0.0.1:PORT`",
+                f"`{connect}` is not on this machine",
+                "the simulated vehicle accepts only `udpout:127.0.0.1:PORT`",
             )
         port = link.port
     port = port or PORT
@@ -120,12 +120,14 @@ def sim(
             code = vehicle.wait()
         except KeyboardInterrupt:
             return ExitCode.OK
-    return fail(ExitCode.FAULT, f"the simulated vehicle ended by itself, with code {code}")
+    return fail(ExitCode.FAULT, f"the simulated vehicle ended unexpectedly with code {code}")
 
 
 def _options(signing_key: Path | None, speed: float) -> str:
-    """What `run` needs to fly it on this machine, besides where it is. It shares the machine's clock: no more is stated
-    of that where it lives faster, or where its time counts.
+    """Return the options that `run` needs to fly this vehicle, other than its address.
+
+    The vehicle shares this machine's clock, so `--utc-error` is needed only at normal speed and if neither the kernel
+    nor the vehicle bounds the error.
     """
     words = [] if signing_key is None else [f"--signing-key {shlex.quote(str(signing_key))} --unsigned-radio"]
     if speed != 1:
@@ -136,10 +138,10 @@ def _options(signing_key: Path | None, speed: float) -> str:
 
 
 def _introduction(ready: Mapping[str, Any], port: int, signing_key: Path | None, speed: float) -> list[str]:
-    """What was started, and what a person types to fly it."""
+    """Return the introduction: the started vehicle, and the commands to fly it."""
     flavour = AutopilotKind(ready["flavour"])
     more = _options(signing_key, speed)
-    finds = "start it: it listens on this port by itself"
+    finds = "start it; it listens on this port"
     adds = f"Application Settings, Comm Links, Add: type UDP, port {port}"
     return [
         f"a simulated {flavour} vehicle, system {ready['system']}, sends to udp port {port}",
@@ -149,5 +151,5 @@ def _introduction(ready: Mapping[str, Any], port: int, signing_key: Path | None,
         f"  MAVProxy         mavproxy.py --master=udpin:127.0.0.1:{port}",
         f"                   then: {', '.join(f'`{step}`' for step in _FIRST_STEPS[flavour])}",
         f"  MAVSDK           udpin://127.0.0.1:{port}",
-        "  end it           Ctrl-C",
+        "  stop it          Ctrl-C",
     ]

@@ -1,4 +1,4 @@
-"""`rtshcua verify-log`: prove what a log proves, and name the first record that fails."""
+"""`rtshcua verify-log`: verify logs, and name the first record that fails."""
 
 import json
 import sys
@@ -24,37 +24,40 @@ from rtshcua.front.cli.stdout import out_json
 
 app = typer.Typer(add_completion=False)
 
-_LONG = 32 << 20  # bytes of a log that is worth a progress bar
+_LONG = 32 << 20  # size from which a progress bar is shown, bytes
 
 
-Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="logs, folders of runs, or folders of these")]
+Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="logs, run folders, or parents of these")]
 Root = Annotated[
-    str | None, typer.Option(metavar="FILE|KEY", help="the trust root or its key [default: your key store's]")
+    str | None, typer.Option(metavar="FILE|KEY", help="trust root or its public key [default: the key store's]")
 ]
-Audited = Annotated[bool, typer.Option("--audit", help="read every record, and derive every decision again")]
-NotDerived = Annotated[bool, typer.Option("--no-derive", help="with --audit: read every record, but derive none")]
-Fast = Annotated[bool, typer.Option("--fast", help="hold the octets against the signatures, and nothing more")]
+Audited = Annotated[bool, typer.Option("--audit", help="also check every record and recompute every decision")]
+NotDerived = Annotated[
+    bool, typer.Option("--no-derive", help="with --audit: check every record, recompute no decision")
+]
+Fast = Annotated[bool, typer.Option("--fast", help="check only the bytes against the signatures")]
 Jobs = Annotated[
     int,
     typer.Option(
         min=0,
         metavar="N",
         show_default=False,
-        help="processes that verify; 0, the default: one a core where the log is long. --audit has one always",
+        help="number of processes; 0 (default): one for each core if the log is long; --audit uses one",
     ),
 ]
 Anchors = Annotated[
-    list[Path] | None, typer.Option("--anchors", metavar="FILE", help="what witnesses cosigned, besides `*.anchors`")
+    list[Path] | None,
+    typer.Option("--anchors", metavar="FILE", help="anchors of witnesses, in addition to `*.anchors`"),
 ]
 Revocations = Annotated[
     list[Path] | None,
-    typer.Option("--revocations", metavar="FILE", help="a newer trust root: what it revokes counts (repeatable)"),
+    typer.Option("--revocations", metavar="FILE", help="newer trust root whose revocations apply (repeatable)"),
 ]
 RequireAnchor = Annotated[
-    bool, typer.Option("--require-anchor", help="a log that witnesses did not see to its end is incomplete")
+    bool, typer.Option("--require-anchor", help="treat a log as incomplete unless witnesses cosigned its end")
 ]
-Explained = Annotated[int | None, typer.Option(min=0, metavar="N", help="audit the log, and tell of record N in words")]
-AsJson = Annotated[bool, typer.Option("--json", help="one JSON object a log on the standard output")]
+Explained = Annotated[int | None, typer.Option(min=0, metavar="N", help="audit the log and describe record N")]
+AsJson = Annotated[bool, typer.Option("--json", help="print one JSON object for each log")]
 
 
 @app.command()
@@ -71,19 +74,20 @@ def verify_log(
     explain: Explained = None,
     as_json: AsJson = False,
 ) -> ExitCode:
-    """Verify logs offline, from the log and one pinned key.
+    """Verify logs offline, with only the log and one pinned key.
 
-    As it is: what was signed by whom, the chain of all records, and their tree. With --audit also the form of each
-    record, its clocks, and every decision once more; that is the slow way, and what an investigation wants. With
-    several logs the exit code is the first that is not 0.
+    By default: the signatures, the hash chain of all records, and their Merkle tree. With --audit also the form of each
+    record, its clocks, and every decision, recomputed; this is slower and meant for investigations. With several logs,
+    the exit code is the first that is not 0.
 
-    Of a folder every log is verified that lies in it or below, also one that is not called log.jsonl. A .jsonl file
-    there that is no log is named.
+    In a folder, all logs in it and below are verified, whatever their names. Other .jsonl files there are listed.
     """
     if (audit or explain is not None) and fast:
-        return fail(ExitCode.USAGE, "`--fast` does not go with `--audit` or `--explain`", "--fast reads no record")
+        return fail(
+            ExitCode.USAGE, "`--fast` cannot be combined with `--audit` or `--explain`", "`--fast` reads no records"
+        )
     if no_derive and not (audit or explain is not None):
-        return fail(ExitCode.USAGE, "`--no-derive` goes with `--audit`", "without `--audit` nothing is derived")
+        return fail(ExitCode.USAGE, "`--no-derive` requires `--audit`", "without `--audit` no decision is recomputed")
     pinned = trusted(root, revocations or ())
     if isinstance(pinned, Refusal):
         return refuse(pinned)
@@ -96,7 +100,7 @@ def verify_log(
         return explained(logs, explain, request, as_json=as_json)
     meant, others = logs_and_others(logs)
     for other in others:
-        say(visible(f"note: `{other}` was not looked at: it is no log of this program"))
+        say(visible(f"note: skipped `{other}`: not a log of this program"))
     return of_each(meant, lambda path, first: _verify(path, pinned, request, as_json=as_json, first=first))
 
 
@@ -116,7 +120,7 @@ def _verify(given: Path, pinned: Pin, request: VerifyRequest, *, as_json: bool, 
 
 @contextmanager
 def _progress(size: int) -> Iterator[Progress]:
-    """What takes how far a log of so many octets is read: a bar on the terminal if it is long."""
+    """Yield a progress callback; it drives a bar on the terminal if the log is long."""
     if size < _LONG or not sys.stderr.isatty():
         yield lambda _: None
         return

@@ -1,4 +1,4 @@
-"""`rtshcua verify-proof`: what a file of `rtshcua prove` proves, from the file and a pinned root key alone."""
+"""`rtshcua verify-proof`: verify a proof with only its file and a pinned root key."""
 
 import json
 from pathlib import Path
@@ -19,18 +19,18 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 def verify_proof(
-    proofs: Annotated[list[Path], typer.Argument(metavar="PROOF...", help="files of `rtshcua prove`")],
+    proofs: Annotated[list[Path], typer.Argument(metavar="PROOF...", help="proofs made by `rtshcua prove`")],
     root: Annotated[
-        str | None, typer.Option(metavar="FILE|KEY", help="the trust root or its key [default: your key store's]")
+        str | None, typer.Option(metavar="FILE|KEY", help="trust root or its public key [default: the key store's]")
     ] = None,
     checkpoint: Annotated[
-        Path | None, typer.Option(help="a checkpoint of the log that you kept: it must be the one in the proof")
+        Path | None, typer.Option(help="a checkpoint of the log that you kept, which the proof must match")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object a proof on the standard output")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object for each proof")] = False,
 ) -> ExitCode:
-    """Verify proofs offline: the record, its path, the signatures up to the root key that you trust.
+    """Verify proofs offline: the record, its Merkle path, and the signatures up to the pinned root key.
 
-    With several proofs the exit code is the first that is not 0.
+    With several proofs, the exit code is the first that is not 0.
     """
     pinned = trusted(root)
     if isinstance(pinned, Refusal):

@@ -1,4 +1,4 @@
-"""`rtshcua why`: one decision, step by step."""
+"""`rtshcua why`: explain one decision."""
 
 import json
 from pathlib import Path
@@ -25,39 +25,40 @@ app = typer.Typer(add_completion=False)
 
 @app.command()
 def why(
-    path: Annotated[Path, typer.Argument(help="a source with a mission, a bundle, a log, or a run's folder")],
-    step: Annotated[int | None, typer.Option(help="the number of the mission's step, from 1")] = None,
+    path: Annotated[Path, typer.Argument(help="a source with a mission, a bundle, a log, or a run folder")],
+    step: Annotated[int | None, typer.Option(help="number of the mission's step, from 1")] = None,
     state: Annotated[
-        list[str] | None, typer.Option("--state", help="a signal's value: `battery=20 %`, `gps.fix=unknown`")
+        list[str] | None,
+        typer.Option("--state", help="value of a signal: `battery=20 %`, `gps.fix=unknown` (repeatable)"),
     ] = None,
-    at: Annotated[
-        str | None, typer.Option(help="the time of the decision [default: that of the issue, or now]")
-    ] = None,
-    waited: Annotated[int, typer.Option(min=0, help="ms since the step was released")] = 0,
+    at: Annotated[str | None, typer.Option(help="time of the decision [default: time of issue, or now]")] = None,
+    waited: Annotated[int, typer.Option(min=0, help="time since the release of the step, ms")] = 0,
     record: Annotated[
-        int | None, typer.Option(help="the number of a record in a log: a decision on a step or link, or an effect")
+        int | None, typer.Option(help="number of a record in a log: a decision on a step or fallback, or an effect")
     ] = None,
     approved: Annotated[
-        bool, typer.Option("--approved", help="whoever a `confirm` asks approved, when the step was released")
+        bool, typer.Option("--approved", help="assume all required approvals at the release of the step")
     ] = False,
     mission: Annotated[str | None, typer.Option(help="the mission to use if the source has several")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")] = False,
 ) -> ExitCode:
-    """Show a decision step by step: what each step looked at, what decided, and what would have passed.
+    """Explain a decision: the inputs of each stage of the check, what decided, and which values would have passed.
 
-    By hand: the step of a mission in a state in which its own conditions hold, but for what --state says, each signal
-    once; a member under `unknown at` is missing, as in a test. --approved grants what a `confirm` waits for. From a
-    log: the inputs that the record holds, and how the flight ended; without --record the last decision on a step that
-    was not `allow`, else the last on a step. Nothing is verified; `rtshcua verify-log` does that.
+    For a source or bundle: the decision on a step in a state that fulfils the step's own conditions, except for --state
+    (each signal once; a member listed under `unknown at` is missing, as in a test). --approved grants the approvals
+    that `confirm` rules require.
+
+    For a log: the recorded inputs, and how the flight ended. Without --record, the last decision on a step that was not
+    `allow`, or else the last one. Nothing is verified; use `rtshcua verify-log` for that.
     """
     page = for_terminal()
     log = service.log_meant(path)
     if log is not None:
         if step is not None or state or at is not None or waited or approved or mission is not None:
-            return fail(ExitCode.USAGE, "a log says itself what was decided on", "only --record goes with a log")
+            return fail(ExitCode.USAGE, "a log contains its own inputs", "for a log, only `--record` is accepted")
         shown = from_log(page, log, record)
     elif record is not None:
-        return fail(ExitCode.USAGE, f"`{path}` is no log", "--record goes with a log or a run's folder")
+        return fail(ExitCode.USAGE, f"`{path}` is not a log", "`--record` requires a log or a run folder")
     else:
         at_us = None if at is None else moment(at)
         if at is not None and at_us is None:

@@ -1,4 +1,4 @@
-"""`rtshcua witness`: cosign the checkpoints of logs, away from the vehicle that writes them."""
+"""`rtshcua witness`: cosign the checkpoints of logs, away from the vehicle."""
 
 import json
 from contextlib import ExitStack
@@ -27,26 +27,26 @@ def witness(
     paths: Annotated[list[Path] | None, typer.Argument(metavar="[LOG|FOLDER]...", help="logs, or folders with logs")]
     = None,
     connect: Annotated[
-        str | None, typer.Option(metavar="udpin:HOST:PORT", help="answer `rtshcua run --witness` at this address")
+        str | None, typer.Option(metavar="udpin:HOST:PORT", help="listen for `rtshcua run --witness` at this address")
     ] = None,
     watch: Annotated[
-        float | None, typer.Option(metavar="SECONDS", min=0.1, help="look at the paths again, every so often")
+        float | None, typer.Option(metavar="SECONDS", min=0.1, help="check the paths again at this interval")
     ] = None,
-    key: Annotated[Path | None, typer.Option(help="the witness key (the key store's)")] = None,
-    passphrase_file: Annotated[Path | None, typer.Option(help="a file with that key's passphrase")] = None,
-    root: Annotated[Path | None, typer.Option(help="the signed trust root (the key store's)")] = None,
-    state_dir: Annotated[Path | None, typer.Option(help="where it is kept what was cosigned (the data folder)")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="one JSON object for each thing that happens")] = False,
+    key: Annotated[Path | None, typer.Option(help="the witness key (default: the key store's)")] = None,
+    passphrase_file: Annotated[Path | None, typer.Option(help="file with the passphrase of that key")] = None,
+    root: Annotated[Path | None, typer.Option(help="the signed trust root (default: the key store's)")] = None,
+    state_dir: Annotated[Path | None, typer.Option(help="folder of cosigned checkpoints (the data folder)")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object for each event")] = False,
 ) -> ExitCode:  # fmt: skip
-    """Cosign the checkpoints of logs. It never cosigns two that contradict each other, and says so when it is asked to.
+    """Cosign the checkpoints of logs. A witness never cosigns contradictory checkpoints; it reports them.
 
-    Logs that are handed over as files get their anchors in a file beside them. With --connect or --watch it goes on
-    until Ctrl-C or SIGTERM, which end it with 0.
+    The anchors of a log file are written to a file next to it. With --connect or --watch, the command runs until Ctrl-C
+    or SIGTERM, and then ends with 0.
     """
     if not paths and connect is None:
-        return fail(ExitCode.USAGE, "nothing to witness", "give logs, folders, or `--connect udpin:HOST:PORT`")
+        return fail(ExitCode.USAGE, "nothing to witness", "name logs or folders, or use `--connect udpin:HOST:PORT`")
     if watch is not None and not paths:
-        return fail(ExitCode.USAGE, "`--watch` goes with a folder")
+        return fail(ExitCode.USAGE, "`--watch` requires a path")
     link = None if connect is None else address_of(connect, ways=(LinkCarrier.UDP_IN,))
     if isinstance(link, ExitCode):
         return link
@@ -60,7 +60,7 @@ def witness(
         if isinstance(ended, Refusal):
             return refuse(ended)
         for path in ended.empty:
-            fail(ExitCode.INPUT, f"there are no logs in `{path}` or below it")
+            fail(ExitCode.INPUT, f"no logs found in `{path}`")
         return max([ended.code, *(ExitCode.INPUT for _ in ended.empty)])
 
 
@@ -73,7 +73,7 @@ def _witness(
     if isinstance(own, Refusal):
         return own
     stop = StopRequest()
-    if request.lasts:  # else a signal ends it at once: what it has written is whole
+    if request.lasts:  # otherwise a signal may end it at once: files are written atomically
         stack.enter_context(stop)
     return attend(own, request, say, stop.look, stack)
 

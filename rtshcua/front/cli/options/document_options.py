@@ -15,5 +15,5 @@ Person = Annotated[
 ]
 SignedRoot = Annotated[Path | None, typer.Option(help="the signed trust root (default: the key store's)")]
 ApprovalKey = Annotated[Path | None, typer.Option(help="the approval key [default: the key store's]")]
-PassphraseFile = Annotated[Path | None, typer.Option(help="a file with the key's passphrase")]
+PassphraseFile = Annotated[Path | None, typer.Option(help="file with the passphrase of the key")]
 AsJson = Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")]

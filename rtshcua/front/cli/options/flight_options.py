@@ -1,4 +1,4 @@
-"""The options of flights, of the vehicle that flies and of the simulated one, as several commands share them."""
+"""Options shared by the commands that fly: of the flight, the vehicle and the simulated vehicle."""
 
 import re
 from collections.abc import Sequence
@@ -21,9 +21,9 @@ _US = {"ms": 1_000, "s": 1_000_000, "min": 60_000_000}
 
 
 def duration_text(text: str | None) -> str | None:
-    """The option's value, checked."""
+    """Validate the value of a duration option."""
     if text is not None and not _TIME.fullmatch(text):
-        raise typer.BadParameter(f"`{text}` is no time, such as 500ms or 2s")
+        raise typer.BadParameter(f"`{text}` is not a duration, such as 500ms or 2s")
     return text
 
 
@@ -31,39 +31,44 @@ Connect = Annotated[
     str,
     typer.Option(
         metavar="ADDRESS",
-        help="the vehicle: `serial:/dev/ttyAMA0:921600`, or `tcp:`, `tcpin:`, `udpin:`, `udpout:HOST:PORT`",
+        help="the vehicle's address: `serial:/dev/ttyAMA0:921600`, or `tcp:`, `tcpin:`, `udpin:`, `udpout:HOST:PORT`",
     ),
 ]
 LinkKey = Annotated[
-    Path | None, typer.Option(metavar="FILE", help="the link's key: sign what is sent, believe nothing unsigned")
+    Path | None,
+    typer.Option(metavar="FILE", help="key of the link: sign outbound frames, ignore unsigned inbound frames"),
 ]
 UnsignedRadio = Annotated[
-    bool, typer.Option("--unsigned-radio", help="with a key: RADIO_STATUS unsigned, the worst of the last seconds")
+    bool,
+    typer.Option(
+        "--unsigned-radio", help="with --signing-key: accept unsigned RADIO_STATUS, and use the worst recent value"
+    ),
 ]
 System = Annotated[
-    int | None, typer.Option(min=1, max=255, help="the vehicle's MAVLink system id, where there are several")
+    int | None, typer.Option(min=1, max=255, help="MAVLink system id of the vehicle, if there are several")
 ]
-NoFence = Annotated[
-    bool, typer.Option("--no-fence", help="leave the vehicle's own geofence as it is; else it becomes the airspace")
-]
+NoFence = Annotated[bool, typer.Option("--no-fence", help="do not upload the airspace as the vehicle's geofence")]
 DecidesIn = Annotated[
     EnforcementMode | None,
     typer.Option(
-        help="where decisions are made: in a process of their own (default with --connect, where its program was "
-        "built) or in this one; `none` enforces nothing, in simulation",
+        help="where decisions are made: in a separate process (default with --connect if its program is built) or in "
+        "this one; `none` enforces nothing, simulation only",
     ),
 ]
 UtcError = Annotated[
     str | None,
     typer.Option(
-        metavar="TIME", callback=duration_text, help="how far UTC is off here, if neither kernel nor vehicle says"
+        metavar="TIME",
+        callback=duration_text,
+        help="bound on the UTC error of this machine, if neither kernel nor vehicle reports one",
     ),
 ]
 
 
 def mode_of(mode: EnforcementMode | None, *, own: bool, named: bool) -> tuple[EnforcementMode, bool]:
-    """Where decisions are made, and whether that is in this process only because there is no program of the boundary.
-    `own`: the vehicle is our simulated one; `named`: a boundary was asked for in another way than by `mode`.
+    """Return where decisions are made, and whether this process decides only because the boundary is not built.
+
+    `own`: the run starts the simulated vehicle; `named`: an option other than `--mode` requires a boundary process.
     """
     if mode is not None or (own and not named):
         return mode or EnforcementMode.SOFTWARE, False
@@ -72,7 +77,7 @@ def mode_of(mode: EnforcementMode | None, *, own: bool, named: bool) -> tuple[En
 
 
 def duration_us(text: str | None) -> int | None:
-    """`500ms`, `1.5s` or `2min` in us, rounded up; None for no text. It was checked before."""
+    """Return a validated duration (`500ms`, `1.5s`, `2min`) in us, rounded up; None for None."""
     found = None if text is None else _TIME.fullmatch(text)
     if found is None:
         return None
@@ -83,19 +88,17 @@ def duration_us(text: str | None) -> int | None:
 
 
 def settings_text(texts: list[str] | None) -> list[str] | None:
-    """The option's values, checked: each a parameter that may be set, to a value that it may be set to, and none
-    twice.
-    """
+    """Validate the values of `--set`: each is a settable parameter with an accepted value, and none occurs twice."""
     named: set[str] = set()
     for text in texts or ():
         name, bits = _read(text)
         if bits is None:
-            raise typer.BadParameter(f"`{text}` is not NAME=VALUE, with a number, such as FENCE_RADIUS=300")
+            raise typer.BadParameter(f"`{text}` is not NAME=NUMBER, such as FENCE_RADIUS=300")
         problem = unsettable(name, bits)
         if problem is not None:
             raise typer.BadParameter(problem)
         if name in named:
-            raise typer.BadParameter(f"`{name}` is given twice")
+            raise typer.BadParameter(f"`{name}` occurs twice")
         named.add(name)
     return texts
 
@@ -104,7 +107,7 @@ Settings = Annotated[
     list[str] | None,
     typer.Option(
         "--set", metavar="NAME=VALUE", callback=settings_text,
-        help="set a parameter of the autopilot for this flight, and put it back after it; repeatable",
+        help="set an autopilot parameter for this flight and restore it afterwards (repeatable)",
     ),
 ]  # fmt: skip
 
@@ -112,13 +115,13 @@ MeantSettings = Annotated[
     list[str] | None,
     typer.Option(
         "--set", metavar="NAME=VALUE", callback=settings_text,
-        help="judge it as `run` with the same would fly it; nothing is set here",
+        help="assume that `run` sets this parameter; doctor sets nothing (repeatable)",
     ),
 ]  # fmt: skip
 
 
 def settings_of(texts: Sequence[str] | None) -> dict[str, int]:
-    """The values by name, as the 32 bits of a float; they were checked before."""
+    """Return the validated values by parameter name, each as the 32 bits of a float."""
     found = dict(map(_read, texts or ()))
     return {name: bits for name, bits in found.items() if bits is not None}
 
@@ -140,13 +143,13 @@ _HOME = re.compile(r"-?\d+(\.\d+)?,-?\d+(\.\d+)?,-?\d+(\.\d+)?", re.ASCII)
 
 
 def _wind(text: str | None) -> str | None:
-    """The wind as the simulated vehicle takes it, without units; a number without one is in m/s or degrees."""
+    """Return the wind in the form of the simulated vehicle, without units; plain numbers are m/s and degrees."""
     if text is None:
         return None
     parts = text.split(",")
     try:
         if not 2 <= len(parts) <= 3 or any(part.startswith("-") for part in parts):
-            raise ValueError("two or three numbers that are not below zero are needed")
+            raise ValueError("expected two or three non-negative numbers")
         words = (
             f"{name}={part}{unit if _BARE.fullmatch(part) else ''}"
             for (name, unit), part in zip(_WIND, parts, strict=False)
@@ -159,9 +162,9 @@ def _wind(text: str | None) -> str | None:
 
 
 def release(text: str | None) -> str | None:
-    """The callback of an option for a release: it is two numbers."""
+    """Validate the value of a release option: two numbers."""
     if text is not None and not _RELEASE.fullmatch(text):
-        raise typer.BadParameter(f"`{text}` is no release, such as 1.18")
+        raise typer.BadParameter(f"`{text}` is not a release, such as 1.18")
     return text
 
 
@@ -180,28 +183,31 @@ def _faults(texts: list[str] | None) -> list[str] | None:
     return texts
 
 
-Flavour = Annotated[AutopilotKind | None, typer.Option(help="which autopilot the simulated vehicle is (px4)")]
-Battery = Annotated[float | None, typer.Option(min=0, max=100, metavar="PERCENT", help="its charge at the start (100)")]
+Flavour = Annotated[AutopilotKind | None, typer.Option(help="autopilot of the simulated vehicle (default: px4)")]
+Battery = Annotated[
+    float | None, typer.Option(min=0, max=100, metavar="PERCENT", help="charge at the start (default: 100)")
+]
 Wind = Annotated[
     str | None,
     typer.Option(
-        metavar="SPEED,FROM[,GUST]", callback=_wind, help="such as 6m/s,270deg,2m/s: the mean, from where, gusts"
+        metavar="SPEED,FROM[,GUST]", callback=_wind, help="mean wind, its direction and gusts, such as 6m/s,270deg,2m/s"
     ),
 ]
 Faults = Annotated[
     list[str] | None,
     typer.Option(
         "--fault", metavar="KIND,at=TIME,...", callback=_faults,
-        help=f"what goes wrong (repeatable): {', '.join(OF_VEHICLE)}; such as battery,at=30s,level=20%",
+        help=f"inject a fault, such as battery,at=30s,level=20% (repeatable); kinds: {', '.join(OF_VEHICLE)}",
     ),
 ]  # fmt: skip
 Home = Annotated[
-    str | None, typer.Option(metavar="LAT,LON,AMSL", callback=_home, help="where it stands: degrees, degrees, metres")
+    str | None,
+    typer.Option(metavar="LAT,LON,AMSL", callback=_home, help="start position in degrees, degrees and metres"),
 ]
-Seed = Annotated[int | None, typer.Option(help="of its noise and gusts: the same seed, the same vehicle (1)")]
+Seed = Annotated[int | None, typer.Option(help="seed of its noise and gusts (default: 1)")]
 
 
-#: the options that say what the simulated vehicle is
+#: the options of the simulated vehicle
 OF_SIMULATOR: Final = ("--flavour", "--battery", "--wind", "--fault", "--seed")
 
 
@@ -213,7 +219,7 @@ def simulator_words(
     faults: list[str] | None,
     seed: int | None,
 ) -> list[str]:
-    """The command line of the simulation's process; options left out keep its own defaults."""
+    """Return the command line arguments of the simulation process; omitted options keep its defaults."""
     words: list[str] = []
     for name, value in (("flavour", flavour), ("battery", battery), ("wind", wind), ("seed", seed)):
         if value is not None:
@@ -225,57 +231,67 @@ def simulator_words(
 
 # ---------------------------------------------------------------- a run
 
-Bundle = Annotated[Path, typer.Argument(help="what `rtshcua compile` made")]
+Bundle = Annotated[Path, typer.Argument(help="a bundle from `rtshcua compile`")]
 OtherVehicle = Annotated[
     str | None,
     typer.Option(
         "--connect", metavar="ADDRESS",
-        help="another vehicle: `serial:/dev/ttyAMA0:921600`, or `tcp:`, `tcpin:`, `udpin:`, `udpout:HOST:PORT`",
+        help="fly this vehicle: `serial:/dev/ttyAMA0:921600`, or `tcp:`, `tcpin:`, `udpin:`, `udpout:HOST:PORT`",
     ),
 ]  # fmt: skip
 BoundaryUser = Annotated[
-    str | None, typer.Option(metavar="USER", help="with `--mode process`: the user that it runs as; needs root")
+    str | None, typer.Option(metavar="USER", help="with `--mode process`: run the boundary as this user; requires root")
 ]
 BoundarySocket = Annotated[
-    Path | None, typer.Option(metavar="PATH", help="with --connect: there a boundary listens, which has the keys")
+    Path | None, typer.Option(metavar="PATH", help="with --connect: socket of a listening boundary, which has the keys")
 ]
-Speed = Annotated[float, typer.Option(min=0.1, max=50, help="seconds of flight in a second; in simulation")]
-Identity = Annotated[str | None, typer.Option(metavar="IDENTITY", help="who this vehicle is (as the bundle says)")]
+Speed = Annotated[float, typer.Option(min=0.1, max=50, help="speed-up of the simulated flight")]
+Identity = Annotated[
+    str | None, typer.Option(metavar="IDENTITY", help="identity of this vehicle (default: the bundle's)")
+]
 Roots = Annotated[
     list[Path] | None,
-    typer.Option("--root", help="the signed trust root, after those that lead to it (the key store's; repeatable)"),
+    typer.Option("--root", help="signed trust root, after its predecessors (repeatable; default: the key store's)"),
 ]
-LogKey = Annotated[Path | None, typer.Option(help="the key that signs the log (the key store's)")]
+LogKey = Annotated[Path | None, typer.Option(help="key that signs the log (default: the key store's)")]
 BoundaryKeyFile = Annotated[
-    Path | None, typer.Option(help="the key that the enforcement boundary signs with (the key store's)")
+    Path | None, typer.Option(help="key of the enforcement boundary (default: the key store's)")
 ]
-PassphraseFile = Annotated[Path | None, typer.Option(help="a file with the passphrase of these keys")]
-Runs = Annotated[Path, typer.Option(help="where the run's folder is made")]
-StateFolder = Annotated[Path | None, typer.Option(help="where it is kept which bundles flew (the data folder)")]
-FreshState = Annotated[bool, typer.Option("--fresh-state", help="forget which bundles flew; simulation only")]
+PassphraseFile = Annotated[Path | None, typer.Option(help="file with the passphrase of these keys")]
+Runs = Annotated[Path, typer.Option(help="folder in which the folder of the run is created")]
+StateFolder = Annotated[
+    Path | None, typer.Option(help="folder that records which bundles have flown (default: the data folder)")
+]
+FreshState = Annotated[bool, typer.Option("--fresh-state", help="ignore which bundles have flown; simulation only")]
 AgentSocketPath = Annotated[
-    Path | None, typer.Option(metavar="PATH", help="a local socket: records go out, signed documents come in")
+    Path | None,
+    typer.Option(metavar="PATH", help="create a local socket that sends records and receives signed documents"),
 ]
 OperatorSocket = Annotated[
-    Path | None, typer.Option(metavar="PATH", help="another one, for operators: no agent holds up a recall there")
+    Path | None,
+    typer.Option(metavar="PATH", help="create a separate one for operators, where agents cannot delay a recall"),
 ]
-AgentGroup = Annotated[
-    str | None, typer.Option(metavar="GROUP", help="users of this group may open the agent socket too")
-]
+AgentGroup = Annotated[str | None, typer.Option(metavar="GROUP", help="let users of this group open the agent socket")]
 Witnesses = Annotated[
     list[str] | None,
-    typer.Option("--witness", metavar="udpout:HOST:PORT", help="a `rtshcua witness` that is shown the log; repeatable"),
+    typer.Option(
+        "--witness",
+        metavar="udpout:HOST:PORT",
+        help="send the log's checkpoints to this `rtshcua witness` (repeatable)",
+    ),
 ]
 ScenarioName = Annotated[
-    str | None, typer.Option(metavar="FILE[:NAME]", help="let go wrong what a scenario says; simulation only")
+    str | None, typer.Option(metavar="FILE[:NAME]", help="fly with the faults of this scenario; simulation only")
 ]
 Wait = Annotated[
-    bool, typer.Option("--wait", help="connect, and fly nothing until a bundle is handed in at the agent socket")
+    bool, typer.Option("--wait", help="connect, then wait until a bundle is submitted at the agent socket")
 ]
 WaitFor = Annotated[
     str | None,
-    typer.Option(metavar="TIME", callback=duration_text, help="with --wait: how long at most [default: 60min]"),
+    typer.Option(metavar="TIME", callback=duration_text, help="with --wait: longest wait [default: 60min]"),
 ]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="decide every step against the present state; send no motion")]
-Plain = Annotated[bool, typer.Option("--plain", help="one line an event, in a terminal too")]
-AsJson = Annotated[bool, typer.Option("--json", help="one JSON object an event, the summary last")]
+DryRun = Annotated[
+    bool, typer.Option("--dry-run", help="decide each step on the present state; send no motion command")
+]
+Plain = Annotated[bool, typer.Option("--plain", help="print one line per event, also in a terminal")]
+AsJson = Annotated[bool, typer.Option("--json", help="print one JSON object per event, the summary last")]

@@ -22,7 +22,7 @@ _NAMES = frozenset({"log", "one", "other", "before", "last_leaf", "missing_leaf"
 _WHOLE = frozenset({"tells"})
 _NAME_SHOWN = 16  # digits of a digest
 _CELL = 48
-_TOLD = 20  # logs that are told of one by one
+_TOLD = 20  # number of logs that are listed individually
 
 
 class Shape(StrEnum):
@@ -107,17 +107,17 @@ def _text(result: ArchiveResult, counts: Mapping[str, int]) -> None:
         what = f"{each.entry.finding}, {visible(each.entry.finding_text or '')}"
         out(f"{each.entry.status:<10}  {visible(str(each.path))}: {what}")
     if len(wrong) > _TOLD:
-        out(f"... and {len(wrong) - _TOLD} more: `rtshcua archive query findings`")
+        out(f"... and {len(wrong) - _TOLD} more; run `rtshcua archive query findings`")
     new = sum(not each.known for each in result.done)
     source = visible(result.pinned.source)
     out(f"{many(len(result.done), 'log')}, {new} of them verified now, under {source}: {counted(counts)}")
     if result.others:
         rest = "rests on another root" if result.others == 1 else "rest on other roots"
-        out(f"{many(result.others, 'log')} in the archive {rest}: `--root` takes the one that they were verified under")
+        out(f"{many(result.others, 'log')} in the archive {rest}; name that root with `--root`")
     if result.missing.rows:
         out(f"missing: logs before {len(result.missing.rows)} of these: `rtshcua archive query missing`")
     for one, other, seq in result.pairs[:_TOLD]:
         two = f"`{visible(result.names[one])}` and `{visible(result.names[other])}`"
         out(f"conflict: {two} were signed differently at record {seq}")
     if result.pairs:
-        out(f"conflict: {many(len(result.pairs), 'pair')} of logs, told by `rtshcua archive query conflicts`")
+        out(f"conflict: {many(len(result.pairs), 'pair')} of logs; run `rtshcua archive query conflicts`")

@@ -1,4 +1,4 @@
-"""A flight that never began, for a person, and with `--json` for a program too."""
+"""Print the refusal of a flight that did not start."""
 
 import json
 
@@ -10,7 +10,7 @@ from rtshcua.front.cli.stdout import out_json
 
 
 def say_refused(refusal: Refusal, *, as_json: bool) -> ExitCode:
-    """Tell why it did not; for a program an error in the one form of errors, and the same beside it."""
+    """Print a refusal and return its exit code; with `as_json` print it also as a JSON event."""
     slug, text, help, code = refusal
     code = code or code_of(slug)
     if not as_json:

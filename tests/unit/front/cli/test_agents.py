@@ -213,10 +213,10 @@ def test_a_socket_that_cannot_be_made_leaves_no_other_behind(tmp_path: Path) -> 
     ("words", "text"),
     [
         (["--agent-socket", "s", "--operator-socket", "s"], "a socket each"),
-        (["--agent-group", "root"], "goes with `--agent-socket`"),
-        (["--wait"], "`--wait` needs `--agent-socket`"),
-        (["--wait-for", "5s"], "goes with `--wait`"),
-        (["--wait", "--agent-socket", "s", "--dry-run"], "does not go with `--dry-run`"),
+        (["--agent-group", "root"], "requires `--agent-socket`"),
+        (["--wait"], "`--wait` requires `--agent-socket PATH`"),
+        (["--wait-for", "5s"], "requires `--wait`"),
+        (["--wait", "--agent-socket", "s", "--dry-run"], "conflicts with `--dry-run`"),
         (["--agent-socket", "s", "--agent-group", "no-such-group"], "no group `no-such-group`"),
     ],
 )

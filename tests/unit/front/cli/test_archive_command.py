@@ -79,7 +79,7 @@ def test_runs_are_added_and_the_unclosed_one_is_told(runs: Path, capsys: pytest.
 
 def test_a_missing_log_is_told(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert archive("add", runs / "quad-07-1", *ROOT) == ExitCode.OK
-    assert "missing: logs before 1 of these: `rtshcua archive query missing`" in capsys.readouterr().out
+    assert "missing: the logs before 1 of these; run `rtshcua archive query missing`" in capsys.readouterr().out
     assert archive("query", "missing", "--json") == ExitCode.OK
     (row,) = as_json(capsys)
     assert row["vehicle"] == "quad-07"
@@ -123,7 +123,7 @@ def test_logs_of_another_root_are_left_and_told(capsys: pytest.CaptureFixture[st
     assert archive("verify", "--root", "00" * 32) == ExitCode.UNTRUSTED
     out = capsys.readouterr().out
     assert out.startswith("0 logs, 0 of them verified now")
-    assert "6 logs in the archive rest on other roots" in out
+    assert "6 logs in the archive were verified under other roots" in out
     assert archive("verify", "--root", "00" * 32, "--json") == as_json(capsys)["exit_code"] == ExitCode.UNTRUSTED
     assert archive("stats", "--json") == ExitCode.OK
     assert len(as_json(capsys)) == 2
@@ -212,16 +212,16 @@ def test_list_and_stats(capsys: pytest.CaptureFixture[str]) -> None:
         (("verify", *ROOT), ExitCode.INPUT, "`archive` is not an archive"),
         (("add", "gone.jsonl", *ROOT), ExitCode.INPUT, "no such file"),
         (("add", ".", *ROOT), ExitCode.INPUT, "there is no `log.jsonl`"),
-        (("query", "refusd"), ExitCode.USAGE, "no such question: `refusd`"),
+        (("query", "refusd"), ExitCode.USAGE, "no such query: `refusd`"),
         (("query", "refused", "--sql", "SELECT 1"), ExitCode.USAGE, "not both"),
         (("query", "refused", "--since", "yesterday"), ExitCode.USAGE, "neither a day nor a time"),
-        (("query", "refused", "--policy", "x@y"), ExitCode.USAGE, "names no version"),
-        (("query", "missing", "--skill", "goto"), ExitCode.USAGE, "takes no conditions"),
+        (("query", "refused", "--policy", "x@y"), ExitCode.USAGE, "has no valid version"),
+        (("query", "missing", "--skill", "goto"), ExitCode.USAGE, "filters on decisions do not apply"),
         (("add",), ExitCode.USAGE, "missing"),
         (("list", "--status", "nonsense"), ExitCode.USAGE, "accepted: verified, incomplete, failed"),
         (("query", "refused", "--outcome", "nonsense"), ExitCode.USAGE, "accepted: allow, deny, defer, fallback"),
         (("query", "refused", "--witness", "nonsense"), ExitCode.USAGE, "accepted: witnessed, unwitnessed"),
-        (("stats",), ExitCode.INPUT, "help: `rtshcua archive add LOG...` makes one"),
+        (("stats",), ExitCode.INPUT, "help: create one with `rtshcua archive add LOG...`"),
     ],
 )
 def test_what_makes_no_sense(
@@ -250,7 +250,7 @@ def test_what_is_no_log_is_not_taken_in(tmp_path: Path, capsys: pytest.CaptureFi
 
 def test_without_a_root_nothing_is_added(runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert archive("add", runs) == ExitCode.UNTRUSTED
-    assert "`--root` takes the trust root" in capsys.readouterr().err
+    assert "name the trust root" in capsys.readouterr().err
     assert not (tmp_path / "archive").exists()
 
 
@@ -264,7 +264,7 @@ def test_without_the_extra_it_says_which(
     monkeypatch.setitem(sys.modules, "duckdb", None)
     assert archive(*words, *((runs, *ROOT) if words == ("add",) else ())) == ExitCode.INPUT
     err = capsys.readouterr().err
-    assert "this needs the package `duckdb`, which is not installed" in err
+    assert "the package `duckdb` is required and not installed" in err
     assert "pip install '.[archive]'" in err
 
 

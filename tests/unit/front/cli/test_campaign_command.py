@@ -198,7 +198,7 @@ def test_another_campaign_in_the_folder_is_refused(
     assert run(capsys, "--flights", "1", "-o", "made")[0] == ExitCode.OK
     code, _, err = run(capsys, "--flights", "1", "-o", "made", "--seed", "2")
     assert code == ExitCode.USAGE
-    assert "`made` holds a campaign with another seed" in err
+    assert "`made` holds a campaign with a different seed" in err
     Path("made/campaign.json").write_text("{}")
     code, _, err = run(capsys, "--flights", "1", "-o", "made")
     assert code == ExitCode.INPUT
@@ -212,7 +212,7 @@ def test_a_campaign_of_other_faults_does_not_go_on_in_its_folder(
     assert run(capsys, "--flights", "1", "-o", "made", "--fault", "wind")[0] == ExitCode.OK
     code, _, err = run(capsys, "--flights", "2", "-o", "made")
     assert code == ExitCode.USAGE
-    assert "`made` holds a campaign with other kinds of faults" in err
+    assert "`made` holds a campaign with different kinds of faults" in err
 
 
 def test_a_flight_whose_line_was_torn_is_flown_again_and_no_other_is_lost(
@@ -224,7 +224,7 @@ def test_a_flight_whose_line_was_torn_is_flown_again_and_no_other_is_lost(
     results = Path("made/results.jsonl")
     results.write_bytes(results.read_bytes()[:-20])
     code, _, err = run(capsys, "--flights", "5", "-o", "made")
-    assert (code, "2 of 5 flights are kept in `made`: it goes on behind them" in err) == (ExitCode.OK, True)
+    assert (code, "2 of 5 flights are kept in `made`; continuing with the next" in err) == (ExitCode.OK, True)
     kept = [line for line in results.read_bytes().splitlines() if line.endswith(b"}")]
     assert sorted(json.loads(line)["number"] for line in kept) == [0, 1, 2, 3, 4]
 
@@ -245,7 +245,7 @@ def test_a_mission_that_does_not_fly_without_faults_is_refused(
     flies(lambda _, flight: replace(told(flight), ending="refused"))
     code, _, err = run(capsys)
     assert code == ExitCode.TESTS
-    assert "on px4 the mission ends as `refused` even if nothing goes wrong" in err
+    assert "on px4 the mission ends as `refused` without faults" in err
     assert not Path("runs").exists()
 
 
@@ -255,7 +255,7 @@ def test_a_mission_that_fails_without_faults_is_refused(
     flies(lambda _, flight: told(flight, JudgeFinding("collision", "flew into the ground")))
     code, _, err = run(capsys)
     assert code == ExitCode.TESTS
-    assert "on px4 the mission fails even if nothing goes wrong: flew into the ground" in err
+    assert "on px4 the mission fails without faults: flew into the ground" in err
 
 
 @pytest.mark.slow
@@ -275,14 +275,14 @@ def test_who_is_asked_for_an_approval_gives_it_in_every_flight_where_that_is_ask
     mission = str(Path(__file__).parents[4] / "examples" / "wind_farm" / "missions" / "near_look.rts")
     made = ["campaign", mission, *AT, "-j", "1", "-o", "made", "--flights", "400"]
     assert app.main(made) == ExitCode.TESTS
-    assert "with `--approve` whoever is asked does" in capsys.readouterr()[1]
+    assert "`--approve` grants all" in capsys.readouterr()[1]
     assert app.main([*made, "--approve"]) == ExitCode.OK
     endings = json.loads(Path("made/report.json").read_text())["endings"]
     assert endings == {"px4": {"completed": 200}, "ardupilot": {"completed": 200}}
     assert refused, "the second role is never drawn"
     capsys.readouterr()
     assert app.main(made) == ExitCode.USAGE
-    assert "another choice of `--approve`" in capsys.readouterr()[1]
+    assert "a different setting of `--approve`" in capsys.readouterr()[1]
 
 
 def test_fewer_flights_than_were_flown_are_reported_with_all_that_were(
@@ -307,7 +307,7 @@ def test_a_file_is_no_folder_of_a_campaign(here: Path, capsys: pytest.CaptureFix
     [
         (["--fault", "storm"], "no such fault: `storm`"),
         (["--at", "noon"], "`noon` is not a UTC time"),
-        (["--cluster", "tcp://127.0.0.1:9"], "`--jobs` is for this machine"),
+        (["--cluster", "tcp://127.0.0.1:9"], "`--jobs` and `--cluster` cannot be combined"),
     ],
 )
 def test_what_makes_no_sense_is_refused(
@@ -337,7 +337,7 @@ def test_what_is_no_scheduler_and_what_is_no_source_is_refused_before_anything_f
 ) -> None:
     flies(lambda *_: pytest.fail("nothing is to fly"))
     assert app.main(["campaign", SHORT, *AT, "--cluster", "foo"]) == ExitCode.USAGE
-    assert "`foo` is no address of a Dask scheduler\n help: write it as `tcp://" in capsys.readouterr().err
+    assert "`foo` is not the address of a Dask scheduler\n help: write it as `tcp://" in capsys.readouterr().err
     Path("made.bundle").write_bytes(case.seal(case.mission(case.short_steps())))
     assert app.main(["campaign", "made.bundle", *AT]) == ExitCode.USAGE
     assert "`made.bundle` is a bundle, and no source\n help: give the source" in capsys.readouterr().err

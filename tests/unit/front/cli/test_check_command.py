@@ -240,7 +240,8 @@ def test_a_policy_that_changes_needs_a_new_version(old: Path, earlier: str, caps
 def test_a_person_is_told_what_was_compared(old: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", "a", "--since", "old.bundle"]) == ExitCode.OK
     assert (
-        capsys.readouterr().out.splitlines()[-1] == "meadow_flight: version 2, and 2 in old.bundle; they mean the same"
+        capsys.readouterr().out.splitlines()[-1]
+        == "meadow_flight: version 2, and 2 in old.bundle; no change in meaning"
     )
 
 
@@ -263,7 +264,7 @@ def test_an_earlier_policy_that_none_was_compared_with_is_told(old: Path, capsys
     code, answered = answer(capsys, "policy.rts", "--since", ".old")
     assert (code, answered["not_here"]) == (ExitCode.OK, ["second_flight"])
     assert main(["check", "policy.rts", "--since", ".old"]) == ExitCode.OK
-    assert "second_flight: in .old, and compared with no policy here" in capsys.readouterr().out
+    assert "second_flight: only in .old; no policy here to compare with" in capsys.readouterr().out
 
 
 def test_what_cannot_be_compared_with(old: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -302,7 +303,7 @@ def test_a_specification_without_its_policy_says_how_to_name_it(
     monkeypatch.chdir(tmp_path)
     Path("alone.json").write_text(json.dumps(proposal | {"imports": []}), encoding="utf-8")
     assert main(["check", "alone.json"]) == ExitCode.DIAGNOSTICS
-    assert "`--with FILE` names them" in capsys.readouterr().err
+    assert "pass them with `--with FILE`" in capsys.readouterr().err
     Path("policy.rts").write_text('import "lib:policies/bridge_inspection.rts"\n', encoding="utf-8")
     assert main(["check", "alone.json", "--with", "policy.rts"]) == ExitCode.OK
     assert "names them" not in capsys.readouterr().err

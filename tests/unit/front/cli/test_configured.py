@@ -41,7 +41,7 @@ def test_what_may_not_be_set_is_said_before_anything_else(
 def test_nothing_is_set_of_a_vehicle_that_is_much_faster_than_life(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["run", "x.bundle", "--set=FENCE_RADIUS=50"]
     assert app.main([*words, "--speed=6"]) == ExitCode.USAGE
-    assert "`--set` goes with a `--speed` of 5 at most" in capsys.readouterr().err
+    assert "`--set` requires a `--speed` of at most 5" in capsys.readouterr().err
     for more in (["--speed=5"], ["--speed=6", "--dry-run"]):
         assert app.main([*words, *more]) == ExitCode.INPUT, "there is no such bundle"
 

@@ -99,4 +99,4 @@ def test_what_is_wrong_with_the_address_is_said_before_that_the_vehicle_is_not_n
         assert app.main(["run", "any.bundle", "--connect", address]) == ExitCode.USAGE
         assert says_so in capsys.readouterr().err
     assert app.main(["run", "any.bundle", "--connect", "udpin:127.0.0.1:14550"]) == ExitCode.USAGE
-    assert "`--connect` needs `--vehicle`" in capsys.readouterr().err
+    assert "`--connect` requires `--vehicle ID`" in capsys.readouterr().err

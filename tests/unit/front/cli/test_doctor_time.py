@@ -72,7 +72,7 @@ def test_of_one_that_does_not_answer_is_said_elsewhere(monkeypatch: pytest.Monke
 def test_a_boundary_that_listens_is_told_in_its_own_command_line(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["doctor", "--connect", "udpin:127.0.0.1:1", "--utc-error", "1s", "--boundary-socket", str(SOCKET)]
     assert main(words) == ExitCode.USAGE
-    assert "its own command line" in capsys.readouterr().err
+    assert "set it on the boundary's command line" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -148,23 +148,34 @@ def test_what_cannot_be_signed(here: Path, capsys: pytest.CaptureFixture[str]) -
         assert main(list(command)) == code
         assert words in capsys.readouterr().err
 
-    says(ExitCode.USAGE, "has to go somewhere", "approve", "low.bundle", "--step", "3")
-    says(ExitCode.USAGE, "has to go somewhere", "recall", "low.bundle")
-    says(ExitCode.USAGE, "for one flight", "approve", "low.bundle", "--step", "3", "-o", "x")
-    says(ExitCode.USAGE, "for one flight", "recall", "low.bundle", "-o", "x")
-    says(ExitCode.USAGE, "there is no step 5", "approve", "low.bundle", "--step", "5", "-o", "x")
+    says(ExitCode.USAGE, "no destination for the answer", "approve", "low.bundle", "--step", "3")
+    says(ExitCode.USAGE, "no destination for the recall", "recall", "low.bundle")
+    says(ExitCode.USAGE, "the flight of the answer is unknown", "approve", "low.bundle", "--step", "3", "-o", "x")
+    says(ExitCode.USAGE, "the flight of the recall is unknown", "recall", "low.bundle", "-o", "x")
+    says(ExitCode.USAGE, "the mission has no step 5", "approve", "low.bundle", "--step", "5", "-o", "x")
     says(ExitCode.USAGE, "no `confirm` of the policy", "approve", "low.bundle", "--step", "2", "-o", "x")
     (here / "high.rts").write_text(LOW.replace("altitude = 9 m", "altitude = 20 m"))
     assert main(["compile", "high.rts"]) == ExitCode.OK
     capsys.readouterr()
     high = ["approve", "high.bundle", "--step", "3", "-o", "x", *FLIGHT]
-    says(ExitCode.USAGE, "no `confirm` of the policy asks anybody about step 3", *high)
-    says(ExitCode.USAGE, "within 30 s` cannot hold for the arguments of the step", *high)
-    says(ExitCode.USAGE, "is not asked", "approve", "low.bundle", "--step", "3", "--role", "operator", "-o", "x")
+    says(ExitCode.USAGE, "no `confirm` rule of the policy applies to step 3", *high)
+    says(ExitCode.USAGE, "within 30 s` cannot hold for the step's arguments", *high)
+    says(
+        ExitCode.USAGE,
+        "step 3 requires no confirmation by `operator`",
+        "approve",
+        "low.bundle",
+        "--step",
+        "3",
+        "--role",
+        "operator",
+        "-o",
+        "x",
+    )
     says(ExitCode.USAGE, "for", "approve", "low.bundle", "--step", "3", "--for", "100000", "-o", "x")
     says(ExitCode.INPUT, "no such file", "approve", "nothing.bundle", "--step", "3", "-o", "x")
-    says(ExitCode.USAGE, "go together", "compile", "shorter.rts", "--replaces", "low.bundle")
-    says(ExitCode.USAGE, "go together", "compile", "shorter.rts", "--from", "3")
+    says(ExitCode.USAGE, "require each other", "compile", "shorter.rts", "--replaces", "low.bundle")
+    says(ExitCode.USAGE, "require each other", "compile", "shorter.rts", "--from", "3")
     says(
         ExitCode.REFUSED,
         "step 3 should be kept",
@@ -288,7 +299,7 @@ def test_what_the_flight_says_is_what_the_command_says(
     assert main(["approve", "low.bundle", "--step", "3", *to]) == ExitCode.OK
     assert "approved as supervisor for 300 s: step 3" in capsys.readouterr().out
     assert main(["recall", "low.bundle", *to]) == ExitCode.REFUSED
-    assert "`--policy` calls home whatever flies" in capsys.readouterr().err
+    assert "`--policy` recalls every mission under the policy" in capsys.readouterr().err
     assert main(["recall", "low.bundle", *to, "--json"]) == ExitCode.REFUSED
     said = json.loads(capsys.readouterr().out)
     text = "the flight refused it: as it says (expired)"
@@ -307,7 +318,7 @@ def test_a_recall_that_was_signed_before_is_sent_without_a_key(
     assert main(send) == ExitCode.OK
     assert "sent `home`: as it says" in capsys.readouterr().out
     assert main(send) == ExitCode.REFUSED
-    assert "`--policy` calls home whatever flies" in capsys.readouterr().err
+    assert "`--policy` recalls every mission under the policy" in capsys.readouterr().err
     assert main(send) == ExitCode.REFUSED
     assert "sign another one" in capsys.readouterr().err
 
@@ -315,8 +326,8 @@ def test_a_recall_that_was_signed_before_is_sent_without_a_key(
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        (["--send", "home"], ExitCode.USAGE, "it goes with `--to SOCKET`"),
-        (["low.bundle", "--send", "home", "--to", "s"], ExitCode.USAGE, "without a bundle"),
+        (["--send", "home"], ExitCode.USAGE, "`--send` requires `--to SOCKET`"),
+        (["low.bundle", "--send", "home", "--to", "s"], ExitCode.USAGE, "conflicts with BUNDLE"),
         (["--send", "low.bundle", "--to", "s"], ExitCode.INPUT, ""),
         (["--send", "none", "--to", "s"], ExitCode.INPUT, "no such file or directory: `none`"),
         (["--to", "s"], ExitCode.USAGE, "give its bundle"),
@@ -362,7 +373,7 @@ def test_a_role_that_no_policy_of_the_project_knows_is_warned_of(
 ) -> None:
     assert main(["keys", *command, "--role", "nosuch"]) == ExitCode.OK
     said = " ".join(capsys.readouterr().err.split())
-    assert "warning: no policy here knows the role `nosuch`; its roles are" in said
+    assert "warning: no policy here declares the role `nosuch`; declared roles:" in said
     assert "`supervisor`" in said
     assert main(["keys", *command, "--role", "supervisor"]) == ExitCode.OK
     assert "warning" not in capsys.readouterr().err

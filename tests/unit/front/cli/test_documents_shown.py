@@ -105,7 +105,7 @@ def test_why_begins_with_what_ended_the_flight(log: Path, capsys: pytest.Capture
     """An admitted step says nothing of that: the recall does."""
     assert main(["why", str(log)]) == ExitCode.OK
     out = capsys.readouterr().out
-    assert out.startswith("The cause: why it ended early\n")
+    assert out.startswith("Cause of the early end\n")
     assert "recall" in out.splitlines()[1]
     assert main(["why", str(log), "--json"]) == ExitCode.OK
     said = json.loads(capsys.readouterr().out)
@@ -217,7 +217,7 @@ def test_why_tells_what_ended_a_flight_and_who_answered(broken_off: Path, capsys
     assert main(["why", str(broken_off)]) == ExitCode.OK
     out = capsys.readouterr().out
     assert "granted as supervisor by ada, 2" in out, "in the step that asks for it, with the time"
-    assert "What was answered about this step" in out
+    assert "Approvals and refusals of this step" in out
     assert "How it ended" in out
     assert "· interrupted" in out
     assert "interrupted" in out.splitlines()[-1]

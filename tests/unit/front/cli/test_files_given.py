@@ -105,10 +105,10 @@ def test_a_seal_says_what_it_is(log: Path, capsys: pytest.CaptureFixture[str]) -
     number = next(number for number, line in enumerate(LINES) if b'"type":"seal"' in line)
     assert app.main(["why", str(log), "--record", str(number)]) == ExitCode.OK
     out = capsys.readouterr().out
-    assert "seal: something that happened, not a decision" in out
+    assert "seal: an event, not a decision" in out
     assert f"epoch 0 sealed, {json.loads(LINES[number])['records']} records" in out
     assert app.main(["why", str(log), "--record", str(len(LINES))]) == ExitCode.INPUT
-    assert f"has no record {len(LINES)} that can be explained" in capsys.readouterr().err
+    assert f"has no explainable record {len(LINES)}" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -59,7 +59,7 @@ def test_without_a_folder_it_is_made_where_one_is(
 def test_a_folder_whose_name_cannot_be_taken_is_said_with_the_way_to_another(tmp_path: Path, capsys: Said) -> None:
     assert app.main(["init", str(tmp_path / "a b" / "ü")]) == 0
     said = capsys.readouterr().out
-    assert "the folder's name `ü` cannot name a policy, so it is called `site`; `--name` chooses another" in said
+    assert "`ü` is not a valid policy name, so the policy is named `site`; choose another with `--name`" in said
     for words in (["--name", "own"], []):  # nothing to say where it was chosen, or is the folder's
         assert app.main(["init", str(tmp_path / "x" / ("ü" if words else "fields")), *words]) == 0
         assert "--name" not in capsys.readouterr().out
@@ -95,7 +95,7 @@ def test_in_a_new_repository_what_is_there_is_kept(tmp_path: Path, capsys: Said)
     assert app.main(["init", str(tmp_path), "--name", "a", "--keep"]) == 0
     assert everything(tmp_path) == project("a") | mine
     out = capsys.readouterr().out
-    assert "kept as they were: README.md, .gitignore\n" in out
+    assert "kept unchanged: README.md, .gitignore\n" in out
     assert "\n  README.md\n" not in out
     assert app.main(["lint", str(tmp_path), "--no-cache"]) == 0
 
@@ -135,7 +135,7 @@ def test_a_file_in_the_way_is_refused_even_with_force(tmp_path: Path, capsys: Sa
 @pytest.mark.parametrize("name", ["Farm", "2", "a b", "", "größe", "../x", "a" * 41])
 def test_a_name_that_is_none_is_refused(tmp_path: Path, name: str, capsys: Said) -> None:
     assert app.main(["init", str(tmp_path / "x"), "--name", name]) == 2
-    assert "cannot be the name of a policy" in capsys.readouterr().err
+    assert "is not a valid policy name" in capsys.readouterr().err
     assert not (tmp_path / "x").exists()
 
 
@@ -147,5 +147,5 @@ def test_a_name_that_means_something_else_is_refused_or_works(tmp_path: Path, na
         assert app.main(["check", str(tmp_path / "x"), "--deny-warnings"]) == 0
     else:
         assert code == 2
-        assert err.startswith(f"error[name]: the project cannot be called `{name}`: ")
+        assert err.startswith(f"error[name]: `{name}` cannot be the name of the project: ")
         assert not (tmp_path / "x").exists()

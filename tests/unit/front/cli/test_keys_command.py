@@ -398,7 +398,7 @@ def test_an_expired_root_is_renewed_by_another_root_key(
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (["revoke"], "no key was named"),
+        (["revoke"], "KEY is missing"),
         (["revoke", "root"], "rotate-root"),
         (["replace", "root"], "rotate-root"),
         (["revoke", "0123456789"], "is no key that the trust root names"),
@@ -455,10 +455,10 @@ def test_the_list_names_files_and_the_roots_version_and_what_is_revoked_is_not_a
     hint = capsys.readouterr().out.splitlines()[-1]
     assert re.search(r"accept \S+/root-1\.trust \S+/root-2\.trust \S+/root\.trust --vehicle", hint)
     assert app.main(["keys", "revoke", gone[:8]]) == ExitCode.USAGE
-    assert f"`{gone[:8]}` was revoked already" in capsys.readouterr().err
+    assert f"`{gone[:8]}` is already revoked" in capsys.readouterr().err
     assert app.main(["keys", "revoke", "--link", "0" * 16]) == ExitCode.OK
     assert app.main(["keys", "revoke", "--link", "0" * 16]) == ExitCode.USAGE
-    assert "was revoked already" in capsys.readouterr().err
+    assert "is already revoked" in capsys.readouterr().err
 
 
 # ---------------------------------------------------------------- a folder for a boundary that listens

@@ -42,7 +42,7 @@ def said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
         ("campaign standard.rts --flights x", ExitCode.USAGE, "'--flights': it should be a whole number"),
         ("show empty.bundle", ExitCode.INPUT, "`empty.bundle` is an empty file"),
         ("run empty.bundle", ExitCode.INPUT, "`empty.bundle` is an empty file"),
-        ("fmt area.json", ExitCode.OK, "skipped area.json: it is GeoJSON, for which others have formatters"),
+        ("fmt area.json", ExitCode.OK, "skipped area.json: it is GeoJSON, which `fmt` does not format"),
         ("check standard.rts", ExitCode.OK, "note: `standard.rts` is empty"),
     ],
 )

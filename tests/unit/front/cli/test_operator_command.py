@@ -361,7 +361,7 @@ def test_a_step_that_waits_for_a_person_says_whom_how_long_and_what_to_type(
     assert "** WAITS FOR A PERSON: supervisor ** step 1, takeoff(altitude = 10 m)" in text
     assert "25 s left, then it is denied. Type in another terminal:" in text
     assert f"rtshcua approve m.bundle --step 1 --role supervisor --to {place} " in text
-    assert "recall: call this flight home · policy: all under its policy · quit: leave it flying" in text
+    assert "recall: recall this flight · policy: recall all under its policy · quit: leave it flying" in text
 
 
 def test_who_is_asked_is_told_to_programs_too(asked: tuple[Bundle, SigningKey], place: Path) -> None:

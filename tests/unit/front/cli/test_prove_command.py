@@ -146,9 +146,9 @@ def test_several_proofs(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("words", "code", "text"),
     [
-        ([], ExitCode.USAGE, "say what is to be proven"),
-        ([3, "--since", 0], ExitCode.USAGE, "record 3 and `--since 0` are two things to prove"),
-        (["--since", 0, "--cose"], ExitCode.USAGE, "do not go together"),
+        ([], ExitCode.USAGE, "nothing to prove"),
+        ([3, "--since", 0], ExitCode.USAGE, "record 3 and `--since 0` require separate proofs"),
+        (["--since", 0, "--cose"], ExitCode.USAGE, "cannot be combined"),
         ([99], ExitCode.INPUT, "the log has no record 99"),
         ([3, "--at", 4], ExitCode.INPUT, "record 4 is not a signed record"),
         ([7, "--at", 6], ExitCode.INPUT, "was signed before record 7"),
@@ -191,7 +191,7 @@ def test_the_nearest_checkpoint_that_witnesses_saw_vouches_for_it(
     assert prove(1, "-o", "p") == prove("--since", 0, "-o", "since") == ExitCode.OK
     out = capsys.readouterr().out
     assert "not anchored" not in out
-    assert "since`: that nothing before record 0 was changed since, proven in" in out
+    assert "since`: the records before record 0 have not changed; " in out
     for name, size in (("p", last), ("since", last)):
         assert verify(name, "--json") == ExitCode.OK
         object = told(capsys)
@@ -202,14 +202,14 @@ def test_the_nearest_checkpoint_that_witnesses_saw_vouches_for_it(
     assert "- what was added since record 0, and what any record says" in out
     assert "that nothing was added" not in out
     assert prove(1, "--at", first, "-o", "at") == ExitCode.OK
-    assert "not anchored: too few witnesses cosigned the checkpoint that vouches" in capsys.readouterr().out
+    assert "not anchored: too few witnesses cosigned the checkpoint that covers it" in capsys.readouterr().out
 
 
 def test_nothing_but_a_proof_is_written_over(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name in ("log.jsonl", "root.trust", "log.key"):
         before = (folder / name).read_bytes()
         assert prove(3, "-o", name) == ExitCode.USAGE
-        assert "is not replaced by one" in capsys.readouterr().err
+        assert "exists and is not a proof" in capsys.readouterr().err
         assert (folder / name).read_bytes() == before
     for words in ([3], ["--since", 0], [3, "--cose", "--log-key", "log.key"], [4]):
         assert prove(*words, "-o", "p") == ExitCode.OK

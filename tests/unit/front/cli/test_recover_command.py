@@ -49,7 +49,7 @@ def test_a_log_that_broke_off(run: Path, lines: list[bytes], capsys: pytest.Capt
     assert recover(run) == ExitCode.OK
     out = capsys.readouterr().out
     assert "log.jsonl: recovered, 30 records kept\n" in out
-    assert "were not sealed yet" in out
+    assert "were not sealed" in out
     assert "11 octets behind them are in log.discarded: the log ends inside this record" in out
     assert unverified(run / "log.jsonl", lines, 30) == ""
     assert recover(run / "log.jsonl") == ExitCode.OK
@@ -80,7 +80,7 @@ def test_what_was_tampered_with_is_left_alone(
     (run / "log.jsonl").write_bytes(data)
     assert recover(run) == ExitCode.EVIDENCE
     err = capsys.readouterr().err
-    assert "this was no crash, and it is not signed: record 2, octet" in err
+    assert "the damage was not caused by a crash, so the log is not signed: record 2, octet" in err
     assert "nothing was changed" in err
     assert (run / "log.jsonl").read_bytes() == data
     assert recover("--json", run) == ExitCode.EVIDENCE
@@ -94,7 +94,7 @@ def test_the_log_of_another_key(run: Path, tmp_path: Path, capsys: pytest.Captur
     )
     other.chmod(0o600)
     assert recover("--log-key", other, run) == ExitCode.UNTRUSTED
-    assert "its flight was made with another log key" in capsys.readouterr().err
+    assert "its flight used a different log key" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -108,7 +108,7 @@ def test_the_log_of_another_key(run: Path, tmp_path: Path, capsys: pytest.Captur
 def test_what_has_no_first_record(run: Path, data: bytes, code: ExitCode, capsys: pytest.CaptureFixture[str]) -> None:
     (run / "log.jsonl").write_bytes(data)
     assert recover(run) == code
-    assert "there is no first record to go on from" in capsys.readouterr().err
+    assert "the first record is missing" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("data", [b"hello\n", b"\x8a\x00\x01", b'{"format":"rtshcua/log"}\r\n'])

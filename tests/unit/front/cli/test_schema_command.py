@@ -52,7 +52,7 @@ def test_a_policy_of_ones_own_is_not_imported(capsys: pytest.CaptureFixture[str]
         (["--policy", "missing.rts"], ExitCode.INPUT, "missing.rts"),
         (["--policy", "wrong.rts"], ExitCode.DIAGNOSTICS, "hoover"),
         (["--policy", "none.rts"], ExitCode.INPUT, "no policy"),
-        (["--name", "another"], ExitCode.USAGE, "`--name` is not used without `--policy`"),
+        (["--name", "another"], ExitCode.USAGE, "`--name` requires `--policy`"),
         (["--policy", POLICY, "--name", "another"], ExitCode.INPUT, "`bridge_inspection`"),
     ],
 )

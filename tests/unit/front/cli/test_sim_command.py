@@ -131,9 +131,9 @@ def test_json(capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        ({"port": 1, "connect": "udpout:127.0.0.1:1"}, "say the same thing"),
+        ({"port": 1, "connect": "udpout:127.0.0.1:1"}, "cannot be combined"),
         ({"connect": "udpin:127.0.0.1:1"}, "cannot be used here"),
-        ({"connect": "udpout:192.0.2.1:1"}, "is not for the simulated vehicle"),
+        ({"connect": "udpout:192.0.2.1:1"}, "is not on this machine"),
         ({"connect": "nonsense"}, "nonsense"),
     ],
 )

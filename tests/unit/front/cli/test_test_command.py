@@ -85,10 +85,10 @@ def test_only_those_that_are_named(here: Path, capsys: pytest.CaptureFixture[str
     assert [each["name"] for each in found["tests"]] == ["coming home"]
     assert found["summary"]["left_out"] == 3
     code, out, _ = run(capsys, "-k", "no such")
-    assert (code, out) == (ExitCode.TESTS, "no test was run: none of 4 has `no such` in its name\n")
+    assert (code, out) == (ExitCode.TESTS, "no test was run: no name of 4 contains `no such`\n")
     for near in ("comming home", "comming"):
         _, out, _ = run(capsys, "-k", near)
-        assert out == f"no test was run: none of 4 has `{near}` in its name; the nearest is `coming home`\n"
+        assert out == f"no test was run: no name of 4 contains `{near}`; the nearest is `coming home`\n"
 
 
 def test_no_test_is_no_success(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -102,7 +102,7 @@ def test_sources_with_errors_are_not_called_sources_without_tests(
 ) -> None:
     put("broken.rts", 'test "one" { when')
     Path("binary.rts").write_bytes(b"\x00\xff\xfe")
-    words = "no test could be run: the sources have errors\n"
+    words = "no test was run: the sources have errors\n"
     for name, code in (
         ("broken.rts", ExitCode.DIAGNOSTICS),
         ("binary.rts", ExitCode.DIAGNOSTICS),
@@ -147,7 +147,7 @@ def test_coverage_names_what_no_test_made_decide(here: Path, capsys: pytest.Capt
     forbid = lines.index("  policy.rts:9  forbid hover by any when battery > 90 %")
     assert lines[forbid + 1] == "      never true, never decided"  # unknown it was, and the permit decided
     assert not any("permit hover" in line for line in lines)
-    assert any(line.endswith("never decided: no test would notice if they said otherwise") for line in lines)
+    assert any(line.endswith("never decided: no test would detect a change of them") for line in lines)
 
 
 def test_coverage_as_json(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -189,7 +189,7 @@ def test_a_threshold_of_the_configuration(here: Path, capsys: pytest.CaptureFixt
     put("rtshcua.toml", "[test]\nfail-under = 100\n")
     code, out, _ = run(capsys)
     assert code == ExitCode.TESTS
-    assert re.match(r"\d+\.\d % is covered, less than 100 % \(", out.splitlines()[-1])
+    assert re.match(r"coverage is \d+\.\d %, below the required 100 % \(", out.splitlines()[-1])
     assert run(capsys, "tests/yard.rts")[0] == ExitCode.OK, "a file alone was not to cover all"
     assert run(capsys, "-k", "HOME")[0] == ExitCode.OK
     assert run(capsys, "--isolated")[0] == ExitCode.OK

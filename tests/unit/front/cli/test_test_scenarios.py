@@ -127,4 +127,4 @@ def test_a_source_with_errors_flies_nothing(here: Path, capsys: pytest.CaptureFi
     code, out, err = run(capsys)
     assert code == ExitCode.DIAGNOSTICS
     assert "did you mean `short`?" in err
-    assert "no test could be run: the sources have errors" in out
+    assert "no test was run: the sources have errors" in out

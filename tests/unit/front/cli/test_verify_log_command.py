@@ -97,7 +97,7 @@ def test_what_is_no_log_in_a_folder_is_named(run: Path, capsys: pytest.CaptureFi
     assert verify(run) == ExitCode.OK
     said = capsys.readouterr().err
     for name in ("events", "nothing"):
-        assert f"{name}.jsonl` was not looked at: it is no log" in " ".join(said.split()), said
+        assert f"{name}.jsonl`: not a log" in " ".join(said.split()), said
 
 
 def test_what_cannot_be_read_in_a_folder_is_no_success(run: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -59,7 +59,7 @@ class Flown:
 @pytest.fixture
 def store(capsys: pytest.CaptureFixture[str]) -> KeyStore:
     assert app.main(["keys", "init", "--witnesses", "3", "--witness-threshold", "2"]) == ExitCode.OK
-    assert "2 witnesses must cosign what counts as anchored" in capsys.readouterr().out
+    assert "2 witnesses must cosign a record for it to be anchored" in capsys.readouterr().out
     return KeyStore(data_folder())
 
 
@@ -168,7 +168,7 @@ def test_a_log_that_was_written_anew(
     assert note in [json.loads(line).get("checkpoint") for line in other.path.read_bytes().splitlines()]
     assert not read_anchors(other.path)
     assert app.main(["witness", str(other.path)]) == ExitCode.ANCHOR
-    assert "the note that shows it" in capsys.readouterr().out
+    assert "; proof: " in capsys.readouterr().out
 
 
 def test_a_log_that_is_not_what_was_signed(flown: Flown, capsys: pytest.CaptureFixture[str]) -> None:
@@ -202,7 +202,7 @@ def test_two_processes(flown: Flown, capsys: pytest.CaptureFixture[str]) -> None
     assert app.main(["witness", str(flown.path)]) == ExitCode.REFUSED
     err = capsys.readouterr().err
     assert "another process cosigns" in err
-    assert "help: end that one, or give another witness key with `--key`" in err
+    assert "help: stop the other process, or use a different witness key with `--key`" in err
     assert app.main(["witness", str(flown.path), "--json"]) == ExitCode.REFUSED
     assert said(capsys)[0]["error"]["slug"] == "in-use"  # type: ignore[index]
     held.close()
@@ -326,7 +326,7 @@ def test_another_record_than_the_one_that_was_cosigned(
 
 def test_a_folder_without_logs(tmp_path: Path, store: KeyStore, capsys: pytest.CaptureFixture[str]) -> None:
     assert app.main(["witness", str(tmp_path)]) == ExitCode.INPUT
-    assert f"there are no logs in `{tmp_path}`" in capsys.readouterr().err
+    assert f"no logs found in `{tmp_path}`" in capsys.readouterr().err
     assert app.main(["witness", str(tmp_path), "--json"]) == ExitCode.INPUT
     assert said(capsys)[0]["error"]["slug"] == "input"  # type: ignore[index]
 
@@ -362,5 +362,5 @@ def test_links_that_others_put_into_the_folder_are_not_followed(
     (tmp_path / "dropped" / "log.jsonl").symlink_to(flown.path)
     capsys.readouterr()
     assert app.main(["witness", str(tmp_path / "dropped")]) == ExitCode.INPUT
-    assert "log.jsonl: not looked at: symbolic links are not followed here" in capsys.readouterr().out
+    assert "log.jsonl: cannot be read: symbolic links are not followed here" in capsys.readouterr().out
     assert app.main(["witness", str(tmp_path / "dropped" / "log.jsonl")]) == ExitCode.OK

@@ -116,22 +116,22 @@ def show_store(store: KeyStore, root: TrustRoot, *, as_json: bool) -> None:
     if as_json:
         out_json(json.dumps(_store_object(store, root), indent=2, ensure_ascii=False))
         return
-    kind = "development root: for trying out, its keys are not encrypted" if root.development else "trust root"
+    kind = "development root: not for production, its keys are not encrypted" if root.development else "trust root"
     out(kind, f"  folder   {store.folder}", f"  version  {root.version}")
     out(f"  valid    {utc(root.issued_at_us)} to {utc(root.expires_at_us)}", "")
     names = {kid: path.name for kid, path in store.paths(root).items()}
     wide = max(map(len, names.values()))
-    rows = [("duty", "key", "file", "may speak for")]
+    rows = [("duty", "key", "file", "may sign for")]
     rows += ((key.duty, key.kid.hex(), names[key.kid], speaks(key)) for key in root.keys)
     for name in sorted(root.revocations):
-        what = "the key of a link" if len(name) == LINK_ID_BYTES else "never trusted again"
+        what = "link key" if len(name) == LINK_ID_BYTES else "revoked permanently"
         rows.append(("revoked", name.hex(), "", what))
     beside = 2 + 10 + 34 + wide + 2 + max(len(row[3]) for row in rows) <= columns()
     for duty, key_name, file, last in rows:
         first = f"  {duty:<9} {key_name:<33} {file:<{wide}}"
         out(*([f"{first}  {last}"] if beside else [first.rstrip(), f"  {'':<9} {last}"]))
     if root.witness_threshold > 1:
-        out("", f"  {root.witness_threshold} witnesses must cosign what counts as anchored")
+        out("", f"  {root.witness_threshold} witnesses must cosign a record for it to be anchored")
 
 
 def _store_object(store: KeyStore, root: TrustRoot) -> dict[str, object]:
@@ -152,13 +152,13 @@ def _store_object(store: KeyStore, root: TrustRoot) -> dict[str, object]:
 def link_lines(seen: SetUp) -> list[str]:
     """What was seen of a vehicle that was given the key of its link."""
     release = "of an unknown release" if seen.release is None else ".".join(map(str, seen.release))
-    did = "it has this key, nothing was sent" if seen.already else "disarmed, on the ground: the key was sent"
+    did = "has this key, so none was sent" if seen.already else "disarmed, on the ground; the key was sent"
     yes = {True: "yes", False: "no"}
     return [
         f"{seen.autopilot} {release}, system {seen.system}: {did}",
         f"  signs what it sends           {yes[seen.signs]}",
         f"  answers a signed request      {yes[seen.answers_signed]}",
         f"  answers an unsigned request   {yes[seen.answers_unsigned]}",
-        *(f"  it said                       `{text}`" for text in seen.texts),
+        *(f"  reported                      `{text}`" for text in seen.texts),
         f"  {after_setup(seen.autopilot, seen.release)}",
     ]

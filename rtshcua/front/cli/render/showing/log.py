@@ -167,7 +167,7 @@ class Names:
         return self._text(STEP, step, -1)
 
     def tell(self, record: AnyRecord) -> str:
-        """A record in one line."""
+        """A record as one line of text."""
         if isinstance(record, DecisionRecord):
             subject = self._subject(record.kind, record.step, record.link)
             clause = f" because {self._quoted(record)}" if record.clause is not None else ""

@@ -50,7 +50,7 @@ def show_assumed(page: TextPage, subject: Subject, assumed: AssumedCase) -> dict
     page.head("Assumed")
     page.row(
         "state",
-        "the contract's conditions hold, for long enough; the vehicle is where the plan has it; --state overrides",
+        "the contract's conditions hold for long enough; the vehicle is at its planned position; --state overrides",
     )
     page.row("time", f"{utc(found.now.utc_us)}, {assumed.waited_ms} ms after the release")
     if found.roles:

@@ -12,7 +12,7 @@ from rtshcua.front.cli.render.showing.page import TextPage
 from rtshcua.front.cli.render.showing.people import People
 from rtshcua.front.cli.render.showing.why import Case, show_why
 
-_MOST = 20  # what is told of how it ended, in records
+_MOST = 20  # number of records shown about the end of the flight
 
 
 def from_log(page: TextPage, path: Path, number: int | None) -> dict[str, object] | Refusal:
@@ -32,7 +32,7 @@ def from_log(page: TextPage, path: Path, number: int | None) -> dict[str, object
     assert chosen is not None
     cause = log.cause
     if cause is not None and cause.seq != chosen.seq:
-        _list(page, "The cause: why it ended early", [cause], log.start_us)
+        _list(page, "Cause of the early end", [cause], log.start_us)
         denied = isinstance(chosen, DecisionRecord) and chosen.outcome != "allow"
         page.head(f"Before that, the last decision on a step{' that was not `allow`' if denied else ''}")
     page.text(f"record {chosen.seq} of {path}, {utc(chosen.utc_us)} (not verified)", indent=0)
@@ -40,13 +40,13 @@ def from_log(page: TextPage, path: Path, number: int | None) -> dict[str, object
     if isinstance(shown, Refusal):
         return shown
     allowed = [] if log.allowed is None else [log.allowed]
-    _list(page, "After it, the same step was allowed", allowed, log.start_us)
+    _list(page, "Later decision that allowed the same step", allowed, log.start_us)
     answers = [told for step, told in log.answers if isinstance(chosen, DecisionRecord) and step == chosen.step]
-    _list(page, "What was answered about this step", answers, log.start_us)
-    _list(page, "When the computer stood still: nothing was read, judged or sent", log.stalls, log.start_us)
+    _list(page, "Approvals and refusals of this step", answers, log.start_us)
+    _list(page, "Stalls of the computer: no input, decision or command", log.stalls, log.start_us)
     _list(
         page,
-        "How it ended: what ended the mission early, if anything, and the decisions after it",
+        "End of the flight: causes of an early end, and later decisions",
         log.ended[-_MOST:],
         log.start_us,
     )
@@ -77,8 +77,8 @@ def _decision(
 def _effect(page: TextPage, chosen: Effect | Close | Recover | Seal, log: LoggedDecision) -> dict[str, object]:
     event = chosen.event if isinstance(chosen, Effect) else chosen.type
     detail = chosen.detail if isinstance(chosen, Effect) else chosen.ending if isinstance(chosen, Close) else ""
-    page.head(f"{event}: something that happened, not a decision")
-    page.row("says", log.what.strip())
+    page.head(f"{event}: an event, not a decision")
+    page.row("text", log.what.strip())
     return {"kind": "why", "event": event, "detail": detail}
 
 

@@ -100,7 +100,7 @@ def test_fix_that_causes_an_error_is_not_applied(
     assert main(["lint", "one.rts", "policy.rts", "--fix", "--no-cache"]) == ExitCode.DIAGNOSTICS
     assert (Path("one.rts").read_text(), Path("policy.rts").read_text()) == (MISSION, POLICY)
     said = capsys.readouterr().err
-    assert "the fixes of `one.rts` would bring an error, so they were not made" in said
+    assert "the fixes of `one.rts` were not applied, because they would cause an error" in said
 
 
 def finding(start: int, end: int, replacement: str, how: Applicability = Applicability.SAFE) -> Diagnostic:

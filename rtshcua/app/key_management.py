@@ -1,4 +1,4 @@
-"""The service `keys`: make, replace and revoke signing keys, the next trust root, a boundary's folder, link keys."""
+"""The service `keys`: create, replace and revoke signing keys, trust roots, boundary folders and link keys."""
 
 import hashlib
 import os
@@ -33,7 +33,7 @@ from rtshcua.wire.keys import ANY, SEED_BYTES, Duty, SigningKey, VerificationKey
 from rtshcua.wire.trust import HUMAN, PERSON, TrustRoot, key_refusal, open_root
 from rtshcua.wire.untrusted import Untrusted
 
-#: characters of a passphrase, at least
+#: minimum length of a passphrase, characters
 SHORTEST: Final = 12
 DAY_US: Final = 86_400_000_000
 
@@ -47,24 +47,22 @@ _LINK_ID: Final = re.compile(r"[0-9a-f]{16}")
 _SERVED: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._-]{0,79}")
 _ROLE: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_.]{0,99}")
 _NO_PASSPHRASE: Final = Refusal(
-    "usage", f"encrypted keys need a passphrase of {SHORTEST} characters or more, typed alike"
+    "usage", f"encrypted keys require a passphrase of at least {SHORTEST} characters, typed the same twice"
 )
-_LISTS: Final = "`rtshcua keys list` shows"
+_LIST: Final = "run `rtshcua keys list` for the keys"
 
 T = TypeVar("T")
 
 
 class Secrets(NamedTuple):
-    """How a key is opened, from a file or the key store, and what new keys are encrypted with: None where no passphrase
-    was given that is long enough.
-    """
+    """How to unlock a key from a file or the key store, and the passphrase for new keys; None if it is too short."""
 
     unlock: Callable[[Duty, Path | None], SigningKey]
     new_passphrase: Callable[[], bytes | None]
 
 
 class NewStore(NamedTuple):
-    """The keys of a new key store: unencrypted for development, else for named policies; no policies are any."""
+    """The keys of a new key store: unencrypted for development, or encrypted for named policies; empty: any policy."""
 
     development: bool
     days: int
@@ -76,7 +74,7 @@ class NewStore(NamedTuple):
 
 
 class ProvisionRequest(NamedTuple):
-    """For which vehicle a boundary's folder is made, where, with which keys, and whether one was made before."""
+    """A request for a boundary's folder: the vehicle, the place, the keys, and whether it replaces an earlier one."""
 
     folder: Path
     vehicle: str
@@ -87,7 +85,7 @@ class ProvisionRequest(NamedTuple):
 
 
 class ProvisionedFolder(NamedTuple):
-    """The folder of a boundary: the version of its trust root, and the names of its keys."""
+    """The folder of a boundary: the version of its trust root, and the ids of its keys."""
 
     place: Path
     trust_root: int
@@ -97,12 +95,12 @@ class ProvisionedFolder(NamedTuple):
 
 
 def key_store() -> KeyStore:
-    """The key store of whoever runs this."""
+    """Return the key store of the current user."""
     return KeyStore(data_folder())
 
 
 def refused(error: Untrusted) -> Refusal:
-    """Why a key store or a key is not used."""
+    """Return the refusal for an error of the key store or a key."""
     found = untrusted(error)
     return found._replace(code=ExitCode.INPUT) if error.slug == "no-keys" else found
 
@@ -117,7 +115,7 @@ def _root(store: KeyStore) -> TrustRoot:
 
 
 def root_key(store: KeyStore) -> tuple[TrustRoot, VerificationKey] | Refusal:
-    """The trust root, and the key that signs it: what an auditor pins."""
+    """Return the trust root and its signing key, which auditors pin."""
 
     def work() -> tuple[TrustRoot, VerificationKey]:
         root, kid = _root(store), store.pin()
@@ -127,14 +125,14 @@ def root_key(store: KeyStore) -> tuple[TrustRoot, VerificationKey] | Refusal:
 
 
 def root_files(store: KeyStore) -> list[Path]:
-    """The store's root, after those before, which a vehicle may have missed."""
+    """Return the files of all trust roots, oldest first, because a vehicle may have missed some."""
     version = _root(store).version
     before = range(version - len(store.chain()) + 1, version)
     return [*map(store.earlier_path, before), store.root_path]
 
 
 def _opened(work: Callable[[], T | Refusal]) -> T | Refusal:
-    """What `work` gives, or why a key store is not used."""
+    """Return the result of `work`, or a refusal if the key store cannot be used."""
     try:
         return work()
     except Untrusted as error:
@@ -146,19 +144,19 @@ def _now_us() -> int:
 
 
 def create(store: KeyStore, new: NewStore, secret: Secrets) -> Refusal | None:
-    """Make a key for each duty, and the trust root that names them. Raises OSError."""
+    """Create a key for each duty, and the trust root that names them. Raises OSError."""
     if store.exists():
         text = f"keys already exist in `{store.folder}`"
-        return Refusal("exists", text, f"{_LISTS} them", ExitCode.INPUT)
+        return Refusal("exists", text, _LIST, ExitCode.INPUT)
     if new.witness_threshold > max(1, new.witnesses):
-        text = f"`--witness-threshold {new.witness_threshold}` is more than the {new.witnesses} of `--witnesses`"
+        text = f"`--witness-threshold {new.witness_threshold}` exceeds `--witnesses {new.witnesses}`"
         return Refusal("usage", text)
     misnamed = _misnamed(new.roles, new.policies) or _no_person(new.owner)
     if misnamed is not None:
         return misnamed
     if not new.development and not new.policies:
-        help = "`--policy NAME` names one: whoever may choose the policy may choose a laxer one"
-        return Refusal("usage", "mission keys that are in earnest are for named policies", help)
+        help = "otherwise the holder of a mission key could choose a more permissive policy"
+        return Refusal("usage", "`--encrypted` requires `--policy NAME`", help)
     now_us = _now_us()
 
     def work() -> Refusal | None:
@@ -177,7 +175,7 @@ def create(store: KeyStore, new: NewStore, secret: Secrets) -> Refusal | None:
 
 
 def approver_key(name: str, role: str, vehicles: Sequence[str]) -> Callable[[SigningKey], VerificationKey] | Refusal:
-    """What names the approval key of a person in a role."""
+    """Return how the trust root names the approval key of a person in a role."""
     misnamed = _no_person(name) or (None if _ROLE.fullmatch(role) else _no_name(role, "role"))
     named = (role,)
     return misnamed or (
@@ -188,7 +186,7 @@ def approver_key(name: str, role: str, vehicles: Sequence[str]) -> Callable[[Sig
 def mission_key(
     source: str, roles: Sequence[str], policies: Sequence[str], vehicles: Sequence[str]
 ) -> Callable[[SigningKey], VerificationKey] | Refusal:
-    """What names a mission key for one source."""
+    """Return how the trust root names a mission key for one source."""
     if source not in PROPOSERS:
         return Refusal("usage", f"unknown source `{source}`", f"accepted: {' or '.join(PROPOSERS)}")
     return _misnamed(roles, policies) or (
@@ -201,7 +199,7 @@ def mission_key(
 def add_key(
     store: KeyStore, duty: Duty, named: Callable[[SigningKey], VerificationKey], secret: Secrets
 ) -> Refusal | None:
-    """Make a key more, and the next version of the trust root, which names it. Raises OSError."""
+    """Create a key, and the next version of the trust root, which names it. Raises OSError."""
 
     def work() -> Refusal | None:
         own = None if _root(store).development else secret.new_passphrase()
@@ -216,7 +214,7 @@ def add_key(
 
 
 def revoke(store: KeyStore, keys: Sequence[str], links: Sequence[str], secret: Secrets) -> Refusal | None:
-    """Make the next version of the trust root, by which keys are never trusted again. Raises OSError."""
+    """Create the next version of the trust root, which revokes keys permanently. Raises OSError."""
 
     def change(root: TrustRoot, signer: SigningKey) -> Refusal | None:
         names = []
@@ -235,7 +233,7 @@ def revoke(store: KeyStore, keys: Sequence[str], links: Sequence[str], secret: S
                 return _revoked_already(text)
             names.append(name)
         if not names:
-            return Refusal("usage", "KEY is missing", f"{_LISTS} them")
+            return Refusal("usage", "KEY is missing", _LIST)
         store.revoke(names, signer=signer, now_us=_now_us())
         return None
 
@@ -243,7 +241,7 @@ def revoke(store: KeyStore, keys: Sequence[str], links: Sequence[str], secret: S
 
 
 def replace_key(store: KeyStore, text: str, secret: Secrets) -> Refusal | None:
-    """Revoke a key, and make another that may speak for the same. Raises OSError."""
+    """Revoke a key, and create a new one with the same duty, roles and limits. Raises OSError."""
 
     def change(root: TrustRoot, signer: SigningKey) -> Refusal | None:
         found = _named(store, root, text)
@@ -278,12 +276,12 @@ def rotate_root(store: KeyStore, days: int | None, secret: Secrets) -> Refusal |
 def _changed(
     store: KeyStore, change: Callable[[TrustRoot, SigningKey], Refusal | None], secret: Secrets
 ) -> Refusal | None:
-    """Make a root that follows from the store's."""
+    """Create the next trust root of the key store by `change`."""
     return _opened(lambda: change(_root(store), secret.unlock(Duty.ROOT, None)))
 
 
 def accept(roots: list[Path], vehicle: str, state: Path | None) -> Trusted | Refusal:
-    """On the vehicle: take a newer trust root, and keep it in its state folder. Raises OSError."""
+    """On the vehicle: accept a newer trust root, and keep it in the state folder. Raises OSError."""
     state = state or state_folder()
     try:
         taken = trust(roots, data_folder(), state, vehicle, _now_us())
@@ -296,15 +294,15 @@ def accept(roots: list[Path], vehicle: str, state: Path | None) -> Trusted | Ref
 
 
 def provision(store: KeyStore, request: ProvisionRequest, secret: Secrets) -> ProvisionedFolder | Refusal:
-    """Make the folder of a boundary that listens: its keys, unlocked, and the trust root. Raises OSError."""
+    """Create the folder of a listening boundary: its decrypted keys and the trust root. Raises OSError."""
     place = request.folder / request.vehicle
     if _SERVED.fullmatch(request.vehicle) is None:
-        text = f"`{visible(request.vehicle)}` names no socket that a boundary listens at"
+        text = f"`{visible(request.vehicle)}` is not a valid name for a boundary's socket"
         help = "accepted: 1 to 80 letters, digits, `_`, `.` and `-`, not beginning with `.` or `-`"
         return Refusal("usage", text, help)
     if os.path.lexists(place):
         help = "it may hold the state of a vehicle in use: move it away, or back it up"
-        return Refusal("refused", f"there is a folder `{place}` already", help, ExitCode.REFUSED)
+        return Refusal("refused", f"the folder `{place}` already exists", help, ExitCode.REFUSED)
     try:
         return _opened(lambda: _provisioned(store, request, place, secret))
     except LinkKeyError as error:
@@ -356,7 +354,7 @@ def _marked_only_if_made(store: KeyStore, vehicle: str, before: bytes | None) ->
 
 
 def _provisioned_before(vehicle: str, own: SigningKey | None, *, again: bool) -> Refusal:
-    """Fail because a second folder is not allowed."""
+    """Return the refusal of a second folder for a vehicle."""
     if not again or own is None:
         text = f"a folder for `{vehicle}` was provisioned before; a second one would not know which bundles it opened"
         help = "if the first one is lost, make a new boundary key with `rtshcua keys replace`, and use `--again`"
@@ -367,22 +365,22 @@ def _provisioned_before(vehicle: str, own: SigningKey | None, *, again: bool) ->
 
 
 def make_link_key(file: Path, passphrase: bytes | None) -> str | Refusal:
-    """Make the key of a link, of a passphrase or a random one; gives its fingerprint. Raises OSError."""
+    """Create a link key, derived from a passphrase or random, and return its fingerprint. Raises OSError."""
     key = secrets.token_bytes(KEY_OCTETS)
     if passphrase is not None:
         if len(passphrase.decode(errors="replace")) < SHORTEST:
-            return Refusal("usage", f"a link key needs a passphrase of {SHORTEST} characters or more")
+            return Refusal("usage", f"a link key requires a passphrase of at least {SHORTEST} characters")
         key = hashlib.sha256(passphrase).digest()
     try:
         write_link_key(file, key)
     except FileExistsError:
-        text = f"there is a file `{file}` already"
-        return Refusal("refused", text, "a key that is in use is not overwritten", ExitCode.REFUSED)
+        text = f"`{file}` already exists"
+        return Refusal("refused", text, "a key that may be in use is not overwritten", ExitCode.REFUSED)
     return fingerprint(key)
 
 
 def set_up_link(file: Path, address: Address, system: int | None) -> SetUp | Refusal:
-    """Put a link key on the vehicle at an address, and look whether it insists on signed frames. Raises OSError."""
+    """Install a link key on the vehicle at an address, and test whether it requires signed frames. Raises OSError."""
     try:
         key = read_link_key(file)
     except LinkKeyError as error:
@@ -405,7 +403,7 @@ def set_up_link(file: Path, address: Address, system: int | None) -> SetUp | Ref
 
 
 def effect_of(seen: SetUp) -> Refusal | None:
-    """Why a link key does not protect the link that it was put on."""
+    """Return a refusal if the installed link key does not protect the link; None if it does."""
     if seen.insists:
         return None
     if seen.signs and seen.answers_signed:
@@ -421,8 +419,9 @@ def _link_key_refused(error: LinkKeyError) -> Refusal:
 
 
 def unknown_roles(roles: Iterable[str]) -> list[str]:
-    """A warning of each role that no policy here knows: a key in such a role signs nothing that anybody asks for. It is
-    no error, for a policy may come later, or lie elsewhere.
+    """Return a warning for each role that no policy of the current project declares.
+
+    It is not an error: the policy may be written later or lie elsewhere.
     """
     known = _known()
     names = ", ".join(f"`{name}`" for name in sorted(known))
@@ -445,7 +444,7 @@ def _known() -> set[str]:
 
 
 def _named(store: KeyStore, root: TrustRoot, text: str) -> VerificationKey | Refusal:
-    """The key that a person means; a refusal where that is none, or several."""
+    """Return the key that a text names; a refusal if it names none or several."""
     paths = store.paths(root)
     digits = text.lower() if _KEY_ID.fullmatch(text.lower()) else None
     found = [
@@ -459,11 +458,11 @@ def _named(store: KeyStore, root: TrustRoot, text: str) -> VerificationKey | Ref
     if digits is not None and any(name.hex().startswith(digits) for name in root.revocations):
         return _revoked_already(text)
     what = "names several keys" if found else "is not a key of the trust root"
-    return Refusal("usage", f"`{text}` {what}", f"{_LISTS} them: an id, or the name of its file")
+    return Refusal("usage", f"`{text}` {what}", "run `rtshcua keys list`, and use an id or a file name")
 
 
 def _revoked_already(text: str) -> Refusal:
-    return Refusal("usage", f"`{text}` was revoked already", f"{_LISTS} what is")
+    return Refusal("usage", f"`{text}` is already revoked", _LIST)
 
 
 def _link_named(text: str) -> bytes | None:
@@ -477,7 +476,7 @@ def _link_named(text: str) -> bytes | None:
 
 
 def _misnamed(roles: Sequence[str], policies: Sequence[str]) -> Refusal | None:
-    """A refusal of the first that can be no role or policy of any source; None where each can."""
+    """Return the refusal of the first invalid role or policy name; None if all are valid."""
     for what, names in (("role", roles), ("policy", policies)):
         for name in names:
             if name != ANY and not _ROLE.fullmatch(name):

@@ -1,4 +1,4 @@
-"""The service `archive`: keep many logs, verified, and ask them questions. Needs the extra `archive`."""
+"""The service `archive`: store many verified logs and query them. Requires the extra `archive`."""
 
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -31,7 +31,7 @@ _HELPS: Final = {
     "archive-index": "rebuild it with `rtshcua archive verify --reindex`",
     "no-archive": "create one with `rtshcua archive add LOG...`, or name its folder with `--archive`",
 }
-#: the values that conditions may have
+#: the accepted values of filters
 _KNOWN: Final[Mapping[str, Sequence[str]]] = {
     "status": ("verified", "incomplete", "failed"),
     "outcome": ("allow", "deny", "defer", "fallback"),
@@ -42,9 +42,7 @@ T = TypeVar("T")
 
 
 class ArchiveRequest(NamedTuple):
-    """By which root the logs of an archive are verified, whether decisions are derived again, by how many processes or
-    on which cluster.
-    """
+    """How the logs of an archive are verified: trust root, recomputed decisions, number of processes or cluster."""
 
     archive: Path
     root: str | None
@@ -61,15 +59,17 @@ class Skipped(NamedTuple):
 
 
 class LogsFound(NamedTuple):
-    """The logs of files and folders, and what is no log in the folders."""
+    """The logs in files and folders, and the skipped files of the folders."""
 
     logs: list[LogSource]
     skipped: list[Skipped]
 
 
 class ArchiveResult(NamedTuple):
-    """What became of each log, and what the archive says since: how many logs rest on `others` than this root, which
-    logs are `missing` before which, and which of them contradict each other; `names` of logs by their digests.
+    """The results of adding or verifying logs, and the state of the archive.
+
+    `others`: number of logs verified under other roots; `missing`: logs whose predecessors are missing; `conflicts`:
+    logs that contradict each other; `names`: the file names of logs by their digests.
     """
 
     folder: Path
@@ -83,13 +83,11 @@ class ArchiveResult(NamedTuple):
 
     @property
     def pairs(self) -> list[tuple[str, str, object]]:
-        """The logs that contradict each other, and at which record."""
+        """The pairs of logs that contradict each other, and the record of each."""
         return [(str(one), str(other), seq) for _, _, seq, one, other in self.conflicts.rows]
 
     def code(self) -> ExitCode:
-        """That of the first log that fails, else of logs that contradict each other, of what is no log, of a log that
-        was not closed.
-        """
+        """Return the exit code of the first failed log; otherwise of conflicts, skipped files or an unclosed log."""
         if not self.done and self.others:
             return ExitCode.UNTRUSTED  # no log was verified under this root
         codes = [code_of(each.entry.status, each.entry.finding) for each in self.done]
@@ -103,7 +101,7 @@ class ArchiveResult(NamedTuple):
 
 
 class ArchiveQuery(NamedTuple):
-    """A question that ships, by `name`, or a SELECT of one's own; with conditions on the decisions that it is about."""
+    """A shipped query, by `name`, or a SELECT statement `sql`; with filters on decisions."""
 
     archive: Path
     conditions: Mapping[str, str | None]
@@ -113,16 +111,16 @@ class ArchiveQuery(NamedTuple):
 
 
 def code_of(status: str, finding: str | None) -> ExitCode:
-    """The exit code for a log, as `rtshcua verify-log` has it."""
+    """Return the exit code for a log, as `rtshcua verify-log` does."""
     if status != "failed":
         return ExitCode.OK if status == "verified" else ExitCode.INCOMPLETE
     return finding_code(finding or "")
 
 
 def logs_in(paths: Iterable[Path]) -> LogsFound | Refusal:
-    """The logs of files, folders of runs, and folders of such folders; a refusal where there is none.
+    """Return the logs in files and folders; a refusal if there are none.
 
-    A file that is named must be a log. One that only lies in a folder does not keep the others out. Raises OSError.
+    A named file must be a log. Files in a folder that are not logs are skipped. Raises OSError.
     """
     found = LogsFound([], [])
     for path in paths:
@@ -145,7 +143,7 @@ def logs_in(paths: Iterable[Path]) -> LogsFound | Refusal:
 
 
 def _no_log(path: Path, root: Path | None) -> str | None:
-    """Why a file is not taken in."""
+    """Return why a file cannot be added; None if it can."""
     try:
         return None if begins_as_log(path, root) else "it is not a log of this program"
     except OSError as error:
@@ -155,7 +153,7 @@ def _no_log(path: Path, root: Path | None) -> str | None:
 
 
 def add(request: ArchiveRequest, found: LogsFound, progress: Callable[[int], None]) -> ArchiveResult | Refusal:
-    """Copy logs into an archive, which is made if there is none, and verify them there. Raises OSError."""
+    """Copy logs into an archive, which is created if missing, and verify them there. Raises OSError."""
 
     def work() -> ArchiveResult | Refusal:
         from rtshcua.adapters.archive import adding
@@ -166,7 +164,7 @@ def add(request: ArchiveRequest, found: LogsFound, progress: Callable[[int], Non
 
 
 def verify(request: ArchiveRequest, progress: Callable[[int], None], *, reindex: bool) -> ArchiveResult | Refusal:
-    """Verify the logs of an archive that were verified under this root, once more. Raises OSError."""
+    """Verify again the logs of an archive that were verified under this root. Raises OSError."""
 
     def work() -> ArchiveResult | Refusal:
         from rtshcua.adapters.archive import adding
@@ -209,7 +207,7 @@ def _verified(
         return Refusal(code.slug, f"the index could not be written: {' '.join(str(error).split())}", "", code)
     except BlockingIOError:
         code, text = ExitCode.REFUSED, f"another process is changing `{where}`"
-        return Refusal(code.slug, text, "only one at a time may", code)
+        return Refusal(code.slug, text, "wait until it has finished", code)
     except OSError as error:
         if error.errno is not None and error.filename is None:
             error.filename = str(where)
@@ -240,7 +238,7 @@ def _result(
 def list_logs(
     archive: Path, vehicle: str | None, status: str | None, limit: int | None, columns: str
 ) -> "QueryRows | Refusal":
-    """The logs of an archive, by when they began."""
+    """Return the logs of an archive, ordered by start time."""
 
     def work() -> "QueryRows | Refusal":
         from rtshcua.adapters.archive.asking import matching
@@ -252,7 +250,7 @@ def list_logs(
 
 
 def statistics(archive: Path) -> "QueryRows | Refusal":
-    """How many logs, records and decisions an archive holds."""
+    """Return the numbers of logs, records and decisions of an archive."""
 
     def work() -> "QueryRows":
         from rtshcua.adapters.archive.asking import STATS
@@ -263,7 +261,7 @@ def statistics(archive: Path) -> "QueryRows | Refusal":
 
 
 def questions() -> "list[Canned] | Refusal":
-    """The questions that ship."""
+    """Return the shipped queries."""
 
     def work() -> "list[Canned]":
         from rtshcua.adapters.archive.asking import canned
@@ -274,7 +272,7 @@ def questions() -> "list[Canned] | Refusal":
 
 
 def question_of(query: ArchiveQuery) -> "Canned | Refusal | None":
-    """The question that ships which a query names; None where it brings its own."""
+    """Return the shipped query that is named; None if the request has its own SQL."""
     if query.sql is not None and query.name is not None:
         return Refusal("usage", "a shipped query and `--sql` cannot be combined")
     unknown = _unknown(query.conditions)
@@ -284,11 +282,11 @@ def question_of(query: ArchiveQuery) -> "Canned | Refusal | None":
     if isinstance(found, Refusal) or query.name is None:
         return found if isinstance(found, Refusal) else None
     named = next((each for each in found if each.name == query.name), None)
-    return named or Refusal("usage", f"no such question: `{query.name}`", "`rtshcua archive query` lists them")
+    return named or Refusal("usage", f"no such query: `{query.name}`", "run `rtshcua archive query` for a list")
 
 
 def ask(query: ArchiveQuery) -> "QueryRows | Refusal":
-    """The answer of an archive to a query."""
+    """Return the result of a query."""
     question = question_of(query)
     if isinstance(question, Refusal):
         return question
@@ -302,13 +300,13 @@ def ask(query: ArchiveQuery) -> "QueryRows | Refusal":
 
 
 def _conditions(values: Mapping[str, str | None]) -> "DecisionQuery | Refusal":
-    """What the decisions are like that are asked about."""
+    """Return the filters on decisions."""
     from rtshcua.adapters.archive.asking import DecisionQuery
 
     times = {name: None if values.get(name) is None else _time_of(str(values[name])) for name in ("since", "until")}
     for name, time_us in times.items():
         if values.get(name) is not None and time_us is None:
-            help = "`2026-03-01`, `2026-03-01T12:00Z`"
+            help = "accepted: `2026-03-01`, `2026-03-01T12:00Z`"
             return Refusal("usage", f"`{values[name]}` is neither a day nor a time", help)
     policy = values.get("policy") or ""
     name, _, version = policy.partition("@")
@@ -322,11 +320,11 @@ def _conditions(values: Mapping[str, str | None]) -> "DecisionQuery | Refusal":
 
 
 def _unknown(values: Mapping[str, str | None]) -> Refusal | None:
-    """Why a condition has none of the values that there are."""
+    """Return the refusal of an unknown filter value; None if all are known."""
     for name, known in _KNOWN.items():
         value = values.get(name)
         if value is not None and value not in known:
-            return Refusal("usage", f"`--{name}` knows no `{value}`", f"accepted: {', '.join(known)}")
+            return Refusal("usage", f"unknown value `{value}` of `--{name}`", f"accepted: {', '.join(known)}")
     return None
 
 
@@ -348,7 +346,7 @@ def _ask(archive: Path, sql: str, conditions: "DecisionQuery | None", limit: int
 
 
 def answered(work: Callable[[], T | Refusal]) -> T | Refusal:
-    """What `work` gives, or a refusal: of a package that is missing, of what is no archive, of a malformed question."""
+    """Return the result of `work`; a refusal for a missing package, an invalid archive or a malformed query."""
     try:
         return work()
     except ModuleNotFoundError as error:

@@ -25,13 +25,13 @@ from rtshcua.wire.untrusted import Untrusted
 #: longest wait between checks of the stop request, s
 _SERVE_S: Final = 0.5
 
-#: takes what happened, for a program and for a person
+#: receives each event, as JSON and as text
 Say = Callable[[dict[str, object], str], None]
 
 
 class WitnessRequest(NamedTuple):
-    """Which logs are cosigned, or at which address; how often files are looked at again, under which trust root, and
-    where it is kept what was cosigned.
+    """What to cosign: logs in paths, checked again every `watch` seconds, or requests at an address; the trust root,
+    and the folder of the witness's state.
     """
 
     paths: list[Path]
@@ -42,12 +42,12 @@ class WitnessRequest(NamedTuple):
 
     @property
     def lasts(self) -> bool:
-        """Whether it goes on until it is stopped."""
+        """Whether the witness runs until it is stopped."""
         return self.link is not None or self.watch is not None
 
 
 class WitnessResult(NamedTuple):
-    """The gravest that happened, and which paths hold no logs."""
+    """The most severe result, and the paths without logs."""
 
     code: ExitCode
     empty: list[Path]
@@ -56,7 +56,7 @@ class WitnessResult(NamedTuple):
 def open_witness(
     request: WitnessRequest, unlock: Callable[[KeyStore], SigningKey], stack: ExitStack
 ) -> FileWitness | Refusal:
-    """The witness, with what it cosigned before; its store is closed by the stack. Raises OSError."""
+    """Return the witness with its state; the stack closes its store. Raises OSError."""
     for path in request.paths:
         path.stat()  # raise an error for a missing path
     store = KeyStore(data_folder())
@@ -178,7 +178,7 @@ class _Witnessing:
     def _told(self, found: Cosigned | NotCosigned) -> ExitCode:
         if isinstance(found, Cosigned):
             said: dict[str, object] = {"records": found.records, "anchored": found.anchored, "fresh": found.fresh}
-            before = "" if found.fresh else " as before"
+            before = "" if found.fresh else " (unchanged)"
             words = f"cosigned {found.anchored} of {many(found.records, 'record')}{before}"
             self._say({"event": "cosigned", "log": str(found.log), **said}, f"{found.log}: {words}")
             return ExitCode.OK

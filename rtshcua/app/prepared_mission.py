@@ -24,7 +24,7 @@ class Subject(NamedTuple):
 
 
 def unpacked(data: bytes, name: str) -> Subject | Refusal:
-    """What a bundle is about; a refusal where it is no bundle."""
+    """Return the prepared mission of a bundle; a refusal if it is not a bundle."""
     try:
         bundle = claimed(data)
     except Untrusted as error:

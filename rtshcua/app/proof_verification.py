@@ -1,4 +1,4 @@
-"""The service `verify-proof`: a file of `rtshcua prove`, verified by a pinned root key and a kept checkpoint."""
+"""The service `verify-proof`: verify a proof with a pinned root key and a kept checkpoint."""
 
 from pathlib import Path
 from typing import TypeAlias
@@ -12,7 +12,7 @@ from rtshcua.evidence.proofs.check import Proven, check_proof
 from rtshcua.evidence.proofs.cose_receipt import TAG_18, ReceiptClaim, check_receipt
 from rtshcua.evidence.proofs.file import MAX_PROOF
 
-#: what a proof proves, or why it is refused
+#: the contents of a verified proof, or why it is refused
 ProofResult: TypeAlias = Proven | ReceiptClaim | Flaw
 
 _PROOFS = "make one with `rtshcua prove`"
@@ -21,12 +21,12 @@ _INPUT = {"proof/malformed", "proof/extra", "proof/too-long"}
 
 
 def read_checkpoint(path: Path | None) -> str | None:
-    """The text of the checkpoint that was kept, if one was. Raises OSError."""
+    """Return the text of the kept checkpoint; None if there is none. Raises OSError."""
     return None if path is None else read_regular(path, _MAX_NOTE).decode("utf-8", "replace")
 
 
 def verify_proof(path: Path, key: bytes, kept: str | None) -> ProofResult:
-    """Verify a proof by a pinned key; a checkpoint that was `kept` must be the one in it. Raises OSError."""
+    """Verify a proof with a pinned key; it must match the `kept` checkpoint, if any. Raises OSError."""
     data = read_regular(path, MAX_PROOF)
     result: ProofResult = check_receipt(data, key) if data[:1] == TAG_18 else check_proof(data, key)
     if kept is not None and not isinstance(result, Flaw):
@@ -38,7 +38,7 @@ def verify_proof(path: Path, key: bytes, kept: str | None) -> ProofResult:
 
 
 def exit_code(result: ProofResult) -> ExitCode:
-    """The exit code for the result of a verification."""
+    """Return the exit code of a verification result."""
     if not isinstance(result, Flaw):
         return ExitCode.OK
     if result.slug in _INPUT:

@@ -1,4 +1,4 @@
-"""The service `why`: the decision on a step of a mission in an assumed state, step by step."""
+"""The service `why`: explain the decision on a step of a mission in an assumed state."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -30,8 +30,9 @@ _SOURCES: Final = (".rts", ".json")
 
 
 class AssumedCase(NamedTuple):
-    """Which step is decided on, in which state: `signals` as `NAME=VALUE`, else as the contract wants it; when, how
-    long after its release, and whether everybody who is asked has approved.
+    """An assumed case: the step, the `signals` as `NAME=VALUE`, the time, the time since the release, and approvals.
+
+    Other signals fulfil the conditions of the step's contract.
     """
 
     step: int | None
@@ -53,7 +54,7 @@ class AssumedDecision(NamedTuple):
 
 
 class CompiledSubject(NamedTuple):
-    """What sources say, with what was found in them; no subject where they have errors."""
+    """The mission of sources, and their diagnostics; no mission if they have errors."""
 
     subject: Subject | Refusal | None
     diagnostics: tuple[Diagnostic, ...]
@@ -61,13 +62,13 @@ class CompiledSubject(NamedTuple):
 
 
 def log_meant(path: Path) -> Path | None:
-    """The log that is meant by a file or the folder of a run; None where it is something else."""
+    """Return the log that a file or run folder contains; None if it is something else."""
     file = path / LOG if path.is_dir() else path
     return file if begins_as_log(file) else None
 
 
 def subject_of(path: Path, mission: str | None, at_us: int | None) -> CompiledSubject:
-    """The mission of a source or a bundle; of a source, issued at this time, or now. Raises OSError."""
+    """Return the mission of a source, issued at this time or now, or of a bundle. Raises OSError."""
     if path.is_dir():
         path /= LOG
     if path.suffix.lower() in _SOURCES:
@@ -89,7 +90,7 @@ def _in_bundle(path: Path) -> Subject | Refusal:
 
 
 def decide_assumed(subject: Subject, case: AssumedCase) -> AssumedDecision | Refusal:
-    """The decision on a step, in a state in which its contract's conditions hold but for what the case says."""
+    """Return the decision on a step in a state that fulfils its contract, except where the case says otherwise."""
     policy, step = subject.policy, case.step
     if step is None or not 1 <= step <= len(subject.invocations):
         what = "`--step` is missing" if step is None else f"the mission has no step {step}"
@@ -114,7 +115,7 @@ def decide_assumed(subject: Subject, case: AssumedCase) -> AssumedDecision | Ref
 
 
 def _state(subject: Subject, index: int, signals: Sequence[str], now: Now) -> State | Refusal:
-    """The state in which the contract's conditions hold, but for these signals."""
+    """Return a state that fulfils the contract's conditions, except for these signals."""
     policy, settings = subject.policy, read_overrides(signals)
     if isinstance(settings, Refusal):
         return settings

@@ -86,7 +86,7 @@ def test_approval_prompt_comes_before_signature(
     assert main(["approve", "low.bundle", "--step", "3", "-o", "yes", *FLIGHT]) == code
     err = capsys.readouterr().err
     assert "step 3 of `low` on `quad-07`: `inspect_area(" in err
-    assert "may be flown as supervisor? [y/N]" in err
+    assert "sign as supervisor that the step may be flown? [y/N]" in err
     assert err.index("inspect_area(") < err.index("[y/N]")
     assert (low / "yes").exists() == bool(seen) == (code is ExitCode.OK)
 

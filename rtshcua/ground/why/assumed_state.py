@@ -126,7 +126,7 @@ def read_overrides(texts: Sequence[str]) -> tuple[SignalOverride, ...] | Refusal
         if not equals:
             return Refusal("usage", f"`{each}` has no `=`", "write a signal and its value: `battery=20 %`")
         if name in found:
-            return Refusal("usage", f"`{name}` occurs twice", "keep one of them")
+            return Refusal("usage", f"`{name}` is given twice", "keep one of them")
         found[name] = SignalOverride(name, text)
     return tuple(found.values())
 

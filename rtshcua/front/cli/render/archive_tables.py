@@ -1,4 +1,4 @@
-"""How answers of an archive are told: a table for a person, JSON or CSV for a program."""
+"""Print the results of archive commands as a table, JSON or CSV."""
 
 import csv
 import json
@@ -26,7 +26,7 @@ _TOLD = 20  # number of logs that are listed individually
 
 
 class Shape(StrEnum):
-    """How rows are printed."""
+    """The output format of rows."""
 
     TABLE = "table"
     JSON = "json"
@@ -34,7 +34,7 @@ class Shape(StrEnum):
 
 
 def tell(names: Sequence[str], rows: Sequence[Sequence[object]], shape: Shape) -> None:
-    """Prints rows on the standard output."""
+    """Print rows on standard output."""
     if shape is Shape.JSON:
         out_json(json.dumps([dict(zip(names, row, strict=True)) for row in rows], ensure_ascii=False, default=str))
     elif shape is Shape.CSV:
@@ -46,7 +46,7 @@ def tell(names: Sequence[str], rows: Sequence[Sequence[object]], shape: Shape) -
 
 
 def _table(names: Sequence[str], cells: list[list[str]]) -> None:
-    """As a table where that fits, else each row as lines of a name and a value."""
+    """Print a table if it fits the width, otherwise each row as lines of name and value."""
     widths = [max(len(row[i]) for row in [list(names), *cells]) for i in range(len(names))]
     if cells and not _WHOLE & {*names} and sum(widths) + 2 * (len(widths) - 1) > columns():
         width = max(map(len, names))
@@ -69,12 +69,12 @@ def _cell(name: str, value: object) -> str:
 
 
 def counted(counts: Mapping[str, int]) -> str:
-    """Counts of logs in one line."""
+    """Return the counts of logs on one line."""
     return ", ".join(f"{count} {name}" for name, count in counts.items() if count) or "none"
 
 
 def tell_result(result: ArchiveResult, *, as_json: bool) -> None:
-    """Prints what became of the logs that were added or verified."""
+    """Print the results of logs that were added or verified."""
     counts = Counter(each.entry.status for each in result.done)
     if as_json:
         out_json(json.dumps(_object(result, counts), ensure_ascii=False))
@@ -101,7 +101,7 @@ def _text(result: ArchiveResult, counts: Mapping[str, int]) -> None:
     for left in result.skipped[:_TOLD]:
         out(f"skipped     {visible(str(left.path))}: {left.why}")
     if len(result.skipped) > _TOLD:
-        out(f"... and {len(result.skipped) - _TOLD} more that are no logs")
+        out(f"... and {len(result.skipped) - _TOLD} more that are not logs")
     wrong = [each for each in result.done if each.entry.status != "verified"]
     for each in wrong[:_TOLD]:
         what = f"{each.entry.finding}, {visible(each.entry.finding_text or '')}"
@@ -112,10 +112,10 @@ def _text(result: ArchiveResult, counts: Mapping[str, int]) -> None:
     source = visible(result.pinned.source)
     out(f"{many(len(result.done), 'log')}, {new} of them verified now, under {source}: {counted(counts)}")
     if result.others:
-        rest = "rests on another root" if result.others == 1 else "rest on other roots"
+        rest = "was verified under another root" if result.others == 1 else "were verified under other roots"
         out(f"{many(result.others, 'log')} in the archive {rest}; name that root with `--root`")
     if result.missing.rows:
-        out(f"missing: logs before {len(result.missing.rows)} of these: `rtshcua archive query missing`")
+        out(f"missing: the logs before {len(result.missing.rows)} of these; run `rtshcua archive query missing`")
     for one, other, seq in result.pairs[:_TOLD]:
         two = f"`{visible(result.names[one])}` and `{visible(result.names[other])}`"
         out(f"conflict: {two} were signed differently at record {seq}")

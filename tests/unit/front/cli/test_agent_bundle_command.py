@@ -166,7 +166,7 @@ def test_what_is_wrong_is_said_and_nothing_is_made(
     no_policy.write_text("policy {", "utf-8")
     words = ["agent-bundle", str(plug), "--bundle", str(base), "--to", SOCKET, "--with"]
     assert main([*words, str(other)]) == 3
-    assert "make another policy" in capsys.readouterr().err
+    assert "the policy of the sources" in capsys.readouterr().err
     assert main([*words, str(no_policy)]) == 3
     assert "have errors" in capsys.readouterr().err
     assert main([*words, str(tmp_path / "missing.rts")]) == 3

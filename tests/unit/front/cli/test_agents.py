@@ -212,12 +212,12 @@ def test_a_socket_that_cannot_be_made_leaves_no_other_behind(tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("words", "text"),
     [
-        (["--agent-socket", "s", "--operator-socket", "s"], "a socket each"),
+        (["--agent-socket", "s", "--operator-socket", "s"], "must be different paths"),
         (["--agent-group", "root"], "requires `--agent-socket`"),
         (["--wait"], "`--wait` requires `--agent-socket PATH`"),
         (["--wait-for", "5s"], "requires `--wait`"),
         (["--wait", "--agent-socket", "s", "--dry-run"], "conflicts with `--dry-run`"),
-        (["--agent-socket", "s", "--agent-group", "no-such-group"], "no group `no-such-group`"),
+        (["--agent-socket", "s", "--agent-group", "no-such-group"], "unknown group `no-such-group`"),
     ],
 )
 def test_sockets_that_make_no_sense(words: list[str], text: str, capsys: pytest.CaptureFixture[str]) -> None:

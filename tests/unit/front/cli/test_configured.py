@@ -17,15 +17,15 @@ from rtshcua.simulation.process import config_of, main, parser
 from virtual.rows import rows
 
 REFUSED = [
-    (["FENCE_RADIUS"], "is not NAME=VALUE"),
-    (["FENCE_RADIUS=wide"], "is not NAME=VALUE"),
-    (["FENCE_RADIUS=nan"], "is not NAME=VALUE"),
-    (["FENCE_RADIUS=1e60"], "is not NAME=VALUE"),
+    (["FENCE_RADIUS"], "is not NAME=NUMBER"),
+    (["FENCE_RADIUS=wide"], "is not NAME=NUMBER"),
+    (["FENCE_RADIUS=nan"], "is not NAME=NUMBER"),
+    (["FENCE_RADIUS=1e60"], "is not NAME=NUMBER"),
     (["FENCE_RADIUS=5"], "must be from 30 to 10000, not 5"),
     (["ARMING_CHECK=0"], "cannot be set for a flight"),
     (["FENCE_TYPE=3"], "must be 4, 5, 6, 7, 12, 13, 14, 15, not 3"),
     (["GF_ACTION=0"], "must be 2, 3, 5, not 0"),
-    (["FENCE_RADIUS=50", "FENCE_RADIUS=60"], "`FENCE_RADIUS` is given twice"),
+    (["FENCE_RADIUS=50", "FENCE_RADIUS=60"], "`FENCE_RADIUS` occurs twice"),
 ]
 
 

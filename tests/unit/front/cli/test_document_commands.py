@@ -140,7 +140,7 @@ def test_a_replacement_that_drops_a_phase_is_followed_in_a_log(here: Path) -> No
     wrong = replace(before.mission, name="")
     refused = prepared(before.policy.policy, wrong)
     assert isinstance(refused, Refusal)
-    assert "refused on board: the name of the mission is invalid" in refused.text
+    assert "the vehicle would refuse this: the name of the mission is invalid" in refused.text
 
 
 def test_what_cannot_be_signed(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -153,7 +153,7 @@ def test_what_cannot_be_signed(here: Path, capsys: pytest.CaptureFixture[str]) -
     says(ExitCode.USAGE, "the flight of the answer is unknown", "approve", "low.bundle", "--step", "3", "-o", "x")
     says(ExitCode.USAGE, "the flight of the recall is unknown", "recall", "low.bundle", "-o", "x")
     says(ExitCode.USAGE, "the mission has no step 5", "approve", "low.bundle", "--step", "5", "-o", "x")
-    says(ExitCode.USAGE, "no `confirm` of the policy", "approve", "low.bundle", "--step", "2", "-o", "x")
+    says(ExitCode.USAGE, "no `confirm` rule of the policy", "approve", "low.bundle", "--step", "2", "-o", "x")
     (here / "high.rts").write_text(LOW.replace("altitude = 9 m", "altitude = 20 m"))
     assert main(["compile", "high.rts"]) == ExitCode.OK
     capsys.readouterr()
@@ -187,7 +187,7 @@ def test_what_cannot_be_signed(here: Path, capsys: pytest.CaptureFixture[str]) -
         "4",
         *FLIGHT,
     )
-    says(ExitCode.INPUT, "is no replacement", "replace", "low.bundle", "--to", "s")
+    says(ExitCode.INPUT, "is not a replacement", "replace", "low.bundle", "--to", "s")
     assert main(["recall", "low.bundle", "-o", "home", *FLIGHT]) == ExitCode.OK
     says(ExitCode.INPUT, "but `rtshcua/recall`", "replace", "home", "--to", "s")
     says(ExitCode.INPUT, "no such file or directory: `s`", "recall", "low.bundle", "--to", "s")
@@ -320,7 +320,7 @@ def test_a_recall_that_was_signed_before_is_sent_without_a_key(
     assert main(send) == ExitCode.REFUSED
     assert "`--policy` recalls every mission under the policy" in capsys.readouterr().err
     assert main(send) == ExitCode.REFUSED
-    assert "sign another one" in capsys.readouterr().err
+    assert "sign a new one" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -330,7 +330,7 @@ def test_a_recall_that_was_signed_before_is_sent_without_a_key(
         (["low.bundle", "--send", "home", "--to", "s"], ExitCode.USAGE, "conflicts with BUNDLE"),
         (["--send", "low.bundle", "--to", "s"], ExitCode.INPUT, ""),
         (["--send", "none", "--to", "s"], ExitCode.INPUT, "no such file or directory: `none`"),
-        (["--to", "s"], ExitCode.USAGE, "give its bundle"),
+        (["--to", "s"], ExitCode.USAGE, "BUNDLE is missing"),
     ],
 )
 def test_what_is_no_recall_is_not_sent(

@@ -71,7 +71,7 @@ def test_a_replacement_that_is_none(log: Path, capsys: pytest.CaptureFixture[str
         log.write_bytes(b"".join(lines))
         assert main(["show", str(log)]) == ExitCode.OK
         assert main(["why", str(log)]) == ExitCode.INPUT
-        assert "a replacement in the log" in capsys.readouterr().err
+        assert "invalid replacement in the log" in capsys.readouterr().err
 
 
 def test_the_audit_says_what_was_signed(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -218,7 +218,7 @@ def test_why_tells_what_ended_a_flight_and_who_answered(broken_off: Path, capsys
     out = capsys.readouterr().out
     assert "granted as supervisor by ada, 2" in out, "in the step that asks for it, with the time"
     assert "Approvals and refusals of this step" in out
-    assert "How it ended" in out
+    assert "End of the flight" in out
     assert "· interrupted" in out
     assert "interrupted" in out.splitlines()[-1]
 

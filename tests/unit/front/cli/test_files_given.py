@@ -138,5 +138,5 @@ def test_show_names_the_log_that_a_folder_lacks(log: Path, capsys: pytest.Captur
     for folder, code in (("runs/one", ExitCode.OK), ("runs", ExitCode.INPUT)):
         assert app.main(["show", folder]) == code
     assert capsys.readouterr().err == (
-        "error[input]: there is no `log.jsonl` in the folder `runs`\n help: name a file, or the folder of one run\n"
+        "error[input]: no `log.jsonl` in the folder `runs`\n help: name a file or a run folder\n"
     )

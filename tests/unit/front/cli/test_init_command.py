@@ -24,7 +24,7 @@ def test_it_makes_the_example_under_the_folders_name(tmp_path: Path, capsys: Sai
     assert everything(folder) == project("river_side_2")
     assert "policy river_side_2 version 1" in (folder / "policies/rules.rts").read_text("utf-8")
     out = capsys.readouterr().out
-    assert out.startswith("made river_side_2 in ")
+    assert out.startswith("created river_side_2 in ")
     assert all(f"\n  {file}\n" in out for file in FILES)
 
 

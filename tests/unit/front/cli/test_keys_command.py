@@ -114,7 +114,7 @@ def test_without_keys(words: list[str], capsys: pytest.CaptureFixture[str]) -> N
     assert app.main(["keys", *words]) == ExitCode.INPUT
     err = capsys.readouterr().err
     assert "holds no keys" in err
-    assert " help: `rtshcua keys init` makes a development root" in err
+    assert " help: run `rtshcua keys init` to create a development root" in err
 
 
 def test_a_damaged_root_is_not_listed(capsys: pytest.CaptureFixture[str]) -> None:
@@ -179,7 +179,7 @@ def test_a_passphrase_is_no_book(tmp_path: Path, capsys: pytest.CaptureFixture[s
     write_new(tmp_path / "book", b"a" * 5_000, mode=0o600)
     words = ["keys", "init", "--encrypted", "--policy", "field", "--passphrase-file", str(tmp_path / "book")]
     assert app.main(words) == ExitCode.UNTRUSTED
-    assert "longer than any passphrase" in capsys.readouterr().err
+    assert "exceeds 4096 bytes" in capsys.readouterr().err
 
 
 def test_mission_keys_in_earnest_are_for_named_policies(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -271,12 +271,12 @@ def test_who_is_no_approver(words: list[str], code: ExitCode, capsys: pytest.Cap
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (["approver", "a/b", "--role", "pilot"], "`a/b` is no name of a person"),
-        (["mission", "agent", "--role", "a/b", "--policy", "field"], "`a/b` is no role"),
-        (["mission", "agent", "--role", "pilot", "--policy", "a b"], "`a b` is no policy"),
-        (["init", "--encrypted", "--policy", "field", "--approver", "A"], "`A` is no name of a person"),
-        (["init", "--encrypted", "--policy", "a b"], "`a b` is no policy"),
-        (["init", "--role", ""], "`` is no role"),
+        (["approver", "a/b", "--role", "pilot"], "`a/b` is not a valid name of a person"),
+        (["mission", "agent", "--role", "a/b", "--policy", "field"], "`a/b` is not a valid role name"),
+        (["mission", "agent", "--role", "pilot", "--policy", "a b"], "`a b` is not a valid policy name"),
+        (["init", "--encrypted", "--policy", "field", "--approver", "A"], "`A` is not a valid name of a person"),
+        (["init", "--encrypted", "--policy", "a b"], "`a b` is not a valid policy name"),
+        (["init", "--role", ""], "`` is not a valid role name"),
     ],
 )
 def test_a_name_that_is_none_is_refused_before_a_passphrase_is_asked_for(
@@ -401,8 +401,8 @@ def test_an_expired_root_is_renewed_by_another_root_key(
         (["revoke"], "KEY is missing"),
         (["revoke", "root"], "rotate-root"),
         (["replace", "root"], "rotate-root"),
-        (["revoke", "0123456789"], "is no key that the trust root names"),
-        (["replace", "nobody"], "is no key that the trust root names"),
+        (["revoke", "0123456789"], "is not a key of the trust root"),
+        (["replace", "nobody"], "is not a key of the trust root"),
         (["revoke", "--link", "0123"], "no such file"),
         (["revoke", "--link", "no.key"], "is not a link key"),
     ],
@@ -518,7 +518,7 @@ def test_the_list_fits_a_terminal_and_what_is_to_be_typed_can_be_pasted(
     said = capsys.readouterr().out
     heading, beneath = said[said.index("  duty") :].splitlines()[:2]
     assert heading.split() == ["duty", "key", "file"]
-    assert beneath.strip() == "may speak for"
+    assert beneath.strip() == "may sign for"
     assert "\n            role operator through operator, under any policy, on any vehicle\n" in said
     assert app.main(["keys", "approver", "owner", "--role", "supervisor"]) == ExitCode.OK
     said = capsys.readouterr().out
@@ -530,4 +530,4 @@ def test_the_list_fits_a_terminal_and_what_is_to_be_typed_can_be_pasted(
     assert all(Path(each).exists() for each in words[3:-2])
     monkeypatch.setenv("COLUMNS", "400")
     assert app.main(["keys", "list"]) == ExitCode.OK
-    assert re.search(r"  duty +key +file +may speak for\n", capsys.readouterr().out)
+    assert re.search(r"  duty +key +file +may sign for\n", capsys.readouterr().out)

@@ -320,7 +320,7 @@ def test_a_signal_leaves_the_flight_as_quit_does(seat: Seat, place: Path, number
 def test_a_word_that_is_no_command_is_said_with_the_nearest(seat: Seat, place: Path) -> None:
     def turn(link: socket.socket) -> None:
         seat.type("recal\n")
-        seat.until_said("is no command")
+        seat.until_said("unknown command")
         seat.type("q\n")
         link.recv(1)
 
@@ -329,7 +329,7 @@ def test_a_word_that_is_no_command_is_said_with_the_nearest(seat: Seat, place: P
     flight.end()
     assert flight.documents == []
     (said,) = [each["text"] for each in seat.told() if each["event"] == "ready" and "`recal`" in each["text"]]
-    assert said.startswith("`recal` is no command, did you mean `recall`? · recall: ")
+    assert said.startswith("unknown command `recal`, did you mean `recall`? · recall: ")
 
 
 @pytest.fixture

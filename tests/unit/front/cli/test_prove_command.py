@@ -46,7 +46,7 @@ def told(capsys: pytest.CaptureFixture[str]) -> dict[str, object]:
 def test_a_record_in_and_out(capsys: pytest.CaptureFixture[str]) -> None:
     assert prove(3) == ExitCode.OK
     size = Path("record-3.tlog-proof").stat().st_size
-    assert f"wrote `record-3.tlog-proof`: record 3, proven in {size} bytes" in capsys.readouterr().out
+    assert f"wrote `record-3.tlog-proof`: record 3; {size} bytes" in capsys.readouterr().out
     assert size < 8_000
     assert verify("record-3.tlog-proof", root="root.trust") == ExitCode.OK
     out = capsys.readouterr().out

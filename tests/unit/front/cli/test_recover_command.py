@@ -50,7 +50,7 @@ def test_a_log_that_broke_off(run: Path, lines: list[bytes], capsys: pytest.Capt
     out = capsys.readouterr().out
     assert "log.jsonl: recovered, 30 records kept\n" in out
     assert "were not sealed" in out
-    assert "11 octets behind them are in log.discarded: the log ends inside this record" in out
+    assert "11 bytes after them are in log.discarded: the log ends inside this record" in out
     assert unverified(run / "log.jsonl", lines, 30) == ""
     assert recover(run / "log.jsonl") == ExitCode.OK
     assert "closed, 32 records; nothing to recover" in capsys.readouterr().out
@@ -81,7 +81,7 @@ def test_what_was_tampered_with_is_left_alone(
     assert recover(run) == ExitCode.EVIDENCE
     err = capsys.readouterr().err
     assert "the damage was not caused by a crash, so the log is not signed: record 2, octet" in err
-    assert "nothing was changed" in err
+    assert "the log was not changed" in err
     assert (run / "log.jsonl").read_bytes() == data
     assert recover("--json", run) == ExitCode.EVIDENCE
     assert json.loads(capsys.readouterr().out)["reason"]["slug"] == "chain/sequence"

@@ -281,7 +281,7 @@ def test_what_cannot_be_read_keeps_no_other_log_waiting(
     assert [each[:2] for each in told] == [("b.jsonl", "unread"), ("c.jsonl", "unread"), ("log.jsonl", "cosigned")]
     assert told[1][2] == "not a regular file"
     assert app.main(["witness", str(tmp_path)]) == ExitCode.INPUT
-    assert f"{tmp_path / 'c.jsonl'}: not looked at: not a regular file" in capsys.readouterr().out
+    assert f"{tmp_path / 'c.jsonl'}: cannot be read: not a regular file" in capsys.readouterr().out
     assert app.main(["witness", str(tmp_path / "c.jsonl")]) == ExitCode.INPUT
 
 

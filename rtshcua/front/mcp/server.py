@@ -45,7 +45,10 @@ _MISSION: Final = {
     "type": "object",
     "description": "A mission specification. Its JSON Schema is the resource rtshcua://schema.",
 }
-_KEY: Final = {"type": "string", "description": "A unique key for each proposal. A repeated call with the same key does not propose again."}
+_KEY: Final = {
+    "type": "string",
+    "description": "Unique for each proposal; a call with a used key does not propose again.",
+}
 _READS: Final = types.ToolAnnotations(readOnlyHint=True, openWorldHint=False)
 _ACTS: Final = types.ToolAnnotations(
     readOnlyHint=False, destructiveHint=False, idempotentHint=True, openWorldHint=False
@@ -69,23 +72,23 @@ def _tool(
 
 
 TOOLS: Final = (
-    _tool("describe_vehicle", "Get the stage of the vehicle (waiting, flying, ended, unreachable) and its reported state."),
+    _tool("describe_vehicle", "Get the vehicle's stage (waiting, flying, ended, unreachable) and its state."),
     _tool("describe_policy", "Get what the policy permits: skills with their ranges, zones, roles and rules."),
     _tool(
         "check_mission", "Check a mission against the policy. Nothing is signed or sent.",
         required=("mission",), mission=_MISSION,
     ),
     _tool(
-        "propose_mission", "Check a mission, sign it as proposed by an agent, and send it to the vehicle. Returns a ticket.",
+        "propose_mission", "Check a mission, sign it as an agent's, and send it to the vehicle. Returns a ticket.",
         _ACTS, ("mission", "idempotency_key"), mission=_MISSION, idempotency_key=_KEY,
     ),
     _tool(
-        "mission_status", "Get the state of a proposal. With wait_s, return when the state changes, or after that time.",
+        "mission_status", "Get the state of a proposal. With wait_s, wait at most that long for a change.",
         required=("ticket",), ticket={"type": "string"}, wait_s={"type": "integer", "minimum": 0, "maximum": 60},
     ),
     _tool(
-        "explain_decision", "Explain the decision on a step: its inputs, their ages, and the values that would have passed.",
-        record={"type": "integer", "description": "Number of the record. Default: the last decision that was not `allow`."},
+        "explain_decision", "Explain the decision on a step: its inputs, their ages, and values that would pass.",
+        record={"type": "integer", "description": "Number of the record; default: the last that was not `allow`."},
     ),
     _tool(
         "replan", "Replace the steps that have not been released. Pass the whole new mission.",
@@ -96,7 +99,7 @@ TOOLS: Final = (
         },
         idempotency_key=_KEY,
     ),
-    _tool("cancel", "Cancel the flying mission: no further step begins, and the policy's contingency flies.", _ENDS),
+    _tool("cancel", "Cancel the flying mission: no further step begins; the contingency flies.", _ENDS),
     _tool(
         "read_evidence", "Read unverified records of the flight's log. Each has an added `step_number`, from 1.",
         first={"type": "integer", "minimum": 0}, count={"type": "integer", "minimum": 1, "maximum": 100},
@@ -131,7 +134,7 @@ class Opening:
     def _run(self, make: Callable[[], Any]) -> None:
         try:
             self._made = make()
-        except Exception as error:  # noqa: BLE001  told to whoever calls a tool
+        except Exception as error:  # noqa: BLE001  reported to the caller of a tool
             self._wrong = error
         finally:
             self._done.set()

@@ -56,7 +56,7 @@ _FLIES: Final = "this mission is already flying, so nothing was sent; call `miss
 #: the last of these effects shows whether the flight waits for a replacement
 _AFTER_REPLAN: Final = frozenset({"replan", "replacement", "dispatched", "cancellation", "recall"})
 _REPLANS: Final = (
-    "call `replan` with this `from_step_number`; the vehicle holds, and flies a fallback if no replacement arrives in time"
+    "call `replan` with this `from_step_number`; the vehicle holds, and falls back if no replacement arrives in time"
 )
 
 
@@ -188,14 +188,14 @@ class Tools:
 
     def _submit(self, mission: Any, key: str, first: int | None) -> dict[str, Any]:
         if not 0 < len(key) <= MOST_KEY:
-            raise Misused("idempotency-key", f"`idempotency_key` has {len(key)} characters", f"use 1 to {MOST_KEY} characters")
+            raise Misused("idempotency-key", f"the key has {len(key)} characters", f"use 1 to {MOST_KEY} characters")
         said = sha256(json.dumps([mission, first], sort_keys=True).encode("utf-8", "surrogatepass")).digest()
         name = sha256(key.encode("utf-8", "surrogatepass")).hexdigest()[:16]
         with self._lock:
             known = self._tickets.get(name)
         if known is not None:
             if known.said != said:
-                raise Misused("key-reused", "`idempotency_key` was used for another proposal", "use a new key for each proposal")
+                raise Misused("key-reused", "the key was used for another proposal", "use a new key for each one")
             return {**_ACCEPTED} | self._told(known)
         latest = self._latest
         if latest is not None and latest.said == said and self.following.stage == "flying":
@@ -223,7 +223,7 @@ class Tools:
         assert policy is not None
         assert mission is not None
         if policy_digest(policy_payload(policy)) != signer.digest:
-            raise Misused("wrong-policy", "the policy of the sources differs from the signed policy", "report this to the operator")
+            raise Misused("wrong-policy", "the sources' policy differs from the signed one", "tell the operator")
         try:
             signer.entitled(policy, mission)
             if first is None:
@@ -238,7 +238,9 @@ class Tools:
         except Untrusted as error:
             raise Misused(error.slug, str(error), "propose for a role that the key may sign for") from None
         if len(document) > MAX_DOCUMENT:
-            raise Misused("too-large", f"the mission is {len(document)} bytes; the limit is {MAX_DOCUMENT}", "use fewer steps")
+            raise Misused(
+                "too-large", f"the mission is {len(document)} bytes; the limit is {MAX_DOCUMENT}", "fewer steps"
+            )
         return document, (policy, mission)
 
     def _in_force(self) -> Bundle:
@@ -275,9 +277,7 @@ class Tools:
         with self._lock:
             known = self._tickets.get(ticket)
             if known is None:
-                raise Misused(
-                    "no-ticket", "unknown ticket", "use the ticket returned by `propose_mission` or `replan`"
-                )
+                raise Misused("no-ticket", "unknown ticket", "use the ticket returned by `propose_mission` or `replan`")
             told = known.told()
         flight = self.flight()
         over = known.state == "refused" or (known.state == "admitted" and flight["over"])
@@ -353,7 +353,9 @@ class Tools:
 
 _ACCEPTED: Final[Mapping[str, Any]] = {"accepted": True, "rejections": [], "more_rejections": 0}
 _DECIDED: Final = ("seq", "outcome", "reason", "clause", "target")
-_HOW: Final = "a person in the rule's role must sign: `rtshcua approve BUNDLE --step N --to SOCKET`; an agent cannot approve"
+_HOW: Final = (
+    "a person in the rule's role must sign: `rtshcua approve BUNDLE --step N --to SOCKET`; agents cannot approve"
+)
 
 
 def _checked(answer: ProposalAnswer) -> dict[str, Any]:

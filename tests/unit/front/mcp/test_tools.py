@@ -175,7 +175,7 @@ def test_a_repeated_proposal_is_told_that_the_mission_flies(desk: Tools, handed:
     flying(desk)
     again = desk.propose_mission(deepcopy(PROPOSAL), key)
     assert (again["ticket"], again["state"], again["accepted"]) == (first["ticket"], "flying", True)
-    assert "flies already" in again["text"]
+    assert "already flying" in again["text"]
     assert len(handed) == 1
 
 

@@ -194,7 +194,17 @@ def test_what_cannot_be_signed(here: Path, capsys: pytest.CaptureFixture[str]) -
     other = (here / "shorter.rts").read_text().replace("bridge_inspection", "training_field").replace("@7", "@2")
     other = other.replace("    goto(bridge_a.entry, altitude = 9 m)\n", "")
     (here / "other.rts").write_text(other)
-    says(ExitCode.REFUSED, "the policy of the sources differs", "compile", "other.rts", "--replaces", "low.bundle", "--from", "2", *FLIGHT)
+    says(
+        ExitCode.REFUSED,
+        "the policy of the sources differs",
+        "compile",
+        "other.rts",
+        "--replaces",
+        "low.bundle",
+        "--from",
+        "2",
+        *FLIGHT,
+    )
     damaged = bytearray((here / "low.bundle").read_bytes())
     damaged[len(damaged) // 2] ^= 1
     (here / "damaged.bundle").write_bytes(damaged)

@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega
 
 from rtshcua.codec.frames import Message, ReceivedFrame
 
-#: : Our type. Numbers from 32768 on are for private use (MAV_TUNNEL_PAYLOAD_TYPE).
+#: Our type. Numbers from 32768 on are for private use (MAV_TUNNEL_PAYLOAD_TYPE).
 PAYLOAD_TYPE: Final = 0xC05E
 NAME_OCTETS: Final = 8
 _HEAD: Final = Struct(f"<B{NAME_OCTETS}sHH")
@@ -24,7 +24,7 @@ CHUNK: Final = _PAYLOAD - _HEAD.size
 #: the longest message, in octets
 LONGEST: Final = 1 << 16
 MOST_CHUNKS: Final = -(-LONGEST // CHUNK)
-#: : the most unfinished messages that are kept, of all senders together, and of one sender
+#: the most unfinished messages that are kept, of all senders together, and of one sender
 MOST_OPEN: Final = 32
 MOST_OF_ONE: Final = 4
 

@@ -49,7 +49,7 @@ def drains(measured: Value) -> tuple[int, int]:
     return least, 0 if gap == ABSENT else min(max(high, 0), MOST_DRAIN)
 
 
-#: : the drain was not measured
+#: the drain was not measured
 UNMEASURED: Value = (0, 0, ABSENT, None)
 
 

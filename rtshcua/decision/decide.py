@@ -43,7 +43,7 @@ from rtshcua.model.flat.policy import Rule
 from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now, State
 from rtshcua.model.outcome import Outcome, Reason
 
-#: : the `step` of a decision in which all steps passed
+#: the `step` of a decision in which all steps passed
 _PASSED_ALL = 8
 
 
@@ -193,7 +193,7 @@ def freshness(invocation: PreparedInvocation, context: Context, sets: Sets) -> F
 
 # ---------------------------------------------------------------- 3: authority
 
-#: : the timing classes that a source may use: an agent may not request reflexes, and a reflex may only react
+#: the timing classes that a source may use: an agent may not request reflexes, and a reflex may only react
 CLASSES: dict[int, frozenset[int]] = {
     SourceKind.AGENT: frozenset({TimingClass.SEMANTIC, TimingClass.TACTICAL}),
     SourceKind.OPERATOR: frozenset({TimingClass.SEMANTIC, TimingClass.TACTICAL}),

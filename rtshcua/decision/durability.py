@@ -22,7 +22,7 @@ from rtshcua.model.flat.situation import Context
 from rtshcua.model.outcome import Outcome
 from rtshcua.wire.request import STEP
 
-#: : the default class of a contract
+#: the default class of a contract
 DEFAULT: Final = SYNCED
 
 _CLASSES: Final = {word: number for number, word in enumerate(WORDS)}

@@ -9,7 +9,7 @@ from rtshcua.decision.times import LocalTime, Window, daily, weekly
 from rtshcua.decision.values import ABSENT, AND, FALSE, NOT, OR, TRUE, UNKNOWN, Span, Truth, Value
 from rtshcua.decision.zones import PlaceSet, PreparedZone, WellKnown, here
 
-#: : the phase of an invocation without a mission, and of a phase that the policy does not name
+#: the phase of an invocation without a mission, and of a phase that the policy does not name
 NO_PHASE: Final = -1
 
 

@@ -16,7 +16,7 @@ from rtshcua.decision.values import AND, EVERYWHERE, FALSE, TRUE, UNKNOWN, Sets,
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now, State
 
-#: : the index of the link that a `degrade` rule flies, and the index that means that no link was tried yet
+#: the index of the link that a `degrade` rule flies, and the index that means that no link was tried yet
 DEGRADE = -1
 START = -2
 

@@ -16,9 +16,9 @@ from rtshcua.model.flat.policy import Speeds, VehicleLimits
 
 SECOND = 1_000_000  # us
 MINUTE = 60 * SECOND
-#: : upper bound of the measured drain per minute, 1/10000: a full charge in a second
+#: upper bound of the measured drain per minute, 1/10000: a full charge in a second
 MOST_DRAIN = 60 * FULL
-#: : from a command to the motion that it requests
+#: from a command to the motion that it requests
 BEGINS = SECOND
 #: from arming to leaving the ground: the motors run up
 LIFTS = 5 * SECOND

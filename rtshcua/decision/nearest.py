@@ -45,7 +45,7 @@ class NearestChange(NamedTuple):
 
 
 Subject: TypeAlias = tuple[bool, int | None]
-#: : the proposed value of each subject
+#: the proposed value of each subject
 Made: TypeAlias = dict[Subject, int]
 
 
@@ -184,7 +184,7 @@ def nearest_in(change: NearestChange, value: Value) -> int:
 LOCAL_TIME = "local time"
 DAYTIME = "daytime"
 
-#: : a value and its name; a quantity has no name
+#: a value and its name; a quantity has no name
 Option = tuple[int, str]
 
 

@@ -131,7 +131,7 @@ def _parted(x: int, y: int, edge: Leg, leg: Leg, box: Box) -> bool:
 
 #: the lower end x, y, and how far the upper end lies east (or west, if negative) and north of it
 Rise: TypeAlias = tuple[int, int, int, int]
-#: : edges through the same slabs, from west to east
+#: edges through the same slabs, from west to east
 Row: TypeAlias = tuple[Rise, ...]
 
 MOST = 32

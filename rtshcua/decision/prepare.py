@@ -33,7 +33,7 @@ from rtshcua.model.flat.situation import Now, State
 from rtshcua.model.flat.zone import MAX_COORDINATE
 from rtshcua.model.step_number import step_words
 
-#: : a clause and its compiled function
+#: a clause and its compiled function
 Guards = tuple[tuple[Clause, Condition], ...]
 
 

@@ -16,15 +16,15 @@ from rtshcua.model.flat.contract import Contract, TimingClass
 from rtshcua.model.flat.policy import Policy, RuleKind
 from rtshcua.model.flat.signal import Signal
 
-#: : Limits of the requested interval between two reports: links and autopilots support no shorter one, and a longer
+#: Limits of the requested interval between two reports: links and autopilots support no shorter one, and a longer
 #: one is never requested.
 MOST_OFTEN: Final = 50_000
 LEAST_OFTEN: Final = 1_000_000
-#: : The number of reports requested within a stale time, and within a deadline.
+#: The number of reports requested within a stale time, and within a deadline.
 WITHIN_STALE: Final = 4
 WITHIN_DEADLINE: Final = 2
 
-#: : The adapters observe effects, takeovers and readiness in these messages, so they are requested at least this
+#: The adapters observe effects, takeovers and readiness in these messages, so they are requested at least this
 #: often.
 AT_LEAST: Final[Mapping[str, int]] = {
     "HEARTBEAT": 100_000,
@@ -34,7 +34,7 @@ AT_LEAST: Final[Mapping[str, int]] = {
     "GPS_RAW_INT": 500_000,
     "SYS_STATUS": 500_000,
 }
-#: : On a slow link they may be as rare as this, because mode and landed state are requested separately.
+#: On a slow link they may be as rare as this, because mode and landed state are requested separately.
 SUFFICES: Final[Mapping[str, int]] = {
     "HEARTBEAT": 1_000_000,
     "GLOBAL_POSITION_INT": 250_000,
@@ -43,10 +43,10 @@ SUFFICES: Final[Mapping[str, int]] = {
     "GPS_RAW_INT": 1_000_000,
     "SYS_STATUS": 1_000_000,
 }
-#: : These messages cannot be requested more often: PX4's HEARTBEAT is constant and its CURRENT_MODE came 1.8 times a
+#: These messages cannot be requested more often: PX4's HEARTBEAT is constant and its CURRENT_MODE came 1.8 times a
 #: second (docs/flying/link.md has the recordings); a radio reports once a second and accepts no requests.
 AT_BEST: Final[Mapping[str, int]] = {"HEARTBEAT": 1_000_000, "CURRENT_MODE": 560_000, "RADIO_STATUS": 1_000_000}
-#: : How much older than its report a value may be. A receiver measures five times a second by default, and a value
+#: How much older than its report a value may be. A receiver measures five times a second by default, and a value
 #: without a time stamp counts as measured at the last position before it.
 FIX: Final = 200_000
 UNSTAMPED: Final = 100_000

@@ -40,7 +40,7 @@ from rtshcua.wire.response import Status
 from rtshcua.wire.trust import TrustRoot
 from rtshcua.wire.untrusted import Untrusted
 
-#: : how many documents may be verified ahead of their acceptance
+#: how many documents may be verified ahead of their acceptance
 MOST_AHEAD: Final = 16
 
 _KINDS: Final = {
@@ -89,18 +89,18 @@ class InForce:
         self._approvals = Approvals(policy.policy)
         #: by step
         self._received_us: tuple[int, ...] = (received_us,) * len(invocations)
-        #: : the last replacements that were verified ahead, by their bytes
+        #: the last replacements that were verified ahead, by their bytes
         self._ahead: dict[bytes, _Ahead] = {}
-        #: : issue time of the first mission: a proposer who post-dates a later mission must not escape a recall of
+        #: issue time of the first mission: a proposer who post-dates a later mission must not escape a recall of
         #: the policy
         self._issued_at_us = min(
             [bundle.mission.issued_at_us, *(each.issued_at_us for each in bundle.mission.invocations)]
         )
-        #: : the first mission and all its replacements
+        #: the first mission and all its replacements
         self._digests: tuple[bytes, ...] = (bundle.mission_digest,)
-        #: : the steps that were in force and no longer are
+        #: the steps that were in force and no longer are
         self._replaced: tuple[Invocation, ...] = ()
-        #: : the ids of all steps that were ever in force
+        #: the ids of all steps that were ever in force
         self._seen = frozenset(each.invocation_id for each in bundle.mission.invocations)
 
     @property
@@ -266,9 +266,9 @@ class InForce:
         return prepared
 
 
-#: : the last step of section 4.1 that a request must pass for its id to be used
+#: the last step of section 4.1 that a request must pass for its id to be used
 _AUTHORITY: Final = 3
-#: : a step that is not admitted may be requested again until its deadline
+#: a step that is not admitted may be requested again until its deadline
 _WAITS: Final = (OnInadmissible.HOLD, OnInadmissible.REPLAN)
 _INTEGRITY: Final = 1
 _STATE: Final = 6

@@ -11,7 +11,7 @@ from rtshcua.decision.values import FALSE, MAYBE, MISSING, PRESENT, TRUE, UNKNOW
 from rtshcua.decision.volume import Volume
 from rtshcua.model.flat.situation import Now, State
 
-#: : the allowed truths of a temporal monitor in a single situation
+#: the allowed truths of a temporal monitor in a single situation
 SINGLE = frozenset({TRUE, FALSE, UNKNOWN})
 
 

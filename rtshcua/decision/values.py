@@ -38,7 +38,7 @@ def _lifted(pick: Callable[..., Truth]) -> Table:
 AND, OR = _lifted(min), _lifted(max)
 #: swaps true and false
 NOT: tuple[Truth, ...] = tuple((a & UNKNOWN) | (a & TRUE) << 1 | (a & FALSE) >> 1 for a in range(8))
-#: : the truth of a condition at every point of one volume: false if false anywhere, else unknown if unknown anywhere
+#: the truth of a condition at every point of one volume: false if false anywhere, else unknown if unknown anywhere
 EVERYWHERE: tuple[Truth, ...] = tuple(FALSE if a & FALSE else UNKNOWN if a & UNKNOWN else a for a in range(8))
 
 
@@ -53,7 +53,7 @@ PRESENT: Final = 0  # certainly present
 MAYBE: Final = 1  # present or missing
 ABSENT: Final = 2  # certainly missing: `low` and `high` mean nothing
 
-#: : never received, stale, or a sentinel
+#: never received, stale, or a sentinel
 MISSING: Final[Value] = (0, 0, ABSENT, None)
 
 

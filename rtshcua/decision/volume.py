@@ -21,10 +21,10 @@ from rtshcua.model.flat.contract import Motion, MotionKind
 from rtshcua.model.flat.policy import VehicleLimits
 
 HOME = (0, 0)  # the origin of local coordinates
-#: : a vehicle starts the way home this far below its return altitude, mm: ArduCopter accepts a corner within
+#: a vehicle starts the way home this far below its return altitude, mm: ArduCopter accepts a corner within
 #: WPNAV_RADIUS, PX4 a height within NAV_MC_ALT_RAD
 SHORT = 2_000
-#: : a return that begins within this distance of home, mm, or within a third of the height, may be lower: PX4 within
+#: a return that begins within this distance of home, mm, or within a third of the height, may be lower: PX4 within
 #: RTL_MIN_DIST, ArduCopter by RTL_CONE_SLOPE
 NEAR = 10_000
 STEEP = 3

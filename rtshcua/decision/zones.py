@@ -19,7 +19,7 @@ from rtshcua.decision.values import ABSENT, AND, FALSE, PRESENT, TRUE, UNKNOWN, 
 from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone
 
 NO_BOX: Box = (0, 0, 0, 0)
-#: : the margin around a place within which a zone is compared in advance, mm: the distance of a second or two of
+#: the margin around a place within which a zone is compared in advance, mm: the distance of a second or two of
 #: flight
 AROUND = 10_000
 _UTC = LocalTime(0)

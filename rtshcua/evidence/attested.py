@@ -64,7 +64,7 @@ _AFTER: Final = Flaw(
     "boundary/after-loss", "the boundary was lost before this record, and so cannot have made its entry"
 )
 
-#: : tag and payload of the boundary's entry for a record
+#: tag and payload of the boundary's entry for a record
 Entry = tuple[Tag, bytes]
 
 
@@ -105,12 +105,12 @@ class BoundaryEvidence:
         keys = root.keys_for(Duty.BOUNDARY)
         refusal = {kid: key_refusal(key, vehicle=genesis.vehicle, now_us=genesis.utc_us) for kid, key in keys.items()}
         self._keys = {kid: key for kid, key in keys.items() if refusal[kid] is None}
-        #: : whether the boundary's evidence is required
+        #: whether the boundary's evidence is required
         self.asked = bool(self._keys)
         self._flight = bytes.fromhex(genesis.boot)
         self._enforced = genesis.mode != UNENFORCED
         self._bundle = sha256(octets(genesis.bundle) or b"").digest()
-        #: : the boundary's chain, recomputed from the records
+        #: the boundary's chain, recomputed from the records
         self.digest = boundary_chain.START
         self._count = 0
         self._pending: list[_Pending] = []
@@ -118,11 +118,11 @@ class BoundaryEvidence:
         #: the last statement
         self.last: Statement | None = None
         self._stated = False  # in this epoch
-        #: : the first record since the last statement that claims a known time of day
+        #: the first record since the last statement that claims a known time of day
         self._claim: _Claimed | None = _claimed(genesis, 0)
         self._recovered = False
         self._lost: tuple[int, int] | None = None  # the record that says so, and its offset
-        #: : by the number of a gap's record, the number of the statement that shows that nothing is missing before it
+        #: by the number of a gap's record, the number of the statement that shows that nothing is missing before it
         self.gaps: dict[int, int] = {}
         self._gap: tuple[int, int] | None = None  # the record of the gap, and its end
 

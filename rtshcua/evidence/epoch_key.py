@@ -10,10 +10,10 @@ from typing import Final
 
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-#: : an epoch is sealed after this many lines, or after this time, in us of monotonic time
+#: an epoch is sealed after this many lines, or after this time, in us of monotonic time
 EPOCH_RECORDS: Final = 1_024
 EPOCH_US: Final = 10_000_000
-#: : The tolerance of a verifier, because a busy machine seals late.
+#: The tolerance of a verifier, because a busy machine seals late.
 MOST_RECORDS: Final = 2_048
 LONGEST_US: Final = 20_000_000
 

@@ -14,7 +14,7 @@ from rtshcua.evidence.finding import Claim, Flaw
 from rtshcua.evidence.records import DecisionRecord, Effect, Genesis, Recover, Signed
 from rtshcua.model.quantity import Dimension, display
 
-#: : the effect with the length of the gap before it
+#: the effect with the length of the gap before it
 STALLED: Final = "stalled"
 
 

@@ -30,12 +30,12 @@ from rtshcua.model.flat.situation import Context, Now, State
 from rtshcua.wire.keys import Duty, key_id
 from rtshcua.wire.request import NOTHING, Ref
 
-#: : the effect with the boundary's signed statement of its own evidence (`wire.statement`), in base64
+#: the effect with the boundary's signed statement of its own evidence (`wire.statement`), in base64
 BOUNDARY: Final = "boundary"
-#: : the effect that reports the permanent loss of the boundary: it makes nothing in the log after that
+#: the effect that reports the permanent loss of the boundary: it makes nothing in the log after that
 BOUNDARY_LOST: Final = "boundary-lost"
 
-#: : The delay after `EPOCH_US` and `EPOCH_RECORDS` at which an epoch is sealed before anything else is recorded; a
+#: The delay after `EPOCH_US` and `EPOCH_RECORDS` at which an epoch is sealed before anything else is recorded; a
 #: fifth.
 _LATE = 5
 _LATE_US, _LATE_RECORDS = EPOCH_US + EPOCH_US // _LATE, EPOCH_RECORDS + EPOCH_RECORDS // _LATE
@@ -82,7 +82,7 @@ class Recorder:
         self._told_gap = False  # in this epoch
         self.attest: Attest = nobody
         self.lost: Callable[[], str | None] = lambda: None
-        #: : whether the loss of the boundary was recorded, after which none of its entries are
+        #: whether the loss of the boundary was recorded, after which none of its entries are
         self.told_loss = False
 
     @classmethod

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from rtshcua.evidence.merkle import EMPTY, MerkleTree, node_hash
 
-#: : leaves from the first number to before the second
+#: leaves from the first number to before the second
 Range = tuple[int, int]
 
 _HASH = 32

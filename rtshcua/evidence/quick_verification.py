@@ -27,10 +27,10 @@ from rtshcua.evidence.report import LogReport, claims, unsealed, with_anchors
 from rtshcua.evidence.seal_verification import Seals, Segment
 from rtshcua.evidence.witnessing.anchors import ANCHORED, Anchors
 
-#: : returns so many octets of a log from an offset, fewer at its end
+#: returns so many octets of a log from an offset, fewer at its end
 Octets = Callable[[int, int], bytes]
 
-#: : a longer signed record, or a longer segment, is left to the full verification; in octets
+#: a longer signed record, or a longer segment, is left to the full verification; in octets
 _LONGEST_LINE: Final = 1 << 20
 LONGEST_SEGMENT: Final = 1 << 27
 _GUESS: Final = 1 << 12  # octets that most signed records fit into

@@ -22,7 +22,7 @@ from rtshcua.wire import names
 
 #: the longest line in bytes; a genesis carries a whole bundle
 LONGEST = 1 << 26
-#: : the most bytes of a line that a finding quotes
+#: the most bytes of a line that a finding quotes
 SHOWN = 80
 
 

@@ -96,7 +96,7 @@ class RecordedContext(msgspec.Struct, frozen=True, forbid_unknown_fields=True, g
     vehicle: str
 
 
-#: : the fields of a decision record with the result of the decision
+#: the fields of a decision record with the result of the decision
 DECIDED: Final = (
     "outcome", "reason", "rule_step", "clause", "clause_at", "target", "target_link", "valid_until_us"
 )  # fmt: skip
@@ -246,9 +246,9 @@ class Close(Record, frozen=True):
 
 
 AnyRecord = Genesis | DecisionRecord | Effect | Seal | Recover | Close
-#: : Records with a `checkpoint`: a C2SP signed note over the tree of all previous lines, and over the record itself.
+#: Records with a `checkpoint`: a C2SP signed note over the tree of all previous lines, and over the record itself.
 Signed = Genesis | Seal | Recover | Close
-#: : records that end an epoch
+#: records that end an epoch
 Sealing = Seal | Recover | Close
 
 _encode = msgspec.json.Encoder().encode_lines  # faster than appending the newline

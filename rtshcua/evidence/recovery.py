@@ -24,7 +24,7 @@ from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, G
 from rtshcua.evidence.seal_verification import Seals
 from rtshcua.model.flat.situation import Now
 
-#: : the `ending` in the close of a recovered log
+#: the `ending` in the close of a recovered log
 RECOVERED = "recovered"
 
 

@@ -17,7 +17,7 @@ from rtshcua.model.quantity import Datum
 
 TABLE = Path(__file__).with_name("dialect.json")
 
-#: : the datum of the altitudes, by message and field (common.xml, in its descriptions)
+#: the datum of the altitudes, by message and field (common.xml, in its descriptions)
 DATUM: Mapping[tuple[str, str], Datum] = MappingProxyType(
     {
         ("GLOBAL_POSITION_INT", "relative_alt"): Datum.HOME,

@@ -10,10 +10,10 @@ MAV_TYPE_GCS: Final = 6
 #: quadrotor, coaxial, hexarotor, octorotor, tricopter, dodecarotor, decarotor
 MULTIROTORS: Final = frozenset({2, 3, 13, 14, 15, 29, 35})
 MAV_TYPE_ONBOARD_CONTROLLER: Final = 18
-#: : vehicles; the other types (ground stations, trackers, gimbals, cameras, ...) are not vehicles
+#: vehicles; the other types (ground stations, trackers, gimbals, cameras, ...) are not vehicles
 VEHICLES: Final = frozenset({*range(5), *range(7, 18), *range(19, 26), 28, 29, 35, 43, 45, 46, 47})
 
-#: : a battery that does not supply a motor
+#: a battery that does not supply a motor
 MAV_BATTERY_FUNCTION_AVIONICS: Final = 3
 MAV_BATTERY_FUNCTION_PAYLOAD: Final = 4
 
@@ -68,5 +68,5 @@ MAV_MISSION_TYPE_RALLY: Final = 2
 
 #: POSITION_TARGET_TYPEMASK: velocity, acceleration, yaw and yaw rate are ignored
 POSITION_ONLY: Final = 0x0DF8
-#: : INT32_MAX: in x and y of COMMAND_INT the equivalent of NaN in a float
+#: INT32_MAX: in x and y of COMMAND_INT the equivalent of NaN in a float
 NO_PLACE: Final = (1 << 31) - 1

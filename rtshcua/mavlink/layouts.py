@@ -96,7 +96,7 @@ LAYOUTS: Final = {
     STATUSTEXT: _layout(83, f"<B{TEXT_OCTETS}sHB", "severity text id chunk_seq"),
 }  # fmt: skip
 
-#: : the fields of commands that an autopilot acts on
+#: the fields of commands that an autopilot acts on
 of_command_long: Final = LAYOUTS[COMMAND_LONG].getter("param1 param2 param3 param4 param5 param6 param7 command")
 of_command_int: Final = LAYOUTS[COMMAND_INT].getter("param1 param2 param3 param4 x y z command frame")
 of_position_target: Final = LAYOUTS[SET_POSITION_TARGET_GLOBAL_INT].getter(

@@ -79,6 +79,6 @@ class CopterMode(IntEnum):
         return self.value, 0
 
 
-#: : the names that the autopilots display
+#: the names that the autopilots display
 PX4_NAMES: Final[Mapping[int, str]] = {mode: mode.name.replace("_", " ").title() for mode in Px4Mode}
 COPTER_NAMES: Final[Mapping[int, str]] = {mode: mode.name for mode in CopterMode}

@@ -14,7 +14,7 @@ from rtshcua.mavlink.modes import PX4
 #: octets of a parameter's name
 NAME_OCTETS: Final = 16
 
-#: : MAV_PARAM_TYPE of integers, and their format in place of a float
+#: MAV_PARAM_TYPE of integers, and their format in place of a float
 _INTEGERS: Final = {1: "<Bxxx", 2: "<bxxx", 3: "<Hxx", 4: "<hxx", 5: "<I", 6: "<i"}
 
 

@@ -10,7 +10,7 @@ from types import MappingProxyType
 
 from rtshcua.model.quantity import Dimension
 
-#: : by dimension: the units of the dialect that a signal may have, as spelled in the XML, with their size in
+#: by dimension: the units of the dialect that a signal may have, as spelled in the XML, with their size in
 #: canonical units as numerator and denominator
 UNITS: Mapping[Dimension, Mapping[str, tuple[int, int]]] = MappingProxyType(
     {

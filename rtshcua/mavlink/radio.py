@@ -11,7 +11,7 @@ from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, message_id
 from rtshcua.mavlink.signing import Counts, FrameVerifier
 
 RADIO_STATUS: Final = 109
-#: : the ids of a SiK radio: `RADIO_SOURCE_SYSTEM` '3' and `RADIO_SOURCE_COMPONENT` 'D' of ArduPilot/SiK,
+#: the ids of a SiK radio: `RADIO_SOURCE_SYSTEM` '3' and `RADIO_SOURCE_COMPONENT` 'D' of ArduPilot/SiK,
 #: Firmware/radio/mavlink.c
 RADIO_SYSTEM, RADIO = 51, 68
 #: us; radios report each second

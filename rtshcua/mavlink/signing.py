@@ -21,17 +21,17 @@ EPOCH_US: Final = 1_420_070_400_000_000  # 1 January 2015 in UTC us (guide, "Tim
 UNIT_US: Final = 10
 MINUTE: Final = 6_000_000
 _SECOND: Final = 100_000
-#: : The distance, in timestamps, of frames signed ahead from those signed now: they stay valid for that long while
+#: The distance, in timestamps, of frames signed ahead from those signed now: they stay valid for that long while
 #: normal frames continue.
 LEAD: Final = 3_000_000
-#: : The least interval between two batches, in us: an attacker who sends them raises time by `LEAD + MOST_AHEAD` a
+#: The least interval between two batches, in us: an attacker who sends them raises time by `LEAD + MOST_AHEAD` a
 #: second.
 _LEADS_EVERY_US: Final = 1_000_000
-#: : The most timestamps reserved above `LEAD`, one per frame. A batch needs some hundreds.
+#: The most timestamps reserved above `LEAD`, one per frame. A batch needs some hundreds.
 MOST_AHEAD: Final = _SECOND
-#: : the same number as in the C library (MAVLINK_MAX_SIGNING_STREAMS)
+#: the same number as in the C library (MAVLINK_MAX_SIGNING_STREAMS)
 MOST_STREAMS: Final = 16
-#: : Timestamps have 48 bits, until 2104; timestamps of the last year are refused, so that ours cannot run out.
+#: Timestamps have 48 bits, until 2104; timestamps of the last year are refused, so that ours cannot run out.
 LAST: Final = (1 << 48) - 366 * 24 * 60 * MINUTE
 
 _TAG: Final = 6
@@ -114,10 +114,10 @@ class SignedLink:
         recent = [stream for stream, last in stored.streams.items() if last >= self._ahead - MINUTE]
         self._heard_by = {stream[:2]: stream[2] for stream in sorted(recent, key=stored.streams.__getitem__)}
         self._counts = Counts()
-        #: : called when the stored state changes by more than the passing of time: a new stream, or a leap of the
+        #: called when the stored state changes by more than the passing of time: a new stream, or a leap of the
         #: local time
         self.on_news: Callable[[], object] = lambda: None
-        #: : called with the stream and the timestamp of each frame that is accepted
+        #: called with the stream and the timestamp of each frame that is accepted
         self.on_heard: Callable[[Stream, int], object] = lambda stream, timestamp: None
 
     @property

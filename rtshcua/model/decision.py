@@ -9,7 +9,7 @@ from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.policy import Airspace, Rule
 from rtshcua.model.outcome import Outcome, Reason
 
-#: : the deciding clause; None where a field of the contract or of the request decided
+#: the deciding clause; None where a field of the contract or of the request decided
 Decisive: TypeAlias = Clause | Rule | Airspace | None
 
 

@@ -515,7 +515,7 @@ class FieldUnit(NamedTuple):
     canonical: int = 1
 
 
-#: : the first one that matches a field's name
+#: the first one that matches a field's name
 UNITS: tuple[FieldUnit, ...] = (
     FieldUnit("_us", {"us": 1, "ms": 1000, "s": 1_000_000, "min": 60_000_000}, Dimension.DURATION),
     FieldUnit("_mv", {"mV": 1, "V": 1000}, None),
@@ -524,20 +524,20 @@ UNITS: tuple[FieldUnit, ...] = (
     FieldUnit("_deg", {"deg": 1}, Dimension.ANGLE, 10_000_000),
     FieldUnit("", {"%": 100}, Dimension.RATIO),
 )
-#: : fields with an enumerated value
+#: fields with an enumerated value
 WORDS: Mapping[str, tuple[str, ...]] = {
     "mode": tuple(FlightMode),
     "way": tuple(Direction),
     "held": ("yes", "no"),
     "says": tuple(Voice),
 }
-#: : and the types of their values
+#: and the types of their values
 WORD_TYPES: Mapping[str, type[FlightMode | Direction | Voice]] = {"mode": FlightMode, "way": Direction, "says": Voice}
-#: : fields that are a plain number
+#: fields that are a plain number
 COUNTS = frozenset({"copies", "shuffle"})
-#: : fields that may be negative: south and west, down, and back in time
+#: fields that may be negative: south and west, down, and back in time
 SIGNED = frozenset({"north", "east", "up", "by"})
-#: : fields that are a name
+#: fields that are a name
 NAMES = frozenset({"message", "role"})
 
 

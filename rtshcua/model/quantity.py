@@ -36,7 +36,7 @@ class UnitOfMeasure(NamedTuple):
     denominator: int = 1
 
 
-#: : Units in sources. `m` is a length; where an altitude is expected it means metres above home.
+#: Units in sources. `m` is a length; where an altitude is expected it means metres above home.
 UNITS: dict[str, UnitOfMeasure] = {
     "mm": UnitOfMeasure(Dimension.LENGTH, 1),
     "cm": UnitOfMeasure(Dimension.LENGTH, 10),
@@ -57,7 +57,7 @@ UNITS: dict[str, UnitOfMeasure] = {
     "V": UnitOfMeasure(Dimension.VOLTAGE, 1_000),
 }
 
-#: : The units for display of each dimension, largest first.
+#: The units for display of each dimension, largest first.
 DISPLAY: dict[Dimension, tuple[str, ...]] = {
     Dimension.LENGTH: ("m", "mm"),
     Dimension.ALTITUDE: ("m", "mm"),
@@ -67,7 +67,7 @@ DISPLAY: dict[Dimension, tuple[str, ...]] = {
     Dimension.RATIO: ("%",),
     Dimension.VOLTAGE: ("V", "mV"),
 }
-#: : the smallest value that is displayed in a unit with decimals, in tenths; else one whole unit
+#: the smallest value that is displayed in a unit with decimals, in tenths; else one whole unit
 _LEAST_TENTHS: dict[str, int] = {"m": 1, "m/s": 1}
 
 

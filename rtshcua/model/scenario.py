@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from rtshcua.model.faults import Fault
 from rtshcua.model.flat.code import Clause
 
-#: : the available autopilots
+#: the available autopilots
 FLAVOURS = ("px4", "ardupilot")
 #: the ways in which a run ends (`onboard.ports.Ending`); sources write `_` for `-`
 ENDINGS = (

@@ -85,7 +85,7 @@ class Succeeded(Event, frozen=True):
     token: int
 
 
-#: : the reason of a `CommandFailed` for a command that was not sent because its record could not be stored
+#: the reason of a `CommandFailed` for a command that was not sent because its record could not be stored
 WITHHELD: Final = "withheld"
 
 
@@ -108,7 +108,7 @@ class Hindered(Event, frozen=True):
     text: str
 
 
-#: : how a takeover was detected: the vehicle stands still far from its target, and nothing else shows who flies it
+#: how a takeover was detected: the vehicle stands still far from its target, and nothing else shows who flies it
 PAUSED: Final = "paused"
 
 
@@ -209,7 +209,7 @@ class Noted(Event, frozen=True):
 # ---------------------------------------------------------------- commands and actions
 
 
-#: : the `not_after_us` of a command without a time limit
+#: the `not_after_us` of a command without a time limit
 ALWAYS: Final = (1 << 63) - 1
 
 

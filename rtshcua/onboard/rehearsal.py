@@ -29,9 +29,9 @@ from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.runtime.dispatcher import CONSERVATIVE_US
 
-#: : a deferral that ends by itself once the mission is under way,
+#: a deferral that ends by itself once the mission is under way,
 _COMES: Final = frozenset({Reason.AWAITING_APPROVAL, Reason.PHASE_NOT_REACHED})
-#: : and in a later step also a value that is unknown before the vehicle flies
+#: and in a later step also a value that is unknown before the vehicle flies
 _COMES_LATER: Final = _COMES | {Reason.STATE_UNKNOWN, Reason.SAFETY_UNKNOWN}
 
 

@@ -182,7 +182,7 @@ class Approvals:
         )
 
 
-#: : the subject of an answer, its role and person, and whether it grants
+#: the subject of an answer, its role and person, and whether it grants
 _Subject = tuple[bytes | tuple[int, tuple[int, ...]], int, int, int]
 
 

@@ -24,9 +24,9 @@ from rtshcua.wire.digest import DIGEST_BYTES
 from rtshcua.wire.preparation import ParameterWrite
 from rtshcua.wire.request import DEGRADE
 
-#: : the digest before the first entry
+#: the digest before the first entry
 START: Final = bytes(DIGEST_BYTES)
-#: : the length of an entry's mark in a statement, in octets of its digest, and the greatest number of marks
+#: the length of an entry's mark in a statement, in octets of its digest, and the greatest number of marks
 MARK_BYTES: Final = 8
 MOST_MARKS: Final = 128
 

@@ -20,9 +20,9 @@ from rtshcua.wire.names import Artefact
 from rtshcua.wire.trust import TrustRoot, key_refusal, proposer_refusal
 from rtshcua.wire.untrusted import Untrusted
 
-#: : a larger bundle is refused unread, in bytes
+#: a larger bundle is refused unread, in bytes
 MAX_BUNDLE: Final = 16 << 20
-#: : the most CBOR items that are decoded of an unverified policy or mission
+#: the most CBOR items that are decoded of an unverified policy or mission
 MAX_UNVERIFIED: Final = 1 << 17
 
 _F = TypeVar("_F", bound=Flat)

@@ -14,13 +14,13 @@ from collections.abc import Mapping, Sequence
 from struct import Struct
 from typing import Final, TypeAlias, cast
 
-#: : the type of a decoded item; arrays are decoded as tuples
+#: the type of a decoded item; arrays are decoded as tuples
 Value: TypeAlias = "bool | int | bytes | str | tuple[Value, ...] | dict[str | int, Value] | None"
 
 #: how deep arrays and maps may nest
 MAX_DEPTH: Final = 32
 
-#: : the default limit of `decode`, in bytes
+#: the default limit of `decode`, in bytes
 LIMIT: Final = 16 << 20
 
 
@@ -144,7 +144,7 @@ def _utf8(text: str) -> bytes:
 #: the least argument that needs 1, 2, 4 or 8 bytes after the initial byte
 _LEAST: Final = (24, 1 << 8, 1 << 16, 1 << 32)
 _INT64_MAX: Final = (1 << 63) - 1
-#: : the integers that are encoded in the head itself, which are most of a bundle
+#: the integers that are encoded in the head itself, which are most of a bundle
 _SMALL: Final = {bytes([n]): n for n in range(24)} | {bytes([0x20 | n]): ~n for n in range(24)}
 _SIMPLE: Final[dict[int, bool | None]] = {0xF4: False, 0xF5: True, 0xF6: None}
 

@@ -5,18 +5,18 @@ from typing import Final
 
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 
-#: : the greatest difference between a claimed time of day and the boundary's own, beyond the errors of both, in us
+#: the greatest difference between a claimed time of day and the boundary's own, beyond the errors of both, in us
 APART_US: Final = 2_000_000
-#: : the growth of the error of UTC per second, in us: the kernel assumes no worse clock (500 ppm, MAXFREQ)
+#: the growth of the error of UTC per second, in us: the kernel assumes no worse clock (500 ppm, MAXFREQ)
 DRIFT_US: Final = 500
-#: : the greatest error of the UTC of an autopilot with GPS, in us. PX4 corrects its clock when it is off by more than
+#: the greatest error of the UTC of an autopilot with GPS, in us. PX4 corrects its clock when it is off by more than
 #: 5 s, because a correction stops everything else for a moment (`SET_CLOCK_DRIFT_TIME_S`, src/drivers/gps/gps.cpp).
 #: ArduPilot sets its clock from the receiver while it is disarmed, and leaves it alone while it is armed (AP_RTC.cpp,
 #: `set_utc_usec`): the error is some ms at arming, plus the crystal's drift since
 AUTOPILOT_US: Final = {"px4": 6_000_000, "ardupilot": 1_000_000}
-#: : SYSTEM_TIME has a resolution of 1 ms
+#: SYSTEM_TIME has a resolution of 1 ms
 STAMP_US: Final = 1_000
-#: : a known time since the epoch is above this (2001); a smaller value counts from the vehicle's boot
+#: a known time since the epoch is above this (2001); a smaller value counts from the vehicle's boot
 UNIX_US: Final = 10**15
 
 

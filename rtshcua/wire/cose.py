@@ -20,7 +20,7 @@ ED25519: Final = -19
 _TAG_18: Final = b"\xd2"  # COSE_Sign1
 _ALGORITHM, _CONTENT_TYPE, _KID = 1, 3, 4  # header labels (RFC 9052, section 3.1)
 _SIGNATURE_BYTES: Final = 64
-#: : the longest protected header, in bytes: ours have less than 80, and a limit prevents needless work
+#: the longest protected header, in bytes: ours have less than 80, and a limit prevents needless work
 MAX_PROTECTED: Final = 200
 #: an envelope is an array, two strings, an empty map and a signature; a header has three pairs
 _ENVELOPE_ITEMS: Final = 5

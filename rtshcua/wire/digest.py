@@ -3,7 +3,7 @@
 from hashlib import sha256
 from typing import Any, Final, NewType
 
-#: : the kind of data in a digest; a label contains no NUL, so that label and data cannot be confused
+#: the kind of data in a digest; a label contains no NUL, so that label and data cannot be confused
 Domain = NewType("Domain", bytes)
 
 POLICY: Final = Domain(b"rtshcua/policy")  # the payload of a policy envelope

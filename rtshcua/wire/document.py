@@ -17,12 +17,12 @@ from rtshcua.wire.names import Artefact
 from rtshcua.wire.trust import HUMAN, TrustRoot, key_refusal, speaker_refusal
 from rtshcua.wire.untrusted import Untrusted
 
-#: : length of a flight's id in bytes: random for each flight, and `boot` in the genesis of its log
+#: length of a flight's id in bytes: random for each flight, and `boot` in the genesis of its log
 FLIGHT_BYTES: Final = 16
-#: : a larger document is refused unread, in bytes; only one that holds a mission is large
+#: a larger document is refused unread, in bytes; only one that holds a mission is large
 MAX_DOCUMENT: Final = 1 << 18
 MAX_WITHOUT_MISSION: Final = 1 << 11
-#: : the longest validity of an approval, a recall or a cancellation, in us
+#: the longest validity of an approval, a recall or a cancellation, in us
 MAX_LIFE_US: Final = 3_600_000_000
 
 _OUTSET: Final = b"\xd2\x84"  # tag 18, an array of four

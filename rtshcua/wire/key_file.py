@@ -29,10 +29,10 @@ from cryptography.hazmat.primitives.kdf.scrypt import Scrypt
 from rtshcua.wire.keys import Duty, SigningKey, WrongDuty
 from rtshcua.wire.untrusted import Untrusted
 
-#: : the largest key file, in bytes
+#: the largest key file, in bytes
 MAX_KEY_FILE: Final = 4096
 
-#: : log2 of the N of scrypt for new keys, and its range for existing keys
+#: log2 of the N of scrypt for new keys, and its range for existing keys
 COST = 17
 COSTS: Final = range(14, 19)
 _BLOCK, _LANES = 8, 1  # r and p of scrypt

@@ -17,14 +17,14 @@ KID_BYTES: Final = 16
 PUBLIC_BYTES: Final = 32
 SEED_BYTES: Final = 32
 
-#: : the field's prime, and the y of each point of small order: anybody can make signatures for such a key
+#: the field's prime, and the y of each point of small order: anybody can make signatures for such a key
 _P: Final = 2**255 - 19
 _Y: Final = (
     0x05FC536D880238B13933C6D305ACDFD5F098EFF289F4C345B027B2C28F95E826  # of the points of order 8, and its negative
 )
 _SMALL_ORDER: Final = frozenset({0, 1, _P - 1, _Y, _P - _Y})
 
-#: : means every role, policy or vehicle; a source is always named
+#: means every role, policy or vehicle; a source is always named
 ANY: Final = "*"
 
 _SOURCES: Final = frozenset(kind.name.lower() for kind in SourceKind)

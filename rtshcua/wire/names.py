@@ -21,11 +21,11 @@ class Artefact:
         return f"application/vnd.{self.name.replace('/', '.')}{self.suffix}"
 
 
-#: : limits of CBOR items for an artefact of a fixed form, and for one with lists
+#: limits of CBOR items for an artefact of a fixed form, and for one with lists
 FEW: Final = 64
 MANY: Final = 1 << 16
 
-#: : the place that says which revision reads earlier versions
+#: the place that says which revision reads earlier versions
 COMPATIBILITY: Final = "docs/compatibility.md"
 
 ROOT: Final = Artefact("rtshcua/root", 2, items=MANY)  # 2: with policies of mission keys, persons of approval keys

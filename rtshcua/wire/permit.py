@@ -20,13 +20,13 @@ _BODY = Struct(">BBhhQBBq")
 _MAC = 32
 SIZE = _BODY.size + _MAC
 
-#: : The validity of a permit for a link that was just decided, in us.
+#: The validity of a permit for a link that was just decided, in us.
 LINK_VALID_US = 1_000_000
-#: : How often a standing permit allows the last link of the contingency to be repeated, each time under a serial of
+#: How often a standing permit allows the last link of the contingency to be repeated, each time under a serial of
 #: its own: repeated landing commands are harmless, and a vehicle whose boundary no longer answers has no other
 #: option.
 AGAIN = 16
-#: : The reason when an unused permit is withdrawn: its step may be decided again.
+#: The reason when an unused permit is withdrawn: its step may be decided again.
 WITHDRAWN = "permit/unsent"
 
 

@@ -15,7 +15,7 @@ from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.trust import TrustRoot, key_refusal
 from rtshcua.wire.untrusted import Untrusted
 
-#: : a larger record is refused unread, in bytes
+#: a larger record is refused unread, in bytes
 MAX_QUALIFICATION: Final = 1 << 18
 
 
@@ -104,7 +104,7 @@ class Qualification(Flat, frozen=True):
         return tuple(changes)
 
 
-#: : the calendar ends here
+#: the calendar ends here
 _YEAR_10000_US: Final = 253_402_300_800_000_000
 
 

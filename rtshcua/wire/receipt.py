@@ -8,9 +8,9 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.wire import artefact, names
 from rtshcua.wire.artefact import ArtefactError
 
-#: : the kind of a document
+#: the kind of a document
 UNKNOWN, APPROVAL, RECALL, REPLACEMENT, CANCELLATION = range(5)
-#: : the slug of an accepted document
+#: the slug of an accepted document
 ACCEPTED: Final = "accepted"
 
 

@@ -24,7 +24,7 @@ from rtshcua.wire.document import DocumentError, check_flight, open_document, si
 from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
 from rtshcua.wire.trust import HUMAN, TrustRoot
 
-#: : the most replacements of one flight
+#: the most replacements of one flight
 MAX_REPLACEMENTS: Final = 64
 
 

@@ -22,9 +22,9 @@ from rtshcua.model.flat.situation import Now, State
 from rtshcua.wire import artefact, names
 from rtshcua.wire.digest import DIGEST_BYTES
 
-#: : the kinds of requests: a mission step, a link of a step's fallback chain, a link of the contingency
+#: the kinds of requests: a mission step, a link of a step's fallback chain, a link of the contingency
 STEP, FALLBACK_LINK, CONTINGENCY_LINK = 0, 1, 2
-#: : the `link` of the target of a degrade rule
+#: the `link` of the target of a degrade rule
 DEGRADE: Final = -1
 
 
@@ -38,13 +38,13 @@ class Ref(NamedTuple):
     link: int
 
 
-#: : belongs to no step and no link
+#: belongs to no step and no link
 NOTHING: Final = Ref(-1, -1, -1)
 
 
 #: the largest request in octets
 MAX_SIZE: Final = 1023
-#: : Ages saturate at this value; the stale time of each signal is below it.
+#: Ages saturate at this value; the stale time of each signal is below it.
 MAX_AGE_US: Final = MAX_STALE + 1
 UNKNOWN: Final = -(1 << 63)
 _TRUTHS: Final = frozenset({1, 2, 4})

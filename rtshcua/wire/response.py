@@ -24,9 +24,9 @@ from rtshcua.wire.digest import DIGEST_BYTES
 from rtshcua.wire.permit import SIZE
 from rtshcua.wire.request import DEGRADE
 
-#: : `target` of a decision without a target: less than `-1 - rule` for any rule
+#: `target` of a decision without a target: less than `-1 - rule` for any rule
 NO_TARGET: Final = -(1 << 15) - 1
-#: : `clause` when the contract itself decided
+#: `clause` when the contract itself decided
 NO_CLAUSE: Final = -1
 
 _OUTCOMES: Final = tuple(Outcome)

@@ -15,15 +15,15 @@ from rtshcua.wire import artefact, cose, names
 from rtshcua.wire.keys import ANY, KID_BYTES, PUBLIC_BYTES, Duty, SigningKey, VerificationKey, is_strong
 from rtshcua.wire.untrusted import Untrusted
 
-#: : the source of a human answer; a key that is only authorised through an agent answers nothing
+#: the source of a human answer; a key that is only authorised through an agent answers nothing
 HUMAN: Final = "operator"
-#: : the form of people's names: each name has one spelling, so that two names are two people
+#: the form of people's names: each name has one spelling, so that two names are two people
 PERSON: Final = re.compile(r"[a-z0-9][a-z0-9._-]{0,63}")
 
-#: : length of the name of a link's key in bytes, as in `revoked`: it signs frames and is not named in a root
+#: length of the name of a link's key in bytes, as in `revoked`: it signs frames and is not named in a root
 LINK_ID_BYTES: Final = 8
 
-#: : a larger root is refused unread, in bytes
+#: a larger root is refused unread, in bytes
 MAX_ROOT: Final = 1 << 20
 
 

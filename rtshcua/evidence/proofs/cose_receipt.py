@@ -34,7 +34,7 @@ _RFC9162_SHA256: Final = 1
 _INCLUSION: Final = -1
 _RECORD, _ROOT = "rtshcua/record", "rtshcua/root"
 _HASH: Final = 32
-#: : the most CBOR items of a receipt, of its header, and of its proof, whose path has at most 64 nodes
+#: the most CBOR items of a receipt, of its header, and of its proof, whose path has at most 64 nodes
 _ITEMS: Final = 128
 
 

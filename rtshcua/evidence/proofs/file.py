@@ -23,7 +23,7 @@ from rtshcua.wire import artefact, names
 from rtshcua.wire.cbor import CborError
 from rtshcua.wire.untrusted import Untrusted
 
-#: : a larger file is refused unread, in octets
+#: a larger file is refused unread, in octets
 MAX_PROOF: Final = 8 << 20
 
 _EXTRA: Final = "extra "

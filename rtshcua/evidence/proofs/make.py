@@ -33,7 +33,7 @@ from rtshcua.wire import cose
 from rtshcua.wire.cbor import CborError
 from rtshcua.wire.untrusted import Untrusted
 
-#: : returns the lines of the log from its beginning, on each call
+#: returns the lines of the log from its beginning, on each call
 Lines = Callable[[], Iterable[bytes]]
 
 _EVENT = b',"event":"%s"' % ANCHORED.encode()

@@ -13,9 +13,9 @@ from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.note import MARK, parse
 from rtshcua.evidence.witnessing.cosign import Cosignature, cosignatures
 
-#: : the event of an effect with an anchor in its `detail`
+#: the event of an effect with an anchor in its `detail`
 ANCHORED: Final = "anchored"
-#: : the longest note that is read, in characters: the checkpoint and some dozens of cosignatures
+#: the longest note that is read, in characters: the checkpoint and some dozens of cosignatures
 LONGEST_NOTE: Final = 1 << 14
 
 

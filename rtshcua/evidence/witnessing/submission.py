@@ -19,7 +19,7 @@ from rtshcua.evidence.records import Close, DecisionRecord, Effect, encode, is_s
 from rtshcua.evidence.witnessing.cosign import Cosignature, read_cosignature
 from rtshcua.evidence.witnessing.witness import CosignRequest
 
-#: : the most notes of a chain in one request; a witness that missed more is updated in several requests
+#: the most notes of a chain in one request; a witness that missed more is updated in several requests
 MOST_NOTES: Final = 32
 
 

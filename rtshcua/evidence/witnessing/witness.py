@@ -29,7 +29,7 @@ _HASH_BYTES: Final = 32
 _LONGEST_SIZE: Final = 16  # digits
 _STRANGER: Final = "not signed by the key that the previous record names, nor by the log's key"
 
-#: : returns the public log keys that the trust root names for a vehicle
+#: returns the public log keys that the trust root names for a vehicle
 LogKeys = Callable[[str], Iterable[bytes]]
 
 

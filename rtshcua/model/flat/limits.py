@@ -34,7 +34,7 @@ MAX_RULE_KEYS = 1 << 18  # entries of the rule index: skills times roles, summed
 MAX_INVOCATIONS = 16_384
 MAX_PHASES = 64
 MAX_PATH = 8_192  # points
-#: : edges of zones that the legs of a mission's paths are compared with, plus one for each leg and zone: a request
+#: edges of zones that the legs of a mission's paths are compared with, plus one for each leg and zone: a request
 #: waits for those of its step, and the boundary must answer within a second in flight
 MAX_COMPARED = 1 << 23
 MAX_MONITORS = 32

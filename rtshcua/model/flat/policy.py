@@ -55,7 +55,7 @@ class AfterSilence(IntEnum):
     CONTINGENCY = 1  # the mission is aborted: the contingency flies
 
 
-#: : the longest silence after which a flight simply continues, if the policy sets none, us
+#: the longest silence after which a flight simply continues, if the policy sets none, us
 SILENCE_US = 30_000_000
 
 

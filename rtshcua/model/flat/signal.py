@@ -4,9 +4,9 @@ from rtshcua.model.flat.struct import Flat
 
 NUMBER, ENUMERATION, POSITION = 0, 1, 2
 
-#: : The name of the signal whose value is the measured drain per minute of its field.
+#: The name of the signal whose value is the measured drain per minute of its field.
 DRAIN = "battery.drain"
-#: : The name of the signal whose value is its field divided by the number of cells of the vehicle.
+#: The name of the signal whose value is its field divided by the number of cells of the vehicle.
 CELL = "battery.cell"
 
 

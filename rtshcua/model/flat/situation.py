@@ -17,7 +17,7 @@ class State(Flat, frozen=True):
     monitors: tuple[int, ...] = ()
 
 
-#: : the error bound of an unverified UTC, in us, with which every condition on the time of day is unknown
+#: the error bound of an unverified UTC, in us, with which every condition on the time of day is unknown
 UTC_UNKNOWN_US = 1 << 52
 
 

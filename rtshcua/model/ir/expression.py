@@ -72,7 +72,7 @@ class Range(Node, kw_only=True):
     high: "Value"
 
 
-#: : the possible values of a comparison or an argument
+#: the possible values of a comparison or an argument
 Value = Quantity | Coordinates | TimeOfDay | Reference | Arithmetic | Function
 
 

@@ -30,7 +30,7 @@ class RuleDecl(Node):
     another: Name | None  # confirm: `and another of role supervisor`, who is another person
     within: Quantity | None  # confirm: `within 30 s`
     target: LinkDecl | None  # degrade: `to return_home`
-    #: : the `use` and `delegate` statements that produced an elaborated rule, the outermost first; empty for a
+    #: the `use` and `delegate` statements that produced an elaborated rule, the outermost first; empty for a
     #: written rule
     origin: tuple[Node, ...] = ()
     where_fitted: bool = False

@@ -19,21 +19,21 @@ from rtshcua.onboard.enforcement.executor import Commands, SignedAhead
 from rtshcua.onboard.ports import Command
 from rtshcua.wire.request import FALLBACK_LINK
 
-#: : how often frames are signed ahead, in us: half of their validity
+#: how often frames are signed ahead, in us: half of their validity
 EVERY_US: Final = 15_000_000
-#: : and after an attempt that failed
+#: and after an attempt that failed
 _AGAIN_US: Final = 1_000_000
-#: : how often the last link of the contingency is signed: as often as an unattended run may send it
+#: how often the last link of the contingency is signed: as often as an unattended run may send it
 LAST: Final = 12
-#: : the most frames of one link (`RT_MOST_AHEAD` in boundary/enforcement/calls.h)
+#: the most frames of one link (`RT_MOST_AHEAD` in boundary/enforcement/calls.h)
 MOST: Final = 128
 
 NOT_AHEAD: Final = Refusal("permit/not-ahead", "the boundary is lost, and this link was not signed ahead")
 NO_COPY: Final = Refusal("frame/not-ahead", "the boundary is lost, and all signed copies of this frame are used")
 
-#: : makes the frames of a command, each as often as it may have to be sent
+#: makes the frames of a command, each as often as it may have to be sent
 Encode = Callable[[Command], Sequence[bytes]]
-#: : signs the frames of a link: the standing permit, kind and number of the link, its frames, and the time
+#: signs the frames of a link: the standing permit, kind and number of the link, its frames, and the time
 Sign = Callable[[bytes, int, int, Sequence[bytes], int], SignedAhead | Refusal]
 
 # the fields that differ between two equivalent frames of one command: the assumed home, the retry count, and our time

@@ -79,7 +79,7 @@ def is_housekeeping(frame: Frame) -> bool:
     return rule is not None and rule(frame.fields)
 
 
-#: : the system id of a ground station, by convention and by ArduPilot's default of `SYSID_MYGCS`
+#: the system id of a ground station, by convention and by ArduPilot's default of `SYSID_MYGCS`
 _GROUND_STATION: Final = 255
 
 
@@ -185,17 +185,17 @@ _BEFORE_FLIGHT: Final[dict[int, Callable[[_Fields], bool]]] = {
 
 # ---------------------------------------------------------------- motion
 
-#: : mm: the greatest change of home's height above sea between the frame that reported it and the one that uses it;
+#: mm: the greatest change of home's height above sea between the frame that reported it and the one that uses it;
 #: 0.7 m in the recorded flight of PX4
 DATUM_MOVES: Final = 2_000
 _ROUNDING: Final = 2  # mm, mm/s
-#: : 1e-7 degree of latitude, 5 m: the greatest distance to a point of its path at which the vehicle may be sent to
+#: 1e-7 degree of latitude, 5 m: the greatest distance to a point of its path at which the vehicle may be sent to
 #: the next one; the adapters count it as arrived within 2 m
 NEAR: Final = 449
 
-#: : command and frame of reference (heights above mean sea level) of a DO_REPOSITION,
+#: command and frame of reference (heights above mean sea level) of a DO_REPOSITION,
 _REPOSITION: Final = (enums.MAV_CMD_DO_REPOSITION, enums.MAV_FRAME_GLOBAL)
-#: : and its flags: change to Hold, or only act in Hold, which overrides no pilot who chose another mode
+#: and its flags: change to Hold, or only act in Hold, which overrides no pilot who chose another mode
 _FLAGS: Final = (enums.MAV_DO_REPOSITION_FLAGS_CHANGE_MODE, 0)
 _NOWHERE: Final = (enums.NO_PLACE, enums.NO_PLACE)
 
@@ -205,7 +205,7 @@ _places: Final = {
 }
 _armings: Final = {number: LAYOUTS[number].getter("command param2") for number in (COMMAND_LONG, COMMAND_INT)}
 
-#: : parameters 2 and 3 of DO_SET_MODE for a kind of motion
+#: parameters 2 and 3 of DO_SET_MODE for a kind of motion
 _MODES: Final[Mapping[int, Mapping[int, tuple[int, int]]]] = {
     PX4: {
         MotionKind.CLIMB: Px4Mode.HOLD.parameters,  # it is armed in Hold
@@ -222,7 +222,7 @@ _MODES: Final[Mapping[int, Mapping[int, tuple[int, int]]]] = {
     },
 }
 _TRAVELS: Final = (MotionKind.FLY, MotionKind.COVER)
-#: : frames that may carry out a command (`carries_out`); none sets a parameter or uploads a fence
+#: frames that may carry out a command (`carries_out`); none sets a parameter or uploads a fence
 COMMANDS: Final = frozenset({COMMAND_LONG, COMMAND_INT, SET_POSITION_TARGET_GLOBAL_INT})
 
 

@@ -34,7 +34,7 @@ from rtshcua.wire.request import FALLBACK_LINK, STEP, Ref, Request, decode
 from rtshcua.wire.response import NO_CLAUSE, NO_TARGET, Status, encode, encode_refusal
 from rtshcua.wire.untrusted import Untrusted
 
-#: : the greatest difference by which UTC and monotonic time may diverge in a session, in us: more than the error of a
+#: the greatest difference by which UTC and monotonic time may diverge in a session, in us: more than the error of a
 #: good clock, and less than matters
 CLOCKS_PART_US: Final = 3_000_000
 _Numbers = dict[Clause | Rule | Airspace, int]
@@ -77,7 +77,7 @@ class SoftwareBoundary:
     decision.
     """
 
-    #: : it exists as long as the runtime does
+    #: it exists as long as the runtime does
     lost = None
 
     def __init__(
@@ -100,7 +100,7 @@ class SoftwareBoundary:
         self._monitors = len(policy.monitors)
         self._shared: _Numbers = {clause: at for at, clause in enumerate(response.shared_clauses(policy.policy))}
         self._own = self._own_numbers(in_force.bundle.mission.invocations)
-        #: : the prepared parts of missions that may come into force, by the document that contains them
+        #: the prepared parts of missions that may come into force, by the document that contains them
         self._ready: dict[bytes, _Ready] = {}
         self._now_us = 0  # of the last request, because time must not go back
         self._ahead_us: int | None = None  # UTC minus monotonic time at the first request

@@ -26,7 +26,7 @@ from rtshcua.wire.permit import AGAIN, WITHDRAWN, Permit, open_permit
 from rtshcua.wire.preparation import Preparation, open_preparation
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP
 
-#: : a command without its token, and until when it may be sent
+#: a command without its token, and until when it may be sent
 _Made = tuple[str, int, tuple[int, ...], tuple[int, ...], int, int, int, bool]
 #: the commands of a mission, by kind, step and link
 Made = dict[tuple[int, int, int], _Made]

@@ -31,15 +31,15 @@ from rtshcua.onboard.ports import Command
 from rtshcua.wire.boundary_chain import BoundaryChain
 from rtshcua.wire.preparation import ParameterWrite
 
-#: : our ids, in the vehicle's own system, and those of the addressee
+#: our ids, in the vehicle's own system, and those of the addressee
 OURS: Final = enums.MAV_COMP_ID_ONBOARD_COMPUTER
 AUTOPILOT: Final = enums.MAV_COMP_ID_AUTOPILOT1
-#: : mm: the greatest difference of a reported height of home from the one when the takeoff was permitted: arming sets
+#: mm: the greatest difference of a reported height of home from the one when the takeoff was permitted: arming sets
 #: home anew, and GPS heights drift. A larger difference is ignored, because every transmitted height above sea would
 #: change with it.
 HOME_MOVES: Final = 10_000
 
-#: : us: the greatest age of a heartbeat, and of a report of the landed state, of a vehicle that counts as on the
+#: us: the greatest age of a heartbeat, and of a report of the landed state, of a vehicle that counts as on the
 #: ground
 STANDS_US: Final = 3_000_000
 
@@ -65,9 +65,9 @@ NOT_DOWN: Final = Refusal(
 SESSION_OVER: Final = Refusal("frame/session-over", "the boundary signed that its session ends here")
 NO_SESSION: Final = Refusal("frame/no-session", "the frame moves the vehicle without a permit")
 NOT_COVERED: Final = Refusal("frame/not-covered", "the frame is not part of the permitted command")
-#: : the leg to it was never checked
+#: the leg to it was never checked
 OUT_OF_ORDER: Final = Refusal("frame/out-of-order", "the frame is for a point of the path before its turn")
-#: : not sent, without a failure
+#: not sent, without a failure
 UNSIGNED: Final = Refusal("frame/unsigned", "the frame moves nothing, and the boundary that would sign it is lost")
 TOO_MANY_AHEAD: Final = Refusal("frame/too-many-ahead", "more frames were signed ahead than any link needs")
 LATE: Final = Refusal("frame/late", "the first frame of the command comes after its permit's time")
@@ -116,15 +116,15 @@ class _Session:
 class FrameSession:
     """The gate for outgoing frames. Only the executor opens and closes it."""
 
-    #: : this gate exists as long as its adapter does
+    #: this gate exists as long as its adapter does
     may_be_lost = is_mute = False
 
     def __init__(self) -> None:
-        #: : the chain of the frames that pass
+        #: the chain of the frames that pass
         self.chain = BoundaryChain()
         self._signer: SignedLink | None = None
         self._session: _Session | None = None
-        #: : whether a frame was sent or signed ahead since the last permit
+        #: whether a frame was sent or signed ahead since the last permit
         self.let_out = False
         self._here: tuple[int, int] | None = None  # 1e-7 degree
         self._started = False  # a session was opened: fences are no longer changed

@@ -33,14 +33,14 @@ from rtshcua.wire.request import STEP
 from rtshcua.wire.response import Status, encode_refusal
 from rtshcua.wire.untrusted import Untrusted
 
-#: : makes one call, and returns its answer
+#: makes one call, and returns its answer
 Call = Callable[[bytes], bytes]
 
 (
     PART, LOAD, ENFORCE, PRESENT, DISPATCH, STAND_IN, ENDED, LANDED, RELEASE, OBSERVE, SEAL, BEGIN, STATEMENT, DIGEST,
     PERMIT, PREPARE, PREPARED, STANDS, AHEAD, FLIGHT, LOG, TIME, WITHDRAW,
 ) = range(1, 24)  # fmt: skip
-#: : octets of a bundle or a document in one call
+#: octets of a bundle or a document in one call
 MAX_PART: Final = 60_000
 
 _FINE: Final = 0
@@ -52,7 +52,7 @@ _PERMITTED: Final = Struct(">BhhQq")
 _SERIAL_BYTES: Final = 8
 _TOLD: Final = Struct(">BqqqQ")
 
-#: : the result of a missing or malformed answer
+#: the result of a missing or malformed answer
 LOST: Final = Refusal("boundary-lost", "the boundary does not answer, or its answer is malformed")
 
 
@@ -71,7 +71,7 @@ def _known(*modules: object) -> dict[str, Refusal]:
     return {refusal.slug: refusal for refusal in found}
 
 
-#: : the reasons of refusals, by slug, with the texts of the boundary in this process
+#: the reasons of refusals, by slug, with the texts of the boundary in this process
 _REFUSALS: Final[Mapping[str, Refusal]] = MappingProxyType(_known(executor, frames, preparation))
 
 
@@ -82,9 +82,9 @@ class Caller:
         """`signs`: the boundary has the link's key."""
         self._call = call
         self.signs = signs
-        #: : whether the boundary is lost
+        #: whether the boundary is lost
         self.lost = False
-        #: : whether the last loaded mission had been opened before: then no step of it may begin
+        #: whether the last loaded mission had been opened before: then no step of it may begin
         self.reopened = False
 
     def __call__(self, kind: int, *parts: bytes) -> bytes | Refusal:
@@ -172,7 +172,7 @@ class IsolatedBoundary:
         self._caller = caller
         self._in_force = in_force
         self._commands = commands
-        #: : the commands of missions that may come into force, made ahead, by the document that contains them
+        #: the commands of missions that may come into force, made ahead, by the document that contains them
         self._ready: dict[bytes, Made] = {}
 
     @property
@@ -391,7 +391,7 @@ class IsolatedIssuer:
 
     def __init__(self, caller: Caller, settings: Mapping[str, int]) -> None:
         self._caller = caller
-        #: : the parameters to set before the flight
+        #: the parameters to set before the flight
         self.settings = dict(settings)
 
     def permit(self, ask: bytes, now_us: int) -> bytes | Refusal:

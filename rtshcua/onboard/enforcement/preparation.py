@@ -13,13 +13,13 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.parameters import shown, value_of
 from rtshcua.wire.preparation import Preparation, decode, seal
 
-#: : the validity of a preparation permit, in us: enough to read all of its parameters several times
+#: the validity of a preparation permit, in us: enough to read all of its parameters several times
 VALID_US: Final = 30_000_000
 
-#: : the most permits of one session, because the record of used ones has a fixed size in the C boundary
+#: the most permits of one session, because the record of used ones has a fixed size in the C boundary
 MOST_PERMITS: Final = 1_023
 
-#: : the parameters that may be set, with their values: bounds of the autopilot's own fence, its reaction to a breach
+#: the parameters that may be set, with their values: bounds of the autopilot's own fence, its reaction to a breach
 #: (hold, return, land), and the height of its return. Ranges are those of the parameter references of ArduCopter 4.7
 #: and PX4 1.16.
 SETTABLE: Final[Mapping[str, tuple[float, ...] | range]] = {
@@ -81,7 +81,7 @@ class PreparationIssuer:
     def __init__(
         self, key: bytes, settings: Mapping[str, int], owed: Mapping[str, Owed] = MappingProxyType({})
     ) -> None:
-        #: : the parameters to set before the flight
+        #: the parameters to set before the flight
         self.settings = dict(settings)
         self._key = key
         self._owed = dict(owed)

@@ -20,10 +20,10 @@ from rtshcua.onboard.runtime.view import Decided
 from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, STEP, Ref, Request, encode
 from rtshcua.wire.response import Status, decode
 
-#: : the number of decisions in the display
+#: the number of decisions in the display
 SHOWN = 6
 _OUTCOMES = {outcome: outcome.name.lower() for outcome in Outcome}
-#: : the MAV_SEVERITY with which ground stations are informed of a decision: info, warning, notice, warning
+#: the MAV_SEVERITY with which ground stations are informed of a decision: info, warning, notice, warning
 _SEVERITIES = {Outcome.ALLOW: 6, Outcome.DENY: 4, Outcome.DEFER: 5, Outcome.FALLBACK: 4}
 
 

@@ -33,15 +33,15 @@ from rtshcua.onboard.runtime.supervisor import RetryPolicy, Supervisor
 from rtshcua.onboard.runtime.view import RunStage, RuntimeView
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref
 
-#: : the effect that records it in the log
+#: the effect that records it in the log
 MAY_FLY: Final = "may-fly"
 
-#: : why this run stops watching
+#: why this run stops watching
 _WHY: Mapping[Ending, str] = {
     Ending.STOOD_DOWN: "somebody else flies the vehicle, so this run sends nothing more and stops watching",
     Ending.LINK_LOST: "the vehicle is not heard or does not answer, so it can be neither watched nor commanded",
 }
-#: : after any abort: no command is left that could be sent
+#: after any abort: no command is left that could be sent
 _TRIED: Final = (
     "the last link of the contingency was sent as often as allowed, and no landing was "
     "observed; this run may send nothing else, so it ends and stops watching"
@@ -49,7 +49,7 @@ _TRIED: Final = (
 OWN_FAILSAFE: Final = (
     "the autopilot's own failsafe flies the vehicle, so this run sends nothing more and stops watching"
 )
-#: : nothing else shows who it was
+#: nothing else shows who it was
 PAUSED: Final = (
     "the vehicle stands far from its target as if somebody had paused it, who may resume the "
     "flight at any time, so this run sends nothing more and stops watching; if nobody did, "
@@ -73,15 +73,15 @@ def may_fly(
     return f"{last_seen}; the vehicle may be flying: {why}"
 
 
-#: : the effect that records the request to replace a step that is not admitted
+#: the effect that records the request to replace a step that is not admitted
 REPLAN: Final = "replan"
-#: : why a command was `late`
+#: why a command was `late`
 LATE: Final = (
     "nothing was sent: this computer was too busy, or its disk too slow, to send the command within its permit's time"
 )
-#: : `late`: the permit's time was over when the command was to be sent, or when its first frame was
+#: `late`: the permit's time was over when the command was to be sent, or when its first frame was
 _LATE: Final = ("late", frames.LATE.slug)
-#: : reasons for the end of a run, the most important last
+#: reasons for the end of a run, the most important last
 _GRAVITY = (Ending.ABORTED, Ending.CANCELLED, Ending.RECALLED, Ending.INTERRUPTED, Ending.EVIDENCE_LOST)
 
 
@@ -100,7 +100,7 @@ class MissionController:
         self._unfit = ""  # why the vehicle cannot become ready
         self.stage = RunStage.WAITING
         self.ending: Ending | None = None
-        #: : the warning that the vehicle may be flying after the end of the run; empty if it does not
+        #: the warning that the vehicle may be flying after the end of the run; empty if it does not
         self.may_fly = ""
         self._cause: Ending | None = None  # why the mission was aborted; None: it was not
         self._began_us: int | None = None

@@ -14,16 +14,16 @@ from rtshcua.onboard.runtime.journal import Detail, Journal
 from rtshcua.wire.permit import WITHDRAWN
 from rtshcua.wire.request import FALLBACK_LINK, STEP, Ref
 
-#: : The default until enough was measured, in us: ten times more than measured on the development machines.
+#: The default until enough was measured, in us: ten times more than measured on the development machines.
 CONSERVATIVE_US = 20_000
 WINDOW = 128
 _ENOUGH = 8
-#: : the vehicle was observed to obey the dispatched command; the detail is its reported target, if any
+#: the vehicle was observed to obey the dispatched command; the detail is its reported target, if any
 OBEYED: Final = "obeyed"
-#: : the record of a fallback that was sent to fly home or land, and ended without a report of a landing
+#: the record of a fallback that was sent to fly home or land, and ended without a report of a landing
 UNCONFIRMED: Final = "sent but not confirmed: no landing was observed"
 _UNCONFIRMED = ("time-over", "released")
-#: : why a permit was not turned into a command in time
+#: why a permit was not turned into a command in time
 _OVERDUE: Final = (executor.LATE.slug, "time-apart")
 
 

@@ -11,14 +11,14 @@ from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Action, Append, Command
 from rtshcua.wire.request import NOTHING, Ref
 
-#: : the least interval between records of notes with the same text, in us: those between are counted
+#: the least interval between records of notes with the same text, in us: those between are counted
 REPEATED_EVERY_US: Final = 30_000_000
-#: : the most texts that are counted; with more, each note is recorded
+#: the most texts that are counted; with more, each note is recorded
 _MOST_TEXTS = 64
 
-#: : makes the line of a report, and its announcement
+#: makes the line of a report, and its announcement
 Telling = Callable[[], Iterable[Action]]
-#: : the text of a report, or a function that makes it when it is recorded
+#: the text of a report, or a function that makes it when it is recorded
 Detail = str | Callable[[], str]
 
 

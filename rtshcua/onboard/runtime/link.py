@@ -25,10 +25,10 @@ from rtshcua.onboard.ports import Frozen
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.monitor import StateMonitor
 
-#: : the effect that records that this computer stood still, and for how long: nothing was read, judged or sent
+#: the effect that records that this computer stood still, and for how long: nothing was read, judged or sent
 #: meanwhile
 STOOD_STILL: Final = "stood-still"
-#: : the name, among those of signals, of the vehicle's report on whether it flies
+#: the name, among those of signals, of the vehicle's report on whether it flies
 AIR_STATE = "whether it is in the air"
 
 

@@ -26,12 +26,12 @@ from rtshcua.wire.receipt import APPROVAL, CANCELLATION, RECALL, UNKNOWN, Receip
 from rtshcua.wire.request import STEP, Ref
 from rtshcua.wire.untrusted import Untrusted
 
-#: : how much of a vehicle's text is recorded, in letters
+#: how much of a vehicle's text is recorded, in letters
 MOST_SAID: Final = 200
-#: : the least interval between records of refused documents, in us: a flood must not fill the disk
+#: the least interval between records of refused documents, in us: a flood must not fill the disk
 REFUSED_EVERY_US: Final = 1_000_000
 
-#: : events that are processed before a crash or a takeover: they change no stage, and explain its cause
+#: events that are processed before a crash or a takeover: they change no stage, and explain its cause
 _TOLD: Final = (Readings, ports.Sent, ports.Obeyed, ports.ClockStepped, ports.StatusText, ports.Noted, ports.Hindered)
 
 

@@ -1,4 +1,4 @@
-"""An adapter that does not do what it was told to: the boundary lets its frames not out, and the flight falls back."""
+"""Threat: a compromised adapter alters commands. The boundary refuses its frames, and the flight falls back."""
 
 from collections.abc import Callable
 from typing import Any

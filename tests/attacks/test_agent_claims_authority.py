@@ -1,6 +1,6 @@
-"""Threat: an agent gives itself authority by what its mission says of itself.
+"""Threat: an agent's mission claims more authority than the agent has.
 
-It writes any specification, and it may hold the agent's mission key, with which it signs what it likes byte by byte.
+The agent writes any specification, and may hold an agent's mission key, with which it signs arbitrary bytes.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Whoever connects to the agent socket again and again, and one that listens there and never answers."""
+"""Threat: a process connects to the agent socket repeatedly, or a listener there never answers."""
 
 import socket
 import subprocess

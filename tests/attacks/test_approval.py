@@ -1,4 +1,4 @@
-"""Threats to approvals: forged, of another step, role, key, vehicle or flight, replayed, expired, or made up."""
+"""Threats to approvals: forged, for another step, role, key, vehicle or flight, replayed, expired, or invented."""
 
 import json
 from base64 import b64encode

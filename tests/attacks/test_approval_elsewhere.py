@@ -1,4 +1,4 @@
-"""Threat: what was signed for one flight is used in another, whose step is octet for octet the same.
+"""Threat: a document that was signed for one flight is used in another flight with an identical step.
 
 The attacker keeps every document that was ever signed, holds a mission key, and begins the next flight.
 """

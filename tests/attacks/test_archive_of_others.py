@@ -1,6 +1,6 @@
-"""Threat: a folder of logs, or an archive, comes from somebody else, with links, pipes and names that lead out of it.
+"""Threat: a folder of logs, or an archive, of another user contains links, pipes and names that lead out of it.
 
-Nothing outside of it is read, written or deleted, and what nobody else may read nobody may read as a copy.
+Nothing outside of it is read, written or deleted, and a copy is never more readable than its original.
 """
 
 import os

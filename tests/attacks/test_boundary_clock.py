@@ -1,10 +1,10 @@
-"""Threat: the runtime is wholly taken over, and names another time of day than it is, or another monotonic time, to fly
-what has expired, by keys that have, or at hours that are closed. It has the boundary's socket, and hands over frames
-when it likes, but has not the link's key.
+"""Threat: a compromised runtime claims another time of day, or another monotonic time, to fly expired missions, use
+expired keys, or reach other permitted hours. It has the boundary's socket and can delay frames, but it does not
+have the link's key.
 
-Outcomes: nothing is decided by a time that the boundary's own clock does not bear out; where the boundary knows none,
-none may be claimed, and steps are deferred; frames that were held back tell no time; what a log claims is held against
-what the boundary signed.
+Outcomes: nothing is decided at a time that disagrees with the boundary's own clock; if the boundary does not know
+the time, no claim is accepted and steps are deferred; delayed frames do not set the time; the times in a log are
+compared with the boundary's statements.
 """
 
 import time

@@ -1,9 +1,9 @@
-"""Threat: the runtime is wholly taken over, and the boundary is one that listens under a user of its own, with the keys
-in a folder of that user. The attacker has the runtime's user, and may connect as often as it likes.
+"""Threat: a compromised runtime, with a boundary that listens under a user of its own, and the keys in a folder of
+that user. The attacker has the rights of the run's user and may connect any number of times.
 
-Outcomes: it reads no key, file or memory of the boundary, and cannot signal it; what it says of root, keys, identity or
-time is not asked for; a second connection is turned away; a boundary that hangs is ended by the kernel, and the next
-one serves.
+Outcomes: it can read no key, file or memory of the boundary, and cannot signal it; the boundary does not take
+root, keys, identity or time from it; a second connection is refused; the kernel ends a boundary that hangs, and
+the next one serves.
 """
 
 import ctypes

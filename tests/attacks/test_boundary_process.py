@@ -1,9 +1,9 @@
-"""Threat: the runtime is wholly taken over, and wants what only the boundary's process has: its keys, and frames that
-no permit covers. It has the socket, the files of its own user, and the rights of that user.
+"""Threat: a compromised runtime wants the keys of the boundary's process, or frames that no permit covers. It has the
+socket, the files of its own user, and the rights of that user.
 
-Outcomes: the keys are not to be read; what is asked out of turn, ahead of time or with a seal of another session is
-refused; nonsense is answered and changes nothing; a second runtime finds the boundary held; when the boundary dies,
-nothing leaves that it had not signed ahead.
+Outcomes: the keys cannot be read; requests out of turn, ahead of time or with a seal of another session are
+refused; malformed calls are answered without an effect; a second runtime finds the boundary in use; after the
+death of the boundary only frames that it signed ahead are sent.
 """
 
 import os

@@ -1,9 +1,9 @@
-"""Threat: whoever has the runtime harms the boundary's process, or what it keeps: it is killed at any point, and so is
-the runtime; its disk is full, its tables are, its file is put back to what it was; what comes is too long, half of it,
-or mixed with something else; two runtimes speak to it at once; a permit comes from another session.
+"""Threat: an attacker who controls the runtime harms the boundary's process, or its state: the boundary or the
+runtime is killed at any point; its disk or its tables are full; an old version of its file is restored; calls are
+too long, incomplete, or mixed; two runtimes call it at once; a permit comes from another session.
 
-Outcomes: nothing is dispatched that was not permitted, what was kept is whole, and a mission of which something was
-sent is not flown again, but where its file and the run's were both put back: then a witness tells.
+Outcomes: nothing is dispatched without a permit, the stored state is intact, and a mission of which something was
+sent does not fly again, unless both its file and the run's were restored: a witness shows that.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""Threat: a bundle changes on its way to the vehicle. Whatever byte flips, wherever it is cut, it does not open."""
+"""Threat: a bundle changes on its way to the vehicle. It does not open after any flipped byte or any truncation."""
 
 import pytest
 

@@ -1,5 +1,5 @@
-"""Threats to cancellations: an agent's word that ends a flight of its own must lead where the policy says and nowhere
-else, end nothing that a person ordered, and serve no other flight.
+"""Threats to cancellations: an agent's cancellation of its own mission must lead to the policy's contingency only,
+must not end a mission of a person, and must not apply to another flight.
 """
 
 import json

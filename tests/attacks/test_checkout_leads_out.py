@@ -1,6 +1,6 @@
-"""Threat: a checkout of a stranger has our tools read or write files outside of it, by imports, settings and links.
+"""Threat: a foreign checkout makes our tools read or write files outside of it, by imports, settings and links.
 
-What they read they would quote in their findings, which a stranger may read in the log of CI.
+Tools quote what they read in their findings, and strangers may read the log of CI.
 """
 
 import os

@@ -1,6 +1,6 @@
-"""Threat: who signs a mission holds a step to a clause of their own, and words it as something else than it is.
+"""Threat: a mission's signer adds a clause to a step, with a text that misrepresents its code.
 
-Its code only tightens; its text stands in the log, where an investigator reads why a step was refused.
+The code can only tighten the contract; the text is in the log, where an investigator reads why a step was refused.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Threat: a key that is trusted signs nonsense, in a document's form or not: refused, and nothing is raised."""
+"""Threat: a trusted key signs malformed data, as a document or not. It is refused without an exception."""
 
 from random import Random
 

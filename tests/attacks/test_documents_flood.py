@@ -1,5 +1,5 @@
-"""Threat: an agent, with a mission key or without, hands in what takes long to decode, verify or hash, again and again:
-the thread that flies would stand still meanwhile, and what comes from the vehicle would wait.
+"""Threat: an agent, with or without a mission key, repeatedly presents documents that take long to decode, verify or
+hash, so that the flight's thread would stall and frames of the vehicle would wait.
 """
 
 import json

@@ -1,4 +1,6 @@
-"""The thread that writes the evidence dies of what is no fault of the disk: that is told, and no line is kept then."""
+"""The evidence thread dies of an error that is not a disk error: this is reported, and later lines do not count as
+stored.
+"""
 
 from pathlib import Path
 

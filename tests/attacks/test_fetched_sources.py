@@ -1,6 +1,6 @@
-"""Threat: a source distribution that the boundary is built with brings a set-up of its own, or is not the one pinned.
+"""Threat: a source distribution that the boundary is built from contains setup code, or is not the pinned one.
 
-Outcomes: nothing of it runs and nothing else is fetched; what is not pinned is not unpacked.
+Outcomes: none of its code runs and nothing else is fetched; a distribution that is not pinned is not unpacked.
 """
 
 import hashlib

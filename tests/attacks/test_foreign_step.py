@@ -1,4 +1,4 @@
-"""Requests for what is not the mission's current step, and bytes that are no request at all."""
+"""Requests for another step than the current one, and malformed requests."""
 
 import pytest
 from hypothesis import given

@@ -1,11 +1,11 @@
-"""Threat: the runtime is wholly taken over, and holds frames that the boundary signed ahead for the case that it dies.
-Or the boundary did die, and somebody on the link forges what the vehicle says, or wants more of the runtime.
+"""Threat: a compromised runtime holds frames that the boundary signed ahead. Or the boundary did die, and somebody on
+the link forges the vehicle's telemetry, or wants the runtime to send more.
 
-Outcomes: nothing is signed ahead but what standing permits are good for now, and nothing opens by it. What is held back
-is void once the vehicle was sent frames that were signed half a minute later, so also in the next step and the next
-flight; a later link voids an earlier one. After the loss only what was signed ahead leaves, a copy once; what was
-recorded before is not believed, and what is forged well chooses among these links. (A log that claims a loss:
-test_log_boundary.py.)
+Outcomes: only links that standing permits cover now are signed ahead, and the gate stays closed for them. A
+delayed frame is void once the vehicle received frames that were signed half a minute later, so also in the next
+step and the next flight; a later link voids an earlier one. After the loss only frames signed ahead are sent, each
+copy once; recorded frames are refused, and well-forged telemetry can only select one of these links. (A log that
+claims a loss: test_log_boundary.py.)
 """
 
 import struct

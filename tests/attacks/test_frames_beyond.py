@@ -1,4 +1,6 @@
-"""Frames that go further than what was permitted, by what the adapter says that it heard, or all at once."""
+"""Frames that exceed the permit, by false reports of the adapter about the vehicle, or by sending all points at
+once.
+"""
 
 from math import nan
 from typing import Any

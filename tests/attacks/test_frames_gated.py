@@ -1,5 +1,5 @@
-"""Threat: whoever took over the runtime, with every key on board but the boundary's, alters the raw frames beside a
-log: the commands that passed the boundary's gate are others, more, fewer, or in another order.
+"""Threat: an attacker who controls the runtime, with every key on board except the boundary's, alters the raw frames
+beside a log: the commands that passed the gate are changed, added, removed or reordered.
 """
 
 from collections.abc import Iterable, Sequence

@@ -1,6 +1,7 @@
-"""Evidence before effect, against the raw frames: what the log's own signers left out, the telemetry still shows.
+"""Evidence before effect, checked against the raw frames: the telemetry shows commands that the log's signers
+removed.
 
-The attacker holds all keys of the log: whatever is cut from it is signed anew, and so is the digest of the telemetry.
+The attacker holds all keys of the log: a truncated log is signed anew, and so is the digest of the telemetry.
 """
 
 from collections.abc import Callable

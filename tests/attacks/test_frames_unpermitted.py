@@ -1,4 +1,4 @@
-"""Frames that no permit stands behind: whoever got hold of the adapter sends them, and the boundary lets none out."""
+"""Frames without a permit: an attacker who controls the adapter sends them, and the boundary refuses them."""
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink

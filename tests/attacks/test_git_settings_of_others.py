@@ -1,4 +1,4 @@
-"""Threat: the git settings in a checkout name programs, and `lint --changed` asks git there what has changed."""
+"""Threat: the git settings in a checkout name programs, and `lint --changed` runs git there."""
 
 import os
 import subprocess

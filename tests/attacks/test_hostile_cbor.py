@@ -1,5 +1,5 @@
-"""Threat: a bundle, trust root, document, proof or record of whoever, of as many tiny items as its size lets in, keeps
-whoever only looks at it busy for seconds, and takes hundreds of megabytes.
+"""Threat: an untrusted bundle, trust root, document, proof or record contains as many tiny items as its size allows,
+so that a tool that only displays it is busy for seconds, and needs hundreds of megabytes.
 """
 
 import json

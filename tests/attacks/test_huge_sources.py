@@ -1,4 +1,4 @@
-"""Threat: a source of megabytes keeps a build busy for minutes, or fills its log."""
+"""Threat: a source of megabytes occupies a build for minutes, or fills its log."""
 
 import ast
 import json

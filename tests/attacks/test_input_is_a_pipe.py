@@ -1,4 +1,4 @@
-"""Threat: a pipe lies where a source, a configuration or a bundle is expected. Who reads it would wait for ever."""
+"""Threat: a pipe takes the place of a source, a configuration or a bundle. A reader would wait for ever."""
 
 import os
 from pathlib import Path

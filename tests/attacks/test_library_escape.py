@@ -1,4 +1,4 @@
-"""An agent imports what ships and nothing else: no detour out of the library leads to a policy of its own."""
+"""An agent can import shipped files only: no path out of the library leads to a policy of its own."""
 
 import json
 from pathlib import Path

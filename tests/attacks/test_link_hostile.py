@@ -1,7 +1,7 @@
-"""A hostile link: garbage, cut and turned frames, replays, spoofed ids, frames without a signature, floods.
+"""A hostile link: garbage, truncated and altered frames, replays, spoofed ids, unsigned frames, floods.
 
-Whatever comes, nothing is raised, nothing is dispatched, and nothing that another system says is believed. With a key
-nothing is believed, or remembered, that does not carry its signature. `bench/hostile_link.py` sends a million of these.
+Nothing is raised, nothing is dispatched, and no other system's frame is accepted. With a key, only signed frames
+are accepted or remembered. `bench/hostile_link.py` sends a million of these.
 """
 
 import pytest

@@ -1,4 +1,4 @@
-"""A whole flight on a link with a key, between hostile frames: the log is the same, line by line, as without them."""
+"""A whole flight on a link with a key, among hostile frames: the log equals, line by line, the one without them."""
 
 import pytest
 

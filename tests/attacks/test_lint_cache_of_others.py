@@ -1,7 +1,7 @@
-"""Threat: somebody else writes what `lint` remembers, or has it written where it has no business.
+"""Threat: another user writes the cache of `lint`, or makes `lint` write it to another place.
 
-A checkout, which may be a stranger's, holds no cache and cannot say where one is. In the user's cache folder nothing is
-believed that another user could have written.
+A checkout, possibly a foreign one, contains no cache and cannot configure its place. In the user's cache folder,
+files that another user could have written are ignored.
 """
 
 import json

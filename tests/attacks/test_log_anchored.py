@@ -1,4 +1,4 @@
-"""Threat: who holds every key writes the whole log anew, or cuts it off. Only what a witness saw tells."""
+"""Threat: a holder of every key rewrites the whole log, or truncates it. Only a witness can show this."""
 
 from base64 import b64decode, b64encode
 

@@ -1,6 +1,6 @@
-"""Threat: whoever took over the runtime, with the log key, every epoch key and all other keys on board but the
-boundary's, writes the log anew. The lies are whole in themselves: numbered, linked, sealed and signed. Each is named at
-the first record that is not what the boundary made.
+"""Threat: an attacker who controls the runtime, with the log key, every epoch key and all other keys on board except
+the boundary's, rewrites the log. The forged log is consistent: numbered, linked, sealed and signed. Each forgery
+is reported at the first record that the boundary did not make.
 """
 
 from base64 import b64decode, b64encode

@@ -1,4 +1,6 @@
-"""Threat: the vehicle is taken in flight, with the key of its present epoch. What was sealed before stays as it is."""
+"""Threat: the vehicle is captured in flight, with the key of its present epoch. Records that were sealed before stay
+unchanged.
+"""
 
 import pytest
 

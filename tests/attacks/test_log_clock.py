@@ -1,4 +1,4 @@
-"""Threat: times are forged, or the clock is set back, so that something old looks fresh."""
+"""Threat: times are forged, or the clock is set back, so that old data appears fresh."""
 
 from reference.forgery import edit, expect, flight, read, rewritten, signed, signers
 

@@ -1,4 +1,4 @@
-"""Threat: a field of a record is edited, with or without the hashes, by an outsider or by the log key's holder."""
+"""Threat: a field of a record is edited, with or without the hashes, by an outsider or by a holder of the log key."""
 
 import pytest
 

@@ -1,7 +1,7 @@
-"""Threat: epochs are left unsealed, sealed by another key, taken out, emptied or exchanged, and so cover something up.
+"""Threat: epochs are left unsealed, sealed by another key, removed, emptied or exchanged, to hide something.
 
-systemd's journal let whoever took a machine go on after an unsealed epoch (CVE-2023-31438), and seal old entries with a
-later key (CVE-2023-31439).
+systemd's journal allowed the owner of a captured machine to continue after an unsealed epoch (CVE-2023-31438), and
+to seal old entries with a later key (CVE-2023-31439).
 """
 
 from collections.abc import Callable

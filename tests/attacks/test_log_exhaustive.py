@@ -1,6 +1,6 @@
-"""Threat: any small change of a log of 200 records. Every byte, every record, every cut: no verifier takes one for it.
+"""Threat: any small change of a log of 200 records. No verifier accepts a changed byte, record or length.
 
-All that the careful, the quick and the independent verifier are asked; `make test` asks a sample, `make soak` all.
+All cases for the full, the fast and the independent verifier; `make test` runs a sample, `make soak` all.
 """
 
 from bisect import bisect_right

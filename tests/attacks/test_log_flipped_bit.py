@@ -1,4 +1,4 @@
-"""Threat: a bit of the log flips, on the disk or by hand. Each one must be noticed, in any byte."""
+"""Threat: a bit of the log flips, on the disk or by hand. Every flip must be detected, in any byte."""
 
 import random
 

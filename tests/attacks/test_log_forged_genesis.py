@@ -1,4 +1,4 @@
-"""Threat: the genesis, on which all else rests, is forged: bundle, root, vehicle, mission, mode, format."""
+"""Threat: the genesis, on which everything else rests, is forged: bundle, root, vehicle, mission, mode, format."""
 
 from base64 import b64decode, b64encode
 

@@ -1,4 +1,4 @@
-"""Threat: the close's signature is stripped, or made by another key, or the log is written anew under another root."""
+"""Threat: the close's signature is removed, or made by another key, or the log is rewritten under another root."""
 
 from base64 import b64decode, b64encode
 

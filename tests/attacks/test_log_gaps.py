@@ -1,7 +1,7 @@
-"""Threat: a gap, which a computer that stood still records, is used to cover up records, or to leave them unsealed.
+"""Threat: a gap, as recorded by a computer that stood still, is used to hide records, or to leave them unsealed.
 
-Nobody without a key can make one; who holds the key of the present epoch gains nothing that it did not have, and the
-gap is told; who holds all keys still leaves nothing unsealed for longer than 20 s besides it.
+Without a key nobody can make a gap. A holder of the present epoch's key gains nothing by one, and the gap is
+reported. A holder of all keys can still leave no record unsealed for longer than 20 s outside of it.
 """
 
 from functools import cache

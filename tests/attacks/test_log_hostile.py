@@ -1,4 +1,4 @@
-"""Threat: a log made to break its reader: huge, deep, binary, hostile to the terminal."""
+"""Threat: a log made to break its reader: huge, deep, binary, or with terminal escapes."""
 
 import tracemalloc
 from base64 import b64decode

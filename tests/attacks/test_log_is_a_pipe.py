@@ -1,4 +1,4 @@
-"""Threat: a pipe lies where a log, a proof or what belongs to a log is expected. Who reads it would wait for ever."""
+"""Threat: a pipe takes the place of a log, a proof or a file beside a log. A reader would wait for ever."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,6 @@
-"""A runtime that waits for no disk: its log says so, and the audit names the first decision that went out unkept."""
+"""A runtime that does not wait for the disk: its log says so, and the audit names the first decision that was sent
+before it was stored.
+"""
 
 from reference.forgery import edit, expect, flight, prove, read, signed
 from rtshcua.model.durability import BUFFERED, SYNCED, SYNCED_FIRST, WRITTEN

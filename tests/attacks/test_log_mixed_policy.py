@@ -1,4 +1,4 @@
-"""Threat: the policy of the log is mixed with another version: in the genesis, or in what single decisions say."""
+"""Threat: the policy of the log is mixed with another version: in the genesis, or in single decisions."""
 
 from base64 import b64encode
 

@@ -1,5 +1,5 @@
-"""Logs of whoever holds the log key, and flew what the executor and the boundary would not: each record is as it should
-be, and what is false is the order, or what is not there.
+"""Logs of a holder of the log key whose flight violated the rules of executor and boundary: each record is
+well-formed, but the order is wrong or records are missing.
 """
 
 from functools import cache

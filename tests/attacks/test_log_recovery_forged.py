@@ -1,4 +1,4 @@
-"""Threat: a recovery hides what was there, turns the clock, or stands where none was."""
+"""Threat: a recovery hides records, changes the clock, or is recorded without a crash."""
 
 import pytest
 

@@ -1,7 +1,7 @@
-"""Threat: a log rests on a key that was revoked, and its own trust root, which is older, does not say so.
+"""Threat: a log rests on a revoked key, and its own, older trust root does not say so.
 
-Who took a log key writes logs under the old root and dates them back; who took another key had a vehicle fly by it that
-had not been told.
+A holder of a stolen log key writes logs under the old root with earlier dates; a holder of another stolen key made
+a vehicle use it that did not know of the revocation.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""Threat: the end of the log is cut off, in a record, between two, or all of it."""
+"""Threat: the end of the log is removed, within a record, between two, or completely."""
 
 from reference.forgery import edit, expect, flight, prove, read, rewritten, signers
 from rtshcua.evidence.report import LogVerdict

@@ -1,4 +1,6 @@
-"""Threat: the same fields in other bytes, so that two readers read two things: whitespace, duplicate keys, junk."""
+"""Threat: the same fields in other bytes, so that two readers read different values: white space, duplicate keys,
+trailing data.
+"""
 
 import json
 

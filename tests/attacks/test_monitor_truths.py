@@ -1,7 +1,6 @@
-"""A runtime that was taken over claims what temporal monitors never said: of a wrong length, or what is no truth.
+"""A compromised runtime claims wrong truths of temporal monitors: of a wrong length, or not a truth at all.
 
-That it lies about what they did say, the boundary cannot see, no more than it could about the wind itself; the log
-keeps what was claimed.
+The boundary cannot detect a false truth, as it cannot detect a false wind speed; the log keeps the claim.
 """
 
 import pytest

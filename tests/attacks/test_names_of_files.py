@@ -1,4 +1,4 @@
-"""Threat: a file of a checkout, whose name holds what a terminal obeys, or a line that a build takes for a command."""
+"""Threat: the name of a file in a checkout contains terminal escapes, or a line that a build reads as a command."""
 
 from pathlib import Path
 

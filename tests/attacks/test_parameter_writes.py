@@ -1,4 +1,4 @@
-"""Parameters of the autopilot: what an operator configured is set, on the ground, and put back to what it was."""
+"""Parameters of the autopilot: only configured values are set, on the ground, and restored to the previous value."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Parameters that were set, against the log: none without its record, none with another value, none in flight."""
+"""Parameter writes, checked against the log: each needs its record and its listed value, and none happens in flight."""
 
 from collections.abc import Sequence
 from functools import cache

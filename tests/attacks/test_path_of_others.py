@@ -1,4 +1,6 @@
-"""Threat: who holds a mission key signs another path in the zone than skill and arguments say, and has it approved."""
+"""Threat: a holder of a mission key signs another path in the zone than skill and arguments describe, and gets it
+approved.
+"""
 
 import json
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""A permit that is used late, or after what it stood for is over."""
+"""Permits that are used late, or after the command that they cover is over."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Permits that the boundary did not issue, or that were changed, send nothing."""
+"""Permits that the boundary did not issue, or that were changed, are refused."""
 
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,4 +1,4 @@
-"""Threat: an older policy, rightly signed and laxer than the one in force, is brought back to the vehicle."""
+"""Threat: an older, correctly signed and laxer policy than the one in force is loaded again."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Proofs that somebody forged, who has logs and proofs of them: each is refused for the reason it must be."""
+"""Proofs forged by somebody who has logs and their proofs: each is refused for the expected reason."""
 
 from base64 import b64decode, b64encode
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Proofs whose signatures, keys or checkpoints are not those of the log; what the holder of every key could forge."""
+"""Proofs whose signatures, keys or checkpoints are not those of the log, and what a holder of every key could forge."""
 
 from base64 import b64decode, b64encode
 

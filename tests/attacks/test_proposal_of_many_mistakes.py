@@ -1,4 +1,4 @@
-"""Threat: an agent proposes something with tens of thousands of mistakes, and whoever checks it is busy with them."""
+"""Threat: an agent proposes a mission with tens of thousands of mistakes, and keeps the checker busy."""
 
 import json
 from time import process_time

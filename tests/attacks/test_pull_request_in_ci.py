@@ -1,6 +1,6 @@
 """Threat: CI checks a pull request with modules beside the sources, which Python might import in place of its own.
 
-Nor may what CI runs be changed by who owns an action's tag, or use a token that it has no need of.
+The owner of an action's tag must not be able to change what CI runs, and no job has a token that it does not need.
 """
 
 import re

@@ -1,4 +1,4 @@
-"""COSE receipts that the log key did not sign, or that are none."""
+"""COSE receipts that the log key did not sign, or that are malformed."""
 
 from typing import Any
 

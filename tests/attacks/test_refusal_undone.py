@@ -1,6 +1,6 @@
-"""Threat: a refusal is undone, by a replacement that brings the refused step back.
+"""Threat: a replacement brings a refused step back.
 
-The attacker holds the runtime and a mission key, signs byte by byte, keeps back what it likes, and replays what a
+The attacker controls the runtime and a mission key, signs arbitrary bytes, withholds documents, and replays what a
 person signed before.
 """
 

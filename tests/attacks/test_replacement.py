@@ -1,4 +1,4 @@
-"""Threats to replacements: forged, of a released step, under another policy, of what is not in force, replayed."""
+"""Threats to replacements: forged, of a released step, under another policy, of an inactive mission, replayed."""
 
 import json
 from base64 import b64encode

@@ -1,4 +1,4 @@
-"""A step that was admitted once, or a permit that was used once, is played again."""
+"""A step that was admitted once, or a permit that was used once, is replayed."""
 
 from reference.world import START, Run, allowed, answer_to, loaded, request_for
 from rtshcua.model.decision import Decision

@@ -1,4 +1,4 @@
-"""A program that died in the air comes back: whatever happens before it knows more, the vehicle is brought down."""
+"""A program that died in the air restarts: the vehicle is brought down, whatever happens before its state is known."""
 
 import pytest
 from msgspec.structs import replace

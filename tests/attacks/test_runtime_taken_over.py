@@ -1,9 +1,9 @@
-"""Threat: the runtime is wholly taken over. It has its memory, the socket to the boundary's process and every way to
-the vehicle there is; the link's key is in that process alone.
+"""Threat: a compromised runtime has its memory, the socket to the boundary's process and every channel to the
+vehicle. Only the boundary's process has the link's key.
 
-Outcome: a vehicle that enforces signing, as each release does it (docs/flying/link.md), obeys nothing that no permit
-covers, preparation permits included: neither unsigned frames, nor those signed with other keys, nor what was signed for
-something else, nor what was sent before. One that does not enforce it obeys whoever speaks to it.
+Outcome: a vehicle that enforces signing, as implemented by each release (docs/flying/link.md), obeys no frame
+without a permit, preparation permits included: no unsigned frames, none signed with other keys, none signed for
+another purpose, and no replayed ones. A vehicle that does not enforce signing obeys anyone.
 """
 
 import time

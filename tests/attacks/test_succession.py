@@ -1,6 +1,8 @@
-"""Threats to succession: a key that was revoked speaks on, and a trust root that does not follow is taken for the next.
+"""Threats to succession: a revoked key continues to sign, and a trust root is accepted that does not follow the
+previous one.
 
-The attacker holds keys that were trusted once, the root's among them, and every root and bundle that was ever signed.
+The attacker holds keys that were trusted once, including the root's, and every root and bundle that was ever
+signed.
 """
 
 import json

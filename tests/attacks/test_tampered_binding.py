@@ -1,4 +1,4 @@
-"""A request names an invocation by its binding: one that presents another is denied, and steers nothing."""
+"""A request identifies an invocation by its binding: a request with another binding is denied, and has no effect."""
 
 import pytest
 from msgspec.structs import replace

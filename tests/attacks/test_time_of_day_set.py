@@ -1,4 +1,4 @@
-"""A runtime that was taken over tells the boundary another time of day: to use what has expired, or at other hours."""
+"""A compromised runtime claims another time of day, to use expired documents or other permitted hours."""
 
 import pytest
 from msgspec.structs import replace

@@ -1,4 +1,4 @@
-"""Threat: a source with thousands of mistakes fills terminals, logs of CI and disks with what is said of it."""
+"""Threat: a source with thousands of mistakes fills terminals, logs of CI and disks with findings."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Threat: one person gives the approvals that two were asked for.
+"""Threat: one person gives both approvals that two people must give.
 
 The attacker is a person whom the root trusts for one role, or for several, and holds their own keys.
 """

@@ -1,6 +1,7 @@
-"""Threats to a vehicle that waits for a mission: whoever reaches the agent socket flies what is not theirs to fly.
+"""Threats to a vehicle that waits for a mission: somebody with access to the agent socket flies an unauthorised
+mission.
 
-They hold the bundle that is waited with, which names the policy, and an agent's mission key.
+They hold the waiting bundle, which names the policy, and an agent's mission key.
 """
 
 import secrets

@@ -1,8 +1,9 @@
-"""Threat: a runtime that was taken over says that nothing was sent of a step, to have it admitted and flown again; or
-who has the log's keys writes so, to hide that it flew twice, or that it came again.
+"""Threat: a compromised runtime claims that nothing of a step was sent, to have it admitted and flown again; or a
+holder of the log's keys records this, to hide that the step flew twice, or that it was decided twice.
 
-Outcomes: the boundary gives the id of a step back by what it let out itself, and by nobody's word. In a log it is
-noticed by what shows that the step was flown, by the frames beside it, and by what the boundary signed.
+Outcomes: the boundary releases the id of a step only according to the frames that it passed itself. In a log the
+claim is contradicted by records that the step was flown, by the frames beside it, and by the boundary's
+statements.
 """
 
 import ctypes

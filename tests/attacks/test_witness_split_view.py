@@ -1,6 +1,7 @@
-"""Threat: who holds the vehicle's keys shows different logs to different people, and a witness may lie for him.
+"""Threat: a holder of the vehicle's keys shows different logs to different people, and a witness may lie in his
+favour.
 
-The forger here has every key of the log, from the log key to the present epoch's. He has no witness's key but one.
+The forger has every key of the log, from the log key to the present epoch's, and the key of one witness.
 """
 
 import pytest

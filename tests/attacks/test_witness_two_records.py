@@ -1,7 +1,7 @@
-"""Threat: a witness is shown two logs that differ in a signed record which it cosigned; the lines before it are alike.
+"""Threat: a witness receives two logs that differ in a signed record which it cosigned, after identical lines.
 
-The checkpoint of n leaves is over the n lines before the record that carries it. So that the tree begins with these n
-says nothing of record n itself: that the later checkpoints name the earlier ones does.
+The checkpoint of n leaves covers the n lines before the record that carries it. A consistency proof therefore says
+nothing about record n itself; the references of later checkpoints to earlier ones do.
 """
 
 import json

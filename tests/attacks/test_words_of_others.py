@@ -1,4 +1,6 @@
-"""Threats to who signs: words of a proposer, of a bundle or of a file's name that say something else than what is."""
+"""Threats to people who sign: texts of a proposer, in a bundle or in a file's name, that misrepresent what is
+signed.
+"""
 
 import io
 import json

@@ -1,6 +1,7 @@
 """Threat: a key that is trusted for one duty is used for another.
 
-The attacker holds one key and may build envelopes byte by byte, without our signer, claiming any duty and any name.
+The attacker holds one key and may build envelopes byte by byte, without our signer, claiming any duty and any
+name.
 """
 
 from itertools import permutations

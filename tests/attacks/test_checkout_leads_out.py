@@ -202,7 +202,7 @@ def test_the_language_server_stays_in_the_workspace(here: Path, workspace: bool)
     session.end()
 
 
-def test_which_folder_is_a_checkout(here: Path, tmp_path: Path) -> None:
+def test_checkout_folder_detection(here: Path, tmp_path: Path) -> None:
     (here / "sub/below").mkdir(parents=True)
     (here / "sub/rtshcua.toml").write_text("")
     assert checkout_of(here / "sub/below/a.rts") == str(here)

@@ -118,7 +118,7 @@ def test_another_key_named_for_what_follows() -> None:
     assert expect(lying) == ("seal/next-key", FIRST)
 
 
-def test_a_key_that_is_none() -> None:
+def test_invalid_epoch_key_is_rejected() -> None:
     """Not every 32 octets are a point of the curve, and a point of small order fits many signatures."""
     for key in ("00" * 32, "01" + "00" * 31, "ff" * 32, "ec" + "ff" * 30 + "7f"):
         odd = [edit(LINES[0], next_key=key), *LINES[1:]]

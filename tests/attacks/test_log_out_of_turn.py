@@ -42,13 +42,13 @@ def found(lines: list[bytes]) -> tuple[str, int]:
 
 
 @pytest.mark.parametrize("left_out", [(0,), (1,), (0, 1), (2,)])
-def test_a_step_that_nobody_decided(left_out: tuple[int, ...]) -> None:
+def test_step_without_decision_is_detected(left_out: tuple[int, ...]) -> None:
     lines = [line for line in flight() if read(line).get("step") not in left_out]
     later = next(at for at, line in enumerate(lines) if read(line).get("step", -1) > max(left_out))
     assert found(lines) == ("decision/not-current", later)
 
 
-def test_a_step_that_was_sent_while_another_ran() -> None:
+def test_step_sent_during_another_is_detected() -> None:
     lines = [line for at, line in enumerate(flight()) if at != number("succeeded", 0)]
     assert found(lines) == ("dispatch/out-of-turn", number("dispatched", 1) - 1)
     ended = edit(flight()[number("succeeded", 0)], event="replaced")
@@ -57,7 +57,7 @@ def test_a_step_that_was_sent_while_another_ran() -> None:
 
 
 @pytest.mark.parametrize("link", [(CONTINGENCY, -1, 2, "emergency_land"), (FALLBACK, 1, 1, "return_home")])
-def test_a_mission_that_went_on_after_it_was_brought_home(link: tuple[int, int, int, str]) -> None:
+def test_mission_continued_after_return_is_detected(link: tuple[int, int, int, str]) -> None:
     slug, record = found(sent_after(number("succeeded", 1), link))
     assert (slug, record) == ("dispatch/mission-over", number("dispatched", 2) + 1)
 
@@ -71,12 +71,12 @@ def test_a_mission_that_went_on_after_it_was_brought_home(link: tuple[int, int, 
         ((FALLBACK, 1, 0, "hover"), (FALLBACK, 1, 0, "hover")),
     ],
 )
-def test_a_chain_that_went_backwards(links: tuple[tuple[int, int, int, str], ...]) -> None:
+def test_chain_flown_backwards_is_detected(links: tuple[tuple[int, int, int, str], ...]) -> None:
     at = number("succeeded", 1)
     assert found(sent_after(at, *links)) == ("dispatch/backwards", at + 2)
 
 
-def test_the_chain_of_a_step_that_is_over() -> None:
+def test_chain_of_ended_step_is_detected() -> None:
     at = number("succeeded", 1)
     assert found(sent_after(at, (FALLBACK, 0, 0, "emergency_land"))) == ("dispatch/lapsed", at + 1)
 
@@ -98,7 +98,7 @@ def test_step_or_link_not_in_bundle_is_refused(link: tuple[int, int, int, str]) 
     assert found(sent_after(at, link)) == ("dispatch/other-skill", at + 1)
 
 
-def test_a_step_under_the_name_of_another() -> None:
+def test_step_under_another_name_is_detected() -> None:
     at = number("dispatched", 1)
     lines = [edit(line, detail="hover") if each == at else line for each, line in enumerate(flight())]
     assert found(lines) == ("dispatch/other-skill", at)

@@ -28,7 +28,7 @@ def test_deleted_and_rewritten_fails_at_the_signature_or_before() -> None:
     assert expect(rewritten(deleted(FIRST))) == ("seal/size", SEAL - 1)
 
 
-def test_a_decision_deleted_by_the_key_holder_leaves_an_effect_without_its_permit() -> None:
+def test_deleted_decision_leaves_unpermitted_effect() -> None:
     assert expect(signed(deleted(FIRST))) == ("dispatch/not-permitted", SENT - 1)
 
 

@@ -255,7 +255,7 @@ def test_an_auditor_gives_the_newer_root(
         assert "--anchors" in said["shortfall"]["help"]
 
 
-def test_a_person_is_told_what_was_revoked(beside: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_report_lists_revoked_keys(beside: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["verify-log", "log.jsonl", "--root", "log.trust"]) == ExitCode.INCOMPLETE
     out = " ".join(capsys.readouterr().out.split())
     assert "INCOMPLETE at record 0, line 1: trust/revoked-log-key" in out

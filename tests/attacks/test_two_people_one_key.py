@@ -104,7 +104,7 @@ def test_person_cannot_answer_for_another_role() -> None:
         {"sources": ()},
     ],
 )
-def test_no_root_names_an_approval_key_of_nobody_or_of_any_role(bound: dict[str, object]) -> None:
+def test_approval_key_needs_a_person_and_one_role(bound: dict[str, object]) -> None:
     usual = {"roles": ("supervisor",), "sources": ("operator",), "vehicles": (VEHICLE,), "person": "ada"} | bound
     root = replace(ROOT, keys=(ROOT.keys[-1], ADA.verification(**usual)))  # type: ignore[arg-type]
     with pytest.raises(RootError) as refused:

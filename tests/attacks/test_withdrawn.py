@@ -69,7 +69,7 @@ def test_a_step_of_which_something_was_signed_ahead_is_not_given_back(apart: Cal
 
 
 @pytest.mark.parametrize("at_its_frame", [False, True])
-def test_a_takeoff_that_was_late_flies_where_frames_are_signed_ahead(
+def test_late_takeoff_flies_with_frames_signed_ahead(
     boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch, at_its_frame: bool
 ) -> None:
     """Late when it was to be sent, or when its first frame was: nothing was signed ahead by then."""
@@ -132,7 +132,7 @@ def where(lines: Lines, event: str) -> list[int]:
 
 
 @pytest.mark.parametrize("mode", [EnforcementMode.SOFTWARE, EnforcementMode.PROCESS])
-def test_the_log_of_a_flight_whose_takeoff_was_late_is_sound(mode: EnforcementMode) -> None:
+def test_log_of_flight_with_late_takeoff_verifies(mode: EnforcementMode) -> None:
     flown: Any = late(lambda: flight(mode=mode)).fly()
     assert flown.ending is Ending.COMPLETED
     assert flown.dispatched() == ["takeoff", "takeoff", "return_home"]

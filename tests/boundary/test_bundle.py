@@ -59,7 +59,7 @@ def test_bundle_opened_by_python_is_opened_by_c(c: Boundary) -> None:
     assert isinstance(agree_on_root(c, MANY.sign(ROOT), ROOT.kid), TrustRoot)
 
 
-def test_a_bundle_of_which_one_bit_is_another_is_refused_alike(c: Boundary) -> None:
+def test_bundle_with_flipped_bit_is_refused_by_both(c: Boundary) -> None:
     random, data = Random(6), bundle_case.sealed()
     trust = agree_on_root(c, SIGNED_ROOT, ROOT.public)
     assert isinstance(trust, TrustRoot)
@@ -84,7 +84,7 @@ def test_roots_have_the_same_limits(c: Boundary) -> None:
         assert agree_on_root(c, too_many, ROOT.public) == "malformed"
 
 
-def test_items_of_roots_and_bundles_and_octets_of_headers_have_the_same_bounds(c: Boundary) -> None:
+def test_item_and_header_limits_are_the_same(c: Boundary) -> None:
     """Whatever is below is not looked at: the same items of a form that makes no sense are malformed in another way."""
     trust = agree_on_root(c, SIGNED_ROOT, ROOT.public)
     assert isinstance(trust, TrustRoot)

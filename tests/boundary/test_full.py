@@ -64,7 +64,7 @@ def both(shadow: Shadow, policy: Policy = flat.POLICY, mission: Mission = flat.M
 
 
 @pytest.mark.soak
-def test_as_many_answers_as_one_flight_keeps(shadow: Shadow) -> None:
+def test_greatest_number_of_answers(shadow: Shadow) -> None:
     """People may answer more than is kept: what is kept stays, and the next one is told so."""
     first, *_, last = flat.MISSION.invocations
     steps = [
@@ -87,7 +87,7 @@ def test_as_many_answers_as_one_flight_keeps(shadow: Shadow) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("granted", [1, 0])
-def test_more_rules_than_answers_are_kept_ask_about_one_step(granted: int, shadow: Shadow) -> None:
+def test_more_confirm_rules_than_kept_answers(granted: int, shadow: Shadow) -> None:
     """An answer is one to each of them, and the second person's counts as the first one's does."""
     asks = tuple(replace(ASKS, text=f"asks {number}") for number in range(MAX_ANSWERS + 1))
     of = both(shadow, replace(flat.POLICY, rules=(*flat.POLICY.rules, *asks)))
@@ -100,7 +100,7 @@ def test_more_rules_than_answers_are_kept_ask_about_one_step(granted: int, shado
 
 
 @pytest.mark.soak
-def test_as_many_permits_as_one_session_dispatches(shadow: Shadow) -> None:
+def test_greatest_number_of_dispatched_permits(shadow: Shadow) -> None:
     of = both(shadow)
     at_us = START.monotonic_us
     used = allowed(of, CONTINGENCY_LINK, -1, 0)

@@ -119,7 +119,7 @@ def test_at_each_moment(flavour: str, key: str, second: int, apart: Make) -> Non
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_a_takeoff_that_has_not_left_the_ground_is_told_to_land(flavour: str, apart: Make) -> None:
+def test_takeoff_still_on_ground_gets_land_command(flavour: str, apart: Make) -> None:
     of = apart(flavour)
 
     def dies(of: Apart) -> bool:
@@ -198,7 +198,7 @@ def test_frames_ahead_are_renewed_silently_during_flight(apart: Make) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("call", [DISPATCH, STATEMENT], ids=["at a dispatch", "at a seal"])
-def test_a_decision_before_the_loss_is_recorded_before_it_though_a_seal_is_late(
+def test_earlier_decision_is_recorded_before_loss_despite_late_seal(
     call: int, apart: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It dies by the call that comes after its decision about a leg, in the same step."""

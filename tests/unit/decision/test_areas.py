@@ -104,7 +104,7 @@ def test_every_corner_and_its_neighbours(of: Random) -> None:
             assert prepared.along(place, (0, 0, 0, 0)) == (T if in_shape(place, zone) else F)
 
 
-def test_edges_far_apart_are_told_from_each_other() -> None:
+def test_distant_edges_are_distinguished() -> None:
     """Two long edges that lie less than 1 mm apart where they are sorted."""
     far = MAX_COORDINATE
     thin: Ring = ((-far, -far), (far, far - 1), (far, far), (-far + 1, -far + 1))

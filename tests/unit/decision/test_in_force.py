@@ -229,7 +229,7 @@ def test_a_recall_by_a_key_that_may_not_speak_in_person_is_refused(fields: dict[
     assert take(flight(entitled(**fields)), recall(OF)).slug == slug
 
 
-def test_after_a_replacement_its_steps_are_in_force_and_their_answers_are_forgotten() -> None:
+def test_replacement_steps_are_in_force_without_old_answers() -> None:
     of = flight()
     assert take(of, approval(OF)).accepted
     receipt = take(of, replacement(OF))
@@ -249,7 +249,7 @@ def test_replacement_steps_are_received_with_document() -> None:
     assert len(received) > kept > 0
 
 
-def test_a_replacement_considered_ahead_is_taken_as_any_other() -> None:
+def test_replacement_verified_ahead_is_accepted_as_any_other() -> None:
     of, plain = flight(), flight()
     of.consider(approval(OF), START)
     of.consider(replacement(OF), START)
@@ -266,7 +266,7 @@ def test_refusal_found_ahead_is_reported_at_presentation() -> None:
     assert take(of, document).slug == "wrong-vehicle"
 
 
-def test_a_replacement_considered_ahead_is_refused_when_its_key_or_root_has_expired_since() -> None:
+def test_replacement_verified_ahead_is_refused_after_expiry() -> None:
     now = later(S)
     of = flight(replace(ROOT, expires_at_us=now.utc_us))
     of.consider(replacement(OF), START)
@@ -285,7 +285,7 @@ def test_replacement_of_inactive_mission_is_not_compared_ahead() -> None:
     assert take(of, document).slug == "superseded"
 
 
-def test_only_the_last_replacements_considered_ahead_are_kept() -> None:
+def test_only_last_replacements_verified_ahead_are_kept() -> None:
     of = flight()
     documents = [replacement(OF, mission=replace(shorter(OF), issued_at_us=n)) for n in range(MOST_AHEAD + 1)]
     for document in documents:

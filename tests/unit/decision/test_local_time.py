@@ -77,9 +77,7 @@ def test_offset_change_lies_between_differing_moments(
 
 
 @rows(("start", "end"), [(8 * H, 18 * H), (22 * H, 6 * H), (0, DAY), (8 * H, 8 * H - 1), (23 * H, DAY), (H, H), (0, 0)])
-def test_a_window_of_the_day_is_the_same_with_a_fixed_offset_and_with_one_that_does_not_change(
-    start: int, end: int
-) -> None:
+def test_day_window_with_constant_offsets_equals_fixed_offset(start: int, end: int) -> None:
     fixed, named = LocalTime(H), LocalTime(0, (0, H, 3 * DAY))
     for moment in range(DAY, 2 * DAY, H // 2):
         for late in (-1, 0, 1):

@@ -329,7 +329,7 @@ def test_a_condition_on_the_phase(members: int, admitted: bool) -> None:
     assert (asked(requiring(negated)).outcome is Outcome.ALLOW) != admitted
 
 
-def test_the_links_of_a_step_are_judged_in_its_phase_and_the_contingency_in_none() -> None:
+def test_links_use_phase_of_step_and_contingency_has_none() -> None:
     """Hovering is for the inspection only."""
     policy = requiring(in_phases(2), skill=HOVER)
     hover = policy.policy.contracts[HOVER]

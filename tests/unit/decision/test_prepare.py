@@ -387,7 +387,7 @@ def test_a_text_that_was_cut_may_begin_as_another_does() -> None:
     assert isinstance(prepare_invocation(replace(S, contract=own), of, flat.MISSION.phases), PreparedInvocation)
 
 
-def test_a_mission_may_choose_among_phases_where_the_policy_names_none() -> None:
+def test_mission_may_restrict_phases_of_unrestricted_contract() -> None:
     goto = flat.INVOCATIONS[1]
     chosen = replace(goto, contract=replace(goto.contract, phases=("inspection",)))
     assert isinstance(prepare_invocation(chosen, POLICY, flat.MISSION.phases), PreparedInvocation)
@@ -410,7 +410,7 @@ def saying(text: str) -> Mission:
 
 
 @pytest.mark.parametrize(("step", "bits"), [(0, 0b111), (0, 0), (2, 0b010), (2, 0)])
-def test_the_phases_of_a_step_are_those_that_its_contract_names_or_fewer(step: int, bits: int) -> None:
+def test_step_phases_are_a_subset_of_contract_phases(step: int, bits: int) -> None:
     assert isinstance(prepare_mission(phases(step, bits), POLICY), tuple)
 
 

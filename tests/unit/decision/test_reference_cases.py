@@ -86,7 +86,7 @@ def test_an_admission_is_bounded_by_deadline_and_validity(context: dict[str, Any
     assert (decision.outcome, decision.valid_until_us) == (ALLOW, until)
 
 
-def test_a_denial_names_no_target_and_a_fallback_the_first_link_that_may_fly() -> None:
+def test_only_fallback_names_a_target() -> None:
     assert (ask(binding=bytes(32)).link, ask(binding=bytes(32)).target) == (None, None)
     wind = ask(values={WIND: 12 * M})
     assert (wind.link, wind.target) == (0, flat.CHAIN[0])

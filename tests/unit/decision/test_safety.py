@@ -194,7 +194,7 @@ def test_a_negated_place_must_hold_everywhere_as_well() -> None:
 # ------------------------------------------------------------------------------------------------------- energy
 
 
-def test_charge_to_finish_to_come_home_and_in_reserve() -> None:
+def test_charge_for_skill_return_and_reserve() -> None:
     """200 m + 1 m rounding at 12 m/s is 16.67 s of 18 min: 155; with 500 to finish and 1,000 in reserve 1,655."""
     step = goto(200 * M, 0)
     needed = 500 + 1_000 + 155
@@ -204,7 +204,7 @@ def test_charge_to_finish_to_come_home_and_in_reserve() -> None:
     assert ask(step, values={BATTERY: None}).reason is Reason.SAFETY_UNKNOWN
 
 
-def test_the_farthest_place_counts_even_if_it_is_the_start() -> None:
+def test_farthest_place_may_be_the_start() -> None:
     energy = Energy(flat.CONTRACTS[GOTO], flat.POLICY.vehicle)
     planner = Planner(MotionKind.FLY, (10 * M, 0), 20 * M, 0)
     known = WellKnown(0, 1, 2, 3)
@@ -243,7 +243,7 @@ def test_measured_drain_counts_if_known(drain: Any, least: int, most: int) -> No
     assert drains(drain) == (least, most)
 
 
-def test_the_way_home_is_counted_with_the_measured_drain_where_that_is_worse() -> None:
+def test_way_home_uses_measured_drain_if_worse() -> None:
     """600 m at 12 m/s are 50 s: 463 of 18 min, 1,467 at 17.6 % a minute."""
     assert ENERGY.way_home(600 * M, (0, 0)) == ENERGY.way_home(600 * M, (0, 0), 555) == 463
     assert ENERGY.way_home(600 * M, (0, 0), 1_760) == 1_467
@@ -356,7 +356,7 @@ def test_planned_volume(kind: int, path: Any, altitude: int | None, parts: Any, 
     assert (found.height, found.place.located, found.place.high) == ((*heights, 0, None), 0, 0)
 
 
-def test_below_home_a_landing_goes_no_further_down_than_the_vehicle_is() -> None:
+def test_landing_below_home_ends_at_vehicle_height() -> None:
     below = [point(0), point(0), point(-700), MISSING]
     assert Planner(MotionKind.LAND, (), None, 0).volume(below, KNOWN).height == point(-700)
     assert Planner(MotionKind.HOME, (), None, 0).volume(below, KNOWN).height == point(-700)
@@ -378,7 +378,7 @@ def test_from_a_set_of_starts_the_leg_covers_every_leg() -> None:
     assert found.farthest == (100, 305)
 
 
-def test_the_last_start_is_remembered_and_a_change_of_height_keeps_the_leg() -> None:
+def test_last_start_is_cached_across_height_changes() -> None:
     planner = Planner(MotionKind.FLY, (7, 8), 2_000, 3)
     first = planner.volume(START, KNOWN)
     assert planner.volume(list(START), KNOWN) is first
@@ -390,7 +390,7 @@ def test_the_last_start_is_remembered_and_a_change_of_height_keeps_the_leg() -> 
     assert moved.place.parts[1][0] is first.place.parts[1][0]
 
 
-def test_a_floor_of_zero_forbids_the_take_off_and_no_floor_does_not() -> None:
+def test_floor_of_zero_forbids_takeoff() -> None:
     takeoff, on_ground = flat.INVOCATIONS[0], {HEIGHT: 0, POSITION_X: 0, POSITION_Y: 0}
     assert ask(takeoff, values=on_ground).outcome is ALLOW
     floored = replace(flat.ZONES[0], floor=0)

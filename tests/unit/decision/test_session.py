@@ -167,14 +167,14 @@ def test_a_step_that_was_given_back_is_not_admitted_after_its_deadline() -> None
     assert of.used() == [0]
 
 
-def test_a_step_that_was_passed_over_has_no_turn_any_more() -> None:
+def test_skipped_step_has_no_turn() -> None:
     of = Asked()
     assert of.step(0, {BATTERY: None}) is DEFER
     of.step(1)
     assert of.turns() == [1, 2]
 
 
-def test_where_nothing_is_enforced_a_denied_step_is_the_current_one() -> None:
+def test_denied_step_is_current_in_mode_none() -> None:
     of = Asked(enforced=False)
     assert of.step(0, **BINDING) is DENY
     assert (of.turns(), of.used()) == ([0, 1], [])
@@ -244,7 +244,7 @@ def test_a_link_flies_where_it_may(ref: Ref, values: dict[int, int | None], skil
 
 
 @pytest.mark.altered
-def test_where_neither_a_rule_nor_the_chain_has_a_link_there_is_no_target() -> None:
+def test_no_target_without_rule_or_link() -> None:
     """The chain ends with a landing that needs nothing; without it, every link needs a fix."""
     of = Asked()
     of.in_force.invocations = tuple(with_fields(each, chain=each.chain[:2]) for each in of.in_force.invocations)
@@ -282,7 +282,7 @@ def confirmed(steps: int) -> tuple[Asked, Loaded]:
     return asked, of
 
 
-def test_after_a_recall_it_is_no_steps_turn_and_links_may_fly() -> None:
+def test_recall_ends_turns_of_steps_but_not_of_links() -> None:
     asked, of = confirmed(1)
     assert asked.session.take(documents.recall(of), NOW).accepted
     assert asked.turns() == []
@@ -291,12 +291,12 @@ def test_after_a_recall_it_is_no_steps_turn_and_links_may_fly() -> None:
 
 
 @pytest.mark.parametrize("steps", [0, 1, 2, 3])
-def test_an_approval_of_a_step_that_still_waits_for_it(steps: int) -> None:
+def test_approval_of_waiting_step_is_used(steps: int) -> None:
     asked, of = confirmed(steps)
     assert asked.session.take(documents.approval(of), NOW).accepted
 
 
-def test_an_approval_of_a_step_that_was_decided_comes_too_late() -> None:
+def test_approval_of_decided_step_is_too_late() -> None:
     asked, of = confirmed(2)
     assert asked.session.take(documents.approval(of), NOW).accepted
     assert asked.step(documents.ASKED, {flat.HEIGHT: documents.LOW}) is ALLOW
@@ -335,7 +335,7 @@ def test_a_replacement_keeps_what_was_released_or_asked_for(steps: int, released
         (OnInadmissible.SKIP, {BATTERY: 2_000}, {}, "already-released"),
     ],
 )
-def test_only_a_step_that_waits_to_be_replaced_is_replaced_though_it_was_asked_for(
+def test_requested_step_is_replaced_only_if_it_awaits_that(
     on_inadmissible: int, values: dict[int, int | None], context: dict[str, Any], slug: str
 ) -> None:
     of = with_mission(on_inadmissible)

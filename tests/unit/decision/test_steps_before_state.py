@@ -266,7 +266,7 @@ def says(person: int, at: int, role: int = SUPERVISOR, granted: int = 1) -> Any:
         ),
     ],
 )
-def test_a_rule_that_asks_two_people_is_answered_by_two_in_whatever_order(
+def test_two_people_may_answer_in_any_order(
     second: int, answers: list[Any], released: int, outcome: Outcome, reason: Reason
 ) -> None:
     policy = with_rules(rule(PERMIT), rule(CONFIRM, approver=SUPERVISOR, second=second, within_us=30 * S))

@@ -102,7 +102,7 @@ def test_by_hand(kind: int, window_us: int, times: list[int], observed: str, sai
         assert says(kind, window_us, history) == said[number], "the reference agrees with the hand"
 
 
-def test_an_outer_monitor_sees_what_the_inner_one_says_at_the_same_observation() -> None:
+def test_outer_monitor_reads_inner_at_same_observation() -> None:
     """`rising calm within the last 1 s`."""
     policy = policy_of(Monitor(RISING, 0, CALM), Monitor(WITHIN, S, asks(0)))
     words = run(policy, list(zip(EVERY_HALF, "FFFTTTTTT", strict=False)))

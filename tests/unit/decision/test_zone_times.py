@@ -170,7 +170,7 @@ def test_an_argument_is_asked_about_at_the_moment() -> None:
         assert ask(step, policy=policy, phase=step.phase).outcome == outcome
 
 
-def test_no_time_of_day_is_offered_at_which_a_zone_is_in_the_way() -> None:
+def test_no_time_is_offered_at_which_a_zone_blocks() -> None:
     """A rule asks for the morning and to be out of a zone that exists from tomorrow on."""
     hours = (Op.TIME_IN, 8 * H, 12 * H)
     outside = (Op.POSITION_IN, flat.CITY, 0, Op.NOT, 0, 0)

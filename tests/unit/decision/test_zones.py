@@ -289,7 +289,7 @@ def test_a_place_is_the_union_of_its_parts_and_of_what_is_unknown() -> None:
         (False, (15, 5, 6), ABSENT, F),
     ],
 )
-def test_an_unknown_height_counts_where_a_band_and_the_outline_leave_it_open(
+def test_unknown_height_counts_only_if_outline_is_undecided(
     banded: bool, place: tuple[int, int, int], high: int, answer: int
 ) -> None:
     zone = SQUARE if banded else replace(SQUARE, floor=LOWEST, ceiling=HIGHEST)
@@ -299,7 +299,7 @@ def test_an_unknown_height_counts_where_a_band_and_the_outline_leave_it_open(
 
 
 @rows(("height", "located", "answer"), [(6, ABSENT, UNKNOWN), (20, ABSENT, F), (20, MAYBE, F), (6, MAYBE, T | UNKNOWN)])
-def test_an_unknown_place_counts_where_the_height_leaves_it_open(height: int, located: int, answer: int) -> None:
+def test_unknown_place_counts_only_if_height_is_undecided(height: int, located: int, answer: int) -> None:
     part = (Sweep((5, 5), (0, 0, 0, 0)), height, height)
     assert PlaceSet((part,), located).inside(PreparedZone(0, SQUARE)) == answer
 

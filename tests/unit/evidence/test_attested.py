@@ -121,7 +121,7 @@ def test_entries_of_a_true_log(log: Log) -> None:
     assert [claim.slug for claim in log.evidence.claims()[1]] == ["clock"]
 
 
-def test_the_first_statement_behind_a_gap_and_before_the_seal_vouches_for_it(log: Log) -> None:
+def test_first_statement_after_gap_vouches_for_it(log: Log) -> None:
     assert [log.take(SEAL), log.take(effect("stalled", "9 us")), log.refuse(), log.state(), log.take(SEAL)] == [
         None
     ] * 5
@@ -129,7 +129,7 @@ def test_the_first_statement_behind_a_gap_and_before_the_seal_vouches_for_it(log
     assert log.evidence.gaps == {3: 5}
 
 
-def test_a_statement_that_is_older_than_the_end_of_a_gap_does_not_vouch_for_it(log: Log) -> None:
+def test_statement_older_than_gap_end_does_not_vouch(log: Log) -> None:
     assert log.take(SEAL) is None
     at_us = EFFECT.at_us + 3_600_000_000
     assert log.take(effect("stalled", "9 us", at_us=at_us, utc_us=EFFECT.utc_us + 3_600_000_000)) is None
@@ -137,7 +137,7 @@ def test_a_statement_that_is_older_than_the_end_of_a_gap_does_not_vouch_for_it(l
     assert log.evidence.gaps == {}
 
 
-def test_records_may_come_after_the_statement_that_speaks_of_them(log: Log) -> None:
+def test_records_may_follow_their_statement(log: Log) -> None:
     log.chain.add(Tag.REFUSED, boundary_chain.refused("permit/late", 5))
     log.chain.add(Tag.REFUSED, boundary_chain.refused("permit/used", 5))
     assert [log.state(), log.take(SEAL)] == [None] * 2
@@ -316,7 +316,7 @@ def test_entries_of_records(record: Effect, tag: Tag, payload: bytes) -> None:
     assert entry_of(record) == (tag, payload)
 
 
-def test_other_records_have_none() -> None:
+def test_other_records_have_no_entry() -> None:
     assert entry_of(effect("noted")) is None
 
 
@@ -349,7 +349,7 @@ def changed(**fields: object) -> DecisionRecord:
         changed(state=replace(DECISION.state, monitors=(1,) * 33)),
     ],
 )
-def test_records_of_which_no_entry_can_be_made(record: DecisionRecord | Effect) -> None:
+def test_records_without_possible_entry_are_rejected(record: DecisionRecord | Effect) -> None:
     found = entry_of(record)
     assert isinstance(found, Flaw)
     assert found.slug == "boundary/record"

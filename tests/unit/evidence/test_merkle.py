@@ -62,7 +62,7 @@ def test_prefixes_keep_leaves_and_nodes_apart() -> None:
 
 
 @pytest.mark.parametrize("count", [MerkleTree.TILE - 1, MerkleTree.TILE, MerkleTree.TILE + 1, 2 * MerkleTree.TILE + 5])
-def test_leaves_are_folded_in_together_wherever_the_root_was_asked_for_before(count: int) -> None:
+def test_root_is_right_for_any_reads_in_between(count: int) -> None:
     entries = [number.to_bytes(2) for number in range(count)]
     for asked in (None, 1, MerkleTree.TILE - 1, MerkleTree.TILE, count // 2):
         tree = MerkleTree()

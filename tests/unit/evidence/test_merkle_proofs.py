@@ -142,7 +142,7 @@ def test_every_tree_begins_with_the_empty_one_and_with_itself() -> None:
     assert not verify_consistency(3, root, 5, root, [])
 
 
-def test_a_proof_that_is_longer_or_shorter_than_any_is_none() -> None:
+def test_proof_of_wrong_length_is_refused() -> None:
     for first, second in ((3, 7), (1, 8), (6, 9), (4, 5)):
         old, new = mth(LEAVES[:first]), mth(LEAVES[:second])
         proof = subproof(first, LEAVES[:second], True)

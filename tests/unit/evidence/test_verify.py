@@ -322,7 +322,7 @@ def test_log_rewritten_without_keys_fails(log: list[bytes]) -> None:
     assert failure(chained([*log[:5], *log[6:]])) == ("seal/epoch", 5)
 
 
-def test_a_record_that_all_keys_wrote_anew_passes_here(log: list[bytes]) -> None:
+def test_record_rewritten_with_all_keys_verifies(log: list[bytes]) -> None:
     assert verify(anew(changed(log, 3, outcome="allow"))).verdict is LogVerdict.VERIFIED
     assert verify(anew([*log[:2], *log[3:]])).verdict is LogVerdict.VERIFIED
 
@@ -340,9 +340,7 @@ def test_an_epoch_lasts_no_longer_than_twenty_seconds(log: list[bytes]) -> None:
     assert failure(anew([*late[:2], seconds(record, 50_001)])) == ("seal/missing", 2)
 
 
-def test_an_epoch_has_no_more_than_twice_as_many_records_as_its_writer_puts_in(
-    log: list[bytes], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_epoch_has_at_most_twice_the_writers_records(log: list[bytes], monkeypatch: pytest.MonkeyPatch) -> None:
     first, record, seal, close = log[0], log[2], log[5], log[8]
     assert gaps.MOST_RECORDS == 2_048
     monkeypatch.setattr(gaps, "MOST_RECORDS", 3)

@@ -59,7 +59,7 @@ def test_numbers_are_the_dialects(name: str, value: int) -> None:
         assert value == getattr(dialect, name)
 
 
-def test_a_position_alone_ignores_everything_else_that_the_mask_has_a_bit_for() -> None:
+def test_position_mask_ignores_all_other_fields() -> None:
     assert sum(getattr(dialect, f"POSITION_TARGET_TYPEMASK_{each}_IGNORE") for each in IGNORED) == enums.POSITION_ONLY
     assert enums.NO_PLACE == 2**31 - 1
 

@@ -201,7 +201,7 @@ def test_at_most_a_minute_behind() -> None:
     assert not ours.accept(at(now + 11), 60_000_200), "also in a stream that is known"
 
 
-def test_a_later_frame_takes_the_local_time_with_it_and_a_refused_one_does_not() -> None:
+def test_only_accepted_later_frame_advances_local_time() -> None:
     ours, now = link(), timestamp_of(UTC)
     assert not ours.accept(at(now + 9_000_000)[:-1] + b"\0", 0)
     assert ours.state.timestamp == now
@@ -310,7 +310,7 @@ def test_frames_signed_ahead_have_later_timestamps() -> None:
     assert stamp(ours.sign(frame(), 20_000_000)) < stamp(ahead[0]) < stamp(ours.sign(frame(), 31_000_000))
 
 
-def test_a_vehicle_takes_it_once_nothing_more_is_signed_however_late() -> None:
+def test_frame_signed_ahead_is_accepted_late() -> None:
     """The last frame that was signed, then what was signed ahead, minutes later, in its order; none of it twice."""
     ours, autopilot = link(), vehicle()
     ahead = [signed_ahead(ours, frame(mode), 0) for mode in range(3)]
@@ -382,7 +382,7 @@ def test_frames_signed_ahead_change_stored_state() -> None:
 # ---------------------------------------------------------------- as the C library
 
 
-def test_the_library_forgets_no_stream_and_has_no_room_for_more() -> None:
+def test_library_keeps_streams_and_refuses_more() -> None:
     """`mavlink_signature_check`: a table of 16, each sender on each link a stream of its own, none given up."""
     autopilot = vehicle()
     for number in range(MOST_STREAMS):
@@ -392,7 +392,7 @@ def test_the_library_forgets_no_stream_and_has_no_room_for_more() -> None:
     assert autopilot.accept(link(number=3).sign(frame(), late), late)
 
 
-def test_the_library_takes_a_new_stream_at_most_a_minute_behind_and_a_known_one_however_late() -> None:
+def test_library_limits_delay_of_new_streams_only() -> None:
     autopilot, known, late = vehicle(), link(number=1), 600_000_000
     assert autopilot.accept(known.sign(frame(), 0), 0)
     first = known.sign(frame(), 1_000)

@@ -96,7 +96,7 @@ def waiting() -> Run:
     return Run(low()).until(lambda run: (0, ASKED, -1, "defer", "approval/awaited") in run.decisions)
 
 
-def test_an_approval_is_looked_at_in_the_step_in_which_it_comes() -> None:
+def test_approval_is_used_in_the_step_of_its_arrival() -> None:
     run = waiting()
     assert hand(run, approval(run.loaded, now=run.clock.now())) == "accepted"
     assert run.flown[-1] == "inspect_area"

@@ -70,7 +70,7 @@ def test_a_permit_for_a_link_of_an_earlier_step_lapses_with_the_next() -> None:
     assert of.executor.dispatch(link, START.monotonic_us) is LAPSED
 
 
-def test_a_contingency_without_a_hold_leaves_a_deferred_vehicle_where_it_is() -> None:
+def test_contingency_without_hold_keeps_deferred_vehicle() -> None:
     policy = replace(POLICY, contingency=tuple(link for link in POLICY.contingency if link.skill != HOVER))
     run = Run(loaded(policy)).until_flies("goto")
     run.vehicle.values[OBSTACLE] = None

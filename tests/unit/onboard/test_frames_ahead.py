@@ -266,7 +266,7 @@ def test_no_links_after_withdrawal_of_first_step() -> None:
     assert boundary.asked == []
 
 
-def test_a_step_that_begins_waits_for_what_stands_behind_it_and_a_link_for_nothing() -> None:
+def test_step_waits_for_signed_links_but_link_does_not() -> None:
     boundary = Boundary()
     of = FramesAhead(Commands(POLICY, MISSION), boundary.sign)
     of.stands(PERMIT, STEP)
@@ -318,7 +318,7 @@ def test_failed_renewal_keeps_frames_and_is_retried() -> None:
     assert of.begin(*CHAIN[0]) is not None
 
 
-def test_a_failed_attempt_is_repeated_once_a_second_where_timestamps_run_fast() -> None:
+def test_failed_renewal_is_retried_once_a_second() -> None:
     boundary = Boundary()
     of = made(boundary)
     of.sent(boundary.link.sign(pack(messages.heartbeat()), 25_000_000))

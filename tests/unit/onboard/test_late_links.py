@@ -119,7 +119,7 @@ def refusing(run: Run, sent: int, times: int) -> list[int]:
 
 
 @rows("times", (1, 4))
-def test_a_link_whose_permit_came_too_late_is_asked_for_again(times: int) -> None:
+def test_link_with_late_permit_is_requested_again(times: int) -> None:
     run = start().until_flies("goto")
     run.vehicle.values[WIND] = 12 * M
     run.until_flies("hover")
@@ -158,7 +158,7 @@ def test_a_hold_that_is_late_again_and_again_ends_the_wait() -> None:
     assert run.flown[-1] == "return_home"
 
 
-def test_a_hold_whose_permit_came_too_late_is_asked_for_again() -> None:
+def test_hold_with_late_permit_is_requested_again() -> None:
     run = start().until_flies("goto")
     left = refusing(run, len(run.flown), 2)
     run.vehicle.values[OBSTACLE] = None

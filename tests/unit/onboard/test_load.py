@@ -94,7 +94,7 @@ def test_garbage_bundle_is_malformed(data: bytes) -> None:
     assert refusal(data).slug == "malformed"
 
 
-def test_a_policy_whose_requests_do_not_fit_the_wire_is_refused() -> None:
+def test_policy_with_oversized_requests_is_refused() -> None:
     slots = POLICY.slots
     more = tuple(replace(SIGNALS[BATTERY], name=f"s{n}", slot=n) for n in range(slots, MAX_SLOTS + 1))
     wide = replace(POLICY, signals=(*POLICY.signals, *more), slots=MAX_SLOTS + 1)

@@ -91,7 +91,7 @@ GIVEN_UP: dict[str, Callable[[Run], object]] = {
 
 
 @pytest.mark.parametrize("name", GIVEN_UP)
-def test_however_a_mission_was_given_up_the_links_that_failed_are_why_nothing_watches(name: str) -> None:
+def test_exhausted_links_are_named_after_any_abort(name: str) -> None:
     """That somebody had ended it before is no reason."""
     run = flying()
     run.vehicle.fails = {"hover", "return_home", "emergency_land"}
@@ -101,7 +101,7 @@ def test_however_a_mission_was_given_up_the_links_that_failed_are_why_nothing_wa
     assert "so it ends and stops watching" in run.runtime.may_fly
 
 
-def test_a_standstill_says_why_it_is_watched_no_longer_and_what_to_do() -> None:
+def test_standstill_warning_says_what_to_do() -> None:
     run = flying()
     run.tick(TakenOver(0, PAUSED))
     assert "who may resume the flight at any time" in run.runtime.may_fly
@@ -147,7 +147,7 @@ def test_observed_landing_gives_no_warning(ending: Interrupted | None) -> None:
     assert MAY_FLY not in run.events
 
 
-def test_a_command_that_was_obeyed_and_then_failed_on_the_ground_is_told() -> None:
+def test_obeyed_command_that_failed_on_ground_is_reported() -> None:
     """The vehicle says that it rests, and may have been told to climb all the same."""
     run = start(vehicle=FakeVehicle(deaf={"takeoff"})).until_flies("takeoff")
     token = next(each["token"] for each in run.records if each.get("event") == "dispatched")
@@ -200,7 +200,7 @@ def test_a_command_that_was_late_says_that_the_computer_was_busy() -> None:
     assert "too busy" in record["detail"]
 
 
-def test_a_count_of_a_note_is_not_told_as_new_in_the_middle_of_its_opposite() -> None:
+def test_note_count_keeps_order_with_opposite_note() -> None:
     run = flying(vehicle=FakeVehicle(deaf={"goto"}))
     bad, good = "the vehicle reports a critical state", "the vehicle's state is no longer critical"
     for text in (bad, good, bad, good):

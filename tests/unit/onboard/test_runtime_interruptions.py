@@ -259,7 +259,7 @@ def test_a_boundary_that_does_not_answer_leaves_the_standing_permits(answer: byt
     assert_audited(run)
 
 
-def test_a_boundary_that_is_lost_is_recorded_before_what_follows_and_asked_no_more() -> None:
+def test_boundary_loss_is_recorded_first_and_ends_requests() -> None:
     """The running step falls back by its standing permit; nothing is recorded as the boundary's."""
     of = loaded()
     deaf = Deaf(of.boundary)
@@ -376,7 +376,7 @@ def test_the_boundary_fails_while_a_chain_is_flown() -> None:
 
 
 @rows("situation", GROUND + AIR)
-def test_whether_it_has_to_be_brought_down_can_be_told(situation: Situation) -> None:
+def test_runtime_reports_whether_vehicle_must_land(situation: Situation) -> None:
     assert situation().runtime.aloft is (situation in AIR)
 
 
@@ -389,7 +389,7 @@ def test_a_bundle_is_used_up_by_what_is_dispatched_and_its_log_says_so(situation
     assert run.runtime.used_up == ("dispatched" in run.events)
 
 
-def test_repeated_notes_are_counted_and_told_in_time_or_at_the_end() -> None:
+def test_repeated_notes_are_counted_and_reported() -> None:
     run = waiting()
 
     def noted() -> list[str]:
@@ -412,7 +412,7 @@ def test_repeated_notes_are_counted_and_told_in_time_or_at_the_end() -> None:
     assert_audited(run)
 
 
-def test_of_more_texts_than_are_looked_for_each_is_recorded() -> None:
+def test_notes_beyond_counting_limit_are_all_recorded() -> None:
     run = waiting()
     for number in (*range(70), 69, 0):
         run.tick(Noted(0, f"{number}"))
@@ -424,7 +424,7 @@ def ended_links(run: Run) -> list[tuple[str, str]]:
     return [(each["event"], each["detail"]) for each in told if each.get("event") in ("time-over", "released")]
 
 
-def test_a_fallback_of_which_no_landing_was_seen_is_said_so() -> None:
+def test_fallback_without_observed_landing_is_recorded() -> None:
     run = returning()
     assert ended_links(run) == [("time-over", "")], "a hold is over when its time is"
     run.tick(TakenOver(0, "POSCTL"))

@@ -125,7 +125,7 @@ def test_a_gap_of_telemetry_is_not_calm() -> None:
     assert [decision[3] for decision in run.decisions] == ["defer", "allow"]
 
 
-def test_time_in_which_the_runtime_did_not_look_is_not_calm() -> None:
+def test_unobserved_time_is_not_calm() -> None:
     run = start(world(TAKEOFF, require=(FOR_3_S,)))
     run.until(lambda run: seconds(run) >= 2.0)
     run.clock.advance(MAX_GAP + 1 - TICK)
@@ -154,7 +154,7 @@ def test_an_edge_is_seen_by_the_decisions_of_its_own_step_and_by_no_other() -> N
     assert run.runtime.step(run.clock.now(), []) == []
 
 
-def test_each_step_observes_once_whatever_it_decides(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_step_observes_once(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[int] = []
     observe = StateMonitor.observe
 

@@ -198,7 +198,7 @@ def test_timeout_names_the_hindrance() -> None:
     assert run.flown == ["takeoff", "goto", "hover", "return_home"]
 
 
-def test_it_came_down_without_being_told_to() -> None:
+def test_uncommanded_descent_ends_mission() -> None:
     run = start().until_flies("goto")
     run.tick(AirState(0, False, False))
     assert run.ending is Ending.ABORTED
@@ -467,7 +467,7 @@ def test_reports_about_ended_commands_are_ignored() -> None:
 
 @pytest.mark.parametrize("reason", ["late", "frame/late"])
 @pytest.mark.parametrize("skill", ["takeoff", "goto"])
-def test_a_step_of_which_nothing_was_sent_in_time_is_tried_again(skill: str, reason: str) -> None:
+def test_unsent_late_step_is_tried_again(skill: str, reason: str) -> None:
     run = start().until_flies(skill)
     step, released_us = run.runtime.view(run.clock.now()).step, released(run)
     run.tick(CommandFailed(0, run.vehicle.commands[-1].token, reason))
@@ -488,9 +488,7 @@ def released(run: Run) -> int:
 @pytest.mark.parametrize(("skill", "flown", "ending"), [
     ("takeoff", ["takeoff"], Ending.REFUSED), ("goto", ["takeoff", "goto", "hover"], Ending.ABORTED),
 ])  # fmt: skip
-def test_a_step_that_is_late_again_and_again_is_tried_up_to_its_deadline(
-    skill: str, flown: list[str], ending: Ending
-) -> None:
+def test_late_step_is_retried_until_its_deadline(skill: str, flown: list[str], ending: Ending) -> None:
     run = start().until_flies(skill)
     began_us, tries = run.clock.now().monotonic_us, 0
     while run.ending is None and run.flown[-1] == skill:
@@ -506,7 +504,7 @@ def test_a_step_that_is_late_again_and_again_is_tried_up_to_its_deadline(
 
 
 @pytest.mark.parametrize("skill", ["takeoff", "goto"])
-def test_a_step_of_which_a_frame_left_does_not_come_again(skill: str) -> None:
+def test_step_with_a_sent_frame_is_not_repeated(skill: str) -> None:
     run = start().until_flies(skill)
     assert isinstance(run.loaded.executor, Executor)
     run.loaded.executor.frames.let_out = True
@@ -525,7 +523,7 @@ def test_late_hold_does_not_count_as_step() -> None:
 
 
 @pytest.mark.parametrize("again", [False, True])
-def test_a_permit_that_comes_too_late_by_the_boundarys_clock_is_given_up_later(again: bool) -> None:
+def test_late_permit_by_boundary_clock_is_withdrawn(again: bool) -> None:
     """The process stood still between decision and dispatch: in the same moment nothing can be done about it."""
     run = start(ready=False)
     executor: Any = run.loaded.executor

@@ -368,7 +368,7 @@ def test_one_message_and_no_more_is_not_the_end_of_a_silence() -> None:
 
 
 @pytest.mark.parametrize("up_us", [50_000, 300_000, 1_200_000])
-def test_a_link_that_comes_and_goes_does_not_put_off_judging_for_ever(up_us: int) -> None:
+def test_flapping_link_delays_judgement_boundedly(up_us: int) -> None:
     run = running(AfterSilence.CONTINUE)
     be_silent(run, 5)
     back_us = run.clock.now().monotonic_us
@@ -416,7 +416,7 @@ def violations(run: Run) -> list[str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("gaps", [(0,), (8,), (3, 3, 3), (2, 2, 2, 2, 2, 2, 2, 2)])
-def test_the_time_limit_of_a_step_runs_in_link_time_and_its_reason_names_the_silence(gaps: tuple[int, ...]) -> None:
+def test_step_time_limit_excludes_silence_and_names_it(gaps: tuple[int, ...]) -> None:
     """What flies it waits in link time, too: a limit by the clock on the wall ended a hover of 20 s for a silence."""
     run = limited()
     began_us = run.clock.now().monotonic_us
@@ -437,7 +437,7 @@ def test_the_time_limit_of_a_step_runs_in_link_time_and_its_reason_names_the_sil
     assert ("without a link" in reason) == (gaps != (0,))
 
 
-def test_the_time_limit_of_a_step_does_not_run_while_the_vehicle_answers_nothing() -> None:
+def test_step_time_limit_excludes_unresponsive_time() -> None:
     run = limited()
     run.step(VehicleAnswers(0, answers=False))
     for _ in range(20):

@@ -144,7 +144,7 @@ def test_wait_after_stall_is_as_long_as_after_silence() -> None:
 
 
 @rows("awake_s", (0, 1))
-def test_one_stall_after_the_other_puts_judging_off_for_a_bounded_number_of_times(awake_s: int) -> None:
+def test_repeated_stalls_delay_judgement_boundedly(awake_s: int) -> None:
     """Also where it does nothing but stall."""
     run = running()
     run.vehicle.values[POSITION_X] = None

@@ -144,7 +144,7 @@ def test_a_crash_says_what_showed_it_and_where_it_was_last_seen() -> None:
     assert_audited(run)
 
 
-def test_a_takeover_that_shows_after_a_command_of_ours_went_out_is_not_fought() -> None:
+def test_takeover_seen_after_command_is_respected() -> None:
     """The next step was dispatched in the very step before; the pilot's mode shows only now."""
     run = start().until_flies("goto")
     run.tick()

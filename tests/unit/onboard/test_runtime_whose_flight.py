@@ -56,7 +56,7 @@ def test_a_flight_of_an_earlier_run_is_brought_down_before_ready(event: Event, e
 
 
 @pytest.mark.parametrize("back", [False, True])
-def test_a_pilot_who_takes_off_while_a_step_is_deferred_has_taken_over(back: bool) -> None:
+def test_pilot_takeoff_during_deferral_is_a_takeover(back: bool) -> None:
     run = Run(vehicle=FakeVehicle(silent={WIND}))
     run.tick()
     run.vehicle.airborne = run.vehicle.armed = True
@@ -68,7 +68,7 @@ def test_a_pilot_who_takes_off_while_a_step_is_deferred_has_taken_over(back: boo
 
 
 @pytest.mark.parametrize("words", [(True, False), (False,)], ids=["touches down, disarms", "at once"])
-def test_a_landing_that_nobody_ordered_while_holding_ends_the_mission(words: tuple[bool, ...]) -> None:
+def test_unordered_landing_during_hold_ends_mission(words: tuple[bool, ...]) -> None:
     run = Run().until_flies("goto")
     run.vehicle.values[OBSTACLE] = None
     run.until_flies("hover")
@@ -103,7 +103,7 @@ def arming(*, armed: bool) -> Run:
 
 @pytest.mark.parametrize("armed", [False, True])
 @pytest.mark.parametrize(("event", "ending"), CAUSES)
-def test_a_take_off_that_is_broken_off_on_the_ground_is_told_to_land(event: Event, ending: Ending, armed: bool) -> None:
+def test_aborted_takeoff_on_ground_gets_land_command(event: Event, ending: Ending, armed: bool) -> None:
     """Also when it is not seen armed: the order to arm may be on its way, in the mode that takes off by itself."""
     run = arming(armed=armed)
     run.tick(event)
@@ -112,7 +112,7 @@ def test_a_take_off_that_is_broken_off_on_the_ground_is_told_to_land(event: Even
     assert_audited(run)
 
 
-def test_a_take_off_that_fails_once_armed_is_told_to_land() -> None:
+def test_failed_takeoff_of_armed_vehicle_gets_land_command() -> None:
     run = arming(armed=True)
     run.tick(CommandFailed(0, run.vehicle.commands[-1].token, "no-effect"))
     assert run.flown == ["takeoff", "emergency_land"]

@@ -58,7 +58,7 @@ def test_an_epoch_that_is_long_over_is_sealed_before_anything_else(journal: Jour
 
 
 @pytest.mark.parametrize("in_a_step", [1, EPOCH_RECORDS // 3])
-def test_an_epoch_of_many_records_is_sealed_though_every_step_sends_something(journal: Journal, in_a_step: int) -> None:
+def test_full_epoch_is_sealed_even_if_every_step_sends(journal: Journal, in_a_step: int) -> None:
     lines: list[tuple[Any, int]] = []
     for number in range(EPOCH_RECORDS * 3):
         journal.effect(at(1), "said")
@@ -108,7 +108,7 @@ def test_records_of_a_reflex_are_made_when_they_are_taken_and_not_before(journal
     assert journal.recorder.count == before + 1
 
 
-def test_a_seal_at_which_the_boundary_is_found_lost_comes_behind_the_record_of_that(journal: Journal) -> None:
+def test_seal_follows_record_of_boundary_loss(journal: Journal) -> None:
     """Else an epoch would end without its statement, and nothing would say why."""
     lost: list[str] = []
     journal.recorder.attest = lambda now, **_: None
@@ -120,7 +120,7 @@ def test_a_seal_at_which_the_boundary_is_found_lost_comes_behind_the_record_of_t
     assert [kind for kind, _ in told(journal, EPOCH_US + 1)] == ["link-back"], "it is told once"
 
 
-def test_a_seal_that_is_late_does_not_hide_that_the_boundary_was_lost_before(journal: Journal) -> None:
+def test_late_seal_does_not_hide_boundary_loss(journal: Journal) -> None:
     late = EPOCH_US + EPOCH_US // 5
     journal.recorder.lost = lambda: "it is gone"
     journal.effect(at(late), "dispatched")
@@ -137,7 +137,7 @@ def test_boundary_entries_are_recorded_before_its_loss(journal: Journal) -> None
     assert [kind for kind, _ in told(journal, late)] == ["approval", "boundary-lost", "seal", "refused"]
 
 
-def test_a_late_seal_that_finds_the_boundary_lost_waits_for_what_was_told_before(journal: Journal) -> None:
+def test_late_seal_after_loss_waits_for_earlier_reports(journal: Journal) -> None:
     lost: list[str] = []
 
     def attest(now: Now, *, final: bool) -> None:
@@ -151,7 +151,7 @@ def test_a_late_seal_that_finds_the_boundary_lost_waits_for_what_was_told_before
     assert [kind for kind, _ in told(journal, late + 1)] == ["link-back"]
 
 
-def test_a_gap_is_recorded_first_where_the_epoch_is_over_for_longer_than_a_verifier_allows(journal: Journal) -> None:
+def test_gap_is_recorded_first_if_seal_is_too_late(journal: Journal) -> None:
     journal.effect(at(5_000_000), "succeeded")
     assert told(journal, 5_000_000) == [("succeeded", WRITTEN)]
     journal.effect(at(LONGEST_US + 1), "link-back")
@@ -162,7 +162,7 @@ def test_a_gap_is_recorded_first_where_the_epoch_is_over_for_longer_than_a_verif
     assert taken[0]["detail"] == f"{LONGEST_US + 1 - 5_000_000} us"
 
 
-def test_a_gap_is_told_once_where_the_seal_must_wait_for_what_the_boundary_made_before_it_was_lost(
+def test_gap_is_recorded_once_if_seal_waits_after_loss(
     journal: Journal,
 ) -> None:
     lost: list[str] = []
@@ -177,7 +177,7 @@ def test_a_gap_is_told_once_where_the_seal_must_wait_for_what_the_boundary_made_
     assert [kind for kind, _ in told(journal, late)] == ["stalled", "approval", "succeeded", "boundary-lost", "seal"]
 
 
-def test_outside_of_a_run_an_epoch_that_is_over_is_ended_first_and_the_close_tells_of_a_gap(journal: Journal) -> None:
+def test_overdue_epoch_is_sealed_outside_of_a_run(journal: Journal) -> None:
     recorder = journal.recorder
     assert recorder.caught_up(at(EPOCH_US)) == ()
     late = EPOCH_US + EPOCH_US // 5

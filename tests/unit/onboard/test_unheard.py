@@ -35,7 +35,7 @@ def test_a_contract_needs_what_it_reads() -> None:
     assert not of(TAKEOFF)
 
 
-def test_a_rule_that_may_stop_a_step_is_needed_and_a_permit_where_there_is_no_other() -> None:
+def test_signals_of_blocking_and_sole_permit_rules_are_needed() -> None:
     stops = [replace(POLICY.rules[-1], kind=kind, when=GOOD_LINK) for kind in (RuleKind.FORBID, RuleKind.DEGRADE)]
     for rule in stops:
         assert of(TAKEOFF, replace(POLICY, rules=(*POLICY.rules, rule)))

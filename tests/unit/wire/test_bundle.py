@@ -63,7 +63,7 @@ def test_a_mission_that_names_another_version() -> None:
     assert slug(sealed(mission=msgspec.structs.replace(THE_MISSION, policy_version=6))) == "wrong-policy"
 
 
-def test_a_mission_key_that_nobody_knows() -> None:
+def test_unknown_mission_key_is_refused() -> None:
     assert slug(sealed(key=STRANGER)) == "unknown-key"
 
 
@@ -84,12 +84,12 @@ def test_a_policy_key_that_expired() -> None:
         ({"vehicles": ("quad-08",)}, "wrong-vehicle"),
     ],
 )
-def test_a_mission_key_that_may_not_speak_for_it(speaks: dict[str, tuple[str, ...]], expected: str) -> None:
+def test_unauthorised_mission_key_is_refused(speaks: dict[str, tuple[str, ...]], expected: str) -> None:
     assert slug(sealed(), trust=root(**speaks)) == expected
 
 
 @pytest.mark.parametrize("change", [{"role": 1}, {"role": -1}, {"source": 9}])
-def test_a_step_whose_speaker_nobody_knows(change: dict[str, int]) -> None:
+def test_step_with_unknown_role_or_source_is_refused(change: dict[str, int]) -> None:
     step = msgspec.structs.replace(STEP, **change)
     assert slug(sealed(mission=msgspec.structs.replace(THE_MISSION, invocations=(step,)))) == "malformed"
 

@@ -222,7 +222,7 @@ def test_passphrase_guess_has_documented_cost(monkeypatch):
         (b"sealed: ", b"sealed:  ", "malformed"),
     ],
 )
-def test_a_sealed_key_whose_head_was_changed(old, new, slug):
+def test_sealed_key_with_changed_header_is_refused(old, new, slug):
     assert refusal(SEALED.replace(old, new), passphrase=PASSPHRASE) == slug
 
 

@@ -45,9 +45,7 @@ def replaced(
 
 
 @rows(("flight", "found"), [(FLIGHT, 3), (OTHER_FLIGHT, "other-flight"), (b"", "other-flight"), (None, 3)])
-def test_a_replacement_is_for_the_flight_that_it_names_unless_any_will_do(
-    flight: bytes | None, found: str | int
-) -> None:
+def test_replacement_is_for_named_flight_unless_any_is_accepted(flight: bytes | None, found: str | int) -> None:
     assert replaced(NEW, flight=flight) == found
 
 
@@ -62,7 +60,7 @@ def test_a_replacement_is_for_the_flight_that_it_names_unless_any_will_do(
         (("agent", "operator"), OPERATOR, AGENT, 3),
     ],
 )
-def test_a_key_that_speaks_in_person_replaces_what_an_agent_proposed_and_not_the_other_way(
+def test_personal_key_may_replace_agent_steps_but_not_vice_versa(
     sources: tuple[str, ...], old: int, new: int, found: str | int
 ) -> None:
     flying = with_fields(IN_FORCE, mission=through(IN_FORCE.mission, old))

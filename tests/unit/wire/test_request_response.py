@@ -58,13 +58,13 @@ def test_the_target_of_a_degrade_rule_is_read_back() -> None:
         (NO_CLAUSE, NO_TARGET - 1, CONTRACT),
     ],
 )
-def test_a_clause_or_a_target_that_there_is_not_is_refused(clause: int, target: int, contract: Contract | None) -> None:
+def test_unknown_clause_or_target_is_refused(clause: int, target: int, contract: Contract | None) -> None:
     refused = read(written(ANSWER, clause, target), contract)
     assert isinstance(refused, Refusal)
     assert refused.text == "the clause or the target is unknown"
 
 
-def test_clauses_are_numbered_from_the_rules_over_the_airspace_to_the_contract() -> None:
+def test_clause_numbers_cover_rules_airspace_and_contract() -> None:
     policy, contract = flat_case.POLICY, flat_case.CONTRACTS[flat_case.INSPECT]
     assert policy.airspace is not None
     assert response.shared_clauses(policy) == (*policy.rules, policy.airspace)

@@ -172,7 +172,7 @@ def approving(number=6, **fields):
         (approving(sources=("agent", "operator")), "whose-approval"),
     ],
 )
-def test_only_approval_keys_are_of_a_person_and_only_mission_keys_for_policies(key, slug):
+def test_persons_and_policies_belong_to_their_duties(key, slug):
     root = changed(keys=(*KEYS, key))
     assert refusal(root.sign, ROOT) == slug
     assert opening(envelope(root.encode())) == slug

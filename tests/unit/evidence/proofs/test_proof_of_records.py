@@ -104,7 +104,7 @@ def test_every_record_is_proven_under_the_first_signed_one_after_it(log: SealedL
         assert proven(data, case.KEYS[Duty.ROOT].kid) == shown
 
 
-def test_a_record_is_proven_under_any_later_checkpoint_and_a_signed_one_by_itself(log: SealedLog) -> None:
+def test_record_is_proven_under_later_checkpoint_or_own_signature(log: SealedLog) -> None:
     for number in (0, 3, log.signed[1], log.signed[2]):
         for at in log.signed:
             made = prove_inclusion(lambda: log.lines, number, at)

@@ -156,7 +156,7 @@ def test_a_changed_proof_of_consistency_is_refused(change: Change, slug: str) ->
     assert parts.slug() == slug
 
 
-def test_the_record_that_carries_the_checkpoint_is_only_proven_in_its_own_place() -> None:
+def test_checkpoint_record_is_only_proven_at_its_own_place() -> None:
     parts = inclusion(18)
     assert parts.slug() == "believed"
     parts.number = "index 17"

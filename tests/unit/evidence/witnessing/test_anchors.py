@@ -104,7 +104,7 @@ def test_two_anchors_that_contradict_each_other_ahead_of_the_log() -> None:
     assert flaw.slug == "anchor/root"
 
 
-def test_a_size_at_which_the_log_has_no_checkpoint(log: Log) -> None:
+def test_anchor_at_size_without_checkpoint_is_detected(log: Log) -> None:
     other = Log()
     other.effects(1)
     assert slug(log, [Judge().blindly(other.seal())]) == "anchor/root"

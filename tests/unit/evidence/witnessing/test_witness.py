@@ -182,7 +182,7 @@ def test_other_lines_below_the_checkpoint_that_was_cosigned(split_view: tuple[Lo
         assert "the tree begins with the one of 6 records" in found.text
 
 
-def test_another_genesis_under_the_key_of_the_one_that_was_cosigned_is_a_contradiction() -> None:
+def test_second_genesis_by_same_key_is_a_contradiction() -> None:
     log, other, witness = Log(), Log(bundle=b"another bundle"), Judge()
     cosigned(witness, asked(log, None))
     other.effects(2)
@@ -294,7 +294,7 @@ def test_request_without_checkpoint_is_declined(note: str) -> None:
     [(ORIGIN, VEHICLE), ("rtshcua/log/quad/00", "quad"), ("rtshcua/log/quad%2f/00", ""), ("rtshcua/log/a b/0", ""),
      ("log/quad/0", ""), ("rtshcua/log/", ""), ("rtshcua/log//0", ""), ("rtshcua/log/%FF/0", "")],
 )  # fmt: skip
-def test_whose_log_it_is(origin: str, vehicle: str) -> None:
+def test_origin_names_the_vehicle(origin: str, vehicle: str) -> None:
     assert vehicle_of(origin) == vehicle
 
 

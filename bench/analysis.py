@@ -1,8 +1,8 @@
-"""Analysis of a policy's rules against each other: the time for 100 rules, and how it grows to 1,000.
+"""Analysis of a policy's rules against each other: the time for 100 rules, and its growth to 1,000.
 
-A policy is generated that is shaped as policies are: a handful of skills, a crew for every ten rules, conditions over
-arguments, zones, signals and the time of day, a tenth of them forbids, and some rules dead or redundant. The time of
-everything but the analysis (parse, check, lower) is not counted. Exits with 1 when a limit is broken.
+The generated policy resembles real ones: a few skills, a crew for every ten rules, conditions over arguments, zones,
+signals and the time of day, a tenth of them forbids, and some dead or redundant rules. Only the analysis is timed, not
+parsing, checking and lowering. Exits with 1 when a limit is exceeded.
 """
 
 import gc
@@ -22,11 +22,11 @@ from rtshcua.mavlink import dialect
 
 SIZES = (100, 300, 1_000)
 SECONDS = 2.0
-"""What the analysis of the smallest policy may take."""
+"""The limit for the smallest policy."""
 GROWTH = 1.5
-"""The greatest exponent with which the time may grow: 1 is in proportion to the rules, 2 to their pairs."""
+"""The greatest exponent of growth: 1 is proportional to the rules, 2 to their pairs."""
 ONE_ROLE = 10.0
-"""What the largest may take when all of its rules are about the same role, so that all pairs matter."""
+"""The limit for the largest policy if all rules are about the same role, so that all pairs matter."""
 ROUNDS = 3
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -35,7 +35,7 @@ HEAD = "".join(f'import "lib:{path}"\n' for path in ("policies/site.rts", *(f"sk
 
 
 def source(count: int, crews: int = 50) -> str:
-    """A policy of about that many rules, for at most so many crews of ten rules."""
+    """Return a policy of about that many rules, for at most so many crews of ten rules."""
     crews = min(max(count // 10, 1), crews)
     declared = f"role {', '.join(f'crew_{number}' for number in range(crews))}"
     parts = [HEAD, declared, "policy large version 1 {", "  permit hover, return_home, emergency_land by any"]
@@ -62,7 +62,7 @@ def source(count: int, crews: int = 50) -> str:
 
 
 def ground(text: str) -> ProofContext:
-    """The policy, lowered and prepared, as the analysis is given it."""
+    """Return the policy, lowered and prepared for the analysis."""
     found: list[ProofContext] = []
     proved = (*proofs.POLICY_PROOFS[:-1], found.append)  # the rules are proved later, and timed
     with patch.object(proofs, "POLICY_PROOFS", proved):
@@ -76,7 +76,7 @@ def _read(path: str, text: str) -> bytes:
 
 
 def seconds(text: str) -> tuple[float, ProofContext]:
-    """How much processor time the analysis takes, and what it was made of."""
+    """Return the processor time of the analysis, and its size."""
     made = ground(text)
     made.questions.forget()
     gc.collect()
@@ -87,7 +87,7 @@ def seconds(text: str) -> tuple[float, ProofContext]:
 
 
 def main() -> int:
-    """Measures, prints one line a size, and says whether the limits held."""
+    """Measure and print; return 1 if a limit is missed."""
     seconds(source(20))  # warm: tables are read, code is compiled
     times: list[float] = []
     for size in SIZES:

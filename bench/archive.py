@@ -1,11 +1,10 @@
-"""Archive: a fleet's logs are taken in, verified again, and asked, against hashing and reading the same files.
+"""Archive: adding, verifying and querying a fleet's logs, compared with hashing and reading the same files.
 
-200 logs of 10 vehicles, generated (real format, seals and trust), 1 million records; with `--whole` 1,000 logs of 50
-vehicles, 10 million records, for which 15 GB are needed where temporary files are. One log was changed after it was
-written, one in a hundred was never closed, and one is missing. Peers: the SHA-256 of the files by OpenSSL, one process;
-and for questions the same engine over the lines themselves, without an index. Ratios are of processor time, for how
-long it takes depends on who else is at work. LOGS=FOLDER keeps the logs for the next time. Exits with 1 when a figure
-is above its limit.
+200 generated logs of 10 vehicles (real format, seals and trust), 1 million records; with `--whole` 1,000 logs of 50
+vehicles, 10 million records, which need 15 GB of temporary space. One log was changed after it was written, one in a
+hundred was never closed, and one is missing. References: the SHA-256 of the files by OpenSSL in one process; for
+queries the same engine over the raw lines, without an index. Ratios are of processor time, because elapsed time
+depends on other load. LOGS=FOLDER keeps the logs for the next run. Exits with 1 when a figure is above its limit.
 """
 
 import os
@@ -42,7 +41,7 @@ CORES = len(os.sched_getaffinity(0))
 
 
 def vehicle(folder: Path, number: int, records: int) -> None:
-    """The logs of one vehicle's flights, each naming the one before."""
+    """Make the logs of one vehicle's flights, each linked to the previous one."""
     before = None
     for flight in range(FLIGHTS):
         path = folder / f"quad-{number:02}-{flight:02}.jsonl"
@@ -61,7 +60,7 @@ def vehicle(folder: Path, number: int, records: int) -> None:
 
 
 def generate(folder: Path, vehicles: int, records: int) -> list[Path]:
-    """The fleet's logs."""
+    """Make the fleet's logs."""
     folder.mkdir(parents=True)
     with ProcessPoolExecutor(CORES, mp_context=get_context("fork")) as pool:
         list(pool.map(vehicle, [folder] * vehicles, range(vehicles), [records] * vehicles))
@@ -69,7 +68,7 @@ def generate(folder: Path, vehicles: int, records: int) -> list[Path]:
 
 
 class Cost(NamedTuple):
-    """Seconds on the clock, and seconds of processors: of this process, and of those that it started and that ended."""
+    """Elapsed time, and processor time of this process and its ended children, in seconds."""
 
     clock: float
     cpu_of_others: float
@@ -77,22 +76,22 @@ class Cost(NamedTuple):
 
     @property
     def cpu(self) -> float:
-        """Seconds of processors in all."""
+        """The total processor time, in seconds."""
         return self.cpu_of_others + self.own_cpu
 
     def since(self) -> "Cost":
-        """What was spent since."""
+        """Return the difference from an earlier measurement."""
         return Cost(*(after - before for before, after in zip(self, spent(), strict=True)))
 
 
 def spent() -> Cost:
-    """What was spent so far."""
+    """Return the times so far."""
     others, own = getrusage(RUSAGE_CHILDREN), getrusage(RUSAGE_SELF)
     return Cost(perf_counter(), others.ru_utime + others.ru_stime, own.ru_utime + own.ru_stime)
 
 
 class Timed(VerifierProcesses):
-    """Processes that verify, and how many seconds on the clock they were waited for."""
+    """Verifying processes, with the elapsed time of waiting for them."""
 
     waited = 0.0
 
@@ -104,7 +103,7 @@ class Timed(VerifierProcesses):
 
 
 def checked(work: Callable[[VerificationOptions], Iterator[Done]], jobs: int) -> tuple[Cost, Cost]:
-    """What it costs, and what the verification in it does, by so many processes; if what comes of it is what should."""
+    """Measure the archive and the verification in it, with so many processes, and check the result."""
     start = spent()
     with closing(Timed(jobs)) as workers:
         done = list(work(VerificationOptions(generated_logs.ROOT_KEY, RECORDS, 0, workers)))
@@ -116,7 +115,7 @@ def checked(work: Callable[[VerificationOptions], Iterator[Done]], jobs: int) ->
 
 
 def hashing(logs: list[Path]) -> Cost:
-    """What the SHA-256 of the files costs."""
+    """Measure the SHA-256 of the files."""
     start = spent()
     for log in logs:
         with log.open("rb") as file:
@@ -125,7 +124,7 @@ def hashing(logs: list[Path]) -> Cost:
 
 
 def without_index(logs: list[Path]) -> Cost:
-    """What it costs the engine to count refusals in the lines themselves."""
+    """Measure how long the engine takes to count refusals in the raw lines."""
     start = spent()
     duckdb.execute(
         "SELECT context.vehicle, reason, count(*) FROM read_ndjson(?, columns={type: 'VARCHAR', outcome: 'VARCHAR', "
@@ -137,7 +136,7 @@ def without_index(logs: list[Path]) -> Cost:
 
 
 def ask(folder: ArchiveFolder, unindexed: Cost) -> bool:
-    """Asks every question that ships; whether one took too long."""
+    """Run every shipped query; return whether one exceeded its limit."""
     slow = False
     questions = [(each.name, each.sql, DecisionQuery()) for each in canned().values()]
     some = DecisionQuery(vehicle="quad-07", skill="goto", reason="state", policy_version=8)
@@ -157,7 +156,7 @@ def ask(folder: ArchiveFolder, unindexed: Cost) -> bool:
 
 
 def main() -> int:
-    """Measures, prints a line a figure, and says whether the limits held."""
+    """Measure and print; return 1 if a limit is missed."""
     whole = "--whole" in sys.argv
     vehicles, each = (50, 10_000) if whole else (VEHICLES, EACH)
     records = vehicles * FLIGHTS * each

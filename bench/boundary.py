@@ -1,6 +1,6 @@
-"""The decision in C, in this process, against the one in Python: ten candidates, a place that changes each time.
+"""The decision in C, in this process, compared with Python: ten candidates, and a place that changes each time.
 
-Exits with 1 when the limit is missed. RTSHCUA_BOUNDARY names a library other than the one that is built here.
+Exits with 1 when the limit is missed. RTSHCUA_BOUNDARY names another library than the one built here.
 """
 
 import ctypes
@@ -21,11 +21,11 @@ from reference.native import Native, Question, expected
 ROOT = Path(__file__).resolve().parents[1]
 DECIDE_MEDIAN = 3.0  # us
 ROUNDS, BATCHES, CALLS = 40, 100, 25
-"""How often a batch of so many calls is measured: a call from Python takes longer than what it calls."""
+"""The number of batches and of calls in a batch: a call from Python takes longer than the called function."""
 
 
 def library() -> ctypes.CDLL:
-    """The boundary in C, built if it is not."""
+    """Load the boundary in C; build it if necessary."""
     named = os.environ.get("RTSHCUA_BOUNDARY")
     if named is None:
         subprocess.run(["make", "-s", "-C", str(ROOT / "boundary"), f"PYTHON={sys.executable}"], check=True)
@@ -33,7 +33,7 @@ def library() -> ctypes.CDLL:
 
 
 def main() -> int:
-    """Measures, prints, and says whether the limit held."""
+    """Measure and print; return 1 if a limit is missed."""
     policy = ten_candidates()
     native, question = Native(library()), Question(flat.state(), flat.context(), flat.NOW)
     assert native.policy(policy.policy) is None

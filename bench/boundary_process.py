@@ -1,10 +1,9 @@
-"""The boundary as a process of its own: what it adds to one request over mode `software`, and how long a start takes.
+"""The boundary process: the time that it adds to a request over mode `software`, and its start time.
 
-Both are asked the same in turns: a step that is allowed, in a session begun for it, and a link of the contingency that
-is allowed and dispatched. The start is measured from the call that starts the program: to its greeting, and to the
-answer that the bundle is in force. The machine is noisy, so the percentiles are those of a block, and the quietest
-block counts; the median block stands beside it: there, whatever else runs counts too. Exits with 1 when a limit is
-missed.
+Both modes answer the same requests in turns: an allowed step in a new session, and an allowed and dispatched link of
+the contingency. The start is measured from the start of the program to its greeting, and to the answer that the
+bundle is in force. Because of noise, percentiles are those of the quietest block; the median block is printed too.
+Exits with 1 when a limit is missed.
 """
 
 import sys
@@ -33,14 +32,14 @@ from virtual.shipped import shipped
 ADDED_MEDIAN_US, ADDED_P99_US, START_MS = 300.0, 1_000.0, 150.0
 BLOCKS, ROUNDS, STARTS = 61, 100, 15
 PAUSE_S = 0.002
-"""Before each request: a runtime asks ten times a second or so, and does not keep the processor busy between."""
+"""The pause before each request: a runtime sends about ten a second and is idle in between."""
 PIN = ROOT_KEY.verification().public
 
 Blocks = list[list[float]]
 
 
 def isolated(caller: Caller, bundle: bytes) -> Loaded:
-    """The bundle in force in the process that this calls."""
+    """Load the bundle in the boundary process."""
     found = load(
         bundle, root=ROOT, vehicle=VEHICLE, now=START, mode=EnforcementMode.PROCESS, session_key=bytes(32),
         flight=bytes(16),
@@ -51,7 +50,7 @@ def isolated(caller: Caller, bundle: bytes) -> Loaded:
 
 
 def asked(of: Loaded, request: bytes) -> tuple[bytes, float]:
-    """The permit of a request that must be allowed, and how long that took, us."""
+    """Return the permit of a request that must be allowed, and the time, us."""
     begin = perf_counter_ns()
     answer = of.boundary.enforce(request)
     taken = perf_counter_ns() - begin
@@ -62,7 +61,7 @@ def asked(of: Loaded, request: bytes) -> tuple[bytes, float]:
 
 
 def dispatched(of: Loaded, request: bytes) -> float:
-    """How long a link takes that is allowed and dispatched, us."""
+    """Return the time of an allowed and dispatched link, us."""
     permit, taken = asked(of, request)
     begin = perf_counter_ns()
     sent = of.executor.dispatch(permit, START.monotonic_us)
@@ -71,7 +70,7 @@ def dispatched(of: Loaded, request: bytes) -> float:
 
 
 def added(name: str, here: Blocks, there: Blocks) -> bool:
-    """Print what the process adds, of blocks that were measured in turns, and say whether the limits hold."""
+    """Print the added time of the process, from blocks measured in turns; return whether the limits hold."""
     held = True
     for share, limit in ((50, ADDED_MEDIAN_US), (99, ADDED_P99_US)):
         figures = [[sorted(block)[len(block) * share // 100] for block in blocks] for blocks in (here, there)]
@@ -86,7 +85,7 @@ def added(name: str, here: Blocks, there: Blocks) -> bool:
 
 
 def requests(folder: Path) -> bool:
-    """Measure requests of both, and say whether the limits hold."""
+    """Measure requests of both modes; return whether the limits hold."""
     survey = replace(flat.INVOCATIONS[flat.INSPECTION_STEP], step=0)
     software = loaded(mission=replace(flat.MISSION, invocations=(survey,)))
     bundle = sealed_again(software)
@@ -103,7 +102,7 @@ def requests(folder: Path) -> bool:
                 of.append([])
             for _ in range(ROUNDS):
                 steps[0][block].append(asked(renewed(software), step)[1])
-                # nothing of it was sent, so it may be loaded again
+                # no frame of it was sent, so it can be loaded again
                 assert isinstance(caller.load(bundle, START), bytes)
                 sleep(PAUSE_S)
                 steps[1][block].append(asked(apart, step)[1])
@@ -121,8 +120,8 @@ def requests(folder: Path) -> bool:
 
 
 def starts() -> bool:
-    """Measure starts with a bundle that ships, each in an empty folder, and say whether the limit holds."""
-    issued_us = time_ns() // 1_000 - 60_000_000  # it trusts a root by its own clock
+    """Measure starts with a shipped bundle, each in an empty folder; return whether the limit holds."""
+    issued_us = time_ns() // 1_000 - 60_000_000  # the process checks the root by its own clock
     signed, bundle = case.root(issued_us)[1], shipped("standard", issued_us)
     now = Now(START.monotonic_us, issued_us + 60_000_000, START.utc_error_us)
     pin = case.KEYS[next(iter(case.KEYS))].kid
@@ -146,7 +145,7 @@ def starts() -> bool:
 
 
 def main() -> int:
-    """Measures, prints, and says whether the limits held."""
+    """Measure and print; return 1 if a limit is missed."""
     with TemporaryDirectory() as name:
         added_little = requests(Path(name))
     started_soon = starts()

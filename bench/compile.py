@@ -1,9 +1,9 @@
-"""Compiling, end to end, against a bare Lark parse with positions of the same text.
+"""Compiling, end to end, compared with a plain Lark parse with positions of the same text.
 
-The text is one policy with many rules and many missions under it, up to 50,000 lines in one file. Compiling means:
-parse to the IR, check everything, lower every mission, prove it, and encode one mission with its policy. Both sides run
-in this process, in turns, under the same setting of the garbage collector. Exits with 1 when the ratio or the memory is
-above its limit, or when the time does not grow linearly.
+The text is one policy with many rules and many missions, up to 50,000 lines in one file. Compiling means: parse to the
+IR, check, lower and prove every mission, and encode one mission with its policy. Both run in this process, in turns,
+with the same garbage collector settings. Exits with 1 when the ratio or the memory is above its limit, or when the
+time does not grow linearly.
 """
 
 import gc
@@ -23,7 +23,7 @@ from rtshcua.wire.binding import bind
 from rtshcua.wire.bundle import mission_payload, policy_digest, policy_payload
 
 LIMIT = 4.0
-SPREAD = 1.6  # how much more a line of the largest text may cost than one of the smallest
+SPREAD = 1.6  # the time per line of the largest text, relative to the smallest
 MEMORY_MIB = 512
 SIZES = (5_000, 15_000, 50_000)
 ROUNDS = 3
@@ -64,9 +64,9 @@ mission flight_{0} under large@1 on quad {{
 
 
 def source(lines: int) -> str:
-    """A text of about that many lines: a fifth of them rules, the rest missions of 16 lines.
+    """Return a text of about that many lines: a fifth rules, the rest missions of 16 lines.
 
-    Whatever its length, ten rules are about each skill of the missions' role; all others are about other roles.
+    For any length, ten rules are about each skill of the missions' role; all others are about other roles.
     """
     rules = lines // 10
     crews = ", ".join(f"crew_{number}" for number in range(50))
@@ -85,7 +85,7 @@ def source(lines: int) -> str:
 
 
 def compiled(text: str) -> int:
-    """Compile the text to the bytes of a policy's and a mission's payload; gives their number."""
+    """Compile the text to the payloads of a policy and a mission; return their size."""
     data = text.encode()
 
     def read(path: str) -> bytes:
@@ -100,7 +100,7 @@ def compiled(text: str) -> int:
 
 
 def milliseconds(run: Callable[[str], object], text: str) -> float:
-    """How much processor time one call takes, which other work on the machine does not change much."""
+    """Return the processor time of one call, which depends little on other load."""
     gc.collect()
     start = process_time_ns()
     run(text)
@@ -108,7 +108,7 @@ def milliseconds(run: Callable[[str], object], text: str) -> float:
 
 
 def main() -> int:
-    """Measures, prints one line a size and one for memory, and says whether the limits held."""
+    """Measure and print; return 1 if a limit is missed."""
     bare = lark(GRAMMAR.read_text(encoding="utf-8")).parse
     compiled(source(500)), bare(source(500))  # warm: tables are read, code is compiled
     good = True

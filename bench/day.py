@@ -1,9 +1,9 @@
-"""A whole day: eight hours with ten flights in each, in virtual time, each by a boundary's process of its own.
+"""A whole day: eight hours with ten flights each, in virtual time, each with its own boundary process.
 
 Every flight is the shipped mission `short` on the simulated vehicle, with the code of a real run; all share a state
-folder, as the runs of a vehicle do. Stated of the boundary: its processor time, its memory, and the file in which it
-keeps what must outlive it; of the runtime: its memory, and the log. Exits with 1 when the last ten flights took more
-than the first ten, by more than the limits.
+folder, like the runs of one vehicle. Printed for the boundary: processor time, memory, and the size of its state file;
+for the runtime: memory, and the log. Exits with 1 when the last ten flights exceed the first ten by more than the
+limits.
 """
 
 import gc
@@ -30,13 +30,13 @@ from virtual import case
 from virtual.shipped import shipped, simulated
 
 HOURS, FLIGHTS, TEN = 8, 10, 10
-MORE, MORE_BYTES = 1.5, 8 << 20  # times the processor time and memory of the boundary; octets of memory of the runtime
+MORE, MORE_BYTES = 1.5, 8 << 20  # ratios of the boundary's processor time and memory; octets of the runtime's memory
 OWN_SEED = case.BOUNDARY_KEY.private.private_bytes_raw()
 VEHICLE = "quad-07"
 
 
 class Used(NamedTuple):
-    """What one flight took: ms, octets, and requests by way of the process."""
+    """The resources of one flight: ms, octets, and requests to the process."""
 
     boundary_ms: float
     boundary_octets: int
@@ -48,19 +48,19 @@ class Used(NamedTuple):
 
 
 def held_octets(process: int | str, what: str) -> int:
-    """What /proc says that a process has of memory."""
+    """Return the memory of a process, from /proc."""
     lines = Path(f"/proc/{process}/status").read_text().splitlines()
     return 1_024 * next(int(line.split()[1]) for line in lines if line.startswith(what))
 
 
 def children_s() -> float:
-    """Processor time of the processes that ended."""
+    """Return the processor time of ended child processes."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
 
 def fly(number: int, issued_us: int, state: Path) -> Used:
-    """One flight of the day."""
+    """Fly one flight of the day."""
     bundle, signed = shipped("short", issued_us), case.root(issued_us - case.MIN, boundary=True)[1]
     pin = case.KEYS[Duty.ROOT].kid
     before_s, began_s = children_s(), process_time()
@@ -96,8 +96,8 @@ def fly(number: int, issued_us: int, state: Path) -> Used:
 
 
 def main() -> int:
-    """Flies, prints, and says whether the day stayed flat."""
-    issued_us = time_ns() // 1_000 - HOURS * 3_600 * case.S  # the boundary trusts a root by the machine's clock
+    """Fly and print; return 1 if the resources grew too much."""
+    issued_us = time_ns() // 1_000 - HOURS * 3_600 * case.S  # the boundary checks the root by the machine's clock
     with TemporaryDirectory() as name:
         day = [fly(number, issued_us + number * 6 * case.MIN, Path(name)) for number in range(HOURS * FLIGHTS)]
         files = sum(len(found) for _, _, found in os.walk(name))

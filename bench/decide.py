@@ -1,7 +1,7 @@
-"""`decide` and its authority step, against `cedarpy` with a policy set parsed beforehand, in turns in one run.
+"""`decide` and its authority step, compared with `cedarpy` with a parsed policy set, in turns in one run.
 
-Cedar is asked the equivalent question: the same rules, with the same conditions, over the same numbers. (It is asked
-less than `decide` is: no freshness, no deadline, no geometry.) Exits with 1 when a limit of the project is missed.
+Cedar evaluates the equivalent rules with the same conditions over the same numbers, but without freshness, deadlines
+and geometry. Exits with 1 when a limit of the project is missed.
 """
 
 import random
@@ -31,13 +31,13 @@ from rtshcua.model.outcome import Outcome
 
 DECIDE_MEDIAN, DECIDE_P99, AUTHORITY_MEDIAN, MANY_RULES = 30.0, 100.0, 5.0, 2.0  # us, us, us, ratio
 ROUNDS, CALLS = 40, 250
-KEYS, WIDE = 1_000, 1_000  # skills and roles that large policies have rules for, candidates of one that is wide
+KEYS, WIDE = 1_000, 1_000  # skills and roles with rules in large policies; candidates in a wide policy
 ENTITIES = cedarpy.Entities.from_json_str("[]")
 ALTITUDE, BATTERY = 20 * flat.M, 9_000
 
 
 def measured(*questions: Callable[[], object]) -> list[tuple[float, float]]:
-    """Median and 99th percentile of each question in us, asked in turns so that a noisy machine slows all alike."""
+    """Return median and 99th percentile of each call in us, measured in turns so that noise affects all alike."""
     times: list[list[int]] = [[] for _ in questions]
     for _ in range(ROUNDS):
         for question, taken in zip(questions, times, strict=True):
@@ -58,9 +58,9 @@ Key = tuple[int, int]
 
 
 class Scenario:
-    """Policies of one shape, ours and Cedar's: each of `keys` has `candidates` permits, of which the last matches.
+    """Equivalent policies for `decide` and Cedar: each of `keys` has `candidates` permits, of which the last matches.
 
-    `shared` of the candidates are written once, for any skill and role.
+    `shared` of the candidates apply to any skill and role.
     """
 
     def __init__(self, name: str, keys: int, candidates: int, shared: int = 0) -> None:
@@ -68,7 +68,7 @@ class Scenario:
         self.skills, self.roles = -(-keys // 10), min(keys, 10)
 
     def rules(self) -> Iterator[tuple[Key | None, int, int]]:
-        """Key (None: any), the highest altitude (0: any) and the least charge of each rule."""
+        """Yield key (None: any), highest altitude (0: any) and least charge of each rule."""
         for number in range(self.shared):
             yield None, 0, 9_500 + number
         for at in range(self.keys):
@@ -110,7 +110,7 @@ def _cedar(key: Key | None, altitude: int, battery: int) -> str:
 
 
 def asked_of_cedar(policies: cedarpy.PolicySet, keys: list[Key], **extra: object) -> Callable[[], object]:
-    """Asks Cedar about each key in turn; refuses to measure an answer that is not to allow."""
+    """Call Cedar for each key in turn; every answer must be "allow"."""
     requests = [
         {
             "principal": f'Role::"r{role}"',
@@ -127,7 +127,7 @@ def asked_of_cedar(policies: cedarpy.PolicySet, keys: list[Key], **extra: object
 
 
 def asked_of_authority(policy: PreparedPolicy, keys: list[Key]) -> Callable[[], object]:
-    """Asks the authority step about each key in turn."""
+    """Call the authority step for each key in turn."""
     plan = Plan(MotionKind.CLIMB, (), ALTITUDE, 0)
     sets = situation(flat.state(), policy, flat.NOW)
     cases = []
@@ -143,14 +143,14 @@ def asked_of_authority(policy: PreparedPolicy, keys: list[Key]) -> Callable[[], 
 
 
 def prepared(invocation: Invocation, policy: PreparedPolicy) -> PreparedInvocation:
-    """An invocation that is known to be well-formed."""
+    """Prepare a well-formed invocation."""
     found = prepare_invocation(invocation, policy, flat.MISSION.phases)
     assert not isinstance(found, Refusal), found
     return found
 
 
 def loaded(policy: Policy) -> PreparedPolicy:
-    """A policy that is known to be well-formed."""
+    """Prepare a well-formed policy."""
     found = prepare(policy)
     assert not isinstance(found, Refusal), found
     return found
@@ -160,7 +160,7 @@ def loaded(policy: Policy) -> PreparedPolicy:
 
 
 def ring(west: int, south: int, east: int, north: int) -> tuple[int, ...]:
-    """A rectangle with 16 vertices."""
+    """Return a rectangle with 16 vertices."""
     xs, ys = [west + (east - west) * n // 4 for n in range(5)], [south + (north - south) * n // 4 for n in range(5)]
     corners = [(x, south) for x in xs[:4]] + [(east, y) for y in ys[:4]]
     corners += [(x, north) for x in xs[:0:-1]] + [(west, y) for y in ys[:0:-1]]
@@ -168,12 +168,12 @@ def ring(west: int, south: int, east: int, north: int) -> tuple[int, ...]:
 
 
 def sixteen(zone: Zone) -> Zone:
-    """The zone with 16 vertices, where it is a polygon."""
+    """Return the zone with 16 vertices if it is a polygon."""
     return replace(zone, data=ring(*zone.data[:2], *zone.data[4:6])) if zone.shape == POLYGON else zone
 
 
 def ten_candidates() -> PreparedPolicy:
-    """A policy of ten rules that all speak of the inspection, in zones of 16 corners."""
+    """Return a policy of ten rules about the inspection, in zones of 16 corners."""
     low = [flat.apply(Op.LT, flat.signal(flat.BATTERY), flat.const(n)) for n in (1_000, 1_500, 2_000)]
     narrow = [flat.apply(Op.LE, flat.argument(1), flat.const(n * flat.M)) for n in (6, 8, 10)]
     rules = (
@@ -188,7 +188,7 @@ def ten_candidates() -> PreparedPolicy:
 
 
 def asked_of_decide(places: int) -> Callable[[], object]:
-    """Asks about the inspection under ten rules that all speak of it, from one place or from several in turn."""
+    """Decide the inspection under ten rules about it, from one place or from several in turn."""
     policy = ten_candidates()
     invocation = prepared(flat.INVOCATIONS[flat.INSPECTION_STEP], policy)
     assert sum(map(len, invocation.candidates)) == 10
@@ -200,7 +200,7 @@ def asked_of_decide(places: int) -> Callable[[], object]:
 
 
 def cedar_for_decide() -> Callable[[], object]:
-    """The same ten rules, with `require` and `assume` as a further condition of the permit."""
+    """Return the same ten rules, with `require` and `assume` as additional conditions of the permit."""
     who, skill = 'principal == Role::"r0"', 'action == Action::"s3"'
     text = [f"forbid(principal, {skill}, resource) when {{ context.battery < {n} }};" for n in (1_000, 1_500, 2_000)]
     text += [f"permit({who}, {skill}, resource) when {{ context.altitude <= {n * flat.M} }};" for n in (6, 8, 10)]
@@ -220,7 +220,7 @@ def cedar_for_decide() -> Callable[[], object]:
 
 
 def scenarios() -> tuple[Scenario, ...]:
-    """What is asked; named for the sizes that are measured."""
+    """Return the measured calls, named by their sizes."""
     return (
         Scenario("authority, 1 candidate", 1, 1),
         Scenario("authority, 10 candidates", 1, 10),
@@ -232,7 +232,7 @@ def scenarios() -> tuple[Scenario, ...]:
 
 
 def main() -> int:
-    """Measures, prints a table, and says whether the limits held."""
+    """Measure and print a table; return 1 if a limit is missed."""
     print(f"{'':38}{'median us':>10}{'p99 us':>10}{'cedarpy':>10}{'p99 us':>10}{'ratio':>8}")
     figures: dict[str, tuple[float, float]] = {}
     faster = True

@@ -1,9 +1,9 @@
-"""How long a document may hold up the loop of a flight: honest, refused, or garbage as large as is read.
+"""How long a document delays the loop of a flight: valid, refused, or garbage of the maximum size.
 
-The time from the event to the answer, in `Runtime.step`, the record included. A replacement was looked at ahead, as
-`rtshcua run` has it done by another thread; what that takes is told besides. The machine is noisy: the percentiles are
+Measured is the time from the event to the answer in `Runtime.step`, including the record. A replacement is verified in
+advance, as `rtshcua run` does in another thread; that time is printed separately. Because of noise, percentiles are
 those of the quietest of `BLOCKS` blocks. Exits with 1 when the 95th percentile of any kind is above the limit, which is
-that of the way from a frame to a fallback.
+the limit from a frame to a fallback.
 """
 
 import sys
@@ -29,7 +29,7 @@ OF = low()
 
 
 def took_us(of: Loaded, document: bytes, slug: str, *, ahead: bool = False) -> tuple[float, float]:
-    """How long a run's step takes with a document, and how long looking at it ahead took before."""
+    """Return the time of a step with a document, and the time of its verification in advance."""
     run = Run(of, ready=False)
     begin = perf_counter_ns()
     if ahead:
@@ -43,7 +43,7 @@ def took_us(of: Loaded, document: bytes, slug: str, *, ahead: bool = False) -> t
 
 
 def measured(name: str, document: bytes, slug: str, *, ahead: bool = False) -> float:
-    """Measures one kind, prints it, and gives its 95th percentile."""
+    """Measure and print one kind; return its 95th percentile."""
     blocks = [sorted(took_us(renewed(OF), document, slug, ahead=ahead) for _ in range(ROUNDS)) for _ in range(BLOCKS)]
     best = min(blocks, key=lambda block: block[ROUNDS * 95 // 100])
     high = best[ROUNDS * 95 // 100][0]
@@ -53,7 +53,7 @@ def measured(name: str, document: bytes, slug: str, *, ahead: bool = False) -> f
 
 
 def main() -> int:
-    """Measures, prints, and says whether the limit held."""
+    """Measure and print; return 1 if a limit is missed."""
     content_type = names.REPLACEMENT.content_type
     large = cose.sign1(bytes(MAX_DOCUMENT - 200), key=MISSION_KEY, duty=Duty.MISSION, content_type=content_type)
     damaged = large[:-1] + bytes([large[-1] ^ 1])

@@ -1,11 +1,11 @@
-"""The language server over its standard streams: from a keystroke to what is found, in a file of 2,000 lines.
+"""The language server over its standard streams: from a keystroke to its diagnostics, in a file of 2,000 lines.
 
-A client of our own sends `textDocument/didChange` and waits for the `textDocument/publishDiagnostics` of that version,
-for each kind of edit often enough for a 95th percentile; the file has zones, skills, policies and missions. Printed are
-milliseconds, and the same in terms of a bare Lark parse of the text in this run. Also how long after the last keystroke
-the whole check, with proofs and lint, has come. On a machine that does other things too, the processor time of the
-server tells more (Linux). Exits with 1 when the 95th percentile of an edit is above its limit, unless the machine was
-slow: then the median must be below so many Lark parses as the limit is on a quiet machine.
+A test client sends `textDocument/didChange` and waits for the `textDocument/publishDiagnostics` of that version, often
+enough for a 95th percentile of each kind of edit; the file has zones, skills, policies and missions. Printed are
+milliseconds, and multiples of a plain Lark parse of the text in this run; also the time from the last keystroke to the
+whole check with proofs and lint. On a busy machine the server's processor time is more meaningful (Linux). Exits with 1
+when the 95th percentile of an edit is above its limit, unless the machine was slow: then the median must be below the
+limit in terms of Lark parses.
 """
 
 import json
@@ -26,9 +26,9 @@ from rtshcua.ground.language.generate import GRAMMAR, lark
 CHECKOUT = Path(__file__).resolve().parents[1]
 LINES = 2_000
 LIMIT_MS = 100
-RATIO = 0.6  # of a bare Lark parse of the text in this run, which takes about 170 ms
+RATIO = 0.6  # multiples of a plain Lark parse of the text in this run, which takes about 170 ms
 ROUNDS = 40
-PAUSE = 0.12  # seconds between keystrokes: about what a person types
+PAUSE = 0.12  # seconds between keystrokes, as a person types
 
 IMPORTED = "policies/site skills/takeoff skills/hover skills/goto skills/return_home skills/emergency_land"
 HEAD = "".join(f'import "lib:{file}.rts"\n' for file in IMPORTED.split())
@@ -58,7 +58,7 @@ mission m_{n} under p_{n}@1 on quad {{
 
 
 def source(lines: int) -> str:
-    """A text of about that many lines; zones and signals, many skills, policies and missions."""
+    """Return a text of about that many lines, with zones, signals, skills, policies and missions."""
     skill = (CHECKOUT / "skills" / "goto.rts").read_text(encoding="utf-8").partition("skill goto")[2]
     text, n = HEAD, 0
     while text.count("\n") < lines:
@@ -72,7 +72,7 @@ def source(lines: int) -> str:
 
 
 class Client:
-    """Speaks to a server that it starts."""
+    """A client of a server that it starts."""
 
     def __init__(self, folder: str) -> None:
         command = [sys.executable, "-P", "-m", "rtshcua", "lsp"]
@@ -82,7 +82,7 @@ class Client:
         threading.Thread(target=self._read, daemon=True).start()
 
     def send(self, method: str, params: Any, *, number: int | None = None) -> None:
-        """Sends a message; with a number it is a request."""
+        """Send a message; with a number it is a request."""
         message = {"jsonrpc": "2.0", "method": method, "params": params} | ({} if number is None else {"id": number})
         body = json.dumps(message).encode()
         assert self._process.stdin is not None
@@ -90,18 +90,18 @@ class Client:
         self._process.stdin.flush()
 
     def ask(self, method: str, params: Any) -> Any:
-        """A request and its answer."""
+        """Send a request and return its answer."""
         self._number += 1
         self.send(method, params, number=self._number)
         return self._until(lambda message: message.get("id") == self._number)[1]
 
     def told(self, version: int) -> tuple[float, int]:
-        """When findings of a version came, and how many."""
+        """Return when the diagnostics of a version came, and their number."""
         at, message = self._until(lambda message: message.get("params", {}).get("version") == version)
         return at, len(message["params"]["diagnostics"])
 
     def processor_ms(self) -> float:
-        """What the server has used of the processor, without the process that proves."""
+        """Return the server's processor time, without the proving process."""
         stat = Path(f"/proc/{self._process.pid}/stat")
         if not stat.exists():
             return 0.0
@@ -109,7 +109,7 @@ class Client:
         return (int(fields[11]) + int(fields[12])) * 1000 / sysconf("SC_CLK_TCK")
 
     def end(self) -> None:
-        """Ends the server."""
+        """End the server."""
         self.ask("shutdown", None)
         self.send("exit", None)
         self._process.wait()
@@ -133,14 +133,14 @@ class Client:
 
 
 def typed(text: str, old: str, new: str) -> Iterator[str]:
-    """The text with `old` and with `new` in turns, as keystrokes there and back would leave it."""
+    """Yield the text with `old` and with `new` in turns, as keystrokes back and forth would."""
     while True:
         yield text.replace(old, new, 1)
         yield text
 
 
 def ranged(old: str, new: str) -> dict[str, Any]:
-    """The change that an editor would send: the lines that differ."""
+    """Return the change that an editor would send: the differing lines."""
     before, after = old.split("\n"), new.split("\n")
     first = next(n for n in range(len(before)) if before[n : n + 1] != after[n : n + 1])
     last = next(n for n in range(len(before)) if before[-1 - n : len(before) - n] != after[-1 - n : len(after) - n])
@@ -153,7 +153,7 @@ def ranged(old: str, new: str) -> dict[str, Any]:
     }
 
 
-#: what is typed, and in place of what
+#: the typed text, and the text that it replaces
 KINDS = {
     "type in a comment": ("// Pad 60, of which", "// Pad 60, of all which"),
     "change a number": ("47.39785 N, 8.5456 E, 15 m", "47.39785 N, 8.5456 E, 16 m"),
@@ -166,7 +166,7 @@ KINDS = {
 
 
 def main() -> int:
-    """Measures, prints, and says whether the limit was kept."""
+    """Measure and print; return 1 if the limit is exceeded."""
     text = source(LINES)
     bare = lark(GRAMMAR.read_text(encoding="utf-8"))
     kept = True

@@ -1,12 +1,11 @@
 """End to end: from the release of a step to its command on the wire, in mode `software`, for short and long missions.
 
-A step is released by the frame in which the end of its predecessor is seen. The time is taken from that frame, as it
-comes in, to the command's, as it is handed to a UDP socket: decoding, state, decision, permit, evidence (written by its
-thread to a file on this disk before the command goes out), encoding and sending. Between steps the vehicle is simulated
-in virtual time; which frames release steps is known from flying the same flight before, and the process sleeps before
-each of them, as one that flies in real time does. The machine is noisy, so the percentiles are those of a block of
-releases, and the quietest block counts; the median block stands beside it. Exits with 1 when the 95th percentile is
-above the limit, or the time of the processor that a release takes grows with the mission.
+The frame that shows the end of a step releases the next one. Measured is the time from that frame's arrival to the
+command's frame at a UDP socket: decoding, state, decision, permit, evidence (written by its thread to a file on this
+disk before the command is sent), encoding and sending. Between steps the vehicle is simulated in virtual time. An equal
+flight before determines the releasing frames; the process sleeps before each of them, as in real time. Because of
+noise, percentiles are those of the quietest block of releases; the median block is printed too. Exits with 1 when the
+95th percentile is above the limit, or when the processor time of a release grows with the mission.
 """
 
 import gc
@@ -37,15 +36,15 @@ from virtual.shipped import shipped, simulated
 
 LIMIT_MS = 5.0
 PUBLISHED_MS = {"short": 55.7, "extended": 135.0}
-FLAT = 1.5  # the processor time of the longest mission's median release, as a multiple of the shortest's
+FLAT = 1.5  # the processor time of the longest mission's median release, relative to the shortest's
 LONG = 50
-#: blocks, and flights in a block
+#: the number of blocks, and of flights in a block
 ROUNDS = {"short": (4, 8), "standard": (3, 3), "extended": (3, 1), "long": (1, 1)}
 SLEEP_S = 0.01
 
 
 class Timed(VirtualVehicle):
-    """Stamps the frames that release steps, sleeping before those, and hands the commands' frames to a socket."""
+    """Time-stamps the frames that release steps, sleeping before them, and sends command frames to a socket."""
 
     number = 0  # of the datagram
     releases: set[int]  # their numbers
@@ -57,7 +56,7 @@ class Timed(VirtualVehicle):
     address: tuple[str, int]
 
     def poll(self, now_us: int, timeout_us: int) -> Sequence[Event]:
-        """A wait for a record is one of real time."""
+        """Wait for a record in real time."""
         if timeout_us == HELD_WAIT_US:
             time.sleep(timeout_us / 1e6)
             timeout_us = 0
@@ -76,7 +75,7 @@ class Timed(VirtualVehicle):
                 self.releases.add(number)
 
     def begin(self, command: Command, now_us: int) -> None:
-        """Send, and take the time."""
+        """Send and time-stamp frames."""
         if self._free and isinstance(self.frames, FrameSession):
             self.frames.open(replace(command, not_after_us=now_us))
         events, frames = self.driver.begin(command, now_us)
@@ -91,7 +90,7 @@ class Timed(VirtualVehicle):
 
 
 def long() -> bytes:
-    """A mission of many short legs, back and forth."""
+    """Return a mission of many short legs, back and forth."""
     steps: list[Invocation] = [case.step(0, 0, flat.TAKEOFF, Plan(MotionKind.CLIMB, (), 15 * case.M, 0), 15 * case.M)]
     for number in range(1, LONG - 1):
         place = (6 * case.M * (number % 2), 0)
@@ -108,7 +107,7 @@ def long() -> bytes:
 def one(
     bundle: bytes, link: socket.socket, address: tuple[str, int], folder: Path, expected: frozenset[int]
 ) -> tuple[list[float], list[int], frozenset[int]]:
-    """The latencies of one flight, in ms, its processor times in ns, and which frames released steps."""
+    """Return the latencies of one flight in ms, its processor times in ns, and the indices of the releasing frames."""
     config = simulated("px4", hover_us=240 * case.MIN)
     first = Flight(bundle, config)
     vehicle = Timed(first.loaded.bundle.policy, config, first.clock, first.loaded.executor.frames)
@@ -131,12 +130,12 @@ def one(
 
 
 def percentile(times: list[float], percent: int) -> float:
-    """By nearest rank."""
+    """Return a percentile by nearest rank."""
     return sorted(times)[-(-len(times) * percent // 100) - 1]
 
 
 def main() -> int:
-    """Measures, prints a line a mission, and says whether the limits held."""
+    """Measure and print; return 1 if a limit is missed."""
     middles, worst = [], 0.0
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as peer, tempfile.TemporaryDirectory() as name:
         peer.bind(("127.0.0.1", 0))

@@ -1,7 +1,7 @@
-"""Endurance: a flight of two hours in virtual time, and how its memory grows.
+"""Endurance: the memory growth of a flight of two hours in virtual time.
 
-Leg after leg, back and forth, with evidence to a file; everything is the code of a real run, but for the vehicle. What
-the process holds is looked at after half an hour and at the end. Exits with 1 when it grew by more than the limit.
+Leg after leg, back and forth, with evidence to a file, with the code of a real run except for the vehicle. The memory
+of the process is compared after half an hour and at the end. Exits with 1 when it grew by more than the limit.
 """
 
 import gc
@@ -25,14 +25,14 @@ from virtual.flight import Flight
 
 HOURS = 2
 HOUR_US = 3_600 * case.S
-STEPS = 400  # more than it gets to
+STEPS = 400  # more steps than are reached
 LIMIT_BYTES = 2 << 20
-LIMIT_OBJECTS = 20  # for each step flown: what a step was last asked about is remembered with it
+LIMIT_OBJECTS = 20  # per flown step: each step keeps its last decision
 _ENDURANCE_US = 10 * HOUR_US
 
 
 class Sink(EvidenceFile):
-    """The file, written to in virtual time: what was appended is kept."""
+    """An evidence file in virtual time: appended lines count as written."""
 
     kept = synced = 0
 
@@ -49,7 +49,7 @@ class Sink(EvidenceFile):
 
 
 def flight() -> Flight:
-    """Leg after leg, for as long as anybody looks."""
+    """Yield legs without end."""
     steps = [case.step(0, 0, flat.TAKEOFF, Plan(MotionKind.CLIMB, (), 15 * case.M, 0), 15 * case.M)]
     for number in range(1, STEPS):
         place = (150 * case.M if number % 2 else -50 * case.M, 0)
@@ -64,14 +64,14 @@ def flight() -> Flight:
 
 
 def held() -> tuple[int, int]:
-    """The bytes of memory that the process has, and the objects that the collector knows."""
+    """Return the memory of the process in bytes, and the number of objects."""
     gc.collect()
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * 4_096, len(gc.get_objects())
 
 
 def main() -> int:
-    """Flies, prints, and says whether memory stayed flat."""
+    """Fly and print; return 1 if memory grew too much."""
     with tempfile.TemporaryDirectory() as name:
         flown = flight()
         clock, sink = flown.clock, Sink(Path(name) / "log.jsonl")

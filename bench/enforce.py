@@ -1,9 +1,9 @@
-"""The dispatch-time path, from a state in hand to a command that may be sent, against the published figure for it.
+"""The dispatch path, from a known state to a permitted command, compared with the published figure.
 
-One admission: encode the request, `enforce` in mode `software` (decide, issue the permit), read the answer, make the
-evidence line and append it to a file, check the permit. Signatures were verified at load. The machine is noisy, so the
-percentiles are those of a block of admissions, and the quietest block counts; the median block stands beside it.
-Exits with 1 when the 95th percentile is above the limit.
+One admission: encode the request, `enforce` in mode `software` (decide, issue the permit), decode the answer, append
+the evidence line to a file, check the permit. Signatures were verified at load. Because of noise, percentiles are those
+of the quietest block of admissions; the median block is printed too. Exits with 1 when the 95th percentile is above the
+limit.
 """
 
 import sys
@@ -35,12 +35,12 @@ PARTS = ("enforce and record", "append", "check the permit", "all")
 
 
 def fresh(of: Loaded) -> Loaded:
-    """The same bundle in a new session, so that its one step may be admitted again."""
+    """Load the same bundle in a new session, so that its step can be admitted again."""
     return renewed(of)
 
 
 def one(of: Loaded, recorder: Recorder, file: EvidenceFile) -> tuple[int, ...]:
-    """How long the parts of one admission take, in ns, and all of it."""
+    """Return the times of the parts of one admission, in ns, and their total."""
     of = fresh(of)
     journal, queue = Journal(recorder), InvocationQueue(of.bundle.mission)
     queue.release(START.monotonic_us)
@@ -61,7 +61,7 @@ def one(of: Loaded, recorder: Recorder, file: EvidenceFile) -> tuple[int, ...]:
 
 
 def main() -> int:
-    """Measures, prints, and says whether the limit held."""
+    """Measure and print; return 1 if a limit is missed."""
     survey = replace(flat.INVOCATIONS[flat.INSPECTION_STEP], step=0)
     of = loaded(mission=replace(flat.MISSION, invocations=(survey,)))
     recorder = Recorder(lambda text: LOG_KEY.sign(text, duty=Duty.LOG), LOG_KEY.public, lambda: bytes(32))

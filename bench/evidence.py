@@ -1,10 +1,10 @@
-"""Evidence: what it costs to append a decision, by class of durability.
+"""Evidence: the cost of appending a decision, by durability class.
 
-`written` (class 1) is what the runtime and its writer do: record, encoding, chain, leaf, and one `write` to the file;
-its peer is `hashlib`'s SHA-256 of the same bytes. `synced first` (class 3) is the same with `fdatasync`; its peer is a
-bare write and `fdatasync` of the same bytes to a file beside it. `buffered` (class 0) is told for comparison. Each
-figure is taken in turns with its peer, so that a noisy machine slows both alike; for the disk the least of some rounds
-counts. Exits with 1 when a figure is above its limit. What verification costs: bench/verify.py.
+`written` (class 1) is the work of the runtime and its writer: record, encoding, chain, leaf, and one `write` to the
+file; its reference is `hashlib`'s SHA-256 of the same bytes. `synced first` (class 3) is the same with `fdatasync`; its
+reference is a plain write and `fdatasync` of the same bytes to another file. `buffered` (class 0) is printed for
+comparison. Each figure and its reference are measured in turns, so that noise affects both; for the disk the least of
+several rounds counts. Exits with 1 when a figure is above its limit. Verification: bench/verify.py.
 """
 
 import gc
@@ -88,7 +88,7 @@ def append(path: Path, durability: int) -> tuple[list[int], list[int], list[int]
 
 
 def synced(folder: Path) -> tuple[list[int], list[int]]:
-    """The nanoseconds of each append that is synced first, and of a bare write and sync of the same bytes."""
+    """Return the nanoseconds of each synced append, and of a plain write and sync of the same bytes."""
     folder.mkdir()
     recorder, file = begin(folder / "synced")
     bare = os.open(folder / "bare", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
@@ -105,7 +105,7 @@ def synced(folder: Path) -> tuple[list[int], list[int]]:
 
     times: dict[Callable[[], None], list[int]] = {ours: [], theirs: []}
     for number in range(1, SYNCED_RECORDS + 1):
-        for work in (ours, theirs) if number % 2 else (theirs, ours):  # who comes second may find less to do
+        for work in (ours, theirs) if number % 2 else (theirs, ours):  # the second write may find less to sync
             start = perf_counter_ns()
             work()
             times[work].append(perf_counter_ns() - start)
@@ -115,13 +115,13 @@ def synced(folder: Path) -> tuple[list[int], list[int]]:
 
 
 def percentile_us(times: list[int], percent: int) -> float:
-    """A percentile of nanoseconds, in microseconds: of blocks, the median one's."""
+    """Return a percentile of nanoseconds, in microseconds: the median over blocks."""
     blocks = [times[start : start + BLOCK] for start in range(0, len(times), BLOCK)]
     return median(quantiles(block, n=100)[percent - 1] for block in blocks) / 1_000
 
 
 def main() -> int:
-    """Measures, prints a line a figure, and says whether the limits held."""
+    """Measure and print; return 1 if a limit is missed."""
     gc.disable()
     failed = False
     with tempfile.TemporaryDirectory(dir=os.environ.get("BENCH_DIR")) as name:

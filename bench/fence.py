@@ -1,8 +1,8 @@
-"""Containment of a place in a polygon, against shapely's `contains_xy` on prepared geometry, in turns in one run.
+"""Point-in-polygon tests, compared with shapely's `contains_xy` on prepared geometry, in turns in one run.
 
-Ours answers exactly, in integers, and what lies on the boundary is outside; shapely answers in floating point. The
-first outlines have edges of many lengths and directions; a zig-zag has edges that run through nearly all heights.
-Exits with 1 when a place in the polygon of 200 vertices takes longer than the limit.
+The project's test is exact, in integers, and a point on the boundary is outside; shapely uses floating point. The first
+outlines have edges of many lengths and directions; a zig-zag has edges that span nearly all heights. Exits with 1 when
+a test in the polygon of 200 vertices takes longer than the limit.
 """
 
 import random
@@ -24,14 +24,14 @@ from rtshcua.decision.outline import Bands, Slabs, edges
 LIMIT_US, LIMIT_VERTICES = 5.0, 200
 ROUNDS, PLACES = 15, 1_000
 PEER_S = 0.5
-"""About how long the peer is asked for in all rounds at most; it is slow where edges run through nearly all heights."""
+"""The approximate time limit of shapely in all rounds; it is slow if edges span nearly all heights."""
 LARGEST = 65_536
-"""Vertices of the outlines that are measured, at most."""
+"""The greatest number of vertices of the measured outlines."""
 KILOMETRE = 1_000_000  # mm
 
 
 def coast(count: int) -> Ring:
-    """A ring whose corners lie at random between 0.6 and 1 km from its middle, some way round it at each step."""
+    """Return a ring with corners at random distances between 0.6 and 1 km from its centre."""
     chance = random.Random(count)
     found = []
     for number in range(count):
@@ -41,7 +41,7 @@ def coast(count: int) -> Ring:
 
 
 def round_outline(count: int) -> Ring:
-    """What a circle is made into."""
+    """Return a polygon in place of a circle."""
     return tuple(
         (round(KILOMETRE * cos(2 * pi * n / count)), round(KILOMETRE * sin(2 * pi * n / count))) for n in range(count)
     )
@@ -55,14 +55,14 @@ OUTLINES = [
 
 
 def places(ring: Ring) -> list[tuple[int, int]]:
-    """Anywhere in the ring's bounding box."""
+    """Return random places in the ring's bounding box."""
     chance, xs, ys = random.Random(7), [x for x, _ in ring], [y for _, y in ring]
     west, east, south, north = min(xs), max(xs), min(ys), max(ys)
     return [(chance.randint(west, east), chance.randint(south, north)) for _ in range(PLACES)]
 
 
 def each(ask: Callable[[int, int], object], of: list[tuple[int, int]]) -> float:
-    """How much processor time a question takes, us, which other work on the machine does not change much."""
+    """Return the processor time of a test in us, which depends little on other load."""
     start = process_time_ns()
     for x, y in of:
         ask(x, y)
@@ -70,7 +70,7 @@ def each(ask: Callable[[int, int], object], of: list[tuple[int, int]]) -> float:
 
 
 def measured(ours: Slabs, ring: Ring) -> tuple[float, float]:
-    """Our time a place and shapely's, of the quietest round. Both must give the same answers, but for rounding."""
+    """Return the time per place and shapely's, of the fastest round. The answers must agree, apart from rounding."""
     peer = shapely.Polygon(ring)
     shapely.prepare(peer)
     theirs, asked = partial(shapely.contains_xy, peer), places(ring)
@@ -84,7 +84,7 @@ def measured(ours: Slabs, ring: Ring) -> tuple[float, float]:
 
 
 def main() -> int:
-    """Measures, prints a table, and says whether the limit held."""
+    """Measure and print a table; return 1 if the limit is missed."""
     print(f"{'us a place':28}{'ours':>8}{'shapely':>9}{'ratio':>7}{'check s':>9}{'tables s':>10}{'entries/vertex':>16}")
     limited = 0.0
     for name, ring in OUTLINES:

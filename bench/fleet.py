@@ -1,7 +1,7 @@
-"""Fleet: ten vehicles fly on this machine at once, each in real time with a runtime, a simulation and a view.
+"""Fleet: ten vehicles on this machine at once, each in real time with a runtime, a simulation and a view.
 
-A deadline is missed when a step is not admitted and sent within its own, when a fallback flies, or when the heartbeat
-of a runtime, due every second, is late. Exits with 1 when one is missed.
+A deadline is missed when a step is not admitted and sent within its deadline, when a fallback flies, or when the
+heartbeat of a runtime, due every second, is late. Exits with 1 when a deadline is missed.
 """
 
 import json
@@ -41,7 +41,7 @@ def fly(folder: Path) -> tuple[list[Path], list[int]]:
 
 
 def slack(log: Path) -> tuple[list[float], list[str]]:
-    """How long after its release each step was sent at most, in ms, and what went otherwise than it should."""
+    """Return the greatest time from release to sending of a step, in ms, and the missed deadlines."""
     records = [json.loads(line) for line in log.read_bytes().splitlines()]
     steps = [record for record in records if record["type"] == "decision" and record["kind"] == 0]
     wrong = [f"{record['outcome']} {record['reason']}" for record in steps if record["outcome"] != "allow"]
@@ -52,7 +52,7 @@ def slack(log: Path) -> tuple[list[float], list[str]]:
 
 
 def gaps(frames: Path) -> list[int]:
-    """The times between two heartbeats of the runtime, in us."""
+    """Return the intervals between heartbeats of the runtime, in us."""
     beats = [
         entry.at_us
         for entry in tlog.read(frames.read_bytes())
@@ -62,7 +62,7 @@ def gaps(frames: Path) -> list[int]:
 
 
 def main() -> int:
-    """Flies, prints, and says whether every deadline held."""
+    """Fly and print; return 1 if a deadline is missed."""
     with tempfile.TemporaryDirectory() as name:
         runs, codes = fly(Path(name))
         used, beats, wrong = [], [], [f"exit code {code}" for code in codes if code]

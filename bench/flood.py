@@ -1,11 +1,12 @@
-"""Whoever floods the agent socket: how much later are the frames of the vehicle taken in?
+"""A flood of the agent socket: how much it delays the vehicle's frames.
 
-A process sends a frame every 20 ms, and the thread that flies takes each in, by the driver, and looks at the agent
-socket in between, as a run does. In turns nobody hands anything in, and another process hands in whatever takes long to
-decode, verify or hash, as fast as it is read, with a mission key and without. Of each the worst gap between two frames
-in a block counts, and of the blocks the median. Exits with 1 where a flood makes it longer than `LIMIT` allows.
+A process sends a frame every 20 ms; the flight thread receives each through the driver and polls the agent socket in
+between, as a run does. In turns there is no submission, or another process submits documents that are slow to decode,
+verify or hash, as fast as they are read, with and without a mission key. The worst gap between two frames in a block
+counts, and the median of the blocks. Exits with 1 when a flood makes it longer than `LIMIT` allows.
 
-Then a replacement is accepted, of few steps and of as many as a document holds: how long the thread that flies stood.
+Then a replacement with few steps, and one with the greatest number of steps, is accepted: how long the flight thread is
+blocked.
 """
 
 import json
@@ -40,21 +41,21 @@ from rtshcua.wire.document import MAX_DOCUMENT
 LIMIT = 1.2
 BLOCKS, BLOCK_S = 7, 3.0
 EVERY_S = 0.02
-#: of replacements that are accepted, but for one; and how often each is tried
+#: the number of steps of accepted replacements, less one; and of repetitions
 STEPS, TRIES = (4, 20, 100, 700), 5
 PIN = ROOT_KEY.verification().public
 _OURS: list[socket.socket] = []
 
 
 def ends_with_us() -> socket.socket:
-    """In this process, a socket for its children: it can be read as soon as this process is gone, however it went."""
+    """A socket for child processes that becomes readable as soon as this process ends for any reason."""
     ours, theirs = socket.socketpair()
     _OURS.append(ours)
     return theirs
 
 
 def end_with_parent(parent: socket.socket) -> None:
-    """In a child: end when the parent is gone. It drops its copies of the parent's end, or it would never see."""
+    """In a child: end with the parent. The child must close its copies of the parent's end to notice."""
     for each in _OURS:
         each.close()
 
@@ -77,7 +78,7 @@ def send(port: int, frames: list[bytes], parent: socket.socket) -> None:
 
 
 def flood(path: str, documents: list[bytes], switch: Switch, parent: socket.socket) -> None:
-    """Hand documents in as fast as they are read, while the switch is on."""
+    """Submit documents as fast as they are read, while the switch is on."""
     end_with_parent(parent)
     lines = [json.dumps({"id": 1, "document": b64encode(each).decode()}).encode() + b"\n" for each in documents]
     while True:
@@ -97,7 +98,7 @@ def flood(path: str, documents: list[bytes], switch: Switch, parent: socket.sock
 
 
 class Flight:
-    """What a run does in each turn of its loop, with what a flood reaches: frames, sockets, the runtime's step."""
+    """The work of a run in each turn of its loop that a flood affects: frames, sockets, the runtime's step."""
 
     def __init__(self, of: Loaded, folder: Path) -> None:
         self.run = Run(of, ready=False)
@@ -110,12 +111,12 @@ class Flight:
         self.handed_in = 0
 
     def now(self) -> Now:
-        """The flight's time: it began as the bundle was received."""
+        """The flight's time, from the receipt of the bundle."""
         passed_us = time.monotonic_ns() // 1000 - self.begun_us
         return Now(START.monotonic_us + passed_us, START.utc_us + passed_us, START.utc_error_us)
 
     def worst_gap_s(self, lasts_s: float) -> float:
-        """The longest time between two frames that were taken in."""
+        """Return the longest time between two received frames."""
         until_s, last_s, worst_s = time.monotonic() + lasts_s, 0.0, 0.0
         while last_s < until_s:
             if select([self.link], [], [], 0.05)[0]:
@@ -129,13 +130,13 @@ class Flight:
         return worst_s
 
     def close(self) -> None:
-        """Listen no more."""
+        """Stop listening."""
         self.agents.__exit__(None, None, None)
         self.link.close()
 
 
 def measured(name: str, of: Loaded, folder: Path) -> float:
-    """Print the gaps of a mode, and give how many times the quiet one that of a flood is."""
+    """Print the gaps of a mode; return the flood's gap relative to the quiet one."""
     flight = Flight(of, folder)
     documents = [document for document, _ in hostile(MISSION_KEY).values()] + [replacement(of)] * 2
     assert max(map(len, documents)) <= MAX_DOCUMENT
@@ -174,7 +175,7 @@ def measured(name: str, of: Loaded, folder: Path) -> float:
 
 @contextmanager
 def in_process(folder: Path) -> Iterator[Loaded]:
-    """The same flight with the boundary in a process of its own."""
+    """Return the same flight with a boundary process."""
     process = BoundaryProcess(ROOT.sign(ROOT_KEY), PIN, VEHICLE, folder, paced=True)
     try:
         of = load(
@@ -189,7 +190,7 @@ def in_process(folder: Path) -> Iterator[Loaded]:
 
 
 def stood_ms(of: Loaded, steps: int, folder: Path) -> float:
-    """The longest turn of the thread that flies while a replacement of so many steps is handed in and accepted."""
+    """Return the longest turn of the flight thread while a replacement of so many steps is accepted."""
     flight = Flight(of, folder)
     line = json.dumps({"id": 1, "document": b64encode(large(of, steps)).decode()}).encode() + b"\n"
     sender = socket.socket(socket.AF_UNIX)
@@ -213,7 +214,7 @@ def stood_ms(of: Loaded, steps: int, folder: Path) -> float:
 
 
 def accepted() -> None:
-    """Print how long an accepted replacement takes of the thread that flies, at best of some."""
+    """Print the time that an accepted replacement blocks the flight thread, the best of several."""
     flown: dict[str, Callable[[Path], AbstractContextManager[Loaded]]] = {
         "software": lambda _: nullcontext(low()),
         "process": in_process,
@@ -230,7 +231,7 @@ def accepted() -> None:
 
 
 def main() -> int:
-    """Measures both modes, prints, and says whether the limit held."""
+    """Measure both modes and print; return 1 if the limit is missed."""
     with TemporaryDirectory(dir="/tmp") as one, TemporaryDirectory(dir="/tmp") as other:
         worst = measured("software", low(), Path(one))
         with in_process(Path(other)) as of:

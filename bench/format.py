@@ -1,7 +1,7 @@
-"""Formatting: laying out against our own parser; the whole, with reading the result again, against a bare Lark parse.
+"""Formatting: the layout compared with our own parser, and the whole compared with a plain Lark parse.
 
-All of the same text, in one run. The whole is what `formatted` does: read, lay out, read again, compare. Exits with 1
-when a limit is broken.
+The whole is the function `formatted`: parse, lay out, parse again, compare. All of the same text, in one run. Exits
+with 1 when a limit is exceeded.
 """
 
 import gc
@@ -24,42 +24,42 @@ from rtshcua.ground.language.parse import parse
 CHECKOUT = Path(__file__).resolve().parents[1]
 
 LAYOUT_RATIO = 1.0
-"""What laying out may take, relative to our own parser."""
+"""The limit of the layout, relative to our own parser."""
 WHOLE_RATIO = 1.0
-"""What all of it may take, relative to a bare Lark parse."""
+"""The limit of the whole, relative to a plain Lark parse."""
 GROWTH = 2.0
-"""The time a line of a file ten times as long may take."""
+"""The limit of the time per line in a file ten times as long."""
 ROUNDS = 7
 LINES = 2_000
 
 
 def shipped() -> list[str]:
-    """The sources that ship."""
+    """Return the shipped sources."""
     folders = ("skills", "policies", "missions")
     return [path.read_text(encoding="utf-8") for each in folders for path in sorted((CHECKOUT / each).glob("*.rts"))]
 
 
 def long(lines: int) -> str:
-    """Those, again and again, until there are so many lines; not formatted, for that is what it would skip."""
+    """Return the shipped sources, repeated to so many lines, unformatted, because formatted text is skipped."""
     once = "".join(shipped()).replace("  ", " ").replace(" = ", "=")
     return once * (lines // once.count("\n") + 1)
 
 
 def milliseconds(work: Callable[[], object]) -> float:
-    """How long `work` takes."""
+    """Return the time of `work`."""
     start = perf_counter_ns()
     work()
     return (perf_counter_ns() - start) / 1e6
 
 
 def whole(texts: list[str]) -> None:
-    """All of it; what comes out must be accepted."""
+    """Format the text; the result must be accepted."""
     for text in texts:
         assert formatted(Source("bench.rts", text)).text is not None
 
 
 def against(bare: Lark, name: str, texts: list[str]) -> bool:
-    """Prints both ratios for these texts."""
+    """Print both ratios for these texts."""
     readings = [found for text in texts if (found := read(text)) is not None]
     assert len(readings) == len(texts)
 
@@ -88,7 +88,7 @@ def against(bare: Lark, name: str, texts: list[str]) -> bool:
 
 
 def in_proportion() -> bool:
-    """Time for a long text and for ten times as much."""
+    """Return the times for a long text and for ten times as much."""
     few, many = [long(LINES)], [long(LINES * 10)]
     small = median(milliseconds(lambda: whole(few)) for _ in range(3)) * 10 / few[0].count("\n")
     large = median(milliseconds(lambda: whole(many)) for _ in range(3)) * 10 / many[0].count("\n")
@@ -97,7 +97,7 @@ def in_proportion() -> bool:
 
 
 def main() -> int:
-    """Measures, prints, and says whether the limits held."""
+    """Measure and print; return 1 if a limit is missed."""
     parser = lark(GRAMMAR.read_text(encoding="utf-8"))
     gc.collect()
     held = [against(parser, "one long file", [long(LINES)]), against(parser, "what ships", shipped()), in_proportion()]

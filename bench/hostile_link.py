@@ -1,10 +1,10 @@
-"""A hostile link: one million datagrams of somebody without the key, and what they cost and change.
+"""A hostile link: the cost and effect of one million datagrams from an attacker without the key.
 
-Garbage, cut and turned frames, replays, spoofed ids, unsigned and wrongly signed frames of every message, and several
-of them in one datagram, to a driver that knows its vehicle: half of them on a link with a key, under the vehicle's own
-ids too, half on one without, under other ids. Nothing is raised and nothing is sent; all that driver, boundary and link
-remember is compared before and after. Then frames of the vehicle's own, rightly signed: what they cost. Exits with 1
-when anything changed, or when a hostile datagram costs more than a good frame.
+Garbage, truncated and reversed frames, replays, spoofed ids, unsigned and wrongly signed frames of every message, also
+several in one datagram, to a driver that knows its vehicle: half of them on a link with a key, also under the vehicle's
+own ids, half on a link without a key, under other ids. No exception is raised and no frame is sent; the state of
+driver, boundary and link is compared before and after. Then the cost of the vehicle's own signed frames is measured.
+Exits with 1 when any state changed, or when a hostile datagram costs more than a valid frame.
 """
 
 import sys
@@ -23,7 +23,7 @@ GOOD = 50_000
 
 
 def attack(flavour: str, *, keyed: bool, datagrams: int) -> float:
-    """Seconds of the processor that the hostile datagrams took."""
+    """Return the processor time of the hostile datagrams, in seconds."""
     target = Target(flavour, keyed=keyed)
     attacker = Attacker(target.heard, seed=datagrams + keyed, impersonate=keyed)
     before, took = target.known(), 0.0
@@ -40,7 +40,7 @@ def attack(flavour: str, *, keyed: bool, datagrams: int) -> float:
 
 
 def good(flavour: str) -> float:
-    """Seconds for a rightly signed frame of the vehicle's own."""
+    """Return the time of a signed frame of the vehicle, in seconds."""
     target = Target(flavour, keyed=True)
     messages = greeting(flavour)
     frames = [target.says(messages[number % len(messages)]) for number in range(GOOD)]
@@ -54,7 +54,7 @@ def good(flavour: str) -> float:
 
 
 def main() -> int:
-    """Measures, prints, and says whether the limit held."""
+    """Measure and print; return 1 if a limit is missed."""
     worst = 0.0
     for flavour in ("px4", "ardupilot"):
         own = good(flavour)

@@ -1,8 +1,8 @@
-"""Linting: a project of 20 files without a cache, one of 200 with a warm one, and `check` of the same, against
+"""Linting: a project of 20 files without a cache, one of 200 with a warm cache, and `check` of both, compared with
 `python -c pass`, in turns, from start to exit.
 
-The limits of issue 6 are 0.8 s and 0.6 s; `python -c pass` takes 10 ms on a quiet machine. What is held is the ratio of
-processor times, which says the same on a machine that is slower or busy. Exits with 1 when one is above its limit.
+The goals are 0.8 s and 0.6 s on a machine where `python -c pass` takes 10 ms. The limits are ratios of processor times,
+which do not depend on the machine and its load. Exits with 1 when a ratio is above its limit.
 """
 
 import os
@@ -98,7 +98,7 @@ mission look_{n} under works_{policy}@{version} on quad {{
 
 
 def project(folder: Path, files: int) -> None:
-    """Writes a project: of ten files one site, one skill of its own, two policies and six missions under them."""
+    """Write a project: of ten files one site, one own skill, two policies and six missions."""
     for number in range(files):
         tens, which = divmod(number, 10)
         site, skill = tens, tens
@@ -120,14 +120,14 @@ def project(folder: Path, files: int) -> None:
 
 
 class Time(NamedTuple):
-    """Seconds from start to exit, and those of processor time: on a quiet machine the same."""
+    """Elapsed seconds from start to exit, and processor time: equal on a quiet machine."""
 
     elapsed: float
     worked: float
 
 
 def seconds(words: list[str], folder: Path, environment: dict[str, str]) -> Time:
-    """How long one run takes."""
+    """Return the times of one run."""
     start, before = perf_counter(), getrusage(RUSAGE_CHILDREN)
     done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     taken, after = perf_counter() - start, getrusage(RUSAGE_CHILDREN)
@@ -136,7 +136,7 @@ def seconds(words: list[str], folder: Path, environment: dict[str, str]) -> Time
 
 
 def main() -> int:
-    """Measures, prints one line a command, and says whether the limits held."""
+    """Measure and print; return 1 if a limit is missed."""
     ours = [sys.executable, "-m", "rtshcua"]
     with TemporaryDirectory(prefix="rtshcua-lint-") as made:
         place = Path(made)
@@ -153,12 +153,12 @@ def main() -> int:
             "check of 20 files": ([*ours, "check", "."], "few"),
         }
         for words, folder in asked.values():
-            seconds(words, place / folder, environment)  # byte code is written, the cache is warm
+            seconds(words, place / folder, environment)  # warm-up: byte code and caches
         taken: dict[str, list[Time]] = {name: [] for name in asked}
         for _ in range(ROUNDS):
             for name, (words, folder) in asked.items():
                 taken[name].append(seconds(words, place / folder, environment))
-    elapsed = [min(each.elapsed for each in times) for times in taken.values()]  # the quietest counts
+    elapsed = [min(each.elapsed for each in times) for times in taken.values()]  # the fastest run counts
     bare, *worked = (min(each.worked for each in times) for times in taken.values())
     held = True
     for name, time, whole in zip(list(taken)[1:], worked, elapsed[1:], strict=True):

@@ -1,6 +1,6 @@
-"""`rtshcua check` of policies with many rules, of several kinds: the time a rule takes among many and among few.
+"""`rtshcua check` of policies with many rules of several kinds: the time per rule among many and among few.
 
-Exits with 1 when a rule takes much longer among `MANY` than among `FEW`, or when `MANY` take longer than the limit.
+Exits with 1 when the time per rule grows too much from `FEW` to `MANY`, or when `MANY` take longer than the limit.
 """
 
 import sys
@@ -18,13 +18,13 @@ from rtshcua.ground.pipeline.program import examine_program
 from rtshcua.mavlink import dialect
 
 FEW, MANY = 1_250, 5_000
-SPREAD = 1.6  # how much longer a rule may take among many
+SPREAD = 1.6  # the greatest growth of the time per rule
 LIMIT_S = 5.0
 ROUNDS = 3
 
 
 def seconds(text: str) -> float:
-    """How long it takes to read a source and to find everything in it."""
+    """Return the time to read and check a source."""
 
     def read(path: str) -> bytes:
         return text.encode() if path == "many.rts" else Path(path).read_bytes()
@@ -35,7 +35,7 @@ def seconds(text: str) -> float:
 
 
 def main() -> int:
-    """Measures each kind, and says whether the limits held."""
+    """Measure each kind; return 1 if a limit is missed."""
     failed = False
     seconds(policy("apart", 10))
     for kind in KINDS:

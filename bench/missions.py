@@ -1,7 +1,7 @@
-"""Checking a mission, with all that is proved of it: a short one is interactive, a long one costs no more a step.
+"""Checking a mission with its proofs: a short mission is fast, and the time per step does not grow.
 
-Measured is a whole check of a mission under the shipped policy, read from text. The long missions are more than a
-battery lasts for, which the check finds, and goes on. Exits with 1 when a limit is not met.
+Measured is a whole check of a mission under the shipped policy, from text. The long missions exceed the battery, which
+the check reports and continues. Exits with 1 when a limit is missed.
 """
 
 import gc
@@ -15,7 +15,7 @@ from rtshcua.ground.pipeline.program import check_program
 from rtshcua.mavlink import dialect
 
 INTERACTIVE_MS = 300.0  # for twelve steps
-SPREAD = 1.6  # how much more a step of the longest mission may cost than one of the shortest
+SPREAD = 1.6  # the time per step of the longest mission, relative to the shortest
 SIZES = (250, 1_000, 2_000)
 SHORT = 12
 ROUNDS = 3
@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 
 def source(steps: int) -> str:
-    """A mission of so many steps."""
+    """Return a mission of so many steps."""
     middle = (
         f"goto(47.39{799 + number % 50:03d} N, 8.54559 E, altitude = 20 m)" if number % 2 else "hover()"
         for number in range(steps - 2)
@@ -38,7 +38,7 @@ def source(steps: int) -> str:
 
 
 def milliseconds(text: str) -> float:
-    """The processor time of one check."""
+    """Return the processor time of one check."""
 
     def read(path: str) -> bytes:
         return text.encode() if path == "flight.rts" else Path(path).read_bytes()
@@ -50,7 +50,7 @@ def milliseconds(text: str) -> float:
 
 
 def main() -> int:
-    """Measures, prints one line for the short mission and one for the growth, and says whether the limits held."""
+    """Measure and print the short mission and the growth; return 1 if a limit is missed."""
     milliseconds(source(SHORT))
     short = median(milliseconds(source(SHORT)) for _ in range(ROUNDS))
     print(f"missions: {SHORT} steps are checked in {short:.0f} ms, limit {INTERACTIVE_MS:g}, median of {ROUNDS}")

@@ -1,6 +1,7 @@
-"""Parsing: text to IR against a bare Lark parse of the same text with positions, in one run, the collector on and off.
+"""Parsing to IR, compared with a plain Lark parse of the same text with positions, in one run, with the garbage
+collector on and off.
 
-Also that both time and memory grow in proportion to the text, up to 50,000 lines. Exits with 1 when a limit is broken.
+Also checks that time and memory grow linearly with the text, up to 50,000 lines. Exits with 1 when a limit is exceeded.
 """
 
 import gc
@@ -24,13 +25,13 @@ ROUNDS = 7
 LINES = 2_000
 MOST_LINES = 50_000
 GROWTH = 1.3
-"""The time a line at `MOST_LINES` may take, relative to that at a tenth of it."""
+"""The limit of the time per line at `MOST_LINES`, relative to a tenth of that."""
 CEILING = 2_048
-"""Bytes of memory a line, of the IR and of all that parsing needs at its peak, without the text."""
+"""Bytes of memory per line, of the IR and at the peak of parsing, without the text."""
 
 
 def sources(lines: int) -> str:
-    """The shipped sources, again and again, until there are so many lines. Names repeat: that is for the checker."""
+    """Return the shipped sources, repeated to so many lines. Names repeat, which only the checker rejects."""
     files = [
         path for folder in ("skills", "policies", "missions") for path in sorted((CHECKOUT / folder).glob("*.rts"))
     ]
@@ -43,19 +44,19 @@ def sources(lines: int) -> str:
 
 
 def milliseconds(work: Callable[[], object]) -> float:
-    """How long `work` takes."""
+    """Return the time of `work`."""
     start = perf_counter_ns()
     work()
     return (perf_counter_ns() - start) / 1e6
 
 
 def ours(text: str) -> None:
-    """Text to IR; the text must be good."""
+    """Parse the text to IR; it must be valid."""
     assert not parse(Source("bench.rts", text)).diagnostics
 
 
 def against_lark() -> bool:
-    """The ratio to Lark, which makes a tree of tokens and no IR."""
+    """Return the ratio to Lark, which makes a tree of tokens instead of IR."""
     grammar, text = GRAMMAR.read_text(encoding="utf-8"), sources(LINES)
     print(
         f"parse: reading the committed table takes {milliseconds(table):.1f} ms, "
@@ -77,7 +78,7 @@ def against_lark() -> bool:
 
 
 def in_proportion() -> bool:
-    """Time and memory for few lines and for many."""
+    """Return time and memory for few lines and for many."""
     few, many = sources(MOST_LINES // 10), sources(MOST_LINES)
     small = median(milliseconds(lambda: ours(few)) for _ in range(3)) * 10
     large = median(milliseconds(lambda: ours(many)) for _ in range(3))
@@ -98,7 +99,7 @@ def in_proportion() -> bool:
 
 
 def start_up() -> None:
-    """What importing the parser costs a process, and that Lark is not among it."""
+    """Print the import time of the parser, and check that it does not import Lark."""
     code = (
         "import sys, time; t = time.perf_counter_ns(); import rtshcua.model.ir.program; m = time.perf_counter_ns();"
         "import rtshcua.ground.language.load; l = time.perf_counter_ns();"
@@ -110,7 +111,7 @@ def start_up() -> None:
 
 
 def main() -> int:
-    """Measures, prints, and says whether the limits held."""
+    """Measure and print; return 1 if a limit is missed."""
     start_up()
     return int(not all([against_lark(), in_proportion()]))
 

@@ -1,9 +1,8 @@
-"""Proofs of one record, against what hashing costs: made from a stored tree, and verified.
+"""Proofs of one record, made from a stored tree and verified, compared with the cost of hashing.
 
-What is kept for them is `StoredTree`: 64 octets a record, appended as records are. A log has none: `rtshcua prove`
-reads it twice instead, which is told too. Percentiles are those of the quietest of some blocks, for the machine is
-noisy. Exits with 1 when the median of an inclusion proof in a log of 65,536, or of its verification, is above the
-limit.
+`StoredTree` keeps 64 octets per record, appended with the records. A log has no stored tree: `rtshcua prove` reads it
+twice instead, which is measured too. Because of noise, percentiles are those of the quietest block. Exits with 1 when
+the median of an inclusion proof in a log of 65,536 records, or of its verification, is above the limit.
 """
 
 import gc
@@ -30,7 +29,7 @@ BLOCKS, ROUNDS = 9, 1_000
 
 
 def least_us(work: Callable[[int], object], numbers: list[int]) -> tuple[float, float]:
-    """Median and 99th percentile of the quietest block, in microseconds."""
+    """Return median and 99th percentile of the quietest block, in microseconds."""
     best = (float("inf"), float("inf"))
     for block in range(BLOCKS):
         times = []
@@ -44,7 +43,7 @@ def least_us(work: Callable[[int], object], numbers: list[int]) -> tuple[float, 
 
 
 def told(what: str, figures: tuple[float, float], peer_us: float, limit_us: float | None = None) -> bool:
-    """Prints a line, and says whether its limit was passed."""
+    """Print a line; return whether its limit was exceeded."""
     limit = "" if limit_us is None else f", limit {limit_us:.0f} us"
     print(
         f"proofs: {what}: P50 {figures[0]:.1f} us, P99 {figures[1]:.1f} us{limit}; "
@@ -54,7 +53,7 @@ def told(what: str, figures: tuple[float, float], peer_us: float, limit_us: floa
 
 
 def in_a_tree(size: int) -> bool:
-    """Inclusion and consistency in a tree of so many records; whether a limit was passed."""
+    """Measure inclusion and consistency proofs in a tree of so many records; return whether a limit was exceeded."""
     tree = StoredTree()
     leaves = [leaf_hash(b"%d\n" % number) for number in range(size)]
     start = perf_counter_ns()
@@ -80,7 +79,7 @@ def in_a_tree(size: int) -> bool:
 
 
 def whole_files() -> None:
-    """A file that verifies alone: how large, and how long it takes with every signature."""
+    """Measure a self-contained proof file: its size, and its verification with all signatures."""
     for epochs in (1, 16, 128):
         log = sealed_log(epochs=epochs, records=64)
         number = len(log.lines) - 2
@@ -98,7 +97,7 @@ def whole_files() -> None:
 
 
 def main() -> int:
-    """Measures, prints a line a figure, and says whether the limits held."""
+    """Measure and print; return 1 if a limit is missed."""
     gc.disable()
     failed = in_a_tree(SIZE)
     in_a_tree(SIZE - 1)

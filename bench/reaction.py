@@ -1,15 +1,14 @@
-"""Reaction: from a telemetry frame that breaks a limit to the frame of the fallback's command, over UDP on loopback.
+"""Reaction: from a telemetry frame that violates a limit to the frame of the fallback's command, over UDP on loopback.
 
-A process flies a mission in virtual time into its second step, and from there in real time, as `rtshcua run` would:
-200 frames a second come in, until one says that the battery is low. The peer, another process, stamps that frame when
-it sends it, and the answers when it has them. What follows is a way home, which names a mode: so the first answer asks
-for the vehicle's, and the command leaves once that is told (docs/adr/0034). The peer tells it at once, so that the
-figures are ours; the autopilot's own time comes on top, and a peer that tells nothing shows the bound. Meanwhile each
-write of evidence and of telemetry takes 20 ms and each sync 200 ms (injected at the files), and nobody reads the
-terminal. Beside it the same with a quick disk and no view. Exits with 1 when a figure is above its limit.
+A process flies a mission in virtual time into its second step, and from there in real time, like `rtshcua run`: it
+receives 200 frames a second, until one reports a low battery. The peer, another process, time-stamps that frame and the
+answers. The fallback is a return, which sets a mode: so the first answer requests the vehicle's mode, and the command
+follows after the report (docs/adr/0034). The peer reports at once, so the autopilot's own delay is not included; a peer
+without reports shows the bound. Meanwhile each write of evidence and telemetry takes 20 ms and each sync 200 ms
+(injected at the files), and the terminal is not read. The same is measured with a fast disk and no view. Exits with 1
+when a figure is above its limit.
 
-The machine is noisy, so the percentiles are those of one process's reactions, and the quietest process counts; the
-median process stands beside it.
+Because of noise, percentiles are those of the quietest process; the median process is printed too.
 """
 
 import gc
@@ -47,12 +46,12 @@ from virtual.shipped import shipped, simulated
 
 PROCESSES, IN_PROCESS, QUICK = 3, 100, 40
 RATE = 200
-FRAMES = 40  # before the one that counts
+FRAMES = 40  # frames before the violating one
 WRITE_S, SYNC_S = 0.02, 0.2
 MEDIAN_LIMIT_US, P99_LIMIT_US = 500.0, 2_000.0
-#: to the command: its own way, and that of the question
+#: to the command: its own time, and the mode request
 COMMAND_MEDIAN_LIMIT_US, COMMAND_P99_LIMIT_US = 1_000.0, 4_000.0
-#: where nothing answers
+#: without an answer to the mode request
 MUTE, MUTE_LIMIT_US = 10, 60_000.0
 PATIENCE_S = 2.0
 STEP = 1
@@ -101,14 +100,14 @@ class Slowly:
 
 
 class Going:
-    """A flight's clock that goes on in real time."""
+    """A flight's clock that continues in real time."""
 
     def __init__(self, since: Now) -> None:
         self._since = since
         self._start_ns = time.monotonic_ns()
 
     def now(self) -> Now:
-        """The present moment."""
+        """Return the current time."""
         gone_us = (time.monotonic_ns() - self._start_ns) // 1_000
         return Now(self._since.monotonic_us + gone_us, self._since.utc_us + gone_us, self._since.utc_error_us)
 
@@ -131,7 +130,7 @@ class Going:
 
 
 def under_way() -> Flight:
-    """A flight whose second step flies."""
+    """Return a flight in its second step."""
     flight = Flight(shipped("short"), simulated("px4"))
     while True:
         assert flight.loop.turn() is None
@@ -141,7 +140,7 @@ def under_way() -> Flight:
 
 
 def telemetry(flight: Flight) -> list[bytes]:
-    """What the vehicle says next, the frame that breaks a limit, and its answer to who flies it."""
+    """Return the next frames of the vehicle, the violating frame, and the mode report."""
     frames: list[bytes] = []
     simulation, elapsed_us = flight.vehicle.simulation, flight.clock.elapsed_us
     while len(frames) < FRAMES:
@@ -149,7 +148,7 @@ def telemetry(flight: Flight) -> list[bytes]:
         frames += simulation.advance(elapsed_us)
     low = mavlink.MAVLink_battery_status_message(0, 0, 0, 32_767, [65_535] * 10, -1, 0, 0, 20)
     codec, after = Codec(1, 1), (frames[FRAMES - 1][4] + 1) % 256
-    for _ in range(after):  # a frame that is numbered as sent before the others counts as old
+    for _ in range(after):  # frames must be numbered in the order of sending, or they count as old
         codec.pack(low)
     broken = codec.pack(low)
     seen = flight.vehicle.driver.seen
@@ -159,7 +158,7 @@ def telemetry(flight: Flight) -> list[bytes]:
 
 @contextmanager
 def blocked() -> Iterator[Feed]:
-    """A view whose terminal nobody reads: its pipe is full, and so is the one to it."""
+    """A view with an unread terminal: its pipe is full, and so is the pipe to it."""
     reading, writing = os.pipe()
     stdout = os.dup(1)
     os.dup2(writing, 1)
@@ -177,11 +176,11 @@ def blocked() -> Iterator[Feed]:
 
 
 def unwatched(*_: Any) -> None:
-    """Nobody looks."""
+    """Run without a view."""
 
 
 def fly_on(flight: Flight, feed: Feed | None, folder: Path) -> None:
-    """The flight from here on, in real time, until the peer has had its answer."""
+    """Continue the flight in real time until the peer has its answer."""
     clock = Going(flight.clock.now())
     frames = TelemetryFile(folder / "telemetry.tlog")
     if feed is not None:
@@ -206,7 +205,7 @@ def fly_on(flight: Flight, feed: Feed | None, folder: Path) -> None:
 
 
 def fly(*, slowly: bool) -> None:
-    """In a process of its own: one flight after the other, for as long as the peer asks."""
+    """Fly in a child process, one flight after the other, until the peer ends."""
     with blocked() if slowly else nullcontext() as feed, tempfile.TemporaryDirectory() as folder:
         number = 0
         while sys.stdin.readline():
@@ -217,13 +216,13 @@ def fly(*, slowly: bool) -> None:
 
 
 Took = tuple[float, float]
-"""us to the first answer, and to the command."""
+"""The time to the first answer and to the command, us."""
 
 
 def reactions(
     frames: list[bytes], chance: Random, *, slowly: bool, count: int, processes: int = 1, tells: bool = True
 ) -> list[list[Took]]:
-    """The reactions in each of some processes, in their order."""
+    """Return the reactions of several processes, in order."""
     found = []
     for _ in range(processes):
         words = [sys.executable, __file__, "--fly", "slowly" if slowly else "quickly"]
@@ -236,7 +235,7 @@ def reactions(
 
 
 def one(flying: Any, frames: list[bytes], chance: Random, *, tells: bool) -> Took:
-    """One reaction of the process."""
+    """Measure one reaction of the process."""
     flying.stdin.write(b"\n")
     flying.stdin.flush()
     port = int(flying.stdout.readline())
@@ -247,8 +246,8 @@ def one(flying: Any, frames: list[bytes], chance: Random, *, tells: bool) -> Too
 
 
 def react(address: tuple[str, int], frames: list[bytes], chance: Random, *, tells: bool) -> Took:
-    """Send the frames at their rate, and time what follows from the last but one. `tells`: the last one, the mode, is
-    told whenever it is asked for.
+    """Send the frames at their rate, and measure the reaction to the last but one. `tells`: send the last one, the mode
+    report, whenever it is requested.
     """
     *before, broken, mode = frames
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link:
@@ -279,7 +278,7 @@ def react(address: tuple[str, int], frames: list[bytes], chance: Random, *, tell
 
 
 def bare(count: int) -> list[float]:
-    """What the same way takes with nothing done on it, in us: a process that sends back whatever comes."""
+    """Return the round trip time to an echo process, in us."""
     words = [sys.executable, "-c", ECHO]
     with (
         subprocess.Popen(words, stdout=subprocess.PIPE) as echo,
@@ -299,12 +298,12 @@ def bare(count: int) -> list[float]:
 
 
 def high(times: list[float]) -> float:
-    """The 99th percentile."""
+    """Return the 99th percentile."""
     return sorted(times)[-(-len(times) * 99 // 100) - 1]
 
 
 def main() -> int:
-    """Measures, prints, and says whether the limits held."""
+    """Measure and print; return 1 if a limit is missed."""
     if sys.argv[1:2] == ["--fly"]:
         fly(slowly=sys.argv[2] == "slowly")
         return 0
@@ -335,7 +334,7 @@ def main() -> int:
 
 
 def told(what: str, runs: list[list[float]], middle_limit: float, worst_limit: float) -> bool:
-    """Print a row; whether its limits held."""
+    """Print a row; return whether its limits hold."""
     middle, worst = min(map(median, runs)), min(map(high, runs))
     print(
         f"reaction: {what}, {RATE} frames a second, slow disk, blocked terminal: "

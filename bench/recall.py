@@ -1,8 +1,8 @@
-"""How long a recall takes, from the command line to the flight's socket, and how long a run that is begun again after a
-kill takes, from its start to the first frame that moves the vehicle.
+"""The time of a recall from the command line to the flight's socket, and of a restarted run from its start to the first
+motion frame.
 
-Wall time, on a machine that is otherwise idle: the limits are for that. `python -c pass` stands beside them. Exits with
-1 when a median is above its limit.
+Elapsed time on an otherwise idle machine, with `python -c pass` for comparison. Exits with 1 when a median is above its
+limit.
 """
 
 import json
@@ -38,13 +38,13 @@ MOVING, MOVING_MESSAGES = {176, 192, 21, 20}, {86, 11}
 
 
 def rtshcua(*words: str, env: dict[str, str]) -> None:
-    """Run a command that has to end well."""
+    """Run a command that must succeed."""
     subprocess.run([RTSHCUA, *words], env=env, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
 
 
 @contextmanager
 def listening(folder: Path) -> Iterator[tuple[Path, list[float]]]:
-    """A flight's socket that accepts everything, and when it did."""
+    """A flight's socket that accepts everything and records the time."""
     hello = json.dumps({"type": "hello", "flight": FLIGHT.hex()}).encode() + b"\n"
     agents, came, over = AgentSocket(folder / "s", lambda: hello), list[float](), threading.Event()
 
@@ -68,7 +68,7 @@ def listening(folder: Path) -> Iterator[tuple[Path, list[float]]]:
 
 
 def recalls(bundle: Path, folder: Path, env: dict[str, str]) -> tuple[float, float, float, float]:
-    """Medians in s: of a start of Python, of a recall that is signed, of one sent, of one at the operator's console."""
+    """Return medians in s: a start of Python, a signed recall, a sent recall, a recall at the operator's console."""
     bare, signed, sent, console = list[float](), list[float](), list[float](), list[float]()
     home = folder / "home"
     rtshcua("recall", str(bundle), "--flight", FLIGHT.hex(), "-o", str(home), env=env)
@@ -105,7 +105,7 @@ def recalls(bundle: Path, folder: Path, env: dict[str, str]) -> tuple[float, flo
 
 
 def moves(datagram: bytes) -> bool:
-    """Whether there is a frame in it that moves a vehicle. A MAVLink 2 frame has ten octets before what it says."""
+    """Return whether it contains a motion frame. A MAVLink 2 payload begins after ten octets."""
     kind = message_id(datagram, 0)
     if kind not in COMMANDS:
         return kind in MOVING_MESSAGES
@@ -114,7 +114,7 @@ def moves(datagram: bytes) -> bool:
 
 
 def height_mm(datagram: bytes) -> int:
-    """Above home, of a GLOBAL_POSITION_INT; 0 of all else. Octets of zero at the end are not sent."""
+    """Return the height above home of a GLOBAL_POSITION_INT, otherwise 0. Trailing zero octets are not sent."""
     if message_id(datagram, 0) != 33:
         return 0
     said = datagram[10 : 10 + datagram[1]].ljust(28, b"\0")
@@ -122,7 +122,7 @@ def height_mm(datagram: bytes) -> int:
 
 
 def restart(flavour: str, folder: Path, env: dict[str, str]) -> float:
-    """Seconds from the start of the run that is begun again to its first frame that moves the vehicle."""
+    """Return the seconds from the start of the restarted run to its first motion frame."""
     folder.mkdir()
     bundle = folder / "short.bundle"
     rtshcua("compile", str(MISSION), "-o", str(bundle), env=env)
@@ -136,7 +136,7 @@ def restart(flavour: str, folder: Path, env: dict[str, str]) -> float:
         each.setblocking(False)
     words = [
         RTSHCUA, "run", str(bundle), "--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07", "--plain",
-        "--utc-error", "500ms",  # a machine whose clock nobody sets, as in a container, defers every step
+        "--utc-error", "500ms",  # without a synchronised clock, as in a container, every step would be deferred
         "--runs", str(folder / "runs"), "--state-dir", str(folder / "state"),
     ]  # fmt: skip
     quiet: Any = {"env": env, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -154,14 +154,14 @@ def restart(flavour: str, folder: Path, env: dict[str, str]) -> float:
 def relayed(
     theirs: socket.socket, ours: socket.socket, run: "subprocess.Popen[bytes]", words: list[str], quiet: Any
 ) -> float:
-    """Stand between vehicle and run, kill the run in the air, and begin it again."""
+    """Forward frames between vehicle and run, kill the run in the air, and restart it."""
     vehicle, begun, until_s = None, None, time.monotonic() + PATIENCE_S
     try:
         while time.monotonic() < until_s:
             for each in select.select([theirs, ours], [], [], 0.01)[0]:
                 try:
                     datagram, sender = each.recvfrom(65_535)
-                except OSError:  # an ICMP answer: the run does not listen
+                except OSError:  # an ICMP error: the run does not listen
                     continue
                 if each is theirs:
                     vehicle = sender

@@ -1,8 +1,7 @@
-"""Recorded flights of a real ArduCopter and a real PX4, replayed through driver and state monitor.
+"""Recorded flights of ArduCopter and PX4, replayed through driver and state monitor.
 
-What is known is compared with what the recording's page says, second by second, but for the second in which it changes;
-what happens, with when the page says that it did. Exits with 1 where a second differs, or a moment is off by more than
-the limit.
+The known signals are compared with the recording's page second by second, except the second of a change; events are
+compared with their times on the page. Exits with 1 when a second differs, or an event is off by more than the limit.
 """
 
 import sys
@@ -19,7 +18,7 @@ LIMIT_S = 2.0
 
 Stretches = list[tuple[float, float]]
 
-#: when the page says that a signal is known: seconds after the autopilot's start
+#: when a signal is known according to the page: seconds after the autopilot's start
 ARDUCOPTER: dict[str, Stretches] = {
     "position": [(41.6, 85.06), (86.56, 162)],
     "height": [(41.6, 162)],
@@ -42,7 +41,7 @@ PX4: dict[str, Stretches] = {
 
 
 def compare(flight: Recorded, page: dict[str, Stretches]) -> int:
-    """How many seconds differ; prints each, and how many were compared."""
+    """Print each differing second and the number of compared ones; return the number of differences."""
     compared = differ = 0
     for second, state in enumerate(flight.states):
         for signal, stretches in page.items():
@@ -59,7 +58,7 @@ def compare(flight: Recorded, page: dict[str, Stretches]) -> int:
 
 
 def moments(flight: Recorded, page: list[tuple[str, float, float]]) -> int:
-    """How many moments are off by more than the limit; prints each."""
+    """Print each event that is off by more than the limit; return their number."""
     off = 0
     for what, said, seen in page:
         late = abs(seen - said) > LIMIT_S
@@ -70,7 +69,7 @@ def moments(flight: Recorded, page: list[tuple[str, float, float]]) -> int:
 
 
 def main() -> int:
-    """Replays both, prints what was compared, and says whether all of it held."""
+    """Replay both flights and print the comparison; return 1 if there is a difference."""
     start = process_time()
     home = (-353_632_621, 1_491_652_371)
     copter = Recorded("arducopter", 1_000_000, at_home(*home), {"RTL_ALT": 3_000.0})

@@ -1,4 +1,5 @@
-"""Start-up: commands against `python -c pass`, from start to exit, in turns, in processor time; what a check imports.
+"""Start-up: commands compared with `python -c pass`, from start to exit, in turns, in processor time; and the imports
+of a check.
 
 Exits with 1 when the ratio of `rtshcua --help`, or the time of a check or of its imports, is above its limit.
 """
@@ -8,7 +9,7 @@ import sys
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
 
-LIMITS = {"--help": 9, "check": 90}  # times `python -c pass`, which takes 10 ms on a quiet machine
+LIMITS = {"--help": 9, "check": 90}  # multiples of `python -c pass`, which takes 10 ms on a quiet machine
 IMPORTS = 50
 ROUNDS = 7
 
@@ -22,7 +23,7 @@ COMMANDS = (
 
 
 def milliseconds(command: list[str]) -> float:
-    """How much processor time one run of `command` takes, from start to exit."""
+    """Return the processor time of one run of `command`, from start to exit."""
     before = getrusage(RUSAGE_CHILDREN)
     subprocess.run(command, stdout=subprocess.DEVNULL, check=True, cwd=ROOT)
     after = getrusage(RUSAGE_CHILDREN)
@@ -30,14 +31,14 @@ def milliseconds(command: list[str]) -> float:
 
 
 def main() -> int:
-    """Measures, prints one line a command, and says whether the limits held."""
+    """Measure and print; return 1 if a limit is missed."""
     script = Path(sys.executable).with_name("rtshcua")
     ours = [str(script)] if script.exists() else [sys.executable, "-m", "rtshcua"]
     bare, imports = [sys.executable, "-c", "pass"], [sys.executable, "-c", NEEDED]
     asked = [bare, imports, *([*ours, *words] for words in COMMANDS)]
-    [milliseconds(command) for command in asked]  # warm: byte code is written, files are in memory
+    [milliseconds(command) for command in asked]  # warm-up: byte code and file cache
     rounds = [[milliseconds(command) for command in asked] for _ in range(ROUNDS)]
-    bare_ms, imports_ms, *times = (min(column) for column in zip(*rounds, strict=True))  # the quietest counts
+    bare_ms, imports_ms, *times = (min(column) for column in zip(*rounds, strict=True))  # the fastest run counts
     held = imports_ms <= IMPORTS * bare_ms
     print(f"startup: the imports of a check take {imports_ms / bare_ms:.1f} times `python -c pass`, limit {IMPORTS}")
     for words, taken in zip(COMMANDS, times, strict=True):

@@ -1,10 +1,10 @@
-"""Verifying a log against OpenSSL's SHA-256 of the same file, by `hashlib`: ratios of the time of the processor.
+"""Verification of a log compared with OpenSSL's SHA-256 of the same file, by `hashlib`: ratios of processor time.
 
-Each is the least of some rounds; what several processes gain is told by the clock on the wall.
+Each figure is the least of several rounds; the gain of several processes is in elapsed time.
 
-The log is of the real format: half decisions that follow from what they record, half effects, sealed as on board. Exits
-with 1 when a figure is above its limit. With a number of records as argument the log is that long, and what the largest
-of the processes took of the memory is told too: it does not grow with the log.
+The log has the real format: half derivable decisions, half effects, sealed as on board. Exits with 1 when a figure is
+above its limit. A number of records as argument sets the length of the log; then the greatest memory of the processes
+is printed too, which does not grow with the log.
 """
 
 import gc
@@ -39,7 +39,7 @@ from virtual import case
 
 RECORDS = 262_144
 ROUNDS = 3
-FAST, QUICK, READ = 1.3, 6.5, 14.0  # times the digest of the file, in one process
+FAST, QUICK, READ = 1.3, 6.5, 14.0  # multiples of the file's digest, in one process
 DERIVED = 20_000  # records a second
 
 LOG_KEY = case.KEYS[Duty.LOG]
@@ -49,7 +49,7 @@ STEP_US = 700  # between two records
 
 
 def lines(records: int) -> Iterator[bytes]:
-    """A log of so many records. A step is asked for again and again, while nobody knows how good the fix is."""
+    """Make a log of so many records, in which a step is requested repeatedly while the fix quality is unknown."""
     start = flat.ISSUED + 60_000_000
     seeds = count(1)
     recorder = Recorder(
@@ -91,13 +91,13 @@ def lines(records: int) -> Iterator[bytes]:
 
 
 def write(path: Path, records: int) -> None:
-    """The log as a file."""
+    """Write the log to a file."""
     with path.open("wb") as file:
         file.writelines(lines(records))
 
 
 def seconds(work: Callable[[], Audit | str]) -> tuple[float, float]:
-    """How long it took, by the processor and by the clock; an audit must find the log whole."""
+    """Return processor time and elapsed time; the audit must succeed."""
     start, clock = process_time(), perf_counter()
     done = work()
     took = process_time() - start, perf_counter() - clock
@@ -108,13 +108,13 @@ def seconds(work: Callable[[], Audit | str]) -> tuple[float, float]:
 
 
 def digest(path: Path) -> str:
-    """What everything is compared to."""
+    """Return the reference time."""
     with path.open("rb") as file:
         return file_digest(file, "sha256").hexdigest()
 
 
 def main() -> int:
-    """Measures, prints a line a figure, and says whether the limits held."""
+    """Measure and print; return 1 if a limit is missed."""
     records = int(sys.argv[1]) if len(sys.argv) > 1 else RECORDS
     cores = len(os.sched_getaffinity(0))
     with tempfile.TemporaryDirectory() as name:
@@ -164,7 +164,7 @@ def main() -> int:
 
 
 def peak() -> str:
-    """The largest that any of the processes was."""
+    """Return the greatest memory of any process."""
     own, others = (resource.getrusage(who).ru_maxrss >> 10 for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     return f"{own} MiB at most, {others} MiB a worker"
 

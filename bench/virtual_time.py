@@ -1,7 +1,7 @@
-"""Virtual time: how many times faster than life the shipped missions fly in one process.
+"""Virtual time: the speed of the shipped missions in one process, relative to real time.
 
-Simulation, real MAVLink both ways, driver, loop, runtime and evidence; at 50 frames a second and more from the vehicle,
-for which the limit is, and one mission at 200. Exits with 1 when a mission is slower than the limit.
+Simulation, real MAVLink both ways, driver, loop, runtime and evidence; with at least 50 frames a second from the
+vehicle, for which the limit applies, and one mission with 200. Exits with 1 when a mission is slower than the limit.
 """
 
 import sys
@@ -36,7 +36,7 @@ _MANY = dict.fromkeys(
 
 
 def one(name: str, flavour: str, more: Mapping[int, int] = _MORE) -> tuple[float, float, float]:
-    """Seconds of flight, seconds of processor time for it, frames a second of flight; `more` are streams, in us."""
+    """Return simulated seconds, processor time in seconds, and frames per simulated second; `more`: intervals in us."""
     flight = Flight(shipped(name), simulated(flavour, land_mm_s=None), tick_us=TICK_US)
     streams = flight.vehicle.simulation._autopilot.streams
     for number, interval_us in more.items():
@@ -50,7 +50,7 @@ def one(name: str, flavour: str, more: Mapping[int, int] = _MORE) -> tuple[float
 
 
 def main() -> int:
-    """Measures, prints a line a mission, and says whether the limit held."""
+    """Measure and print; return 1 if a limit is missed."""
     slowest = float("inf")
     for name in NAMES:
         for flavour in ("px4", "ardupilot"):

@@ -1,8 +1,9 @@
-"""What a witness costs: on the ground, of each checkpoint and of a log by file; aboard, in the thread that shows it.
+"""The cost of a witness: on the ground, of each checkpoint and of a log from a file; on board, in the thread that
+submits lines.
 
-Ratios within one run. A checkpoint costs at least one signature to verify and one to make; a log handed over as a file,
-one SHA-256 of all its octets; showing it, one of each line. The machine is noisy: each figure is the best of `BLOCKS`.
-Exits with 1 when one is above its limit.
+Ratios within one run. A checkpoint needs at least one signature verification and one signature; a log from a file, one
+SHA-256 of all octets; submitting, one SHA-256 of each line. Because of noise, each figure is the best of `BLOCKS`.
+Exits with 1 when a ratio is above its limit.
 """
 
 import sys
@@ -20,16 +21,16 @@ from rtshcua.wire.keys import Duty
 
 EPOCHS, RECORDS, BLOCKS = 40, 1_024, 5
 DETAIL = "x" * 200
-#: a checkpoint, as times of verifying and making one signature
+#: a checkpoint, relative to verifying and making one signature
 CHECKPOINT = 2.5
-#: a log by file, as times of its SHA-256
+#: a log from a file, relative to its SHA-256
 FILE = 8.0
-#: a line that is shown, as times of its SHA-256
+#: a submitted line, relative to its SHA-256
 SHOWN = 6.0
 
 
 def best_s(work: Callable[[], object]) -> float:
-    """The shortest of several."""
+    """Return the shortest of several runs."""
     times = []
     for _ in range(BLOCKS):
         begin = perf_counter()
@@ -39,13 +40,13 @@ def best_s(work: Callable[[], object]) -> float:
 
 
 def told(name: str, us: float, ratio: float, limit: float, of: str) -> bool:
-    """Prints a figure, and says whether it is above its limit."""
+    """Print a figure; return whether it is above its limit."""
     print(f"witness: {name}: {us:.1f} us, {ratio:.2f} times {of} (limit {limit:g})")
     return ratio > limit
 
 
 def main() -> int:
-    """Measures, prints, and says whether the limits held."""
+    """Measure and print; return 1 if a limit is missed."""
     log = Log()
     for _ in range(EPOCHS):
         for _ in range(RECORDS):

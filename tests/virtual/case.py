@@ -17,9 +17,9 @@ from rtshcua.wire.keys import ANY, Duty, SigningKey
 from rtshcua.wire.trust import TrustRoot
 
 S, MIN, M = flat.S, flat.MIN, flat.M
-#: as fast as it comes down anyway
+#: equal to the descent rate
 LAND_MM_S = 1_500
-#: as low as a leg may be
+#: the least height of a leg
 LOW = 5 * M
 YEAR_US = 366 * 24 * 3_600 * S
 
@@ -48,7 +48,7 @@ def _projection() -> Projection:
 
 
 def policy() -> Policy:
-    """The reference policy with real signal sources, valid at any hour."""
+    """Return the reference policy with real signal sources, valid at any time of day."""
     signals = []
     for signal in flat.SIGNALS:
         message, fields, numerator, unknown = SOURCES[signal.slot]
@@ -70,7 +70,7 @@ def policy() -> Policy:
 
 
 def _flyable(contract: Contract) -> Contract:
-    """The wind is known in the air only: a takeoff does not ask for it."""
+    """Remove the wind from the takeoff's conditions: it is known only in the air."""
     if contract.name != "takeoff":
         return contract
     return replace(contract, assume=(), reads=(flat.BATTERY, flat.FIX))
@@ -91,7 +91,7 @@ def short_steps() -> tuple[Invocation, ...]:
 
 
 def low_steps(*, leg: bool = True) -> tuple[Invocation, ...]:
-    """The same at the least height, and soon over; without a leg, up and home."""
+    """A short mission at the least height: up, one leg, home; without `leg` up and home."""
     up, there, back = short_steps()
     up = step(0, 0, flat.TAKEOFF, Plan(MotionKind.CLIMB, (), LOW, 0), LOW)
     there = step(1, 1, flat.GOTO, Plan(MotionKind.FLY, (30 * M, 0), LOW, 0), 30 * M, 0, LOW)
@@ -99,7 +99,7 @@ def low_steps(*, leg: bool = True) -> tuple[Invocation, ...]:
 
 
 def mission(steps: Sequence[Invocation] | None = None, issued_at_us: int = flat.ISSUED) -> Mission:
-    """The reference mission, or one of these steps, issued at a UTC time."""
+    """Return the reference mission, or one with these steps, issued at a UTC time."""
     chosen = flat.INVOCATIONS if steps is None else steps
     return replace(
         flat.MISSION,
@@ -120,7 +120,7 @@ def seal(of: Mission, under: Policy | None = None, keys: Mapping[Duty, SigningKe
 
 
 def root(issued_at_us: int = flat.ISSUED, *, boundary: bool = False, life_us: int = YEAR_US) -> tuple[TrustRoot, bytes]:
-    """The development root that names the keys, and its signed bytes; with `boundary` that of the boundary too."""
+    """Return the development root with the keys, and its signed bytes; `boundary`: with the boundary's key."""
     made = TrustRoot(
         version=1, development=True, issued_at_us=issued_at_us, expires_at_us=issued_at_us + life_us,
         keys=tuple(
@@ -141,5 +141,5 @@ def root(issued_at_us: int = flat.ISSUED, *, boundary: bool = False, life_us: in
 def simulated(
     flavour: str, *, return_mm: int = 16 * M, land_mm_s: int | None = LAND_MM_S, **fields: object
 ) -> SimulationConfig:
-    """A simulated vehicle that fits the policy; it returns little above where it flies and lands fast: down soon."""
+    """Return a simulated vehicle for the policy with a low return and a fast landing, to shorten flights."""
     return SimulationConfig(flavour=AutopilotKind(flavour), return_mm=return_mm, land_mm_s=land_mm_s, **fields)

@@ -1,4 +1,4 @@
-"""Copies of vehicles and flights under way: what many tests begin with is flown once, and each goes on from there."""
+"""Copies of vehicles and flights: a common beginning is flown once, and each test continues from a copy."""
 
 import copyreg
 from collections.abc import Callable
@@ -17,21 +17,21 @@ from rtshcua.onboard.ports import Readings
 T = TypeVar("T")
 
 _KEY = Ed25519PrivateKey.from_private_bytes(bytes(32))
-#: What a flight holds and Python does not copy by itself. Of a counter only its text tells where it is.
+#: Parts of a flight that Python cannot copy. A counter's position is only in its text.
 _WAYS: dict[type, Callable[[Any], Any]] = {
     MappingProxyType: lambda made: (MappingProxyType, (dict(made),)),
     Struct: lambda made: (Struct, (made.format,)),
     count: lambda made: (count, (int(repr(made)[len("count(") : -1]),)),
     type(sha256()): lambda made: (made.copy, ()),
-    Readings: lambda made: "kept as it is",  # a flight remembers hundreds, and none changes: text copies nothing
+    Readings: lambda made: "kept as it is",  # hundreds of immutable objects need no copy
     type(_KEY): lambda key: (Ed25519PrivateKey.from_private_bytes, (key.private_bytes_raw(),)),
 }
 
 
 def copied(original: T) -> T:
-    """A copy that goes its own way.
+    """Return an independent copy.
 
-    Functions are not copied: none of what is copied may be one that remembers the original.
+    Functions are not copied, so no copied object may hold a closure over the original.
     """
-    with patch.dict(copyreg.dispatch_table, _WAYS):  # here alone: a key is not to be pickled anywhere else
+    with patch.dict(copyreg.dispatch_table, _WAYS):  # only here: keys must not be pickled elsewhere
         return deepcopy(original)

@@ -1,4 +1,4 @@
-"""Evidence on a disk with faults, in virtual time: what the writer's thread does is done between the loop's turns."""
+"""Evidence on a faulty disk, in virtual time: the writer's work is done between turns of the loop."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from rtshcua.virtual.vehicle import VirtualClock
 
 
 class DiskSink:
-    """The evidence sink over a file port that a test has in its hands. `hangs`: a write does not return."""
+    """The evidence sink over a file that the test controls. `hangs`: a write does not return."""
 
     def __init__(self, path: Path, disk: FaultyDisk, clock: VirtualClock) -> None:
         self.path, self.disk = path, disk

@@ -1,4 +1,4 @@
-"""An editor, as the language server has it at the other end: pygls's own client, which remembers what it was told."""
+"""An editor for the language server: pygls's client, which stores the received diagnostics."""
 
 import asyncio
 import sys
@@ -11,7 +11,7 @@ from pygls.lsp.client import LanguageClient
 
 from rtshcua.front.lsp.disk import uri_of
 
-PATIENCE = 60  # seconds, for a machine that does other things too
+PATIENCE = 60  # seconds, enough for a busy machine
 HEAD = 'import "lib:policies/bridge_inspection.rts"\n'
 MISSION = (
     HEAD
@@ -25,7 +25,7 @@ MISSION = (
 
 
 class Editor:
-    """An editor: keeps what it was told of each text, and waits until it was told something."""
+    """An editor that stores the diagnostics of each text and can wait for them."""
 
     def __init__(self) -> None:
         self.loop = asyncio.new_event_loop()
@@ -70,13 +70,13 @@ class Editor:
         return found
 
     def open(self, uri: str, text: str) -> list[lsp.Diagnostic]:
-        """Opens a text, and gives what is found at once."""
+        """Open a text and return its first diagnostics."""
         self.told.pop(uri, None)
         self.client.text_document_did_open(lsp.DidOpenTextDocumentParams(lsp.TextDocumentItem(uri, "rtshcua", 1, text)))
         return self.until(uri, lambda told: told.version == 1)
 
     def change(self, uri: str, version: int, *changes: tuple[int, int, int, int, str] | str) -> list[lsp.Diagnostic]:
-        """Changes a text, by ranges or as a whole, and gives what is found at once."""
+        """Change a text, by ranges or as a whole, and return its first diagnostics."""
         made: list[Any] = []
         for each in changes:
             if isinstance(each, str):
@@ -91,7 +91,7 @@ class Editor:
         return self.until(uri, lambda told: told.version == version)
 
     def until(self, uri: str, fits: Callable[[lsp.PublishDiagnosticsParams], bool]) -> list[lsp.Diagnostic]:
-        """What the server told last of a text, as soon as that fits."""
+        """Wait for diagnostics of a text that satisfy a condition, and return them."""
 
         async def waiting() -> list[lsp.Diagnostic]:
             while not (self.told.get(uri) and fits(self.told[uri][-1])):
@@ -103,7 +103,7 @@ class Editor:
         return found
 
     async def first_of(self, answer: Any, uri: str, text: str, version: int) -> tuple[Any, str]:
-        """Changes a text while a question is on its way; the answer, and what came first: it, or the findings."""
+        """Change a text during a request; return the answer, and whether it or the diagnostics came first."""
         answered = asyncio.ensure_future(answer)
         await asyncio.sleep(0)
         self.client.text_document_did_change(

@@ -1,4 +1,4 @@
-"""A virtual flight with the keys of the tests, whose log the independent verifier must agree about."""
+"""A virtual flight with the tests' keys; the independent verifier must agree about its log."""
 
 from typing import Any
 
@@ -10,13 +10,13 @@ from rtshcua.virtual.flight import FlownFlight, VirtualFlight
 from rtshcua.wire.keys import Duty
 from virtual import case
 
-#: longer than a user's flight has, and so cheaper
+#: longer than the default, and so cheaper
 TICK_US = 50_000
 UTC_US = case.flat.ISSUED + 60 * case.S
 
 
 class Flown(FlownFlight):
-    """What came of a flight."""
+    """The result of a flight."""
 
     def audit(self) -> Audit:
         found = super().audit()
@@ -25,7 +25,7 @@ class Flown(FlownFlight):
 
 
 class Flight(VirtualFlight):
-    """One flight under the development root of `case`; `attested`, by a boundary that signs its own evidence."""
+    """One flight under the development root of `case`; `attested`: with a boundary that signs its own evidence."""
 
     flown = Flown
 

@@ -1,4 +1,4 @@
-"""A driver that flies the simulated vehicle in virtual time, with no runtime above it."""
+"""A driver that flies the simulated vehicle in virtual time, without a runtime."""
 
 from functools import cache
 from typing import Any
@@ -11,10 +11,10 @@ from virtual.policy import POLICY, geo
 
 
 class Flyer:
-    """Begins commands and remembers every event."""
+    """Begins commands and stores every event."""
 
     def __init__(self, flavour: str, *, return_mm: int = 22_000, **config: Any) -> None:
-        """A return climbs little: it is down soon."""
+        """Return a vehicle with a low return, to shorten flights."""
         self.vehicle = VirtualVehicle(
             POLICY, SimulationConfig(flavour=AutopilotKind(flavour), return_mm=return_mm, **config)
         )
@@ -30,7 +30,7 @@ class Flyer:
         return self.vehicle.simulation.truth()
 
     def wait(self, seconds: float) -> list[Event]:
-        """Let time pass; what happened meanwhile."""
+        """Advance and return the events."""
         before = len(self.events)
         end_us = self.now_us + round(seconds * SECOND)
         while self.now_us < end_us:
@@ -38,7 +38,7 @@ class Flyer:
         return self.events[before:]
 
     def until(self, kind: type[Event] | tuple[type[Event], ...], seconds: float = 300) -> Any:
-        """Let time pass until an event of the kind comes."""
+        """Advance until an event of the kind comes."""
         end_us = self.now_us + round(seconds * SECOND)
         while self.now_us < end_us:
             new = self.vehicle.poll(self.now_us, SECOND)
@@ -53,7 +53,7 @@ class Flyer:
     def begin(
         self, kind: MotionKind, *points: tuple[int, int], altitude: int = 0, speed: int = 0, hold_us: int = 0
     ) -> int:
-        """Start a command; its token."""
+        """Start a command and return its token."""
         self.token += 1
         path = tuple(part for point in points for part in point)
         command = Command(self.token, kind.name.lower(), kind, path, geo(*points), altitude, speed, hold_us)
@@ -68,7 +68,7 @@ class Flyer:
         return end
 
     def up(self, altitude: int = 20_000) -> "Flyer":
-        """Ready, and climbed."""
+        """Wait until ready, and climb."""
         self.until(Ready)
         end = self.fly(MotionKind.CLIMB, altitude=altitude)
         assert isinstance(end, Succeeded), end
@@ -77,5 +77,5 @@ class Flyer:
 
 @cache
 def climbed(flavour: str, altitude: int) -> Flyer:
-    """One that has climbed. Copy it before you fly on."""
+    """Return a flyer in the air. Copy it before flying on."""
     return Flyer(flavour).up(altitude)

@@ -1,7 +1,6 @@
-"""Command lines in processes of their own, each forked from one that has loaded the command and read what ships.
+"""Run command lines in processes forked from one that has loaded the program and the shipped sources.
 
-A process that starts afresh loads modules for most of a second before it reads its first word. Where it is the command
-that is looked at, and not how it starts, this saves that second each time.
+A fresh process loads modules for almost a second. Tests that do not test the start save that second.
 """
 
 import atexit
@@ -26,25 +25,26 @@ from tempfile import TemporaryFile
 from threading import Thread
 from typing import BinaryIO, NamedTuple
 
-#: the packages of what commands load sooner or later
+#: packages that commands import
 LOADED = ("rtshcua.front.cli", "rtshcua.ground", "rtshcua.adapters.store", "rtshcua.front.mcp")
 
 
 class Ended(NamedTuple):
-    """What a command came to."""
+    """The result of a command."""
 
     code: int
     out: str
     err: str
 
 
-#: what is told of a command: first its process id, then how it ended, as `subprocess` tells it; before that, the length
-#: of what is asked, with the descriptors of input and both outputs
+#: replies about a command: its process id, then its return code as in `subprocess`; requests begin with their length
+#: and
+#: the descriptors of input and both outputs
 TOLD = Struct("=i")
 
 
 class Started:
-    """A command under way: what tests use of `subprocess.Popen`, with what it writes to."""
+    """A running command, with the parts of `subprocess.Popen` that tests use."""
 
     def __init__(self, told: socket.socket, out: BinaryIO, err: BinaryIO) -> None:
         self._told, self.stdout, self.stderr = told, out, err
@@ -52,37 +52,37 @@ class Started:
         self.returncode: int | None = None
 
     def poll(self) -> int | None:
-        """The exit code, or None while it runs."""
+        """Return the exit code, or None while it runs."""
         with suppress(TimeoutError):
             self.wait(0)
         return self.returncode
 
     def wait(self, timeout: float | None = None) -> int:
-        """The exit code, negative for the signal that ended it. Raises TimeoutError."""
+        """Wait for the exit code, negative for a signal. Raise TimeoutError."""
         if self.returncode is None:
             self._told.settimeout(timeout)
             try:
                 self.returncode = self._next()
-            except BlockingIOError:  # as it is told where nothing is waited for
+            except BlockingIOError:  # the reply without waiting
                 raise TimeoutError from None
             self._told.close()
         return self.returncode
 
     def send_signal(self, number: signal.Signals) -> None:
-        """A signal, if it runs still."""
+        """Send a signal if it still runs."""
         if self.poll() is None:
             os.kill(self.pid, number)
 
     def terminate(self) -> None:
-        """Ask it to end."""
+        """Terminate it."""
         self.send_signal(signal.SIGTERM)
 
     def kill(self) -> None:
-        """End it at once."""
+        """Kill it."""
         self.send_signal(signal.SIGKILL)
 
     def communicate(self) -> tuple[bytes, bytes]:
-        """What it says from now on, on both outputs, once it has ended."""
+        """Wait for its end and return the remaining output of both streams."""
         said: list[bytes] = []
         aside = Thread(target=lambda: said.append(_rest(self.stderr)))
         aside.start()
@@ -99,7 +99,7 @@ class Started:
 
 
 def _rest(stream: BinaryIO) -> bytes:
-    """What is left to read of a stream, which is closed then; nothing of one that is."""
+    """Read the rest of a stream and close it; return nothing if it is closed."""
     if stream.closed:
         return b""
     with stream:
@@ -107,13 +107,13 @@ def _rest(stream: BinaryIO) -> bytes:
 
 
 class Forked:
-    """The process that has loaded the commands, reached by a socket: all test processes have the same."""
+    """The process with the loaded program, reached by a socket and shared by all test processes."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
 
     def run(self, words: Sequence[str], folder: Path, patience_s: float) -> Ended:
-        """`rtshcua` with these words in a folder, under the environment of now. Raises TimeoutError."""
+        """Run `rtshcua` with these arguments in a folder, with the current environment. Raise TimeoutError."""
         with TemporaryFile() as out, TemporaryFile() as err:
             command = Started(self._asked(words, folder, os.environ, out.fileno(), err.fileno()), out, err)
             try:
@@ -127,7 +127,7 @@ class Forked:
             return Ended(code, out.read().decode(), err.read().decode())
 
     def start(self, words: Sequence[str], folder: Path, environment: Mapping[str, str]) -> Started:
-        """`rtshcua` with these words in a folder and an environment, under way, with nothing to read."""
+        """Start `rtshcua` with these arguments in a folder and an environment, with empty input."""
         (out, told_out), (err, told_err) = os.pipe(), os.pipe()
         try:
             told = self._asked(words, folder, environment, told_out, told_err)
@@ -137,7 +137,7 @@ class Forked:
         return Started(told, os.fdopen(out, "rb"), os.fdopen(err, "rb"))
 
     def program(self, file: Path) -> str:
-        """A file that can be started as `rtshcua` is, with input, outputs and signals, and needs no time to load."""
+        """Write an executable that behaves like `rtshcua` but starts at once."""
         file.write_text(PROGRAM.format(python=sys.executable, path=str(self._path)), encoding="utf-8")
         file.chmod(0o755)
         return str(file)
@@ -154,7 +154,7 @@ class Forked:
         return channel
 
 
-#: isolated and without site packages: it starts in a hundredth of the time that the command takes to load
+#: isolated and without site packages: starts in a hundredth of the command's load time
 PROGRAM = """#!{python} -IS
 import json, os, signal, socket, struct, sys
 channel = socket.socket(socket.AF_UNIX)
@@ -172,7 +172,7 @@ os._exit(code if code >= 0 else 128 - code)
 
 @contextmanager
 def forked(path: Path) -> Iterator[None]:
-    """Such a process, as long as it is wanted; what connects to the path waits until it has loaded."""
+    """Run such a process; clients of the path wait until it has loaded."""
     with socket.socket(socket.AF_UNIX) as listening:
         listening.bind(str(path))
         listening.listen(100)
@@ -188,14 +188,14 @@ def forked(path: Path) -> Iterator[None]:
 
 
 def _serve(listening: socket.socket) -> None:
-    """Begin each command that is asked for, and tell how it ended; until the input ends."""
+    """Start each requested command and report its end, until the input ends."""
     for package in map(import_module, LOADED):
         for each in walk_packages(package.__path__, f"{package.__name__}."):
             if not each.name.endswith("__main__"):
                 import_module(each.name)
     _warm()
     gc.collect()
-    gc.freeze()  # what is looked at is written to, and copied for each command
+    gc.freeze()  # garbage collection would write to all objects, and copy their pages for each command
     woken, wake = socket.socketpair()
     wake.setblocking(False)
     signal.set_wakeup_fd(wake.fileno(), warn_on_full_buffer=False)
@@ -225,7 +225,7 @@ def _serve(listening: socket.socket) -> None:
 
 
 def _received(channel: socket.socket) -> tuple[bytes, list[int]]:
-    """What is asked, and the descriptors that came with it."""
+    """Receive a request and its descriptors."""
     octets, given, _, _ = socket.recv_fds(channel, TOLD.size, 3)
     (length,) = TOLD.unpack(octets)
     asked = b""
@@ -235,15 +235,15 @@ def _received(channel: socket.socket) -> tuple[bytes, list[int]]:
 
 
 def _tell(under_way: dict[int, socket.socket]) -> None:
-    """Tell of those that ended."""
+    """Report ended commands."""
     with suppress(ChildProcessError):
         while (ended := os.waitpid(-1, os.WNOHANG))[0]:
-            with suppress(BrokenPipeError), under_way.pop(ended[0]) as channel:  # perhaps nobody wants to know
+            with suppress(BrokenPipeError), under_way.pop(ended[0]) as channel:  # the client may be gone
                 channel.sendall(TOLD.pack(os.waitstatus_to_exitcode(ended[1])))
 
 
 def _command(words: Sequence[str], folder: str, environment: Mapping[str, str], given: Sequence[int]) -> None:
-    """Be the command: take over input, outputs, folder and environment, run, and end."""
+    """Become the command: take over input, outputs, folder and environment, run, and exit."""
     code = 1
     try:
         signal.set_wakeup_fd(-1)
@@ -251,7 +251,7 @@ def _command(words: Sequence[str], folder: str, environment: Mapping[str, str], 
         for descriptor, each in enumerate(given):
             os.dup2(each, descriptor)
             os.close(each)
-        # those of the process that was forked may be of a file, which has a place to return to
+        # inherited streams may be files with a position
         sys.stdin = os.fdopen(0, "r", closefd=False)
         sys.stdout = os.fdopen(1, "w", buffering=1 if os.isatty(1) else -1, closefd=False)
         sys.stderr = os.fdopen(2, "w", buffering=1, errors="backslashreplace", closefd=False)
@@ -260,7 +260,7 @@ def _command(words: Sequence[str], folder: str, environment: Mapping[str, str], 
         os.environ.update(environment)
         time.tzset()
         code = _main(words)
-        # what Python does at the end of a process, but for letting go of what is loaded
+        # Python's shutdown without unloading modules
         threading._shutdown()  # type: ignore[attr-defined]
         atexit._run_exitfuncs()
         _flush()
@@ -269,7 +269,7 @@ def _command(words: Sequence[str], folder: str, environment: Mapping[str, str], 
 
 
 def _warm() -> None:
-    """Remember what ships as each command would: read, checked, its zones compared."""
+    """Load the shipped sources as each command would: read, checked, zones compared."""
     from rtshcua import library
     from rtshcua.app.programs import compile_sources
 

@@ -1,4 +1,4 @@
-"""A flight whose computer stands still for 3 s just when its take-off is to be sent; the steps have 10 s to begin."""
+"""A flight whose computer stalls for 3 s just before the takeoff is sent; the steps have 10 s to begin."""
 
 from collections.abc import Callable, Mapping
 from functools import cache
@@ -29,7 +29,7 @@ def bundle() -> bytes:
 
 
 class Stalls:
-    """Has the computer of a flight stand still, in us by how often it looked at its clock from now on: `looks`."""
+    """Stalls a flight's computer, in us by the number of clock readings from now on (`looks`)."""
 
     def __init__(self, flight: VirtualFlight, stalls: Mapping[int, int]) -> None:
         self.looks = 0
@@ -46,8 +46,8 @@ class Stalls:
 
 
 def looks_until_sent(flight: VirtualFlight) -> int:
-    """How often a flight looks at its clock until its first command is handed to the vehicle: the last look is whether
-    it comes in time.
+    """Return the number of clock readings until the first command reaches the vehicle; the last one checks its
+    deadline.
     """
     counted, begin, found = Stalls(flight, {}), flight.vehicle.begin, list[int]()
 
@@ -63,7 +63,7 @@ def looks_until_sent(flight: VirtualFlight) -> int:
 
 
 def late(make: Callable[[], VirtualFlight], *, at_its_frame: bool = False) -> VirtualFlight:
-    """A flight, to be flown, of which the take-off is late when it is to be sent, or when its first frame is."""
+    """Return a flight whose takeoff is late when it is sent, or when its first frame is."""
     looks, flight = looks_until_sent(make()), make()
     Stalls(flight, {looks - (not at_its_frame): STALL_US})
     return flight

@@ -1,5 +1,5 @@
-"""The simulated vehicle at the other end of a real line, in explicit time: a pseudo-terminal or a TCP connection that
-carries so many octets a second each way.
+"""The simulated vehicle behind a real line, in explicit time: a pseudo-terminal or a TCP connection with a limited
+capacity each way.
 """
 
 import os
@@ -28,7 +28,7 @@ from rtshcua.simulation.world import Simulation
 from rtshcua.virtual.vehicle import SECOND, START, VirtualClock, VirtualVehicle
 from virtual.flight import UTC_US
 
-#: what the vehicle's own port holds until it is sent; a frame that does not fit is not sent, as on an autopilot
+#: the send buffer of the vehicle's port; a frame that does not fit is dropped, as on an autopilot
 UART_OCTETS = 1_024
 TICK_US = 20_000
 
@@ -44,14 +44,14 @@ class FarEnd(Protocol):
 
 
 class Terminal:
-    """A pseudo-terminal; `path` is a link to the end that is opened, so that another one can take its place."""
+    """A pseudo-terminal; `path` is a symbolic link to it, so that another one can replace it."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self.plug_in()
 
     def plug_in(self) -> None:
-        """A device is there (again)."""
+        """Create the device (again)."""
         self.far, self._near = pty.openpty()
         tty.setraw(self._near)
         os.set_blocking(self.far, False)
@@ -59,7 +59,7 @@ class Terminal:
         self.path.symlink_to(os.ttyname(self._near))
 
     def pull(self) -> None:
-        """The device is gone, and its name with it."""
+        """Remove the device and its name."""
         self.path.unlink()
         os.close(self.far)
         os.close(self._near)
@@ -105,7 +105,7 @@ class Connection:
 
 
 class LineClock(VirtualClock):
-    """Virtual time, as a link needs it: nobody waits."""
+    """Virtual time for a link: waiting returns at once."""
 
     def heard(self, boot_us: int) -> None:
         pass
@@ -118,8 +118,8 @@ class LineClock(VirtualClock):
 
 
 class LinedVehicle(VirtualVehicle):
-    """A vehicle behind a line that carries `capacity` octets a second; `end` is its side. `sent_octets` is how many it
-    sent, `dropped` how many frames did not fit into its port. `free`: whatever is begun counts as permitted.
+    """A vehicle behind a line with `capacity` octets per second; `end` is its side. `sent_octets` counts its octets,
+    `dropped` the frames that did not fit into its port. `free`: every command counts as permitted.
     """
 
     def __init__(
@@ -138,10 +138,10 @@ class LinedVehicle(VirtualVehicle):
         self.capacity = capacity
         self.sent_octets = self.dropped = 0
         self._out = b""
-        self._down = self._up = 0  # octets that may go by now
+        self._down = self._up = 0  # octets that may be sent by now
 
     def poll(self, now_us: int, timeout_us: int) -> Sequence[Event]:
-        """Let time pass, at most `timeout_us`; comes back early for anything but readings."""
+        """Advance by at most `timeout_us`; return early for any event except readings."""
         end_us, events = self.clock.elapsed_us + timeout_us, list[Event]()
         while True:
             events += self.connected.poll(self.clock.monotonic_us, 0)
@@ -150,7 +150,7 @@ class LinedVehicle(VirtualVehicle):
             self.pump(min(end_us, self.clock.elapsed_us + TICK_US))
 
     def pump(self, until_us: int) -> None:
-        """The vehicle lives until then, and its port sends and takes in what the line carries in that time."""
+        """Advance the vehicle, and move octets as far as the line's capacity allows."""
         passed_us, self.clock.elapsed_us = until_us - self.clock.elapsed_us, until_us
         for datagram in self.simulation.advance(until_us):
             self._say(datagram)

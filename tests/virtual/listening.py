@@ -1,4 +1,4 @@
-"""A boundary that listens, as systemd has it listen: `rtshcua-boundary@.socket` and `.service`, without the sandbox."""
+"""A listening boundary as under systemd: `rtshcua-boundary@.socket` and `.service`, without the sandbox."""
 
 import os
 import shutil
@@ -15,13 +15,13 @@ from typing import Final
 from rtshcua.adapters.boundary_process import PATIENCE_S, program
 
 VEHICLE: Final = "quad-07"
-#: who runs the boundary, and who the run, where we may choose: ourselves, where we may not
+#: the users of the boundary and of the run if the test may choose, otherwise the current user
 ROOT: Final = os.geteuid() == 0
 BOUNDARY_USER: Final = 65_533 if ROOT else os.geteuid()
 RUN_USER: Final = 65_532
-#: the flags of a socket that connections are taken from, in /proc/net/unix
+#: the flags of a listening socket in /proc/net/unix
 _ACCEPTS: Final = "00010000"
-#: what stands in for systemd where it is not installed: it hands over each connection as descriptor 3
+#: a replacement for systemd: it passes each connection as descriptor 3
 _ACCEPT: Final = """
 import os, signal, socket, sys
 signal.signal(signal.SIGCHLD, signal.SIG_IGN)
@@ -39,7 +39,7 @@ while True:
 
 
 class Listening:
-    """A folder of boundaries, and who starts one for each connection to `socket`, under a user of its own."""
+    """A folder of boundaries, and a service that starts one for each connection to `socket`, under its own user."""
 
     def __init__(self, place: Path, words: Sequence[str]) -> None:
         place.chmod(0o755)
@@ -67,7 +67,7 @@ class Listening:
         return any(fields[3] == _ACCEPTS and fields[-1] == str(self.socket) for fields in found)
 
     def give(self) -> None:
-        """The folder is provisioned: it goes to its user, and the socket to who may connect."""
+        """Give the provisioned folder to its user, and the socket to the connecting user."""
         for path in (self.folder, self.own, *self.own.iterdir()):
             os.chown(path, BOUNDARY_USER, BOUNDARY_USER if ROOT else -1)
         if ROOT:
@@ -75,7 +75,7 @@ class Listening:
         self.socket.chmod(0o600)
 
     def boundaries(self) -> list[int]:
-        """The processes of those that run."""
+        """Return the process ids of running boundaries."""
         pid, found = self._process.pid, []
         for child in Path(f"/proc/{pid}/task/{pid}/children").read_text().split():
             with suppress(OSError):
@@ -83,14 +83,14 @@ class Listening:
         return found
 
     def await_gone(self, within_s: float) -> None:
-        """Wait until none runs."""
+        """Wait until no boundary runs."""
         until_s = time.monotonic() + within_s
         while self.boundaries():
             assert time.monotonic() < until_s, "it goes on"
             time.sleep(0.02)
 
     def close(self) -> None:
-        """End all of them, and who starts them."""
+        """End all boundaries and the service."""
         if self._process.poll() is not None:
             return
         for pid in self.boundaries():
@@ -103,7 +103,7 @@ class Listening:
 
 @contextmanager
 def listening(*words: str) -> Iterator[Listening]:
-    """One with nothing in its folder yet; `words` are told to the program."""
+    """Create one with an empty folder; `words` are arguments of the program."""
     with TemporaryDirectory(dir="/tmp", prefix="rtshcua-") as place:  # the address of a socket is short
         made = Listening(Path(place), words)
         try:

@@ -1,4 +1,4 @@
-"""Uploads and downloads by the mission protocol, as a ground station does them, and some plans to upload."""
+"""Uploads and downloads by the mission protocol, like a ground station, and some plans."""
 
 from math import nan
 from typing import Any
@@ -42,7 +42,7 @@ def square(half_m: float, north: float = 0, east: float = 0, command: int = 5001
 
 
 def upload(pilot: Any, rows: list[Row], kind: int = MISSION, at_once: bool = True) -> tuple[list[str], int | None]:
-    """Uploads; the names of the messages it was asked with, and the result of MISSION_ACK, if it came."""
+    """Upload a plan; return the names of the request messages, and the result of MISSION_ACK, if any."""
     asked: list[str] = []
     replies = pilot.send(mavlink.MAVLink_mission_count_message(1, 1, len(rows), kind))
     for _ in range(len(rows) + 1):
@@ -58,12 +58,12 @@ def upload(pilot: Any, rows: list[Row], kind: int = MISSION, at_once: bool = Tru
 
 
 def mission(pilot: Any, rows: list[Row]) -> list[Row]:
-    """The rows as the flavour wants them: ArduCopter keeps slot 0 for home."""
+    """Return the items for the flavour: ArduCopter reserves slot 0 for home."""
     return rows if pilot.px4 else [HOME, *rows]
 
 
 def download(pilot: Any, kind: int = MISSION, whole: bool = True) -> list[Any]:
-    """Downloads; the items' messages."""
+    """Download a plan; return the items' messages."""
     replies = pilot.send(mavlink.MAVLink_mission_request_list_message(1, 1, kind))
     count = next(f.message.count for f in replies if f.name == "MISSION_COUNT")
     ask = mavlink.MAVLink_mission_request_int_message if whole else mavlink.MAVLink_mission_request_message

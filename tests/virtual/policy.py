@@ -1,4 +1,4 @@
-"""A policy by hand, with the signals and the vehicle that a driver reads and nothing that decides."""
+"""A policy by hand with the signals and the vehicle that a driver needs, without rules."""
 
 from math import cos, radians
 

@@ -1,4 +1,4 @@
-"""A whole qualification in virtual time: each sortie a flight of its own, of one simulated vehicle."""
+"""A whole qualification in virtual time: each sortie is a flight of the same simulated vehicle."""
 
 from collections.abc import Callable, Sequence
 from functools import cache
@@ -56,8 +56,8 @@ def bundle(sortie: Sortie, *, by_pilot: bool) -> tuple[bytes, Policy, Mission]:
 
 
 class Qualifying:
-    """One simulated vehicle, and what is flown with it. `wrong` makes it another than it should be; `pilot` is asked to
-    take over, where it counts as a real one.
+    """One simulated vehicle and its sorties. `wrong` changes its behaviour; `pilot` is asked to take over if it counts
+    as a real vehicle.
     """
 
     def __init__(self, flavour: str, wrong: Wrong = lambda _: None, pilot: Pilot | None = None, **chosen: Any) -> None:
@@ -71,7 +71,7 @@ class Qualifying:
         self.flights: list[Any] = []
 
     def fly(self, sorties: Sequence[Sortie] = SORTIES) -> list[QualificationCheck]:
-        """Fly these sorties, as far as each before ended well; the checks."""
+        """Fly these sorties until one fails; return the checks."""
         found, missing = [], {each.name: "not asked for" for each in SORTIES}
         for sortie in sorties:
             found.append(self.sortie(sortie))
@@ -84,7 +84,7 @@ class Qualifying:
         return judge(self.observed, self._policy)
 
     def sortie(self, sortie: Sortie) -> ObservedSortie:
-        """One sortie, from the ground to the ground."""
+        """Fly one sortie, from the ground to the ground."""
         data, policy, mission = bundle(sortie, by_pilot=self._pilot is not None)
         before, clock = self._vehicle, self._clock
 
@@ -106,7 +106,7 @@ class Qualifying:
         self._vehicle = vehicle
         flown = Flight(data, self._config, vehicle=vehicle).fly(most_s=300)
         self.flights.append(flown)
-        vehicle.stand_still(300_000)  # a run closes its log before it watches who lands
+        vehicle.stand_still(300_000)  # a run closes its log before it observes the landing
         ended_us = clock.elapsed_us
         while not driver.seen.down and clock.elapsed_us - ended_us < 60 * SECOND:
             vehicle.poll(clock.monotonic_us, 100_000)
@@ -115,7 +115,7 @@ class Qualifying:
 
     @property
     def elapsed_us(self) -> int:
-        """How long all of it took."""
+        """Return the total time."""
         return self._clock.elapsed_us
 
     def _observed(self, sorties: list[ObservedSortie], missing: dict[str, str]) -> ObservedQualification:

@@ -1,7 +1,7 @@
 """One test over the rows of a table.
 
-A row that is a test of its own costs several milliseconds, some of them in each process of a run, before anything of it
-is tried. Where a row is a call of a function, that is most of its price.
+A separate test costs several milliseconds of overhead, partly in each process of a run. For a row that is a single
+function call, that is most of its cost.
 """
 
 import inspect
@@ -12,15 +12,15 @@ from typing import Any
 import pytest
 
 Test = Callable[..., None]
-#: characters of what a row has that a failure shows
+#: the most characters of a row that a failure shows
 LONG = 500
 
 
 def rows(names: str | Sequence[str], table: Iterable[Any], *, ids: Any = None) -> Callable[[Test], Test]:
-    """As `pytest.mark.parametrize`, but as one test: it tries every row, and fails with all that fail, each named.
+    """Like `pytest.mark.parametrize`, but as one test: it runs every row and reports all failing rows.
 
-    For tests that leave nothing behind. A fixture is the same for all rows, so only those of a module or of the session
-    are taken. Rows with marks stay parameters.
+    For tests without side effects. All rows share fixtures, so only fixtures of a module or of the session are allowed.
+    Rows with marks stay parameters.
     """
     argnames = [name.strip() for name in names.split(",")] if isinstance(names, str) else list(names)
     single = len(argnames) == 1
@@ -57,7 +57,7 @@ def rows(names: str | Sequence[str], table: Iterable[Any], *, ids: Any = None) -
 
 
 def _name(at: int, id: object, values: Sequence[Any], argnames: Sequence[str], ids: Any) -> str:
-    """A row by its number, the name it was given, and what it has."""
+    """Describe a row by its number, its name and its values."""
     if id is None and callable(ids):
         id = "-".join(str(ids(value)) for value in values)
     elif id is None and ids is not None:

@@ -1,4 +1,4 @@
-"""Which cases of many `make test` tries; `make soak` tries the others."""
+"""Choose a sample of cases for `make test`; `make soak` runs the others."""
 
 from collections.abc import Iterable
 from itertools import product
@@ -8,9 +8,10 @@ import pytest
 
 
 def each_once(*axes: Iterable[Any]) -> list[Any]:
-    """Every combination as parameters. Those on the diagonal show each value of each axis; the others are for soak.
+    """Return every combination as parameters. The diagonal covers each value of each axis; the others are marked
+    `soak`.
 
-    The diagonal has the first values of all axes, then the second ones; a shorter axis begins again.
+    The diagonal has the first values of all axes, then the second ones; a shorter axis repeats.
     """
     values = [list(axis) for axis in axes]
     sample = {tuple(row % len(axis) for axis in values) for row in range(max(map(len, values)))}
@@ -24,7 +25,7 @@ def each_once(*axes: Iterable[Any]) -> list[Any]:
 
 
 def parts(values: Iterable[Any], count: int) -> list[Any]:
-    """Of many cases that are alike, each so-manieth: `make test` tries the first of these parts, soak the others."""
+    """Split similar cases into interleaved parts: `make test` runs the first part, soak the others."""
     every = list(values)
     return [
         pytest.param(every[at::count], id=f"{at + 1} of {count}", marks=() if at == 0 else pytest.mark.soak)

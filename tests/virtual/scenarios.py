@@ -19,12 +19,12 @@ KEYS = Keys(
 
 
 def incident(at_s: float, fault: Fault) -> Incident:
-    """A fault at a time."""
+    """An incident with a fault at a time."""
     return when(AtTime(int(at_s * case.S), int(at_s * case.S)), fault)
 
 
 def when(time: When, fault: Fault) -> Incident:
-    """A fault at whatever time."""
+    """An incident with a fault and any trigger."""
     return Incident(time, fault, repr(fault))
 
 
@@ -35,7 +35,7 @@ def scenario(*incidents: Incident, start: Start = CALM, expects: tuple[Expected,
 
 
 def fast(policy: Policy, **fields: object) -> SimulationConfig:
-    """A vehicle that fits, and soon is down."""
+    """A fitting vehicle that lands fast."""
     low: dict[str, object] = {} if policy.vehicle.return_altitude else {"return_mm": 16 * case.M}
     return fitting(policy, land_mm_s=case.LAND_MM_S, **low, **fields)
 
@@ -43,7 +43,7 @@ def fast(policy: Policy, **fields: object) -> SimulationConfig:
 def flown(
     of: Scenario, flavour: str = "px4", *, bundle: bytes | None = None, seed: int = 1, attested: bool = True
 ) -> ScenarioFlown:
-    """A flight of it: up, a leg, and home, unless another bundle is given. `attested`, by a boundary that signs."""
+    """Fly a scenario: up, a leg, and home, or another bundle. `attested`: with a boundary that signs its evidence."""
     flies = case.seal(case.mission(case.low_steps())) if bundle is None else bundle
     keys = KEYS if attested else replace(KEYS, boundary=None)
     return fly(flies, case.root(boundary=attested)[1], keys, of, flavour, seed, chosen=fast)

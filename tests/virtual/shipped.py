@@ -1,4 +1,4 @@
-"""The missions that ship, compiled and sealed as `rtshcua compile` does it."""
+"""The shipped missions, compiled and sealed as `rtshcua compile` does."""
 
 from functools import cache
 from pathlib import Path
@@ -21,7 +21,7 @@ def shipped(name: str, issued_at_us: int = case.flat.ISSUED) -> bytes:
 
 @cache
 def equipped(name: str) -> bytes:
-    """The same for the copter on which everything is fitted."""
+    """Return the same bundle for a copter with all equipment."""
     text = (library.root() / "missions" / f"{name}.rts").read_text(encoding="utf-8")
     with TemporaryDirectory() as folder:
         source = Path(folder) / f"{name}.rts"
@@ -38,5 +38,5 @@ def sealed(source: Path, issued_at_us: int = case.flat.ISSUED) -> bytes:
 
 
 def simulated(flavour: str, **fields: Any) -> SimulationConfig:
-    """A simulated vehicle that returns at the height that the policies that ship say."""
+    """Return a simulated vehicle with the return height of the shipped policies."""
     return case.simulated(flavour, return_mm=30 * case.M, **fields)

@@ -1,6 +1,6 @@
-"""A flight whose computer stands still for a while when it looks at its clock: between any two things that it does.
+"""A flight whose computer stalls when it reads its clock: between any two of its actions.
 
-The vehicle flies on meanwhile, and what it says waits to be read.
+The vehicle flies on meanwhile, and its frames wait to be read.
 """
 
 from collections.abc import Mapping
@@ -13,13 +13,13 @@ from rtshcua.virtual.vehicle import VirtualClock
 from virtual import case
 from virtual.flight import Flight, Flown
 
-#: a silence that is longer than this is told by whoever verifies the log, in us
+#: us: a verifier reports longer gaps of a log
 TOLD_US = 20_000_000
 
 
 class StallingFlight(Flight):
-    """`stalls` are how long it stands still, in us, by how often it looked at the clock before, from its log on;
-    `lost` is when its boundary is lost, where that is elsewhere. `looks` counts.
+    """`stalls` are the durations of stalls, in us, by the number of earlier clock readings since its log began; `lost`
+    is the reading at which its boundary process is lost. `looks` counts readings.
     """
 
     def __init__(
@@ -47,7 +47,7 @@ class StallingFlight(Flight):
 
 
 def silences(flown: Flown) -> list[tuple[int, int]]:
-    """The times in which its log has nothing for longer than 20 s: the record behind each, and its us."""
+    """Return the gaps of its log longer than 20 s: the record after each, and its length in us."""
     times = [record["at_us"] for record in flown.records]
     return [
         (number, after - before)

@@ -1,6 +1,6 @@
-"""Vehicles that are deliberately wrong: each the simulated one with one habit that the adapters take for impossible.
+"""Deliberately wrong vehicles: the simulated one with one behaviour that the adapters exclude.
 
-A habit is put on by a function of the virtual vehicle, after it was made; all but the check made for it may fail too.
+A function changes the virtual vehicle after its construction. Other checks than the intended one may fail too.
 """
 
 from collections import deque
@@ -18,12 +18,12 @@ HEARTBEAT = 0
 
 
 def _of(vehicle: VirtualVehicle) -> Any:
-    """The simulated autopilot, from inside."""
+    """Return the simulated autopilot inside."""
     return vehicle.simulation._autopilot
 
 
 def _filtered(vehicle: VirtualVehicle, change: Callable[[Any, bytes], Sequence[bytes]]) -> None:
-    """What comes of each frame that the vehicle sends, as it is parsed and as it is."""
+    """Replace each frame of the vehicle, given parsed and raw."""
     codec = Codec(0, 0)
 
     def hurt(datagram: bytes) -> list[bytes]:
@@ -33,7 +33,7 @@ def _filtered(vehicle: VirtualVehicle, change: Callable[[Any, bytes], Sequence[b
 
 
 def _each_tick(vehicle: VirtualVehicle, act: Callable[[], None]) -> None:
-    """What it does of its own, each time that it says something."""
+    """Call a function whenever the vehicle sends frames."""
 
     def change(_: Any, octets: bytes) -> Sequence[bytes]:
         act()
@@ -57,7 +57,7 @@ def hold_that_drifts(vehicle: VirtualVehicle) -> None:
 
 
 def _delayed(vehicle: VirtualVehicle, is_late: Callable[[Any], bool], late_us: int) -> None:
-    """Some frames come later by this much, and others overtake them."""
+    """Some frames are delayed by this much, and others overtake them."""
     late: deque[tuple[int, bytes]] = deque()
 
     def change(frame: Any, octets: bytes) -> Sequence[bytes]:
@@ -77,7 +77,7 @@ def late_heartbeat(vehicle: VirtualVehicle) -> None:
 
 
 def seldom_heartbeat(vehicle: VirtualVehicle) -> None:
-    """It answers nobody who asks for it, and streams it once a second."""
+    """HEARTBEAT is not sent on request, only once a second."""
     last = [0]
 
     def change(frame: Any, octets: bytes) -> Sequence[bytes]:
@@ -103,7 +103,7 @@ def fence_switched_off(vehicle: VirtualVehicle) -> None:
 
 
 def fence_that_keeps_other_items(vehicle: VirtualVehicle) -> None:
-    """It takes the upload, and keeps nothing of it."""
+    """It accepts the upload but stores nothing."""
 
     def change(frame: Any, octets: bytes) -> Sequence[bytes]:
         return [] if frame.name == "MISSION_COUNT" else [octets]
@@ -112,7 +112,7 @@ def fence_that_keeps_other_items(vehicle: VirtualVehicle) -> None:
 
 
 def silent_mode_change(vehicle: VirtualVehicle) -> None:
-    """Its heartbeat never tells of a return."""
+    """Its heartbeat never reports a return."""
     reports = _of(vehicle).reports
     build = reports._build[HEARTBEAT]
     kept: list[int] = []
@@ -139,7 +139,7 @@ def slow_climb(vehicle: VirtualVehicle) -> None:
 
 
 def fast_leg(vehicle: VirtualVehicle) -> None:
-    """It flies at twice the speed that it is told."""
+    """It flies at twice the commanded speed."""
     body = _of(vehicle).vehicle
     of = type(body)
     body.__class__ = type("Fast", (of,), {"speed": property(lambda self: 8.0, lambda self, value: None)})
@@ -151,7 +151,7 @@ def return_that_does_not_move(vehicle: VirtualVehicle) -> None:
 
 
 def return_that_does_not_climb(vehicle: VirtualVehicle) -> None:
-    """Whatever its parameters say."""
+    """Ignores its parameters."""
     _of(vehicle).vehicle.handling.return_height = lambda handling, away, up: up
 
 
@@ -185,7 +185,7 @@ def stream_at_a_third(vehicle: VirtualVehicle) -> None:
 
 
 def returns_when_we_are_silent(vehicle: VirtualVehicle) -> None:
-    """It takes the silence of a companion for the loss of its ground station, after two seconds."""
+    """It treats two seconds of silence of the companion as a loss of its ground station."""
     heard = [0]
     body = _of(vehicle).vehicle
     advance = vehicle.simulation.advance

@@ -1,4 +1,4 @@
-"""A campaign on a Dask cluster comes to the same as in one process, also when a worker is killed."""
+"""A campaign on a Dask cluster gives the same results as in one process, even if a worker is killed."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""What a campaign draws: the same for the same seed, by the stated distribution, where little was tried."""
+"""Drawing: reproducible by seed, with the stated distribution, preferring untried pairs."""
 
 from collections import Counter
 from dataclasses import fields

@@ -1,4 +1,4 @@
-"""A campaign is the same however many fly it, in whatever order, wherever it was interrupted."""
+"""A campaign gives the same results with any workers, order of completion and interruption."""
 
 import os
 import signal
@@ -34,7 +34,7 @@ ORDER = CampaignOrder(5, 230, SPACE)
 
 
 def result(flight: CampaignFlight) -> CampaignResult:
-    """What comes of a flight here: made of its number alone."""
+    """Make a result from the flight's number only."""
     chance = Random(flight.number)
     moments = tuple((label, chance.randrange(60 * S)) for label in ("airborne", "down"))
     failed = (JudgeFinding("late", "too late", 3),) if flight.number % 7 == 0 else ()
@@ -46,7 +46,7 @@ def result(flight: CampaignFlight) -> CampaignResult:
 
 
 class Shuffled:
-    """Workers whose results come in an order of their own; `most` flights, then it is interrupted."""
+    """Workers that return results in a given order and are interrupted after `most` flights."""
 
     def __init__(self, seed: int = 0, most: int = 10**9) -> None:
         self.chance, self.left = Random(seed), most
@@ -126,7 +126,7 @@ def test_pairs_of_kind_and_moment_are_counted() -> None:
 
 
 class Nothing(FlownMission):
-    """Flies nothing."""
+    """Work that must not be called."""
 
     __slots__ = ()
 
@@ -135,7 +135,7 @@ class Nothing(FlownMission):
 
 
 class DiesOnce(Nothing):
-    """Flight 3 kills its process, unless there is a file of that name."""
+    """Flight 3 kills its process, unless a marker file exists."""
 
     __slots__ = ()
 
@@ -192,11 +192,11 @@ def test_campaign_runs_in_one_process() -> None:
 
 
 class Enough(Exception):
-    """No flight is waited for any more."""
+    """Raised to stop waiting for flights."""
 
 
 class NeverEnds(Nothing):
-    """A flight that lasts longer than anybody waits."""
+    """A flight that does not end in time."""
 
     __slots__ = ()
 

@@ -1,4 +1,4 @@
-"""A failing scenario becomes small: only what is needed is left, and what is left is round."""
+"""Shrinking keeps only the needed faults of a failing scenario, with round parameters."""
 
 from rtshcua.campaign.drawing import CampaignTally, FaultSpace, Moment, draw
 from rtshcua.campaign.scenario_source import incident_text, scenario_text

@@ -1,4 +1,4 @@
-"""What people are told of a campaign: every margin and every kind of fault has a name for them."""
+"""Every margin and every kind of fault has a displayed name."""
 
 from dataclasses import fields
 

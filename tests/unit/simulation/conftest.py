@@ -1,4 +1,4 @@
-"""A ground station in virtual time: flies the simulated vehicle by MAVLink alone, in the test process."""
+"""A ground station in virtual time that flies the simulated vehicle by MAVLink, in the test process."""
 
 from collections.abc import Callable
 from copy import copy
@@ -15,12 +15,12 @@ from rtshcua.simulation.world import Simulation
 from virtual.copying import copied
 
 SECOND = 1_000_000
-#: a pilot that has only waited until the vehicle is ready is at the beginning yet
+#: a pilot that has only waited for a ready vehicle counts as unused
 BEGINNING_US = 1_500_000
 
 
 class Pilot:
-    """Sends commands and remembers every frame that came back."""
+    """Sends commands and stores every received frame."""
 
     def __init__(self, flavour: str, station: bool = True, **config: Any) -> None:
         self.px4 = flavour == "px4"
@@ -69,7 +69,7 @@ class Pilot:
         return self.long(mavlink.MAV_CMD_DO_SET_MODE, 1, number)
 
     def pause(self) -> list[int]:
-        """PX4's DO_REPOSITION without a place, a height and a heading: stop."""
+        """Send PX4's DO_REPOSITION without place, height and heading, which stops the vehicle."""
         return self.long(mavlink.MAV_CMD_DO_REPOSITION, -1, 1, 0, nan, nan, nan, nan)
 
     # ------------------------------------------------------------------------------------------- flying
@@ -82,7 +82,7 @@ class Pilot:
         return self.long(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)
 
     def take_off(self, up_m: float = 20) -> None:
-        """Climb. What was told the same at the beginning has climbed the same: that is flown once."""
+        """Climb. Equal beginnings are flown once and copied."""
         now_us = self.simulation.now_us
         if now_us > BEGINNING_US or self.simulation._events:
             self._take_off(up_m)
@@ -137,7 +137,7 @@ class Pilot:
         return [frame.message.text for frame in self.seen if frame.name == "STATUSTEXT"]
 
 
-#: by configuration, what was sent before and when, the time, and the height
+#: keyed by configuration, earlier messages with their times, the current time, and the height
 CLIMBED: dict[tuple[str, tuple[tuple[int, bytes], ...], int, float], Pilot] = {}
 
 

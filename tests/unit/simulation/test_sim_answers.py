@@ -1,4 +1,4 @@
-"""How long the simulated vehicle takes to obey and answer, where that is asked for: as was recorded."""
+"""The answer times of the simulated vehicle, compared with the recordings."""
 
 from collections.abc import Callable
 from functools import cache
@@ -37,7 +37,7 @@ STALLED = "arducopter-dropout"
 
 @cache
 def measured(kind: AutopilotKind) -> dict[int, list[int]]:
-    """By lane, how long answers took in the recordings, microseconds."""
+    """Return the recorded answer times by lane, microseconds."""
     lanes, taken = FLAVOURS[kind].lanes, dict[int, list[int]]()
     for name in RECORDED[kind]:
         asked: dict[object, tuple[int, int]] = {}
@@ -54,7 +54,7 @@ def measured(kind: AutopilotKind) -> dict[int, list[int]]:
             if key is None or getattr(m, key) not in asked:
                 continue
             at_us, lane = asked.pop(getattr(m, key))
-            if name != STALLED or heard.at_us - at_us < 300_000:  # it stood still for five seconds
+            if name != STALLED or heard.at_us - at_us < 300_000:  # a stall of five seconds
                 taken.setdefault(lane, []).append(heard.at_us - at_us)
     return taken
 
@@ -94,7 +94,7 @@ def test_inbox_keeps_the_order_within_each_lane() -> None:
 
 
 def acknowledged(p: Any, command: int, *params: float) -> int:
-    """Microseconds until the command was acknowledged."""
+    """Return the microseconds until the acknowledgement."""
     start_us = p.simulation.now_us
     answered = p.long(command, *params)
     while not answered:
@@ -128,7 +128,7 @@ def test_at_once_answers_without_delay(pilot: Callable[..., Any], flavour: str) 
 
 
 def test_requests_overtake_commands_on_px4_only(pilot: Callable[..., Any], flavour: str) -> None:
-    """Asked right behind a command for another mode, PX4 may tell the old one, as measured on the real one."""
+    """A request right after a mode command may be answered with the old mode, as measured on PX4."""
     p = pilot(flavour, answers=Answers.RECORDED, noise=False)
     p.wait(2)
     modes = [FlightMode.LAND, FlightMode.POSITION] if p.px4 else [FlightMode.LAND, FlightMode.ALTITUDE]

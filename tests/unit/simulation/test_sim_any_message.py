@@ -1,4 +1,4 @@
-"""Whatever messages come, with whatever values, in whatever order: the simulated vehicle goes on."""
+"""The simulated vehicle survives any messages, with any values, in any order."""
 
 from math import inf, nan
 from random import Random
@@ -21,7 +21,7 @@ BITS = {f"{sign}int{bits}_t": (sign, bits) for sign in ("u", "") for bits in (8,
 
 
 def value(chance: Random, name: str, type_: str, length: int) -> Any:
-    """A value that is often the one that matters."""
+    """Draw a value that is often a meaningful one."""
     likely = {
         "target_system": [1], "target_component": [1, 0], "command": COMMANDS, "mission_type": [0, 0, 1, 2, 3, 255],
         "seq": range(5), "count": range(5), "frame": [0, 2, 3, 6, 10, 77], "coordinate_frame": [5, 6, 77],

@@ -1,4 +1,4 @@
-"""What the simulated ArduCopter answers: the table of a recorded session with the real one (4.7.0-dev)."""
+"""Answers of the simulated ArduCopter, compared with a recorded session (4.7.0-dev)."""
 
 from collections.abc import Callable
 from math import nan
@@ -184,7 +184,7 @@ def test_pause_keeps_mode_and_later_targets(flying: Any) -> None:
 
 
 def speeds(name: str) -> dict[float, int]:
-    """Recorded speeds to the north, in cm/s, by the seconds after the fastest one, which the pilot ended."""
+    """Recorded northward speeds in cm/s, by seconds after the greatest one."""
     reports = [h for h in Trace(name, wall=True).of_vehicle if h.name == "GLOBAL_POSITION_INT"]
     since_us = max(reports, key=lambda each: int(each.message.vx)).at_us
     return {(h.at_us - since_us) / SECOND: h.message.vx for h in reports}
@@ -208,7 +208,7 @@ def leg_at_5_6_m_s(flying: Any) -> None:
 
 @pytest.mark.parametrize("name", ["arducopter-velocity-takeover", "arducopter-pause-takeover"])
 def test_velocity_or_pause_in_a_leg_matches_the_recording(flying: Any, name: str) -> None:
-    """From 5.6 m/s. The mode stays; on a velocity no target is told any more, on a pause the same one is."""
+    """From 5.6 m/s. The mode stays; a velocity ends the target report, a pause keeps it."""
     leg_at_5_6_m_s(flying)
     real, told, velocity = speeds(name), [], "velocity" in name
     for tenth in range(70):
@@ -225,7 +225,7 @@ def test_velocity_or_pause_in_a_leg_matches_the_recording(flying: Any, name: str
 
 
 def test_velocity_expires_without_renewal(flying: Any) -> None:
-    """GUID_TIMEOUT: 3 s after the last. In another mode than GUIDED nobody minds it."""
+    """GUID_TIMEOUT: 3 s after the last one. Other modes than GUIDED ignore it."""
     flying.mode(FlightMode.BRAKE)
     steer(flying, 3)
     flying.wait(2)

@@ -1,4 +1,4 @@
-"""How the vehicle comes up, what it says to whoever wants to arm it too early, and what it refuses for later."""
+"""The boot sequence, and refusals to arm."""
 
 from collections.abc import Callable
 from typing import Any
@@ -22,7 +22,7 @@ def watched(pilot: Callable[..., Any], flavour: str, **config: Any) -> Any:
     return p
 
 
-#: seconds, HEARTBEAT.system_status, fix type, estimator flags, pre-arm bit; None: nothing came yet
+#: seconds, HEARTBEAT.system_status, fix type, estimator flags, pre-arm bit; None: no message yet
 COMING_UP = {
     "px4": [
         (0.15, 0, 3, None, None),

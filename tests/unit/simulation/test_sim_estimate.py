@@ -1,4 +1,4 @@
-"""An estimate as real ones are: late, and a metre off, slowly straying."""
+"""The realistic position estimate: late, with a drifting error of about a metre."""
 
 from collections.abc import Callable
 from math import hypot
@@ -21,7 +21,7 @@ def flying(pilot: Callable[..., Any], flavour: str, **config: Any) -> Any:
 
 
 def behind(p: Any, name: str) -> float:
-    """Metres that a report is behind what is, on a way to the north."""
+    """Return the lag of reports behind the true position on a northward flight, in metres."""
     north, _ = p.config.home.local(p.last(name).lat, p.last(name).lon)
     return float(p.truth.north_mm / 1_000 - north)
 

@@ -1,4 +1,4 @@
-"""Every kind of fault that a simulated vehicle can have changes something that can be seen."""
+"""Every kind of vehicle fault has a visible effect."""
 
 from collections.abc import Callable
 from typing import Any
@@ -16,7 +16,7 @@ from virtual.copying import copied
 
 S = 1_000_000
 POSITION = "GLOBAL_POSITION_INT"
-#: by its name, a fault of each kind
+#: a fault of each kind, by name
 EXAMPLES: dict[str, Callable[[int], Fault]] = {
     "battery": lambda at: faults.BatteryLevel(at, 5_000),
     "battery-cell": faults.BatteryCell,
@@ -51,9 +51,9 @@ EXAMPLES: dict[str, Callable[[int], Fault]] = {
     "stuck": lambda at: faults.MessageStuck(at, POSITION),
     "mute": lambda at: faults.MessageSilence(at, POSITION),
 }
-#: what ArduCopter does not mind on its way to a target
+#: faults without effect on ArduCopter on a leg
 LANDING = {"pilot-sticks"}
-#: what PX4 does not mind while it is in Hold
+#: faults without effect on PX4 in Hold
 STAYS = {"pilot"}
 #: nor ever
 NEVER = {"px4": {"pilot-velocity"}, "ardupilot": set()}

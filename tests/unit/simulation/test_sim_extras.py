@@ -1,4 +1,4 @@
-"""What is fitted beside GPS, barometer and battery, and what a stock vehicle does not tell."""
+"""Messages of optional equipment, which a stock vehicle does not send."""
 
 from collections.abc import Callable
 from typing import Any
@@ -11,7 +11,7 @@ from rtshcua.simulation.surroundings import Wind
 
 NOT_STOCK = {"RADIO_STATUS", "DISTANCE_SENSOR", "OBSTACLE_DISTANCE", "WIND_COV"}
 ASKED = (1, 132, 147, 168, 330)
-"""The streams that ArduCopter is asked for: SYS_STATUS, DISTANCE_SENSOR, BATTERY_STATUS, WIND, OBSTACLE_DISTANCE."""
+"""Requests ArduCopter's streams: SYS_STATUS, DISTANCE_SENSOR, BATTERY_STATUS, WIND, OBSTACLE_DISTANCE."""
 
 
 def ask(p: Any) -> Any:
@@ -26,7 +26,7 @@ def names(p: Any) -> set[str]:
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_stock_vehicle_sends_no_messages_of_extras(pilot: Callable[..., Any], flavour: str) -> None:
-    """But the voltage of the whole battery, which every vehicle measures."""
+    """Apart from the voltage of the whole battery, which every vehicle measures."""
     p = pilot(flavour, extras=STOCK, wind=Wind(5_000, 270))
     p.take_off(5)
     ask(p).wait(2)
@@ -40,7 +40,7 @@ def test_stock_vehicle_sends_no_messages_of_extras(pilot: Callable[..., Any], fl
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_wind_is_estimated_in_the_air_only(pilot: Callable[..., Any], flavour: str) -> None:
-    """Seen on the real ones: PX4 sends no WIND_COV on the ground, ArduCopter goes on sending the last of the flight."""
+    """As observed: PX4 sends no WIND_COV on the ground, ArduCopter repeats the last estimate of the flight."""
     p = pilot(flavour, wind=Wind(5_000, 270))
     ask(p.ready()).wait(1)
     name = "WIND_COV" if p.px4 else "WIND"

@@ -1,4 +1,4 @@
-"""Each fault, and what it shows to a client."""
+"""Each fault, and its effect as a client sees it."""
 
 from collections.abc import Callable
 from dataclasses import replace

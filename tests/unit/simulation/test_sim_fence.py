@@ -1,4 +1,4 @@
-"""The simulated vehicle's fence: where it is, what it refuses, and what each flavour does when it is breached."""
+"""The simulated vehicle's fence: its area, refusals, and each flavour's reaction to a breach."""
 
 import struct
 from collections.abc import Callable
@@ -31,7 +31,7 @@ def set_param(a: Any, name: str, value: float) -> float:
 
 
 def fenced(a: Any, rows: list[Any], **params: float) -> Any:
-    """With this fence, and in force."""
+    """Upload this fence and wait until it is in force."""
     assert p.upload(a, rows, p.FENCE)[1] == 0
     if not a.px4:
         set_param(a, "FENCE_ENABLE", 1)
@@ -113,7 +113,7 @@ def test_uploaded_items_become_an_area(pilot: Pilots) -> None:
 
 
 def ordered_out(a: Any) -> list[int]:
-    """A reposition to 150 m north, at 10 m."""
+    """Reposition to 150 m north, at 10 m."""
     latitude, longitude = a.config.home.globe(150, 0)
     up = 10 + (a.config.home.amsl_mm / 1000 if a.px4 else 0)
     result: list[int] = a.int(192, 5 if a.px4 else 6, [-1, 1, 0, float("nan")], latitude, longitude, up)
@@ -157,7 +157,7 @@ def test_target_outside_is_accepted_right_after_an_upload(pilot: Pilots, flavour
 
 
 def on_the_way_out(a: Any) -> Any:
-    """On the way out of a square of 30 m, ordered before it was in force."""
+    """Fly out of a square of 30 m, with a target from before the fence was in force."""
     assert ordered_out(a) == [0]
     return fenced(a, p.square(30))
 

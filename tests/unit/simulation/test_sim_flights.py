@@ -11,8 +11,8 @@ from rtshcua.simulation.config import SimulationConfig
 from rtshcua.simulation.surroundings import Wind
 from virtual.sampling import each_once
 
-#: s: the least and the most that it flies past a target, divided by its speed on the way. Recorded: 0.13 to 0.28 (PX4),
-#: 0.09 to 0.15 (ArduCopter); simulated: up to 0.18 and 0.09, less the noise
+#: s: the least and the greatest overshoot, divided by the speed of the leg. Recorded: 0.13 to 0.28 (PX4), 0.09 to 0.15
+#: (ArduCopter); simulated: up to 0.18 and 0.09, minus the noise
 OVERSHOOT_S = {"px4": (0.15, 0.19), "ardupilot": (0.07, 0.1)}
 
 
@@ -110,7 +110,7 @@ def test_hold_keeps_its_place_in_wind(pilot: Callable[..., Any], flavour: str) -
     assert abs(p.truth.east_mm - start.east_mm) < 1_000
 
 
-#: from the speed: the distance, and the time until it is slower than 0.4 m/s, as measured on the real ones
+#: by speed: the stopping distance, and the time until it is slower than 0.4 m/s, as measured on real autopilots
 STOPS = [
     ("px4", "pause", 4.5, 7.7, 3.6),
     ("ardupilot", FlightMode.BRAKE, 10.1, 20.7, 4.6),

@@ -1,4 +1,4 @@
-"""Faults of the link and of the autopilot's loop: what is late, lost, out of order, old, and said all at once."""
+"""Faults of the link and of the autopilot's loop: delay, loss, reordering, stale values, and bursts."""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -34,7 +34,7 @@ def of_autopilot(received: list[Any]) -> list[Any]:
 
 
 def lag_us(p: Any) -> list[int]:
-    """How old each position is when it comes, in steps of a tick."""
+    """Return the age of each received position, in ticks."""
     return [
         p.simulation.now_us - frame.message.time_boot_ms * 1000
         for _ in range(250)

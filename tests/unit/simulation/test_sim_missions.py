@@ -1,4 +1,4 @@
-"""Missions flown by the simulated vehicle: started, paused, resumed, refused; what it tells while it flies them."""
+"""Missions on the simulated vehicle: start, pause, resume, refusal, and reports of progress."""
 
 from collections.abc import Callable
 from typing import Any

@@ -1,4 +1,4 @@
-"""Faster than life the simulated vehicle waits for a computer that is busy, and not for one that stands still."""
+"""At high speed the simulated vehicle waits for a busy computer, but not for a stalled one."""
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -25,7 +25,7 @@ def test_pace_waits_while_ahead_of_received_positions() -> None:
 
 
 def test_pace_does_not_wait_without_reports() -> None:
-    """A link that is cut, or a computer that stands still: the vehicle flies on."""
+    """With a cut link or a stalled computer the vehicle flies on."""
     pace = Pace()
     pace.says(position(70_000))
     assert not pace.waits(100.0), "nobody ever told"

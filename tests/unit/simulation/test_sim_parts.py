@@ -1,4 +1,4 @@
-"""The parts by themselves: braking, battery, link, parameters."""
+"""Single parts: braking, battery, link, parameters."""
 
 from dataclasses import replace
 from math import degrees, hypot, tan

@@ -1,4 +1,4 @@
-"""A pilot who takes over without the mode switch, and motors that stop."""
+"""Takeovers without the mode switch, and motor stops."""
 
 from collections.abc import Callable
 from typing import Any

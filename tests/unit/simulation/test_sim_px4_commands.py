@@ -1,4 +1,4 @@
-"""What the simulated PX4 answers: the table of a recorded session with the real one (v1.16.0)."""
+"""Answers of the simulated PX4, compared with a recorded session (v1.16.0)."""
 
 import struct
 from collections.abc import Callable
@@ -33,11 +33,11 @@ def flying(px4: Any) -> Any:
         (511, (33, 200_000), [0]),
         (511, (230, 1_000_000), [0]),
         (511, (193, 1_000_000), [4]),  # ArduPilot's estimator message
-        (511, (0, 100_000), [4]),  # the heartbeat's rate is what it is
+        (511, (0, 100_000), [4]),  # the heartbeat's rate is fixed
         (511, (436, 100_000), [0]),
         (512, (436,), [2]),
         (512, (0,), [0]),
-        (512, (87,), [2]),  # nothing to tell yet
+        (512, (87,), [2]),  # no content yet
         (512, (148,), [0]),
         (512, (242,), [0]),
         (512, (9999,), [2]),
@@ -116,7 +116,7 @@ def test_takeoff_without_altitude_uses_the_parameter(px4: Any) -> None:
 
 
 def test_takeoff_in_the_air_climbs_from_the_current_height(flying: Any) -> None:
-    """`Takeoff::set_takeoff_position`: what NAV_TAKEOFF named counts once, also where it was interrupted."""
+    """`Takeoff::set_takeoff_position`: the height of NAV_TAKEOFF is used once, even if the takeoff was interrupted."""
     before_mm = flying.truth.up_mm
     assert flying.long(22, -1, 0, 0, nan, nan, nan, AMSL + before_mm // 1_000 + 20) == [0]
     flying.wait(1)
@@ -144,14 +144,14 @@ def test_command_results_in_the_air(flying: Any) -> None:
 
 
 def unflagged(flying: Any) -> list[int]:
-    """Sent 20 m north by DO_REPOSITION without the flag that changes the mode."""
+    """Send it 20 m north by DO_REPOSITION without the flag that changes the mode."""
     latitude, longitude = flying.config.home.globe(20, 0)
     answers: list[int] = flying.int(192, 5, [-1, 0, 0, nan], latitude, longitude, AMSL + 10)
     return answers
 
 
 def test_reposition_without_flag_is_unsupported_but_flown_in_hold(flying: Any) -> None:
-    """Recorded: answered 3, the target follows at once, and then the vehicle does."""
+    """Recorded: answer 3, then target and vehicle follow."""
     assert unflagged(flying) == [3]
     flying.wait(0.3)
     assert targets(flying.wait(0.3))[-1].lat_int == pytest.approx(flying.config.home.globe(20, 0)[0], abs=2)
@@ -161,7 +161,7 @@ def test_reposition_without_flag_is_unsupported_but_flown_in_hold(flying: Any) -
 
 @pytest.mark.parametrize("mode", [FlightMode.LAND, FlightMode.RETURN, FlightMode.POSITION, FlightMode.TAKEOFF])
 def test_reposition_without_its_flag_changes_no_mode(flying: Any, mode: FlightMode) -> None:
-    """`Loiter::on_active` alone looks at it, and for half a second at most."""
+    """Only `Loiter::on_active` uses it, for half a second at most."""
     if mode is FlightMode.TAKEOFF:
         flying.long(22, 0, 0, 0, nan, nan, nan, AMSL + 30)
     else:
@@ -269,7 +269,7 @@ def test_heartbeat_interval_is_constant(flying: Any) -> None:
 
 
 def test_requested_heartbeat_shows_a_new_mode_15_ms_late(flying: Any) -> None:
-    """Recorded: Land was acknowledged at 2 ms, and a heartbeat that was asked for told of Hold at 7 ms."""
+    """Recorded: Land was acknowledged at 2 ms, and a requested heartbeat showed Hold at 7 ms."""
     asked = mavlink.MAVLink_command_long_message(1, 1, 512, 0, 0, 0, 0, 0, 0, 0, 0)
     flying.mode(FlightMode.LAND)
     for wait, mode in ((0.005, LOITER), (0.009, LOITER), (0.001, LAND)):
@@ -280,7 +280,7 @@ def test_requested_heartbeat_shows_a_new_mode_15_ms_late(flying: Any) -> None:
 
 
 def test_land_cancelled_within_the_lag_hardly_shows(flying: Any) -> None:
-    """Recorded: by no heartbeat, no landed state and no target."""
+    """Recorded: no heartbeat, landed state or target shows it."""
     latitude, longitude = flying.config.home.globe(20, 0)
     flying.wait(0.001)
     flying.mode(FlightMode.LAND)

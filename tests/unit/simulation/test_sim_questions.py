@@ -1,4 +1,4 @@
-"""What a ground station asks when it connects: there is an answer, and for what is not there a refusal, at once."""
+"""Requests of a ground station when it connects are answered or refused at once."""
 
 import math
 import struct
@@ -17,7 +17,7 @@ Pilots = Callable[..., Any]
 
 
 def modes_asked(a: Any, number: int) -> tuple[list[int], list[Any]]:
-    """The results, and the messages, read with a dialect that has them."""
+    """Return results and messages, decoded with a dialect that has them."""
     message = mavlink.MAVLink_command_long_message(1, 1, 512, 0, 435, number, 0, 0, 0, 0, 0)
     datagrams = a.simulation.receive(a.codec.pack(message), a.simulation.now_us)
     reader = development.MAVLink(None)
@@ -125,7 +125,7 @@ def test_item_counts_are_parameters(pilot: Pilots) -> None:
 
 
 def test_target_is_sent_on_request_if_there_is_one(pilot: Pilots, flavour: str) -> None:
-    """PX4 denies what it has nothing to tell of; ArduCopter acknowledges it, and sends nothing."""
+    """Without a target PX4 denies the request; ArduCopter acknowledges it and sends nothing."""
     a = pilot(flavour).ready()
     asked = mavlink.MAVLink_command_long_message(1, 1, 512, 0, 87, 0, 0, 0, 0, 0, 0)
     (refused,) = a.send(asked)
@@ -139,7 +139,7 @@ def test_target_is_sent_on_request_if_there_is_one(pilot: Pilots, flavour: str) 
 
 
 def test_ignored_parameter_writes_are_not_answered(pilot: Pilots, flavour: str) -> None:
-    """PX4: another type than the parameter's; ArduPilot: no number. Both: a name that they do not have."""
+    """PX4: a wrong type; ArduPilot: not a number; both: an unknown name."""
     a = pilot(flavour).ready()
     name, was = ("GF_ACTION", 2.0) if a.px4 else ("FENCE_RADIUS", 300.0)
     for parameter, value, kind in ((name, 3.0, 9) if a.px4 else (name, math.nan, 9), (name + "X", 1.0, 9)):

@@ -1,4 +1,4 @@
-"""The autopilot starts again: in the air it falls, on the ground it comes back."""
+"""Autopilot restarts: in the air the vehicle falls, on the ground it boots."""
 
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,7 @@
-"""The simulated vehicle is asked what the real ones were asked, at the same times, and does the same.
+"""The simulated vehicle answers the requests of recorded sessions like the real autopilots.
 
-Acknowledgements, messages asked for, parameters, uploads, modes, landed states, texts, height and place are compared.
-What differs, and is kept, is listed here with the reason; a difference that goes away must leave the list.
+Compared are acknowledgements, requested messages, parameters, uploads, modes, landed states, texts, height and place.
+Accepted differences are listed here with reasons; a difference that disappears must be removed from the list.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from rtshcua.simulation.config import AutopilotKind, Boot, SimulationConfig
 from rtshcua.simulation.place import HomePosition
 
 LATE_US = 5 * SECOND // 2
-"""So far apart in time may the same change be: heartbeats come once a second, and a landing takes long."""
+"""The greatest time difference of a change: heartbeats come once a second, and a landing takes long."""
 UP_M, AWAY_M = 2.0, 5.0
 
 COPTER = SimulationConfig(
@@ -33,7 +33,7 @@ PX4 = SimulationConfig(
     noise=False,
     boot=Boot.RECORDED,
 )
-"""It was set to 5 m/s, and came to that only at the end of long legs: its simulator's air is thick."""
+"""It was set to 5 m/s, but reached that only at the end of long legs: its simulator's air is dense."""
 
 LANDING = "the height of its simulator strays by half a metre on the ground, which keeps the landing from being noticed"
 LIFTED = "the reposition on the ground begins to fly there before the takeoff takes over; here it lifts straight up"
@@ -94,7 +94,7 @@ def test_answers_match_the_recording(name: str) -> None:
 
 
 def test_comparison_detects_differences() -> None:
-    """The comparison by itself: a session compared with one that is a little otherwise."""
+    """A session is compared with a slightly changed one."""
     trace = Trace("arducopter-signing")
     real = trace.of_vehicle
     late = [Heard(h.at_us + 20 * SECOND, h.received) for h in real]

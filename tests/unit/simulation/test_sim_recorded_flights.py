@@ -1,7 +1,7 @@
-"""The simulated vehicle flies what the real ones flew, told the same at the same times, and is where they were.
+"""The simulated vehicle repeats recorded flights with the same commands at the same times.
 
-Modes, landed states, estimator flags, fixes, texts, height and place are compared, second by second. What differs and
-is kept is listed with the reason; a difference that goes away must leave the list.
+Compared second by second are modes, landed states, estimator flags, fixes, texts, height and place. Accepted
+differences are listed with reasons; a difference that disappears must be removed from the list.
 """
 
 from collections.abc import Mapping
@@ -31,7 +31,7 @@ COPTER = SimulationConfig(
     noise=False,
     boot=Boot.RECORDED,
     faults=(
-        # set to 8 m/s; its simulator has less of it near the ground
+        # set to 8 m/s; its simulator has less wind near the ground
         faults.WindStep(65_900_000, 4_000, 90),
         faults.WindStep(91_000_000, 3_300, 90),
         faults.WindStep(99_000_000, 2_700, 90),
@@ -62,7 +62,7 @@ def target(home: HomePosition, north: float, east: float) -> Any:
     return mavlink.MAVLink_set_position_target_global_int_message(0, 1, 1, 6, 0xDF8, *place, 15.0, *[0.0] * 8)
 
 
-#: what was sent, and when by the autopilot's clock
+#: the sent messages, with their times by the autopilot's clock
 SENT: Mapping[str, tuple[tuple[float, Any], ...]] = {
     "arducopter": (
         (42.31, long(176, 1, 4)),
@@ -101,7 +101,7 @@ KEPT: Mapping[str, Mapping[str, str]] = {
 
 
 def flown(name: str, until_us: int) -> list[Heard]:
-    """What comes from the simulated vehicle."""
+    """Return the frames of the simulated vehicle."""
     simulation, codec, heard = Simulation(CONFIGS[name]), Codec(255, 190), list[Heard]()
 
     def take(datagrams: list[bytes]) -> None:
@@ -128,7 +128,7 @@ def base(heard: Heard) -> object:
 
 
 def estimator(heard: Heard) -> object:
-    """Whether it vouches for a position."""
+    """Return whether the position is valid."""
     if heard.name not in ("ESTIMATOR_STATUS", "EKF_STATUS_REPORT"):
         return None
     return bool(heard.message.flags & mavlink.ESTIMATOR_POS_HORIZ_ABS)
@@ -161,5 +161,5 @@ def test_flight_matches_the_recording(name: str) -> None:
 
 
 def test_script_is_that_of_the_page() -> None:
-    """One config says nothing of the other; both are as recorded."""
+    """The script has the commands of the page."""
     assert replace(COPTER, faults=()).boot is PX4.boot is Boot.RECORDED

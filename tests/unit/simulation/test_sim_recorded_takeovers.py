@@ -1,9 +1,9 @@
-"""The simulated vehicle in the six flights of ours in which something went wrong: told the same, it does the same.
+"""The simulated vehicle repeats six recorded flights with takeovers or defects.
 
-What the runtime sent is sent again at the same times of the autopilot's clock, and with it what the pilot's ground
-station evidently sent, which is not in the recordings. Acknowledgements, modes, landed states, reported targets,
-height, place and rates are compared. What differs and is kept is listed with the reason; what differs no more must
-leave the list.
+The frames of the runtime are sent again at the same times of the autopilot's clock, with the presumed frames of the
+pilot's ground station, which are not in the recordings. Compared are acknowledgements, modes, landed states, reported
+targets, height, place and rates. Accepted differences are listed with reasons; a difference that disappears must be
+removed from the list.
 """
 
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ from rtshcua.simulation.place import HomePosition
 
 LATE_US = 5 * SECOND // 2
 UP_M, AWAY_M = 2.3, 5.0
-"""The height of PX4's simulator strays by 0.3 m."""
+"""The height of PX4's simulator drifts by 0.3 m."""
 STALLED = "arducopter-dropout"
 RATES = ("HEARTBEAT", "EXTENDED_SYS_STATE", "GLOBAL_POSITION_INT", "GPS_RAW_INT", "TIMESYNC", "SYSTEM_TIME")
 STATION = Codec(255, 190)
@@ -50,9 +50,9 @@ PILOT: Mapping[str, tuple[tuple[float, bytes], ...]] = {
     "px4-takeover-race": ((17.09, long(21, 0, 0, 0, nan, nan, nan)),),
     "px4-pilot-pause": ((24.71, long(192, -1, 1, 0, nan, nan, nan, nan)),),
     "px4-pilot-goto": ((24.40, to(473_980_000, 85_440_000, 530.0)),),
-    "arducopter-pilot-goto": ((17.76, target(473_980_000, 85_440_000, 42.0)),),  # where to is a guess: up and west
+    "arducopter-pilot-goto": ((17.76, target(473_980_000, 85_440_000, 42.0)),),  # the target is a guess: up and west
 }
-#: m/s on the long legs: PX4's simulator has thick air, and comes to the 6 m/s that were asked for only at their end
+#: m/s on the long legs: PX4's simulator has dense air, and reaches the commanded 6 m/s only at their end
 REACHED_MM_S = {
     "px4-hover-does-not-stop": 4_700,
     "px4-takeover-race": 5_300,
@@ -118,7 +118,7 @@ def test_takeover_matches_the_recording(name: str) -> None:
 
 
 def moved_m(home: HomePosition, heard: list[Heard], from_s: float, to_s: float) -> float:
-    """How far it is from where it was at one time to where it was at another."""
+    """Return the distance between the places at two times."""
     places = [
         home.local(h.message.lat, h.message.lon)
         for h in heard
@@ -129,7 +129,7 @@ def moved_m(home: HomePosition, heard: list[Heard], from_s: float, to_s: float) 
 
 
 def test_each_recording_shows_its_takeover() -> None:
-    """The defects by themselves, so that no tolerance above can hide them."""
+    """The defects are checked directly, so that no tolerance above can hide them."""
     flight = again("px4-hover-does-not-stop")
     for side in (flight.real, flight.own):
         assert moved_m(flight.home, side, 25.4, 35.0) > 40, "told to hold, it flies on"
@@ -150,7 +150,7 @@ def test_each_recording_shows_its_takeover() -> None:
 
 
 def test_comparison_detects_differences() -> None:
-    """The comparison by itself: a flight compared with one that is a little otherwise."""
+    """A flight is compared with a slightly changed one."""
     flight = again("px4-pilot-pause")
     real = flight.real
     late = [Heard(h.at_us + 20 * SECOND, h.received) for h in real]

@@ -1,5 +1,5 @@
-"""How high the simulated vehicles fly home from near home and from far, as rtl.cpp of PX4 1.16 and mode_rtl.cpp of
-ArduCopter 4.7 count it: the parameters, the place and the height, and the height of the way.
+"""The return height from near and far, as in rtl.cpp of PX4 1.16 and mode_rtl.cpp of ArduCopter 4.7: parameters, place
+and height, and the expected return height.
 """
 
 from collections.abc import Callable
@@ -16,17 +16,17 @@ from virtual.rows import rows
     ("flavour", "parameters", "away", "up", "height"),
     [
         ("px4", (), 15, 5, 30),  # further away than RTL_MIN_DIST
-        ("px4", (), 8, 5, 8),  # inside of the cone of 45 degrees
+        ("px4", (), 8, 5, 8),  # inside the cone of 45 degrees
         ("px4", (("RTL_CONE_ANG", 80.0),), 8, 3, 4),  # no lower than 2 * NAV_ACC_RAD
         ("px4", (("RTL_CONE_ANG", 0.0),), 8, 5, 30),
         ("px4", (("RTL_MIN_DIST", 20.0),), 15, 5, 15),
-        ("px4", (), 8, 12, 12),  # it never comes down for the way
+        ("px4", (), 8, 12, 12),  # never below the current height
         ("px4", (), 40, 36, 36),
         ("ardupilot", (), 15, 5, 30),
         ("ardupilot", (), 8, 5, 24),  # RTL_CONE_SLOPE 3
         ("ardupilot", (("RTL_CONE_SLOPE", 1.0),), 25, 5, 25),
         ("ardupilot", (("RTL_CONE_SLOPE", 0.0),), 8, 5, 30),
-        ("ardupilot", (("RTL_CONE_SLOPE", 0.3),), 8, 5, 30),  # flatter than RTL_MIN_CONE_SLOPE: none
+        ("ardupilot", (("RTL_CONE_SLOPE", 0.3),), 8, 5, 30),  # flatter than RTL_MIN_CONE_SLOPE: ignored
         ("ardupilot", (("RTL_CLIMB_MIN", 500.0),), 8, 22, 27),
         ("ardupilot", (("RTL_CLIMB_MIN", 500.0),), 40, 36, 41),
         ("ardupilot", (), 8, 28, 28),

@@ -1,4 +1,4 @@
-"""Signing in the simulated vehicle: what has an effect without a signature, and what has none."""
+"""Signing in the simulated vehicle: which unsigned frames have an effect."""
 
 from collections.abc import Callable
 from typing import Any
@@ -40,7 +40,7 @@ class Signer:
 
 
 def ahead(pilot: Any) -> int:
-    """How far a key begins ahead of the time that came with it: as recorded of ArduCopter, a minute."""
+    """Return how far time stamps begin ahead of the time of the key: for ArduCopter a minute, as recorded."""
     return 0 if pilot.px4 else 6_000_000
 
 
@@ -49,7 +49,7 @@ def setup(key: bytes, timestamp: int = START) -> Any:
 
 
 def keyed(a: Any) -> Signer:
-    """A vehicle that insists on this key from now on."""
+    """Return a vehicle that requires this key from now on."""
     a.send(setup(KEY))
     return Signer(a)
 
@@ -96,7 +96,7 @@ def test_first_channel_matches_the_recording(pilot: Pilots) -> None:
 
 
 def signing(pilot: Pilots, flavour: str, **config: Any) -> Any:
-    """A vehicle that takes a key, and is ready."""
+    """Return a ready vehicle that accepts a key."""
     return pilot(flavour, release=(1, 18) if flavour == "px4" else None, **config).ready()
 
 
@@ -187,7 +187,7 @@ def test_configured_key_signs_from_the_start(pilot: Pilots, flavour: str) -> Non
     assert a.long(512, 148) == []
     assert Signer(a).long(512, 148) == [0]
     stamps = [int.from_bytes(f.frame[-12:-6], "little") for f in a.wait(40) if f.component == 1]
-    passed = 1_000_000 if a.px4 else len(stamps)  # ten seconds outside
+    passed = 1_000_000 if a.px4 else len(stamps)  # ten seconds of real time
     assert stamps[-1] - stamps[0] == pytest.approx(passed, rel=0.05)
     for wrong in (
         {"signing_key": b"short"},

@@ -1,4 +1,4 @@
-"""Faults of what the vehicle measures, and of what it says of it."""
+"""Faults of the vehicle's measurements and reports."""
 
 from collections.abc import Callable
 from itertools import pairwise

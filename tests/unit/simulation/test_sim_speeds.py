@@ -1,4 +1,4 @@
-"""The simulated vehicle flies with the speeds of its parameters, those that a policy's durations are proved by."""
+"""The simulated vehicle flies at the speeds of its parameters, on which proofs of durations rest."""
 
 from collections.abc import Callable
 from typing import Any
@@ -8,7 +8,7 @@ from virtual.rows import rows
 
 
 def ascent(made: Any) -> float:
-    """How fast it climbs at a take-off."""
+    """Return the climb rate of a takeoff."""
     made.ready()
     if not made.px4:
         made.mode(FlightMode.GUIDED)
@@ -19,7 +19,7 @@ def ascent(made: Any) -> float:
 
 
 def home(made: Any) -> float:
-    """How fast it comes home from 60 m away, once it is well on its way."""
+    """Return the speed of a return from 60 m away, after the acceleration."""
     made.take_off(30)
     made.go_to(80, 0, 30)
     made.until(lambda: made.truth.north_mm > 79_000)
@@ -30,7 +30,7 @@ def home(made: Any) -> float:
 
 
 def gained(made: Any) -> float:
-    """What it has of speed 2 s after it was told to go far away."""
+    """Return the speed 2 s after a distant target."""
     made.take_off(20)
     made.go_to(300, 0, 20)
     made.wait(2)
@@ -38,7 +38,7 @@ def gained(made: Any) -> float:
 
 
 def landing(made: Any) -> float:
-    """How fast it comes down at 15 m."""
+    """Return the descent rate at 15 m."""
     made.take_off(20)
     made.mode(FlightMode.LAND)
     made.until(lambda: made.truth.up_mm < 15_000)

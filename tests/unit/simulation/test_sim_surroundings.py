@@ -1,4 +1,4 @@
-"""Things in the world: what is seen of them from where the vehicle is, and what happens to who flies into one."""
+"""Obstacles: range finder readings, and collisions."""
 
 from collections.abc import Callable
 from math import cos, hypot, pi, sin
@@ -16,7 +16,7 @@ BEAM = pi / SECTORS
 
 
 def naive(pillar: Cylinder, body: Body, bearing: float) -> float | None:
-    """Walks along many rays of the beam."""
+    """Compute the distance by stepping along many rays of the beam."""
     for step in range(round(RANGE_MAX_M / 0.05)):
         for ray in range(-10, 11):
             angle = bearing + BEAM * ray / 10
@@ -33,7 +33,7 @@ def test_distance_matches_a_walk_along_the_beam(north: float, east: float, radiu
     surroundings.pillars.append(pillar)
     seen, walked = surroundings.ahead(body), naive(pillar, body, yaw)
     if walked is None or seen is None:
-        # a hair's breadth on the edge of the beam, or of the range
+        # rounding at the edge of the beam or the range
         edge = Cylinder(north, east, radius * 0.98 - 0.05, 20.0), Cylinder(north, east, radius * 1.02 + 0.05, 20.0)
         assert walked is seen or naive(edge[0], body, yaw) is None or naive(edge[1], body, yaw) is not None
     else:
@@ -91,10 +91,10 @@ def test_collision_leaves_the_vehicle_tilted_on_the_ground(pilot: Callable[..., 
     assert fall > 1_000, "it comes down fast"
     assert abs(p.last("ATTITUDE").roll) > 1.2
     assert 27_000 < p.truth.north_mm < 29_000
-    # neither knows at once: it is still armed, in the air and in its mode
+    # neither detects it at once: still armed, in the air and in its mode
     assert (p.truth.armed, p.truth.in_air, p.last("EXTENDED_SYS_STATE").landed_state) == (True, False, 2)
     p.wait(2)
-    if p.px4:  # and PX4 never does: its failure detector only warns, CBRK_FLIGHTTERM being what it is
+    if p.px4:  # PX4 never does: its failure detector only warns with the default CBRK_FLIGHTTERM
         assert p.texts()[-1] == "Attitude failure detected\t"
         p.wait(60)
         assert p.last("EXTENDED_SYS_STATE").landed_state == 2

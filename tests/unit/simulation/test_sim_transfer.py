@@ -1,4 +1,4 @@
-"""The mission protocol of the simulated vehicle: uploads, downloads, clearing, both flavours with their habits."""
+"""The mission protocol of the simulated vehicle: uploads, downloads and clearing in both flavours."""
 
 from collections.abc import Callable
 from math import nan
@@ -49,7 +49,7 @@ def test_px4_requests_int_items_after_the_first_one(pilot: Pilots) -> None:
 
 
 def test_px4_switches_the_request_form_when_refused(pilot: Pilots) -> None:
-    """MAVSDK answers a legacy request with an ACK of UNSUPPORTED, and waits to be asked again."""
+    """MAVSDK answers a legacy request with an ACK of UNSUPPORTED and waits for the other form."""
     a = pilot("px4").ready()
     asked = a.send(mavlink.MAVLink_mission_count_message(1, 1, 1, p.RALLY))
     refusal = mavlink.MAVLink_mission_ack_message(1, 1, mavlink.MAV_MISSION_UNSUPPORTED, p.RALLY)
@@ -122,7 +122,7 @@ def test_item_out_of_order_is_refused(pilot: Pilots, flavour: str) -> None:
         (p.MISSION, [(16, 10, (0, 0, 0, 0), 1, 1, 5)] * 2, 2),  # a frame above terrain
         (p.MISSION, [(183, 2, (0, 0, 0, 0), 0, 0, 0)] * 2, 3),  # a command that it does not fly
         (p.MISSION, [(16, 2, (0, 0, 0, 0), 0, 0, 0)] * 2, 3),  # a waypoint nowhere
-        (p.FENCE, p.square(60)[:3], 1),  # four vertices told, three sent
+        (p.FENCE, p.square(60)[:3], 1),  # four vertices announced, three sent
         (p.FENCE, p.fence((0, 0), (1, 1)), 1),  # two vertices
         (p.FENCE, [(5003, 0, (0, 0, 0, 0), 0, 0, 0)], 1),  # a circle of no radius
         (p.FENCE, [(16, 0, (0, 0, 0, 0), 0, 0, 0)], 3),

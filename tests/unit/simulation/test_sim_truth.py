@@ -1,4 +1,4 @@
-"""What a judge is told who believes nobody: what really is, and what came to the vehicle."""
+"""The true state for the judge, and the frames that reached the vehicle."""
 
 from collections.abc import Callable
 from math import hypot
@@ -54,7 +54,7 @@ def test_pilot_action_without_effect_is_no_takeover(pilot: Callable[..., Any], f
 
 
 def test_switch_to_an_unavailable_mode_is_refused(pilot: Callable[..., Any]) -> None:
-    """PX4's `UserModeIntention::change`: Offboard without targets was entered for a moment, and Hold anew."""
+    """`UserModeIntention::change` of PX4: Offboard without targets is refused."""
     p = on_its_way(pilot, "px4")
     assert taken(p, faults.PilotMode, FlightMode.GUIDED) == (None, None)
     assert p.truth.mode is FlightMode.LOITER

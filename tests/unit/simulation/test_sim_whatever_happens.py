@@ -1,4 +1,4 @@
-"""Whatever it is told and whatever goes wrong, it stays a vehicle: finite, above the ground, not too fast."""
+"""Under any commands and faults the state stays valid: finite, above the ground, not too fast."""
 
 from math import isfinite
 from random import Random

@@ -1,4 +1,4 @@
-"""The simulation as a whole: the same in, the same out; and nothing that comes in stops it."""
+"""The whole simulation: equal inputs give equal outputs, and no input stops it."""
 
 import random
 from collections.abc import Callable
@@ -23,7 +23,7 @@ S = 1_000_000
 
 
 def flight(kind: AutopilotKind, seed: int, steps_us: list[int]) -> tuple[list[bytes], Any]:
-    """Twenty seconds, advanced in the steps given, with two commands at fixed times."""
+    """Simulate twenty seconds in the given steps, with two commands at fixed times."""
     simulation = Simulation(
         SimulationConfig(flavour=kind, seed=seed, wind=Wind(5_000, 10, 1_000), faults=(faults.LinkLoss(4 * S, 500),))
     )
@@ -148,7 +148,7 @@ def test_no_position_before_it_is_ready(pilot: Callable[..., Any]) -> None:
 
 
 def test_garbage_is_survived(pilot: Callable[..., Any], flavour: str) -> None:
-    """Random bytes, and frames with a right checksum but random content: it answers the next command all the same."""
+    """After random bytes and frames with a valid checksum but random content it still answers the next command."""
     chance = random.Random(5)
     p = pilot(flavour)
     p.take_off(20)

@@ -1,4 +1,4 @@
-"""The boundary that answers calls in virtual time: it decides as the one in the runtime's own process."""
+"""The in-process stand-in of the boundary process decides like mode `software`."""
 
 from random import Random
 
@@ -29,7 +29,7 @@ def test_flight_in_mode_process_equals_mode_software(flavour: str) -> None:
         "_prev",
         "checkpoint",
         "digest",
-    }  # what names the mode, how long that is, and hashes of it
+    }  # fields with the mode, its length, and hashes over it
     for here, there in zip(one.records, other.records, strict=True):
         assert {name for name in here if here[name] != there[name]} <= apart
     assert other.audit().report.failure is None

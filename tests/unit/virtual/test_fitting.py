@@ -1,4 +1,4 @@
-"""The vehicle that a scenario is flown with: its owner has set it for how far the mission goes, and for no more."""
+"""The vehicle of a scenario: its own fence holds the mission and is not wider."""
 
 from msgspec.structs import replace
 

@@ -1,4 +1,4 @@
-"""The judge of flights: hand-made truths, and a real flight of which something was changed; one for each failure."""
+"""The judge: hand-made true states, and changed copies of a real flight, for each kind of failure."""
 
 import pickle
 from collections.abc import Sequence
@@ -36,7 +36,7 @@ S, M = case.S, case.M
 @pytest.fixture(scope="module")
 def good() -> ScenarioFlown:
     was = once("judged-flight", lambda: flown(scenario()))
-    # what really was is made by hand here: what it heard of that is not told (`runtime_checks`)
+    # true states are made by hand here, so `runtime_checks`, which need readings, do not apply
     return replace(was, lives=tuple(replace(life, turns=()) for life in was.lives))
 
 
@@ -62,7 +62,7 @@ def sample(at_s: float, east_m: float = 0, north_m: float = 0, up_m: float = 10,
 
 
 def judged(good: ScenarioFlown, samples: Sequence[TruthSample], *happened: Fault, **fields: Any) -> Judgement:
-    """What is said of these truths, of a flight whose logs and frames are good."""
+    """Judge these true states, with the logs and frames of a good flight."""
     incidents = tuple(IncidentOccurrence(number, fault.at_us, fault, "") for number, fault in enumerate(happened))
     given: dict[str, Any] = {"frames": (), "lives": (replace(good.lives[0], ending="aborted"),), **fields}
     return judge(replace(good, samples=tuple(samples), happened=incidents, **given))
@@ -222,7 +222,7 @@ def test_faults_that_excuse_leaving_the_airspace(good: ScenarioFlown, fault: Fau
 def test_copter_landing_begun_without_position_is_excused(
     good: ScenarioFlown, fault: Fault, flavour: str, from_s: int, cause: str | None
 ) -> None:
-    """It is carried off by the wind long after the receiver is right again (`ModeLand::init`)."""
+    """The wind carries it away long after the receiver has recovered (`ModeLand::init`)."""
     modes = [(at_s, FlightMode.LAND if at_s >= from_s else FlightMode.BRAKE) for at_s in range(18, 29)]
     samples = [
         *(sample(at_s, mode=mode) for at_s, mode in modes),
@@ -297,12 +297,12 @@ def test_visible_pillar_is_no_excuse(good: ScenarioFlown) -> None:
         return causes(judged(good, samples, *happened, policy=looks_out))
 
     assert found(far, pillar(5 * S)) == []
-    assert found(crash(), pillar(5 * S)) == excused  # there at once
+    assert found(crash(), pillar(5 * S)) == excused  # appears within the stopping distance
     assert found(far, pillar(5 * S, speed_mm_s=M)) == excused
     assert found([far[0], *crash(speed_mm_s=0)[1:]], pillar(5 * S)) == excused
     assert found(far, pillar(5 * S), faults.MessageStuck(2 * S, "DISTANCE_SENSOR")) == excused
     assert found(far, pillar(5 * S), faults.MessageStuck(2 * S, "ATTITUDE")) == []
-    assert causes(judged(good, far, pillar(5 * S))) == excused  # nothing looks out for it
+    assert causes(judged(good, far, pillar(5 * S))) == excused  # no range finder signal is read
 
 
 def test_empty_battery_is_an_excuse_only_after_a_fault(good: ScenarioFlown) -> None:
@@ -327,7 +327,7 @@ def test_vehicle_must_rest_or_hover_at_the_end(good: ScenarioFlown) -> None:
     assert slugs(judged(good, after(good, speed_mm_s=3 * M, in_air=False), lives=lives)) == []
     assert slugs(judged(good, after(good), lives=good.lives)) == [
         "not-ended"
-    ]  # it says that it completed the mission, and flies
+    ]  # the run ended as `completed` in the air
 
 
 def test_faults_that_excuse_flying_on(good: ScenarioFlown) -> None:
@@ -407,13 +407,13 @@ def test_motion_frame_after_a_takeover_is_a_failure(good: ScenarioFlown) -> None
     assert taken(2 * S).margins.takeover_us == 2 * S
     assert not is_late(taken(200_000))
     assert not is_late(taken(2 * S, faults.LinkDelay(S, 2 * S)))
-    over_us = frame.sent_us - 3 * S  # a second before the takeover, which waits behind what the delay holds
+    over_us = frame.sent_us - 3 * S  # a second before the takeover, queued behind delayed frames
     assert not is_late(taken(2 * S, faults.LinkDelay(over_us - S, 3 * S, S)))
     assert is_late(taken(2 * S, faults.LinkDelay(over_us - S, 2 * S, S)))  # it arrives a second after, not two
     assert is_late(taken(2 * S, faults.LinkDelay(over_us - 3 * S, 3 * S, S)))
     assert not is_late(taken(2 * S, faults.LinkSilence(S, held=True)))
-    assert is_late(taken(2 * S, faults.LinkSilence(S)))  # nothing comes later than it is
-    assert is_late(taken(2 * S, faults.PilotPause(S)))  # that shows on PX4
+    assert is_late(taken(2 * S, faults.LinkSilence(S)))  # no later frame
+    assert is_late(taken(2 * S, faults.PilotPause(S)))  # visible on PX4
     under_way = frame._replace(sent_us=frame.sent_us - 2 * S - 1, heard_us=frame.sent_us - 2 * S + 1)
     assert causes(taken(2 * S, more=[under_way])) == [("motion-after-takeover", "crossed")]
     at_once = frame._replace(sent_us=frame.sent_us - 2 * S, heard_us=frame.sent_us - 2 * S)
@@ -421,7 +421,7 @@ def test_motion_frame_after_a_takeover_is_a_failure(good: ScenarioFlown) -> None
 
 
 def test_takeover_by_the_mode_of_a_lost_frame_is_excused(good: ScenarioFlown) -> None:
-    """It looks as if that frame had arrived. Another mode, or a frame that did arrive, excuses nothing."""
+    """It looks as if the lost frame had arrived. Another mode, or a frame that arrived, is no excuse."""
     land, hold = long(176, 1, 9), long(176, 1, 17)
     since_us, again_us = 30 * S, 33 * S
 
@@ -479,7 +479,7 @@ def test_invisible_pause_is_excused(good: ScenarioFlown) -> None:
 def test_invisible_takeovers_in_a_copter_takeoff_are_excused(
     good: ScenarioFlown, fault: Fault, after_s: int, *, seen: bool
 ) -> None:
-    """A go-to to its end looks like the end itself; a velocity shows once it rises no further."""
+    """A go-to to its end looks like the end itself; a velocity shows once the climb stops."""
     frame = motion(good)[-1]
     since_us = frame.sent_us - after_s * S
     after = [each for each in good.samples if each.at_us > since_us]
@@ -494,7 +494,7 @@ def test_invisible_takeovers_in_a_copter_takeoff_are_excused(
 
 @pytest.mark.parametrize(("climb_mm_s", "cause"), [(600, "unseen"), (700, None), (800, None)])
 def test_pause_of_a_stopping_vehicle_is_excused(good: ScenarioFlown, climb_mm_s: int, cause: str | None) -> None:
-    """Told to stop, it still climbs when a pilot tells it the same: nothing shows that, while it slows down."""
+    """A pilot stops a vehicle that still climbs after the runtime's stop: no report shows that while it slows down."""
     frame = motion(good)[-1]
     since_us = frame.sent_us - 5 * S
     stop = SentFrame(since_us - S // 10, since_us - S // 10, reposition(0x7FFFFFFF, 0x7FFFFFFF))
@@ -510,7 +510,7 @@ def test_pause_of_a_stopping_vehicle_is_excused(good: ScenarioFlown, climb_mm_s:
 
 @pytest.mark.parametrize("left", ["replayed", "no-vehicle"])
 def test_airborne_vehicle_without_a_run_is_a_failure(good: ScenarioFlown, left: str) -> None:
-    """A run that refused to begin, for the vehicle was on the ground, excuses nothing: it was about to take off."""
+    """A run that did not start because the vehicle was on the ground is no excuse: it was about to take off."""
     hovers = [sample(at_us / S, up_m=5.0) for at_us in range(90 * S, 96 * S, S // 2)]
     found = judge(replace(good, samples=(*good.samples, *hovers), left=left, lives=()))
     ended = [each.cause for each in (*found.failures, *found.exceptions) if each.slug == "not-ended"]
@@ -533,7 +533,7 @@ def test_unlogged_frame_is_a_failure(good: ScenarioFlown) -> None:
 
 
 def test_frame_may_belong_to_either_of_two_simultaneous_commands() -> None:
-    """ArduCopter refuses to brake without a position: the landing goes out in the same turn, and both are logged."""
+    """ArduCopter refuses to brake without a position: the landing is sent in the same turn, and both are logged."""
     found = judge(flown(scenario(incident(13.4, faults.EstimatorUnhealthy(0, 5 * S))), "ardupilot", seed=5))
     assert found.failures == ()
 

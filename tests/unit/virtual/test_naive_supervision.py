@@ -1,4 +1,4 @@
-"""The judge's own supervision: tables by hand; in random worlds it claims what the product says, or nothing."""
+"""The judge's own supervision: tables by hand; in random worlds it agrees with the runtime or is in doubt."""
 
 from random import Random
 from typing import Any
@@ -55,7 +55,7 @@ def watched(policy: Policy, invocation: Invocation) -> WatchedStep:
 
 
 def compare(policy: Policy, invocation: Invocation, state: State, now: Now) -> tuple[int, int]:
-    """How many claims of what is broken were compared, and how many were in doubt."""
+    """The number of compared violations, and of doubtful ones."""
     by_product, step = prepared(policy, invocation)
     at, naive = situation(policy, state, now), watched(policy, invocation)
     broken = list(at.broken(naive))
@@ -104,7 +104,7 @@ def test_agrees_with_the_runtime_about_a_braking_vehicle(of: Random) -> None:
 
 
 def named(policy: Policy) -> Policy:
-    """With a text of its own for each rule and clause: a doubt is known by the text."""
+    """Give each rule and clause its own text, by which doubts are identified."""
 
     def own(contract: Contract) -> Contract:
         clauses: dict[str, Any] = {
@@ -118,7 +118,7 @@ def named(policy: Policy) -> Policy:
 
 
 def heard(policy: Policy, state: State) -> State:
-    """As the runtime keeps it: one truth for each monitor, and ages that are not negative."""
+    """Return the state as the runtime stores it: one truth per monitor, and no negative ages."""
     monitors = state.monitors if len(state.monitors) == len(policy.monitors) else (UNKNOWN,) * len(policy.monitors)
     return replace(
         state,
@@ -163,7 +163,7 @@ def texts(policy: Policy, state: State, now: Now = flat.NOW) -> list[tuple[str, 
         (flat.state(), []),
         (flat.state({flat.WIND: 10 * M}), [("wind.speed < 10 m/s", False, True)]),
         (flat.state(ages={flat.LINK: 5 * S + 1}), [("link.quality >= 40 %", None, True)]),
-        # the area grown by 15 m ends at 85 m; 3 m of position error are added
+        # the area grown by 15 m ends at 85 m, plus 3 m of position error
         (flat.state({flat.POSITION_X: 88_020}), []),
         (flat.state({flat.POSITION_X: 88_000}), [("position inside grow(area, 15 m)", False, False)]),
         (flat.state({flat.POSITION_X: 87_980}), [("position inside grow(area, 15 m)", False, True)]),
@@ -186,7 +186,7 @@ def test_exclusion_zone_counts_while_it_exists() -> None:
 
 
 def turns(unknown: tuple[int, int], until_us: int) -> list[Turn]:
-    """Ten turns in a second, of which some do not tell the quality of the link."""
+    """Ten turns in a second, some without the link quality."""
     made = []
     for at_us in range(0, until_us, S // 10):
         quality = None if unknown[0] <= at_us < unknown[1] else 9_000
@@ -199,7 +199,7 @@ def turns(unknown: tuple[int, int], until_us: int) -> list[Turn]:
     [((), 2 * S + 600_000), (((2 * S + 200_000, 5 * S),), 5 * S + 400_000), (((2 * S, 4 * S),), 4 * S + 600_000)],
 )
 def test_silence_does_not_count_for_the_grace(silences: tuple[tuple[int, int], ...], broken_us: int) -> None:
-    """It is unknown from 2 s on; the grace is 500 ms, and a turn notices."""
+    """The signal is unknown from 2 s on; the grace is 500 ms, and the next turn detects it."""
     contract = replace(STEP.contract, grace_us=500_000)
     mission = replace(flat.MISSION, invocations=(replace(STEP, contract=contract),))
     step = RunningStep(QUIET, mission, 0, (0, None), silences)

@@ -1,4 +1,4 @@
-"""Flights of scenarios: when incidents happen, and what each kind of fault of host and agent does to a flight."""
+"""Flights of scenarios: times of incidents, and effects of each host and agent fault."""
 
 import json
 from collections.abc import Iterator
@@ -109,7 +109,7 @@ def test_shipped_mission_is_flown(flavour: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_killed_runtime_continues_in_another_process(flavour: str) -> None:
-    """PX4 streams from the start: judged before anything of it had an age, it was once landed on the spot."""
+    """Regression: state was checked before PX4's readings had an age, and the vehicle landed on the spot."""
     found = flown(scenario(incident(15, faults.RuntimeKilled(0, 3 * S))), flavour)
     killed, after = found.lives
     assert (killed.ending, after.ending) == (None, "aborted")
@@ -126,7 +126,7 @@ def test_killed_runtime_continues_in_another_process(flavour: str) -> None:
     ("after_ms", "dead_ms", "flavour"), each_once((50, 150, 700, 1_500, 2_500), (500, 1_000, 2_000, 3_000), FLAVOURS)
 )
 def test_runtime_killed_during_takeoff_brings_the_vehicle_down(after_ms: int, dead_ms: int, flavour: str) -> None:
-    """Killed between the takeoff and the lift-off: the next process finds the vehicle on the ground, and armed."""
+    """Killed between takeoff command and lift-off: the next process finds the vehicle armed on the ground."""
     killed = when(AfterStep(0, after_ms * 1_000, after_ms * 1_000), faults.RuntimeKilled(0, dead_ms * 1_000))
     found = flown(scenario(killed), flavour, seed=after_ms + dead_ms)
     last = found.samples[-1]
@@ -134,7 +134,7 @@ def test_runtime_killed_during_takeoff_brings_the_vehicle_down(after_ms: int, de
     if any(sample.armed for sample in found.samples):
         assert [life.ending for life in found.lives] == [None, "aborted"]
         assert dispatched(found)[-1] in ("emergency_land", "return_home")
-    else:  # it was not told to arm yet, and is left where it is
+    else:  # not armed yet: the vehicle stays on the ground
         assert found.left == "replayed"
     nothing_wrong(found)
 
@@ -165,7 +165,7 @@ def test_next_process_has_its_own_boundary() -> None:
 def test_killed_process_may_leave_a_truncated_line() -> None:
     torn = set()
     for seed in range(1, 8):
-        found = flown(scenario(incident(1, faults.RuntimeKilled(0, S))), seed=seed)  # on the ground: soon over
+        found = flown(scenario(incident(1, faults.RuntimeKilled(0, S))), seed=seed)  # on the ground: ends soon
         torn.add(json.loads(found.lives[0].lines[-2])["discarded_bytes"] > 0)
         assert judge(found).failures == ()
     assert torn == {True, False}
@@ -191,7 +191,7 @@ def test_process_starts_when_the_disk_accepts_records_again() -> None:
 
 @pytest.fixture(scope="module")
 def bothered() -> ScenarioFlown:
-    """A flight in which several things happen that change nothing, each for a test of its own."""
+    """A flight with several harmless faults, one for each test."""
     return flown(
         scenario(
             incident(5, faults.Approval(0, "supervisor")),
@@ -315,7 +315,7 @@ def test_documents_for_a_dead_process_are_lost() -> None:
 
 
 def test_go_to_in_a_copter_takeoff_is_detected() -> None:
-    """It has no target in a takeoff, so nothing was compared: it followed the pilot, and then flew home."""
+    """Regression: in a takeoff there is no target to compare, so the run followed the pilot's target."""
     pilot = incident(7.7, faults.PilotGoto(0, -20_000, 0, 10_000))
     found = flown(scenario(pilot), "ardupilot", bundle=shipped("short"), seed=0)
     assert found.ending == "stood-down"
@@ -324,7 +324,7 @@ def test_go_to_in_a_copter_takeoff_is_detected() -> None:
 
 @pytest.mark.parametrize(("at_s", "seed"), [(8.8, 6), (9.2, 3)])
 def test_pause_near_the_end_of_a_px4_climb_is_detected(at_s: float, seed: int) -> None:
-    """It stops where it is, 1.4 and 1 m below the end of the climb, which was taken for that end."""
+    """Regression: a stop 1.4 or 1 m below the end of the climb was taken for that end."""
     found = flown(scenario(incident(at_s, faults.PilotPause(0))), seed=seed)
     assert found.ending == "stood-down"
     nothing_wrong(found)
@@ -399,7 +399,7 @@ def _with(found: ScenarioFlown, expected: Expected) -> tuple[ScenarioFlown, Any]
 
 @pytest.mark.soak
 def test_silent_vehicle_is_awaited_for_its_endurance() -> None:
-    """A link that is lost for good is waited out for as long as the vehicle can fly: an hour, and no fault."""
+    """A lost link is awaited for the vehicle's endurance, an hour, and is no fault."""
     from msgspec.structs import replace
 
     policy = case.policy()
@@ -437,7 +437,7 @@ def test_host_and_agent_faults_cause_no_failure_at_any_time(kind: type[Fault], a
 @pytest.mark.slow
 @pytest.mark.parametrize(("flavour", "at_s"), [("ardupilot", 25.3), ("px4", 21.75), ("px4", 20.15)])
 def test_motor_stop_during_descent_is_no_landing(flavour: str, at_s: float) -> None:
-    """Disarmed in the air a vehicle says at once that it is on the ground, also while it lands."""
+    """A vehicle disarmed in the air reports at once that it is on the ground, also while it lands."""
     found = flown(scenario(incident(at_s, faults.Kill(0))), flavour, bundle=shipped("short"))
     before = next(each for each in found.samples if each.at_us >= round(at_s * S) - 50_000)
     assert before.up_mm > 3 * M
@@ -448,7 +448,7 @@ def test_motor_stop_during_descent_is_no_landing(flavour: str, at_s: float) -> N
 
 def test_run_killed_in_its_first_record_has_no_log() -> None:
     killed = scenario(incident(0, faults.RuntimeKilled(0, 3 * S)))
-    lives = [flown(killed, seed=seed, attested=False) for seed in range(1, 7)]  # else a statement is the last line
+    lives = [flown(killed, seed=seed, attested=False) for seed in range(1, 7)]  # otherwise a statement is the last line
     torn = [of for of in lives if not of.lives[0].lines[-1].endswith(b"\n")]
     assert torn
     assert {each.slug for of in torn for each in judge(of).failures} == set()

@@ -1,4 +1,4 @@
-"""What every test gets: a user's folders that are its own, a plain terminal, and repeatable property tests."""
+"""Common setup of all tests: private user folders, a plain terminal, and reproducible property tests."""
 
 import atexit
 import gc
@@ -29,10 +29,10 @@ from virtual.forked import Forked, forked
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 
-# Wall time says nothing on a shared machine, so no deadline. `make test` tries the same few examples each time;
-# `make soak` tries many in every property test, and new ones each time. A test that needs more or fewer than others
-# takes a share of the profile's: `@settings(max_examples=settings().max_examples * 2)`. `make mutate` needs
-# the same examples for each change, and enough of them to notice it.
+# No deadline, because elapsed time is meaningless on a shared machine. `make test` runs the same few examples each
+# time; `make soak` runs many new ones. A test that needs more or fewer examples scales the profile's number:
+# `@settings(max_examples=settings().max_examples * 2)`. `make mutate` needs the same examples for each mutation, and
+# enough of them to detect it.
 settings.register_profile("test", deadline=None, derandomize=True, max_examples=15)
 settings.register_profile("mutate", deadline=None, derandomize=True, max_examples=100)
 settings.register_profile("soak", deadline=None, max_examples=5_000)
@@ -42,26 +42,26 @@ settings.load_profile("test")
 @settings(max_examples=20, database=None, derandomize=True, phases=[Phase.generate], suppress_health_check=HealthCheck)
 @given(st.lists(st.integers(), min_size=30), st.text(min_size=1))
 def have_hypothesis_ready(numbers: list[int], text: str) -> None:
-    """Let Hypothesis read what it draws from: the table of all characters, and the constants in what is loaded.
+    """Load Hypothesis' character table and the constants of loaded modules.
 
-    Once, before processes are forked. In a new checkout it takes some seconds, which no test then has to answer for.
+    Once, before processes are forked. In a new checkout it takes some seconds, which then count for no test.
     """
 
 
-#: the tests that cover decision, wire and evidence in full; the others run without the price of being traced
+#: the tests that cover decision, wire and evidence; other tests run without tracing
 COVERING = ("unit/decision", "unit/wire", "unit/evidence", "attacks/test_log_boundary.py")
-#: what they cover (`pyproject.toml` names it too)
+#: the covered packages (also in `pyproject.toml`)
 COVERED = ("rtshcua.decision", "rtshcua.evidence", "rtshcua.wire")
 
 
 def measuring(config: pytest.Config) -> Any:
-    """What starts and stops measuring in pytest-cov; None without `--cov`."""
+    """Return pytest-cov's controller; None without `--cov`."""
     return getattr(config.pluginmanager.getplugin("_cov"), "cov_controller", None)
 
 
-#: the socket, in the folder of a run, of the process from which commands are forked
+#: the socket of the process that forks commands, in the run's folder
 COMMANDS = "commands"
-#: folders of what is installed that no process imports from
+#: installed folders without imported modules
 NOT_IMPORTED = ("__pycache__", "idlelib", "lib2to3", "pip", "site-packages", "test", "tests")
 
 
@@ -74,7 +74,7 @@ def pytest_addoption(parser: Any) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """All processes of a run share a folder, and byte code."""
+    """Share a folder and byte code between all processes of a run."""
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as a shell starts what runs in the background
         signal.signal(signal.SIGINT, signal.default_int_handler)  # else commands would inherit it
     shared = TemporaryDirectory(prefix="rtshcua_once_")
@@ -89,21 +89,21 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def save_measured(config: pytest.Config) -> None:
-    """Keep what one of several processes measured, for the one that adds it up."""
+    """Store the coverage of one process, to be combined later."""
     if controller := measuring(config):
         controller.cov.save()
 
 
 def keep_byte_code(config: pytest.Config) -> None:
-    """Where no byte code may be kept in the checkout, keep it in pytest's cache, or for this run alone.
+    """If no byte code may be written to the checkout, keep it in pytest's cache, or for this run only.
 
-    What is installed has its byte code, and is linked to it; the rest is compiled by whoever comes first.
+    Installed packages have byte code, which is linked; the first process compiles the rest.
     """
     cache = getattr(config, "cache", None)
     if cache is not None:
         folder = cache.mkdir("byte-code")
         for run in (folder / gettempdir().lstrip("/")).glob("pytest-of-*"):
-            rmtree(run, ignore_errors=True)  # of modules that tests made in runs before
+            rmtree(run, ignore_errors=True)  # from modules that tests created in earlier runs
     else:
         temporary = TemporaryDirectory(prefix="rtshcua_byte_code_")
         config.add_cleanup(temporary.cleanup)
@@ -123,10 +123,10 @@ def keep_byte_code(config: pytest.Config) -> None:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection(session: pytest.Session) -> Generator[None, object, object]:
-    """Importing is measured for what is covered, not for hundreds of test files.
+    """Measure coverage of imports only for covered packages, not for hundreds of test files.
 
-    What is collected stays for as long as the process: looking for garbage in it, time and again, took a third of
-    collecting. What the tests make is looked through as ever, but for that in it that was there before them.
+    Collected tests live as long as the process: garbage collection over them took a third of the collection time.
+    Objects that exist before the tests are therefore frozen.
     """
     gc.disable()
     helper = rewriting_from_the_end(session.config)
@@ -137,21 +137,21 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
             os.waitpid(helper, 0)
         gc.enable()
         gc.freeze()
-        atexit.register(gc.unfreeze)  # libraries look at the end whether anything of theirs is left, and print what is
+        atexit.register(gc.unfreeze)  # at exit, libraries check for remaining objects and print them
         gc.set_threshold(20_000, 20, 20)
 
 
 def rewriting_from_the_end(config: pytest.Config) -> int | None:
-    """Begin a process that rewrites the assertions of test files, from the last one to the first that has byte code.
+    """Start a process that rewrites the assertions of test files, from the last file to the first one with byte code.
 
-    In a new checkout this takes half of the time of collecting, which one process does, from the first file on.
+    In a new checkout this takes half of the collection time; the main process starts with the first file.
     """
     folders = [Path(each) for each in config.args]
     if not config.option.processes or sys.dont_write_bytecode or not all(each.is_dir() for each in folders):
         return None
     if process := os.fork():
         return process
-    with suppress(BaseException):  # whoever collects meets the same fault, and tells it
+    with suppress(BaseException):  # the collecting process reports the same error
         if controller := measuring(config):
             controller.pause()
         for file in sorted((file for each in folders for file in each.rglob("test_*.py")), reverse=True):
@@ -165,7 +165,7 @@ def rewriting_from_the_end(config: pytest.Config) -> int | None:
 
 
 def collected(session: pytest.Session) -> Generator[None, object, object]:
-    """Collect, measuring no more than what is covered."""
+    """Collect with coverage of the covered packages only."""
     controller = measuring(session.config)
     if controller is None:
         return (yield)
@@ -178,9 +178,9 @@ def collected(session: pytest.Session) -> Generator[None, object, object]:
 
 
 class Measured:
-    """Measures tests that cover, and the fixtures that are made for them, but not what runs them.
+    """Measure covering tests and their fixtures, but not pytest.
 
-    To begin and to end is cheap; pytest itself, traced, takes longer than most of these tests.
+    Starting and stopping is cheap; tracing pytest itself takes longer than most of these tests.
     """
 
     def __init__(self, coverage: Any) -> None:
@@ -201,7 +201,7 @@ class Measured:
         return (yield from self._measured())
 
     def _measured(self) -> Generator[None, object, object]:
-        if self._begun or not self._wanted:  # a fixture may ask for another one
+        if self._begun or not self._wanted:  # a fixture may request another one
             return (yield)
         self._begun = True
         self._coverage.start()
@@ -213,9 +213,9 @@ class Measured:
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Begin the process from which commands are forked, if a test asks for it: it loads while the first tests run.
+    """Start the process that forks commands, if a test needs it: it loads while the first tests run.
 
-    Of a command that is called many times in a process, typer makes its parser once: it takes a tenth of such tests.
+    Cache typer's parser of a command that is called often in one process: it takes a tenth of such tests.
     """
     if any(is_hypothesis_test(getattr(item, "obj", None)) for item in session.items):
         have_hypothesis_ready()
@@ -229,9 +229,9 @@ def pytest_collection_finish(session: pytest.Session) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Coverage is measured by the tests that are for it, and among these by the cases that somebody chose.
+    """Coverage counts only the tests for it, and among these only chosen cases.
 
-    What only a random example reaches is covered by luck: it gets a case of its own.
+    Code that only a random example reaches needs its own case.
     """
     covering = tuple(CHECKOUT / "tests" / folder for folder in COVERING)
 
@@ -246,25 +246,25 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture
 def checkout() -> Path:
-    """The top of the checkout."""
+    """The root of the checkout."""
     return CHECKOUT
 
 
 @pytest.fixture(scope="session")
 def commands() -> Forked:
-    """`rtshcua` in processes that need not load it first."""
+    """Run `rtshcua` in forked processes that have loaded it already."""
     return Forked(Path(os.environ[once.FOLDER], COMMANDS))
 
 
 class Worlds:
-    """A data folder for each test; one that a test left empty is the next one's too."""
+    """A data folder for each test; an unused one is reused."""
 
     def __init__(self, top: Path) -> None:
         self._new = (top / str(number) for number in count())
         self._folder: Path | None = None
 
     def enter(self) -> None:
-        """From here on nobody sees the keys, the replay state or the terminal settings of whoever runs the tests."""
+        """Hide the keys, the replay state and the terminal settings of the user who runs the tests."""
         folder = self._folder
         if folder is None or not as_made(folder):
             folder = self._folder = next(self._new)
@@ -275,15 +275,15 @@ class Worlds:
 
 
 def as_made(folder: Path) -> bool:
-    """Whether a folder is still there, still its owner's alone, and empty."""
+    """Return whether a folder still exists, is private, and is empty."""
     try:
         return os.lstat(folder).st_mode == stat.S_IFDIR | 0o700 and next(folder.iterdir(), None) is None
     except OSError:
         return False
 
 
-#: what the terminal of every test is like
-#: so wide that tests find what is said in one line; `tests/unit/front/cli/test_width.py` holds it to 80 columns
+#: the terminal of every test, wide enough for messages on one line; `tests/unit/front/cli/test_width.py` checks 80
+#: columns
 PLAIN = {"COLUMNS": "400", "NO_COLOR": "1", "TZ": "UTC"}
 NOT_SET = ("FORCE_COLOR", "GITHUB_ACTIONS", "RTSHCUA_DEBUG")
 
@@ -295,8 +295,8 @@ def worlds(tmp_path_factory: pytest.TempPathFactory) -> Worlds:
 
 @pytest.fixture(autouse=True)
 def own_world(worlds: Worlds) -> None:
-    """No test sees or touches the keys, the replay state or the terminal settings of whoever runs it.
+    """Isolate tests from the keys, the replay state and the terminal settings of the user.
 
-    All tests have this, so it costs next to nothing: what a test changes of the environment, it puts back itself.
+    All tests use this fixture, so it must be cheap: a test restores its own changes of the environment.
     """
     worlds.enter()

@@ -1,7 +1,7 @@
-"""`pytest -n N`: run the tests in N processes, forked from one that has imported and collected them.
+"""`pytest -n N`: run the tests in N processes, forked after import and collection.
 
-To import and collect all tests takes longer than any file's tests take, so it is done once. A file is run by one
-process as a whole: what its tests share is made once. Whoever is done with a file asks for the next.
+Import and collection take longer than the tests of any file, so they are done once. One process runs a whole file, so
+that its shared fixtures are made once, and then requests the next file.
 """
 
 import gc
@@ -25,20 +25,20 @@ import pytest
 from _pytest.capture import FDCapture
 from _pytest.unraisableexception import collect_unraisable
 
-#: how long those that run tests may take to end once no more is wanted of them
+#: how long worker processes may take to end
 PATIENCE_S = 10.0
-#: by how much those that compute give way to those that fly, which are held up else
+#: the niceness of computing processes, which would otherwise delay flights in real time
 NICER = 5
-#: the last word of a process that ran all it was given, and tore down what they shared
+#: the final message of a process that ran all its tests and tore down their fixtures
 DONE = "done"
 
 
 @dataclass
 class Worker:
-    """A process that runs tests: the tests it has been given and has not begun, and the one it has begun.
+    """A worker process: its assigned tests, and the running one.
 
-    `owes`: no report of that came yet; `heard_s`: when it last said something; `why` it failed outside of a test;
-    `done`: it said that it was over.
+    `owes`: the report of the running test is missing; `heard_s`: the time of the last message; `why`: a failure outside
+    tests; `done`: it has reported its end.
     """
 
     number: int
@@ -53,7 +53,7 @@ class Worker:
 
     @property
     def node(self) -> SimpleNamespace:
-        """What a report of xdist says, too: then the terminal writes the letters of all files in a row."""
+        """A field of xdist's reports, with which the terminal prints the letters of all files in a row."""
         name = f"p{self.number}"
         return SimpleNamespace(gateway=SimpleNamespace(id=name), _workerinfocache=f"[{name}]")
 
@@ -63,9 +63,9 @@ class Crashed(Exception):
 
 
 class Processes:
-    """Runs the tests of a session in `number` processes. In each, `ended` is called at its end.
+    """Runs the tests of a session in `number` processes; each calls `ended` at its end.
 
-    A process that says nothing for longer than `most_s` is ended (0: none is).
+    A process without a message for longer than `most_s` is ended (0: never).
     """
 
     def __init__(self, number: int, ended: Callable[[], None], most_s: float = 0) -> None:
@@ -80,8 +80,9 @@ class Processes:
         ):
             return None
         files = [[at for at, _ in group] for _, group in groupby(enumerate(session.items), lambda each: each[1].path)]
-        # flights in real time come last: two of three processes begin at that end, see `next_file`; before them come
-        # the many small files, so that all processes are done at about the same time where both ends meet
+        # flights in real time come last: two of three processes start at that end, see `next_file`; many small files
+        # come
+        # before them, so that all processes end at about the same time
         files.sort(key=lambda each: [name in session.items[each[0]].path.parts for name in ("integration", "unit")])
         session.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]  one folder for all processes
         try:
@@ -103,12 +104,12 @@ class Processes:
         return True
 
     def _fork(self, session: pytest.Session) -> None:
-        """Begin another process."""
+        """Start another process."""
         number = max((worker.number for worker in self._workers), default=-1) + 1
         own, other = Pipe()
         sys.stdout.flush()
         sys.stderr.flush()
-        with warnings.catch_warnings():  # libraries that compute have threads, and let go of them when it forks
+        with warnings.catch_warnings():  # computing libraries release their threads before a fork
             warnings.simplefilter("ignore", DeprecationWarning)
             process = os.fork()
         if process:
@@ -116,7 +117,7 @@ class Processes:
             self._workers.append(Worker(number, process, own))
             return
         code = 1
-        with suppress(KeyboardInterrupt, OSError):  # Ctrl-C, or nobody listens: whoever forked says so
+        with suppress(KeyboardInterrupt, OSError):  # Ctrl-C, or the parent is gone: the parent reports it
             own.close()
             for worker in self._workers:
                 worker.pipe.close()
@@ -133,7 +134,7 @@ class Processes:
         os._exit(code)
 
     def _hear(self, session: pytest.Session, worker: Worker, files: list[list[int]]) -> None:
-        """Take what a process says: the test it begins, a report, or (None) that it wants another file."""
+        """Handle a message: the test that begins, a report, or (None) a request for another file."""
         try:
             said = worker.pipe.recv()
             worker.heard_s = time.monotonic()
@@ -161,7 +162,9 @@ class Processes:
             hook.pytest_runtest_logreport(report=report)
 
     def _lost(self, session: pytest.Session, worker: Worker, files: list[list[int]]) -> None:
-        """A process is over. If it was not done, its test has failed, and another runs those that it would have."""
+        """Handle the end of a process. If it was not done, its test fails, and another process runs its remaining
+        tests.
+        """
         self._workers.remove(worker)
         worker.pipe.close()
         code = os.waitstatus_to_exitcode(os.waitpid(worker.process, 0)[1])
@@ -174,7 +177,7 @@ class Processes:
             self._fork(session)
 
     def _end_those_that_hang(self) -> None:
-        """End a process whose test takes too long: pytest prints where it is, and `_lost` counts it as failed."""
+        """End a process whose test takes too long: pytest prints its stack, and `_lost` counts it as failed."""
         if not self._most_s:
             return
         for worker in self._workers:
@@ -184,7 +187,7 @@ class Processes:
                 os.kill(worker.process, signal.SIGABRT if silent_s < self._most_s + PATIENCE_S else signal.SIGKILL)
 
     def _failed(self, session: pytest.Session, worker: Worker, why: str) -> None:
-        """Count what went wrong outside of tests as a failure of the one that was begun last."""
+        """Count an error outside of tests as a failure of the last begun test."""
         if worker.begun is None:
             raise Crashed(why)
         item = session.items[worker.begun]
@@ -194,21 +197,21 @@ class Processes:
 
 
 def computes(number: int) -> bool:
-    """Whether a process begins with the first files, as every third does, or with the last, which are flights."""
+    """Return whether a process starts with the first files, as every third does, or with the last ones, the flights."""
     return number % 3 == 0
 
 
 def next_file(worker: Worker, files: list[list[int]]) -> list[int]:
-    """The next file for a process, from the end that it works from until both ends meet.
+    """Return the next file for a process, from its end of the list, until both ends meet.
 
-    Flights in real time mostly wait. Were they all begun first, or last, the processors would have little to do
-    meanwhile; so two of three processes fly them, while the third computes.
+    Flights in real time mostly wait. To keep the processors busy, two of three processes fly them while the third
+    computes.
     """
     return files.pop(0 if computes(worker.number) else -1) if files else []
 
 
 def _end(workers: list[Worker]) -> None:
-    """Wait a while for those that go on: they end what their tests began once nobody listens, or at Ctrl-C."""
+    """Wait a while for remaining processes: they clean up once the parent is gone, or at Ctrl-C."""
     for worker in workers:
         worker.pipe.close()
     until_s = time.monotonic() + PATIENCE_S
@@ -220,7 +223,7 @@ def _end(workers: list[Worker]) -> None:
 
 
 class _Told:
-    """Sends reports to whoever counts them: of each test one, and of its fixtures if they failed or are timed."""
+    """Sends reports to the parent: one per test, and of fixtures that failed or are timed."""
 
     def __init__(self, config: pytest.Config, pipe: Connection) -> None:
         self._config, self._pipe = config, pipe
@@ -234,13 +237,13 @@ class _Told:
 
 
 def _become(config: Any, number: int, pipe: Connection) -> None:
-    """Get what a process must not share: where it writes, what it captures, the folder of its files."""
+    """Set up the private parts of a process: output, capturing, temporary folder."""
     plugins = config.pluginmanager
     plugins.unregister(name="terminalreporter")
     plugins.register(_Told(config, pipe), "told")
     captured = plugins.getplugin("capturemanager")._global_capturing
     for stream in (captured.out, captured.err):
-        if isinstance(stream, FDCapture):  # it stays the same file for those that have it already
+        if isinstance(stream, FDCapture):  # existing references keep the same file
             with TemporaryFile() as own:
                 os.dup2(own.fileno(), stream.tmpfile.fileno(), inheritable=False)
     factory = config._tmp_path_factory
@@ -248,7 +251,7 @@ def _become(config: Any, number: int, pipe: Connection) -> None:
 
 
 def _run(session: pytest.Session, pipe: Connection) -> None:
-    """Run what is given."""
+    """Run the assigned tests."""
     items = _given(pipe)
     at = next(items, None)
     try:
@@ -259,13 +262,13 @@ def _run(session: pytest.Session, pipe: Connection) -> None:
             item.config.hook.pytest_runtest_protocol(item=item, nextitem=after)
             at = following
     finally:
-        session._setupstate.teardown_exact(None)  # what is left of it where it is broken off
+        session._setupstate.teardown_exact(None)  # the rest after an interruption
     gc.collect()
     collect_unraisable(session.config)
 
 
 def _given(pipe: Connection) -> Iterator[int]:
-    """The tests to be run. Before the last of a file begins, the next file is asked for."""
+    """Yield the tests to run. The next file is requested before the last test of a file begins."""
     while True:
         pipe.send(None)
         file = pipe.recv()

@@ -1,4 +1,4 @@
-"""The pins say what to install, never where from."""
+"""Pinned requirements name packages and hashes, but no source."""
 
 import re
 import tomllib
@@ -11,14 +11,14 @@ REQUIREMENTS = sorted((CHECKOUT / "requirements").glob("*.txt"))
 
 
 def pins(text: str) -> list[str]:
-    """The logical lines: continuations joined, comments and blank lines left out."""
+    """Yield the logical lines: continuations joined, without comments and blank lines."""
     lines = (re.sub(r"(^|\s)#.*", "", line).strip() for line in text.replace("\\\n", " ").splitlines())
     return [line for line in lines if line]
 
 
 @pytest.mark.parametrize("file", REQUIREMENTS, ids=lambda file: file.name)
 def test_pins_are_exact_and_hashed_and_name_no_place(file: Path) -> None:
-    """A name, `==` and a version, perhaps a marker, and hashes: so no address, no path and no option fits."""
+    """A name, `==` and a version, an optional marker, and hashes: no address, path or option matches."""
     pin = re.compile(r"[A-Za-z0-9._-]+==[0-9A-Za-z.!+]+( ; [\w\s.*'<>=!()]+?)?(\s+--hash=sha256:[0-9a-f]{64})+")
     text = file.read_text(encoding="utf-8")
     assert "://" not in text

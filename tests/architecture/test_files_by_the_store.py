@@ -1,4 +1,4 @@
-"""Files are opened, replaced and made by `rtshcua/adapters/store`; who does it otherwise stands here, and why."""
+"""Only `rtshcua/adapters/store` opens, replaces and creates files; the exceptions are listed here with reasons."""
 
 import ast
 import re
@@ -12,7 +12,7 @@ from virtual.rows import rows
 
 PACKAGE = Path(__file__).resolve().parents[2] / "rtshcua"
 
-#: who opens or writes files by other means, besides the store itself
+#: modules outside the store that open or write files
 ALLOWED = {
     "adapters/archive/asking.py": "reads the SQL that ships",
     "adapters/vehicle/transport.py": "a serial device is not a regular file",
@@ -38,7 +38,7 @@ MODULES = {
     "tempfile": {"mkstemp", "mkdtemp", "mktemp", "NamedTemporaryFile", "SpooledTemporaryFile", "TemporaryFile"},
 }
 METHODS = {"read_bytes", "read_text", "write_bytes", "write_text", "rename", "hardlink_to", "symlink_to"}
-#: what a module has that does any of this, so that few need be parsed: a call of such a name, or an import of one
+#: strings that such a module contains, so that few modules need parsing: calls or imports of these names
 WORDS = re.compile(
     rf"\.(?:{'|'.join(METHODS.union(*MODULES.values()))})\s*\(|(?<![\w.])open\s*\("
     rf"|\bfrom\s+(?:{'|'.join(MODULES)})\s+import\b"
@@ -46,7 +46,7 @@ WORDS = re.compile(
 
 
 def opened(source: str) -> Iterator[str]:
-    """Every way in which a module opens, makes or renames files: what it imports for that, and what it calls."""
+    """Yield the imports and calls by which a module opens, creates or renames files."""
     if not WORDS.search(source):
         return
     for node in ast.walk(ast.parse(source)):
@@ -107,7 +107,7 @@ def test_only_the_store_opens_and_writes_files() -> None:
 
 
 def test_folders_are_created_with_a_mode() -> None:
-    """Without one a folder has what the umask leaves, all to everybody where it takes nothing."""
+    """Without a mode a folder gets the umask's, which may be open to everybody."""
     without = []
     for file in sorted(PACKAGE.rglob("*.py")):
         source = file.read_text(encoding="utf-8")

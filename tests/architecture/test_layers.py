@@ -1,4 +1,4 @@
-"""The house of docs/architecture.md: layers, purity, and what may load on board."""
+"""The rules of docs/architecture.md: layers, purity, and the modules on board."""
 
 import ast
 import subprocess
@@ -16,7 +16,7 @@ NOT_ON_BOARD = {"lark", "pydantic", "pymavlink", "rich", "shapely", "typer"}
 
 
 def imports(source: str) -> Iterator[str]:
-    """Every module that `source` imports, wherever it stands: in a function and by name through importlib too."""
+    """Return every module that `source` imports, also in functions and through importlib."""
     for node in ast.walk(ast.parse(source)):
         match node:
             case ast.Import(names=names):

@@ -1,4 +1,4 @@
-"""docs/paper-map.md names only what exists, and leaves out nothing of an invocation or a contract."""
+"""docs/paper-map.md names only existing code, and covers every field of an invocation and a contract."""
 
 import importlib
 import re

@@ -1,6 +1,5 @@
-"""No pattern repeats a group possessively: CPython before 3.11.5 then ends the match behind a try that failed, so that
-`20_ m` was read as `20 m` (python/cpython#106052). Atomic groups and possessive repetitions of one character are
-right.
+"""No pattern repeats a group possessively: CPython before 3.11.5 then ends the match after a failed attempt, so that
+`20_ m` was read as `20 m` (python/cpython#106052). Atomic groups and possessive repetitions of one character are safe.
 """
 
 import ast
@@ -18,15 +17,15 @@ with warnings.catch_warnings():
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 FOLDERS = ("rtshcua", "grammar", "examples", "skills", "editors", ".make", "bench", "tests")
-#: `)*+`, `)++`, `)?+`, `){2,3}+`, where the bracket is not escaped
+#: `)*+`, `)++`, `)?+`, `){2,3}+` with an unescaped bracket
 WRITTEN = re.compile(r"(?<!\\)(?:\\\\)*\)(?:[*+?]|\{[0-9,]+\})\+")
 
-#: what possessive repetitions end in; constants that Python joins are each in the file
+#: endings of possessive repetitions; constants that Python joins are separate in the file
 POSSESSIVE = re.compile(r"[*+?}]\+")
 
 
 def repeated_groups(pattern: str | bytes) -> bool:
-    """Whether a pattern has a possessive repetition of more than one character."""
+    """Return whether a pattern has a possessive repetition of more than one character."""
     return any(_repeated(_parser.parse(pattern)))
 
 
@@ -72,13 +71,13 @@ def test_no_file_repeats_a_group_possessively() -> None:
 
 
 def test_no_pattern_given_to_re_repeats_a_group_possessively() -> None:
-    """What the text does not show: groups that are put together of parts in one call."""
+    """Check groups that are composed of parts in one call, which the source text does not show."""
     count, found = 0, []
     for path in _files():
         if path.suffix != ".py" or path == Path(__file__):
             continue
         text = path.read_text(encoding="utf-8")
-        if not POSSESSIVE.search(text):  # to parse all files takes seconds
+        if not POSSESSIVE.search(text):  # parsing all files takes seconds
             continue
         for node in ast.walk(ast.parse(text)):
             if isinstance(node, ast.Constant) and isinstance(node.value, str | bytes) and _of_re(node.value):
@@ -90,7 +89,7 @@ def test_no_pattern_given_to_re_repeats_a_group_possessively() -> None:
 
 
 def _of_re(value: str | bytes) -> bool:
-    """Whether a text has a possessive repetition at all, and is a pattern."""
+    """Return whether a text is a pattern with a possessive repetition."""
     if not POSSESSIVE.search(value if isinstance(value, str) else value.decode("latin-1")):
         return False
     try:

@@ -1,4 +1,4 @@
-"""What commands print passes `front/cli/stdout.py` or `front/cli/faults.py`; who prints otherwise stands here."""
+"""All output of commands passes `front/cli/stdout.py` or `front/cli/faults.py`; the exceptions are listed here."""
 
 import ast
 import re
@@ -9,7 +9,7 @@ from virtual.rows import rows
 
 PACKAGE = Path(__file__).resolve().parents[2] / "rtshcua"
 
-#: who writes on a standard stream by other means, and why nothing that others wrote can be in it unseen
+#: modules that write to a standard stream directly, with the reason why untrusted text cannot reach it unescaped
 ALLOWED = {
     "front/lsp/prover.py": "logs, of a process whose standard error an editor reads",
     "front/lsp/server.py": "speaks the protocol, and logs",
@@ -46,13 +46,13 @@ PRINTING = {
     "input",
 }
 STREAMS = ("sys.stdout", "sys.stderr", "sys.__stdout__", "sys.__stderr__")
-#: what reads a stream's properties only
+#: uses that only read a stream's properties
 HARMLESS = {"isatty", "flush", "fileno", "reconfigure"}
 WORDS = re.compile(rf"\b(?:{'|'.join(PRINTING)})\s*\(|sys\.(?:__)?std(?:out|err)")
 
 
 def printing(source: str) -> Iterator[str]:
-    """Every way in which a module writes on a standard stream."""
+    """Yield every way in which a module writes to a standard stream."""
     if not WORDS.search(source):
         return
     for node in ast.walk(ast.parse(source)):

@@ -1,4 +1,4 @@
-"""Flights of the field mission by the right runtime, and by wrong ones."""
+"""Flights of the field mission by the correct runtime, and by wrong ones."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -28,20 +28,20 @@ LASTS_US: Final = {"px4": 76_650_000, "ardupilot": 77_700_000}
 
 @dataclass(frozen=True)
 class Right:
-    """A flight by the right runtime, and its log."""
+    """A flight by the correct runtime, and its log."""
 
     flight: CampaignFlight
     result: CampaignResult
     log: bytes
 
     def shows(self, words: Sequence[bytes]) -> bool:
-        """Whether any of these is in the log, or none is asked for."""
+        """Return whether any of these is in the log, or the list is empty."""
         return not words or any(word in self.log for word in words)
 
 
 @cache
 def space(aimed: Aimed | None = None) -> FaultSpace:
-    """What is drawn from."""
+    """Return the fault space."""
     roles = sorted({POLICY.roles[rule.approver] for rule in POLICY.rules if rule.approver >= 0})
     read = sorted({source.message for signal in POLICY.signals for source in signal.sources})
     drawn_from = FaultSpace(SKILLS, LASTS_US, tuple(roles), FLAVOURS, read=tuple(read))
@@ -51,28 +51,28 @@ def space(aimed: Aimed | None = None) -> FaultSpace:
 
 
 def flight_of(seed: int, number: int, drawn_from: FaultSpace, known: CampaignTally) -> CampaignFlight:
-    """A flight of a campaign."""
+    """Draw a flight of a campaign."""
     made = draw(seed, number, drawn_from, known)
     return CampaignFlight(number, made.scenario, made.tries)
 
 
 def calm(flavour: str) -> Scenario:
-    """Nothing goes wrong."""
+    """Return a scenario without faults."""
     return Scenario("calm", (flavour,), 1, 1, Start(), (), ())
 
 
 def flown(scenario: Scenario) -> ScenarioFlown:
-    """By whatever runtime there is."""
+    """Fly with the current runtime."""
     return FIELD.flown(scenario, scenario.flavours[0], scenario.first_seed)
 
 
 def right(flight: CampaignFlight) -> Right:
-    """By the right runtime."""
+    """Fly with the correct runtime."""
     return judged(flight, flown(flight.scenario))
 
 
 def judged(flight: CampaignFlight, was: ScenarioFlown) -> Right:
-    """What came of it."""
+    """Judge the flight."""
     verdict = judge(was)
     result = CampaignResult(
         flight.number, was.flavour, was.seed, tuple(each.text for each in flight.scenario.incidents), flight.tries,
@@ -85,11 +85,11 @@ def judged(flight: CampaignFlight, was: ScenarioFlown) -> Right:
 
 
 def wrongly(name: str, scenario: Scenario) -> ScenarioFlown:
-    """By a wrong one."""
+    """Fly with a wrong runtime."""
     with BY_NAME[name].made():
         return flown(scenario)
 
 
 def wrong_fails(name: str, flight: CampaignFlight) -> tuple[str, ...]:
-    """The slugs of its failures."""
+    """Return the slugs of its failures."""
     return tuple(dict.fromkeys(each.slug for each in judge(wrongly(name, flight.scenario)).failures))

@@ -1,4 +1,4 @@
-"""Wrong runtimes fly well while nothing goes wrong, and a campaign's judge sees what is wrong where something does."""
+"""Wrong runtimes complete calm flights; with faults the judge detects their defects."""
 
 import pytest
 
@@ -28,7 +28,7 @@ def slugs(was: ScenarioFlown) -> set[str]:
     return {each.slug for each in judge(was).failures}
 
 
-#: where each shows soon, and as what
+#: a scenario that shows each defect, and its slug
 SHOWN: dict[str, tuple[Scenario, str]] = {
     "hover-by-mode": (of("px4", at(12, faults.Recall(0))), "no-stop"),
     "grace-through-silence": (
@@ -69,7 +69,7 @@ SHOWN: dict[str, tuple[Scenario, str]] = {
 
 
 def test_wrong_runtime_is_undone_afterwards() -> None:
-    """What a process makes once and keeps was the wrong runtime's in the flights of the right one that came after."""
+    """Regression: caches of the wrong runtime remained in later flights of the correct one."""
     scenario, slug = SHOWN["landing-by-word"]
     before = logs(flown(scenario))
     assert slugs(wrongly("landing-by-word", scenario)) == {slug}
@@ -80,7 +80,7 @@ def logs(was: ScenarioFlown) -> list[bytes]:
     return [line for life in was.lives for line in life.lines]
 
 
-#: of which so many are flown at each `make test`
+#: how many of these `make test` flies
 SOME = ("recall-ignored", "dispatch-unwritten", "first-link-skipped", "hover-by-mode")
 
 
@@ -98,11 +98,11 @@ def test_judge_detects_each_wrong_runtime(name: str) -> None:
     "name", [pytest.param(each, marks=[] if each == "assume-not-watched" else [pytest.mark.soak]) for each in SHOWN]
 )
 def test_judge_does_not_share_the_runtimes_defects(name: str) -> None:
-    """It shares no code with it: what is wrong there while the flight is judged changes no verdict."""
+    """The judge shares no code with the runtime, so its defects change no verdict."""
     scenario, slug = SHOWN[name]
     was = wrongly(name, scenario)
     with BY_NAME[name].made():
-        assert slug in slugs(was) or slug == "derive"  # for the auditor decides again as the product decides
+        assert slug in slugs(was) or slug == "derive"  # the auditor shares the decision with the runtime
 
 
 @pytest.mark.soak
@@ -116,7 +116,7 @@ def test_correct_runtime_does_not_fail_in_these_flights(name: str) -> None:
 def test_aimed_campaign_finds_the_defect(name: str, number: int) -> None:
     flight = flight_of(
         1, number - 1, space(BY_NAME[name].aimed), CampaignTally()
-    )  # of the first round, which knows nothing
+    )  # the first round has no observations
     assert wrong_fails(name, flight)
     assert right(flight).result.failures == ()
 

@@ -1,10 +1,10 @@
-"""Wrong runtimes: each is the real one with one plausible mistake, and flies a calm mission as well as that.
+"""Wrong runtimes: the real one with one plausible mistake each. All complete a calm mission.
 
-What a campaign is worth is told by how many flights it needs to find them (docs/flying/wrong-runtimes.md). A mistake is
-in force only while a flight is flown: whoever judges it is not mistaken.
+The number of flights that a campaign needs to find them measures the campaign (docs/flying/wrong-runtimes.md). A
+mistake is active only during a flight, not while the flight is judged.
 
-`shows` are words of a log: where the right runtime's log of a flight has none of them, the mistake changed nothing, for
-what it changes is done only there. So that flight need not be flown again.
+`shows` are strings of a log: if the correct runtime's log of a flight has none of them, the mistake cannot have had an
+effect, and the flight need not be repeated.
 """
 
 from collections.abc import Callable, Iterator
@@ -35,26 +35,26 @@ from rtshcua.wire.request import FALLBACK_LINK, STEP
 
 Patch = tuple[object, str, Callable[[Any], Any]]
 _ALWAYS: Final = 1 << 62
-#: what is made once in a process, and of functions that a wrong runtime has others of
+#: caches of functions that wrong runtimes replace
 _REMEMBERED: Final = (px4._coming_down, ardupilot._coming_down)
 
 
 class Aimed(NamedTuple):
-    """A campaign of faults of these kinds alone, by their words, on these autopilots."""
+    """A campaign with only these kinds of faults, on these autopilots."""
 
     kinds: tuple[str, ...]
     flavours: tuple[str, ...] = FLAVOURS
 
     @property
     def options(self) -> str:
-        """What asks `rtshcua campaign` for it."""
+        """Return the options of `rtshcua campaign`."""
         chosen = () if self.flavours == FLAVOURS else self.flavours
         return " ".join([*(f"--fault {kind}" for kind in self.kinds), *(f"--flavour {each}" for each in chosen)])
 
 
 @dataclass(frozen=True)
 class Wrong:
-    """A mistake: what is wrong, in words, and the functions of the right runtime that are others then."""
+    """A mistake: its description, and the replaced functions of the correct runtime."""
 
     name: str
     what: str
@@ -62,13 +62,13 @@ class Wrong:
     shows: tuple[bytes, ...] = ()
     """Empty: it may change any flight."""
     flavour: str | None = None
-    """The autopilot that it is about; None: both."""
+    """The affected autopilot; None: both."""
     aimed: Aimed | None = None
-    """The campaign that somebody would fly who fears such a mistake."""
+    """The campaign that is aimed at this mistake."""
 
     @contextmanager
     def made(self) -> Iterator[None]:
-        """The runtime is wrong meanwhile. What it remembers of a right one is forgotten, and the other way round."""
+        """Make the runtime wrong in this context, and clear caches before and after."""
         with ExitStack() as stack:
             for remembered in _REMEMBERED:
                 remembered.cache_clear()
@@ -170,7 +170,7 @@ def _unknown_is_true(of: Any) -> Any:
 
 
 def _without(which: str) -> Any:
-    """A watch that leaves some of its clauses out."""
+    """Return a supervision without some clauses."""
 
     def broken(of: Any) -> Any:
         def watch(invocation: Any, state: Any, policy: Any, now: Any) -> Iterator[Any]:
@@ -293,7 +293,7 @@ WRONG: Final = (
     Wrong("first-link-skipped", "A step's fallback begins with its second link.",
           ((fallback_flight.Fallback, "begin", _second_link_first),), (b'"kind":1',)),
     Wrong("sent-before-recorded", "A step's command does not wait for the record of its decision.",
-          ((executor.Executor, "_dispatch", _record_for(False)),)),  # a disk that is slow for a second shows in no log
+          ((executor.Executor, "_dispatch", _record_for(False)),)),  # a disk stall of a second is not visible in a log
     Wrong("fallback-held-for-record", "A fallback waits for its record, like a step.",
           ((executor.Executor, "_dispatch", _record_for(True)),), (b'"gap"',)),
     Wrong("dispatch-unwritten", "The dispatch of a fallback link is not recorded.",

@@ -1,7 +1,7 @@
-"""What the simulated session did otherwise than the recorded one.
+"""Differences between a simulated and a recorded session.
 
-Answers are compared question by question; modes, landed states and texts by when they come; height and place second by
-second. A difference has a key, by which one that is kept on purpose can be named, and a text that says both sides.
+Answers are compared request by request; modes, landed states and texts by their times; height and place second by
+second. A difference has a key, by which an accepted one is named, and a text with both sides.
 """
 
 import re
@@ -20,7 +20,7 @@ REQUESTS = ("MISSION_REQUEST", "MISSION_REQUEST_INT")
 
 @dataclass(frozen=True)
 class Difference:
-    """`key` names it, `recorded` and `simulated` say what was seen."""
+    """A difference: its `key`, and the `recorded` and `simulated` facts."""
 
     key: str
     recorded: object
@@ -31,7 +31,7 @@ class Difference:
 
 
 def answers(questions: list[Question], recorded: list[Heard], simulated: list[Heard]) -> Iterator[Difference]:
-    """What came for each question until the next: acknowledgements, messages asked for, parameters, uploads."""
+    """Compare the answers to each request: acknowledgements, requested messages, parameters, uploads."""
     ends = [question.at_us for question in questions[1:]] + [questions[-1].at_us + 3 * SECOND]
     for question, end_us in zip(questions, ends, strict=True):
         real, own = (_answer(question, _between(heard, question.at_us, end_us)) for heard in (recorded, simulated))
@@ -74,10 +74,10 @@ def _at(heard: Heard) -> int:
 def changes(
     what: str, read: Callable[[Heard], object], recorded: list[Heard], simulated: list[Heard], limit_us: int
 ) -> Iterator[Difference]:
-    """Changes of what `read` gives (None: nothing to see) that come on one side only, or more than `limit_us` apart.
+    """Compare changes of the value that `read` returns (None: no value): those on one side only, or more than
+    `limit_us` apart.
 
-    The sides are aligned change by change; after a difference they are compared again from the next time when both
-    show the same.
+    The sides are aligned change by change; after a difference the comparison continues when both have the same value.
     """
     during = _between(simulated, recorded[0].at_us, recorded[-1].at_us)
     real, own = _changes(read, recorded), _changes(read, during)
@@ -112,7 +112,7 @@ def _moment(at_us: int) -> str:
 
 
 def texts(recorded: list[Heard], simulated: list[Heard], limit_us: int) -> Iterator[Difference]:
-    """Texts that come on one side only, or more than `limit_us` apart."""
+    """Compare texts: those on one side only, or more than `limit_us` apart."""
     left = [h for h in _between(simulated, recorded[0].at_us, recorded[-1].at_us) if h.name == "STATUSTEXT"]
     count: dict[str, int] = {}
     for h in recorded:
@@ -133,7 +133,7 @@ def texts(recorded: list[Heard], simulated: list[Heard], limit_us: int) -> Itera
 
 
 def _text(heard: Heard) -> str:
-    """Severity and text; figures are of the day."""
+    """Return severity and text without numbers, which vary."""
     return f"{heard.message.severity} {re.sub(r'[0-9]+([.][0-9]+)?', '#', heard.message.text)}"
 
 
@@ -143,7 +143,7 @@ def _text(heard: Heard) -> str:
 def motion(
     home: HomePosition, recorded: list[Heard], simulated: list[Heard], up_m: float, away_m: float
 ) -> Iterator[Difference]:
-    """Stretches of time in which height or place differ by more than the limits, looked at where positions came."""
+    """Find intervals in which height or place differ by more than the limits, at received positions."""
     own = [h for h in simulated if h.name == "GLOBAL_POSITION_INT" and h.message.lat]
     real = [h for h in recorded if h.name == "GLOBAL_POSITION_INT" and h.message.lat]
     if not own:
@@ -156,7 +156,7 @@ def motion(
 def targets(
     home: HomePosition, recorded: list[Heard], simulated: list[Heard], up_m: float, away_m: float, late_us: int
 ) -> Iterator[Difference]:
-    """The same for the targets that are reported, and stretches in which one side reports none for `late_us`."""
+    """Compare reported targets, and find intervals in which one side reports none for `late_us`."""
     during = _between(simulated, recorded[0].at_us, recorded[-1].at_us)
     real, own = ([h for h in side if h.name == "POSITION_TARGET_GLOBAL_INT"] for side in (recorded, during))
     for side, others, whose in ((real, own, "recorded"), (own, real, "simulated")):
@@ -169,7 +169,7 @@ def targets(
 
 
 def acknowledgements(recorded: list[Heard], simulated: list[Heard]) -> Iterator[Difference]:
-    """The results of each command of the client's, in order, over the whole session."""
+    """Compare the results of each command of the client, in order."""
     real, own = _results(recorded), _results(simulated)
     for command in sorted({*real, *own}):
         if real.get(command) != own.get(command):
@@ -185,7 +185,7 @@ def _results(heard: list[Heard]) -> dict[int, list[int]]:
 
 
 def rates(names: Iterable[str], recorded: list[Heard], simulated: list[Heard], part: float) -> Iterator[Difference]:
-    """How many messages of these names came, if that differs by more than a part of them, and by more than two."""
+    """Compare the numbers of messages of these names: by more than a share, and by more than two."""
     during = _between(simulated, recorded[0].at_us, recorded[-1].at_us)
     for name in names:
         real, own = (sum(h.name == name for h in side) for side in (recorded, during))
@@ -201,7 +201,7 @@ def _stretches(
     read: Callable[[Any], tuple[float, ...]],
     late_us: int = 0,
 ) -> Iterator[Difference]:
-    """Where the sides differ by more than `limit`, and by what comes within `late_us` too."""
+    """Find where the sides differ by more than `limit`, also within `late_us`."""
     worst: tuple[float, Heard, Any] | None = None
     start_us = 0
     times, places = [h.at_us for h in own], [read(h.message) for h in own]

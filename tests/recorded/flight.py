@@ -1,4 +1,4 @@
-"""A recorded flight of ours, again on the simulated vehicle: what the runtime sent, and what a pilot evidently did."""
+"""Repeat a recorded flight of the runtime on the simulated vehicle, with its frames and the presumed pilot actions."""
 
 from collections.abc import Sequence
 
@@ -9,15 +9,15 @@ from rtshcua.simulation.config import SimulationConfig
 from rtshcua.simulation.world import Simulation
 
 LEAD_US = 3 * SECOND
-"""The simulated vehicle is as old when the recording begins: it has come up, and its heartbeats come when those did."""
+"""The age of the simulated vehicle at the start of the recording: booted, with heartbeats in phase."""
 _LOOK_US = 20_000
 _ITEM, _REQUESTS = "MISSION_ITEM_INT", ("MISSION_REQUEST", "MISSION_REQUEST_INT")
 
 
 class Flight:
-    """`real` and `own` hold what either vehicle said, at microseconds from the first frame of the recording.
+    """`real` and `own` hold the frames of either vehicle, at microseconds from the first frame of the recording.
 
-    `pilot` holds frames of a ground station, and `faults` what went wrong, at their times from there.
+    `pilot` holds frames of a ground station, and `faults` the faults, with their times.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class Flight:
                     self._upload(self.own[-1])
 
     def _upload(self, heard: Heard) -> None:
-        """Answers a question for an item, as ours did."""
+        """Answer a mission item request, as the runtime did."""
         if heard.name not in _REQUESTS or heard.at_us < 0:
             return
         m = heard.message

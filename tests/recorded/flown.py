@@ -1,4 +1,4 @@
-"""A recorded flight through the driver and the state monitor, as the runtime would have seen it."""
+"""A recorded flight, replayed through the driver and the state monitor."""
 
 import lzma
 from collections import deque
@@ -31,12 +31,12 @@ from virtual.shipped import equipped, shipped
 TRACES = Path(__file__).resolve().parents[1] / "traces"
 SECOND = 1_000_000
 TICK_US = 50_000
-#: what is asked for by REQUEST_MESSAGE
+#: messages requested by REQUEST_MESSAGE
 ASKED = {
     "HEARTBEAT": mavlink.MAVLINK_MSG_ID_HEARTBEAT,
     "POSITION_TARGET_GLOBAL_INT": mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT,
 }
-#: an autopilot that was not heard for so long answers nothing either
+#: after such a silence the autopilot does not answer either
 SILENT_US = 300_000
 #: monotonic time of the autopilot's start
 START_US = 5_000_000
@@ -44,7 +44,7 @@ START_US = 5_000_000
 
 @cache
 def shipped_policy() -> Policy:
-    """The policy of the shipped missions, with all the signals that one of them needs."""
+    """Return the policy of the shipped missions, with all signals that they need."""
     policy, _ = (cose.unverified(envelope).payload for envelope in bundles.envelopes(equipped("one_bridge")))
     return bundles.parse(names.POLICY, policy, Policy)
 
@@ -57,7 +57,7 @@ def stock() -> tuple[Policy, Mission]:
 
 
 def at_home(latitude: int, longitude: int) -> Policy:
-    """That policy for a vehicle that lives elsewhere (1e-7 degree)."""
+    """Return that policy for another home (1e-7 degree)."""
     north = round(11.1319491 * (1 << SHIFT))
     east = round(11.1319491 * cos(radians(latitude / 1e7)) * (1 << SHIFT))
     return replace(shipped_policy(), projection=Projection(latitude, longitude, east, north))
@@ -65,13 +65,13 @@ def at_home(latitude: int, longitude: int) -> Policy:
 
 @dataclass
 class Recorded:
-    """One flight. `late_us` is when the first frame came, in us after the autopilot's start (the page's second 0).
+    """One flight. `late_us` is the time of the first frame, in us after the autopilot's start (second 0 of the page).
 
-    The recording holds only what the vehicle sent, and to another client. So nothing of it answers what the driver
-    asks: `parameters` and the last mode are told to it instead, and its fence is left alone. TIMESYNC is answered after
-    `round_trip_us`, by the time since boot that the recorded stamps show. `commands` are begun at their second, as if
-    the recorded client's had been ours; with `acknowledges`, whatever is commanded is acknowledged. What came after
-    `until_s` is left out.
+    The recording holds only frames of the vehicle, sent to another client, so it has no answers to the driver's
+    requests: `parameters` and the last mode are answered instead, and the fence is not uploaded. TIMESYNC is answered
+    after `round_trip_us`, by the time since boot of the recorded time stamps. `commands` begin at their seconds, as if
+    the recorded client's commands were the runtime's; with `acknowledges` every command is acknowledged. Frames after
+    `until_s` are dropped.
     """
 
     name: str
@@ -83,7 +83,7 @@ class Recorded:
     until_s: float = inf
     events: list[tuple[float, Event]] = field(default_factory=list)
     states: list[dict[str, int | None]] = field(default_factory=list)
-    monitored: list[State] = field(default_factory=list)  # the same, as the decision takes it
+    monitored: list[State] = field(default_factory=list)  # the same in the decision's form
     sent: list[tuple[float, ReceivedFrame]] = field(default_factory=list)
     round_trip_us: int = 20_000
 
@@ -94,11 +94,11 @@ class Recorded:
         self._frames = FrameSession()
         self.driver = Driver(self.policy, self._frames, fence=False)
         self._reader, self._teller = Codec(0, 0), Codec(1, 1)
-        self._told: dict[int, bytes] = {}  # the last report of mode and target,
-        self._told_us: dict[str, int] = {}  # and when it came
+        self._told: dict[int, bytes] = {}  # the last report of mode and target
+        self._told_us: dict[str, int] = {}  # its time
         self._alive_us = START_US  # when the autopilot itself was last heard
         self._now_us = START_US
-        self._boots: deque[int] = deque(maxlen=20)  # boot time minus ours, as the last stamps have it
+        self._boots: deque[int] = deque(maxlen=20)  # boot time minus own time, by the last time stamps
         self._clock_answers: deque[tuple[int, int]] = deque()  # when, and `ts1`
         self.states.append(self._state())
         waiting = list(self.commands)
@@ -110,7 +110,7 @@ class Recorded:
                 self._pass(next_us, waiting)
             if entry.frame[6] == 1:
                 if self._now_us - self._alive_us > SILENT_US:
-                    self._boots.clear()  # its clock may have stood still meanwhile
+                    self._boots.clear()  # its clock may have stopped meanwhile
                 self._alive_us = self._now_us
             self._receive(entry.frame)
 
@@ -119,15 +119,15 @@ class Recorded:
         return (self._now_us - START_US) / SECOND
 
     def of(self, *kinds: type[Event]) -> list[tuple[float, Event]]:
-        """The events of these kinds, and when they came."""
+        """Return the events of these kinds, with their times."""
         return [(at, event) for at, event in self.events if isinstance(event, kinds)]
 
     def first(self, kind: type[Event]) -> float:
-        """When the first of a kind came."""
+        """Return the time of the first event of a kind."""
         return self.of(kind)[0][0]
 
     def known(self, signal: str) -> list[tuple[int, int]]:
-        """The stretches of seconds, from and to, at each of which a signal was known and not stale."""
+        """Return the intervals of seconds in which a signal was known and not stale."""
         stretches: list[tuple[int, int]] = []
         for second, state in enumerate(self.states):
             if state[signal] is None:
@@ -204,7 +204,7 @@ class Recorded:
         self._receive(self._teller.pack(mavlink.MAVLink_command_ack_message(number, 0, 0, 0, 1, OURS)))
 
     def _tell(self, number: int) -> None:
-        """As both real ones answer: acknowledged, and as it was told last; a target only while it is streamed."""
+        """Answer like both autopilots: an acknowledgement, and the last report; a target only while it is streamed."""
         self._acknowledge(mavlink.MAV_CMD_REQUEST_MESSAGE)
         streamed = self._now_us - self._told_us.get("POSITION_TARGET_GLOBAL_INT", 0) <= SILENT_US
         if number == ASKED["POSITION_TARGET_GLOBAL_INT"] and not streamed:
@@ -225,7 +225,7 @@ class Recorded:
 
 
 def _boot_us(frame: ReceivedFrame) -> int:
-    """When it was measured, of those messages that are sent as soon as that; 0 of others."""
+    """Return the time of measurement of messages that are sent at once; 0 for others."""
     match frame.name:
         case "GLOBAL_POSITION_INT":
             return int(frame.message.time_boot_ms) * 1_000
@@ -235,5 +235,5 @@ def _boot_us(frame: ReceivedFrame) -> int:
 
 
 def command(token: int, kind: MotionKind, *geo: int, altitude: int = 0, speed: int = 0) -> Command:
-    """A command at a place in 1e-7 degree."""
+    """Return a command with a place in 1e-7 degree."""
     return Command(token, kind.name.lower(), kind, (0,) * len(geo), geo, altitude, speed)

@@ -1,4 +1,4 @@
-"""Asks the simulated vehicle what the real one was asked, at the same times of its clock."""
+"""Send the requests of a recorded session to the simulated vehicle, at the same times of its clock."""
 
 from heapq import merge
 
@@ -12,7 +12,7 @@ _LOOK_US = 100_000
 
 
 class Replay:
-    """The simulated session; `heard` holds what came back, as `Trace.of_vehicle` does."""
+    """The simulated session; `heard` holds the received frames, like `Trace.of_vehicle`."""
 
     def __init__(self, trace: Trace, config: SimulationConfig) -> None:
         self.simulation = Simulation(config)

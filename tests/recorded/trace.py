@@ -1,7 +1,7 @@
-"""A recorded session with a real autopilot: what was asked, and what came back, by the autopilot's own clock.
+"""A recorded session with a real autopilot: requests and answers, by the autopilot's own clock.
 
-The autopilot's clock is `time_boot_ms` of GLOBAL_POSITION_INT. One session ran faster than life, another a little
-slower; by that clock they can be asked again in virtual time.
+The autopilot's clock is `time_boot_ms` of GLOBAL_POSITION_INT. One session ran faster than real time, another a little
+slower; by that clock they can be repeated in virtual time.
 """
 
 import lzma
@@ -22,7 +22,7 @@ _UPLOADED = "MISSION_ITEM_INT"
 
 @dataclass(frozen=True)
 class Heard:
-    """A good frame, and when it came: microseconds since the autopilot's start."""
+    """A valid frame, and its time: microseconds since the autopilot's start."""
 
     at_us: int
     received: ReceivedFrame
@@ -49,7 +49,7 @@ def landed(heard: Heard) -> object:
 
 @dataclass(frozen=True)
 class Question:
-    """Something that the client sent; `items` are those of an upload, sent as they are asked for."""
+    """A request of the client; `items` are those of an upload, sent on request."""
 
     number: int
     heard: Heard
@@ -61,7 +61,7 @@ class Question:
 
     @property
     def key(self) -> str:
-        """Its place in the session and what it is, short."""
+        """Return a short description with its position in the session."""
         m = self.heard.message
         what = self.heard.name
         if what in ("COMMAND_LONG", "COMMAND_INT"):
@@ -72,9 +72,9 @@ class Question:
 
 
 class Trace:
-    """The session of one file in `tests/traces`.
+    """Read the session of one file in `tests/traces`.
 
-    `wall`: by the clock of who recorded it, from the first frame; for an autopilot whose own clock stood still.
+    `wall`: by the recorder's clock, from the first frame; for an autopilot whose own clock stopped.
     """
 
     def __init__(self, name: str, wall: bool = False) -> None:
@@ -100,7 +100,7 @@ class Trace:
 
     @cached_property
     def heard(self) -> list[Heard]:
-        """Every frame of both ends, in order."""
+        """Return every frame of both ends, in order."""
         return [Heard(self._boot_us(at), received) for at, received in self._frames]
 
     @cached_property
@@ -109,7 +109,7 @@ class Trace:
 
     @cached_property
     def heartbeats(self) -> list[Heard]:
-        """The client's."""
+        """Return the client's frames."""
         return [h for h in self.heard if h.received.component == CLIENT and h.name == "HEARTBEAT"]
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Where the library is found, in every shape an installation can have."""
+"""Locating the library in every kind of installation."""
 
 import importlib.util
 import shutil
@@ -14,7 +14,7 @@ Installed = Callable[[], Path]
 
 @pytest.fixture
 def installed(tmp_path: Path) -> Installed:
-    """A copy of `library.py` alone in `tmp_path/rtshcua`, loaded from there."""
+    """Load a copy of only `library.py` from `tmp_path/rtshcua`."""
     home = tmp_path / "rtshcua" / "library.py"
     home.parent.mkdir()
     shutil.copy(library.__file__, home)

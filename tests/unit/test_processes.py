@@ -1,4 +1,4 @@
-"""Tests run by several processes: none is lost, each file is one process's, and a process that dies is a failure."""
+"""Tests in several processes: no test is lost, one process runs each file, and a dead process is a failure."""
 
 import os
 import subprocess
@@ -65,7 +65,7 @@ def test_leaves_garbage():
     left = Left()
     left.itself = left
 """
-#: in the middle of a file, at its end, and when what it shared is torn down: as though all were well
+#: exits in the middle of a file, at its end, and during teardown, with a successful exit code
 ENDS = """
 import os
 
@@ -111,7 +111,7 @@ def test_after():
 
 
 def run(folder: Path, *words: str, **files: str) -> tuple[int, str]:
-    """What pytest says of these files, and its exit code."""
+    """Run pytest on these files; return its exit code and output."""
     for name, text in {"conftest": CONFTEST, **files}.items():
         (folder / f"{name}.py").write_text(text, encoding="utf-8")
     paths = os.pathsep.join([str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
@@ -174,7 +174,7 @@ def test_run_that_ends_early_says_why(tmp_path: Path, words: tuple[str, ...], fi
 def test_process_that_leaves_tests_is_a_failure(
     tmp_path: Path, text: str, told: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Also where it ends as one does that did."""
+    """Also if its exit code signals success."""
     if text is HANGS:
         monkeypatch.setenv("MOST_S", "5")
     code, said = run(tmp_path, test_it=text, test_other=PASSES)

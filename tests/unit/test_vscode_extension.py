@@ -1,6 +1,6 @@
-"""The extension for VS Code: its grammar knows every word of the language, its snippets parse, its parts are there.
+"""The extension for VS Code: its grammar has every keyword, its snippets parse, its files exist.
 
-A small walker stands for VS Code's tokeniser; the real one (vscode-textmate) was tried by hand, see editors/vscode.
+A small tokeniser replaces VS Code's; the real one (vscode-textmate) was tried manually, see editors/vscode.
 """
 
 import json
@@ -31,7 +31,7 @@ PACKAGE = read("package.json")
 
 
 def rules(name: str = "$self") -> Iterator[dict[str, Any]]:
-    """The rules of a pattern list, in their order, with what they include."""
+    """Yield the rules of a pattern list, in order, with included ones."""
     listed = GRAMMAR["patterns"] if name == "$self" else GRAMMAR["repository"][name]["patterns"]
     for rule in listed:
         if "include" in rule:
@@ -41,7 +41,7 @@ def rules(name: str = "$self") -> Iterator[dict[str, Any]]:
 
 
 def tokens(text: str) -> Iterator[tuple[str, str]]:
-    """Each part of a text with its innermost scope; empty for none. A part of a rule that is nested is left to it."""
+    """Yield each part of a text with its innermost scope, empty for none."""
     inside: dict[str, Any] | None = None
     known = [(rule, re.compile(rule.get("match") or rule["begin"])) for rule in rules()]
     for line in text.split("\n"):
@@ -78,7 +78,7 @@ def tokens(text: str) -> Iterator[tuple[str, str]]:
 
 
 def matches(rule: dict[str, Any]) -> list[str]:
-    """The patterns within a rule that begins and ends."""
+    """Return the patterns inside a begin/end rule."""
     return [each["match"] for each in rule.get("patterns", ())]
 
 
@@ -98,7 +98,7 @@ def captured(rule: dict[str, Any], match: re.Match[str]) -> Iterator[tuple[str, 
 def test_grammar_has_exactly_the_keywords() -> None:
     text = (CHECKOUT / "grammar" / "rtshcua.lark").read_text(encoding="utf-8")
     quoted = set(re.findall(r'^[A-Z_.0-9]+: "([a-z_]+)"', text, re.MULTILINE))
-    # words that are regular expressions, as they stand only before a bracket, or as part of a phrase
+    # keywords that need a regular expression: only before a bracket, or in a phrase
     special = re.findall(r"^_?(?!NAME|UNIT|REASON|LINK_NAME|STRING)[A-Z_]+(?:\.\d)?: /(.*?)/", text, re.MULTILINE)
     phrased = {word for pattern in special for word in re.findall(r"(?<![\\[a-z])[a-z]{2,}(?![a-z-]*\])", pattern)}
     words = {word for rule in rules("words") for word in re.findall(r"[a-z]+", rule["match"].replace(r"\b", ""))}
@@ -161,7 +161,7 @@ def test_every_pattern_has_a_scope_of_this_language() -> None:
 
 
 def expanded(body: str) -> str:
-    """A snippet with every placeholder filled by its default, or the first of its choices."""
+    """Return a snippet with every placeholder filled by its default, or its first choice."""
     body = re.sub(r"\$\{\d+\|([^,|]*)[^|]*\|\}", r"\1", body)
     while True:
         found = re.sub(r"\$\{\d+:([^${}]*)\}", r"\1", body)

@@ -160,6 +160,5 @@ def test_flight_matches_the_recording(name: str) -> None:
     assert set(kept) == {d.key for d in differences}, "these differ no more"
 
 
-def test_script_is_that_of_the_page() -> None:
-    """The script has the commands of the page."""
+def test_both_configurations_boot_as_recorded() -> None:
     assert replace(COPTER, faults=()).boot is PX4.boot is Boot.RECORDED

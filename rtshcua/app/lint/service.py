@@ -66,19 +66,25 @@ def lint(options: LintOptions) -> LintRun | Refusal:
     forbidden = None if options.output is None else overwriting_a_source(options.output, read, "a report")
     if forbidden is not None:
         return forbidden
-    if not options.fixes:
-        return LintRun(options, about, found, names, None, {})
+    run = LintRun(options, about, found, names, None, {})
+    return _fixed(run, session, changed) if options.fixes else run
+
+
+def _fixed(run: LintRun, session: LintSession, changed: GitChanges | None) -> LintRun:
+    """Apply the fixes of a run, and write them unless the run only shows them."""
+    options, about = run.options, run.scope
     fixed = fix(
-        session, found, lambda: _find(options, about, session, changed)[0], names, suggested=options.unsafe_fixes
-    )
+        session, run.findings, lambda: _find(options, about, session, changed)[0], run.names,
+        suggested=options.unsafe_fixes,
+    )  # fmt: skip
     unwritten = {} if options.diff else _write(fixed)
     if unwritten:
         for name in unwritten:
             session.put(name, fixed.before[name])
-        found, names = _find(options, about, session, changed)
         files = {name: data for name, data in fixed.files.items() if name not in unwritten}
-        fixed = fixed._replace(files=files, told=found)
-    return LintRun(options, about, fixed.told, names, fixed, unwritten)
+        told, names = _find(options, about, session, changed)
+        run, fixed = run._replace(names=names), fixed._replace(files=files, told=told)
+    return run._replace(findings=fixed.told, fixed=fixed, unwritten=unwritten)
 
 
 def _misused(options: LintOptions) -> Refusal | None:

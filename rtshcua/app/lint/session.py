@@ -5,8 +5,10 @@ This module does not import the parser. `examine` does, and is imported only if 
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rtshcua import library
 from rtshcua.adapters.store.lint_cache import LintCache
@@ -15,6 +17,9 @@ from rtshcua.app.files import SPECIFICATION, root_programs
 from rtshcua.app.lint.cache import LintedProgram, decoded, encoded, mark
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.language.paths import shown
+
+if TYPE_CHECKING:
+    from rtshcua.app.lint.examine import Examiner
 
 
 class LintSession:
@@ -105,30 +110,27 @@ class LintSession:
             from rtshcua.app.lint.examine import examine_specification
 
             return [examine_specification(self, files, further[files[0]], asked)]
-        entries = [_entry(name, further[path]) for name, path in zip(names, files, strict=True)]
-        known = [self._known(caches[path], entry, asked) for path, entry in zip(files, entries, strict=True)]
-        missing = [number for number, each in enumerate(known) if each is None]
-        loaded: dict[int, LintedProgram] = {}
-        if missing:
-            from rtshcua.app.lint.examine import Examiner
-
-            fresh = Examiner(self, asked)
-            loaded = {number: fresh.loaded(files[number], further[files[number]]) for number in missing}
-        every = [known[number] or loaded[number] for number in range(len(files))]
+        examiner = cache(partial(_examiner, self, asked))  # imported and created only if a program is not cached
+        every: list[LintedProgram] = []
+        new: dict[int, LintedProgram] = {}
+        for number, path in enumerate(files):
+            found = self._known(caches[path], _entry(names[number], further[path]), asked)
+            if found is None:
+                found = new[number] = examiner().loaded(path, further[path])
+            every.append(found)
         chosen = root_programs(names, [each.members for each in every])
         waiting = [number for number in chosen if every[number].result is None]
         if waiting:
-            from rtshcua.app.lint.examine import Examiner
-
-            fresh = fresh if missing else Examiner(self, asked)
-            results = fresh.examined([(files[number], further[files[number]]) for number in waiting])
-            loaded |= dict(zip(waiting, results, strict=True))
-        for number, each in loaded.items():
+            results = examiner().examined([(files[number], further[files[number]]) for number in waiting])
+            new |= dict(zip(waiting, results, strict=True))
+        for number, each in new.items():
             every[number] = each
-            cache = caches[files[number]]
-            if cache is not None and each.lasting:
-                cache.put(entries[number], encoded(each, self._marked(entries[number])))
+            self._store(caches[files[number]], _entry(names[number], further[files[number]]), each)
         return [every[number] for number in chosen]
+
+    def _store(self, cache: LintCache | None, entry: str, program: LintedProgram) -> None:
+        if cache is not None and program.lasting:
+            cache.put(entry, encoded(program, self._marked(entry)))
 
     def _known(self, cache: LintCache | None, entry: str, asked: Mapping[str, int | None]) -> LintedProgram | None:
         data = None if cache is None else cache.get(entry)
@@ -141,6 +143,12 @@ class LintSession:
         if self._mark is None:
             self._mark = mark()
         return f"{self._mark} {entry}"
+
+
+def _examiner(session: LintSession, asked: Mapping[str, int | None]) -> "Examiner":
+    from rtshcua.app.lint.examine import Examiner
+
+    return Examiner(session, asked)
 
 
 def _entry(name: str, further: Sequence[Path]) -> str:

@@ -95,7 +95,7 @@ class Extents:
                 one, other = self._parts(left, holds=holds), self._parts(right, holds=holds)
                 if isinstance(node, tree.Both) is not holds:
                     return _few([*one, *other])
-                return _few([both for a in one for b in other for both in [_common(a, b)] if both is not None])
+                return _few(_intersections(one, other))
             case tree.AtMost(terms, bound):
                 return _sum_bounds(terms, -FAR, bound) if holds else _sum_bounds(terms, bound + 1, FAR)
             case tree.Equal(terms, value):
@@ -177,10 +177,10 @@ def _overlap(one: Bounds, other: Bounds) -> dict[Cell, tuple[int, int]]:
     return made
 
 
-def _common(one: Bounds, other: Bounds) -> Bounds | None:
-    """Return the intersection of two bounds, or None if it is empty."""
-    made = _overlap(one, other)
-    return None if any(low > high for low, high in made.values()) else made
+def _intersections(one: list[Bounds], other: list[Bounds]) -> list[Bounds]:
+    """Return the intersection of each pair of bounds that is not empty."""
+    pairs = (_overlap(a, b) for a in one for b in other)
+    return [each for each in pairs if all(low <= high for low, high in each.values())]
 
 
 def _few(parts: list[Bounds]) -> list[Bounds]:

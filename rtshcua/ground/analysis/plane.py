@@ -90,14 +90,12 @@ class Plane:
 
     def _candidates(self, inside: list[int], outside: list[int]) -> Iterator[Point]:
         yield from _FAR
-        boxes = [_bounds(self._zones[zone]) for zone in inside]
-        if boxes:
-            west, south = max(box[0] for box in boxes), max(box[1] for box in boxes)
-            east, north = min(box[2] for box in boxes), min(box[3] for box in boxes)
-        else:
-            boxes = [_bounds(self._zones[zone]) for zone in outside] or [(0, 0, 0, 0)]
-            west, south = min(box[0] for box in boxes) - 2, min(box[1] for box in boxes) - 2
-            east, north = max(box[2] for box in boxes) + 2, max(box[3] for box in boxes) + 2
+        boxes = [_bounds(self._zones[zone]) for zone in inside or outside] or [(0, 0, 0, 0)]
+        wests, souths, easts, norths = zip(*boxes, strict=True)
+        if inside:  # their common box
+            west, south, east, north = max(wests), max(souths), min(easts), min(norths)
+        else:  # a box around them
+            west, south, east, north = min(wests) - 2, min(souths) - 2, max(easts) + 2, max(norths) + 2
         if west > east or south > north:
             return
         yield (west + east) // 2, (south + north) // 2

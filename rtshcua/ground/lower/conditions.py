@@ -252,6 +252,23 @@ class ConditionLowering:
                     self._condition(code, operand, place, safe)
                     if number:
                         code.add(Op.AND if node.operator == "and" else Op.OR)
+            case ForLast() | WithinLast() | Edge() | Near():
+                self._temporal(code, node, place, safe)
+            case Inside():
+                self._inside(code, node, place, safe)
+            case Known():
+                self._known(code, node.subject.name)
+            case Comparison():
+                self._comparison(code, node, place)
+            case Within():
+                self._range(code, node, place)
+            case OneOf():
+                self._one_of(code, node, place)
+
+    def _temporal(
+        self, code: CodeWriter, node: ForLast | WithinLast | Edge | Near, place: ConditionPlace, safe: bool
+    ) -> None:
+        match node:
             case ForLast():
                 self._monitor(code, MonitorKind.FOR_LAST, node.operand, node.window.value, place, safe)
             case WithinLast():
@@ -265,16 +282,6 @@ class ConditionLowering:
                     self._monitor(code, MonitorKind.WITHIN_LAST, before, node.window.value, place, safe)
                     code.add(Op.AND)
                 code.add(Op.OR)
-            case Inside():
-                self._inside(code, node, place, safe)
-            case Known():
-                self._known(code, node.subject.name)
-            case Comparison():
-                self._comparison(code, node, place)
-            case Within():
-                self._range(code, node, place)
-            case OneOf():
-                self._one_of(code, node, place)
 
     def _monitor(
         self, code: CodeWriter, kind: MonitorKind, operand: Condition, window_us: int, place: ConditionPlace, safe: bool

@@ -185,31 +185,39 @@ def _prove_links(
     Returns the returns that may exceed the energy of their skill, with the charge that they need.
     """
     returns: list[tuple[Contract, int]] = []
+    for link, last, time_us in _link_times(proof, step, starts, slowest):
+        contract = proof.policy.contracts[link.link.skill]
+        allowed = link.link.limit_us or contract.duration_us
+        if not last and 0 < allowed < time_us:
+            name = f"`{contract.name}`, a link of this step's chains,"
+            declared = proof.skills[contract.name].duration
+            limit = proof.span(link.link) if link.link.limit_us or declared is None else declared.span
+            _too_long(proof, step, name, contract, time_us, allowed, limit, slowest=slowest)
+            return []
+        needed = charge(proof.speeds, time_us)
+        if link.motion == MotionKind.HOME and needed > contract.energy:
+            returns.append((contract, needed))
+    return returns
+
+
+def _link_times(
+    proof: ProofContext, step: MissionStep, starts: Sequence[StartPlace], slowest: int
+) -> Iterator[tuple[PreparedLink, bool, int]]:
+    """Yield each link of a step's chains, with whether it is the last one, and its longest time in us."""
     if step.flat.plan.kind in (MotionKind.HOME, MotionKind.LAND):
-        return returns  # the links after it only land
+        return  # the links after it only land
     volumes = [planned(proof, step.prepared, start)[1] for start in starts]
     distance = max(volume.farthest[1] for volume in volumes)
-    low = min(volume.height[0] for volume in volumes)
-    high = max(volume.height[1] for volume in volumes)
+    lows, highs = zip(*(volume.height[:2] for volume in volumes), strict=True)
     degrades = [rule.target for rule in step.prepared.candidates.degrades]
     for chain in (degrades, step.prepared.chain, proof.prepared.contingency):
-        reach, so_far = (distance, low, high), slowest
+        reach, so_far = (distance, min(lows), max(highs)), slowest
         for link in chain:
             reach, time_us = _link_us(proof, link, *reach, so_far)
-            contract = proof.policy.contracts[link.link.skill]
-            sets_speed = contract.motion.speed >= 0 and contract.motion.kind == MotionKind.FLY
-            so_far = slower(so_far, link.link.arguments[contract.motion.speed] if sets_speed else 0)
-            allowed = link.link.limit_us or contract.duration_us
-            name = f"`{contract.name}`, a link of this step's chains,"
-            if link is not chain[-1] and 0 < allowed < time_us:
-                declared = proof.skills[contract.name].duration
-                limit = proof.span(link.link) if link.link.limit_us or declared is None else declared.span
-                _too_long(proof, step, name, contract, time_us, allowed, limit, slowest=slowest)
-                return []
-            needed = charge(proof.speeds, time_us)
-            if link.motion == MotionKind.HOME and needed > contract.energy:
-                returns.append((contract, needed))
-    return returns
+            yield link, link is chain[-1], time_us
+            motion = proof.policy.contracts[link.link.skill].motion
+            if motion.speed >= 0 and motion.kind == MotionKind.FLY:
+                so_far = slower(so_far, link.link.arguments[motion.speed])
 
 
 def _link_us(

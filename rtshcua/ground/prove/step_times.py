@@ -148,14 +148,8 @@ class StepTime:
         if not windows and not dates:
             return ClauseFailure(not holds((0, EVER)))
         if dates:  # it must hold on some date, at some time of the day
-            period = max((window.period for window in windows), default=DAY)
-            starts = {self.proof.prepared.tables.local.steady(), *(date - period for date in dates)}
-            moments = {
-                moment
-                for start in starts
-                for moment in (start, *_moments(windows, dates, start, start + 2 * period + DAY, through))
-            }
-            return ClauseFailure(not any(holds((moment, moment)) for moment in sorted({0, EVER, *dates, *moments})))
+            moments = sorted({0, EVER, *dates, *self._around_dates(windows, dates, through)})
+            return ClauseFailure(not any(holds((moment, moment)) for moment in moments))
         cycle = IssueCycle.of(self.proof, windows)
         edges = {each - back for each in cycle.edges(windows) for back in (0, through)}
         arcs = arcs_where(edges, lambda at: holds(cycle.at(at)), cycle.period)
@@ -163,6 +157,12 @@ class StepTime:
             label = (self.proof.span(clause), "the contract contains this condition")
             self._require(IssueRequirement(arcs, self.low, self.high, cycle.period, (label,)))
         return ClauseFailure(not arcs)
+
+    def _around_dates(self, windows: Sequence[Window], dates: Sequence[int], through: int) -> Iterator[int]:
+        """Yield the times around dates, and around an ordinary day, at which a window or a date changes the value."""
+        period = max((window.period for window in windows), default=DAY)
+        for start in {self.proof.prepared.tables.local.steady(), *(date - period for date in dates)}:
+            yield from (start, *_moments(windows, dates, start, start + 2 * period + DAY, through))
 
     def timed(self, clause: Clause, arguments: Sequence[int]) -> bool:
         """Whether the value of a condition depends on the time."""

@@ -1,4 +1,4 @@
-"""How the verification of a proof is told: to a person, and as JSON."""
+"""Print the result of a proof verification, as text or JSON."""
 
 from pathlib import Path
 
@@ -18,11 +18,11 @@ from rtshcua.evidence.records import encode
 from rtshcua.front.cli.render.claims import listed, write
 
 _SHOWN = 160
-_HELPS = {"trust/root-unknown-key": "if another root flew it: `--root` takes that trust root, or its public key"}
+_HELPS = {"trust/root-unknown-key": "if the flight used another trust root, name it or its public key with `--root`"}
 
 
 def as_object(result: ProofResult, path: Path, pinned: Pin, code: ExitCode) -> dict[str, object]:
-    """The whole, for a program. Keys are only ever added."""
+    """Return the result as a JSON object. Members are only ever added."""
     told: dict[str, object] = {
         "proof": str(path),
         "verdict": "refused" if isinstance(result, Flaw) else "proven",
@@ -53,7 +53,7 @@ def as_object(result: ProofResult, path: Path, pinned: Pin, code: ExitCode) -> d
 
 
 def as_text(result: ProofResult, path: Path, pinned: Pin, *, kept: bool, first: bool) -> None:
-    """The whole, for a person."""
+    """Print the result for a person."""
     lines: list[tuple[str, str]] = [] if first else [("", "")]
     if isinstance(result, Flaw):
         lines += [("bold red", f"REFUSED  {visible(str(path))}"), ("", f"  {visible(result.text)}")]
@@ -80,7 +80,7 @@ def as_text(result: ProofResult, path: Path, pinned: Pin, *, kept: bool, first: 
 
 
 def claims(result: Proven | ReceiptClaim) -> tuple[list[Claim], list[Claim]]:
-    """What the proof proves, and what it does not."""
+    """Return the claims that the proof proves, and those that it does not."""
     key = f"log key {_key(result)}, which the trust root names for `{_name(result).vehicle}`"
     last = "that nothing was added, and what the other records say: `verify-log` proves a log"
     rewritten = "unanchored: too few witnesses vouch for it here, and the log key's holder could have written it anew"
@@ -122,7 +122,7 @@ def _key(result: Proven | ReceiptClaim) -> str:
 
 
 def _record(result: Proven | ReceiptClaim) -> dict[str, object] | None:
-    """The fields of the record that is proven."""
+    """Return the fields of the proven record."""
     if result.record is None:
         return None
     fields: dict[str, object] = msgspec.json.decode(encode(result.record))

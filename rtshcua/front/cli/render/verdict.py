@@ -1,4 +1,4 @@
-"""How the audit of a log is told: to a person, and as JSON."""
+"""Print the result of a log verification, as text or JSON."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -14,54 +14,54 @@ from rtshcua.evidence.report import LogReport, LogVerdict, cosigned
 from rtshcua.front.cli.render.claims import listed, write
 from rtshcua.ground.audit.audit import Audit
 
-#: what a kind of failure means to whoever must act on it, by the first part of its slug
+#: the meaning of each kind of failure, by the first part of its slug
 MEANINGS = {
     "log": "There is nothing to verify.",
-    "genesis": "The beginning of the log is not what this program writes, or belongs to another flight.",
-    "record": "A line was damaged or written by something else: it is not what this program writes.",
-    "chain": "The log was changed after it was written, or records were taken out, added or moved.",
-    "clock": "The recorded times contradict each other: records were put together from elsewhere, or the clock failed.",
-    "seal": "What stands here is not what was signed: it was changed by someone who did not hold the key of the time.",
-    "close": "The end of the log was forged or damaged: it is not the end of these records.",
-    "trust": "Not trusted here: the log may be sound in itself, but it does not rest on the root that you trust.",
+    "genesis": "The beginning of the log is invalid, or belongs to another flight.",
+    "record": "A line is damaged, or was not written by this program.",
+    "chain": "The log was changed after it was written, or records were removed, added or moved.",
+    "clock": "The recorded times contradict each other: records come from another log, or the clock failed.",
+    "seal": "The records differ from the signed ones: they were changed by someone without the key of this epoch.",
+    "close": "The end of the log was forged or damaged, or belongs to other records.",
+    "trust": "The log may be valid, but it is not signed under the trust root that you pinned.",
     "decision": "The record does not follow from its own inputs: it was forged, or the onboard software is faulty.",
-    "document": "What somebody signed for the flight was forged, or taken in where it should have been refused.",
-    "dispatch": "The vehicle was commanded without the permission that the log should show first.",
-    "preparation": "Parameters of the autopilot were set otherwise than their record says, or when they may not be.",
-    "frames": "The raw frames show a command that the log does not: it went out without a record before it.",
-    "anchor": "A witness outside saw another log: this one was rewritten or cut, by someone who held its keys.",
-    "boundary": "The enforcement boundary decided, accepted or sent something else, or did not sign that it did this.",
-    "telemetry": "The raw frames beside the log are not those of this flight. The log itself is sound.",
-    "tail": "The log was cut, or the program stopped while it wrote. What came after is not known.",
+    "document": "A signed document was forged, or was accepted although it should have been refused.",
+    "dispatch": "The vehicle was commanded without an earlier record of the permission.",
+    "preparation": "Autopilot parameters were set differently from their record, or at a forbidden time.",
+    "frames": "The raw frames contain a command that is not in the log: it was sent without an earlier record.",
+    "anchor": "A witness saw a different log: this one was rewritten or cut by a holder of its keys.",
+    "boundary": "The log contradicts what the enforcement boundary decided, accepted or sent, or lacks its signature.",
+    "telemetry": "The raw frames file belongs to another flight. The log itself is valid.",
+    "tail": "The log was cut, or the program stopped while it was writing. Later events are unknown.",
 }
-#: the same, of what makes a log incomplete
+#: the meaning of findings that make a log incomplete
 _SHORT = {
-    "boundary": "The enforcement boundary was lost in flight, says who wrote the log: it signed nothing of the rest.",
-    "anchor": "The log is whole, and witnesses outside did not see all of it: `rtshcua witness` cosigns it.",
-    "close": "The program stopped before it closed the log, or its end was cut off. What came after is not known.",
+    "boundary": "According to the log, the enforcement boundary was lost in flight: the rest lacks its signature.",
+    "anchor": "The log is complete, but witnesses did not see all of it: cosign it with `rtshcua witness`.",
+    "close": "The program stopped before it closed the log, or the end was cut off. Later events are unknown.",
     "tail": MEANINGS["tail"],
-    "trust": "The log is whole, and a key that it rests on was revoked since: it may have been signed after that.",
+    "trust": "The log is complete, but one of its keys was revoked later: the log may have been signed after that.",
 }
-#: the same, of a slug that says something else than its kind
+#: the meaning of slugs that differ from their kind
 _OF_SLUG = {
-    "archive/changed": "The file was damaged or changed in the archive, after it was taken in.",
-    "archive/missing": "The file was moved or removed; nothing says that the log itself was bad.",
+    "archive/changed": "The file was damaged or changed after it was added to the archive.",
+    "archive/missing": "The file was moved or removed; the log itself may have been valid.",
     "close/junk-after": (
-        "The signed log ends before it, and its records are as they were signed: a file system that pads, a copy, or "
-        "somebody added the rest."
+        "The signed log before it is valid and complete: the rest was added by padding of the file system, by a copy, "
+        "or by somebody."
     ),
-    "seal/missing": "Whoever wrote the log did not sign in time, or a seal was taken out: no gap explains it.",
-    "seal/gap": "The record of a gap contradicts the records beside it: whoever wrote the log, wrote it wrongly.",
+    "seal/missing": "The log was not signed in time, or a seal was removed: no recorded gap explains it.",
+    "seal/gap": "The record of a gap contradicts the adjacent records: the log was written incorrectly.",
 }
-#: what to do about a failure, by its slug
+#: the remedy of a failure, by its slug
 HELPS = {
-    "archive/changed": "add the sound log again: `rtshcua archive add`",
-    "archive/missing": "add the log again: `rtshcua archive add`",
-    "close/junk-after": "`head -c BYTE LOG > COPY`, with the byte at which it begins, gives the log alone: verify that",
-    "trust/root-unknown-key": "if another root flew it: `--root` takes that trust root, or its public key",
-    "trust/root-revoked-key": "`--root` or `--revocations` takes the very trust root that was flown under",
-    "trust/revoked-log-key": "what witnesses cosigned before counts: `--anchors`",
-    "trust/revoked-when": "`--revocations` takes the trust roots between too, one by one",
+    "archive/changed": "add a valid copy of the log with `rtshcua archive add`",
+    "archive/missing": "add the log again with `rtshcua archive add`",
+    "close/junk-after": "run `head -c BYTE LOG > COPY` with the byte at which the extra data begins; verify the copy",
+    "trust/root-unknown-key": "if the flight used another trust root, name it or its public key with `--root`",
+    "trust/root-revoked-key": "name the trust root of the flight with `--root` or `--revocations`",
+    "trust/revoked-log-key": "name the anchors from before the revocation with `--anchors`",
+    "trust/revoked-when": "name all trust roots in between with `--revocations`",
 }
 
 _SHOWN = 160
@@ -75,7 +75,7 @@ _OUTCOMES = ("allow", "deny", "defer", "fallback")
 
 
 def as_object(audit: Audit, path: Path, pinned: Pin, code: ExitCode) -> dict[str, object]:
-    """The whole, for a program. Keys are only ever added."""
+    """Return the result as a JSON object. Members are only ever added."""
     report = audit.report
     genesis, close = report.genesis, report.close
     return {
@@ -122,7 +122,7 @@ def _finding(finding: Finding | None) -> dict[str, object] | None:
 
 
 def as_text(audit: Audit, path: Path, pinned: Pin, *, first: bool) -> None:
-    """Prints the whole for a person."""
+    """Print the result for a person."""
     report = audit.report
     lines: list[tuple[str, str]] = [] if first else [("", "")]
     lines += [("", f"log     {visible(str(path))}"), *_flight(report, path)]
@@ -164,7 +164,7 @@ def _why(finding: Finding, *, failed: bool) -> Iterable[tuple[str, str]]:
 
 
 def _gapped(report: LogReport) -> str:
-    """That nothing was recorded for a while, for how long, and who says so."""
+    """Return a line about the gaps of the log, their length, and the keys that signed them."""
     longest = max(gap.us for gap in report.gaps)
     both = all(gap.boundary is not None for gap in report.gaps)
     by = "the epoch keys and by the boundary" if both else "the epoch keys"
@@ -174,7 +174,7 @@ def _gapped(report: LogReport) -> str:
 
 
 def meaning_of(slug: str, *, failed: bool) -> str:
-    """What a finding means to whoever must act on it."""
+    """Return the meaning of a finding."""
     return _OF_SLUG.get(slug) or (MEANINGS if failed else _SHORT)[slug.partition("/")[0]]
 
 
@@ -191,7 +191,7 @@ def _counts(report: LogReport) -> Iterable[tuple[str, str]]:
         return
     epochs = f", in {many(report.epochs, 'sealed epoch')}" if report.epochs else ""
     if set(counts) <= _SIGNED:
-        yield "", f"  {many(report.records, 'record')}{epochs}; those that sign were read"
+        yield "", f"  {many(report.records, 'record')}{epochs}; only signed records were read"
         return
     outcomes = ", ".join(f"{counts[name]} {name}" for name in _OUTCOMES if counts.get(name))
     decisions = f"{many(counts.get('decision', 0), 'decision')}{f' ({outcomes})' if outcomes else ''}"

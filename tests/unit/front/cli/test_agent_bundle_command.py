@@ -47,7 +47,7 @@ def read(path: Path) -> Any:
     return json.loads(path.read_text("utf-8"))
 
 
-def test_a_plug_in_has_what_hosts_ask_for_and_no_secret(
+def test_plug_in_has_the_required_files_and_no_secret(
     base: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -92,7 +92,7 @@ def test_a_plug_in_has_what_hosts_ask_for_and_no_secret(
 @pytest.mark.skipif(
     "RTSHCUA_CLAUDE" not in os.environ, reason="names the program of Claude Code, which is not ours to have"
 )
-def test_claude_codes_own_validator_takes_it_and_refuses_what_is_wrong(base: Path, tmp_path: Path) -> None:
+def test_claude_validator_accepts_the_plug_in_and_rejects_a_broken_one(base: Path, tmp_path: Path) -> None:
     def validated(plug: Path) -> bool:
         command = [os.environ["RTSHCUA_CLAUDE"], "plugin", "validate", "--strict", "--json", str(plug)]
         settings = {"HOME": str(tmp_path), "DISABLE_AUTOUPDATER": "1", "CLAUDE_CODE_DISABLE_NONESSENTIAL_TRAFFIC": "1"}
@@ -143,7 +143,7 @@ def hooked(plug: Path, call: bytes) -> "subprocess.CompletedProcess[bytes]":
     return subprocess.run(words, input=call, capture_output=True, check=False)
 
 
-def test_the_hook_refuses_what_reaches_for_keys_or_socket_and_nothing_else(base: Path, tmp_path: Path) -> None:
+def test_hook_blocks_only_access_to_keys_and_socket(base: Path, tmp_path: Path) -> None:
     plug = tmp_path / "a plug"
     assert made(base, plug) == 0
     key = next(data_folder().rglob("mission-agent.key"))
@@ -156,9 +156,7 @@ def test_the_hook_refuses_what_reaches_for_keys_or_socket_and_nothing_else(base:
         assert hooked(plug, call).returncode == 0, call
 
 
-def test_what_is_wrong_is_said_and_nothing_is_made(
-    base: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_invalid_input_creates_no_plug_in(base: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     plug = tmp_path / "plug"
     other = tmp_path / "other.rts"
     other.write_text(POLICY.read_text("utf-8").replace("version 7", "version 8"), "utf-8")

@@ -73,7 +73,7 @@ def run() -> Iterator[Followed]:
         found.link.close()
 
 
-def test_the_first_lines_say_what_flies(run: Followed) -> None:
+def test_first_lines_name_the_mission(run: Followed) -> None:
     run.agents.events(run.clock.now())
     hello, mission = run.told()
     assert hello == {
@@ -122,7 +122,7 @@ def test_documents_and_their_answers(run: Followed) -> None:
     assert run.told() == [{"type": "close"}]
 
 
-def test_what_comes_in_after_the_mission_is_answered(run: Followed) -> None:
+def test_document_after_the_mission_is_answered(run: Followed) -> None:
     run.send(recall(run.loaded))
     told: list[dict[str, Any]] = []
     before = len(run.lines)
@@ -175,7 +175,7 @@ def test_operators_have_a_socket_of_their_own_and_are_looked_at_first(tmp_path: 
             assert (lines[-1]["id"], lines[-1]["slug"]) == (number, slug)
 
 
-def test_what_agents_make_the_flight_look_at_keeps_no_operator_waiting(tmp_path: Path) -> None:
+def test_agent_documents_do_not_delay_operators(tmp_path: Path) -> None:
     """Replacements are looked at ahead, by a thread for each socket, and no more of them than that."""
     of, over = low(), threading.Event()
     seeds = (number.to_bytes(32) for number in range(1, 14))

@@ -53,7 +53,7 @@ def test_version(word: str, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.parametrize("words", [[], ["--help"], ["--version"]])
-def test_the_door_opens_without_loading_what_is_behind_it(words: list[str]) -> None:
+def test_overview_imports_no_command(words: list[str]) -> None:
     program = (
         f"import sys; from rtshcua.front.cli.app import main; main({words})\n"
         "print(*sys.modules, sep='\\n', file=sys.stderr)"
@@ -84,7 +84,7 @@ def test_check_loads_nothing_of_lint(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_what_ships_is_checked_without_floating_point_geometry(checkout: Path) -> None:
+def test_shipped_sources_are_checked_without_float_geometry(checkout: Path) -> None:
     """What a check needs not takes long to import, and the floats of geometry differ between machines."""
     files = [str(path) for folder in ("skills", "policies", "missions") for path in (checkout / folder).glob("*.rts")]
     program = (
@@ -168,7 +168,7 @@ def test_misused_command(
     assert help == " help: `rtshcua show --help` explains it"
 
 
-def test_a_typo_and_a_limit_are_told_as_every_other_error(
+def test_typo_and_limit_have_the_common_error_format(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def takes(speed: Annotated[int, typer.Option(max=50)] = 1) -> None:
@@ -230,7 +230,7 @@ def abort_at_the_end() -> typer.Abort:
         return error
 
 
-def test_what_follows_a_question_that_was_left_begins_on_a_line_of_its_own(
+def test_output_after_an_interrupted_prompt_starts_on_a_new_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     door = typer.Typer()
@@ -267,7 +267,7 @@ def test_what_follows_a_question_that_was_left_begins_on_a_line_of_its_own(
         (TimeoutError("timed out"), ExitCode.LINK, "error: timed out"),
     ],
 )
-def test_what_rises_becomes_one_line_and_a_code(
+def test_exception_becomes_one_line_and_an_exit_code(
     error: BaseException,
     code: ExitCode,
     message: str,
@@ -305,7 +305,7 @@ def test_an_error_that_ctrl_c_caused_is_no_fault(
 
 
 @pytest.mark.parametrize("debug", ["", "0", "1"])
-def test_internal_fault_shows_its_traceback_only_when_asked(
+def test_traceback_requires_debug_variable(
     debug: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def breaks() -> None:

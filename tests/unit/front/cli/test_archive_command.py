@@ -68,7 +68,7 @@ def as_json(capsys: pytest.CaptureFixture[str]) -> Any:
 
 
 @pytest.mark.slow
-def test_runs_are_added_and_the_unclosed_one_is_told(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_add_reports_an_unclosed_log(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert archive("add", runs, *ROOT) == ExitCode.INCOMPLETE
     first, last = capsys.readouterr().out.splitlines()
     assert first.startswith(f"incomplete  {runs / 'quad-08-2' / 'log.jsonl'}: close/missing, the log ends after")
@@ -77,7 +77,7 @@ def test_runs_are_added_and_the_unclosed_one_is_told(runs: Path, capsys: pytest.
     assert "1 log, 0 of them verified now" in capsys.readouterr().out
 
 
-def test_a_missing_log_is_told(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_missing_log_is_reported(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert archive("add", runs / "quad-07-1", *ROOT) == ExitCode.OK
     assert "missing: the logs before 1 of these; run `rtshcua archive query missing`" in capsys.readouterr().out
     assert archive("query", "missing", "--json") == ExitCode.OK
@@ -85,7 +85,7 @@ def test_a_missing_log_is_told(runs: Path, capsys: pytest.CaptureFixture[str]) -
     assert row["vehicle"] == "quad-07"
 
 
-def test_a_log_that_fails_is_told_with_its_exit_code(
+def test_failed_log_is_reported_with_its_exit_code(
     runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     data = (runs / "quad-07-0" / "log.jsonl").read_bytes()
@@ -119,7 +119,7 @@ def test_verified_again(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.usefixtures("archived")
-def test_logs_of_another_root_are_left_and_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_logs_of_another_root_are_reported(capsys: pytest.CaptureFixture[str]) -> None:
     assert archive("verify", "--root", "00" * 32) == ExitCode.UNTRUSTED
     out = capsys.readouterr().out
     assert out.startswith("0 logs, 0 of them verified now")
@@ -130,7 +130,7 @@ def test_logs_of_another_root_are_left_and_told(capsys: pytest.CaptureFixture[st
 
 
 @pytest.mark.usefixtures("archived")
-def test_a_damaged_index_is_told_and_made_anew(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_damaged_index_is_reported_and_rebuilt(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "archive" / "index" / "logs.parquet").write_bytes(b"PAR1")
     assert archive("stats") == ExitCode.INPUT
     assert "help: rebuild it with `rtshcua archive verify --reindex`" in capsys.readouterr().err
@@ -138,7 +138,7 @@ def test_a_damaged_index_is_told_and_made_anew(tmp_path: Path, capsys: pytest.Ca
     assert archive("stats") == ExitCode.OK
 
 
-def test_a_full_disk_is_told(runs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_full_disk_is_reported(runs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> None:
         raise duckdb.IOException("IO Error: Could not write file: No space left on device")
 
@@ -163,7 +163,7 @@ def test_questions_that_ship_are_listed(capsys: pytest.CaptureFixture[str]) -> N
 
 
 @pytest.mark.usefixtures("archived")
-def test_who_was_refused_what_when_under_which_version(capsys: pytest.CaptureFixture[str]) -> None:
+def test_refused_query_has_vehicle_step_time_and_version(capsys: pytest.CaptureFixture[str]) -> None:
     words = ("--vehicle", "quad-07", "--skill", "goto", "--policy", "bridge_inspection@8", "--since", "2025-06-15")
     assert archive("query", "refused", *words, "--json") == ExitCode.OK
     rows = as_json(capsys)
@@ -224,7 +224,7 @@ def test_list_and_stats(capsys: pytest.CaptureFixture[str]) -> None:
         (("stats",), ExitCode.INPUT, "help: create one with `rtshcua archive add LOG...`"),
     ],
 )
-def test_what_makes_no_sense(
+def test_invalid_options_are_refused(
     words: tuple[str, ...], code: ExitCode, text: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert archive(*words) == code
@@ -232,7 +232,7 @@ def test_what_makes_no_sense(
 
 
 @pytest.mark.slow
-def test_a_cluster_that_is_none_is_told(runs: Path) -> None:
+def test_unreachable_cluster_is_reported(runs: Path) -> None:
     """In a process of its own: a client of a cluster leaves a thread behind."""
     words = ["archive", "add", str(runs / "quad-07-0"), *ROOT, "--cluster", "nonsense"]
     run = subprocess.run(
@@ -241,7 +241,7 @@ def test_a_cluster_that_is_none_is_told(runs: Path) -> None:
     assert (run.returncode, run.stderr) == (ExitCode.LINK, "error: no cluster answered: `nonsense`\n")
 
 
-def test_what_is_no_log_is_not_taken_in(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_file_that_is_not_a_log_is_not_added(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "notes.txt").write_text("{}")
     assert archive("add", "notes.txt", *ROOT) == ExitCode.INPUT
     assert "`notes.txt` is not a log of this program" in capsys.readouterr().err
@@ -315,7 +315,7 @@ def test_a_log_that_is_gone_fails_and_the_others_are_verified(
     assert {row["status"]: row["logs"] for row in as_json(capsys)} == {"verified": 5, "incomplete": 1}
 
 
-def test_what_is_no_log_keeps_no_log_of_its_folder_out(
+def test_other_files_do_not_block_the_logs_of_a_folder(
     runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for name, data in (("a", b""), ("b", b"junk\n"), ("z", (runs / "quad-07-0" / "log.jsonl").read_bytes())):
@@ -383,9 +383,7 @@ def test_a_log_that_becomes_a_link_before_it_is_copied_is_not_taken_in(
     assert not list(Path("archive/logs").rglob("*.jsonl"))
 
 
-def test_a_table_that_is_too_wide_is_told_row_by_row(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_wide_table_is_printed_row_by_row(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     rows = [["a" * 30, "b" * 30, 1], ["c", "d", 2]]
     monkeypatch.setenv("COLUMNS", "80")
     archive_tables.tell(["one", "another", "third"], rows, archive_tables.Shape.TABLE)

@@ -50,7 +50,7 @@ def test_the_key_store_s_key_or_another_file(store: KeyStore) -> None:
         assert found.kid == own.kid
 
 
-def test_a_root_that_names_none_asks_for_none(store: KeyStore) -> None:
+def test_root_without_boundary_key_requires_none(store: KeyStore) -> None:
     of = root(store)
     others = tuple(key for key in of.keys if key.duty is not Duty.BOUNDARY)
     elsewhere = replace(store.signing_key(Duty.BOUNDARY).verification(vehicles=("quad-08",)))
@@ -118,7 +118,7 @@ def test_without_a_key_nothing_is_kept(tmp_path: Path) -> None:
     assert (session.key, list(tmp_path.iterdir())) == (None, [])
 
 
-def test_what_cannot_be_known_or_kept_holds_back_nothing_that_is_in_the_air(tmp_path: Path) -> None:
+def test_unreadable_state_does_not_block_an_airborne_vehicle(tmp_path: Path) -> None:
     store = BoundaryStore(tmp_path, "quad-07")
     store.keep(1, b"a" * 32)
     store.path.write_bytes(b"x")

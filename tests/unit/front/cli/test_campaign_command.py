@@ -215,7 +215,7 @@ def test_a_campaign_of_other_faults_does_not_go_on_in_its_folder(
     assert "`made` holds a campaign with different kinds of faults" in err
 
 
-def test_a_flight_whose_line_was_torn_is_flown_again_and_no_other_is_lost(
+def test_torn_result_line_repeats_only_its_flight(
     here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
 ) -> None:
     flies(good)
@@ -259,7 +259,7 @@ def test_a_mission_that_fails_without_faults_is_refused(
 
 
 @pytest.mark.slow
-def test_who_is_asked_for_an_approval_gives_it_in_every_flight_where_that_is_asked_for(
+def test_approve_grants_each_requested_approval(
     here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
 ) -> None:
     """Two roles are asked before each of two orbits: without them the mission cannot be flown."""
@@ -310,7 +310,7 @@ def test_a_file_is_no_folder_of_a_campaign(here: Path, capsys: pytest.CaptureFix
         (["--cluster", "tcp://127.0.0.1:9"], "`--jobs` and `--cluster` cannot be combined"),
     ],
 )
-def test_what_makes_no_sense_is_refused(
+def test_conflicting_options_are_refused(
     here: Path, capsys: pytest.CaptureFixture[str], words: list[str], text: str
 ) -> None:
     code, _, err = run(capsys, *words)
@@ -332,7 +332,7 @@ def test_a_cluster_that_does_not_answer_is_named(
     assert "no cluster answered: `tcp://127.0.0.1:9`" in capsys.readouterr().err
 
 
-def test_what_is_no_scheduler_and_what_is_no_source_is_refused_before_anything_flies(
+def test_invalid_scheduler_or_source_is_refused_before_flying(
     here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
 ) -> None:
     flies(lambda *_: pytest.fail("nothing is to fly"))

@@ -108,19 +108,19 @@ def test_without_a_path_it_is_this_folder(here: Path, capsys: pytest.CaptureFixt
     assert answers[0] == answers[1] == answers[2]
 
 
-def test_the_answer_does_not_depend_on_how_often_it_is_asked(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_repeated_check_gives_the_same_result(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     put({"policy.rts": POLICY.replace("<= 15 m", "<= 5 m")})
     assert answer(capsys, ".") == answer(capsys, ".")
 
 
-def test_a_finding_in_a_shared_file_is_told_once(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_finding_in_a_shared_file_is_reported_once(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     put({"policy.rts": POLICY.replace("meadow\n", "meddow\n")})
     code, answered = answer(capsys, "a", "b")
     assert code == ExitCode.DIAGNOSTICS
     assert found(answered) == [("E0201", "policy.rts")]
 
 
-def test_each_file_sees_only_what_it_imports(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_each_file_sees_only_its_imports(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     put({"alone.rts": MISSION.replace('import "policy.rts"\n', "")})
     code, answered = answer(capsys, "alone.rts", "policy.rts")
     assert (code, found(answered)[0]) == (ExitCode.DIAGNOSTICS, ("E0201", "alone.rts"))
@@ -237,7 +237,7 @@ def test_a_policy_that_changes_needs_a_new_version(old: Path, earlier: str, caps
     assert raised == {"policy": "meadow_flight", "version": 3, "earlier": 2}
 
 
-def test_a_person_is_told_what_was_compared(old: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_compared_versions_are_printed(old: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", "a", "--since", "old.bundle"]) == ExitCode.OK
     assert (
         capsys.readouterr().out.splitlines()[-1]
@@ -259,7 +259,7 @@ def test_a_gate_does_not_pass_where_nothing_was_compared(
     assert (code, answered["exit"], answered["error"]["slug"]) == (ExitCode.INPUT, "input", "since")
 
 
-def test_an_earlier_policy_that_none_was_compared_with_is_told(old: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_unmatched_earlier_policy_is_printed(old: Path, capsys: pytest.CaptureFixture[str]) -> None:
     put({".old/second.rts": POLICY.replace("meadow_flight", "second_flight")})
     code, answered = answer(capsys, "policy.rts", "--since", ".old")
     assert (code, answered["not_here"]) == (ExitCode.OK, ["second_flight"])
@@ -267,7 +267,7 @@ def test_an_earlier_policy_that_none_was_compared_with_is_told(old: Path, capsys
     assert "second_flight: only in .old; no policy here to compare with" in capsys.readouterr().out
 
 
-def test_what_cannot_be_compared_with(old: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_since_is_refused(old: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("empty").mkdir()
     Path("bad.bundle").write_bytes(b"\xd9\xd9\xf7nothing")
     put({"bad.rts": "zone ?"})
@@ -350,6 +350,6 @@ def test_a_zone_that_exists_on_dates_counts_for_the_time_that_is_given(
     assert ("E0508" in capsys.readouterr().err) is then
 
 
-def test_a_time_that_is_none(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_time_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", "policy.rts", "--at", "noon"]) == ExitCode.USAGE
     assert "`noon` is not a UTC time" in capsys.readouterr().err

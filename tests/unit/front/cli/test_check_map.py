@@ -64,7 +64,7 @@ def test_a_refused_mission_is_drawn_with_the_place_where_it_fails(at: Path) -> N
     assert ">refused</strong>" in page
 
 
-def test_a_step_that_is_refused_for_what_it_asks_has_no_cross(at: Path) -> None:
+def test_step_refused_for_its_arguments_has_no_cross(at: Path) -> None:
     code, page = drawn(at, "bridge_a.entry", "41 m")
     assert code == ExitCode.DIAGNOSTICS
     assert page.count('class="failed-leg"') == 1
@@ -81,7 +81,7 @@ def test_a_mission_without_errors_is_drawn_too(at: Path, capsys: pytest.CaptureF
     assert 'class="way"' in page
 
 
-def test_what_stands_outside_of_a_step_is_told_beneath(at: Path) -> None:
+def test_findings_outside_steps_are_listed_below_the_map(at: Path) -> None:
     (at / "past.rts").write_text(MISSION.format(*GOOD).replace("goto(47", "no_skill(47"))
     assert check("past.rts", "--map", "map.html") == ExitCode.DIAGNOSTICS
     page = (at / "map.html").read_text(encoding="utf-8")
@@ -110,7 +110,7 @@ def test_the_page_is_well_formed_and_the_same_every_time(at: Path) -> None:
 
 
 @pytest.mark.parametrize("target", ["past.rts", "nowhere/map.html", "."])
-def test_what_a_page_does_not_replace(at: Path, target: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_map_does_not_replace_other_files(at: Path, target: str, capsys: pytest.CaptureFixture[str]) -> None:
     (at / "past.rts").write_text(MISSION.format(*GOOD))
     assert check("past.rts", "--map", target) != ExitCode.OK
     assert (at / "past.rts").read_text() == MISSION.format(*GOOD)

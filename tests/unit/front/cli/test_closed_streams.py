@@ -37,7 +37,7 @@ def test_everything_closed(tmp_path: Path) -> None:
     assert shell(f"{COMMAND} --version <&- >&- 2>&-", tmp_path).returncode == ExitCode.FULL
 
 
-def test_what_is_opened_next_is_not_taken_for_the_output(tmp_path: Path) -> None:
+def test_file_opened_later_does_not_become_standard_output(tmp_path: Path) -> None:
     program = (
         "from rtshcua.front.cli.streams import mend_streams; mend_streams()\n"
         "x = open('x', 'w'); x.write(str(x.fileno()))"

@@ -75,7 +75,7 @@ def findings(text: str, code: Code) -> tuple[tuple[Diagnostic, ...], Program]:
     return found + (linted(program) if code.id.startswith("E13") else ()), program
 
 
-def test_there_is_a_page_for_each_code_and_none_besides() -> None:
+def test_each_code_has_exactly_one_page() -> None:
     assert {path.stem for path in PAGES.iterdir()} == set(REGISTRY)
 
 

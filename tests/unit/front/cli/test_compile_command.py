@@ -39,7 +39,7 @@ def proposal(checkout: Path) -> str:
 
 
 @pytest.mark.parametrize("name", ["short.rts", "standard.rts", "extended.rts", "proposal.json"])
-def test_what_ships_compiles_to_the_same_bytes_each_time(checkout: Path, tmp_path: Path, name: str) -> None:
+def test_shipped_missions_compile_reproducibly(checkout: Path, tmp_path: Path, name: str) -> None:
     first, second = tmp_path / "first", tmp_path / "second"
     under = ["--policy", "bridge_inspection@7"] if name.endswith(".json") else []
     for target in (first, second):
@@ -114,7 +114,7 @@ def test_the_policy_of_a_proposal_may_be_named_by_whoever_compiles(checkout: Pat
     assert main(["compile", "p.json", "--with", policy]) == ExitCode.OK
 
 
-def test_the_schema_is_valid_and_takes_what_ships(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_schema_is_valid_and_accepts_shipped_missions(checkout: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema"]) == ExitCode.OK
     schema = json.loads(capsys.readouterr().out)
     jsonschema.Draft202012Validator.check_schema(schema)
@@ -154,7 +154,7 @@ def test_a_missing_source(here: Path, capsys: pytest.CaptureFixture[str]) -> Non
 
 
 @pytest.mark.parametrize("target", ["source.rts", ".", "/dev/null", "nowhere/x.bundle"])
-def test_what_a_bundle_must_not_replace(checkout: Path, here: Path, target: str) -> None:
+def test_bundle_does_not_replace_other_files(checkout: Path, here: Path, target: str) -> None:
     source = (checkout / "missions" / "short.rts").read_bytes()
     (here / "source.rts").write_bytes(source)
     assert main(["compile", "source.rts", "-o", target]) in {ExitCode.USAGE, ExitCode.INPUT}
@@ -182,7 +182,7 @@ def test_without_keys_there_is_a_way_on(
 
 
 @pytest.mark.parametrize("moment", ["yesterday", "2026-01-31", "2026-01-31T08:00:00", ""])
-def test_a_time_of_issue_that_is_none(checkout: Path, here: Path, moment: str) -> None:
+def test_invalid_time_of_issue_is_refused(checkout: Path, here: Path, moment: str) -> None:
     assert main(["compile", str(checkout / "missions" / "short.rts"), "--at", moment]) == ExitCode.USAGE
 
 
@@ -252,9 +252,7 @@ def test_a_folder_or_a_bundle_is_no_source(
     assert ((here / "made.bundle").read_bytes(), names(here)) == (kept, ["made", "made.bundle"])
 
 
-def test_a_key_that_others_may_read_says_what_to_do(
-    checkout: Path, here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_readable_key_is_refused_with_a_remedy(checkout: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     key = here / "policy.key"
     shutil.copy(KeyStore(data_folder()).folder / "policy.key", key)
     key.chmod(0o644)

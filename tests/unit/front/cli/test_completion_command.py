@@ -111,7 +111,7 @@ def test_zsh_can_load_it(place: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert (done.stdout.strip(), done.stderr) == ("_rtshcua", "")
 
 
-def test_what_is_said_of_parameters_is_said_of_some_that_are_there() -> None:
+def test_completion_tables_name_existing_parameters() -> None:
     seen: set[str] = set()
 
     def walk(name: str, each: object) -> None:

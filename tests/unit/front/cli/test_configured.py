@@ -30,9 +30,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize("command", [["run", "x.bundle"], ["doctor", "--connect", "udpin:127.0.0.1:9"]])
-def test_what_may_not_be_set_is_said_before_anything_else(
-    command: list[str], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_unsettable_parameter_is_refused_first(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     for words, says in REFUSED:
         assert app.main([*command, *(f"--set={word}" for word in words)]) == ExitCode.USAGE
         assert says in capsys.readouterr().err, words
@@ -46,7 +44,7 @@ def test_nothing_is_set_of_a_vehicle_that_is_much_faster_than_life(capsys: pytes
         assert app.main([*words, *more]) == ExitCode.INPUT, "there is no such bundle"
 
 
-def test_what_may_be_set_is_read_as_a_number() -> None:
+def test_settable_parameters_are_parsed_as_numbers() -> None:
     read = settings_of(["FENCE_RADIUS=250", "FENCE_ALT_MAX=80.5"])
     assert {name: value_of(bits) for name, bits in read.items()} == {"FENCE_RADIUS": 250.0, "FENCE_ALT_MAX": 80.5}
     assert would_set(read) == [
@@ -65,7 +63,7 @@ def test_the_bounds_of_each_are_its_own(name: str) -> None:
         assert (unsettable(name, bits) is None) == good
 
 
-def test_the_doctor_says_what_a_run_that_broke_off_has_left(tmp_path: Path) -> None:
+def test_doctor_reports_parameters_of_an_interrupted_run(tmp_path: Path) -> None:
     debts = OwedParameters(tmp_path, "quad")
     assert _owed(debts) == []
     fifty, wide = settings_of(["A=50"])["A"], settings_of(["A=300"])["A"]
@@ -78,7 +76,7 @@ def test_the_doctor_says_what_a_run_that_broke_off_has_left(tmp_path: Path) -> N
     assert "is damaged" in found.found
 
 
-def test_the_simulated_vehicle_takes_what_its_owner_set(capsys: pytest.CaptureFixture[str]) -> None:
+def test_simulated_vehicle_takes_parameters(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["--port", "9", "--flavour", "ardupilot", "--parameter", "FENCE_RADIUS=50", "--parameter=RTL_ALT=3000"]
     assert config_of(parser().parse_args(words)).parameters == (("FENCE_RADIUS", 50.0), ("RTL_ALT", 3_000.0))
     assert main([*words, "--parameter", "GF_ACTION=1"]) == 2

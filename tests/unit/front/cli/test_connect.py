@@ -37,7 +37,7 @@ def says(address: str, capsys: pytest.CaptureFixture[str]) -> tuple[ExitCode, st
     return ExitCode(code), capsys.readouterr().err
 
 
-def test_garbage_is_told_from_no_heartbeat(line: tuple[str, int], capsys: pytest.CaptureFixture[str]) -> None:
+def test_garbage_is_distinguished_from_no_heartbeat(line: tuple[str, int], capsys: pytest.CaptureFixture[str]) -> None:
     device, far = line
     over, chance = threading.Event(), Random(3)
 
@@ -77,7 +77,7 @@ def test_nobody_at_the_other_end(capsys: pytest.CaptureFixture[str]) -> None:
     assert "nobody has connected" in said
 
 
-def test_a_line_that_is_no_address(capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_serial_address_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     code, said = says("serial:ttyUSB0:57600", capsys)
     assert code == ExitCode.USAGE
     assert said.splitlines() == [
@@ -89,7 +89,7 @@ def test_a_line_that_is_no_address(capsys: pytest.CaptureFixture[str]) -> None:
     ]
 
 
-def test_what_is_wrong_with_the_address_is_said_before_that_the_vehicle_is_not_named(
+def test_invalid_address_is_reported_before_missing_vehicle(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     for address, says_so in (

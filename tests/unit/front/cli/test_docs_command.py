@@ -34,7 +34,7 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_a_page_is_written_and_the_digest_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_page_is_written_and_its_digest_printed(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["docs", str(MISSION), "-o", "page.html", *AT]) == ExitCode.OK
     told = capsys.readouterr().out
     text = Path("page.html").read_text(encoding="utf-8")
@@ -74,7 +74,7 @@ def test_at_a_terminal_the_page_goes_to_a_file(monkeypatch: pytest.MonkeyPatch) 
     assert Path("own.html").is_file()
 
 
-def test_since_marks_what_changed(capsys: pytest.CaptureFixture[str]) -> None:
+def test_since_highlights_changes(capsys: pytest.CaptureFixture[str]) -> None:
     Path("new.rts").write_text(newer("<= 15 m\n", "<= 12 m\n"), encoding="utf-8")
     assert main(["docs", "new.rts", "--since", str(POLICY), "--json", *AT]) == ExitCode.OK
     (chapter,) = json.loads(capsys.readouterr().out)["handbook"]["chapters"]
@@ -103,7 +103,7 @@ def newer(old: str, new: str, *, raised: bool = True) -> str:
 
 
 @pytest.mark.parametrize("machine", [[], ["--json"]])
-def test_since_refuses_what_check_refuses(machine: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_since_refuses_like_check(machine: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     Path("new.rts").write_text(newer("<= 15 m\n", "<= 12 m\n", raised=False), encoding="utf-8")
     assert main(["check", "new.rts", "--since", str(POLICY)]) == ExitCode.DIAGNOSTICS
     assert "E0716" in capsys.readouterr().err
@@ -171,7 +171,9 @@ def test_where_nothing_earlier_is_found_it_says_so(capsys: pytest.CaptureFixture
         (["none.rts", "--since", "missing.rts"], ExitCode.INPUT, "missing.rts"),
     ],
 )
-def test_what_is_refused(words: list[str], code: ExitCode, told: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_arguments_are_refused(
+    words: list[str], code: ExitCode, told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     Path("wrong.rts").write_text(WRONG, encoding="utf-8")
     Path("none.rts").write_text(NO_POLICY, encoding="utf-8")
     Path("binary.rts").write_bytes(b"\xff\xfe\x00")
@@ -204,7 +206,7 @@ def test_with_a_test_that_fails_nothing_is_written(capsys: pytest.CaptureFixture
     assert "came out as they must" in Path("page.html").read_text(encoding="utf-8")
 
 
-def test_scenarios_of_the_files_that_were_asked_for_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_page_shows_the_scenarios_of_the_named_files(capsys: pytest.CaptureFixture[str]) -> None:
     scenario = (
         'import "lib:missions/short.rts"\nscenario "{}" {{ flies short  at 9 s gps_loss()  expect ends aborted }}\n'
     )
@@ -222,7 +224,7 @@ def test_as_json_a_refusal_is_an_object(capsys: pytest.CaptureFixture[str]) -> N
     assert json.loads(capsys.readouterr().out)["exit"] == "input"
 
 
-def test_policies_of_one_name_are_told_apart_by_vehicle_and_file(capsys: pytest.CaptureFixture[str]) -> None:
+def test_policies_with_equal_names_show_vehicle_and_file(capsys: pytest.CaptureFixture[str]) -> None:
     text = POLICY.read_text(encoding="utf-8")
     for folder, digits in (("east", "20"), ("west", "25")):
         Path(folder).mkdir()

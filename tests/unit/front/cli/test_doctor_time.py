@@ -60,7 +60,7 @@ def test_of_a_boundary_that_listens(
     assert asked == [bytes([TIME, True]), b"closed"]
 
 
-def test_of_one_that_does_not_answer_is_said_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_silent_boundary_is_reported_elsewhere(monkeypatch: pytest.MonkeyPatch) -> None:
     def nobody(path: Path) -> None:
         raise BoundaryError("not-begun", "nobody answers", "start it")
 
@@ -69,7 +69,7 @@ def test_of_one_that_does_not_answer_is_said_elsewhere(monkeypatch: pytest.Monke
     assert doctor._time_of_day(SOCKET, None, keyed=False, apart=True) == TimeSources(9, listens=True)
 
 
-def test_a_boundary_that_listens_is_told_in_its_own_command_line(capsys: pytest.CaptureFixture[str]) -> None:
+def test_utc_error_is_refused_for_a_listening_boundary(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["doctor", "--connect", "udpin:127.0.0.1:1", "--utc-error", "1s", "--boundary-socket", str(SOCKET)]
     assert main(words) == ExitCode.USAGE
     assert "set it on the boundary's command line" in capsys.readouterr().err

@@ -143,7 +143,7 @@ def test_a_replacement_that_drops_a_phase_is_followed_in_a_log(here: Path) -> No
     assert "the vehicle would refuse this: the name of the mission is invalid" in refused.text
 
 
-def test_what_cannot_be_signed(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_unsignable_documents_are_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     def says(code: ExitCode, words: str, *command: str) -> None:
         assert main(list(command)) == code
         assert words in capsys.readouterr().err
@@ -215,7 +215,7 @@ def test_what_cannot_be_signed(here: Path, capsys: pytest.CaptureFixture[str]) -
 
 
 @pytest.mark.parametrize("whose", ["mission-agent", "policy"])
-def test_what_flies_is_stopped_also_once_the_keys_of_its_bundle_are_revoked(here: Path, whose: str) -> None:
+def test_flight_can_be_stopped_after_its_keys_are_revoked(here: Path, whose: str) -> None:
     """It flies on under the root that it began with: an operator must not have to choose what to do first."""
     flies, again = in_force(here / "low.bundle"), in_force(here / "low.bundle")
     first = here / "first.trust"
@@ -302,7 +302,7 @@ def listening() -> Iterator[Path]:
         agents.close()
 
 
-def test_what_the_flight_says_is_what_the_command_says(
+def test_command_reports_the_answer_of_the_flight(
     here: Path, listening: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     to = ["--to", str(listening)]
@@ -343,7 +343,7 @@ def test_a_recall_that_was_signed_before_is_sent_without_a_key(
         (["--to", "s"], ExitCode.USAGE, "BUNDLE is missing"),
     ],
 )
-def test_what_is_no_recall_is_not_sent(
+def test_send_refuses_other_files(
     here: Path, capsys: pytest.CaptureFixture[str], words: list[str], code: ExitCode, said: str
 ) -> None:
     assert main(["recall", "low.bundle", "-o", "home", *FLIGHT]) == ExitCode.OK
@@ -372,7 +372,7 @@ def test_an_operator_follows_a_flight_and_calls_it_home(here: Path, listening: P
         assert console.wait(30) == ExitCode.REFUSED, "by the last answer"
 
 
-def test_an_operator_of_no_flight_is_told_so(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_operator_without_a_flight_is_refused(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["operator", "low.bundle", "--to", "none"]) == ExitCode.INPUT
     assert "no such file or directory: `none`" in capsys.readouterr().err
 
@@ -393,7 +393,7 @@ def test_a_role_that_no_policy_of_the_project_knows_is_warned_of(
     assert "warning" not in capsys.readouterr().err, "no policy is here: nothing is known"
 
 
-def test_whose_key_may_not_sign_for_the_role_is_told_before_they_are_asked(
+def test_wrong_role_is_refused_before_the_prompt(
     here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["keys", "approver", "bob", "--role", "nosuch"]) == ExitCode.OK

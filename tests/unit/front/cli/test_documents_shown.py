@@ -53,7 +53,7 @@ def test_a_timeline_names_the_steps_that_are_in_force(log: Path, capsys: pytest.
     assert "step 3 `return_home()`" in out, "the last step, which is the third one now"
 
 
-def test_a_decision_is_told_from_the_mission_in_force(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_decision_is_explained_with_the_mission_in_force(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["why", str(log), "--json"]) == ExitCode.OK
     assert json.loads(capsys.readouterr().out)["outcome"] == "allow"
     damaged = log.read_bytes().replace(b'"event":"replacement"', b'"event":"replacemant"')
@@ -62,7 +62,7 @@ def test_a_decision_is_told_from_the_mission_in_force(log: Path, capsys: pytest.
     assert json.loads(capsys.readouterr().out)["reason"] == "integrity/binding-mismatch"
 
 
-def test_a_replacement_that_is_none(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_replacement_in_a_log_is_refused(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     lines = log.read_bytes().splitlines(keepends=True)
     at = next(n for n, line in enumerate(lines) if b'"event":"replacement"' in line)
     for nonsense in ("", "!!", "aGVsbG8="):
@@ -74,7 +74,7 @@ def test_a_replacement_that_is_none(log: Path, capsys: pytest.CaptureFixture[str
         assert "invalid replacement in the log" in capsys.readouterr().err
 
 
-def test_the_audit_says_what_was_signed(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_audit_lists_signed_documents(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["verify-log", str(log), "--root", ROOT_KEY.public.hex(), "--json", "--audit"]) == ExitCode.OK
     proven = {claim["slug"]: claim["text"] for claim in json.loads(capsys.readouterr().out)["proven"]}
     assert proven["documents"].startswith("1 approval by ada, 1 recall by ada, 1 replacement, ")
@@ -101,7 +101,7 @@ def test_a_trust_root_that_makes_no_sense_names_nobody(log: Path, capsys: pytest
         assert "ada" not in out
 
 
-def test_why_begins_with_what_ended_the_flight(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_why_begins_with_the_cause_of_the_end(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """An admitted step says nothing of that: the recall does."""
     assert main(["why", str(log)]) == ExitCode.OK
     out = capsys.readouterr().out
@@ -185,7 +185,7 @@ def test_a_fallback_of_which_no_landing_was_seen_is_in_the_summary_of_run_and_au
     assert "not confirmed" not in capsys.readouterr().out, "without an audit no record is read"
 
 
-def test_the_summary_says_what_the_battery_gave_beside_what_is_declared() -> None:
+def test_summary_compares_battery_with_its_declaration() -> None:
     told = "6.3 % a minute declared, 17.6 % measured", "100.0 % a km declared, 100.0 % measured"
     lines = list(ending(Summary(**SUMMARY | {"battery": told})))
     assert [line for line in lines if "measured" in line] == [f"  battery  {each}" for each in told]
@@ -213,7 +213,7 @@ def broken_off(tmp_path: Path) -> Path:
     return path
 
 
-def test_why_tells_what_ended_a_flight_and_who_answered(broken_off: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_why_shows_end_and_approvals_of_a_flight(broken_off: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["why", str(broken_off)]) == ExitCode.OK
     out = capsys.readouterr().out
     assert "granted as supervisor by ada, 2" in out, "in the step that asks for it, with the time"
@@ -263,7 +263,7 @@ def test_a_step_refused_on_the_ground_flies_nothing(tmp_path: Path, capsys: pyte
     assert "flies         nothing: it had not left the ground" in capsys.readouterr().out
 
 
-def test_a_number_in_a_log_says_what_it_counts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_numbers_in_a_log_are_labelled(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     vehicle = FakeVehicle()
     vehicle.values[WIND] = None
     run = Run(vehicle=vehicle)

@@ -83,7 +83,7 @@ def rehearsed(
     return code, said
 
 
-def test_it_says_what_it_waits_for(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_dry_run_lists_pending_conditions(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     world = World(12)
     code, said = rehearsed(world, monkeypatch, capsys, notes=["the radio"])
     assert (code, said["ready"], said["notes"]) == (ExitCode.OK, True, ["the radio"])
@@ -103,7 +103,7 @@ def test_its_own_wait_makes_nothing_stale(monkeypatch: pytest.MonkeyPatch, capsy
     assert code is ExitCode.OK
 
 
-def test_what_it_does_not_tell_is_not_set_and_would_not_begin(
+def test_dry_run_refuses_a_parameter_the_vehicle_does_not_report(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert rehearsed(World(1), monkeypatch, capsys, sets=["RTL_RETURN_ALT"])[0] is ExitCode.OK
@@ -115,7 +115,7 @@ def test_what_it_does_not_tell_is_not_set_and_would_not_begin(
     assert dry_run.SETTINGS_S <= world.s <= dry_run.SETTINGS_S + 1
 
 
-def test_what_flew_before_would_not_begin(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_dry_run_refuses_a_flown_bundle(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     code, said = rehearsed(World(1), monkeypatch, capsys, refusal="a bundle flies once")
     assert (code, said["refusal"]) == (ExitCode.REFUSED, "a bundle flies once")
 

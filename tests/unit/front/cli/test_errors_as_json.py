@@ -84,7 +84,7 @@ def test_every_command_is_tried() -> None:
     assert MISSING.keys() == {row.name for row in COMMANDS}
 
 
-def test_an_address_that_is_none_says_where_it_is_wrong(capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_address_error_has_its_position(capsys: pytest.CaptureFixture[str]) -> None:
     assert app.main(["doctor", "--connect", "serial:/dev/ttyAMA0:57601", "--json"]) == ExitCode.USAGE
     at = json.loads(capsys.readouterr().out)["error"]["at"]
     assert at == {"option": "--connect", "value": "serial:/dev/ttyAMA0:57601", "start": 20, "end": 25}
@@ -116,7 +116,7 @@ def raising(error: BaseException) -> Callable[[], int]:
         (RuntimeError("odd"), ExitCode.FAULT, "fault"),
     ],
 )
-def test_what_rises_to_the_barrier(
+def test_exceptions_become_json_errors(
     error: BaseException, code: ExitCode, slug: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with faults.as_json(wanted=True):

@@ -49,7 +49,7 @@ def test_a_decision(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "anchored no" in told
 
 
-def test_a_command_names_what_permits_it(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_dispatch_record_names_its_permit(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert explain(log, SENT["seq"]) == ExitCode.OK
     told = words(capsys)
     assert f"permitted by record {DECISION['seq']}" in told
@@ -57,7 +57,7 @@ def test_a_command_names_what_permits_it(log: Path, capsys: pytest.CaptureFixtur
 
 
 @pytest.mark.slow
-def test_every_record_can_be_told(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_record_can_be_explained(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for record in RECORDS:
         assert explain(log, record["seq"], "--json", "--no-derive") == ExitCode.OK
         told = json.loads(capsys.readouterr().out)
@@ -70,7 +70,7 @@ def test_every_record_can_be_told(log: Path, capsys: pytest.CaptureFixture[str])
         assert capsys.readouterr().out.startswith(f"Record {record['seq']}: ")
 
 
-def test_what_nobody_signed_for(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_unsigned_record_is_explained_as_unsigned(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log.write_bytes(b"".join(LINES[:4]))
     assert explain(log, 3) == ExitCode.INCOMPLETE
     told = words(capsys)

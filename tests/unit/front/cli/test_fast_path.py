@@ -61,7 +61,7 @@ def test_typer_reads_the_same_words_the_same_way(words: list[str]) -> None:
     assert all(isinstance(path, Path) for path in found[0])
 
 
-def test_what_is_left_to_typer(capsys: pytest.CaptureFixture[str]) -> None:
+def test_other_command_lines_are_left_to_typer(capsys: pytest.CaptureFixture[str]) -> None:
     assert fast_path.lint([]) is fast_path.lint(["--fix"]) is fast_path.check(["--json"]) is None
     for words in (
         ["--help"],

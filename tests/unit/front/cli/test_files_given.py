@@ -47,7 +47,7 @@ def test_a_log_that_is_cut_inside_its_first_record(words: tuple[str, ...], log: 
 
 
 @pytest.mark.parametrize("words", READERS)
-def test_what_may_not_be_read_is_bad_input(
+def test_unreadable_file_is_bad_input(
     words: tuple[str, ...], log: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """And no wrong command line, as it would be for an argument parser that looks first."""
@@ -101,7 +101,7 @@ def test_a_folder_of_runs_is_all_of_them(
     assert given(words, tmp_path / "empty") == ExitCode.INPUT
 
 
-def test_a_seal_says_what_it_is(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_seal_is_explained(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     number = next(number for number, line in enumerate(LINES) if b'"type":"seal"' in line)
     assert app.main(["why", str(log), "--record", str(number)]) == ExitCode.OK
     out = capsys.readouterr().out

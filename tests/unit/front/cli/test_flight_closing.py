@@ -105,7 +105,7 @@ def test_the_records_that_the_disk_refused_are_counted(ended: Ended) -> None:
     assert len(ended.records()) == 1
 
 
-def test_what_the_last_try_could_still_write_is_not_missing(ended: Ended) -> None:
+def test_records_of_the_last_attempt_are_not_missing(ended: Ended) -> None:
     ended.sink.append(line := ended.recorder.effect(NOW, "arrived"), WRITTEN)
     until(lambda: ended.sink.kept == 1)
     ended.disk.room = len(line)
@@ -113,7 +113,7 @@ def test_what_the_last_try_could_still_write_is_not_missing(ended: Ended) -> Non
     assert len(ended.records()) == 2
 
 
-def test_a_disk_that_hangs_is_told_and_not_waited_for_for_ever(ended: Ended) -> None:
+def test_hanging_disk_is_reported_after_a_limit(ended: Ended) -> None:
     ended.disk.open["sync"].clear()
     assert ended.close() == ("1 of 2 records: the disk has not answered for 0.5 s (log.jsonl)",)
     ended.disk.heal()
@@ -138,7 +138,7 @@ def test_a_summary_that_could_not_be_written(ended: Ended, monkeypatch: pytest.M
     ended.close()
 
 
-def test_what_is_missing_is_shown() -> None:
+def test_missing_records_are_shown() -> None:
     lines = list(ending(replace(SUMMARY, whole=False, missing=("5 of 6 records (log.jsonl)", "the summary"))))
     assert "  log      l (3 records, evidence NOT whole)" in lines
     assert "  missing  5 of 6 records (log.jsonl)" in lines

@@ -10,7 +10,7 @@ from rtshcua.app.fly.flight_session import FlightSession
 
 @pytest.mark.parametrize("error", [RuntimeError("bug"), KeyboardInterrupt(), MemoryError(), OSError(5, "gone")])
 @pytest.mark.parametrize("aloft", [True, False])
-def test_a_failure_is_told_with_what_the_vehicle_may_do(error: BaseException, aloft: bool) -> None:
+def test_failure_is_reported_with_the_vehicles_possible_reaction(error: BaseException, aloft: bool) -> None:
     said: list[str] = []
     closed: list[Any] = []
 

@@ -39,7 +39,7 @@ def said(capsys: pytest.CaptureFixture[str]) -> tuple[str, str]:
     return found.out, found.err
 
 
-def test_what_ships_is_formatted(capsys: pytest.CaptureFixture[str]) -> None:
+def test_shipped_sources_are_formatted(capsys: pytest.CaptureFixture[str]) -> None:
     folders = [str(CHECKOUT / folder) for folder in ("skills", "policies", "missions", "examples")]
     assert main(["fmt", "--check", "--isolated", *folders]) == ExitCode.OK, capsys.readouterr()
 
@@ -99,7 +99,7 @@ def test_as_json(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     ],
     ids=["syntax", "latin", "nul", "size"],
 )
-def test_what_is_no_source_is_left_and_the_others_are_done(
+def test_other_files_are_skipped_and_sources_formatted(
     here: Path, data: bytes, words: str, code: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("aa.rts").write_bytes(data)

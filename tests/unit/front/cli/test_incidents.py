@@ -89,13 +89,13 @@ def refused(source: Path, name: str, **options: str | int | None) -> str:
     return found.text
 
 
-def test_what_a_vehicle_starts_with_goes_to_its_process(source: Path) -> None:
+def test_start_conditions_are_passed_to_the_simulator(source: Path) -> None:
     assert incidents(source, "gusts and a lost fix", seed=9).words == [
         "--flavour", "px4", "--seed", "9", "--estimate", "real", "--battery", "80", "--wind", "3,270,0",
     ]  # fmt: skip
 
 
-def test_a_file_that_is_not_there_is_bad_input(source: Path) -> None:
+def test_missing_scenario_file_is_bad_input(source: Path) -> None:
     source.rename(source.with_name("flight.rts"))
     found = refusal_of(planned(source, ""))
     assert (found.code, found.text) == (
@@ -104,7 +104,7 @@ def test_a_file_that_is_not_there_is_bad_input(source: Path) -> None:
     )
 
 
-def test_what_no_run_can_have_is_refused_by_name(source: Path) -> None:
+def test_unsupported_incident_is_refused_by_name(source: Path) -> None:
     assert "`at 4 s runtime_killed(for = 2 s)` goes wrong in virtual time alone" in refused(source, "killed")
     assert "the scenario says at what time it begins" in refused(source, "at its own time")
     assert "no scenario `nobody`" in refused(source, "nobody")

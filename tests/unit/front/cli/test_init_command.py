@@ -56,7 +56,7 @@ def test_without_a_folder_it_is_made_where_one_is(
     assert "`site_2_farms`" in renamed
 
 
-def test_a_folder_whose_name_cannot_be_taken_is_said_with_the_way_to_another(tmp_path: Path, capsys: Said) -> None:
+def test_renamed_policy_is_reported_with_the_name_option(tmp_path: Path, capsys: Said) -> None:
     assert app.main(["init", str(tmp_path / "a b" / "ü")]) == 0
     said = capsys.readouterr().out
     assert "`ü` is not a valid policy name, so the policy is named `site`; choose another with `--name`" in said
@@ -72,7 +72,7 @@ def test_a_long_name_is_cut(tmp_path: Path) -> None:
     ).read_text("utf-8")
 
 
-def test_what_is_there_is_not_touched_without_force(tmp_path: Path, capsys: Said) -> None:
+def test_existing_files_require_force(tmp_path: Path, capsys: Said) -> None:
     for name in ("README.md", "notes.txt"):
         (tmp_path / name).write_text("mine")
     assert app.main(["init", str(tmp_path), "--name", "a", "--json"]) == 3
@@ -85,7 +85,7 @@ def test_what_is_there_is_not_touched_without_force(tmp_path: Path, capsys: Said
     assert everything(tmp_path) == project("a") | {"notes.txt": b"mine"}
 
 
-def test_in_a_new_repository_what_is_there_is_kept(tmp_path: Path, capsys: Said) -> None:
+def test_keep_keeps_the_files_of_a_new_repository(tmp_path: Path, capsys: Said) -> None:
     mine = {"README.md": b"mine", "LICENSE": b"mine", ".gitignore": b"mine", ".git/HEAD": b"mine"}
     for name, data in mine.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
@@ -133,7 +133,7 @@ def test_a_file_in_the_way_is_refused_even_with_force(tmp_path: Path, capsys: Sa
 
 
 @pytest.mark.parametrize("name", ["Farm", "2", "a b", "", "größe", "../x", "a" * 41])
-def test_a_name_that_is_none_is_refused(tmp_path: Path, name: str, capsys: Said) -> None:
+def test_invalid_name_is_refused(tmp_path: Path, name: str, capsys: Said) -> None:
     assert app.main(["init", str(tmp_path / "x"), "--name", name]) == 2
     assert "is not a valid policy name" in capsys.readouterr().err
     assert not (tmp_path / "x").exists()

@@ -46,7 +46,7 @@ def test_slow_ones_only_ask(at: Any) -> None:
             assert requests.wish() is Wish.KNOW
 
 
-def test_none_is_lost_when_they_come_at_once(at: Any) -> None:
+def test_simultaneous_signals_are_not_lost(at: Any) -> None:
     with Interrupts() as requests:
         for _ in range(3):
             press()
@@ -76,7 +76,7 @@ def test_a_request_to_stop_raises_where_it_is_looked_at_and_nowhere_else(number:
         signal.signal(signal.SIGINT, before)
 
 
-def test_what_is_started_with_ctrl_c_ignored_goes_on_ignoring_it() -> None:
+def test_ignored_sigint_stays_ignored() -> None:
     """As a shell starts what runs in the background."""
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
@@ -90,7 +90,7 @@ def test_what_is_started_with_ctrl_c_ignored_goes_on_ignoring_it() -> None:
         signal.signal(signal.SIGINT, before)
 
 
-def test_a_thread_that_is_not_the_main_one_gets_no_signals() -> None:
+def test_other_threads_install_no_handler() -> None:
     seen = []
 
     def work() -> None:

@@ -68,7 +68,7 @@ def test_init_twice_changes_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     assert KeyStore(data_folder()).root() == before
 
 
-def test_listing_says_what_each_key_is_trusted_for(capsys: pytest.CaptureFixture[str]) -> None:
+def test_list_shows_the_rights_of_each_key(capsys: pytest.CaptureFixture[str]) -> None:
     app.main(["keys", "init", "--days", "2"])
     capsys.readouterr()
     assert app.main(["keys", "list", "--json"]) == ExitCode.OK
@@ -198,7 +198,7 @@ def test_a_short_passphrase_is_none(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert "12 characters" in capsys.readouterr().err
 
 
-def test_without_a_terminal_nobody_is_asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_no_prompt_without_a_terminal(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(unlock, "getpass", lambda prompt: pytest.fail("asked"))
     monkeypatch.setattr(keys, "getpass", lambda prompt: pytest.fail("asked"))
     assert app.main(["keys", "init", "--encrypted", "--policy", "field"]) == ExitCode.USAGE
@@ -279,7 +279,7 @@ def test_who_is_no_approver(words: list[str], code: ExitCode, capsys: pytest.Cap
         (["init", "--role", ""], "`` is not a valid role name"),
     ],
 )
-def test_a_name_that_is_none_is_refused_before_a_passphrase_is_asked_for(
+def test_invalid_name_is_refused_before_the_passphrase_prompt(
     words: list[str], says: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(keys, "_new_passphrase", lambda _: pytest.fail("too early"))
@@ -288,7 +288,7 @@ def test_a_name_that_is_none_is_refused_before_a_passphrase_is_asked_for(
     assert says in capsys.readouterr().err
 
 
-def test_a_further_mission_key_is_for_what_it_names(capsys: pytest.CaptureFixture[str]) -> None:
+def test_added_mission_key_is_limited_to_its_names(capsys: pytest.CaptureFixture[str]) -> None:
     app.main(["keys", "init"])
     words = ["keys", "mission", "agent", "--role", "surveyor", "--policy", "field", "--json"]
     capsys.readouterr()
@@ -313,7 +313,7 @@ def test_keys_in_earnest_are_added_under_passphrases(tmp_path: Path, capsys: pyt
     assert store.signing_key(Duty.APPROVAL, whose="ada-supervisor", passphrase=own.read_bytes()).duty is Duty.APPROVAL
 
 
-def test_whose_key_approves(capsys: pytest.CaptureFixture[str]) -> None:
+def test_approval_key_is_selected_by_person(capsys: pytest.CaptureFixture[str]) -> None:
     app.main(["keys", "init"])
     store = KeyStore(data_folder())
     assert unlock.unlock_person(store, None, None).kid == store.signing_key(Duty.APPROVAL, whose="owner-operator").kid
@@ -407,7 +407,7 @@ def test_an_expired_root_is_renewed_by_another_root_key(
         (["revoke", "--link", "no.key"], "is not a link key"),
     ],
 )
-def test_keys_that_are_none_are_not_revoked(
+def test_unknown_keys_are_not_revoked(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], words: list[str], text: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -418,7 +418,7 @@ def test_keys_that_are_none_are_not_revoked(
     assert not KeyStore(data_folder()).earlier_path(1).exists()
 
 
-def test_a_vehicle_says_what_it_accepted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_accept_prints_the_accepted_root(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     app.main(["keys", "init"])
     app.main(["keys", "revoke", "witness"])
     root = str(KeyStore(data_folder()).root_path)
@@ -442,7 +442,7 @@ def test_a_vehicle_says_what_it_accepted(tmp_path: Path, capsys: pytest.CaptureF
     assert capsys.readouterr().err.startswith(f"error[root-malformed]: `{damaged}` is no trust root: ")
 
 
-def test_the_list_names_files_and_the_roots_version_and_what_is_revoked_is_not_again(
+def test_list_shows_files_and_version_and_revoking_twice_fails(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     app.main(["keys", "init"])
@@ -501,7 +501,7 @@ def test_a_folder_is_provisioned_once(tmp_path: Path, capsys: pytest.CaptureFixt
 
 
 @pytest.mark.parametrize("data", [b"", b"nonsense\n"])
-def test_what_is_remembered_of_a_folder_may_be_damaged(
+def test_damaged_provisioning_record_is_reported(
     data: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     app.main(["keys", "init"])
@@ -510,7 +510,7 @@ def test_what_is_remembered_of_a_folder_may_be_damaged(
     assert provisioned(capsys, tmp_path / "two") == (ExitCode.REFUSED, "provisioned-before")
 
 
-def test_the_list_fits_a_terminal_and_what_is_to_be_typed_can_be_pasted(
+def test_list_fits_a_terminal_and_commands_can_be_pasted(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")

@@ -65,7 +65,7 @@ def test_a_bundle_that_was_opened_goes_on_where_the_vehicle_flies_or_may_be_abou
 
 @pytest.mark.parametrize("damage", ["empty", "no-versions", "pipe", "no-folder", "gone", "full"])
 @pytest.mark.parametrize("armed", [False, True])
-def test_whatever_the_state_folder_says_what_flies_comes_down(
+def test_airborne_vehicle_is_landed_whatever_the_state_folder_holds(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: str, armed: bool
 ) -> None:
     monkeypatch.setattr(replay_check, "AIR_S", 0.01)
@@ -113,9 +113,7 @@ def test_that_a_mark_could_be_written_leaves_nothing_behind(tmp_path: Path) -> N
 
 @pytest.mark.parametrize("damage", ["damaged", "no-folder"])
 @pytest.mark.parametrize("resumed", [False, True])
-def test_a_link_whose_timestamps_are_not_known_brings_home_what_flies(
-    tmp_path: Path, damage: str, resumed: bool
-) -> None:
+def test_unknown_link_timestamps_bring_an_airborne_vehicle_home(tmp_path: Path, damage: str, resumed: bool) -> None:
     key_file = tmp_path / "link.key"
     write_link_key(key_file, bytes(range(32)))
     store = LinkStore(tmp_path, VEHICLE, bytes(range(32)))
@@ -183,7 +181,7 @@ def test_a_mark_that_the_disk_does_not_take_grounds_the_flight(tmp_path: Path) -
     assert flight.refused
 
 
-def test_a_policy_that_reads_what_no_vehicle_sends() -> None:
+def test_policy_with_an_unavailable_signal_is_refused() -> None:
     (first, *others) = POLICY.signals
     signals = (replace(first, sources=(SignalSource("BATTERY_STATUS", ("nope",), 1, 1, ()),)), *others)
     signing: Any = SimpleNamespace(verifier=None)
@@ -209,7 +207,7 @@ def test_a_bundle_of_which_nothing_was_sent_may_be_handed_in_again(tmp_path: Pat
     assert replay_check.flown_before(tmp_path, loaded()) is not None
 
 
-def test_a_flight_whose_log_is_gone_is_not_said_to_have_broken_off(tmp_path: Path) -> None:
+def test_missing_log_is_not_reported_as_interrupted(tmp_path: Path) -> None:
     """Whoever clears `runs/` away is not told to bring a vehicle down by a file that is not there."""
     log = tmp_path / "runs" / "1" / "log.jsonl"
     log.parent.mkdir(parents=True)
@@ -225,7 +223,7 @@ def test_a_flight_whose_log_is_gone_is_not_said_to_have_broken_off(tmp_path: Pat
     assert "broke off" not in told
 
 
-def test_what_a_simulated_flight_leaves_is_not_the_connected_vehicles(tmp_path: Path) -> None:
+def test_simulated_flight_does_not_affect_the_connected_vehicle(tmp_path: Path) -> None:
     """Its log, and the parameters that it set: neither is brought down or put back on the real one."""
     simulated, real = (request(state=tmp_path, link=link).kept_in for link in (None, 1))
     log = tmp_path / "log.jsonl"
@@ -251,7 +249,7 @@ def late(us: int) -> Now:
     return Now(START.monotonic_us, end_us + START.utc_error_us + us, START.utc_error_us)
 
 
-def test_a_bundle_that_expired_is_said_to_have_and_may_not_be_handed_in_again(tmp_path: Path) -> None:
+def test_expired_bundle_is_reported_and_not_reusable(tmp_path: Path) -> None:
     refusal = replay_check.expired(loaded(), late(1))
     assert refusal is not None
     assert refusal.slug == "bundle-expired"
@@ -268,7 +266,7 @@ def test_a_bundle_that_may_be_fresh_still_is_no_expired_one() -> None:
     assert replay_check.expired(loaded(), unknown) is None, "nobody knows the time of day"
 
 
-def test_a_disk_that_does_not_give_a_bundle_back_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failed_release_of_a_bundle_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     replay_check.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
 
     def fails(store: FileReplayStore, digest: bytes) -> None:

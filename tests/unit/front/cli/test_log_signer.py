@@ -30,7 +30,7 @@ def test_this_process_signs_until_the_key_is_handed_over() -> None:
     assert signer.sign(TEXT) == key().sign(TEXT, duty=Duty.LOG)
 
 
-def test_what_the_boundary_does_not_sign_does_not_fly() -> None:
+def test_flight_requires_the_boundarys_signature() -> None:
     signer = LogSigner(key())
     signer.hand_over(lambda _: Refusal("not-its-log", "the boundary refuses the call"))
     with pytest.raises(LogNotSigned, match="does not sign the log") as refused:

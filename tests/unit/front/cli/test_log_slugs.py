@@ -83,7 +83,7 @@ def test_every_refusal_of_something_signed_is_explained() -> None:
 
 
 @pytest.mark.slow
-def test_what_is_explained_can_be_found() -> None:
+def test_explained_slugs_exist() -> None:
     """A slug that nothing prints any more would mislead."""
     written = literal_slugs() | {f"seal/{part}" for part in _PARTS.values()} | {"boundary/frames", "boundary/clock"}
     written |= {f"decision/{field.replace('_', '-')}" for field in DECIDED} | {"trust/revoked-key"}
@@ -103,7 +103,7 @@ def test_each_slug_has_a_meaning_and_an_exit_code() -> None:
     ("word", "code"), [("seal/missing", 9), ("SEAL/MISSING", 9), ("close/junk-after", 9), ("boundary/lost", 10),
                        ("trust/root-unknown-key", 4), ("document/expired", 11), ("anchor/root", 12)],
 )  # fmt: skip
-def test_explain_prints_what_a_slug_means(
+def test_explain_prints_the_meaning_of_a_slug(
     word: str, code: int, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("COLUMNS")
@@ -116,14 +116,12 @@ def test_explain_prints_what_a_slug_means(
     assert json.loads(capsys.readouterr().out)["exit_code"] == code
 
 
-def test_a_slug_that_is_none_is_told_with_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
+def test_unknown_slug_suggests_the_nearest(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["explain", "seal/mising"]) == 2
     assert "did you mean `seal/missing`?" in capsys.readouterr().err
 
 
-def test_a_whole_log_with_zeros_behind_it_is_named_as_what_it_is(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_zeros_after_a_closed_log_are_recognised(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """As a file system pads it after a power cut: nothing says that it was forged, and it tells how to go on."""
     whole = b"".join(flight())
     path = tmp_path / "log.jsonl"
@@ -132,7 +130,7 @@ def test_a_whole_log_with_zeros_behind_it_is_named_as_what_it_is(
     out = " ".join(capsys.readouterr().out.split())
     assert "close/junk-after" in out
     assert "4096 zero octets, as a file system leaves them after a power cut" in out
-    assert "its records are as they were signed" in out
+    assert "before it is valid and complete" in out
     assert "forged" not in out
     assert f"begins at byte {len(whole)} of the log" in out
     path.write_bytes(path.read_bytes()[: len(whole)])

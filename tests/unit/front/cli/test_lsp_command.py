@@ -7,9 +7,7 @@ import pytest
 from rtshcua.front.cli.app import main
 
 
-def test_without_the_extra_it_says_what_to_install(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_missing_extra_names_the_package(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setitem(sys.modules, "pygls", None)
     for name in [each for each in sys.modules if each.startswith("rtshcua.front.lsp")]:
         monkeypatch.delitem(sys.modules, name)

@@ -8,9 +8,7 @@ import pytest
 from rtshcua.front.cli.app import main
 
 
-def test_without_the_extra_it_says_what_to_install(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_missing_extra_names_the_package(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.delitem(sys.modules, "rtshcua.front.mcp.server", raising=False)
     monkeypatch.setitem(sys.modules, "mcp", None)
     monkeypatch.setitem(sys.modules, "anyio", None)
@@ -27,7 +25,7 @@ def test_bundle_socket_and_sources_are_all_needed(words: list[str], capsys: pyte
     assert "Traceback" not in capsys.readouterr().err
 
 
-def test_what_is_no_bundle(tmp_path: Path, own_world: None, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_bundle_is_refused(tmp_path: Path, own_world: None, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("mcp", reason="the extra `mcp` is not installed: `make setup` installs it")
     (tmp_path / "b").write_bytes(b"no bundle")
     assert main(["mcp", str(tmp_path / "b"), "--to", "s", "--with", "p.rts"]) in (3, 4)

@@ -37,7 +37,7 @@ class Silent:
 
 
 @pytest.mark.parametrize(("hurried", "armed", "waits"), [(True, True, False), (True, False, True), (False, True, True)])
-def test_what_hangs_in_the_air_does_not_wait_for_the_time_of_day(
+def test_airborne_vehicle_does_not_wait_for_the_time_of_day(
     hurried: bool, armed: bool, waits: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """3 s of each restart on a machine whose clock nobody sets, where the operator said how far it is off."""
@@ -49,7 +49,7 @@ def test_what_hangs_in_the_air_does_not_wait_for_the_time_of_day(
     assert utc.bound.source == "operator"
 
 
-def test_it_is_not_ready_before_all_that_is_asked_of_it_first_is_known(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_vehicle_is_not_ready_before_its_first_answers(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a busy machine it had all else while a second vehicle was waited for: its first step was deferred as
     uncertain, until the deadline of that was over.
     """
@@ -131,5 +131,5 @@ def test_a_simulated_vehicle_is_met_at_the_speed_that_it_says(speed: float, monk
     assert vehicle.driver.issued_from_us == 0
 
 
-def test_at_the_speed_of_life_nothing_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_speed_query_in_real_time(monkeypatch: pytest.MonkeyPatch) -> None:
     assert not met_at(1, None, monkeypatch)[0].asked_before_ready

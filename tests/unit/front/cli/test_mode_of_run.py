@@ -65,7 +65,7 @@ def test_the_doctor_says_whether_there_is_one(built: bool, monkeypatch: pytest.M
     assert (finding.found == UNBUILT) != built
 
 
-def test_a_process_that_was_asked_for_is_not_done_without(
+def test_requested_process_mode_is_required(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -46,7 +46,7 @@ def said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
         ("check standard.rts", ExitCode.OK, "note: `standard.rts` is empty"),
     ],
 )
-def test_what_was_meant_is_named(said: Said, words: str, code: ExitCode, help: str) -> None:
+def test_nearest_fix_is_suggested(said: Said, words: str, code: ExitCode, help: str) -> None:
     found = said(*words.split())
     assert found[0] == code, found
     assert help in found[1]
@@ -57,7 +57,7 @@ def test_nothing_is_guessed_where_no_name_is_alike(said: Said) -> None:
     assert "did you mean" not in said("show", "nowhere/standard.rts")[1]
 
 
-def test_a_folder_without_a_log_and_the_secret_half_of_a_root_are_told(said: Said) -> None:
+def test_folder_without_log_and_secret_root_key_are_reported(said: Said) -> None:
     assert said("keys", "init")[0] == ExitCode.OK
     assert "there is no `log.jsonl` in the folder `empty`" in said("verify-log", "empty")[1]
     secret = KeyStore(data_folder()).root_path.with_suffix(".key")

@@ -196,14 +196,14 @@ def test_a_connection_that_is_lost_is_made_again(seat: Seat, place: Path) -> Non
     assert seat.events() == ["following", "ready", "lost", "following", "lost", "following", "over"]
 
 
-def test_a_flight_that_is_not_reached_again_is_not_said_to_be_over(seat: Seat, place: Path) -> None:
+def test_lost_flight_is_not_reported_as_ended(seat: Seat, place: Path) -> None:
     flight = Flight(place, hangs_up)
     assert seat.sits(place, lost_s=0.5) == ExitCode.LINK
     flight.end()
     assert seat.events() == ["following", "ready", "lost", "gone"]
 
 
-def test_a_recall_that_was_not_answered_is_told_and_sent_again(seat: Seat, place: Path) -> None:
+def test_unanswered_recall_is_reported_and_repeated(seat: Seat, place: Path) -> None:
     told: list[bytes] = []
 
     def takes_it_and_hangs_up(link: socket.socket) -> None:
@@ -255,7 +255,7 @@ def test_a_flight_that_does_not_read_keeps_nobody_from_leaving(seat: Seat, place
     assert events[-2:] == ["kept", "left"]
 
 
-def test_who_does_not_read_what_is_told_can_still_recall_and_is_told_the_newest(seat: Seat, place: Path) -> None:
+def test_slow_terminal_does_not_block_a_recall(seat: Seat, place: Path) -> None:
     def is_recalled(link: socket.socket) -> None:
         for number in range(2 * MOST_LINES):
             link.sendall(effect(number))
@@ -273,7 +273,7 @@ def test_who_does_not_read_what_is_told_can_still_recall_and_is_told_the_newest(
     assert events.count("noted") < 2 * MOST_LINES, "the pipe has no room for all"
 
 
-def test_silence_is_told_once(seat: Seat, place: Path) -> None:
+def test_silence_is_reported_once(seat: Seat, place: Path) -> None:
     def is_silent(link: socket.socket) -> None:
         seat.until("silent")
         closes(link)
@@ -317,7 +317,7 @@ def test_a_signal_leaves_the_flight_as_quit_does(seat: Seat, place: Path, number
     assert seat.events() == ["following", "ready", "left"]
 
 
-def test_a_word_that_is_no_command_is_said_with_the_nearest(seat: Seat, place: Path) -> None:
+def test_unknown_command_suggests_the_nearest(seat: Seat, place: Path) -> None:
     def turn(link: socket.socket) -> None:
         seat.type("recal\n")
         seat.until_said("unknown command")
@@ -341,7 +341,7 @@ def asked(flying: tuple[Bundle, SigningKey]) -> tuple[Bundle, SigningKey]:
     return dataclasses.replace(bundle, policy=policy), key
 
 
-def test_a_step_that_waits_for_a_person_says_whom_how_long_and_what_to_type(
+def test_pending_approval_shows_role_time_and_command(
     asked: tuple[Bundle, SigningKey], place: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
@@ -364,7 +364,7 @@ def test_a_step_that_waits_for_a_person_says_whom_how_long_and_what_to_type(
     assert "recall: recall this flight · policy: recall all under its policy · quit: leave it flying" in text
 
 
-def test_who_is_asked_is_told_to_programs_too(asked: tuple[Bundle, SigningKey], place: Path) -> None:
+def test_pending_approval_is_in_json(asked: tuple[Bundle, SigningKey], place: Path) -> None:
     seat = Seat(asked)
 
     def turn(link: socket.socket) -> None:

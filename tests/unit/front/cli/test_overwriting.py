@@ -39,9 +39,7 @@ def test_a_source_that_is_read_or_imported_is_not_written_over(
     assert Path("policy.rts").read_text(encoding="utf-8") == POLICY
 
 
-def test_what_is_read_from_a_warm_cache_is_not_written_over_either(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_source_read_from_the_cache_is_not_overwritten(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for _ in range(2):
         app.main(["lint", "tests.rts"])
     assert app.main(["lint", "tests.rts", "--format", "junit", "-o", "policy.rts"]) == ExitCode.USAGE

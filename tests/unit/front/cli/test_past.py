@@ -47,7 +47,7 @@ def test_a_log_that_was_closed_is_named_by_the_next(tmp_path: Path, log: Path) -
     assert recover(log, signer(Random(1))).done  # nobody holds it
 
 
-def test_what_is_aloft_does_not_wait_for_the_state_folder(tmp_path: Path, log: Path) -> None:
+def test_airborne_vehicle_does_not_wait_for_the_state_folder(tmp_path: Path, log: Path) -> None:
     grounded = past(tmp_path)
     (tmp_path / "state").touch()  # no folder, and none can be made
     with pytest.raises(OSError, match=r"exists|Not a directory"):
@@ -59,7 +59,7 @@ def test_what_is_aloft_does_not_wait_for_the_state_folder(tmp_path: Path, log: P
     flying.end("ab" * 32)
 
 
-def test_where_the_end_cannot_be_kept_the_log_is_asked(tmp_path: Path, log: Path) -> None:
+def test_unrecorded_end_is_read_from_the_log(tmp_path: Path, log: Path) -> None:
     first = past(tmp_path)
     first.begin(log)
     last = recover_unheld(log)

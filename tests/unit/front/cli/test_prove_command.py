@@ -155,7 +155,7 @@ def test_several_proofs(capsys: pytest.CaptureFixture[str]) -> None:
         ([3, "--cose"], ExitCode.UNTRUSTED, "holds no keys"),
     ],
 )
-def test_what_cannot_be_proven(
+def test_unprovable_records_are_refused(
     words: list[object], code: ExitCode, text: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert prove(*words) == code
@@ -164,7 +164,7 @@ def test_what_cannot_be_proven(
     assert json.loads(capsys.readouterr().out)["exit_code"] == code
 
 
-def test_what_witnesses_cosigned_goes_along(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_proof_includes_cosignatures(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "log.anchors").write_text(f"{cosigned(LOG)}\n", encoding="utf-8")
     assert prove(3, "-o", "p") == prove(8, "-o", "q") == ExitCode.OK
     capsys.readouterr()
@@ -239,12 +239,12 @@ def test_a_log_that_was_changed(folder: Path, capsys: pytest.CaptureFixture[str]
     assert prove(0) == ExitCode.INPUT
 
 
-def test_what_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_arguments_are_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert prove(3, "-o", "p") == ExitCode.OK
     other = SigningKey.from_seed(bytes([99]) * 32, duty=Duty.ROOT)
     capsys.readouterr()
     assert verify("p", root=other.public.hex()) == ExitCode.UNTRUSTED
-    assert "if another root flew it" in capsys.readouterr().out
+    assert "if the flight used another trust root" in capsys.readouterr().out
     assert verify("p", root="p") == ExitCode.UNTRUSTED
     assert app.main(["verify-proof", "p"]) == ExitCode.UNTRUSTED
     assert "no root to trust" in capsys.readouterr().err

@@ -49,7 +49,7 @@ LINK = ["--connect", "udpin:127.0.0.1:14550", "--vehicle", "quad-07"]
         ([SHORT, *LINK, "--sitl"], 4, "holds no keys"),
     ],
 )  # fmt: skip
-def test_what_does_not_fly(
+def test_invalid_qualification_does_not_fly(
     commands: Forked, own_world: None, words: list[str], code: int, says: str, tmp_path: Path
 ) -> None:
     done = commands.run(["qualify", *words], tmp_path, 60)
@@ -94,7 +94,7 @@ def record(*checks: QualificationCheck) -> Qualification:
     return Qualification("quad-07", firmware, (), parameters_digest(()), b"", "ada", "0", 0, 61_000_000, (), checks)
 
 
-def test_the_table_says_what_failed_and_why() -> None:
+def test_table_lists_failed_checks_with_reasons() -> None:
     held = QualificationCheck("land/down", CheckOutcome.HELD, "lands", "0.1 m off", advice="")
     failed = QualificationCheck("stop/fly", CheckOutcome.FAILED, "within 9.7 m", "14.3 m", advice="declare `brakes`")
     left = QualificationCheck("takeover/mode", CheckOutcome.UNCHECKED, "it shows", "not asked for")

@@ -75,7 +75,7 @@ def test_a_frame_that_the_log_does_not_have(
     assert f"frame {len(entries)}" in said["failure"]["found"]
 
 
-def test_what_is_no_frame_is_not_spoken_for(
+def test_invalid_frame_is_not_covered(
     flown: tuple[list[bytes], Entries], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     data = encoded(flown[1])

@@ -73,9 +73,7 @@ def test_as_json(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert said["reason"]["slug"] == "tail/torn"
 
 
-def test_what_was_tampered_with_is_left_alone(
-    run: Path, lines: list[bytes], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_tampered_log_is_left_unchanged(run: Path, lines: list[bytes], capsys: pytest.CaptureFixture[str]) -> None:
     data = b"".join(lines[:2] + lines[3:])
     (run / "log.jsonl").write_bytes(data)
     assert recover(run) == ExitCode.EVIDENCE
@@ -105,7 +103,9 @@ def test_the_log_of_another_key(run: Path, tmp_path: Path, capsys: pytest.Captur
         (b'{"_prev":"","format":"rtshcua/log","type":"genesis","version":1}\n', ExitCode.UNTRUSTED),
     ],
 )
-def test_what_has_no_first_record(run: Path, data: bytes, code: ExitCode, capsys: pytest.CaptureFixture[str]) -> None:
+def test_log_without_first_record_is_refused(
+    run: Path, data: bytes, code: ExitCode, capsys: pytest.CaptureFixture[str]
+) -> None:
     (run / "log.jsonl").write_bytes(data)
     assert recover(run) == code
     assert "the first record is missing" in capsys.readouterr().err
@@ -113,7 +113,7 @@ def test_what_has_no_first_record(run: Path, data: bytes, code: ExitCode, capsys
 
 @pytest.mark.parametrize("data", [b"hello\n", b"\x8a\x00\x01", b'{"format":"rtshcua/log"}\r\n'])
 @pytest.mark.parametrize("how", [[], ["--dry-run"]])
-def test_what_is_no_log(run: Path, data: bytes, how: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_other_file_is_refused(run: Path, data: bytes, how: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     (run / "log.jsonl").write_bytes(data)
     assert recover(run, *how) == ExitCode.INPUT
     assert "is not a log of this program" in capsys.readouterr().err
@@ -126,7 +126,7 @@ def test_a_log_that_is_being_written(run: Path, capsys: pytest.CaptureFixture[st
     assert "is still being written" in capsys.readouterr().err
 
 
-def test_the_first_exit_code_that_is_not_0_counts(run: Path, tmp_path: Path) -> None:
+def test_first_nonzero_exit_code_is_returned(run: Path, tmp_path: Path) -> None:
     assert recover(run, tmp_path / "none.jsonl") == ExitCode.INPUT
     (tmp_path / "empty.jsonl").touch()
     assert recover(run, tmp_path / "empty.jsonl") == ExitCode.EVIDENCE
@@ -165,7 +165,7 @@ def flown(run: Path) -> tuple[tuple[bytes, ...], list[int]]:
 
 @pytest.mark.parametrize("words", [[], ["--dry-run"], ["--json"]])
 @pytest.mark.parametrize("end", [b"", b'{"_prev":"0'])
-def test_what_a_witness_saw_more_of_is_not_ended(
+def test_log_shorter_than_its_anchors_is_not_closed(
     words: list[str], end: bytes, run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A log that was cut behind a signed record looks as after a crash; its witness saw a later one."""
@@ -181,7 +181,7 @@ def test_what_a_witness_saw_more_of_is_not_ended(
     assert sorted((path.name, path.read_bytes()) for path in run.iterdir()) == before, "nothing was written"
 
 
-def test_what_a_witness_saw_of_what_is_kept_hinders_nothing(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_anchors_of_kept_records_do_not_block_recovery(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     whole, signed = flown(run)
     (run / "log.jsonl").write_bytes(b"".join(whole[: signed[-2] + 2]))
     (run / "log.anchors").write_text(mark(note_of(whole, signed[-2])) + "\n" + "garbage\n\n")

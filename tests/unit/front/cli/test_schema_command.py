@@ -56,7 +56,7 @@ def test_a_policy_of_ones_own_is_not_imported(capsys: pytest.CaptureFixture[str]
         (["--policy", POLICY, "--name", "another"], ExitCode.INPUT, "`bridge_inspection`"),
     ],
 )
-def test_what_is_refused(
+def test_invalid_arguments_are_refused(
     words: list[str],
     code: ExitCode,
     told: str,

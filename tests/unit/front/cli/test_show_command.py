@@ -149,7 +149,7 @@ def test_a_damaged_log_is_shown_as_far_as_it_goes(tmp_path: Path, capsys: pytest
 
 @pytest.mark.parametrize("link", [-2, 0, 99])
 @pytest.mark.parametrize("kind", [0, 1, 2, 3])
-def test_a_log_may_name_what_its_bundle_has_not(
+def test_log_may_name_items_missing_in_its_bundle(
     kind: int, link: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     lines = [flight()[0], *(edit(line, kind=kind, step=99, link=link) for line in flight()[2:4])]
@@ -198,7 +198,9 @@ def test_an_encrypted_key(tmp_path: Path, capsys: pytest.CaptureFixture[str], mo
         (b"\x83nrtshcua/bundle\x02\x80", ExitCode.UNTRUSTED),
     ],
 )
-def test_what_cannot_be_shown(data: bytes, code: ExitCode, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_unsupported_files_are_refused(
+    data: bytes, code: ExitCode, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "x").write_bytes(data)
     assert app.main(["show", str(tmp_path / "x")]) == code
     err = capsys.readouterr().err
@@ -207,7 +209,7 @@ def test_what_cannot_be_shown(data: bytes, code: ExitCode, tmp_path: Path, capsy
 
 
 @pytest.mark.parametrize(("number", "said"), [(0, "evidence land: "), (1, "evidence refuse: "), (7, "evidence: 7?")])
-def test_what_is_done_without_evidence(number: int, said: str) -> None:
+def test_unlogged_actions_are_shown(number: int, said: str) -> None:
     page = TextPage()
     show_policy(page, replace(case.policy(), without_evidence=number))
     assert any(row.split()[:1] == ["without"] and said in row for row in str(page).splitlines())
@@ -221,7 +223,7 @@ def test_what_is_done_without_evidence(number: int, said: str) -> None:
         (1, 7, "link for 1 us 7?"),
     ],
 )
-def test_what_flies_after_a_silence(silence_us: int, then: int, said: str) -> None:
+def test_flight_after_a_silence_is_shown(silence_us: int, then: int, said: str) -> None:
     page = TextPage()
     show_policy(page, replace(case.policy(), silence_us=silence_us, after_silence=then))
     assert any(row.split()[:1] == ["without"] and said in row for row in str(page).splitlines())
@@ -266,7 +268,7 @@ def test_envelopes_of_other_kinds_are_not_shown_as_roots(bundle: Path, tmp_path:
     assert app.main(["show", str(tmp_path / "policy")]) == ExitCode.INPUT
 
 
-def test_words_of_what_is_out_of_range() -> None:
+def test_out_of_range_values_are_described() -> None:
     choice = Parameter("pattern", CHOICE, "", 0, 0, 1, ("grid", "orbit"))
     assert words.arguments(case.policy(), (choice,), (7,)) == "pattern = 7, out of range"
 

@@ -74,7 +74,7 @@ def test_without_a_key_nothing_is_signed(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_with_a_key_what_leaves_is_signed_and_its_timestamps_are_kept(tmp_path: Path, key_file: Path) -> None:
+def test_outbound_frames_are_signed_and_timestamps_kept(tmp_path: Path, key_file: Path) -> None:
     of = loaded()
     signing = LinkSigning(key_file, of.bundle.policy, of.executor.frames, tmp_path, SystemClock(), unsigned_radio=False)
     of.executor.frames.observe(HEARTBEAT)
@@ -99,7 +99,7 @@ def test_the_radio_may_be_let_in(tmp_path: Path, key_file: Path, policy: Policy)
 
 
 @pytest.mark.parametrize("what", ["exposed", "malformed", "damaged", "in-use"])
-def test_what_keeps_a_run_from_beginning(tmp_path: Path, key_file: Path, what: str) -> None:
+def test_invalid_link_key_prevents_the_run(tmp_path: Path, key_file: Path, what: str) -> None:
     store = LinkStore(tmp_path, VEHICLE, KEY)
     if what != "in-use":
         store.close()
@@ -122,7 +122,7 @@ def test_what_keeps_a_run_from_beginning(tmp_path: Path, key_file: Path, what: s
 @pytest.mark.parametrize(
     ("link", "told"), [(None, False), ("udpin:127.0.0.1:14550", False), ("udpin:0.0.0.0:14550", True)]
 )
-def test_a_link_without_a_key_that_others_may_reach_is_told_of(tmp_path: Path, link: str | None, told: bool) -> None:
+def test_unsigned_reachable_link_is_reported(tmp_path: Path, link: str | None, told: bool) -> None:
     at = None if link is None else address.parse(link)
     signing = sign_link(context(request(state=tmp_path, link=at)), loaded())
     assert isinstance(signing, LinkSigning)
@@ -134,7 +134,7 @@ def test_letting_the_radio_in_goes_with_a_key(tmp_path: Path, capsys: pytest.Cap
     assert "--signing-key" in capsys.readouterr().err
 
 
-def test_frames_that_another_key_signed_are_told_of(tmp_path: Path, key_file: Path) -> None:
+def test_frames_signed_by_another_key_are_reported(tmp_path: Path, key_file: Path) -> None:
     clock = SystemClock()
     signing = LinkSigning(key_file, POLICY, FrameSession(), tmp_path, clock, unsigned_radio=False)
     now = clock.now()
@@ -172,7 +172,7 @@ def test_a_mission_that_would_wait_for_the_radio_in_vain_does_not_begin(
     signing.close()
 
 
-def test_memory_that_is_somebody_elses_is_told_at_the_start(
+def test_foreign_state_folder_is_reported_at_the_start(
     tmp_path: Path, key_file: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(memory, "_FOLDER", tmp_path)

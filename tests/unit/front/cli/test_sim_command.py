@@ -76,7 +76,7 @@ def typed(out: str) -> list[str]:
         (True, None, False, 5, ["--speed", "5"]),
     ],
 )
-def test_what_flies_it_flies_it_on_this_machine_when_copied(
+def test_printed_run_command_works_when_copied(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
     apart: bool, kernel_us: int | None, keyed: bool, speed: float, needs: list[str],
 ) -> None:  # fmt: skip

@@ -91,7 +91,7 @@ def test_a_replacement_is_new_from_the_step_that_was_typed(here: Path, capsys: p
     assert "accepted: 1 to 5" in told(capsys, *command, "--from", "6", code=ExitCode.USAGE)
 
 
-def test_json_that_has_the_index_has_the_number_beside_it(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_with_a_step_index_has_the_step_number(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     why = json.loads(told(capsys, "why", "low.bundle", "--step", str(ASKED), "--json"))
     assert (why["step"], why["step_number"], why["skill"]) == (ASKED - 1, ASKED, "inspect_area")
     checked = json.loads(told(capsys, "check", "low.rts", "--json"))
@@ -100,7 +100,7 @@ def test_json_that_has_the_index_has_the_number_beside_it(here: Path, capsys: py
     assert mission["steps"][ASKED - 1]["skill"] == "inspect_area"
 
 
-def test_a_log_is_told_by_numbers(flown: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_log_is_shown_with_step_numbers(flown: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = tmp_path / "evidence.jsonl"
     log.write_bytes(b"".join(flown.lines))
     shown = told(capsys, "show", str(log))
@@ -115,7 +115,7 @@ def test_a_log_is_told_by_numbers(flown: Run, tmp_path: Path, capsys: pytest.Cap
     assert "Step 1, takeoff(" in told(capsys, "why", str(log), "--record", str(first))
 
 
-def test_what_an_agent_is_told_of_a_mission_has_both(tmp_path: Path) -> None:
+def test_mission_for_agents_has_index_and_number(tmp_path: Path) -> None:
     with Agents(None, low()) as agents:
         steps = json.loads(agents._mission())["steps"]
     assert [(each["step"], each["step_number"]) for each in steps] == [(at, at + 1) for at in range(len(steps))]
@@ -132,7 +132,7 @@ def test_an_event_of_a_run_has_both_and_its_text_the_number() -> None:
     assert "from step 3 on" in line
 
 
-def test_an_auditor_is_told_a_step_by_its_number() -> None:
+def test_audit_uses_step_numbers() -> None:
     assert ref_words(Ref(STEP, 0, -1)) == "step 1"
     assert ref_words(Ref(FALLBACK_LINK, 2, 0)) == "link 1 of the fallback of step 3"
     assert ref_words(Ref(FALLBACK_LINK, 2, DEGRADE)) == "the target of a degrade rule, at step 3"
@@ -174,7 +174,7 @@ def test_no_text_is_made_of_an_index() -> None:
     assert wrong == []
 
 
-def test_a_replacement_in_a_log_is_told_by_number(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_replacement_in_a_log_uses_step_numbers(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     path = tmp_path / "r"
     path.write_bytes(replacement(low()))
     shown = told(capsys, "show", str(path))

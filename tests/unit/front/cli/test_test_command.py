@@ -58,9 +58,7 @@ def test_verbose_lists_rows(here: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert "      ok    [60 %]" in out.splitlines()
 
 
-def test_a_failure_shows_the_source_what_decided_and_what_would_have_passed(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_failure_shows_source_clause_and_nearest_value(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     put("policy.rts", POLICY.replace("> 50 %", "> 70 %"))
     code, out, err = run(capsys, "tests")
     assert code == ExitCode.TESTS
@@ -72,7 +70,7 @@ def test_a_failure_shows_the_source_what_decided_and_what_would_have_passed(
     assert "`battery = 70.01 %`" in err
 
 
-def test_tests_run_where_their_own_file_is_asked_for(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_tests_run_only_in_named_files(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     put("all.rts", 'import "tests/yard.rts"\ntest "mine" from noon { when hover(5 s) expect allow }\n')
     code, found = answer(capsys, "all.rts")
     assert (code, [each["name"] for each in found["tests"]]) == (ExitCode.OK, ["mine"])
@@ -139,7 +137,7 @@ def test_one_case_as_json_in_full(here: Path, capsys: pytest.CaptureFixture[str]
     assert found["coverage"] is None
 
 
-def test_coverage_names_what_no_test_made_decide(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_coverage_lists_undecided_clauses(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = run(capsys, "--coverage")
     assert code == ExitCode.OK
     assert "coverage of yard@1 on quad: " in out
@@ -275,7 +273,7 @@ def test_a_reader_that_left(here: Path) -> None:
     assert (ended.returncode, ended.stderr) == (ExitCode.FULL, b"")
 
 
-def test_a_word_that_is_no_file_gets_the_nearest_file_and_the_way_to_choose_by_name(
+def test_unknown_path_suggests_a_file_and_the_k_option(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -62,9 +62,7 @@ def test_which_policy_must_be_clear(here: Path, capsys: pytest.CaptureFixture[st
     assert run(capsys, "--generate", "policy.rts", "other.rts", "--policy", "idle")[0] == ExitCode.OK
 
 
-def test_what_is_not_reached_is_told_in_the_file_on_standard_error_and_as_json(
-    here: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_unreached_limits_are_reported_in_file_stderr_and_json(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     put("policy.rts", POLICY.replace("battery > 90 %", "battery > 90 % and battery < 80 %"))
     _, out, err = run(capsys, "--generate", "policy.rts", "--skill", "hover")
     words = "hover: forbid: forbid hover by any when battery > 90 % and battery < 80 %: `battery`"

@@ -103,7 +103,7 @@ def not_flown(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("not_flown")
-def test_what_went_wrong_in_many_flights_is_told_once(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_repeated_failure_is_reported_once(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("flights.rts").write_text(SOURCE.replace("aboard px4", "aboard px4, ardupilot\n  seeds  1 .. 6"))
     code, out, err = run(capsys, "-k", "dropout", "--json")
     assert (code, err) == (ExitCode.TESTS, "")

@@ -53,7 +53,7 @@ def test_a_sound_log(run: Path, capsys: pytest.CaptureFixture[str], monkeypatch:
     out = capsys.readouterr().out
     count = len(flight())
     assert f"VERIFIED  {count} records, closed and signed; unanchored" in out
-    assert f"{count} records, in 8 sealed epochs; those that sign were read" in out
+    assert f"{count} records, in 8 sealed epochs; only signed records were read" in out
     assert f"- unanchored tail: {count} records" in out
     assert "closed and signed by log key" in out
     assert "complete" not in out.replace("completed", "")
@@ -91,7 +91,7 @@ def test_of_a_folder_no_log_is_passed_over_for_its_name(
         assert verify(folder / "y") == ExitCode.EVIDENCE, "the folder of a run is looked through too"
 
 
-def test_what_is_no_log_in_a_folder_is_named(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_other_files_in_a_folder_are_listed(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (run / "events.jsonl").write_text('{"event": "took off"}\n')
     (run / "nothing.jsonl").touch()
     assert verify(run) == ExitCode.OK
@@ -100,7 +100,7 @@ def test_what_is_no_log_in_a_folder_is_named(run: Path, capsys: pytest.CaptureFi
         assert f"{name}.jsonl`: not a log" in " ".join(said.split()), said
 
 
-def test_what_cannot_be_read_in_a_folder_is_no_success(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_unreadable_log_in_a_folder_fails(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (run / "flight-0412.jsonl").symlink_to("nowhere")
     assert verify(run) == ExitCode.INPUT
     assert "flight-0412.jsonl" in capsys.readouterr().err
@@ -134,7 +134,9 @@ def test_without_any_root(run: Path, capsys: pytest.CaptureFixture[str]) -> None
 
 
 @pytest.mark.parametrize("data", [b"", b"hello", b"00" * 31, bytes(100)])
-def test_a_root_file_that_is_none(data: bytes, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_root_file_is_refused(
+    data: bytes, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "no.trust").write_bytes(data)
     assert app.main(["verify-log", str(run), "--root", str(tmp_path / "no.trust")]) == ExitCode.UNTRUSTED
     assert "is neither a root key nor a trust root" in capsys.readouterr().err
@@ -145,9 +147,7 @@ def test_another_root(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "FAILED  at record 0, line 1: trust/root-unknown-key" in capsys.readouterr().out
 
 
-def test_a_log_under_another_root_is_told_whole_and_how_to_trust_it(
-    run: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_log_under_another_root_is_reported_with_a_remedy(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert verify(run) == ExitCode.OK
     duration = re.search(r", (\d+\.\d) s, mode", capsys.readouterr().out)
     assert duration is not None
@@ -155,7 +155,7 @@ def test_a_log_under_another_root_is_told_whole_and_how_to_trust_it(
     out = capsys.readouterr().out
     assert duration.group() in out
     assert "Not trusted here" in out
-    assert "`--root` takes that trust root" in out
+    assert "name it or its public key with `--root`" in out
     assert app.main(["verify-log", str(run), "--json", "--root", "00" * 32]) == ExitCode.UNTRUSTED
     assert "`--root`" in json.loads(capsys.readouterr().out)["failure"]["help"]
 
@@ -197,7 +197,7 @@ def test_a_later_format_is_not_trusted(run: Path) -> None:
 
 
 @pytest.mark.parametrize("data", [b"\x00\x01", b"hello\n", b"{}\n", b"\xff" * 100_000])
-def test_what_is_no_log(data: bytes, run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_other_file_is_refused(data: bytes, run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (run / "log.jsonl").write_bytes(data)
     assert verify(run) == ExitCode.INPUT
     assert "is not a log of this program" in capsys.readouterr().err
@@ -220,7 +220,7 @@ def with_telemetry(run: Path, data: bytes) -> None:
     (run / "telemetry.tlog").write_bytes(data)
 
 
-def test_the_telemetry_beside_the_log(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_telemetry_file_is_verified(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with_telemetry(run, b"frames")
     assert verify(run) == ExitCode.OK
     assert "`telemetry.tlog` is the one that was signed" in capsys.readouterr().out
@@ -313,7 +313,7 @@ def test_a_log_may_have_to_be_anchored(run: Path, capsys: pytest.CaptureFixture[
 
 
 @pytest.mark.parametrize("how", [[], ["--audit"], ["--fast"]])
-def test_anchors_beside_a_log_and_elsewhere(
+def test_anchor_files_are_found_and_named(
     how: list[str], run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     count = len(flight())
@@ -338,7 +338,7 @@ def test_anchors_beside_a_log_and_elsewhere(
 
 
 @pytest.mark.parametrize("how", [[], ["--audit"], ["--fast"]])
-def test_anchors_that_were_named_are_read_or_it_is_said(
+def test_named_anchors_are_read_or_reported(
     how: list[str], run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "folder.anchors").mkdir()

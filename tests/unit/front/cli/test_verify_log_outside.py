@@ -67,10 +67,10 @@ def test_a_file_of_anchors_that_holds_none(how: list[str], log: Path, capsys: py
     assert "- what witnesses would say in `log.anchors`: nothing there can be read as their notes" in out
 
 
-def test_what_is_missing_is_told_as_such(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_missing_path_is_reported(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert verify(log, "--require-anchor") == ExitCode.INCOMPLETE
     out = capsys.readouterr().out
-    assert "The log is whole, and witnesses outside did not see all of it" in out
+    assert "The log is complete, but witnesses did not see all of it" in out
     assert "The program stopped" not in out
 
 
@@ -115,7 +115,7 @@ def test_how_fast_a_flight_was() -> None:
     assert pace_of(0.5, own=False) == "a simulated vehicle, 0.5 times as fast as life"
 
 
-def test_a_missing_log_is_told_and_the_others_come_all_the_same(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_missing_log_does_not_stop_the_others(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     lost = log.parent / "lost.jsonl"
     assert verify(lost, log) == verify(log, lost) == verify(lost, log, lost) == ExitCode.INPUT
     said = capsys.readouterr()
@@ -126,7 +126,7 @@ def test_a_missing_log_is_told_and_the_others_come_all_the_same(log: Path, capsy
     assert verify(cut, lost, log) == ExitCode.INCOMPLETE, "the first that is not 0"
 
 
-def test_what_cannot_be_written_ends_it(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_write_failure_ends_the_command(log: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
@@ -134,9 +134,7 @@ def test_what_cannot_be_written_ends_it(log: Path, monkeypatch: pytest.MonkeyPat
     assert verify(log, log) == ExitCode.FULL
 
 
-def test_zeros_behind_the_last_record_are_what_a_power_cut_leaves(
-    log: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_trailing_zeros_are_explained_as_a_power_cut(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log.write_bytes(b"".join(flight()[:-1]) + bytes(5_000))
     assert verify(log) == ExitCode.INCOMPLETE
     assert "tail/torn" in capsys.readouterr().out

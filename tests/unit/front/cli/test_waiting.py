@@ -127,7 +127,7 @@ def lines_of(world: World, count: int) -> list[dict[str, Any]]:
         return [json.loads(file.readline()) for _ in range(count)]
 
 
-def test_a_bundle_that_is_admitted_flies_as_the_flight_that_was_told_of(
+def test_admitted_bundle_flies_under_the_announced_id(
     begin: Callable[..., World], capfd: pytest.CaptureFixture[str]
 ) -> None:
     world = begin()
@@ -141,7 +141,7 @@ def test_a_bundle_that_is_admitted_flies_as_the_flight_that_was_told_of(
     assert world.vehicle.announced == [waiting.ANNOUNCED]
 
 
-def test_what_comes_in_with_the_bundle_that_flies_is_for_the_flight(
+def test_documents_after_the_bundle_go_to_the_flight(
     begin: Callable[..., World], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It was dropped, a recall too, and never answered."""
@@ -152,7 +152,7 @@ def test_what_comes_in_with_the_bundle_that_flies_is_for_the_flight(
     assert [cast("Presented", event).sender for event in Agents.events(world.agents, Clock().now())] == [2]
 
 
-def test_what_is_no_bundle_to_be_trusted_changes_nothing(
+def test_untrusted_bundle_changes_nothing(
     begin: Callable[..., World], capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(waiting, "SAID_S", 3600)
@@ -168,7 +168,7 @@ def test_what_is_no_bundle_to_be_trusted_changes_nothing(
     assert [each["slug"] for each in told if each["event"] == "not-admitted"] == ["not-flying"], "once in SAID_S"
 
 
-def test_who_follows_is_told_that_nothing_flies_and_how_the_vehicle_is(begin: Callable[..., World]) -> None:
+def test_followers_see_that_the_vehicle_waits(begin: Callable[..., World]) -> None:
     world = begin()
     hello, waits, *vehicle = lines_of(world, 12)
     assert (hello["type"], waits["type"], waits["policy"]) == ("hello", "waiting", "bridge_inspection@7")
@@ -200,7 +200,7 @@ def test_it_does_not_wait_for_ever(begin: Callable[..., World]) -> None:
     assert (refused.code, refused.slug) == (ExitCode.REFUSED, "nothing-handed-in")
 
 
-def test_lines_that_are_none_are_answered(begin: Callable[..., World]) -> None:
+def test_malformed_lines_are_answered(begin: Callable[..., World]) -> None:
     world = begin()
     with socket.socket(socket.AF_UNIX) as link:
         link.connect(str(world.path))

@@ -27,7 +27,7 @@ def test_a_copy_of_a_shipped_policy(
     assert "the imports of `proposal.json`" in found["help"]
 
 
-def test_a_missing_name_is_told_once(
+def test_missing_name_is_reported_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)

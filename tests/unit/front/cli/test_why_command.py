@@ -57,7 +57,7 @@ def test_a_state_by_hand(
     assert [each["words"] for each in found["would_pass"]] == would_pass
 
 
-def test_a_person_sees_each_step_what_decided_and_what_would_pass(capsys: pytest.CaptureFixture[str]) -> None:
+def test_explanation_shows_stages_clause_and_nearest_values(capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = why(capsys, STANDARD, "--step", "3", *AT, "--state", "battery=32 %")
     assert code == ExitCode.OK
     assert "fallback, state/violated" in out
@@ -98,7 +98,7 @@ def test_wrong_words(words: list[str], message: str, capsys: pytest.CaptureFixtu
     assert message in err
 
 
-def test_what_is_no_bundle(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_bundle_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "x.bundle"
     path.write_bytes(b"nothing of ours")
     code, _, err = why(capsys, str(path), "--step", "1")
@@ -122,16 +122,14 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def test_a_log_shows_its_latest_decision_or_the_one_that_is_asked_for(
-    log: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_log_shows_the_latest_or_the_requested_decision(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = shown(capsys, str(log.parent))
     assert {step["verdict"] for step in found["steps"]} == {"passes"}
     again = shown(capsys, str(log), "--record", str(found["record"]))
     assert again == found
 
 
-def test_a_log_that_lacks_what_is_asked_for(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_missing_record_is_refused(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = why(capsys, str(log), "--record", "9999")
     assert (code, out) == (ExitCode.INPUT, "")
     assert "run `rtshcua show` for the records" in err
@@ -201,7 +199,7 @@ mission up under seen@1 on surveyor {
 """
 
 
-def test_what_follows_an_approval(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_decision_after_an_approval_is_explained(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / "seen.rts"
     path.write_text(CONFIRMED, encoding="utf-8")
     asked = (str(path), "--step", "1")
@@ -253,7 +251,7 @@ def stalled(run: Run, slot: int | None) -> bytes:
     return logged(run.until_over())
 
 
-def test_what_a_stall_left_unknown_the_stall_caused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_unknown_inputs_after_a_stall_are_attributed_to_it(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     log = tmp_path / "log.jsonl"
     log.write_bytes(stalled(Run(vehicle=FakeVehicle(deaf={"inspect_area"})), POSITION_X))
     found = shown(capsys, str(log))
@@ -266,9 +264,7 @@ def test_what_a_stall_left_unknown_the_stall_caused(capsys: pytest.CaptureFixtur
     assert "Stalls of the computer" in page
 
 
-def test_a_stall_after_which_it_flew_on_is_told_and_no_cause(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_survived_stall_is_shown_but_not_the_cause(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     log = tmp_path / "log.jsonl"
     log.write_bytes(stalled(Run(), None))
     found = shown(capsys, str(log))
@@ -276,9 +272,7 @@ def test_a_stall_after_which_it_flew_on_is_told_and_no_cause(
     assert len(found["stalls"]) == 1  # type: ignore[arg-type]
 
 
-def test_what_ends_a_flight_long_after_a_stall_is_its_own_cause(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_later_end_is_not_attributed_to_a_stall(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     run = Run(vehicle=FakeVehicle(deaf={"inspect_area"})).until_flies("inspect_area")
     run.clock.advance(14 * S)
     run.step()
@@ -292,9 +286,7 @@ def test_what_ends_a_flight_long_after_a_stall_is_its_own_cause(
     assert "interrupted" in cause["what"]
 
 
-def test_a_step_that_was_deferred_and_then_allowed_is_told_with_both(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_deferred_then_allowed_step_shows_both_decisions(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     run = Run(vehicle=FakeVehicle(silent={BATTERY}))
     run.until(lambda run: "defer" in [each.get("outcome") for each in run.records])
     run.vehicle.silent.clear()

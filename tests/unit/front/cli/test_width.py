@@ -68,7 +68,7 @@ SAID: dict[str, Callable[[], object]] = {
 
 
 @pytest.mark.parametrize("what", SAID)
-def test_what_is_said_fits_80_columns(what: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_messages_fit_80_columns(what: str, capsys: pytest.CaptureFixture[str]) -> None:
     SAID[what]()
     said = capsys.readouterr()
     assert said.out + said.err
@@ -86,7 +86,7 @@ def test_every_page_of_a_code_fits_80_columns_but_for_its_examples() -> None:
         assert text.split() == read_page(code).text.split()
 
 
-def test_what_findings_of_a_log_mean_fits_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
+def test_meanings_of_log_findings_fit_80_columns(capsys: pytest.CaptureFixture[str]) -> None:
     for slug in every():
         assert find(slug) is not None
         main(["explain", slug])

@@ -22,6 +22,6 @@ def test_with_and_without_units(written: str | None, taken: str | None) -> None:
 
 
 @pytest.mark.parametrize("written", ["strong", "6", "6,270,2,1", "-6,270", "6deg,270", "6m/s,west", "6,270,", "6,inf"])
-def test_what_is_no_wind(written: str) -> None:
+def test_invalid_wind_is_refused(written: str) -> None:
     with pytest.raises(typer.BadParameter, match="as in 6m/s,270deg,2m/s"):
         wind(written)

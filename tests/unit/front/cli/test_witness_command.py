@@ -171,7 +171,7 @@ def test_a_log_that_was_written_anew(
     assert "; proof: " in capsys.readouterr().out
 
 
-def test_a_log_that_is_not_what_was_signed(flown: Flown, capsys: pytest.CaptureFixture[str]) -> None:
+def test_log_that_differs_from_its_signature_is_not_cosigned(flown: Flown, capsys: pytest.CaptureFixture[str]) -> None:
     flown.path.write_bytes(flown.path.read_bytes().replace(b'"said"', b'"sand"'))
     assert app.main(["witness", str(flown.path)]) == ExitCode.EVIDENCE
     assert "not cosigned: record 4: the checkpoint does not match the records before it" in capsys.readouterr().out
@@ -212,7 +212,7 @@ def test_two_processes(flown: Flown, capsys: pytest.CaptureFixture[str]) -> None
     "words",
     [[], ["--watch", "1"], ["--connect", "nowhere"], ["--connect", "udpout:127.0.0.1:15000"]],
 )
-def test_what_makes_no_sense(words: list[str], store: KeyStore) -> None:
+def test_invalid_options_are_refused(words: list[str], store: KeyStore) -> None:
     assert app.main(["witness", *words]) == ExitCode.USAGE
 
 
@@ -260,7 +260,7 @@ def test_a_survey_needs_a_log(tmp_path: Path, store: KeyStore) -> None:
     assert app.main(["witness", str(tmp_path)]) == ExitCode.EVIDENCE
 
 
-def test_what_cannot_be_read_keeps_no_other_log_waiting(
+def test_unreadable_log_does_not_delay_the_others(
     flown: Flown, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Whoever may put a file into the folder that is watched must not end the watch."""
@@ -285,7 +285,7 @@ def test_what_cannot_be_read_keeps_no_other_log_waiting(
     assert app.main(["witness", str(tmp_path / "c.jsonl")]) == ExitCode.INPUT
 
 
-def test_a_log_whose_anchors_could_not_be_written_is_looked_at_again(
+def test_log_with_unwritten_anchors_is_tried_again(
     flown: Flown, store: KeyStore, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     beside = flown.path.with_suffix(".anchors")
@@ -340,7 +340,7 @@ def test_a_request_to_stop_ends_a_witness_as_ctrl_c_does(
     assert signal.getsignal(signal.SIGTERM) is before
 
 
-def test_what_follows_the_close_is_not_cosigned(flown: Flown, capsys: pytest.CaptureFixture[str]) -> None:
+def test_data_after_the_close_is_not_cosigned(flown: Flown, capsys: pytest.CaptureFixture[str]) -> None:
     flown.epoch(close=True)
     data = flown.path.read_bytes()
     flown.path.write_bytes(data + b"\n")

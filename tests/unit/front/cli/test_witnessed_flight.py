@@ -62,7 +62,7 @@ def test_a_host_that_nobody_knows(monkeypatch: pytest.MonkeyPatch) -> None:
     assert (refused.code, refused.slug) == (ExitCode.LINK, "witness-address")
 
 
-def test_what_comes_is_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_received_anchors_are_recorded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(witnesses, "WitnessClient", Client)
     for closed, waited in ((True, ()), (False, (0,))):
         made = find_witnesses([THERE], KEYS)

@@ -17,7 +17,7 @@ from rtshcua.wire.keys import Duty, SigningKey
 
 @pytest.mark.parametrize("command", ["check", "compile", "lint"])
 @pytest.mark.parametrize("name", ["-", "pipe.rts"])
-def test_a_source_that_is_no_file_is_told_as_that(
+def test_source_that_is_not_a_file_is_reported(
     command: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -45,7 +45,7 @@ def test_a_name_that_was_typed_is_never_suggested(tmp_path: Path) -> None:
     assert missing(tmp_path / "log.rts") is None
 
 
-def test_the_help_about_a_page_names_what_is_taken(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_help_for_a_page_names_accepted_kinds(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = tmp_path / "README.md"
     page.write_text("# A page\n")
     mistaken = no_bundle(page)
@@ -56,7 +56,7 @@ def test_the_help_about_a_page_names_what_is_taken(tmp_path: Path, capsys: pytes
     assert "a source is a plain text file that ends in `.rts`" in "".join(capsys.readouterr())
 
 
-def test_what_is_no_key_is_told_as_that_and_a_key_by_its_mode(tmp_path: Path) -> None:
+def test_wrong_kind_is_reported_before_the_mode_of_a_key(tmp_path: Path) -> None:
     page, long, link, own = (tmp_path / name for name in ("page", "long", "link", "own"))
     page.write_text("# A page\n")
     long.write_text("# A page\n" * 1_000)

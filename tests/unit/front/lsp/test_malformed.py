@@ -73,7 +73,7 @@ def test_a_request_that_is_well_formed_is_handled() -> None:
 
 
 @rows("debug", ["", "1"])
-def test_what_cannot_be_read_is_logged_in_a_line(debug: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unreadable_message_is_logged_on_one_line(debug: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("RTSHCUA_DEBUG", debug)
     try:
         json.loads("[")

@@ -74,7 +74,7 @@ def test_a_process_that_fails_once_is_replaced(tmp_path: Path, fault: str) -> No
     assert asked(tmp_path, f"if not starts:\n  {fault}{RIGHT}", "a") == ([FOUND], [], 2)
 
 
-def test_one_that_always_fails_is_said_and_the_next_question_tries_again(tmp_path: Path) -> None:
+def test_failing_prover_is_reported_and_tried_again(tmp_path: Path) -> None:
     found, said, starts = asked(tmp_path, f"if starts < 2:\n  sys.exit(1){RIGHT}", "a", "b")
     assert found == [None, FOUND]
     assert said == ["the proofs of a could not be had: the process that proves has ended"]
@@ -90,7 +90,7 @@ def test_one_that_hangs_is_ended(tmp_path: Path, hangs: str) -> None:
     assert starts == 2
 
 
-def test_no_process_at_all_is_said(tmp_path: Path) -> None:
+def test_missing_prover_process_is_reported(tmp_path: Path) -> None:
     said: list[str] = []
 
     async def asking() -> Found:

@@ -79,7 +79,7 @@ def test_a_token_that_others_may_read_or_write_is_refused(tmp_path: Path, mode: 
 
 
 @pytest.mark.parametrize("text", ["", "short", "a" * 31, "a b" * 20, "a" * 40 + "\nb", "é" * 40])
-def test_what_is_no_token_is_refused(tmp_path: Path, text: str) -> None:
+def test_invalid_token_is_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "token"
     path.write_text(text, "utf-8")
     path.chmod(0o600)

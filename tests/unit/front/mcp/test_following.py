@@ -29,7 +29,7 @@ def test_the_first_word_is_waited_for(tmp_path: Path) -> None:
             followed.end()
 
 
-def test_what_cannot_be_reached_is_waited_for_no_longer_than_that_shows(tmp_path: Path) -> None:
+def test_unreachable_vehicle_is_not_waited_for(tmp_path: Path) -> None:
     began_s = time.monotonic()
     followed = Following(tmp_path / "none.sock")
     followed.await_first()
@@ -39,7 +39,7 @@ def test_what_cannot_be_reached_is_waited_for_no_longer_than_that_shows(tmp_path
 
 
 @pytest.mark.parametrize("line", [b"[" * 200_000, b"[" + b"[]," * 100_000 + b"[]]", b"{" * 3, b"x" * (LONGEST + 9)])
-def test_a_line_that_is_no_flights_loses_the_flight_until_the_next_connection_alone(
+def test_invalid_line_drops_only_the_current_connection(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, line: bytes
 ) -> None:
     monkeypatch.setattr(flight, "AGAIN_S", 0.01)
@@ -61,9 +61,7 @@ def test_a_line_that_is_no_flights_loses_the_flight_until_the_next_connection_al
 
 
 @pytest.mark.parametrize("values", [1, 1_000])
-def test_what_is_kept_is_bounded_by_what_it_weighs(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, values: int
-) -> None:
+def test_kept_records_are_bounded_by_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, values: int) -> None:
     """A record of a megabyte, or one of few octets and many values."""
     monkeypatch.setattr(flight, "MOST_KEPT", 300_000)
     followed = Following(tmp_path / "none.sock")

@@ -59,7 +59,7 @@ def played(what: Callable[[Host], Awaitable[None]]) -> None:
     asyncio.run(play())
 
 
-def test_a_message_is_served_whole_and_what_is_none_is_answered_here() -> None:
+def test_message_is_served_and_other_bodies_are_refused() -> None:
     async def play(host: Host) -> None:
         host.let.set()
         whole = PING % b"1"
@@ -82,7 +82,7 @@ def test_a_body_of_millions_of_values_is_refused_before_any_is_built() -> None:
     played(play)
 
 
-def test_a_body_that_is_too_large_is_refused_by_what_it_says_or_is() -> None:
+def test_large_body_is_refused_by_declared_or_actual_size() -> None:
     async def play(host: Host) -> None:
         assert await host.ask(b"", content_length=str(MOST_OCTETS + 1)) == (413, b"")
         assert await host.ask(*[b" " * LARGE] * (MOST_OCTETS // LARGE), b" ", ends=False) == (413, b"")
@@ -129,7 +129,7 @@ def test_a_body_that_does_not_come_is_waited_for_a_while(monkeypatch: pytest.Mon
     played(play)
 
 
-def test_an_id_is_not_asked_twice_before_it_is_answered() -> None:
+def test_open_request_id_is_not_reused() -> None:
     """The SDK would answer the second alone; it takes 1 and "1" for one."""
 
     async def play(host: Host) -> None:

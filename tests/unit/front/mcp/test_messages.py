@@ -77,7 +77,7 @@ REFUSED = {
 }
 
 
-def test_what_is_no_message_is_refused_with_the_id_that_it_certainly_has() -> None:
+def test_invalid_message_is_refused_with_its_certain_id() -> None:
     wrong = {}
     for line, expected in REFUSED.items():
         read = read_message(line)
@@ -119,7 +119,7 @@ def test_a_refusal_is_one_line_with_its_id_or_null() -> None:
     assert json.loads(Wrong(NO_REQUEST, "a", "x").answer())["id"] == "x"
 
 
-def test_what_others_say_can_be_written_whatever_it_is() -> None:
+def test_any_external_text_can_be_serialised() -> None:
     told = {"\ud800": float("nan"), "b": ["\udfff\ud800", float("inf"), -float("inf"), 1.5, "é"], "c": "\ud834\udd1e"}
     mended = {"\ufffd": None, "b": ["\ufffd\ufffd", None, None, 1.5, "é"], "c": "\ufffd\ufffd"}
     assert writable(told)[0] == mended

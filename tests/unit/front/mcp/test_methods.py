@@ -19,7 +19,7 @@ def test_an_unknown_method_is_answered_as_that() -> None:
 
 
 @pytest.mark.parametrize("method", ["initialize", "ping", "tools/call", "tools/list", "resources/subscribe"])
-def test_what_the_protocol_has_is_left_to_the_sdk(method: str) -> None:
+def test_known_methods_are_left_to_the_sdk(method: str) -> None:
     assert method in METHODS
     assert unknown_method({"id": 1, "method": method}) is None
 

@@ -83,7 +83,7 @@ def request(number: int) -> bytes:
     return b'{"jsonrpc":"2.0","id":%d,"method":"ping"}\n' % number
 
 
-def test_what_is_no_message_is_answered_in_its_place_and_the_rest_as_ever() -> None:
+def test_invalid_line_is_answered_in_order() -> None:
     told = served(
         request(1) + b'{"jsonrpc":"2.0","id":"\\ud800","method":"ping"}\n\n[]\n{"jsonrpc":"2.0","id":9,"result":{}}\n'
         b'{"jsonrpc":"2.0","method":"notifications/initialized"}\n' + request(2).rstrip()
@@ -92,7 +92,7 @@ def test_what_is_no_message_is_answered_in_its_place_and_the_rest_as_ever() -> N
     assert answers == ["[1, false]", "[2, false]", "[null, true]", "[null, true]"]
 
 
-def test_what_utf_8_cannot_say_ends_nothing() -> None:
+def test_invalid_utf_8_does_not_end_the_session() -> None:
     told = served(request(1) + request(2), more={"a": "\ud800"})
     assert [(each["id"], each["result"]) for each in told] == [(1, {"a": "\ufffd"}), (2, {"a": "\ufffd"})]
 

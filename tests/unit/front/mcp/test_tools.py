@@ -169,7 +169,7 @@ def flying(desk: Tools) -> None:
 
 
 @pytest.mark.parametrize("key", ["one", "two"])
-def test_a_repeated_proposal_is_told_that_the_mission_flies(desk: Tools, handed: list[bytes], key: str) -> None:
+def test_repeated_proposal_reports_the_flying_mission(desk: Tools, handed: list[bytes], key: str) -> None:
     first = desk.propose_mission(PROPOSAL, "one")
     assert status(desk, first["ticket"]) == "admitted"
     flying(desk)

@@ -62,7 +62,7 @@ def test_a_refusal_says_why_and_what_flies_instead() -> None:
     )
 
 
-def test_what_the_world_says_cannot_steer_a_terminal() -> None:
+def test_external_text_cannot_control_the_terminal() -> None:
     nasty = "\x1b[2J\x07\r\nroot"
     assert (
         sentence(Happening("failed", 1, 0, "takeoff()", detail=nasty))
@@ -71,7 +71,7 @@ def test_what_the_world_says_cannot_steer_a_terminal() -> None:
     assert "\x1b" not in drawn(PLAN, Note(nasty), Happened(Happening("failed", 1, 0, nasty, detail=nasty)))
 
 
-def test_a_step_that_comes_again_is_told_as_that() -> None:
+def test_repeated_step_is_shown_as_repeated() -> None:
     told = sentence(Happening("refused", 1, 0, "takeoff()", detail="permit/unsent"))
     assert told == "refused      takeoff()  nothing was sent: it is tried again, up to its deadline"
     assert sentence(Happening("refused", 1, 0, "takeoff()", detail="permit/sent")).endswith("permit/sent")

@@ -34,7 +34,7 @@ def waiting(skill: int = TAKEOFF) -> Loaded:
     return loaded(replace(POLICY, monitors=(CALM, STILL), contracts=contracts), replace(MISSION, invocations=steps))
 
 
-def test_a_run_says_what_a_deferral_waits_for() -> None:
+def test_run_names_the_condition_a_deferral_waits_for() -> None:
     run = Run(waiting()).until_flies("takeoff")
     teller = Teller(run.loaded.policy.policy, run.loaded.bundle.mission, START.monotonic_us)
     told = [each for each in map(teller.tell, run.lines[1:]) if each is not None and each.event == "decision"]
@@ -44,7 +44,7 @@ def test_a_run_says_what_a_deferral_waits_for() -> None:
     assert told[1].waits == ""
 
 
-def test_what_is_unknown_after_it_was_observed_for_long_waits_for_something_else() -> None:
+def test_unknown_input_after_long_observation_waits_for_another_cause() -> None:
     run = Run(waiting()).until_flies("takeoff")
     teller = Teller(run.loaded.policy.policy, run.loaded.bundle.mission, START.monotonic_us - 5 * S)
     told = [each for each in map(teller.tell, run.lines[1:]) if each is not None and each.event == "decision"]
@@ -70,7 +70,7 @@ def test_a_first_step_that_waits_to_have_observed_enough_would_fly(
     assert (first.hopeful, first.observing) == (hopeful, observing)
 
 
-def test_a_rehearsal_says_what_it_waits_for() -> None:
+def test_dry_run_names_the_condition_it_waits_for() -> None:
     of, values = waiting(), FakeVehicle().values
     state = State(tuple(values[slot] for slot in range(len(values))), (10_000,) * len(values), (UNKNOWN, UNKNOWN))
     page = str(rehearsed._page(FlightRehearsal(of, rehearse(of, state, START), (), None, None, interrupted=False)))
@@ -78,7 +78,7 @@ def test_a_rehearsal_says_what_it_waits_for() -> None:
     assert "1 waiting for what will come, 0 would not fly" in page
 
 
-def test_what_a_policy_degrades_to_is_named_where_it_is_one_thing() -> None:
+def test_degraded_skill_is_named_if_it_is_unique() -> None:
     run = Run(loaded()).until_flies("takeoff")
     sent = next(line for line in run.lines if b'"event":"dispatched"' in line)
     degraded = edit(sent, kind=FALLBACK_LINK, link=DEGRADE)

@@ -102,7 +102,7 @@ def waiting() -> tuple[Run, Teller, list[Happening]]:
 # ------------------------------------------------------------------------------------------ whom, how long, what
 
 
-def test_a_real_flight_tells_whom_it_waits_for_how_long_and_the_command_that_answers() -> None:
+def test_flight_prints_role_time_and_command_of_a_pending_approval() -> None:
     _, _, told = waiting()
     what = next(each for each in told if each.asks is not None)
     assert what.asks is not None
@@ -125,7 +125,7 @@ def test_the_plain_view_has_the_banner_and_the_command_can_be_copied_from_it() -
     assert shlex.split("\n".join(lines[first:]).replace("\\\n", "")) == [*COMMAND]
 
 
-def test_a_program_is_told_the_same() -> None:
+def test_pending_approval_is_in_json_too() -> None:
     (told,) = map(json.loads, as_json(Happened(WAITS)))
     assert told["asks"]["roles"] == ["supervisor"]
     assert told["asks"]["commands"] == [[*COMMAND]]
@@ -153,7 +153,7 @@ def test_without_a_socket_it_says_that_nobody_can_answer() -> None:
     assert "this run has no `--operator-socket`" in " ".join(" ".join(plain(Happened(asked))).split())
 
 
-def test_two_people_are_asked_until_both_agreed() -> None:
+def test_two_approvals_are_requested_until_both_are_given() -> None:
     both = Asks(
         ("chief", "safety"), 0, 60 * S, tuple((*COMMAND[:6], role, "--to", "s") for role in ("chief", "safety"))
     )
@@ -169,7 +169,7 @@ def test_two_people_are_asked_until_both_agreed() -> None:
     assert found.banner(80) == []
 
 
-def test_an_answer_is_told_with_its_role() -> None:
+def test_answer_is_shown_with_its_role() -> None:
     run, teller, _ = waiting()
     before = len(run.lines)
     run.tick(Presented(run.clock.now().monotonic_us, approval(run.loaded), 1))
@@ -182,7 +182,7 @@ def test_an_answer_is_told_with_its_role() -> None:
 # ------------------------------------------------------------------------------------------ the screen
 
 
-def test_the_screen_counts_the_seconds_down_and_says_what_to_type() -> None:
+def test_screen_counts_down_and_shows_the_command() -> None:
     found = board(PLAN, Happened(WAITS), Snapshot(view(5 * S)))
     text = "\n".join(shown(found))
     assert "29 s left" in text
@@ -330,7 +330,7 @@ def test_the_map_shows_zones_fence_keep_out_and_the_way_home() -> None:
     assert HOMEWARD not in kinds(without)
 
 
-def test_what_must_not_be_entered_is_hatched_and_the_rest_is_not() -> None:
+def test_only_keep_out_zones_are_hatched() -> None:
     def dots(kind: str) -> int:
         area = Area("z", kind, ((-40_000, -40_000, 40_000, -40_000, 40_000, 40_000, -40_000, 40_000),))
         found = chart([], [(-40_000, -40_000), (40_000, 40_000)], None, 30, 12, [area])

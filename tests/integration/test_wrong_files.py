@@ -64,7 +64,7 @@ def test_file_of_another_kind_is_named(
         ("chek x", "no such command: `chek`|did you mean `rtshcua check`?"),
         ("keys lst", "no such command: `keys lst`|did you mean `rtshcua keys list`?"),
         ("archive ad x", "no such command: `archive ad`|did you mean `rtshcua archive add`?"),
-        ("keys frobnicate", "no such command: `keys frobnicate`|`rtshcua keys --help` lists the commands"),
+        ("keys frobnicate", "no such command: `keys frobnicate`|run `rtshcua keys --help` for a list of commands"),
         ("sim --fault batery,at=3s", "no such fault: `batery`; did you mean `battery`?"),
         ("sim --fault quantum,at=3s", "no such fault: `quantum`; expected one of battery, "),
     ],

@@ -1,4 +1,4 @@
-"""The front door: `rtshcua COMMAND ...`. Reads the table, imports the one command that is asked for, and guards it.
+"""The main program: `rtshcua COMMAND ...`. It looks up the command in the table, imports it, and runs it.
 
 `rtshcua`, `rtshcua --help` and `rtshcua --version` import neither typer nor rich (bench/startup.py measures it).
 """
@@ -20,16 +20,16 @@ from rtshcua.front.cli.streams import mend_streams
 from rtshcua.front.cli.table import COMMANDS, EXAMPLES, GROUPS, Row, find
 from rtshcua.front.cli.width import fitted
 
-#: when the collector looks for garbage while sources are checked: syntax trees come by thousands, and stay
+#: thresholds of the garbage collector while sources are checked: syntax trees are many and long-lived
 _COLLECTING = (50_000, 20, 100)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs one command and gives its exit code back, for `sys.exit`; nothing but SystemExit rises from it."""
+    """Run one command and return its exit code; raises nothing but SystemExit."""
     words = list(sys.argv[1:] if arguments is None else arguments)
     mend_streams()
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # a poor terminal must not turn a degree sign into a fault
+        sys.stdout.reconfigure(errors="backslashreplace")  # a terminal without UTF-8 must not fail on a degree sign
     options = words[: words.index("--")] if "--" in words else words
     with as_json(wanted="--json" in options):
         return int(barrier(lambda: _dispatch(words)))
@@ -54,12 +54,12 @@ def _unknown(word: str) -> ExitCode:
 
     kind = "option" if word.startswith("-") else "command"
     near = nearest(word, [row.name for row in COMMANDS] + ["--help", "--version"])
-    help = f"did you mean `rtshcua {near}`?" if near else "`rtshcua --help` lists the commands"
+    help = f"did you mean `rtshcua {near}`?" if near else "run `rtshcua --help` for a list of commands"
     return fail(ExitCode.USAGE, f"no such {kind}: `{word}`", help)
 
 
 def _call(row: Row, words: list[str]) -> int:
-    """Imports the command of `row` and runs it through typer, whose own way of reporting errors is left out."""
+    """Import the command of `row` and run it with typer, but report errors in our own format."""
     if row.fast_path:
         from rtshcua.front.cli import fast_path
 
@@ -72,7 +72,7 @@ def _call(row: Row, words: list[str]) -> int:
         if code is not None:
             return code
     collecting = gc.isenabled()
-    gc.disable()  # what is loaded stays: to look through it for garbage takes a tenth of a command's start
+    gc.disable()  # the loaded modules stay: collecting takes 10 % of a command's start
     try:
         import typer
         from typer.main import get_command
@@ -95,18 +95,18 @@ def _call(row: Row, words: list[str]) -> int:
             return int(cast("int | None", command.invoke(context)) or ExitCode.OK)
     except typer.Exit as end:
         return end.exit_code
-    except (typer.Abort, EOFError) as error:  # Ctrl-C, or the end of the input, at a question
+    except (typer.Abort, EOFError) as error:  # Ctrl-C or the end of the input at a prompt
         if sys.stderr is not None and sys.stderr.isatty():
-            sys.stderr.write("\n")  # the question stands there
+            sys.stderr.write("\n")  # the cursor is after the prompt
         if isinstance(error, EOFError) or isinstance(error.__context__, EOFError):
-            return fail(ExitCode.INPUT, "the input ended at a question that was not answered")
-        return fail(ExitCode.INTERRUPTED, "stopped at a question that was not answered")
+            return fail(ExitCode.INPUT, "the input ended at a prompt")
+        return fail(ExitCode.INTERRUPTED, "interrupted at a prompt")
     except typer.TyperException as error:
         return _misused(row, error, words)
 
 
 def _unguarded(command: object) -> None:
-    """Leaves it to the command to open its files: one that cannot be read is bad input, not a wrong command line."""
+    """Disable typer's check of readable files: an unreadable file is bad input, not a wrong command line."""
     for parameter in getattr(command, "params", ()):
         described = getattr(parameter, "type_descriptor", None)
         each: Any
@@ -118,7 +118,7 @@ def _unguarded(command: object) -> None:
 
 
 def _reflowed(command: object) -> None:
-    """Makes each paragraph of a command's help one line, which typer then breaks where the terminal ends."""
+    """Join each paragraph of a command's help into one line, which typer wraps at the terminal's width."""
     text = getattr(command, "help", None)
     if text:
         command.help = "\n\n".join(" ".join(each.split()) for each in text.split("\n\n"))  # type: ignore[attr-defined]
@@ -127,9 +127,7 @@ def _reflowed(command: object) -> None:
 
 
 def _misused(row: Row, error: Exception, given: list[str]) -> ExitCode:
-    """Says what is wrong with the command line as every other error is said; with `--json` as JSON, where the command
-    reports findings.
-    """
+    """Report a wrong command line in the common error format, or as JSON for commands that report findings."""
     words = cast("str", error.format_message()).rstrip(".")  # type: ignore[attr-defined]
     context = getattr(error, "ctx", None)
     path = context.command_path if context is not None else f"rtshcua {row.name}"
@@ -144,9 +142,9 @@ def _misused(row: Row, error: Exception, given: list[str]) -> ExitCode:
     verb = re.fullmatch(r"no such command '(.*?)'(?:\. Did you mean (.*?))?\??", words, re.DOTALL)
     if verb is not None:
         meant = (verb[2] or "").replace("'", "").removeprefix("one of: ").partition(", ")[0]
-        help = f"did you mean `{path} {meant}`?" if meant else f"`{path} --help` lists the commands"
+        help = f"did you mean `{path} {meant}`?" if meant else f"run `{path} --help` for a list of commands"
         return fail(ExitCode.USAGE, f"no such command: `{path.partition(' ')[2]} {verb[1]}`", help)
-    help = f"`{path} --help` explains it"
+    help = f"run `{path} --help` for its options"
     if row.reports and "--json" in given:
         from rtshcua.front.cli.render.findings import Findings
 
@@ -156,7 +154,7 @@ def _misused(row: Row, error: Exception, given: list[str]) -> ExitCode:
 
 
 def _meant(words: str, command: object) -> str:
-    """What was probably meant by an option that ends as others do, or by a word that is none of those accepted."""
+    """Return the probable intention of an unknown option or value, or an empty text."""
     from rtshcua.diagnostics.suggest import nearest
 
     chosen = re.search(r"'([^']*)' is not one of (.+)$", words)
@@ -168,7 +166,7 @@ def _meant(words: str, command: object) -> str:
 
 
 def overview(*, bold: bool) -> str:
-    """What `rtshcua --help` prints, from the table alone."""
+    """Return the text of `rtshcua --help`, from the table alone."""
     width = max(len(row.name) for row in COMMANDS)
     example_width = max(len(line) for line, _ in EXAMPLES)
 
@@ -191,8 +189,8 @@ def overview(*, bold: bool) -> str:
     lines += [
         "",
         head("Options"),
-        f"  {'-h, --help':<{width + 3}}  this page; `rtshcua COMMAND --help` for one command",
-        f"  {'-V, --version':<{width + 3}}  the version",
+        f"  {'-h, --help':<{width + 3}}  print this help; `rtshcua COMMAND --help` for one command",
+        f"  {'-V, --version':<{width + 3}}  print the version",
     ]
     return "\n".join(lines)
 

@@ -1,4 +1,4 @@
-"""The static table of commands: all that `rtshcua --help` reads, so that start-up stays fast as commands grow.
+"""The static table of commands, which is all that `rtshcua --help` imports, so that it starts fast.
 
 To add a command:
 
@@ -7,9 +7,9 @@ To add a command:
 - the module has `app = typer.Typer(add_completion=False)`. One `@app.command()` makes `rtshcua NAME ...`; for
   `rtshcua NAME VERB ...` give the app an `@app.callback()` too, over a function that does nothing, else a single verb
   would be swallowed;
-- the function returns an `ExitCode`. It reports what it refuses itself, in one way for all: `return
-  fail(ExitCode.INPUT, "...")` from `rtshcua.front.cli.faults`; OSError, Ctrl-C and faults rise to the barrier there;
-- Ctrl-C ends it at once, by the signal, unless its row says that it ends in order, or it sets a flag instead
+- the function returns an `ExitCode`. It reports its own errors with `return fail(ExitCode.INPUT, "...")` of
+  `rtshcua.front.cli.faults`; the barrier there handles OSError, Ctrl-C and faults;
+- Ctrl-C ends the command at once by the signal, unless its row has `ends_in_order`, or the command uses a flag
   (`rtshcua.front.cli.interrupts`).
 """
 
@@ -17,14 +17,14 @@ from typing import NamedTuple
 
 
 class Row(NamedTuple):
-    """One command: its name on the command line, the group it is shown in, and one line of help."""
+    """One command: its name, its group in `rtshcua --help`, and one line of help."""
 
     name: str
     group: str
     help: str
-    fast_path: bool = False  # plain command lines of it are read by `rtshcua.front.cli.fast_path`, without typer
-    reports: bool = False  # its `--json` is that of `Findings`, also where the command line is wrong
-    ends_in_order: bool = False  # Ctrl-C raises in it, for something is put in order; else the signal ends it
+    fast_path: bool = False  # `rtshcua.front.cli.fast_path` reads its plain command lines without typer
+    reports: bool = False  # `--json` prints the object of `Findings`, also if the command line is wrong
+    ends_in_order: bool = False  # Ctrl-C raises KeyboardInterrupt, so that the command can clean up
 
     @property
     def module(self) -> str:
@@ -36,74 +36,74 @@ COMMANDS = (
     Row(
         "check",
         "write",
-        "report everything that is wrong with sources or a mission specification",
+        "report the errors in sources or a mission specification",
         reports=True,
         fast_path=True,
     ),
     Row(
         "lint",
         "write",
-        "report that and what is worth a second look; fix it, ignore it, for CI too",
+        "report errors and warnings; fix or ignore them; reports for CI",
         reports=True,
         fast_path=True,
     ),
-    Row("fmt", "write", "lay sources out in the one style; comments stay where they are", reports=True),
-    Row("test", "write", "run the tests of sources, say what they cover, and write tests for each limit", reports=True),
+    Row("fmt", "write", "format sources in one style", reports=True),
+    Row("test", "write", "run the tests of sources, measure coverage, and generate tests", reports=True),
     Row(
         "campaign",
         "write",
-        "fly a mission thousands of times with faults drawn by chance, and judge each",
+        "fly a mission many times with random faults, and judge each flight",
         reports=True,
     ),
     Row("compile", "write", "check a mission and sign it into a bundle that can fly", reports=True),
     Row("explain", "write", "print what a diagnostic code means, with a bad and a good example"),
-    Row("docs", "write", "render skills and policies as one page that a person can sign off on", reports=True),
+    Row("docs", "write", "render skills and policies as one page for review and sign-off", reports=True),
     Row("schema", "write", "print the JSON Schema of a mission specification, for agents"),
-    Row("init", "write", "make a project of your own, with policy, mission, tests and CI", ends_in_order=True),
-    Row("lsp", "write", "serve an editor: findings while you write, hover, renaming, completion"),
-    Row("completion", "write", "print a script by which bash, zsh or fish complete commands"),
-    Row("keys", "fly", "make, list, replace and revoke keys, and the trust root", ends_in_order=True),
-    Row("run", "fly", "fly a bundle on the simulated vehicle, or on yours with --connect"),
-    Row("approve", "fly", "answer a step that asks for confirmation, with your signature", ends_in_order=True),
-    Row("recall", "fly", "call a flight home, with your signature", fast_path=True),
-    Row("operator", "fly", "follow a flight, and hold its recall ready: one key calls it home"),
-    Row("replace", "fly", "hand a flight the mission that takes the place of its own"),
-    Row("mcp", "fly", "let an agent's host propose missions to a vehicle that waits (MCP)"),
-    Row("agent-bundle", "fly", "make a plug-in of that for hosts of agents: OpenClaw, Claude"),
-    Row("doctor", "fly", "say what a vehicle supports, and what would stop a mission"),
+    Row("init", "write", "create a project with a policy, a mission, tests and CI", ends_in_order=True),
+    Row("lsp", "write", "run the language server for editors"),
+    Row("completion", "write", "print a completion script for bash, zsh or fish"),
+    Row("keys", "fly", "create, list, replace and revoke keys, and manage the trust root", ends_in_order=True),
+    Row("run", "fly", "fly a bundle on the simulated vehicle, or with --connect on yours"),
+    Row("approve", "fly", "approve or refuse a step that requires confirmation", ends_in_order=True),
+    Row("recall", "fly", "recall a flight with your signature", fast_path=True),
+    Row("operator", "fly", "follow a flight in a terminal, and recall it at once if needed"),
+    Row("replace", "fly", "send a replacement mission to a flight"),
+    Row("mcp", "fly", "run an MCP server through which agents propose missions"),
+    Row("agent-bundle", "fly", "make a plug-in with that server for OpenClaw and Claude"),
+    Row("doctor", "fly", "report what a vehicle supports and what would stop a mission"),
     Row(
         "qualify",
         "fly",
-        "fly a short test of the autopilot itself, and sign the result",
+        "flight-test an autopilot, and sign the result",
         reports=True,
         ends_in_order=True,
     ),
-    Row("sim", "fly", "start the simulated vehicle alone, for any MAVLink ground station", ends_in_order=True),
-    Row("recover", "fly", "end the log of a flight that broke off, and lose nothing of it"),
-    Row("witness", "fly", "cosign logs from the ground, so that they cannot be rewritten or cut"),
+    Row("sim", "fly", "start the simulated vehicle alone, for any ground station", ends_in_order=True),
+    Row("recover", "fly", "close the log of an interrupted flight"),
+    Row("witness", "fly", "cosign logs, so that rewriting or cutting them is detected"),
     Row(
         "verify-log",
         "audit",
-        "prove that a flight's log is whole, signed, and decides the same again",
+        "verify integrity, signatures and decisions of a log",
         ends_in_order=True,
     ),
-    Row("prove", "audit", "prove one record of a log, or that nothing changed since, in a small file"),
-    Row("verify-proof", "audit", "verify such a file, which needs no log"),
-    Row("archive", "audit", "keep many logs, verified, and ask them questions", ends_in_order=True),
-    Row("why", "audit", "show a decision step by step: what decided, and what would have passed"),
-    Row("show", "audit", "print a bundle, a key, a trust root or a log for a person"),
+    Row("prove", "audit", "write a small proof of one record of a log, or of its consistency"),
+    Row("verify-proof", "audit", "verify such a proof without the log"),
+    Row("archive", "audit", "store many verified logs and query them", ends_in_order=True),
+    Row("why", "audit", "explain a decision: what decided, and which values would pass"),
+    Row("show", "audit", "print the contents of a bundle, key, trust root or log"),
 )
 
 GROUPS = {"write": "Write a mission", "fly": "Fly it", "audit": "Audit it"}
 
 EXAMPLES = (
-    ("rtshcua keys init", "once: a development root and its keys"),
-    ("rtshcua compile missions/short.rts -o short.bundle", "check, sign"),
-    ("rtshcua run short.bundle", "fly it on the simulated vehicle"),
-    ("rtshcua verify-log runs/*/log.jsonl", "prove what happened"),
+    ("rtshcua keys init", "once: development keys"),
+    ("rtshcua compile missions/short.rts -o short.bundle", "check and sign"),
+    ("rtshcua run short.bundle", "fly it in simulation"),
+    ("rtshcua verify-log runs/*/log.jsonl", "verify the log"),
 )
 
 
 def find(name: str) -> Row | None:
-    """The row of the command called `name`, or None."""
+    """Return the row of the command `name`, or None."""
     return next((row for row in COMMANDS if row.name == name), None)

@@ -103,7 +103,7 @@ def test_shipped_sources_are_checked_without_float_geometry(checkout: Path) -> N
         ("comple", "no such command: `comple`\n help: did you mean `rtshcua compile`?"),
         ("verify_log", "no such command: `verify_log`\n help: did you mean `rtshcua verify-log`?"),
         ("--versoin", "no such option: `--versoin`\n help: did you mean `rtshcua --version`?"),
-        ("zzz", "no such command: `zzz`\n help: `rtshcua --help` lists the commands"),
+        ("zzz", "no such command: `zzz`\n help: run `rtshcua --help` for a list of commands"),
     ],
 )
 def test_unknown_words(word: str, answer: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -165,7 +165,7 @@ def test_misused_command(
     assert error.removeprefix("error[usage]: ")[0].islower()
     assert not error.endswith(".")
     assert usage.startswith("usage: rtshcua show [OPTIONS] ")
-    assert help == " help: `rtshcua show --help` explains it"
+    assert help == " help: run `rtshcua show --help` for its options"
 
 
 def test_typo_and_limit_have_the_common_error_format(
@@ -213,10 +213,10 @@ def test_misused_verb_names_the_verb(monkeypatch: pytest.MonkeyPatch, capsys: py
     assert app.main(["keys", "init", "x"]) == ExitCode.INPUT
     assert capsys.readouterr().out == "x\n"
     assert app.main(["keys", "init"]) == ExitCode.USAGE
-    assert capsys.readouterr().err.endswith(" help: `rtshcua keys init --help` explains it\n")
+    assert capsys.readouterr().err.endswith(" help: run `rtshcua keys init --help` for its options\n")
     assert app.main(["keys", "init", "-h"]) == ExitCode.OK
     assert app.main(["keys"]) == ExitCode.USAGE
-    assert capsys.readouterr().err.endswith(" help: `rtshcua keys --help` explains it\n")
+    assert capsys.readouterr().err.endswith(" help: run `rtshcua keys --help` for its options\n")
 
 
 def abort_at_the_end() -> typer.Abort:
@@ -243,16 +243,16 @@ def test_output_after_an_interrupted_prompt_starts_on_a_new_line(
     monkeypatch.setattr(app, "import_module", lambda name: SimpleNamespace(app=door))
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
     assert app.main(["check"]) == ExitCode.INTERRUPTED
-    assert "[y/N]: \nerror: stopped at a question" in capsys.readouterr().err
+    assert "[y/N]: \nerror: interrupted at a prompt" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
     ("error", "code", "message"),
     [
         (KeyboardInterrupt(), ExitCode.INTERRUPTED, "error: interrupted"),
-        (typer.Abort(), ExitCode.INTERRUPTED, "error: stopped at a question that was not answered"),
-        (EOFError(), ExitCode.INPUT, "error[input]: the input ended at a question that was not answered"),
-        (abort_at_the_end(), ExitCode.INPUT, "error[input]: the input ended at a question that was not answered"),
+        (typer.Abort(), ExitCode.INTERRUPTED, "error: interrupted at a prompt"),
+        (EOFError(), ExitCode.INPUT, "error[input]: the input ended at a prompt"),
+        (abort_at_the_end(), ExitCode.INPUT, "error[input]: the input ended at a prompt"),
         (BrokenPipeError(errno.EPIPE, "Broken pipe"), ExitCode.FULL, ""),
         (OSError(errno.ENOSPC, "No space left on device", "x"), ExitCode.FULL, "error: no space left on device: `x`"),
         (OSError("odd"), ExitCode.FULL, "error: odd"),

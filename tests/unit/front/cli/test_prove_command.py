@@ -228,7 +228,7 @@ def test_a_log_that_was_changed(folder: Path, capsys: pytest.CaptureFixture[str]
     log = folder / "log.jsonl"
     log.write_bytes(log.read_bytes().replace(b'"token":3', b'"token":4'))
     assert prove(3) == ExitCode.EVIDENCE
-    assert "`rtshcua verify-log` says what is wrong" in capsys.readouterr().err
+    assert "run `rtshcua verify-log`" in capsys.readouterr().err
     log.write_bytes(b"".join(LOG.lines[:5]))
     assert prove(3) == ExitCode.INCOMPLETE
     assert app.main(["prove", "nothing", "1"]) == ExitCode.INPUT

@@ -154,7 +154,7 @@ def test_log_under_another_root_is_reported_with_a_remedy(run: Path, capsys: pyt
     assert app.main(["verify-log", str(run), "--root", "00" * 32]) == ExitCode.UNTRUSTED
     out = capsys.readouterr().out
     assert duration.group() in out
-    assert "Not trusted here" in out
+    assert "not signed under the trust root that you pinned" in out
     assert "name it or its public key with `--root`" in out
     assert app.main(["verify-log", str(run), "--json", "--root", "00" * 32]) == ExitCode.UNTRUSTED
     assert "`--root`" in json.loads(capsys.readouterr().out)["failure"]["help"]

@@ -109,7 +109,7 @@ def said_whole(capsys: pytest.CaptureFixture[str]) -> list[dict[str, object]]:
 def test_a_threshold_above_the_witnesses(capsys: pytest.CaptureFixture[str]) -> None:
     for words in (["--witness-threshold", "2"], ["--witnesses", "3", "--witness-threshold", "4"]):
         assert app.main(["keys", "init", *words]) == ExitCode.USAGE
-        assert "is more than the" in capsys.readouterr().err
+        assert "exceeds `--witnesses" in capsys.readouterr().err
     assert app.main(["keys", "init", "--witnesses", "0"]) == ExitCode.OK
     assert not KeyStore(data_folder()).key_path(Duty.WITNESS).exists()
     assert app.main(["witness", str(data_folder())]) == ExitCode.INPUT

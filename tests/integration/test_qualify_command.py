@@ -71,4 +71,4 @@ def test_qualify_flies_a_sortie_and_writes_a_record(ground: Any, port: int, tmp_
     simulated(ground, port, 40)  # somebody has set it otherwise
     finding = doctor(ground, link)
     assert finding["verdict"] == "warn"
-    assert "is another now: changed since: `RTL_ALT`" in finding["found"]
+    assert "has changed since: parameters `RTL_ALT`" in finding["found"]

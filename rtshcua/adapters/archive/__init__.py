@@ -1,1 +1,1 @@
-"""The archive: many logs, copied in and verified, and an index over them that answers questions (extra `archive`)."""
+"""The archive: copies of many logs, verified, with an index for queries (extra `archive`)."""

@@ -1,4 +1,4 @@
-"""Taking logs into an archive, and verifying those that are there."""
+"""Add logs to an archive, and verify the ones in it."""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -15,15 +15,15 @@ from rtshcua.adapters.archive.index import forget_unfinished, ingest, lay_out, r
 from rtshcua.wire.keys import PUBLIC_BYTES, Duty, key_id
 from rtshcua.wire.untrusted import Untrusted
 
-#: octets of logs that are taken in at once: what a crash has to be done again
+#: octets of logs that are added together: the most that a crash undoes
 _BATCH = 256 << 20
-#: rows of the index are written for so many logs at once at most
+#: the most logs whose index rows are written together
 _MOST = 512
 _DIGEST = re.compile("[0-9a-f]{64}")
 
 
 class VerificationOptions(NamedTuple):
-    """What logs are verified with: the pinned root key, how deep, the time (UTC, us), and by whom."""
+    """How to verify logs: the pinned root key, the depth, the time (UTC, us), and the processes."""
 
     pinned: bytes
     depth: str
@@ -32,12 +32,12 @@ class VerificationOptions(NamedTuple):
 
     @property
     def root(self) -> str:
-        """The name of the pinned key, in hexadecimal, whichever way it was given."""
+        """The name of the pinned key, in hexadecimal."""
         return (key_id(Duty.ROOT, self.pinned) if len(self.pinned) == PUBLIC_BYTES else self.pinned).hex()
 
 
 class Done(NamedTuple):
-    """What became of one log: `known` where the archive had it already, verified no less."""
+    """The result for one log. `known`: the archive had it already, verified at least as deeply."""
 
     path: Path
     entry: ArchiveEntry
@@ -45,10 +45,8 @@ class Done(NamedTuple):
 
 
 def add(folder: ArchiveFolder, sources: Iterable[LogSource], check: VerificationOptions) -> Iterator[Done]:
-    """Takes logs in, verifies them and indexes those that are to be believed.
-
-    What was given is done when the iterator says so: a crash before leaves the archive as it was then. Raises OSError
-    where a file cannot be read, with all before it done.
+    """Copy logs in, verify them and index the valid ones. A returned log is done: a crash before leaves the archive as
+    it was. Raises OSError where a file cannot be read, after all logs before it.
     """
     with folder.writing():
         entries = read_catalogue(folder)
@@ -73,7 +71,7 @@ def add(folder: ArchiveFolder, sources: Iterable[LogSource], check: Verification
 
 
 def verify(folder: ArchiveFolder, check: VerificationOptions) -> Iterator[Done]:
-    """Verifies the logs of an archive once more, where they lie: those that were verified under this root."""
+    """Verify the logs in an archive again: those that were verified under this root."""
     with folder.writing():
         entries = read_catalogue(folder)
         forget_unfinished(folder, entries)
@@ -84,10 +82,8 @@ def verify(folder: ArchiveFolder, check: VerificationOptions) -> Iterator[Done]:
 
 
 def reindex(folder: ArchiveFolder, check: VerificationOptions) -> Iterator[Done]:
-    """Verifies every log of an archive, and makes the whole index anew from them; an old one is not believed, but for
-    which logs there were: one that is gone is told.
-
-    Broken off, it is to be done again.
+    """Verify every log in an archive and rebuild the index from them. The old index is only used to report missing
+    logs. If interrupted, repeat it.
     """
     with folder.writing():
         try:
@@ -108,12 +104,12 @@ def reindex(folder: ArchiveFolder, check: VerificationOptions) -> Iterator[Done]
 
 
 def _no_less(held: ArchiveEntry, check: VerificationOptions) -> bool:
-    """Whether an entry already says what this check would."""
+    """Whether an entry already holds the result of this check."""
     return held.pinned == check.root and held.status != FAILED and (held.checked == AUDIT or check.depth != AUDIT)
 
 
 def _asked(held: ArchiveEntry | None, digest: str, size: int, name: str, check: VerificationOptions) -> ArchiveEntry:
-    """The row of a log before its verification; of one that is known, what stays."""
+    """The row of a log before its verification; for a known log, with the values that stay."""
     return ArchiveEntry(
         log=digest,
         bytes=size,
@@ -128,8 +124,8 @@ def _asked(held: ArchiveEntry | None, digest: str, size: int, name: str, check: 
 
 
 class _Batch:
-    """Logs that are verified and indexed together. `entries`, the rows by log, follow what came of them; of `copies` of
-    them the same came.
+    """Logs that are verified and indexed together. `entries`, the rows by log, are updated with the results; `copies`
+    counts further sources of the same log.
     """
 
     def __init__(self, folder: ArchiveFolder, entries: dict[str, ArchiveEntry], check: VerificationOptions) -> None:
@@ -140,18 +136,19 @@ class _Batch:
         self._check = check
 
     def put(self, path: Path, entry: ArchiveEntry) -> Iterator[Done]:
-        """One more log; what came of all, where they are enough to be done before more are taken in."""
+        """Add a log; return results once there are enough logs to process."""
         self.logs[entry.log] = path, entry
         if len(self.logs) >= _MOST or sum(entry.bytes for _, entry in self.logs.values()) >= _BATCH:
             yield from self.settle()
 
     def settle(self) -> Iterator[Done]:
-        """What came of those that wait: verified, indexed, and in the catalogue."""
+        """The results of the waiting logs: verified, indexed, and in the catalogue."""
         if not self.logs:
             return
         folder, entries = self._folder, self._entries
         asked = [entry for _, entry in sorted(self.logs.values(), key=lambda each: -each[1].bytes)]
-        gone = {entry.log for entry in asked if not folder.log(entry.log).exists()}  # here: others may see no file
+        # here: other processes may see no file
+        gone = {entry.log for entry in asked if not folder.log(entry.log).exists()}
         tasks = [Task(folder.log(entry.log), entry, self._check.pinned) for entry in asked if entry.log not in gone]
         examined = list(self._check.workers.examine(tasks)) if tasks else []
         examined += [missing(entry) for entry in asked if entry.log in gone]

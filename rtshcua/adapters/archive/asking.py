@@ -1,4 +1,4 @@
-"""Questions to an archive: SQL over its tables, canned or the caller's own."""
+"""Query an archive: SQL over its tables, shipped or the caller's own."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,7 +10,7 @@ from rtshcua.adapters.archive.folder import NOTHING, TABLES, ArchiveFolder
 from rtshcua.adapters.archive.index import is_digest, misleading, quoted
 from rtshcua.wire.untrusted import Untrusted
 
-#: what an archive holds, by status of its logs
+#: the content of an archive, by status of its logs
 STATS: Final = """
 SELECT l.status, COUNT(*) AS logs, COUNT(DISTINCT l.vehicle) AS vehicles, SUM(l.bytes) AS bytes,
   SUM(l.records) AS records, SUM(l.anchored) AS anchored, SUM(d.decisions) AS decisions, SUM(d.refusals) AS refusals,
@@ -25,7 +25,7 @@ ORDER BY l.status"""
 
 _HERE: Final = Path(__file__).parent
 VIEWS: Final = ("decided", "happened")
-#: a reason may be the beginning of one, a clause a part of one
+#: a reason may be given by its beginning, a clause by a part
 _FORMS: Final = {
     "reason": "(reason = {0} OR starts_with(reason, {0} || '/'))",
     "clause": "contains(clause, {0})",
@@ -35,7 +35,7 @@ _FORMS: Final = {
 
 
 class Canned(NamedTuple):
-    """A question that ships: its name, what it tells, its SQL."""
+    """A shipped query: its name, its description, its SQL."""
 
     name: str
     tells: str
@@ -43,12 +43,12 @@ class Canned(NamedTuple):
 
     @property
     def filtered(self) -> bool:
-        """Whether conditions on decisions change its answer."""
+        """Whether conditions on decisions affect its result."""
         return "FROM decided" in self.sql
 
 
 def canned() -> dict[str, Canned]:
-    """All of them, by name."""
+    """All shipped queries, by name."""
     found = {}
     for path in sorted((_HERE / "sql").glob("*.sql")):
         text = path.read_text(encoding="utf-8")
@@ -63,14 +63,14 @@ def view(name: str) -> str:
 
 
 class QueryRows(NamedTuple):
-    """Rows under the names of their columns."""
+    """Rows with the names of their columns."""
 
     columns: tuple[str, ...]
     rows: Sequence[tuple[object, ...]]
 
 
 class DecisionQuery(NamedTuple):
-    """What decisions are asked about; None is any. `since` and `until` are UTC in us, the latter not included."""
+    """Conditions on decisions; None is any. `since` and `until` are UTC in us, `until` excluded."""
 
     vehicle: str | None = None
     mission: str | None = None
@@ -91,7 +91,7 @@ class DecisionQuery(NamedTuple):
 
 
 def matching(**values: object) -> str:
-    """The condition that columns have these values; None is any. See `_FORMS` for those that mean something else."""
+    """The condition that columns have these values; None is any. `_FORMS` holds those that are compared otherwise."""
     given = {name: value for name, value in values.items() if value is not None}
     terms = (_FORMS.get(name, f"{name} = {{0}}").format(quoted(value)) for name, value in given.items())
     return " AND ".join(terms) or "TRUE"
@@ -103,7 +103,7 @@ _ABOUT_STEPS: Final = frozenset({"decisions", "effects"})
 
 
 class ArchiveReader:
-    """A connection to an archive that can only read it."""
+    """A read-only connection to an archive."""
 
     def __init__(self, folder: ArchiveFolder, conditions: DecisionQuery | None = None) -> None:
         self._engine = duckdb.connect()
@@ -136,7 +136,7 @@ class ArchiveReader:
         engine.execute("SET lock_configuration = true")
 
     def ask(self, sql: str, limit: int | None = None) -> QueryRows:
-        """The answer to one SELECT. Raises `Untrusted` (`malformed`) for anything else, and where it makes no sense."""
+        """The result of one SELECT. Raises `Untrusted` (`malformed`) for anything else, and for an invalid one."""
         try:
             statements = duckdb.extract_statements(sql)
             if len(statements) != 1 or statements[0].type != duckdb.StatementType.SELECT:
@@ -145,10 +145,10 @@ class ArchiveReader:
             columns = tuple(column[0] for column in cursor.description or ())
             rows = cursor.fetchall() if limit is None else cursor.fetchmany(limit)
         except duckdb.Error as error:
-            said = str(error).partition("\n\nLINE ")[0]  # then the question once more, with a caret under it
+            said = str(error).partition("\n\nLINE ")[0]  # the rest repeats the query, with a caret under it
             raise Untrusted("malformed", " ".join(said.split())) from None
         return QueryRows(columns, rows)
 
     def close(self) -> None:
-        """Lets the connection go."""
+        """Close the connection."""
         self._engine.close()

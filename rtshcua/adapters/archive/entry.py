@@ -1,21 +1,21 @@
-"""What an archive knows of one log: a row of its catalogue, and what its records are explained with."""
+"""What an archive knows about one log: its row of the catalogue, and the data that explains its records."""
 
 import msgspec
 
-#: how deep a log was verified: the chain, seals and anchors of typed records; or each decision derived again too
+#: the depth of a verification: chain, seals and anchors of typed records; or each decision derived again too
 RECORDS, AUDIT = "records", "audit"
 
-#: `verified`: whole up to its signed close. `incomplete`: sound as far as it goes. `failed`: not to be believed
+#: `verified`: complete up to its signed close. `incomplete`: valid but without an end. `failed`: not valid
 VERIFIED, INCOMPLETE, FAILED = "verified", "incomplete", "failed"
 
 
 class ArchiveEntry(msgspec.Struct, frozen=True):
-    """A log. Times are UTC in us. What comes from the log itself is null where the log is not to be trusted.
+    """A log. Times are UTC in us. Values from the log itself are null if the log cannot be trusted.
 
-    `part` names the files with the rows of its records; empty where none are indexed. `finding` is the slug of what is
-    wrong or missing, at record `finding_record`. `indexed` records have rows: those that a signature covers. `anchored`
-    of the records are held by as many witnesses as the trust root demands. `before` and `last_leaf` link the logs of a
-    vehicle; `root` is the RFC 9162 root over `records`.
+    `part` names the files with the rows of its records; empty without any. `finding` is the slug of the fault, at
+    record `finding_record`. `indexed` counts the records with rows: those under a signature. `anchored` counts the
+    records that as many witnesses hold as the trust root demands. `before` and `last_leaf` link the logs of a vehicle;
+    `root` is the RFC 9162 root over `records`.
     """
 
     log: str
@@ -52,7 +52,7 @@ class ArchiveEntry(msgspec.Struct, frozen=True):
 
 
 class StepRecords(msgspec.Struct, frozen=True):
-    """Which skill a step, or a link of a chain, stands for, in the records from `first` to before `until` of a log."""
+    """The skill of a step, or of a link of a chain, in the records from `first` to before `until` of a log."""
 
     log: str
     first: int
@@ -65,7 +65,7 @@ class StepRecords(msgspec.Struct, frozen=True):
 
 
 class VerifiedLog(msgspec.Struct, frozen=True):
-    """What came of the verification of one log."""
+    """The result of the verification of one log."""
 
     entry: ArchiveEntry
     steps: tuple[StepRecords, ...] = ()

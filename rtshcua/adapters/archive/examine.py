@@ -1,4 +1,4 @@
-"""The verification of the logs of an archive, in whatever process: octets, trust, records, seals, anchors."""
+"""Verify the logs of an archive in any process: octets, trust, records, seals, anchors."""
 
 import errno
 import os
@@ -33,12 +33,12 @@ from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
 from rtshcua.wire.untrusted import Untrusted
 
 _END = 1 << 62
-#: octets of logs for which it is not worth it to start processes
+#: octets of logs below which no processes are started
 _LITTLE = 4 << 20
 
 
 class Task(NamedTuple):
-    """A log to verify: where it lies, its anchors beside it; its row as far as it is known; the pinned root key."""
+    """A log to verify: its path, its anchors, its row so far, and the pinned root key."""
 
     path: Path
     entry: ArchiveEntry
@@ -46,7 +46,7 @@ class Task(NamedTuple):
 
 
 def examine(task: Task) -> VerifiedLog:
-    """Verifies a log. Whatever it holds, the answer is a row; OSError where it cannot be read."""
+    """Verify a log. Returns a row for any content; raises OSError where it cannot be read."""
     entry = task.entry
     replacements: list[Effect] = []
     last = b""
@@ -83,13 +83,13 @@ def examine(task: Task) -> VerifiedLog:
 
 
 def missing(entry: ArchiveEntry) -> VerifiedLog:
-    """What comes of a log that does not lie in the archive any more."""
+    """The result for a log that is no longer in the archive."""
     text = "the log was removed from the archive"
     return _failed(entry, Finding("archive/missing", 0, text, "no file", entry.log))
 
 
 def _described(entry: ArchiveEntry, audit: Audit) -> ArchiveEntry:
-    """The row with what the log says of its flight, if the pinned root vouches for its beginning."""
+    """The row with the log's description of its flight, if the pinned root vouches for its beginning."""
     report, genesis = audit.report, audit.report.genesis
     if genesis is None or audit.basis is None:
         return entry
@@ -113,14 +113,14 @@ def _described(entry: ArchiveEntry, audit: Audit) -> ArchiveEntry:
 
 
 def _lasted_us(report: LogReport) -> int | None:
-    """Monotonic time begins anew at a recover: then nobody knows."""
+    """The duration; unknown after a recover, where monotonic time restarts."""
     if report.genesis is None or report.counts.get("recover", 0):
         return None
     return report.last_us - report.genesis.at_us
 
 
 def _failed(entry: ArchiveEntry, finding: Finding) -> VerifiedLog:
-    """Nothing of such a log is indexed; what it said of its flight stays, where that much was to be trusted."""
+    """The row of an invalid log, which is not indexed; its description of the flight stays if that part was trusted."""
     return VerifiedLog(_with_finding(entry, FAILED, finding))
 
 
@@ -130,13 +130,12 @@ def _with_finding(entry: ArchiveEntry, status: str, finding: Finding | None) -> 
     return replace(entry, status=status, finding=finding.slug, finding_record=finding.record, finding_text=finding.text)
 
 
-# --------------------------------------------------- which skill the steps and links of a log stand for
+# --------------------------------------------------- the skills of the steps and links of a log
 
 
 def _steps(log: str, bundle: Bundle, genesis: Genesis, replacements: Sequence[Effect]) -> tuple[StepRecords, ...]:
-    """The steps and links of a log that verified, each for the records in which its mission was in force.
-
-    `bundle` is that of the log, with or without what replaced its mission later.
+    """The steps and links of a verified log, each for the records in which its mission was in force. `bundle` is that
+    of the log, with or without later replacements.
     """
     missions = [(0, bundle.mission)]
     if replacements:
@@ -155,7 +154,7 @@ def _steps(log: str, bundle: Bundle, genesis: Genesis, replacements: Sequence[Ef
 
 
 def _replacing(mission: Mission, record: Effect) -> Mission | None:
-    """The mission after a replacement was recorded; None where the record makes no sense, which an audit says."""
+    """The mission after a recorded replacement; None where the record is invalid, which an audit reports."""
     try:
         said = parse(names.REPLACEMENT, cose.unverified(b64decode(record.detail)).payload, ReplacementDocument)
     except (Untrusted, ValueError):
@@ -180,28 +179,28 @@ def _skill(policy: Policy, index: int) -> str:
     return policy.contracts[index].name if 0 <= index < len(policy.contracts) else ""
 
 
-# ------------------------------------------------------------------------------------------ who verifies
+# ------------------------------------------------------------------------------------------ verifying processes
 
 
 class LogVerifiers(Protocol):
-    """Whoever verifies logs; the answers come in the order of the tasks."""
+    """Verifies logs; the results come in the order of the tasks."""
 
     def examine(self, tasks: Sequence[Task]) -> Iterator[VerifiedLog]:
         """Verifies these logs."""
 
     def close(self) -> None:
-        """Lets them go."""
+        """Release its resources."""
 
 
 class VerifierProcesses:
-    """As many processes as there are cores, or `jobs`; they start with the first work that is worth it."""
+    """One process for each core, or `jobs`; they start with the first work that is large enough."""
 
     def __init__(self, jobs: int | None = None) -> None:
         self._jobs = jobs or _cores()
         self._pool: ProcessPoolExecutor | None = None
 
     def examine(self, tasks: Sequence[Task]) -> Iterator[VerifiedLog]:
-        """Verifies these logs, the largest first."""
+        """Verify these logs, the largest first."""
         if self._jobs == 1 or len(tasks) == 1 or (self._pool is None and sum(t.entry.bytes for t in tasks) < _LITTLE):
             return map(examine, tasks)
         if self._pool is None:
@@ -209,18 +208,18 @@ class VerifierProcesses:
         return self._pool.map(examine, tasks)
 
     def close(self) -> None:
-        """Ends the processes."""
+        """End the processes."""
         if self._pool is not None:
             self._pool.shutdown(cancel_futures=True)
 
 
 def _cores() -> int:
-    """How many this process may use."""
+    """The number of cores for this process."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class SchedulerWorkers:
-    """The workers of a scheduler, at an address such as `tcp://10.0.0.1:8786`. Raises OSError where there is none."""
+    """The workers of a scheduler at an address like `tcp://10.0.0.1:8786`. Raises OSError where there is none."""
 
     def __init__(self, address: str) -> None:
         try:
@@ -229,10 +228,10 @@ class SchedulerWorkers:
             raise OSError(errno.EHOSTUNREACH, "no cluster answered", address) from None
 
     def examine(self, tasks: Sequence[Task]) -> Iterator[VerifiedLog]:
-        """Verifies these logs; one whose worker is lost is given to another."""
+        """Verify these logs; a log whose worker is lost is given to another."""
         futures = self._client.map(examine, tasks, pure=False)
         yield from self._client.gather(futures)
 
     def close(self) -> None:
-        """Leaves the cluster."""
+        """Disconnect from the cluster."""
         self._client.close()

@@ -40,24 +40,24 @@ from rtshcua.wire.untrusted import Untrusted
 FORMAT, VERSION = "rtshcua/archive", 1
 #: the tables of records, one folder each
 TABLES: Final = ("decisions", "effects", "seals")
-#: the part of each that has no rows
+#: the part of each table without rows
 NOTHING: Final = "nothing"
 
 _MARK: Final = "archive.json"
 _BLOCK: Final = 1 << 20
 _MOST_ANCHORS: Final = 16 << 20  # octets of a file of anchors
-_PATTERN: Final = frozenset("*?[]{}")  # the engine would take a path with these for a pattern
+_PATTERN: Final = frozenset("*?[]{}")  # the query engine would take a path with these for a pattern
 
 
 class LogSource(NamedTuple):
-    """A log to take in. Below `root`, the folder that somebody gave it in, no link is followed."""
+    """A log to add. Below `root`, the folder that the user named, no link is followed."""
 
     path: Path
     root: Path | None = None
 
 
 class ArchiveFolder:
-    """An archive's folder. Raises `Untrusted` (`no-archive`, `archive-version`, `archive-path`) where it is none."""
+    """An archive's folder. Raises `Untrusted` (`no-archive`, `archive-version`, `archive-path`) for other folders."""
 
     def __init__(self, path: Path, *, make: bool = False) -> None:
         self.path = path.resolve()
@@ -88,8 +88,8 @@ class ArchiveFolder:
             raise Untrusted("archive-version", f"`{given}` is an archive of another version than {VERSION}")
 
     def _expect_plain(self) -> None:
-        """An archive may be anybody's. Nothing in its folders leads out of it, or would be waited for; those of logs
-        are not looked at here, for no link is followed to a log.
+        """Check that nothing in the archive's folders leads out of it or could block: an archive may come from a
+        stranger. The folders of logs are not checked here, because no link to a log is followed.
         """
         index = self.catalogue.parent
         for folder in (self.path, self.scratch, index, *map(self.table, TABLES)):
@@ -107,7 +107,7 @@ class ArchiveFolder:
 
     @property
     def scratch(self) -> Path:
-        """Where what is not finished lies."""
+        """The folder for unfinished files."""
         return self.path / "tmp"
 
     def table(self, name: str) -> Path:
@@ -115,11 +115,11 @@ class ArchiveFolder:
         return self.path / "index" / name
 
     def log(self, digest: str) -> Path:
-        """The log of that SHA-256."""
+        """The log with this SHA-256."""
         return self.path / "logs" / digest[:2] / digest / LOG
 
     def logs(self) -> list[Path]:
-        """All logs that were taken in."""
+        """All logs in the archive."""
         return sorted((self.path / "logs").glob(f"*/*/{LOG}"))
 
     def parts(self) -> list[Path]:
@@ -128,7 +128,7 @@ class ArchiveFolder:
 
     @contextmanager
     def writing(self) -> Iterator[None]:
-        """Holds off everyone else who wants to change the archive. Raises BlockingIOError if somebody does."""
+        """Lock the archive for changes. Raises BlockingIOError if another process has it."""
         with os.fdopen(lock(self.path / "lock", mode=PUBLIC_FILE), "rb"):
             for left in self.scratch.iterdir():
                 if left.is_dir() and not left.is_symlink():
@@ -138,8 +138,8 @@ class ArchiveFolder:
             yield
 
     def take_in(self, source: LogSource) -> tuple[str, int, bool]:
-        """Copies a log in, with the anchors beside it, unless it is there. Its SHA-256, its octets, and whether
-        anything is new.
+        """Copy a log in, with its anchors, unless it is there. Returns its SHA-256, its size, and whether anything is
+        new.
         """
         scratch = self.scratch / f"{os.getpid()}.taken"
         try:
@@ -150,7 +150,7 @@ class ArchiveFolder:
                 with naming(self.path), os.fdopen(open_new(scratch, mode=mode), "wb") as writer:
                     digest, size = _copy(reader, writer)
             place = self.log(digest)
-            new = not _holds(place, digest, size, self.path)  # a copy that was damaged since is replaced
+            new = not _holds(place, digest, size, self.path)  # a copy that was damaged later is replaced
             if new:
                 make_folder(place.parent, root=self.path)
                 publish(scratch, place, self.path)
@@ -159,7 +159,7 @@ class ArchiveFolder:
         return digest, size, self._take_anchors(source, digest) or new
 
     def _take_anchors(self, source: LogSource, digest: str) -> bool:
-        """Those beside a log that is named as in a run's folder are its own; else those that bear its name."""
+        """Copy the anchors: all of those beside a log named as in a run's folder, otherwise those with its name."""
         log, root = source
         found = log.parent.glob(f"*{ANCHORS}") if log.name == LOG else [anchors_path(log)]
         new = False
@@ -170,7 +170,7 @@ class ArchiveFolder:
             except (FileNotFoundError, NotRegular):
                 continue
             if len(data) > _MOST_ANCHORS or not any(notes(data.decode("utf-8", "replace"))):
-                continue  # what is not of witnesses is nobody's to copy
+                continue  # only notes of witnesses are copied
             with suppress(FileExistsError):
                 copy = self.log(digest).with_name(sha256(data).hexdigest() + ANCHORS)
                 write_new(copy, data, mode=mode, root=self.path)
@@ -179,12 +179,12 @@ class ArchiveFolder:
 
 
 def _mode(file: BinaryIO, most: int) -> int:
-    """Who may read the copy of a file: nobody who may not read the file itself."""
+    """The permissions of a copy: nobody who may not read the file itself may read it."""
     return stat.S_IMODE(os.fstat(file.fileno()).st_mode) & most | stat.S_IRUSR
 
 
 def _holds(place: Path, digest: str, size: int, root: Path) -> bool:
-    """Whether a log lies there with these octets, and not only with this name."""
+    """Whether the file there is a log with these octets, not only with this name."""
     try:
         with open_regular(place, root) as file:
             return os.fstat(file.fileno()).st_size == size and file_digest(file, "sha256").hexdigest() == digest

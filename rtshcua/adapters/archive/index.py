@@ -1,8 +1,8 @@
-"""The index of an archive: the catalogue, a row a log, and the rows of their records, as Parquet files.
+"""The index of an archive: the catalogue with a row for each log, and the rows of their records, as Parquet files.
 
-The catalogue is replaced as a whole by each change. DuckDB reads the lines of verified logs itself, and writes a part
-of each table of records. Every line was read by the verifier before, in its one canonical form; what is read here is
-the same octets with the same meaning. How many records there are is counted again.
+Each change replaces the whole catalogue. DuckDB reads the lines of verified logs itself, and writes a part of each
+table of records. The verifier has read every line before, in its one canonical form, so the same octets have the same
+meaning here. The number of records is checked again.
 """
 
 import os
@@ -25,7 +25,7 @@ from rtshcua.adapters.store.writing import PRIVATE_FOLDER, publish, replacing
 from rtshcua.evidence.reading import LONGEST
 from rtshcua.wire.untrusted import Untrusted
 
-#: what is read of a line, by its SQL type
+#: the fields that are read of a line, with their SQL types
 _FIELDS: Final = {
     "BIGINT": (
         "at_us", "durability", "epoch", "kind", "link", "records", "rule_step", "seq", "step", "token", "utc_error_us",
@@ -65,15 +65,14 @@ _ROWS: Final = {
 
 @cache
 def _engine() -> duckdb.DuckDBPyConnection:
-    """For what is small, which takes less time than to make an engine; what is made in a cursor of it goes with that.
-
-    It keeps nothing of the files that it read: the catalogue is replaced under one name.
+    """A shared engine for small queries, because making one takes longer; objects made in a cursor end with it. It
+    caches no file: the catalogue is replaced under the same name.
     """
     return duckdb.connect(config={"enable_external_file_cache": "false"})
 
 
 def read_catalogue(folder: ArchiveFolder) -> dict[str, ArchiveEntry]:
-    """The rows by log. Raises `Untrusted` (`archive-index`) where one would lead to what is not in the archive."""
+    """The rows by log. Raises `Untrusted` (`archive-index`) where one leads out of the archive."""
     if not folder.catalogue.exists():
         return {}
     names = ", ".join(ArchiveEntry.__struct_fields__)
@@ -87,17 +86,17 @@ def read_catalogue(folder: ArchiveFolder) -> dict[str, ArchiveEntry]:
 
 
 def is_digest(found: object, characters: int) -> bool:
-    """Whether a name that files are found by is one of ours: hexadecimal digits, so many."""
+    """Whether a name that leads to files is valid: hexadecimal digits of this number."""
     return isinstance(found, str) and len(found) == characters and set(found) <= _DIGITS
 
 
 def misleading(folder: ArchiveFolder) -> Untrusted:
-    """Why an index is not gone by."""
+    """The error for an index that is not used."""
     return Untrusted("archive-index", f"the index of `{folder.path}` refers to files outside of the archive")
 
 
 def write_catalogue(folder: ArchiveFolder, entries: Iterable[ArchiveEntry]) -> None:
-    """Puts these rows in the place of all that were there, in one step."""
+    """Replace all rows by these, atomically."""
     fresh = folder.scratch / "logs.parquet"
     with _engine().cursor() as engine:
         _load(engine, "logs", ArchiveEntry, entries, folder.scratch)
@@ -106,7 +105,7 @@ def write_catalogue(folder: ArchiveFolder, entries: Iterable[ArchiveEntry]) -> N
 
 
 def forget_unfinished(folder: ArchiveFolder, entries: dict[str, ArchiveEntry]) -> None:
-    """Removes the rows of records that a crash left, before the catalogue named them."""
+    """Remove rows of records that a crash left before the catalogue named them."""
     parts = {entry.part for entry in entries.values()}
     for path in folder.parts():
         if path.stem not in parts and path.stem != NOTHING:
@@ -114,12 +113,14 @@ def forget_unfinished(folder: ArchiveFolder, entries: dict[str, ArchiveEntry]) -
 
 
 def quoted(value: object) -> str:
-    """A number or a text as SQL has it."""
+    """A number or a text as an SQL literal."""
     return str(value) if isinstance(value, int) else "'" + str(value).replace("'", "''") + "'"
 
 
 def ingest(folder: ArchiveFolder, examined: Sequence[VerifiedLog]) -> list[ArchiveEntry]:
-    """Writes a part with the rows of these logs, and gives their entries, which name it. The catalogue must follow."""
+    """Write a part with the rows of these logs, and return their entries, which name it. The caller then writes the
+    catalogue.
+    """
     sound = [each for each in examined if each.entry.indexed]
     if not sound:
         return [each.entry for each in examined]
@@ -137,7 +138,7 @@ def ingest(folder: ArchiveFolder, examined: Sequence[VerifiedLog]) -> list[Archi
 
 
 def lay_out(folder: ArchiveFolder) -> None:
-    """A part without rows, so that every table has its columns before there is anything in it."""
+    """Write a part without rows, so that every table has its columns from the beginning."""
     if all((folder.table(table) / f"{NOTHING}.parquet").exists() for table in TABLES):
         return
     with _engine().cursor() as engine:
@@ -156,7 +157,7 @@ def _write(engine: duckdb.DuckDBPyConnection, folder: ArchiveFolder, table: str,
 
 
 def _read(engine: duckdb.DuckDBPyConnection, files: list[str]) -> None:
-    """All that is indexed of the lines, but for the records that no signature covers yet."""
+    """Load the lines to index, without records that no signature covers yet."""
     engine.execute(
         f"CREATE TEMP TABLE raw AS SELECT l.* EXCLUDE (filename) FROM (SELECT *, {_LOG} AS log FROM read_ndjson("
         f"?, columns={_columns(_KINDS)}, filename=true, maximum_object_size={LONGEST + 1})) l "
@@ -178,7 +179,7 @@ def _load(
     engine: duckdb.DuckDBPyConnection, name: str, form: type[msgspec.Struct], rows: Iterable[msgspec.Struct],
     scratch: Path,
 ) -> None:  # fmt: skip
-    """A table of ours in the engine, with a column for each field of its rows."""
+    """Make a table in the engine, with a column for each field of the rows."""
     kinds = {
         field.name: "BIGINT" if int in (field.type, *get_args(field.type)) else "VARCHAR"
         for field in msgspec.structs.fields(form)
@@ -193,7 +194,7 @@ def _load(
 
 
 def _columns(kinds: Mapping[str, str]) -> str:
-    """Names and SQL types, as the engine's readers take them."""
+    """Names and SQL types in the form of the engine's readers."""
     return "{" + ", ".join(f"{name}: '{kind}'" for name, kind in kinds.items()) + "}"
 
 
@@ -204,7 +205,7 @@ def _write_lines(place: Path, data: Iterable[bytes]) -> None:
 
 @contextmanager
 def _files(folder: ArchiveFolder, sound: Sequence[VerifiedLog]) -> Iterator[list[str]]:
-    """The logs to read; of one that ends inside a line, a copy of its whole lines."""
+    """The logs to read; for one that ends inside a line, a copy of its whole lines."""
     copies: list[Path] = []
     files = []
     for each in sound:

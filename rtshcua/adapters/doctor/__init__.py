@@ -1,1 +1,1 @@
-"""The doctor: what a vehicle supports, and what would stop a mission. It asks, listens, and moves nothing."""
+"""The doctor examines what a vehicle supports and what would stop a mission. It asks and listens; it moves nothing."""

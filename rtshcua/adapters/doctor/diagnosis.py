@@ -1,4 +1,4 @@
-"""The whole diagnosis: every finding of an examination, in the order in which a person would look."""
+"""The diagnosis: all findings of an examination, in the order in which a person would check."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import StrEnum
@@ -31,21 +31,19 @@ from rtshcua.wire.qualification import Firmware
 
 
 class MissionVerdict(StrEnum):
-    """How a finding bears on a mission."""
+    """What a finding means for a mission."""
 
     OK = "ok"
-    WARN = "warn"  # it would fly, but somebody should know
-    STOP = "stop"  # a mission would not fly, or not to its end
-    UNKNOWN = "unknown"  # the vehicle did not say
+    WARN = "warn"  # the mission would fly, but a person should know
+    STOP = "stop"  # the mission would not fly, or not to its end
+    UNKNOWN = "unknown"  # the vehicle did not report it
 
 
 OK, WARN, STOP, UNKNOWN = MissionVerdict
 
 
 class VehicleFinding(msgspec.Struct, frozen=True):
-    """What the doctor has to say to one question: a stable slug, what was found, and where something is wrong what is
-    needed and what to do about it.
-    """
+    """The result of one check: a stable slug, the finding and, in case of a fault, what is needed and what to do."""
 
     slug: str
     verdict: MissionVerdict
@@ -55,7 +53,7 @@ class VehicleFinding(msgspec.Struct, frozen=True):
 
 
 def told_apart(agent: str, user: int, own: int) -> VehicleFinding:
-    """Whether the kernel can tell an agent, which runs as the user `agent` of the id `user`, from operators (`own`)."""
+    """Whether the kernel can tell an agent, running as the user `agent` with the id `user`, from operators (`own`)."""
     found = f"the agent runs as `{agent}`"
     if user not in (0, own):
         return VehicleFinding("agents/user", MissionVerdict.OK, f"{found}, and the flight as another user")
@@ -72,14 +70,12 @@ def diagnose(
     unheard: frozenset[int] = frozenset(), named: bool = False,
     qualified: Callable[[Firmware | None, Mapping[str, bytes]], Standing] | None = None,
 ) -> Iterator[VehicleFinding]:  # fmt: skip
-    """What was found. `flown` is the mission that the vehicle is to fly, None where only signals were asked about.
+    """All findings. `flown` is the mission to fly, None for signals only. `keyed`: a link key was given, and frames
+    without its signature were dropped. `unheard` are the slots of signals that cannot come on this link, because their
+    messages come unsigned. `time` holds the sources of a run's time of day. `named`: the operator selected the system.
+    `qualified` is the vehicle's standing by its qualification record; None if the vehicle's identity is unknown.
 
-    `keyed`: a link key was given, and what is not signed with it was dropped. `unheard` are the slots of signals that
-    cannot come on this link, for nobody signs what carries them. `time` is what a run would take the time of
-    day from. `named`: the operator said which system is meant.
-    `qualified` says how this vehicle stands to its qualification record; None where it is not known which one it is.
-
-    Before a heartbeat of an autopilot was heard there is nothing to say.
+    Without a heartbeat of an autopilot there are no findings.
     """
     if vehicle.flavour is None:
         return
@@ -87,7 +83,7 @@ def diagnose(
     if keyed or not locked(vehicle):
         yield from found
         return
-    for each in found:  # who answers nothing is not to blame for each single thing that is not known then
+    for each in found:  # without any answer, single missing facts are not findings of their own
         wrong = each.verdict is STOP or (each.verdict is WARN and each.slug.startswith("signal/"))
         if wrong and each.slug not in _WITHOUT_ANSWERS:
             yield VehicleFinding(each.slug, UNKNOWN, _NOT_ASKED)
@@ -121,7 +117,7 @@ def _found(
     yield from _settings(vehicle, flavour, policy, flown)
 
 
-#: what stops a mission, known without any answer
+#: slugs that stop a mission without any answer of the vehicle
 _WITHOUT_ANSWERS: Final = (
     "link/signing", "link/loss", "link/component", "link/other-vehicle", "autopilot/kind", "vehicle/airborne",
     "vehicle/armed", "sensor/unwell",
@@ -132,7 +128,7 @@ _NOT_ASKED: Final = "not checked: the vehicle answers signed frames only, and no
 def _graded(
     slug: str, found: str, needed: str = "", advice: str = "", *, warns: bool = False, stops: bool = False
 ) -> VehicleFinding:
-    """Where all is well nothing is needed, and nothing is to be done."""
+    """A finding with a need and an advice only if something is wrong."""
     if not (warns or stops):
         return VehicleFinding(slug, OK, found)
     return VehicleFinding(slug, STOP if stops else WARN, found, needed, advice)
@@ -142,7 +138,7 @@ def _graded(
 
 _SLOW_HEARTBEAT_US: Final = 1_500_000
 _SLOW_US, _TOO_SLOW_US = 200_000, 1_000_000
-#: parts of the frames that are missing, in 1/1000
+#: the share of missing frames, in 1/1000
 _LOSSY, _TOO_LOSSY = 20, 200
 
 
@@ -177,12 +173,12 @@ def _signing(vehicle: ExaminingDriver, *, keyed: bool) -> VehicleFinding:
     return VehicleFinding("link/signing", WARN, "no frame is signed", "", _for_signing(vehicle))
 
 
-#: the first PX4 that takes a key for MAVLink 2 signing
+#: the first PX4 that accepts a key for MAVLink 2 signing
 _PX4_SIGNS: Final = (1, 17)
 
 
 def _for_signing(vehicle: ExaminingDriver) -> str:
-    """What can be done about a link that is not signed, with the release that this is."""
+    """The remedy for an unsigned link, for this autopilot's release."""
     risk = "anyone with access to this link can command the vehicle"
     make = "`rtshcua keys link` makes a key for MAVLink 2 signing"
     message, px4 = vehicle.latest("AUTOPILOT_VERSION"), vehicle.flavour is not None and vehicle.flavour.name == "px4"
@@ -200,7 +196,7 @@ def _for_signing(vehicle: ExaminingDriver) -> str:
 
 
 def locked(vehicle: ExaminingDriver) -> bool:
-    """Whether all that it sends is signed, and it answers nothing that is not."""
+    """Whether it signs all its frames and answers no unsigned one."""
     talker = vehicle.talkers[vehicle.system, AUTOPILOT]
     return talker.frames == talker.signed and not _it_answers(vehicle)
 
@@ -221,7 +217,7 @@ def _is_vehicle(talker: Talker) -> bool:
 
 
 def _others(vehicle: ExaminingDriver, *, named: bool) -> Iterator[VehicleFinding]:
-    stations, crowd = 0, vehicle.link.crowd  # another vehicle, as a run would refuse it
+    stations, crowd = 0, vehicle.link.crowd  # another vehicle: a run would refuse it
     for (system, component), talker in vehicle.talkers.items():
         if (system, component) == (vehicle.system, OURS):
             advice = "stop the other program: two such programs do not see each other's commands"
@@ -259,7 +255,7 @@ _FASTER: Final = {
 
 
 def _streams(vehicle: ExaminingDriver, flavour: str) -> VehicleFinding:
-    """What the program needs, what the link carries, and what is really delivered."""
+    """The required streams, the link's capacity, and the delivered rates."""
     slug, requests = "link/streams", vehicle.stream_requests
     plan = requests.plan
     of = "" if plan.capacity is None else f" of {plan.capacity} that the link carries"
@@ -281,9 +277,9 @@ def _streams(vehicle: ExaminingDriver, flavour: str) -> VehicleFinding:
 
 # ---------------------------------------------------------------- the autopilot
 
-#: the versions that the recorded answers and flights are of
+#: the versions that the recordings were made with
 _TESTED: Final = {"px4": (1, 16), "ardupilot": (4, 7)}
-#: MAV_PROTOCOL_CAPABILITY that a flight needs, or is better off with
+#: MAV_PROTOCOL_CAPABILITY bits that a flight needs or benefits from
 _CAPABILITIES: Final = {
     "px4": {0x2000: ("MAVLink 2", STOP), 0x4000: ("a fence by MAVLink", WARN), 0x08: ("COMMAND_INT", STOP)},
     "ardupilot": {0x2000: ("MAVLink 2", STOP), 0x4000: ("a fence by MAVLink", WARN), 0x100: ("position targets", STOP)},
@@ -318,7 +314,7 @@ def _version(vehicle: ExaminingDriver, flavour: str) -> Iterator[VehicleFinding]
 def _qualification(
     vehicle: ExaminingDriver, flavour: str, qualified: Callable[[Firmware | None, Mapping[str, bytes]], Standing]
 ) -> VehicleFinding:
-    """Whether a flight test of this autopilot, as it is set up now, held what the adapters take for granted."""
+    """Whether this autopilot, with its present settings, passed a flight test of what the adapters assume."""
     message = vehicle.latest("AUTOPILOT_VERSION")
     values = {} if vehicle.parameters is None or vehicle.flavour is None else vehicle.parameters.values
     known = {} if vehicle.flavour is None else those_that_matter(vehicle.flavour, values)
@@ -327,7 +323,7 @@ def _qualification(
     return _graded("autopilot/qualified", stands.text, "qualified as it is", advice, warns=not stands.qualified)
 
 
-# ---------------------------------------------------------------- the vehicle as it stands, whatever it is to fly
+# ---------------------------------------------------------------- the vehicle's present state, for any mission
 
 _METRE: Final = 1_000  # mm
 _ACCURATE_MM: Final = 5_000
@@ -372,7 +368,7 @@ def _fix(vehicle: ExaminingDriver) -> VehicleFinding:
 
 
 def settling(vehicle: ExaminingDriver) -> str | None:
-    """What of a vehicle that has just been switched on may still come by itself, in words."""
+    """What may still come by itself on a vehicle that was just switched on, in words."""
     fix = vehicle.latest("GPS_RAW_INT")
     if fix is not None and fix.fix_type < 3:
         return f"a 3D fix (its receiver has fix type {fix.fix_type})"
@@ -380,12 +376,12 @@ def settling(vehicle: ExaminingDriver) -> str | None:
         least = display(_ACCURATE_MM, Dimension.LENGTH)
         return f"a fix accurate to {least} (its receiver reports {display(fix.h_acc, Dimension.LENGTH)})"
     if fix is None:
-        return None  # nothing tells that there is a receiver
+        return None  # there may be no receiver
     return None if vehicle.seen.estimator.missing(vehicle.seen.now_us) is None else "the estimator's position"
 
 
 def settled(what: str, seconds: int, still: str | None) -> VehicleFinding:
-    """That it was waited for, and for how long."""
+    """That the vehicle was waited for, and for how long."""
     if still is None:
         found = f"waited {seconds} s for {what}"
         return VehicleFinding("sensor/settled", OK, found)
@@ -393,12 +389,12 @@ def settled(what: str, seconds: int, still: str | None) -> VehicleFinding:
     return VehicleFinding("sensor/settled", WARN, found, "a settled vehicle", "give it a clear sky, and try again")
 
 
-#: a cell of a lithium battery, at rest or nearly so, mV
+#: the voltage of a lithium cell at rest, in mV
 _CELL_MV: Final = range(3_000, 4_400)
 
 
 def _cells(vehicle: ExaminingDriver, policy: Policy) -> Iterator[VehicleFinding]:
-    """Whether the battery has as many cells as the policy's vehicle says, by what one of them would give."""
+    """Whether the battery has the number of cells of the policy's vehicle, judged by the voltage of one cell."""
     for signal in policy.signals:
         value = vehicle.values.get(signal.slot) if signal.name == CELL else None
         if value is None:
@@ -410,13 +406,13 @@ def _cells(vehicle: ExaminingDriver, policy: Policy) -> Iterator[VehicleFinding]
 
 
 def _battery(vehicle: ExaminingDriver, policy: Policy) -> VehicleFinding:
-    """The charge that a run would decide by, and of which batteries it is."""
+    """The charge that a run would use, and the batteries that it is from."""
     slot, batteries = policy.vehicle.battery, vehicle.batteries
     message = vehicle.latest("SYS_STATUS")
     if slot >= 0:
         known = vehicle.values.get(slot)
         charge = None if known is None else f"{known // 100} %"
-    else:  # no policy of a flight: what it says of its main battery
+    else:  # without the policy of a flight: the charge of its main battery
         charge = None if message is None or message.battery_remaining < 0 else f"{message.battery_remaining} %"
     each = f": {batteries.summary}" if len(batteries.told) > 1 else ""
     if charge is None:
@@ -427,7 +423,7 @@ def _battery(vehicle: ExaminingDriver, policy: Policy) -> VehicleFinding:
 
 # ---------------------------------------------------------------- what a bundle needs
 
-#: a message should come this often within the time to stale of what it carries
+#: how often a message should come within the time to stale of its signals
 _TIMES: Final = 2
 _CLOCK_US: Final = 1_000_000
 _ADVICE: Final = "a higher stream rate, or another source for the signal in the policy"
@@ -436,8 +432,8 @@ _ADVICE: Final = "a higher stream rate, or another source for the signal in the 
 def _signals(
     vehicle: ExaminingDriver, policy: Policy, mission: Mission | None, unheard: frozenset[int]
 ) -> Iterator[VehicleFinding]:
-    """Whether each signal of the policy is known, and comes often enough to stay so. It stops a mission where a step is
-    not admitted without it, as far as its contract says.
+    """Whether each signal of the policy is known and comes often enough. A fault stops a mission if a step is not
+    admitted without the signal, by its contract.
     """
     well_known = policy.vehicle.position, policy.vehicle.position + 1, policy.vehicle.height, policy.vehicle.battery
     wanted = {slot for slot in well_known if slot >= 0}
@@ -491,7 +487,7 @@ def _signal(
 
 
 def _place(vehicle: ExaminingDriver, policy: Policy) -> VehicleFinding:
-    """What stands between this vehicle and a bundle that was made for it."""
+    """Differences between this vehicle and the one that a bundle was made for."""
     preflight = vehicle.preflight
     unknown = preflight.unplaced or preflight.unread
     if preflight.astray is not None:
@@ -510,7 +506,7 @@ _STATE_THERE: Final = "`--utc-error US` in the boundary's command line states th
 
 
 def _clock(vehicle: ExaminingDriver, time: TimeSources) -> VehicleFinding:
-    """By which time of day a run would judge, in the order in which it takes them."""
+    """The time of day that a run would use, by its order of sources."""
     ahead_us = vehicle.ahead_us
     if time.machine_us is None:
         if time.vehicle and ahead_us is not None:
@@ -535,7 +531,7 @@ def _clock(vehicle: ExaminingDriver, time: TimeSources) -> VehicleFinding:
     return VehicleFinding("mission/clock", WARN, found, "the same time", advice)
 
 
-# ---------------------------------------------------------------- what it does by itself
+# ---------------------------------------------------------------- the autopilot's own reactions
 
 
 def _settings(
@@ -559,8 +555,8 @@ def settings_told(
     flavour: str, values: Mapping[str, float], policy: Policy, reach: FlightReach,
     meant: Mapping[str, float] = MappingProxyType({}),
 ) -> Iterator[VehicleFinding]:  # fmt: skip
-    """A finding for each of the parameters that were read, which a mission of that reach is to fly with. `meant` is
-    what a run would set some of them to.
+    """A finding for each parameter that was read, for a mission of this reach. `meant` holds values that a run would
+    set.
     """
     told = [setting for setting in SETTINGS[flavour] if setting.parameter in values]
     for setting in told:
@@ -578,7 +574,7 @@ def settings_told(
 
 
 def _sees_voltage(policy: Policy) -> bool:
-    """Whether something of the policy counts on a voltage: the charge may be counted wrongly."""
+    """Whether the policy uses a voltage: the charge may be measured wrongly."""
     return any(signal.dimension == Dimension.VOLTAGE.value for signal in policy.signals)
 
 

@@ -1,7 +1,6 @@
-"""The examination: a driver that also asks the doctor's questions and keeps what everybody says, whoever sent it.
-
-It sends what any driver sends before a flight, the fence apart, and questions: each is housekeeping, and passes the
-frame session like all else. Nothing is armed, moved, set or uploaded.
+"""The examination: a driver that also asks the doctor's questions and keeps the frames of every sender. It sends what
+any driver sends before a flight except the fence, and questions: all of it is housekeeping, and passes the frame
+session. Nothing is armed, moved, set or uploaded.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -25,12 +24,12 @@ _ASK_US: Final = 1_000_000
 _ONCE: Final = ("AUTOPILOT_VERSION", "HOME_POSITION", "SYSTEM_TIME")
 _MOST_TEXTS: Final = 20
 _MOST_TALKERS: Final = 64
-_LONG_AGO: Final = 64  # a sequence that goes back by less than this came out of order, and nothing is missing
+_LONG_AGO: Final = 64  # a sequence number that goes back by less than this came out of order; nothing is missing
 
 
 @dataclass(slots=True)
 class Talker:
-    """One component of one system: its frames, how many are missing in between, and how many carried a signature."""
+    """One component of one system: its frames, how many are missing, and how many were signed."""
 
     frames: int = 0
     missing: int = 0
@@ -53,7 +52,7 @@ class Talker:
 
 @dataclass(slots=True)
 class Stream:
-    """One kind of message of the vehicle: how often it came, when first and last (us), and the last one."""
+    """One message of the vehicle: how often it came, the first and last time (us), and the last message."""
 
     count: int
     first_us: int
@@ -62,12 +61,12 @@ class Stream:
 
     @property
     def interval_us(self) -> int | None:
-        """The mean time from one to the next; None for a single one."""
+        """The mean interval; None for a single message."""
         return (self.last_us - self.first_us) // (self.count - 1) if self.count > 1 else None
 
 
 class ExaminingDriver(Driver):
-    """Listens and asks. `talkers` by (system, component); `streams` of the vehicle's own components by name."""
+    """Listens and asks. `talkers` by (system, component); `streams` of the vehicle's components by name."""
 
     judges = True
 
@@ -78,20 +77,21 @@ class ExaminingDriver(Driver):
         super().__init__(policy, frames, fence=False, verifier=verifier, system=system, steps=steps, meant=meant)
         self.talkers: dict[tuple[int, int], Talker] = {}
         self.streams: dict[str, Stream] = {}
-        self.texts: list[str] = []  # what it said, the first few texts once each
-        self.ahead_us: int | None = None  # how far the vehicle's UTC is ahead of ours
-        self.answered = False  # it answered something that we asked, TIMESYNC apart
-        self.values: dict[int, int | None] = {}  # of the policy's signals, by state slot, as a run would read them,
-        self.told: dict[int, Stream] = {}  # and how often each was told, of all instances and components the one meant
+        self.texts: list[str] = []  # its first few texts, once each
+        self.ahead_us: int | None = None  # the vehicle's UTC minus ours
+        self.answered = False  # it answered a request other than TIMESYNC
+        self.values: dict[int, int | None] = {}  # the policy's signals by state slot, as a run would read them
+        self.told: dict[int, Stream] = {}  # how often each was reported by the selected instance and component
         self.parameters: VehicleParameters | None = None
         self._clock = clock
         self._ears = Codec(0, 0)
         self._asked_us: int | None = None
         self._heard_us = 0
-        self._of_autopilot: set[str] = set()  # what the autopilot itself tells is taken from nobody else, as in a run
+        # what the autopilot itself reports is not taken from another component, as in a run
+        self._of_autopilot: set[str] = set()
 
     def receive(self, datagram: bytes, now_us: int) -> DatagramContents:
-        """As any driver, and keep what was heard: who speaks, and of what is believed what it says."""
+        """Like any driver, and keep who sends and what accepted frames report."""
         self._heard_us = now_us
         heard = super().receive(datagram, now_us)
         self._meet(datagram, now_us)
@@ -102,12 +102,12 @@ class ExaminingDriver(Driver):
         return heard
 
     def overhear(self, datagram: bytes, now_us: int) -> None:
-        """Somebody else speaks at this port; under the vehicle's own id that is no talker to be counted."""
+        """Take in a datagram of another sender at this port; one under the vehicle's id is not counted."""
         super().overhear(datagram, now_us)
         self._meet(datagram, now_us, but=self.system)
 
     def tick(self, now_us: int) -> tuple[list[Event], list[bytes]]:
-        """As any driver, and ask what is due."""
+        """Like any driver, and put the questions that are due."""
         events, frames = super().tick(now_us)
         self._note(events)
         flavour = self.flavour
@@ -124,7 +124,7 @@ class ExaminingDriver(Driver):
         return events, frames + self._pack(send, now_us, events)
 
     def _told(self, name: str) -> bool:
-        """Whether it said what it was asked for; before its receiver has the time it says that it has none."""
+        """Whether it reported a requested message; before its receiver has the time it reports that it has none."""
         return name in self.streams and (name != "SYSTEM_TIME" or self.ahead_us is not None)
 
     def latest(self, name: str) -> Any:
@@ -133,7 +133,7 @@ class ExaminingDriver(Driver):
         return None if stream is None else stream.latest
 
     def _meet(self, datagram: bytes, now_us: int, but: int | None = None) -> None:
-        """Count each good frame, of anybody, believed or not."""
+        """Count each valid frame of any sender, accepted or not."""
         for frame in self._ears.parse(datagram, now_us):
             key = (frame.system, frame.component)
             if frame.system != but and (key in self.talkers or len(self.talkers) < _MOST_TALKERS):
@@ -147,7 +147,7 @@ class ExaminingDriver(Driver):
             told.count, told.last_us = told.count + 1, now_us
 
     def _examine(self, frame: ReceivedFrame, now_us: int) -> None:
-        """Take in what one frame of the vehicle says."""
+        """Take in one frame of the vehicle."""
         name, message = frame.name, frame.message
         if frame.component == AUTOPILOT:
             if name not in self._of_autopilot:

@@ -1,4 +1,4 @@
-"""What an autopilot is: its version, and the parameters that matter, asked for on the ground."""
+"""The identity of an autopilot: its version and the parameters that matter, requested on the ground."""
 
 import struct
 from collections.abc import Iterable, Mapping
@@ -13,29 +13,29 @@ from rtshcua.adapters.vehicle.parameters import VehicleParameters
 from rtshcua.wire.qualification import CheckOutcome, Firmware, Qualification
 
 _ASK_US: Final = 1_000_000
-#: one that is not answered so often is not told
+#: after this many unanswered requests a parameter counts as not reported
 _TRIES: Final = 5
 
 
 def firmware_of(flavour: str, version: Any) -> Firmware:
-    """What AUTOPILOT_VERSION tells."""
+    """The firmware in AUTOPILOT_VERSION."""
     return Firmware(flavour, version.flight_sw_version, bytes(version.flight_custom_version))
 
 
 def as_octets(value: float) -> bytes:
-    """The value of a parameter as a record has it: no float is signed."""
+    """The value of a parameter as in a record: floats are not signed."""
     return struct.pack(">d", value)
 
 
 def those_that_matter(flavour: AutopilotFlavour, values: Mapping[str, float]) -> dict[str, bytes]:
-    """Of the parameters that were read those that a qualification is about. What a run itself switches is none."""
+    """The parameters that a qualification covers, among those read; without those that a run itself switches."""
     switched = {name for name, _ in flavour.fence.switches}
     named = [setting.parameter for setting in SETTINGS[flavour.name] if setting.parameter not in switched]
     return {name: as_octets(values[name]) for name in sorted(named) if name in values}
 
 
 class IdentityQuestions:
-    """Asks for them, one request each until it is answered; of parameters, for those of `names`."""
+    """Requests version and parameters until they are answered; with `names`, only those parameters."""
 
     def __init__(self, flavour: AutopilotFlavour, slack: int = 1, names: Iterable[str] | None = None) -> None:
         self._flavour = flavour
@@ -46,21 +46,21 @@ class IdentityQuestions:
             self.values.read(name)
         self._asked_us: int | None = None
         self._asked = 0
-        #: None before it was told
+        #: None until reported
         self.firmware: Firmware | None = None
 
     @property
     def told(self) -> bool:
-        """Whether all was answered."""
+        """Whether everything was answered."""
         return self.firmware is not None and all(map(self.values.is_settled, self._names))
 
     @property
     def parameters(self) -> dict[str, bytes]:
-        """Those that matter, as far as they were told."""
+        """The reported parameters that matter."""
         return those_that_matter(self._flavour, self.values.values)
 
     def due(self, system: int, now_us: int) -> list[Message]:
-        """What to ask now."""
+        """The requests to send now."""
         out = self.values.due(system, now_us)
         again = self._asked_us is None or now_us - self._asked_us >= _ASK_US * self._slack
         if self.firmware is None and self._asked <= _TRIES and again:
@@ -69,26 +69,26 @@ class IdentityQuestions:
         return out
 
     def take(self, name: str, message: Any) -> None:
-        """A message of the autopilot."""
+        """Take in a message of the autopilot."""
         if name == "PARAM_VALUE":
             self.values.take(message)
         elif name == "AUTOPILOT_VERSION":
             self.firmware = firmware_of(self._flavour.name, message)
 
 
-#: the sorties without which a qualification is a partial one; a real vehicle flies its takeovers only when asked to
+#: the sorties of a complete qualification; a real vehicle flies takeovers only on request
 WHOLE: Final = ("climb", "leg")
 
 
 class Standing(NamedTuple):
-    """Whether a record holds for it as it is now; and that in words, or why not."""
+    """Whether a vehicle is qualified now, and the reason in words."""
 
     qualified: bool
     text: str
 
 
 def unflown(record: Qualification) -> list[str]:
-    """The sorties of a whole qualification that a partial one (`--only`) left out. Takeovers are none of them."""
+    """The sorties of a complete qualification that a partial one (`--only`) left out. Takeovers are not among them."""
     flown = {each.slug for each in record.checks}
     return [name for name in WHOLE if f"sortie/{name}" not in flown]
 

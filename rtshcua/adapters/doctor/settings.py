@@ -1,8 +1,7 @@
-"""Parameters that make an autopilot act by itself in a flight, keep it from arming, or bound where and how fast it
-flies: what they say in words, what a mission needs of them, and how to change them.
-
-Sources: the parameter references of PX4 1.16 (docs.px4.io) and ArduCopter 4.7 (ardupilot.org/copter); ArduCopter's
-speeds are WPNAV_* in cm/s before 4.7 and WP_* in m/s from then on.
+"""Parameters that make an autopilot act by itself in flight, prevent arming, or limit where and how fast it flies:
+their meaning in words, the values that a mission needs, and how to change them. Sources: the parameter references of
+PX4 1.16 (docs.px4.io) and ArduCopter 4.7 (ardupilot.org/copter); ArduCopter's speeds are WPNAV_* in cm/s before 4.7 and
+WP_* in m/s from then on.
 """
 
 from collections.abc import Callable, Mapping
@@ -16,11 +15,12 @@ from rtshcua.model.flat.policy import Policy, VehicleLimits
 
 
 class VehicleSetting(NamedTuple):
-    """A parameter, what it is about, its values in words, and why some of them are worth a warning.
+    """A parameter, its subject, its values in words, and warnings about some of them. `better` is a value to set in
+    place of those.
 
-    `better` is a value to set in place of those. For a number, `mm` is how many mm, mm/s or ms one is, and `needs`
-    what a policy and the reach of a mission need of it; None where nothing does. Where it is 0, `otherwise` names the
-    parameter that counts in its place. `limit` is the rule of a choice that a run refuses where it is not 0.
+    For a number, `mm` is the size of its unit in mm, mm/s or ms, and `needs` the range that a policy and the reach of a
+    mission need; None where nothing is needed. Where it is 0, `otherwise` names the parameter that counts in its place.
+    `limit` is the rule of a choice with which a run refuses values other than 0.
     """
 
     parameter: str
@@ -36,17 +36,17 @@ class VehicleSetting(NamedTuple):
 
     @property
     def label(self) -> str:
-        """What it is about, without what 0 stands for."""
+        """Its subject, without the meaning of 0."""
         return self.about.partition(" (0: ")[0]
 
     @property
     def at_zero(self) -> str:
-        """What 0 stands for, where it is no number; else empty."""
+        """The meaning of 0, if it is not a number; else empty."""
         return self.about.partition(" (0: ")[2].removesuffix(")")
 
     @property
     def unit(self) -> str:
-        """Of its number, for a person."""
+        """The unit of its number, as text."""
         if not self.mm or "slope" in self.about:
             return ""
         return " s" if "empty" in self.about else " m/s" if "speed" in self.about else " m"
@@ -90,8 +90,8 @@ def _slow_below(policy: Policy, _: FlightReach) -> Need | None:
 
 
 def _gains(slows: int) -> Callable[[Policy, FlightReach], Need | None]:
-    """What it must gain of speed in a second to keep its acceleration on a whole leg, slowing down by no more than
-    `slows` mm/s in a second before a target, as recorded.
+    """The acceleration that it needs to reach the declared speed on a whole leg, if it slows down by at most `slows`
+    mm/s in a second before a target, as recorded.
     """
 
     def needs(policy: Policy, _: FlightReach) -> Need | None:
@@ -101,7 +101,7 @@ def _gains(slows: int) -> Callable[[Policy, FlightReach], Need | None]:
         if kept <= slows:
             return Need(kept)
         # speeding up to v and slowing down again takes v / gains / 2 + v / slows / 2 longer than the way at v, and may
-        # take v / kept; where slowing down alone takes more, nothing is enough
+        # take v / kept; where slowing down alone takes more, no value is enough
         return Need(-(-kept * slows // (2 * slows - kept)) if kept < 2 * slows else MAX_SPEED)
 
     return needs
@@ -113,7 +113,7 @@ def _returns(policy: Policy, _: FlightReach) -> Need | None:
 
 
 def _lasts(policy: Policy, _: FlightReach) -> Need | None:
-    """For how long a full battery flies, ms."""
+    """The flight time with a full battery, in ms."""
     vehicle = policy.vehicle
     return Need(-(-(vehicle.endurance_us if vehicle.speeds is None else vehicle.speeds.flight_us) // 1_000))
 

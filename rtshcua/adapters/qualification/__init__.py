@@ -1,3 +1,3 @@
-"""The qualification: sorties on the user's own vehicle, what was observed in them, and what that says of each thing
-that the adapters take for granted.
+"""The qualification: sorties with the user's own vehicle, the observations in them, and the checks of what the adapters
+assume.
 """

@@ -1,7 +1,6 @@
-"""The checks of a qualification: what was observed, against what the adapters and the signed vehicle take for granted.
-
-Pure: the same observations give the same checks. Each says what was expected and what was measured; one for which
-nothing was observed is unchecked, with the reason. The table of them is in docs/flying/qualify.md.
+"""The checks of a qualification: they compare the observations with the assumptions of the adapters and the signed
+vehicle. Pure: the same observations give the same checks. Each check states the expected and the measured value;
+without an observation it is unchecked, with the reason. docs/flying/qualify.md lists them.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -37,7 +36,7 @@ _US, _MM, _MM_S = "us", "mm", "mm/s"
 
 
 def judge(observed: ObservedQualification, policy: Policy) -> list[QualificationCheck]:
-    """Every check, in the order of the flights."""
+    """All checks, in the order of the flights."""
     return [
         _firmware(observed),
         *_fence(observed),
@@ -67,7 +66,7 @@ def _unchecked(slug: str, expected: str, why: str) -> QualificationCheck:
 
 
 def _why(observed: ObservedQualification, sortie: str) -> str:
-    """Why something of a sortie was not seen."""
+    """Why something in a sortie was not observed."""
     return observed.missing.get(sortie, "not reached")
 
 
@@ -83,7 +82,7 @@ def _time(us: int) -> str:
     return f"{us / 1_000:.0f} ms" if us < 10 * _SECOND else f"{us / _SECOND:.1f} s"
 
 
-# ---------------------------------------------------------------- what it is, and how it is set up
+# ---------------------------------------------------------------- the vehicle and its settings
 
 
 def _firmware(observed: ObservedQualification) -> QualificationCheck:
@@ -117,14 +116,14 @@ _FENCE_ACTIONS: Final = ("settings/gf_action", "settings/fence_action")
 
 
 def _settings(observed: ObservedQualification) -> Iterator[QualificationCheck]:
-    """What the doctor finds; nothing rests on what it warns of."""
+    """The doctor's findings; a warning fails nothing."""
     well = 0
     for each in observed.settings:
         if each.verdict is MissionVerdict.OK:
             well += 1
             continue
         if each.slug == "settings/fence_enable":
-            continue  # a flight of ours switches it on
+            continue  # a flight of this program switches it on
         outcome = FAILED if each.verdict is MissionVerdict.STOP else TOLD
         yield QualificationCheck(each.slug, int(outcome), each.needed, each.found, advice=each.advice)
     if well:
@@ -133,7 +132,7 @@ def _settings(observed: ObservedQualification) -> Iterator[QualificationCheck]:
         yield _unchecked("settings/others", "no setting that interferes", "no parameter was read")
 
 
-# ---------------------------------------------------------------- how a sortie went
+# ---------------------------------------------------------------- the course of a sortie
 
 _PLANNED: Final = {
     each.name: Ending.COMPLETED if each.takeover is None else Ending.STOOD_DOWN for each in SORTIES
@@ -141,7 +140,7 @@ _PLANNED: Final = {
 
 
 def _sortie(flown: ObservedSortie) -> QualificationCheck:
-    """Whether it went as planned: each of its commands did what it reported, and it is down."""
+    """Whether a sortie went as planned: each command had its reported effect, and the vehicle is down."""
     failed = [each for each in flown.commands if each.how not in ("succeeded", "replaced", "taken-over", "")]
     planned = _PLANNED[flown.name]
     pauses = flown.takeover is not None and flown.takeover.kind is TakeoverKind.PAUSE
@@ -154,8 +153,8 @@ def _sortie(flown: ObservedSortie) -> QualificationCheck:
 
 
 def ends_after(flown: ObservedSortie) -> str | None:
-    """Why no other sortie is flown after this one, in words; None where it went as planned. What did not is not tried
-    further: somebody took over, something failed, or it is not down.
+    """Why no other sortie follows this one, in words; None if it went as planned. After a takeover, a failure, or
+    without a landing no further one is flown.
     """
     check = _sortie(flown)
     if check.outcome == HELD:
@@ -165,12 +164,12 @@ def ends_after(flown: ObservedSortie) -> str | None:
 
 # ---------------------------------------------------------------- speeds
 
-#: 1/100 of what was declared or asked for, and mm/s more, that gusts and reports may make of a speed
+#: the tolerance of a declared or commanded speed, in 1/100 and in mm/s, for gusts and reports
 _MORE, _NOISE = 110, 300
-#: the least, in 1/100: of the climb that is declared, by which climbs are timed; of the speed that was asked for
+#: the least speed in 1/100: of the declared climb, which times climbs; of the commanded speed
 _CLIMBS, _FLIES = 33, 50
 _RISES: Final = 300  # mm/s
-#: so long a climb has to keep a speed for it to count, us
+#: us: how long a climb has to keep a speed
 _KEPT_US: Final = 2_000_000
 
 
@@ -202,8 +201,8 @@ def _speeds(observed: ObservedQualification, vehicle: VehicleLimits) -> Iterator
 
 
 def _kept_climb(samples: Sequence[MotionSample]) -> int:
-    """The fastest climb that was kept for so long, mm/s: a takeoff takes metres to come to speed (PX4: to
-    MPC_TKO_SPEED, ramped), so one that is stopped half-way tells little by its mean.
+    """The fastest climb that was kept for this long, in mm/s: a takeoff takes metres to reach its speed (PX4:
+    MPC_TKO_SPEED, ramped), so the mean of an interrupted one is misleading.
     """
     rising = [each for each in samples if each.climb >= _RISES] or list(samples)
     best, first = 0, 0
@@ -217,7 +216,7 @@ def _kept_climb(samples: Sequence[MotionSample]) -> int:
 
 
 def _flown(observed: ObservedQualification, kind: MotionKind) -> list[tuple[ObservedCommand, list[MotionSample]]]:
-    """The commands of a kind that were sent, and the samples while each flew."""
+    """The commands of a kind that were sent, and the samples during each."""
     return [
         (command, _while(sortie, command))
         for sortie in observed.sorties
@@ -231,12 +230,12 @@ def _while(sortie: ObservedSortie, command: ObservedCommand) -> list[MotionSampl
     return [each for each in sortie.samples if since <= each.at_us and (until is None or each.at_us <= until)]
 
 
-# ---------------------------------------------------------------- stopping, and staying there
+# ---------------------------------------------------------------- stopping and holding
 
-#: us of way that reports are late, and mm that they are off
+#: the delay of reports in us of way, and their error in mm
 _LATE_US: Final = 200_000
 _OFF: Final = 500
-#: mm that a vehicle which holds may stray in any case
+#: mm that a holding vehicle may drift in any case
 _STRAYS: Final = 2_000
 
 
@@ -287,7 +286,7 @@ def _stop(
 
 
 def _stood(samples: Sequence[MotionSample]) -> int | None:
-    """From which sample on it stands; None where it does not."""
+    """The sample from which on it stands; None where it does not."""
     moving = [number for number, each in enumerate(samples) if _whole_speed(each) > STILL]
     stood = moving[-1] + 1 if moving else 0
     return stood if stood < len(samples) else None
@@ -315,7 +314,8 @@ def _across(one: MotionSample, other: MotionSample) -> int:
 
 # ---------------------------------------------------------------- return and landing
 
-#: mm that a return may end from home, and a landing from where it began, on top of the position error
+#: mm between home and the end of a return, or between the begin and the end of a landing, in addition to the position
+#: error
 _ENDS: Final = 2_000
 
 
@@ -369,7 +369,7 @@ def _highest(observed: ObservedQualification, vehicle: VehicleLimits) -> Qualifi
 
 
 def _lowest_across(observed: ObservedQualification, vehicle: VehicleLimits) -> QualificationCheck:
-    """Of a return that begins outside of the cone over home: how low it is between its climb and its descent."""
+    """The least height of a return between its climb and its descent, if it begins outside of the cone over home."""
     slug, flown = "return/across", observed.sortie("leg")
     expected, clear = "flies home at the declared height", vehicle.position_error + _ENDS
     command = None if flown is None else next((each for each in flown.commands if each.kind == MotionKind.HOME), None)
@@ -410,7 +410,7 @@ def _answers(observed: ObservedQualification) -> Iterator[QualificationCheck]:
         latest = max(times)
         expected = f"within {_time(RETRY_US)}: after that it is sent again"
         yield _check("answers/late", latest <= RETRY_US, expected, _time(latest), RETRY_US, latest, _US)
-    obeyed = {(True, _UNSUPPORTED)}  # whether it flew there, other checks say
+    obeyed = {(True, _UNSUPPORTED)}  # other checks judge whether it flew there
     refused = sorted(
         {
             (each.command, each.result)
@@ -422,13 +422,13 @@ def _answers(observed: ObservedQualification) -> Iterator[QualificationCheck]:
     yield _check("answers/accepted", not refused, "accepted", told or "all")
 
 
-# ---------------------------------------------------------------- who flies it
+# ---------------------------------------------------------------- heartbeats and takeovers
 
-#: of 100 gaps between heartbeats so many are no longer than the limit: a frame may be lost
+#: the share in 1/100 of gaps between heartbeats within the limit: a frame may be lost
 _MOST_GAPS: Final = 95
-#: us without progress after which a leg counts as stopped short, and by when that is told
+#: us without progress after which a leg counts as stopped short, and by when that is reported
 _STALLS_US: Final = 8 * _SECOND
-#: us in which an autopilot obeys; the slowest that was recorded took 94 ms
+#: us in which an autopilot obeys; the slowest recording took 94 ms
 _OBEYS_US: Final = 100_000
 
 
@@ -454,7 +454,7 @@ def _overlaps(silence: ObservedSilence, since: int, until: int) -> bool:
 
 
 def _within_us(observed: ObservedQualification) -> int:
-    """W: by when a takeover shows, with the link's delay (docs/adr/0034)."""
+    """W: the time in which a takeover must show, plus the link's delay (docs/adr/0034)."""
     return observed.mode_within_us + (observed.round_trip_us or 0)
 
 
@@ -472,7 +472,7 @@ def _takeover(
     slug: str, flown: ObservedSortie, takeover: ObservedTakeover, observed: ObservedQualification
 ) -> QualificationCheck:
     sent, shown = takeover.sent_us, takeover.shown_us
-    if sent is None:  # by a pilot: nobody knows when
+    if sent is None:  # by a pilot, at an unknown time
         found = "not detected" if shown is None else f"detected by `{takeover.how}`; the delay is not known"
         return _check(slug, shown is not None and flown.ending == Ending.STOOD_DOWN, "it is detected", found)
     limit = _within_us(observed)
@@ -483,7 +483,7 @@ def _takeover(
     advice = "the program would act against the pilot: do not fly it"
     if shown is None:
         return _check(slug, False, expected, "not detected", limit, None, _US, advice)
-    # W counts from when it took effect, which is not long after it was sent
+    # W counts from the effect, which comes soon after the frame
     sent = max(sent, min(takeover.obeyed_us or sent, sent + (observed.round_trip_us or 0) + _OBEYS_US, shown))
     late = shown - sent
     if takeover.kind is TakeoverKind.MODE:
@@ -502,7 +502,7 @@ def _takeover(
 
 # ---------------------------------------------------------------- silences
 
-#: us after which a link counts as silent, and what looking for it takes
+#: us after which a link counts as silent, and the time of its detection
 _SILENT_US: Final = _SECOND
 _LOOKS_US: Final = 300_000
 
@@ -537,7 +537,7 @@ def _silences(observed: ObservedQualification) -> Iterator[QualificationCheck]:
 
 
 def _streams(observed: ObservedQualification) -> Iterator[QualificationCheck]:
-    """What comes at less than half the rate asked for; the heartbeat has a check of its own."""
+    """The streams below half of their requested rate; the heartbeat has its own check."""
     slow: dict[str, tuple[int, int | None]] = {}
     measured = 0
     for sortie in observed.sorties:

@@ -1,7 +1,6 @@
-"""The missions of the sorties, as sources under the user's own policy: the compiler proves them as it does any other.
-
-A step is the policy's own skill of its kind of motion. How far, how fast and which way a leg goes is tried out: the
-first of `trials` that the policy permits, within its airspace, is flown.
+"""The missions of the sorties, as sources under the user's own policy: the compiler proves them like any other. Each
+step uses the policy's own skill for its kind of motion. Distance, speed and direction of a leg are tried out: the first
+of `trials` that the policy permits, within its airspace, is flown.
 """
 
 from collections.abc import Iterator
@@ -17,7 +16,7 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.zone import unproject
 from rtshcua.model.quantity import Dimension, display
 
-#: the shipped skill of each kind of motion, where a policy has several of the kind
+#: the shipped skill of each kind of motion, if a policy has several of the kind
 _SHIPPED: Final = {
     MotionKind.CLIMB: "takeoff", MotionKind.FLY: "goto", MotionKind.HOLD: "hover", MotionKind.HOME: "return_home",
     MotionKind.LAND: "emergency_land",
@@ -27,14 +26,14 @@ _LEGS_MM: Final = (50_000, 30_000)
 _SPEEDS_MM_S: Final = (5_000, 3_000, 2_000)
 _BEARINGS_DEG: Final = (0, 180, 90, 270, 45, 135, 225, 315)
 _HOLD_US: Final = 5_000_000
-#: s of link time that each silence takes, and what is between and around them
+#: us of link time for each silence, and for the time between and around them
 _AROUND_US, _EACH_US = 3_500_000, 4_000_000
 _PILOT_US: Final = 30_000_000
 NAME: Final = "qualification"
 
 
 class SortiePlan(NamedTuple):
-    """How high the sorties are, how long and fast their legs, and which way they go."""
+    """The height of the sorties, and the length, speed and direction of their legs."""
 
     height: int
     leg: int
@@ -43,13 +42,13 @@ class SortiePlan(NamedTuple):
 
 
 def trials() -> Iterator[SortiePlan]:
-    """What is tried, the most telling first."""
+    """The plans to try, the most informative first."""
     for height, leg, speed, bearing in product(_HEIGHTS_MM, _LEGS_MM, _SPEEDS_MM_S, _BEARINGS_DEG):
         yield SortiePlan(height, leg, speed, bearing)
 
 
 def skill_of(policy: Policy, kind: MotionKind) -> Contract | None:
-    """The skill that flies a kind of motion."""
+    """The policy's skill for a kind of motion."""
     those = [each for each in policy.contracts if each.motion.kind == kind]
     return next((each for each in those if each.name == _SHIPPED[kind]), those[0] if those else None)
 
@@ -57,14 +56,13 @@ def skill_of(policy: Policy, kind: MotionKind) -> Contract | None:
 def source_of(
     sortie: Sortie, trial: SortiePlan, imported: str, policy: Policy, mission: Mission, *, by_pilot: bool
 ) -> str:
-    """The source of a sortie's mission: beside the file `imported`, by whoever proposes `mission`, under its policy.
-
-    Raises LookupError with the kind of motion for which the policy has no skill.
+    """The source of a sortie's mission: it imports the file `imported`, has the proposer of `mission`, and its policy.
+    Raises LookupError with a kind of motion that the policy has no skill for.
     """
     first = mission.invocations[0]
     source, role = SourceKind(first.source).name.lower(), policy.roles[first.role]
     speaker = f"agent {mission.proposer}" if source == "agent" else f"{source} {mission.proposer}"
-    # a vehicle that was taken over lands where it is: the next one flies back over home, or it would wander off
+    # a vehicle that was taken over lands where it is: the next leg goes back over home, so that it does not drift away
     way = trial._replace(bearing=(trial.bearing + 180) % 360) if sortie.takeover is TakeoverKind.PAUSE else trial
     steps = []
     for kind in sortie.steps:

@@ -1,6 +1,5 @@
-"""What was observed in the sorties of a qualification: plain values, of which the checks are made.
-
-Times are us of our monotonic clock, lengths mm, speeds mm/s, places 1e-7 degree.
+"""The observations in the sorties of a qualification, as plain values for the checks. Times are us of our monotonic
+clock, lengths mm, speeds mm/s, places 1e-7 degree.
 """
 
 from collections.abc import Mapping
@@ -13,7 +12,7 @@ from rtshcua.wire.qualification import Firmware
 
 
 class TakeoverKind(StrEnum):
-    """How somebody else takes the vehicle over."""
+    """How somebody else takes over."""
 
     MODE = "mode"
     PAUSE = "pause"
@@ -21,7 +20,7 @@ class TakeoverKind(StrEnum):
 
 
 class MotionSample(NamedTuple):
-    """A report of place and speed: over ground and upwards."""
+    """A report of position and speed: over ground and upwards."""
 
     at_us: int
     latitude: int
@@ -33,8 +32,8 @@ class MotionSample(NamedTuple):
 
 @dataclass(slots=True)
 class ObservedCommand:
-    """A command that was begun: what it was, when its first frame left, and when and how it ended. `how` is
-    `succeeded`, a reason of failure, `replaced`, or empty while it flies. `shortened`: it was to end on its way.
+    """A command: when its first frame left, and when and how it ended. `how` is `succeeded`, a reason of failure,
+    `replaced`, or empty in flight. `shortened`: it was planned to end early.
     """
 
     kind: int
@@ -49,8 +48,8 @@ class ObservedCommand:
 
 @dataclass(slots=True)
 class ObservedAnswer:
-    """A MAV_CMD that was sent, and the result of its first acknowledgement. `asks_no_mode`: a DO_REPOSITION without the
-    flag that changes the mode, which PX4 calls unsupported and obeys in Hold (recorded; ADR 34).
+    """A sent MAV_CMD and the result of its first acknowledgement. `asks_no_mode`: a DO_REPOSITION without the flag that
+    changes the mode, which PX4 calls unsupported and obeys in Hold (recorded; ADR 34).
     """
 
     command: int
@@ -62,9 +61,9 @@ class ObservedAnswer:
 
 @dataclass(slots=True)
 class ObservedTakeover:
-    """Somebody else took over. `sent_us` None: a pilot did, nobody knows when. `obeyed_us`: that was acknowledged to
-    whoever sent it; `mode_us`: another mode showed in a heartbeat; `shown_us`: the driver told of it, as `how`;
-    `moved_us`: the last frame of ours to move it left. `unwatched_us`: how long nobody looked before the mode showed.
+    """A takeover. `sent_us` None: by a pilot, at an unknown time. `obeyed_us`: it was acknowledged to its sender;
+    `mode_us`: another mode showed in a heartbeat; `shown_us`: the driver reported it, as `how`; `moved_us`: our last
+    frame that moves the vehicle left. `unwatched_us`: how long nothing was watched before the mode showed.
     """
 
     kind: TakeoverKind
@@ -79,8 +78,8 @@ class ObservedTakeover:
 
 @dataclass(slots=True)
 class ObservedSilence:
-    """Nothing was let through for `for_us`, in either direction, while it held. `fresh_us`: all that came before had
-    come again. `kept`: the command was still in force then, and the mode the same.
+    """A silence of `for_us` in both directions during a hold. `fresh_us`: every earlier stream had come again. `kept`:
+    the command was still in force, and the mode unchanged.
     """
 
     for_us: int
@@ -121,8 +120,8 @@ class ObservedSortie:
 
 @dataclass(frozen=True, slots=True)
 class ObservedQualification:
-    """All that was observed. `mode_within_us`: the W that is declared for the flavour; `settings`: what the doctor
-    finds of its parameters; `missing`: why sorties were not flown, by their name.
+    """All observations. `mode_within_us`: the declared W of the flavour; `settings`: the doctor's findings about its
+    parameters; `missing`: why sorties were not flown, by name.
     """
 
     firmware: Firmware | None
@@ -133,5 +132,5 @@ class ObservedQualification:
     missing: Mapping[str, str]
 
     def sortie(self, name: str) -> ObservedSortie | None:
-        """The sortie of this name, if it was flown."""
+        """The sortie of this name, if flown."""
         return next((each for each in self.sorties if each.name == name), None)

@@ -1,7 +1,6 @@
-"""A second ground station, which takes the vehicle over in a simulation: what a pilot would do, as frames of its own.
-
-It is not ours: its frames have its own system and component, and pass no gate, as those of any ground station do. It is
-made for a simulation alone, where whoever runs it said so. It sends no heartbeat, so that no loss is hidden.
+"""A second ground station that takes the vehicle over in a simulation, with the frames of a pilot's ground station. Its
+frames have their own system and component, and pass no gate, like those of any ground station. It is made only for a
+simulation, with the user's confirmation. It sends no heartbeat, so that no loss of the real one is hidden.
 """
 
 from typing import Any, Final
@@ -20,7 +19,7 @@ _PAUSE: Final = 0.0  # of DO_PAUSE_CONTINUE
 
 
 class GroundStation:
-    """Speaks to one autopilot."""
+    """Sends to one autopilot."""
 
     def __init__(self, autopilot: int, system: int) -> None:
         self._autopilot = autopilot
@@ -28,7 +27,7 @@ class GroundStation:
         self._codec = Codec(_SYSTEM, _COMPONENT)
 
     def takes_over(self, kind: TakeoverKind, home: tuple[int, int], seen: ObservedVehicle) -> list[bytes]:
-        """The frames that take it over; to a target: back home, at the height that it has."""
+        """The frames of a takeover; to a target: back home, at its present height."""
         match kind:
             case TakeoverKind.MODE:
                 return self._sets(Px4Mode.RETURN if self._autopilot == PX4 else CopterMode.RTL)
@@ -38,14 +37,14 @@ class GroundStation:
                 return [self._codec.pack(self._target(home, seen))]
 
     def lands(self) -> list[bytes]:
-        """The frames that have it land where it is."""
+        """The frames that land it where it is."""
         return self._sets(Px4Mode.LAND if self._autopilot == PX4 else CopterMode.LAND)
 
     def _sets(self, mode: Px4Mode | CopterMode) -> list[bytes]:
         return [self._codec.pack(messages.set_mode(self._system, mode))]
 
     def _pause(self) -> Any:
-        """PX4's ground stations pause with a reposition to no place, ArduPilot's with the command for it."""
+        """The pause command: PX4's ground stations send a reposition without a place, ArduPilot's the pause command."""
         if self._autopilot == PX4:
             return messages.stop_here(self._system)
         return messages.command(self._system, dialect.MAV_CMD_DO_PAUSE_CONTINUE, _PAUSE)

@@ -1,9 +1,9 @@
-"""The boundary as a process of its own (boundary/home/process.c), called over a socket.
+"""The boundary in a separate process (boundary/home/process.c), called over a socket.
 
-A run starts it (`BoundaryProcess`): it gets open files and no path: the trust root, one file in which it keeps what
-must outlive it, and the link's key, which is never read here. Or somebody else starts it, as systemd does, for whoever
-connects to its socket (`ListeningBoundary`): then its keys and its root are its own, and a run has none of them. One
-process at a time holds the file of a vehicle: two runtimes cannot share what is kept of it.
+A run starts it (`BoundaryProcess`) with open files and no paths: the trust root, one file for its persistent state, and
+the link's key, which is not read here. Or another program, such as systemd, starts it for whoever connects to its
+socket (`ListeningBoundary`): then it has its own keys and trust root, and a run has none of them. One process at a time
+holds the file of a vehicle, so two runtimes cannot share its state.
 """
 
 import os
@@ -25,35 +25,35 @@ from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, create_
 from rtshcua.onboard.enforcement.isolated import LOAD, MAX_PART
 from rtshcua.wire.keys import PUBLIC_BYTES
 
-#: how long it may take to begin, and to load a bundle, whose mission is looked at as a whole, in s;
+#: the time to start, and to load a bundle with its whole mission, in s;
 PATIENCE_S: Final = 20.0
-#: and any other answer: one that stands still is as good as gone, and something flies
+#: the time for any other answer: a boundary that does not answer counts as lost, while the vehicle flies
 ANSWER_S: Final = 1.0
-#: and then so much longer: where the whole machine stood still, the time of both is over, and one of them goes on first
+#: and an extra time: if the whole machine stood still, both times are over, and one process resumes first
 AGAIN_S: Final = 0.2
-#: and how long the boundary of a run that was killed may take to write what it keeps, and end
+#: the time for the boundary of a killed run to write its state and end
 ENDING_S: Final = 2.0
-#: and one that listens: where it hangs, the kernel ends it 3 s after its last sign of life, and nobody else may
+#: the same for a listening one: if it hangs, the kernel ends it 3 s after its last activity, and nobody else may
 LISTENING_ENDING_S: Final = 5.0
 _PACKAGED: Final = Path(__file__).resolve().parents[1] / "boundary" / "rtshcua-boundary"
 _BUILT: Final = Path(__file__).resolve().parents[2] / "build" / "boundary" / "rtshcua-boundary"
-#: how often one that listens is asked again, in s: each time is a line of systemd's journal
+#: the interval of attempts with a listening one, in s: each writes a line to systemd's journal
 _ASKING_S: Final = 0.1
 #: octets of the largest call and answer
 _CALL, _ANSWER = MAX_PART + 64, 2_112
-#: after the measures, as `process.c` has it: the name of the link's key, two public halves, whether its clock counts
+#: after the measures, as in `process.c`: the name of the link's key, two public keys, whether its clock counts
 _SAID: Final = Struct(f"8s{PUBLIC_BYTES}s{PUBLIC_BYTES}s?")
 _FIRST: Final = Struct(f"<Qq{PUBLIC_BYTES}s")
 _FIRST_LAYOUT: Final = 0x7274736863756100
 _GREETING: Final = 4 + _SAID.size
 
-#: what is told where there is no program, and nobody asked for one
+#: the message without a program, if none was requested
 UNBUILT: Final = "the boundary's program was not built, so the run decides in its own process, without isolation"
 UNBUILT_HELP: Final = "`make setup` builds it in a checkout; the wheels for Linux on x86-64 and aarch64 have it"
 
 
 class Measure(IntFlag):
-    """What keeps others out of the process, and it away from everything else (boundary/home/isolation.h)."""
+    """The measures that isolate the process (boundary/home/isolation.h)."""
 
     OWN_USER = 1
     OWN_NETWORK = 2
@@ -64,7 +64,7 @@ class Measure(IntFlag):
     SECRET_MEMORY = 64
 
 
-#: what is missing where a measure is not in force, in words
+#: the message for each measure that is not in force
 MISSING: Final = {
     Measure.OWN_USER: "a separate user: every process of the present user can read its key files (`--boundary-user`)",
     Measure.OWN_NETWORK: "a separate network namespace (needs root or CAP_SYS_ADMIN)",
@@ -82,7 +82,7 @@ _ENDED: Final = {
     _NO_KEY: "its link key is not a valid key",
     _MISSING: "a file in its folder is missing or unreadable, or other users have access to the folder",
 }
-#: what to look at, of a boundary that listens
+#: what to check for a listening boundary
 _ENDED_HELP: Final = {
     64: "`log.seed` and `boundary.seed` of its folder: 64 hexadecimal digits each",
     _UNTRUSTED: "`root.trust` and `root.pin` of its folder; `rtshcua keys provision` writes both",
@@ -97,8 +97,7 @@ _DAMAGED_HELP: Final = (
 
 
 class BoundaryError(Exception):
-    """The boundary's process does not begin: `missing`, `in-use`, `damaged`, `not-kept`, `untrusted`,
-    `not-begun`."""
+    """The boundary's process did not start: `missing`, `in-use`, `damaged`, `not-kept`, `untrusted`, `not-begun`."""
 
     def __init__(self, slug: str, text: str, help: str = "") -> None:
         super().__init__(text)
@@ -107,27 +106,27 @@ class BoundaryError(Exception):
 
 
 def program() -> Path | None:
-    """The program, in a checkout or as the package has it; None where it was not built."""
+    """The program, in a checkout or in the package; None where it was not built."""
     return next((each for each in (_BUILT, _PACKAGED) if each.is_file()), None)
 
 
 def kept_file(state: Path, vehicle: str) -> Path:
-    """What a boundary keeps of a vehicle, in a state folder."""
+    """The file of a boundary's state for a vehicle, in a state folder."""
     return state / "boundary" / f"vehicle-{quote(vehicle, safe='')}.kept"
 
 
 def first_kept(since_us: int = 0, public: bytes = bytes(PUBLIC_BYTES)) -> bytes:
-    """What stands in the file of a boundary before it keeps anything (`rt_kept_first` of boundary/enforcement/kept.h):
-    an empty file is damage. It opens no mission that was issued before `since_us` (UTC), and is that of a boundary with
-    this public key, or of any.
+    """The initial content of a boundary's file (`rt_kept_first` of boundary/enforcement/kept.h); an empty file is
+    damage. It opens no mission that was issued before `since_us` (UTC), and belongs to a boundary with this public key,
+    or to any.
     """
     said = _FIRST.pack(_FIRST_LAYOUT, since_us, public)
     return said + sha256(said).digest()
 
 
 def measures_here(user: tuple[int, int] | None) -> Measure:
-    """The measures that a boundary's process takes on this machine, as this user and group or ours: one begins, says
-    them, and ends. Raises BoundaryError.
+    """The measures that a boundary's process takes on this machine, as this user and group or ours: one is started,
+    reports them, and ends. Raises BoundaryError.
     """
     path = program()
     if path is None:
@@ -148,16 +147,16 @@ def measures_here(user: tuple[int, int] | None) -> Measure:
 
 
 class _Connected:
-    """The socket of a boundary, and what its first message said."""
+    """The socket of a boundary, and the content of its first message."""
 
     _socket: socket.socket
     #: the measures in force
     measures: Measure
-    #: the name of the link's key, and the public halves of the log's key and of its own, None for those it has not
+    #: the name of the link's key, and the public keys of the log and of the boundary, None for missing ones
     link_name: bytes | None
     log_public: bytes | None
     own_public: bytes | None
-    #: whether it decides by its own clock; else the caller's time counts, as of a vehicle that is flown faster
+    #: whether it decides by its own clock; otherwise the caller's time counts, as for a vehicle that runs faster
     own_clock: bool
 
     @property
@@ -166,8 +165,8 @@ class _Connected:
         return [text for measure, text in MISSING.items() if measure not in self.measures]
 
     def call(self, octets: bytes) -> bytes:
-        """One call. Raises OSError when nobody answers; an empty answer says that it is gone. One that is late is put
-        to an end: it must not go on behind the back of who did not wait for it.
+        """Send one call and return the answer. Raises OSError without an answer; an empty answer means that the
+        boundary ended. A boundary that is late is ended: it must not continue unnoticed.
         """
         loads = octets[0] == LOAD
         try:
@@ -192,7 +191,7 @@ class _Connected:
             self._socket.settimeout(ANSWER_S)
 
     def _end(self) -> None:
-        """Put it to an end."""
+        """End the process."""
         raise NotImplementedError
 
     def _take_in(self, greeting: bytes) -> None:
@@ -203,16 +202,15 @@ class _Connected:
 
 
 def _sized(connection: socket.socket) -> socket.socket:
-    """A socket that takes the largest call."""
+    """A socket with room for the largest call."""
     connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 2 * _CALL)
     return connection
 
 
 class ListeningBoundary(_Connected):
-    """A boundary that somebody else starts for whoever connects to the socket at `path`; until `close`.
-
-    It ends when that connection does: one that hangs is ended by the kernel (boundary/home/process.c), for a run may
-    not end what another user runs. One that is ending, or that another run has, is waited for. Raises BoundaryError.
+    """A boundary that another program starts for the client of the socket at `path`; until `close`. It ends with that
+    connection: if it hangs, the kernel ends it (boundary/home/process.c), because a run may not end another user's
+    process. A boundary that is ending, or in use by another run, is waited for. Raises BoundaryError.
     """
 
     def __init__(self, path: Path) -> None:
@@ -225,7 +223,7 @@ class ListeningBoundary(_Connected):
         self._take_in(greeting)
 
     def close(self) -> None:
-        """Let it end: it does so when its socket is closed."""
+        """Close the socket, which ends it."""
         self._socket.close()
 
     def _end(self) -> None:
@@ -233,7 +231,7 @@ class ListeningBoundary(_Connected):
             self._socket.shutdown(socket.SHUT_RDWR)
 
     def _greeted(self, path: Path) -> bytes | None:
-        """The first message; None where the connection was closed without one, or the file of the vehicle is held."""
+        """The first message; None if the connection was closed without one, or the vehicle's file is locked."""
         self._socket = _sized(socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET))
         self._socket.settimeout(PATIENCE_S)
         try:
@@ -261,15 +259,12 @@ class ListeningBoundary(_Connected):
 
 
 class BoundaryProcess(_Connected):
-    """A boundary that runs, started here.
-
-    `own_seed` is that of the key that it signs its own evidence with, `log_seed` that of the log's key. `settings` are
-    the parameters that are set of the vehicle before the flight, and `owed` those that earlier runs set and did not put
-    back, each as the body of a preparation (`wire.preparation`). `user` is the user and group that it runs as, None for
-    ours. `paced`: the caller's time is not the machine's, as on a simulated vehicle that is flown faster.
-    `utc_error_us` is what an operator says that the machine's time of day is off by at most, where the kernel does not.
-
-    Raises BoundaryError, LinkKeyError, and OSError for files that cannot be opened.
+    """A running boundary, started here. `own_seed` is the seed of the key for its own evidence, `log_seed` that of the
+    log's key. `settings` are the parameters to set before the flight, and `owed` those that earlier runs set and did
+    not restore, each as the body of a preparation (`wire.preparation`). `user` is its user and group, None for ours.
+    `paced`: the caller's time is not the machine's, as for a simulated vehicle that runs faster. `utc_error_us` is the
+    operator's bound on the error of the time of day, for use without the kernel's. Raises BoundaryError, LinkKeyError,
+    and OSError for files that cannot be opened.
     """
 
     def __init__(
@@ -322,11 +317,11 @@ class BoundaryProcess(_Connected):
 
     @property
     def pid(self) -> int:
-        """Its process."""
+        """The process id."""
         return self._process.pid
 
     def close(self) -> None:
-        """Let it end: it does so when its socket is closed."""
+        """Close the socket, which ends it."""
         self._socket.close()
         try:
             self._process.wait(PATIENCE_S)
@@ -385,9 +380,7 @@ class BoundaryProcess(_Connected):
 
 
 def _unbegun(code: int, kept: str, help: str = "") -> BoundaryError:
-    """Why a boundary does not begin, by the code that its program ends with; `kept` names what it keeps, `help` what
-    to look at.
-    """
+    """The error for an exit code of its program; `kept` names its state, `help` what to check."""
     if code == _DAMAGED:
         text = f"{kept} is damaged, so the bundles that the boundary has opened are not known"
         return BoundaryError("damaged", text, _DAMAGED_HELP)

@@ -1,4 +1,6 @@
-"""The machine's clocks as the runtime's `Clock` port, and one for a simulated vehicle that lives faster than life."""
+"""The machine's clocks as the runtime's `Clock` port, and a clock for a simulated vehicle that runs faster than real
+time.
+"""
 
 import time
 from collections.abc import Callable
@@ -8,15 +10,15 @@ from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.onboard.ports import Clock, ClockStepped
 from rtshcua.wire.clock import DRIFT_US
 
-#: How far UTC may be off in a simulation, in us: it has the time of the machine that it runs on.
+#: The error of UTC in a simulation, in us: it uses the time of its machine.
 UTC_ERROR_US = 100_000
 #: Linux's monotonic clock stops in a suspend, and this one does not
 _BOOTTIME: int | None = getattr(time, "CLOCK_BOOTTIME", None)
 
 
 def monotonic_ns() -> int:
-    """The machine's monotonic time, which goes on while that is suspended, where the system has such a clock: else the
-    time of day, carried on by it, would stay behind, and an age too.
+    """The machine's monotonic time, including suspended time where the system has such a clock. Otherwise the derived
+    time of day and all ages would fall behind.
     """
     return time.clock_gettime_ns(_BOOTTIME) if _BOOTTIME is not None else time.monotonic_ns()
 
@@ -26,35 +28,34 @@ def _machine_us() -> tuple[int, int]:
 
 
 class LinkClock(Clock, Protocol):
-    """The `Clock` port, with what a link needs of it besides."""
+    """The `Clock` port with the functions that a link needs."""
 
     def heard(self, boot_us: int) -> None:
-        """A frame of the vehicle said how long it has been up, in us."""
+        """Take in the vehicle's time since boot, in us."""
         ...
 
     def tell(self, whom: Callable[[int], object]) -> None:
-        """From now on tell, several times a second, how long the vehicle had been up, in us, when it was last heard: it
-        waits for us. A clock that goes on by itself tells nothing.
+        """Report several times a second the vehicle's last known time since boot, in us, to a simulation that waits for
+        us. A clock of real time reports nothing.
         """
         ...
 
     def real_seconds(self, us: int) -> float:
-        """How long `us` of this clock last on the machine's, for waiting."""
+        """The duration of `us` of this clock in real time, for waiting."""
         ...
 
     def us_in(self, seconds: float) -> int:
-        """How far this clock goes, at most, in that time of the machine's."""
+        """How far this clock goes, at most, in this real time."""
         ...
 
     def bound_utc(self, error_us: int, ahead_us: int | None = None) -> None:
-        """From now on UTC is true to `error_us`; with `ahead_us` it is so far ahead of monotonic time, from now on."""
+        """Set the error bound of UTC; with `ahead_us` also its offset from monotonic time."""
         ...
 
 
 class SystemClock:
-    """Monotonic time and UTC of the machine, in us. UTC is read once and carried on: a clock step moves nothing.
-
-    How far it may be off is not known until somebody says so (`utc.UtcWatch`), and grows from then on.
+    """Monotonic time and UTC of the machine, in us. UTC is read once and then derived: setting the clock changes
+    nothing. Its error is unknown until it is set (`utc.UtcWatch`), and grows from then on.
     """
 
     def __init__(self, utc_error_us: int = UTC_UNKNOWN_US) -> None:
@@ -76,10 +77,10 @@ class SystemClock:
             self._ahead_us = ahead_us
 
     def heard(self, boot_us: int) -> None:
-        """The vehicle's own time does not matter here."""
+        """Nothing: the vehicle's time does not matter here."""
 
     def tell(self, whom: Callable[[int], object]) -> None:
-        """Nor does whoever lives by it."""
+        """Nothing: no simulation waits for this clock."""
 
     def real_seconds(self, us: int) -> float:
         """The same in seconds."""
@@ -91,13 +92,12 @@ class SystemClock:
 
 
 class StepWatch:
-    """Tells when the machine's time of day was set: it went on otherwise than monotonic time. It looks once a second.
-
-    Records carry on the time of day that they began with; that the machine has another one now is for them to say.
+    """Detects that the machine's time of day was set: it differs from monotonic time. It checks once a second. Records
+    keep the time of day that they began with, and report such a change.
     """
 
     def __init__(self, machine_us: Callable[[], tuple[int, int]] = _machine_us, least_us: int = UTC_ERROR_US) -> None:
-        """`machine_us` gives monotonic time and UTC; a difference below `least_us` is no news."""
+        """`machine_us` returns monotonic time and UTC; differences below `least_us` are ignored."""
         self._machine_us = machine_us
         self._least_us = least_us
         monotonic_us, utc_us = machine_us()
@@ -105,7 +105,7 @@ class StepWatch:
         self._looked_us = monotonic_us
 
     def events(self, now: Now) -> list[ClockStepped]:
-        """That it was set since the last call, if it was."""
+        """The change since the last call, if any."""
         monotonic_us, utc_us = self._machine_us()
         if monotonic_us - self._looked_us < 1_000_000:
             return []
@@ -118,18 +118,18 @@ class StepWatch:
 
 
 class PacedClock:
-    """Time as a simulated vehicle has it that lives `speed` times as fast; never for a real one.
+    """The time of a simulated vehicle that runs `speed` times faster; never for a real one.
 
-    It runs on from the vehicle's boot time as frames bring it, at most `LEAD_US` ahead: when the vehicle's process or
-    this one is held up for a moment, which at such a speed is a long time, the age of a signal does not jump. Only when
-    nothing was heard for some time of the machine's does it run free, so that silence is still noticed: for at most
-    `PATIENCE_NS`, and the slower it is the sooner, for what it stood still it makes up for in one step when something
-    is heard again. Until the vehicle first tells its time, this is the machine's.
+    It follows the vehicle's boot time from its frames, at most `LEAD_US` ahead: if the vehicle's process or this one is
+    held up for a moment, which is long at such a speed, the ages of signals do not jump. Without frames for some real
+    time it runs freely, so that silence is still detected: after at most `PATIENCE_NS`, and sooner at lower speeds,
+    because the time that it stood still is added in one step with the next frame. Before the first frame it is the
+    machine's time.
     """
 
     LEAD_US = 200_000
     TELL_US = 100_000
-    PATIENCE_NS = 500_000_000  # from ten times as fast on
+    PATIENCE_NS = 500_000_000  # from a speed of ten on
     _PATIENCE_FROM = 10
 
     def __init__(
@@ -147,7 +147,7 @@ class PacedClock:
         self._told_us = -self.TELL_US
 
     def now(self) -> Now:
-        """The present moment; never before the last."""
+        """The present time; never before the last one."""
         silent_ns = self._machine_ns() - self._heard_ns
         if self._boot_us is None:
             run_us = silent_ns // 1_000
@@ -158,13 +158,13 @@ class PacedClock:
         return Now(self._last_us, self._last_us + self._ahead_us, self._utc_error_us)
 
     def bound_utc(self, error_us: int, ahead_us: int | None = None) -> None:
-        """See `LinkClock`; a simulated time of day grows no worse."""
+        """See `LinkClock`; the error of a simulated time of day does not grow."""
         self._utc_error_us = error_us
         if ahead_us is not None:
             self._ahead_us = ahead_us
 
     def heard(self, boot_us: int) -> None:
-        """Follow the vehicle's time. One that goes backwards (a new start) is set aside."""
+        """Follow the vehicle's time. A time that goes back (a restart) is ignored."""
         if self._boot_us is None:
             self._base_us = self.now().monotonic_us
         elif boot_us > self._boot_us:

@@ -27,17 +27,17 @@ _AUTOPILOT: Final = enums.MAV_COMP_ID_AUTOPILOT1
 _OURS: Final = enums.MAV_COMP_ID_ONBOARD_COMPUTER
 _NAMES: Final = {PX4: "px4", ARDUPILOT: "ardupilot"}
 
-#: us: how long a heartbeat is waited for, then another vehicle's, then what it says of itself
+#: us: how long to wait for a heartbeat, then for another vehicle, then for its reports
 _HEARTBEAT_US: Final = 10_000_000
 _ANOTHER_US: Final = 1_500_000
 _TELL_US: Final = 6_000_000
 #: how old a report of the motors or the ground may be when the key is sent
 _FRESH_US: Final = 2_500_000
 _SAFE: Final = "a key can only be set on a vehicle that is disarmed and on the ground"
-#: how long a key may take to show, and how often it is sent
+#: how long a key may take to take effect, and how often it is sent
 _SHOW_US: Final = 1_500_000
 _TRIES: Final = 3
-#: how long an answer may take, at least; as many round trips as this, where they are long
+#: the least time for an answer; on slow links, this many round trips
 _ANSWER_US: Final = 1_000_000
 _ROUND_TRIPS: Final = 4
 #: requests of each kind
@@ -48,12 +48,12 @@ _MOST_TEXTS: Final = 8
 _WAIT_S: Final = 0.02
 
 _T = TypeVar("_T")
-#: a part of the course: gives nothing whenever there is something to wait for, and a value in the end
+#: a part of the procedure: yields while it waits, and returns a value at the end
 _Part = Generator[None, None, _T]
 
 
 class SetUp(NamedTuple):
-    """What was seen. `release` is what AUTOPILOT_VERSION says; `already`: it had the key, and nothing was sent."""
+    """The result. `release` is that of AUTOPILOT_VERSION; `already`: it had the key, and nothing was sent."""
 
     autopilot: str
     system: int
@@ -67,16 +67,14 @@ class SetUp(NamedTuple):
 
     @property
     def insists(self) -> bool:
-        """Whether the key holds on this link: signed frames are answered, and no others."""
+        """Whether the key is effective on this link: only signed frames are answered."""
         return self.signs and self.answers_signed and not self.answers_unsigned
 
 
 def after_setup(autopilot: str, release: tuple[int, int, int] | None) -> str:
-    """What an autopilot of this release does with a key, in words.
-
-    Sources: ArduPilot `GCS_Signing.cpp`, pull requests 10311 (not while armed) and 29546 (MAVn_OPTIONS), and
-    `tests/recorded` (both channels); PX4 pull requests 25284 (1.17) and 26894 (1.18), its guide's page "MAVLink Message
-    Signing", and the release notes of 1.18.
+    """How an autopilot of this release uses a key, in words. Sources: ArduPilot `GCS_Signing.cpp`, pull requests 10311
+    (not while armed) and 29546 (MAVn_OPTIONS), and `tests/recorded` (both channels); PX4 pull requests 25284 (1.17) and
+    26894 (1.18), the page "MAVLink Message Signing" of its guide, and the release notes of 1.18.
     """
     if autopilot == "ardupilot":
         also = ", nor on a port where MAVn_OPTIONS switches signing off" if release is None or release >= (4, 7) else ""
@@ -101,12 +99,12 @@ def after_setup(autopilot: str, release: tuple[int, int, int] | None) -> str:
 
 
 class LinkSetup:
-    """One set-up, in explicit time (us, monotonic). It is over when `result` is there."""
+    """One set-up, with the time as an argument (us, monotonic). It ends with a `result`."""
 
     def __init__(
         self, key: bytes, utc_us: int, now_us: int, system: int | None = None, *, begins: bool = False
     ) -> None:
-        """`system` names one of several vehicles; `begins`: the transport may be spoken to first."""
+        """`system` selects one of several vehicles; `begins`: our side may send first on this transport."""
         self.result: SetUp | Refusal | None = None
         self._key = key
         self._link = SignedLink(key, SigningState(0, {}), utc_us, now_us)
@@ -122,7 +120,7 @@ class LinkSetup:
         self._autopilot = 0
         self._kind = (0, 0)
         self._other: int | None = None
-        self._armed: tuple[bool, int] | None = None  # and when it said so
+        self._armed: tuple[bool, int] | None = None  # and the time of that report
         self._landed: tuple[int, int] | None = None
         self._version: tuple[int, int, int] | None = None
         self._verified = self._answers = 0
@@ -134,19 +132,19 @@ class LinkSetup:
         return bool(self._system)
 
     def receive(self, octets: bytes, now_us: int) -> None:
-        """Take in what came."""
+        """Take in received octets."""
         self._now_us = now_us
         for frame in self._codec.parse(octets):
             self._hear(frame)
 
     def overhear(self, octets: bytes) -> None:
-        """Take in what another sender said: nothing, but that a vehicle speaks there too, under whatever id."""
+        """Take in the octets of another sender, only to detect another vehicle, under any id."""
         for frame in Codec(0, 0).parse(octets):
             if _is_autopilot(frame) and self._wanted in (None, frame.system):
                 self._other = frame.system
 
     def tick(self, now_us: int) -> list[bytes]:
-        """Go on; the frames to send."""
+        """Continue; return the frames to send."""
         self._now_us = now_us
         if self.result is None:
             next(self._steps, None)
@@ -156,7 +154,7 @@ class LinkSetup:
         frames, self._outbox = self._outbox, []
         return frames
 
-    # ---------------------------------------------------------------- what is heard
+    # ---------------------------------------------------------------- receiving
 
     def _hear(self, frame: ReceivedFrame) -> None:
         message = frame.message
@@ -181,7 +179,7 @@ class LinkSetup:
                 self._texts.append(message.text)
 
     def _is_ours(self, message: Any) -> bool:
-        """Another ground station may ask for messages, too."""
+        """Whether an answer is addressed to us: another ground station may request messages, too."""
         return is_addressed(message, self._system, _OURS)
 
     def _meet(self, frame: ReceivedFrame) -> None:
@@ -193,10 +191,10 @@ class LinkSetup:
         elif frame.system != self._system:
             self._other = frame.system
 
-    # ---------------------------------------------------------------- what is done
+    # ---------------------------------------------------------------- the procedure
 
     def _course(self) -> _Part[None]:
-        """From the first heartbeat to what was seen."""
+        """The procedure, from the first heartbeat to the result."""
         if not (yield from self._until(lambda: self.met, _HEARTBEAT_US)):
             self.result = Refusal(
                 "no-vehicle", "no heartbeat of a vehicle within 10 s", "check that it is on and sends to this address"
@@ -223,7 +221,7 @@ class LinkSetup:
             yield from self._probe(answer_us, already=already)
 
     def _ask(self, *, signed: bool) -> _Part[int]:
-        """Which release it is, and whether it stands on the ground; gives how long the first answer took, in us."""
+        """Ask for the release and whether it is on the ground; return the time of the first answer, in us."""
         begun_us = self._now_us
         asked_us: int | None = None
         took_us: int | None = None
@@ -245,7 +243,7 @@ class LinkSetup:
     def _send_key(self) -> _Part[None]:
         self.result = self._unfit()
         for _ in range(_TRIES):
-            if self._unfit() is not None:  # of a key that was sent before, what comes of it is looked at all the same
+            if self._unfit() is not None:  # the effect of a key that was sent before is tested all the same
                 return
             stamp = self._link.state.timestamp
             setup = mavlink.MAVLink_setup_signing_message(self._system, _AUTOPILOT, list(self._key), stamp)
@@ -270,12 +268,12 @@ class LinkSetup:
         return None
 
     def _probe(self, wait_us: int, *, already: bool) -> _Part[None]:
-        """Unsigned and signed requests in turn, and what is answered."""
+        """Send unsigned and signed requests in turn, and note which are answered."""
         answered = {False: False, True: True}
         verified = self._verified
         for _ in range(_ROUNDS):
             answered[False] |= yield from self._answered(wait_us, signed=False)
-            # silence before it tells something only if this is answered
+            # an earlier silence only counts if this one is answered
             answered[True] &= yield from self._answered(wait_us, signed=True)
         if not answered[True] and not answered[False]:
             text = (
@@ -298,17 +296,18 @@ class LinkSetup:
             answered_since = partial(self._has_answered, self._answers)
             self._request("AUTOPILOT_VERSION", signed=signed)
             if (yield from self._until(answered_since, wait_us)):
-                yield from self._until(lambda: False, _AGAIN_US)  # the rest of the answer is none to the next request
+                # the rest of this answer must not count for the next request
+                yield from self._until(lambda: False, _AGAIN_US)
                 return True
         return False
 
-    # ---------------------------------------------------------------- small things
+    # ---------------------------------------------------------------- helpers
 
     def _has_answered(self, before: int) -> bool:
         return self._answers > before
 
     def _until(self, reached: Callable[[], bool], time_us: int) -> _Part[bool]:
-        """Wait for something, at most so long; whether it came."""
+        """Wait for a condition for at most this time; return whether it was met."""
         end_us = self._now_us + time_us
         while not reached() and self._now_us < end_us:
             yield

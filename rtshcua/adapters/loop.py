@@ -1,8 +1,8 @@
-"""The thin loop around the runtime: waits for the world, steps, carries out the actions in their order.
+"""The loop around the runtime: it waits for events, steps the runtime, and carries out its actions in order. The same
+loop runs on a machine's clock and in virtual time, because it only knows their ports.
 
-The same loop runs on a machine's clock and in virtual time: of either it knows ports only. It never waits for the
-evidence: a command that must be recorded first is held until its record is kept, and the loop goes on meanwhile; a
-fallback is held for nothing.
+It never waits for evidence: a command that must be recorded first is held until its record is kept, and the loop goes
+on meanwhile; a fallback is never held.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -14,9 +14,9 @@ from rtshcua.onboard import ports
 from rtshcua.onboard.ports import Action, Command, Ending, Event
 from rtshcua.onboard.runtime.runtime import Runtime
 
-#: The longest that the loop waits for the vehicle before it steps the runtime again, in us of its clock;
+#: The longest wait for the vehicle before the next step of the runtime, in us of its clock;
 WAIT_US = 50_000
-#: while a command is held for its record, it looks this often whether that is kept.
+#: while a command is held for its record, this interval.
 HELD_WAIT_US = 300
 
 
@@ -24,8 +24,8 @@ Watch = Callable[[Now, Sequence[Event], Sequence[Action]], None]
 
 
 def append_all(sink: ports.EvidenceSink, lines: Iterable[bytes], durability: int) -> None:
-    """Give a sink lines that were made together. All of them, also where it refuses one: it takes that over all the
-    same, and a log has no holes. Raises the first OSError.
+    """Append lines that belong together to a sink: all of them, even if it refuses one, because it takes that one over
+    all the same, and a log has no gaps. Raises the first OSError.
     """
     refused: OSError | None = None
     for line in lines:
@@ -38,16 +38,15 @@ def append_all(sink: ports.EvidenceSink, lines: Iterable[bytes], durability: int
 
 
 class _Record(NamedTuple):
-    """How many lines of evidence must be kept before a command is sent, and of which class of durability."""
+    """How many lines of evidence must be kept before a command is sent, and their durability class."""
 
     lines: int
     durability: int
 
 
 class RunLoop:
-    """One run. `watch` sees each step's events and actions, after they were carried out; it must not block.
-
-    `prepares`: between steps the runtime looks ahead, so that the next one is quick. In virtual time no one waits.
+    """One run. `watch` gets the events and actions of each step, after they were carried out; it must not block.
+    `prepares`: between steps the runtime works ahead, so that the next one is quick. In virtual time nothing waits.
     """
 
     def __init__(
@@ -62,13 +61,13 @@ class RunLoop:
         self._wait_us = wait_us
         self._held_wait_us = min(wait_us, held_wait_us)
         self._prepares = prepares
-        self._held: tuple[Command, _Record] | None = None  # a command, and the record that it is held for
-        self._lines = sink.kept  # that were given to the sink
-        self._failed: int | None = None  # the sink refused something, when so many lines had been given to it
+        self._held: tuple[Command, _Record] | None = None  # a command and the record that it waits for
+        self._lines = sink.kept  # the number of lines that were handed to the sink
+        self._failed: int | None = None  # that number at the sink's first refusal
         self._answers: list[Event] = []
 
     def turn(self, also: Sequence[Event] = ()) -> Ending | None:
-        """Wait, step, act; `also` are events from elsewhere (Ctrl-C). Gives the ending once there is one."""
+        """Wait, step and act; `also` are events from elsewhere (Ctrl-C). Returns the ending once there is one."""
         self._tend()
         wait_us = self._wait_us if self._held is None else self._held_wait_us
         seen = self._vehicle.poll(self._clock.now().monotonic_us, 0 if self._answers or also else wait_us)
@@ -89,7 +88,7 @@ class RunLoop:
         return ending
 
     def _tend(self) -> None:
-        """See what became of the records; send the command that waits for its own, or withhold it."""
+        """Check the records; send the command that waits for its own, or withhold it."""
         reason, late = self._sink.trouble(), self._sink.late()
         if reason is not None:
             self._fail(reason)
@@ -131,7 +130,7 @@ class RunLoop:
         return ending
 
     def _append(self, append: ports.Append, record: _Record | None) -> _Record | None:
-        """What a command after it is held for; None if it, or one before it in this step, was refused."""
+        """The record that a following command waits for; None if it, or an earlier one in this step, was refused."""
         try:
             given = self._sink.append(append.line, append.durability)
         except OSError as error:
@@ -144,7 +143,7 @@ class RunLoop:
         return _Record(given, max(record.durability, append.durability))
 
     def _dispatch(self, command: Command, record: _Record | None) -> None:
-        """Send a command, or hold it until its record is kept. The one that was held is replaced."""
+        """Send a command, or hold it until its record is kept. It replaces a command that was held."""
         self._held = None
         if command.needs_record and record is None:
             self._refuse(command, ports.WITHHELD)
@@ -154,7 +153,7 @@ class RunLoop:
             self._held = command, record
 
     def _recorded(self, record: _Record) -> bool:
-        """Whether a record is as durable as it must be before anything is sent on it."""
+        """Whether a record is as durable as the command requires."""
         if record.durability == BUFFERED:
             return True
         return (self._sink.synced if record.durability == SYNCED_FIRST else self._sink.kept) >= record.lines
@@ -164,7 +163,7 @@ class RunLoop:
         self._answers.append(ports.EvidenceFailed(self._clock.now().monotonic_us, reason))
 
     def _send(self, command: Command) -> None:
-        """Look at the clock again: what is late is not sent."""
+        """Send a command, unless it is too late by now."""
         now_us = self._clock.now().monotonic_us
         if now_us > command.not_after_us:
             self._refuse(command, "late")

@@ -27,14 +27,14 @@ from typing import Any
 from rtshcua.adapters.vehicle.flavour import Stages
 
 SKILLS, MANOEUVRES = "rtshcua.skills", "rtshcua.manoeuvres"
-#: the pack that ships: the way to fly what has no way of its own comes from its package alone
+#: the shipped pack: stages for whole flavours come from its package alone
 SHIPPED = "lib"
 
 _NAME = re.compile(r"([a-z][a-z0-9_-]+):", re.ASCII)
 
 
 class BrokenPack(OSError):
-    """A pack that is installed and cannot be used, or is installed twice; the text is for a person."""
+    """An installed pack that cannot be used, or is installed twice; the text is for people."""
 
     def __init__(self, text: str) -> None:
         super().__init__(ENOENT, text)
@@ -43,7 +43,7 @@ class BrokenPack(OSError):
 
 @cache
 def folder(pack: str) -> str | None:
-    """The folder that `pack:` stands for; None where no installed package brings it. Raises `BrokenPack`."""
+    """The folder that `pack:` stands for; None where no installed package provides it. Raises `BrokenPack`."""
     found = [point for point in entry_points(group=SKILLS) if point.name == pack]
     if not found:
         return None
@@ -61,11 +61,10 @@ def packs_of(sources: Iterable[str]) -> frozenset[str]:
     return frozenset(match[1] for source in sources if (match := _NAME.match(source)))
 
 
-@cache  # what is installed is read of some hundred packages, which takes longer than all else that begins a flight
+@cache  # reading the metadata of some hundred packages takes longer than the rest of a flight's start
 def manoeuvres(packs: frozenset[str]) -> Mapping[str, Stages]:
-    """How to fly, by flavour (`px4`) and by flavour and skill (`px4.spray_area`), from what ships and these packs.
-
-    Raises `BrokenPack`: a skill that has a way of its own is not flown in another one because that is broken.
+    """The stages by flavour (`px4`) and by flavour and skill (`px4.spray_area`), from the shipped pack and these packs.
+    Raises `BrokenPack`: a skill with its own stages is not flown in another way because these are broken.
     """
     table: dict[str, Stages] = {}
     for point in _allowed(packs):
@@ -97,5 +96,5 @@ def _packages(points: Iterable[EntryPoint]) -> str:
 def _load(point: EntryPoint) -> Any:
     try:
         return point.load()
-    except Exception as error:  # code of others: whatever it raises, it is broken
+    except Exception as error:  # third-party code may raise anything
         raise BrokenPack(f"`{point.name}` of {_packages([point])} cannot be loaded: {error}") from error

@@ -1,8 +1,8 @@
-"""Parameters of the autopilot, set before a flight as configured, and put back after it (docs/adr/0051).
+"""Set parameters of the autopilot before a flight as configured, and restore them after it (docs/adr/0051).
 
-What is to be written is on the disk first, for the next run (`keep_owed`) and in the log (`record`). Then a permit is
-asked for, which opens the gate for just that; then it is written; and what is read back counts, nothing else. All of it
-happens on the ground: a vehicle that flies is left as it is, and what it is owed is kept for when it stands.
+The values to write are on the disk first, for the next run (`keep_owed`) and in the log (`record`). Then a permit opens
+the gate for exactly these; then they are written; and only the value that is read back counts. All of this happens on
+the ground: a flying vehicle is left alone, and its parameters stay owed until it has landed.
 """
 
 from collections.abc import Callable, Iterable, Mapping
@@ -17,39 +17,38 @@ from rtshcua.onboard.enforcement.preparation import Owed
 from rtshcua.onboard.ports import Clock
 from rtshcua.wire.preparation import ParameterWrite, Preparation, encode
 
-#: the effects that say, in the signed log, what is about to be written, that it was read back, and what was not done
+#: the effects in the signed log: the values to be written, the values read back, and failures
 PREPARATION: Final = "preparation"
 PREPARED: Final = "prepared"
 NOT_PREPARED: Final = "not-prepared"
-#: and what the boundary permitted of it, or why it did not
+#: and what the boundary permitted, or why it did not
 PERMITTED: Final = "permitted"
 NOT_PERMITTED: Final = "not-permitted"
 NOT_RESTORED: Final = "not-restored"
 
-#: how long it is waited for that the vehicle is known to stand on the ground, before a flight and after one,
+#: how long to wait until the vehicle is known to be on the ground, before and after a flight
 BEFORE_US: Final = 30_000_000
 AFTER_US: Final = 8_000_000
-#: and for all of the answers to what is asked for at once
+#: and for all answers to requests that are sent together
 ANSWERS_US: Final = 12_000_000
 
 Values = Mapping[str, int]
 
 
 def told_of(writes: Iterable[ParameterWrite], *, restoring: bool) -> str:
-    """What is about to be written, as the log says it and an audit reads it."""
+    """The values to be written, in the form of the log, which an audit reads."""
     listed = ", ".join(f"{each.name} from {shown(each.before)} to {shown(each.value)}" for each in writes)
     return f"{'restore' if restoring else 'set'} {listed}"
 
 
 class _Stopped(Exception):
-    """Whoever lets time pass does not go on."""
+    """The function that lets time pass has ended."""
 
 
 class Preparations:
-    """What is set, and owed, in one run. Each method waits by `turn`, which lets time pass, and says whether to go on.
-
-    `record` puts an effect into the log and comes back when it is on the disk, `note` does not wait for that; they and
-    `keep_owed` raise OSError. With `trouble`, which says why nobody knows what is owed, nothing is set.
+    """The parameters that one run sets and owes. Each method waits by `turn`, which lets time pass and returns whether
+    to go on. `record` writes an effect to the log and returns once it is on the disk, `note` does not wait for that;
+    they and `keep_owed` raise OSError. With `trouble`, the reason why the owed parameters are unknown, nothing is set.
     """
 
     def __init__(
@@ -58,7 +57,7 @@ class Preparations:
         keep_owed: Callable[[Mapping[str, Owed]], None],
         slack: int = 1, trouble: str | None = None,
     ) -> None:  # fmt: skip
-        #: what is to be put back
+        #: the parameters to restore
         self.owed = dict(owed)
         self._issuer, self._executor = loaded.preparation, loaded.executor
         self._settings = loaded.preparation.settings
@@ -72,14 +71,14 @@ class Preparations:
         driver.prepares = bool(self._settings or self.owed)
 
     def begin(self, turn: Callable[[], bool]) -> str | None:
-        """Put back what an earlier run left, and set what is configured. Why the mission cannot fly, in words."""
+        """Restore what an earlier run owes, and set what is configured. Returns why no mission can fly, in words."""
         if not self._driver.prepares:
             return None
         try:
             problem = self._begin(turn)
-            return None if self._flies else problem  # what flies is brought down as it is
+            return None if self._flies else problem  # a flying vehicle is brought down with its present values
         except _Stopped:
-            return None  # `end` puts back what was set
+            return None  # `end` restores the values
         except OSError as error:
             if self._flies:
                 return None
@@ -89,7 +88,7 @@ class Preparations:
             self._driver.prepares = False
 
     def end(self, turn: Callable[[], bool]) -> str | None:
-        """Put back what was set. Why it was not, in words."""
+        """Restore the values. Returns why that failed, in words."""
         if not self.owed:
             return None
         try:
@@ -102,9 +101,9 @@ class Preparations:
             self._over()
 
     def _over(self) -> None:
-        """Nothing more is asked for or set, wherever it broke off."""
+        """Stop all reading and writing, at any stage."""
         self._executor.prepared()
-        if self._driver.flavour is not None:  # it was heard, so it could be asked
+        if self._driver.flavour is not None:  # without a heartbeat nothing could be requested
             for name in {*self._settings, *self.owed}:
                 self._driver.settings.drop(name)
 
@@ -154,7 +153,7 @@ class Preparations:
         return self._driver.seen.airborne or self._driver.resumes
 
     def _tell(self, event: str, detail: str) -> None:
-        """Put it into the log if that takes it, and wait for nothing: the vehicle is in the air."""
+        """Record an effect if the log accepts it, without waiting: the vehicle is in the air."""
         with suppress(OSError):
             self._note(event, detail)
 
@@ -163,7 +162,7 @@ class Preparations:
         return why
 
     def _restore(self, turn: Callable[[], bool], within_us: int) -> str | None:
-        """Put back all that is owed, as far as it can be."""
+        """Restore everything owed, as far as possible."""
         if not self.owed:
             return None
         if not self._stands(turn, within_us):
@@ -190,7 +189,9 @@ class Preparations:
         return None if problem is None else f"{problem}: {self._kept()}"
 
     def _forgive(self, values: Values) -> None:
-        """Nothing is owed of what is as it was, or was set by somebody else since, which is left to them."""
+        """Drop owed parameters that have their earlier value, or that somebody else has changed since; those are left
+        unchanged.
+        """
         for name, each in list(self.owed.items()):
             value = values.get(name)
             if value is None or (value == each.value and value != each.before):
@@ -202,11 +203,11 @@ class Preparations:
             self._keep_owed(self.owed)
 
     def _write(self, wanted: Values, values: Values, turn: Callable[[], bool], *, restoring: bool) -> str | None:
-        """Record, permit, write, read back. What was not done, in words."""
+        """Record, permit, write, read back. Returns what failed, in words."""
         self._keep_owed(self.owed)
         listed = tuple(ParameterWrite(name, values[name], value) for name, value in wanted.items())
         self._record(PREPARATION, told_of(listed, restoring=restoring))
-        self._stands(turn, ANSWERS_US)  # the disk took its time: what is known of where it is may be old by now
+        self._stands(turn, ANSWERS_US)  # the disk may have been slow: the vehicle's state may have changed
         now_us = self._clock.now().monotonic_us
         sealed = self._issuer.permit(encode(Preparation(0, restoring, 0, listed)), now_us)
         opened = sealed if isinstance(sealed, Refusal) else self._permitted(sealed, now_us)
@@ -229,14 +230,14 @@ class Preparations:
             return None
         said = [f"{name} is {shown(found[name])}" if name in found else f"{name} is not reported" for name in wrong]
         text = f"{'not put back' if restoring else 'not set'} as it was to be{why or ': ' + ', '.join(said)}"
-        if not restoring:  # what the vehicle made of a value is of our making too, and is put back
+        if not restoring:  # a value that the vehicle adapted came from us too, and is restored
             self.owed |= {name: Owed(self.owed[name].before, found[name]) for name in wrong if name in found}
             self._keep_owed(self.owed)
         self._record(NOT_PREPARED, text)
         return text
 
     def _permitted(self, sealed: bytes, now_us: int) -> Preparation | Refusal:
-        """What the boundary lets be set. That it does is recorded, and nothing waits for the disk: all is on it."""
+        """The boundary's permit. It is recorded without waiting for the disk, which has the values already."""
         opened = self._executor.prepare(sealed, now_us)
         if isinstance(opened, Refusal):
             self._note(NOT_PERMITTED, opened.slug)
@@ -245,7 +246,7 @@ class Preparations:
         return opened
 
     def _read(self, names: Iterable[str], turn: Callable[[], bool]) -> dict[str, int]:
-        """What the vehicle says now that these parameters are, of those that it tells."""
+        """The present values of these parameters, as far as they are reported."""
         settings, names = self._driver.settings, sorted(names)
         for name in names:
             settings.forget(name)
@@ -257,7 +258,7 @@ class Preparations:
         return {name: bits for name, bits in found.items() if bits is not None}
 
     def _stands(self, turn: Callable[[], bool], within_us: int) -> bool:
-        """Whether it is known to rest on the ground, at once where it is known to fly."""
+        """Whether the vehicle is known to rest on the ground; returns at once if it is known to fly."""
         seen, frames = self._driver.seen, self._executor.frames
 
         def known() -> bool:

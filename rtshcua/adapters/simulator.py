@@ -1,4 +1,4 @@
-"""The simulated vehicle as a process of its own, started for one run and gone with it."""
+"""The simulated vehicle in a separate process, started for one run and ended with it."""
 
 import json
 import os
@@ -12,12 +12,12 @@ from typing import Any, Self
 
 START_S = 20.0
 _STOP_S = 2.0
-_USAGE = 2  # its exit code for options that it does not take
+_USAGE = 2  # its exit code for invalid options
 _MODULE = "rtshcua.simulation"
 
 
 class SimulatorError(Exception):
-    """The simulated vehicle did not start; the text is for a person. `usage`: its options are none that it takes."""
+    """The simulated vehicle did not start; the text is for people. `usage`: its options are invalid."""
 
     def __init__(self, text: str, *, usage: bool = False) -> None:
         super().__init__(text)
@@ -25,14 +25,15 @@ class SimulatorError(Exception):
 
 
 class Simulator:
-    """Starts `python -m rtshcua.simulation` with these options, and waits until it says that it is up.
+    """Starts `python -m rtshcua.simulation` with these options, and waits until it is up. Its standard input is a pipe
+    from this process, so it ends with this process in any case; it has its own session, so that Ctrl-C in the terminal
+    does not reach it.
 
-    Its standard input is a pipe from here, so it ends when this process does, however that happens; it has a session of
-    its own, so that Ctrl-C in the terminal is not for it. `ready` is what it says of itself. Raises `SimulatorError`.
+    `ready` is its first output. Raises `SimulatorError`.
     """
 
     def __init__(self, options: Sequence[str], patience_s: float = START_S) -> None:
-        # -P: nothing of the folder that we happen to stand in is imported.
+        # -P: import nothing from the working folder
         command = [sys.executable, "-P", "-m", _MODULE, *options]
         try:
             self._process = subprocess.Popen(
@@ -51,11 +52,11 @@ class Simulator:
         os.set_blocking(self._process.stdin.fileno(), False)
 
     def wait(self) -> int:
-        """Wait until the process ends by itself; its exit code."""
+        """Wait until the process ends by itself; return its exit code."""
         return self._process.wait()
 
     def inject(self, fault: str) -> None:
-        """Let something go wrong, as `--fault` says it, its time counted from now on. Raises `SimulatorError`."""
+        """Inject a fault, in the form of `--fault`, with its time counted from now. Raises `SimulatorError`."""
         assert self._process.stdin is not None
         try:
             self._process.stdin.write(fault.encode("ascii") + b"\n")
@@ -64,15 +65,15 @@ class Simulator:
             raise SimulatorError(f"the simulated vehicle ended: {error.strerror or error}") from error
 
     def heard(self, boot_us: int) -> None:
-        """Tell it which of its positions was heard last, by its time since boot: faster than life it waits for us. That
-        never waits for it.
+        """Report which of its positions was received last, by its time since boot: faster than real time, the
+        simulation waits for us. Never waits.
         """
         assert self._process.stdin is not None
-        with suppress(OSError, ValueError):  # it reads nothing now, or is gone
+        with suppress(OSError, ValueError):  # it does not read at present, or has ended
             os.write(self._process.stdin.fileno(), b"heard %d\n" % boot_us)
 
     def stop(self) -> None:
-        """End it: by closing its input, and, should it not listen, by signals."""
+        """End it by closing its input and, if it does not react, by signals."""
         process = self._process
         if process.stdin is not None:
             with suppress(OSError):
@@ -95,7 +96,7 @@ class Simulator:
         self.stop()
 
     def _first_line(self, patience_s: float) -> bytes | None:
-        """What it says once it is up, a JSON object; None when nothing comes in time, or it ended."""
+        """Its first output, a JSON object; None if nothing comes in time, or it ended."""
         assert self._process.stdout is not None
         handle, line = self._process.stdout.fileno(), b""
         end = time.monotonic() + patience_s

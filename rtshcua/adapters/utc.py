@@ -1,9 +1,9 @@
-"""How far UTC may be off, and who says so.
+"""The error bound of UTC and its source. In this order: the kernel, if it is synchronised (NTP, PTP); the vehicle's
+SYSTEM_TIME, from its satellite receiver; a bound stated by the operator. Otherwise it is unknown, and so is everything
+that depends on the time of day: freshness, approvals, the hours of zones. Nothing is decided by a clock that is only
+assumed to be right.
 
-In this order: the kernel, if it is synchronised (NTP, PTP); the vehicle's SYSTEM_TIME, which it has from its satellite
-receiver; a bound that the operator states. Else it is not known, and whatever asks for the time of day is unknown:
-freshness, approvals, the hours of zones. What is assumed of a clock that nobody keeps right decides nothing. Where the
-boundary is a process of its own, it alone knows the time of day, and this follows it.
+A boundary in a separate process is the only source of the time of day, and this module follows it.
 """
 
 from collections.abc import Callable
@@ -16,35 +16,34 @@ from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.onboard.enforcement.isolated import OwnTime
 from rtshcua.wire.clock import AUTOPILOT_US, DRIFT_US, STAMP_US, ClockSource
 
-#: the effect that says in the log where the bound came from
+#: the effect that records the source of the bound
 CLOCK: Final = "clock"
 _SIMULATED: Final = "simulated"
 
 
 @dataclass(frozen=True, slots=True)
 class UtcBound:
-    """Where the bound comes from (`kernel`, `vehicle`, `operator`, `simulated`, `unknown`), and what it was, in us."""
+    """The source of the bound (`kernel`, `vehicle`, `operator`, `simulated`, `unknown`), and the bound in us."""
 
     source: str
     error_us: int
 
     def told(self) -> str:
-        """As the log has it."""
+        """The text in the log."""
         if self.source == "unknown":
             return "unknown: nothing tells how far UTC may be off"
         return f"{self.source}: UTC is true to {self.error_us} us"
 
 
 def kernel_error_us() -> int | None:
-    """What the kernel says UTC is off by at most, in us; None where it is not synchronised, or does not say.
-
-    `adjtimex(2)` with no mode set changes nothing: STA_UNSYNC in `status`, the state TIME_ERROR, and `maxerror`.
+    """The kernel's bound on the error of UTC, in us; None if it is not synchronised or unknown. `adjtimex(2)` without a
+    mode changes nothing: STA_UNSYNC in `status`, the state TIME_ERROR, and `maxerror`.
     """
     try:
         import ctypes  # noqa: PLC0415  only where it is asked, which no other command does
 
         class Timex(ctypes.Structure):
-            """`struct timex`, up to `status`, and room for the rest."""
+            """`struct timex` up to `status`, and space for the rest."""
 
             _fields_ = (
                 ("modes", ctypes.c_uint),
@@ -58,7 +57,7 @@ def kernel_error_us() -> int | None:
 
         timex = Timex()
         state = ctypes.CDLL(None).adjtimex(ctypes.byref(timex))
-    except (ImportError, OSError, AttributeError):  # another system than Linux
+    except (ImportError, OSError, AttributeError):  # not Linux
         return None
     return synchronised_us(state, timex.status, timex.maxerror)
 
@@ -68,23 +67,22 @@ _TIME_ERROR: Final = 5
 
 
 def synchronised_us(state: int, status: int, maxerror: int) -> int | None:
-    """The bound of an answer of `adjtimex`; None where the clock is not synchronised."""
+    """The bound in an answer of `adjtimex`; None where the clock is not synchronised."""
     wrong = state < 0 or state == _TIME_ERROR or status & _STA_UNSYNC
     return None if wrong or maxerror < 0 else maxerror
 
 
 def vehicle_counts(*, apart: bool, keyed: bool) -> bool:
-    """Whether a run takes the vehicle's own time. A boundary `apart`, in a process of its own, believes it over a link
-    with a key alone: anybody could say it on another (ADR 78).
+    """Whether a run uses the vehicle's time. A boundary `apart`, in a separate process, accepts it only over a link
+    with a key: otherwise anybody could forge it (ADR 78).
     """
     return keyed or not apart
 
 
 @dataclass(frozen=True, slots=True)
 class TimeSources:
-    """What a run would take the time of day from: what this machine's is off by at most, in us, None where the kernel
-    does not say; whether the vehicle's own would count; what the operator stated; whether a boundary that listens
-    decides, in whose command line that stands.
+    """The sources of a run's time of day: the kernel's error bound in us, None if unknown; whether the vehicle's time
+    would count; the operator's bound; whether a listening boundary decides, which has that bound in its command line.
     """
 
     machine_us: int | None
@@ -94,8 +92,8 @@ class TimeSources:
 
 
 def certain_from_us(moment_us: int, now: Now) -> int:
-    """From which monotonic time on it is certain that `moment_us` (UTC) has come, in us; now, where it is certain, has
-    certainly not come, or nobody knows the time of day: no waiting changes that.
+    """The monotonic time from which it is certain that `moment_us` (UTC) has passed, in us; now, where it is certain
+    already, certainly in the future, or the time of day is unknown, because waiting changes nothing.
     """
     wait_us = moment_us + now.utc_error_us - now.utc_us
     may_have_come = now.utc_error_us < UTC_UNKNOWN_US and moment_us <= now.utc_us + now.utc_error_us
@@ -105,11 +103,11 @@ def certain_from_us(moment_us: int, now: Now) -> int:
 
 
 class UtcWatch:
-    """Bounds a clock's UTC by the best that is known, once; `bound` is what it has come to so far.
+    """Sets the best known bound of a clock's UTC, once; `bound` is the present one.
 
-    `stated_us` is what the operator says, None for nothing. While only that is known, or nothing, `look` takes the
-    vehicle's own time where it comes; until `settle` says that no more is waited for. `vehicle`: whether that counts,
-    as `vehicle_counts` has it of what is rehearsed here and decided apart.
+    `stated_us` is the operator's bound, None for none. While only that is known, or nothing, `look` uses the vehicle's
+    time when it comes, until `settle` ends the waiting. `vehicle`: whether that time counts, by `vehicle_counts`, for a
+    rehearsal whose decisions are made in another process.
     """
 
     def __init__(
@@ -118,7 +116,7 @@ class UtcWatch:
     ) -> None:  # fmt: skip
         self._clock = clock
         self._stated_us = stated_us
-        #: whether the vehicle's own time would be taken at all
+        #: whether the vehicle's time would be used at all
         self.vehicle_counts = vehicle
         self._own: Callable[[bool], OwnTime | None] | None = None
         kernel = (kernel_us or kernel_error_us)()
@@ -128,14 +126,14 @@ class UtcWatch:
 
     @classmethod
     def simulated(cls, clock: LinkClock) -> "UtcWatch":
-        """Of a vehicle that this machine simulates: it has this machine's time of day."""
+        """For a vehicle that this machine simulates: it has this machine's time of day."""
         watch = cls(clock, kernel_us=lambda: None)
         watch._take(_SIMULATED, UTC_ERROR_US)
         return watch
 
     def follow(self, own: Callable[[bool], OwnTime | None]) -> None:
-        """From now on the time of day is that of a boundary that decides by a clock of its own, and by no other; it is
-        asked whether no more is waited for. One that has no clock of its own changes nothing.
+        """Follow the time of day of a boundary that decides by its own clock; it gets whether waiting has ended. A
+        boundary without its own clock changes nothing.
         """
         said = own(False)
         if said is None or said.source is ClockSource.SHARED:
@@ -145,11 +143,11 @@ class UtcWatch:
             self._clock.bound_utc(UTC_UNKNOWN_US)
             self.bound = UtcBound("unknown", UTC_UNKNOWN_US)
             self._follow(said)
-        elif (said := own(True)) is not None and said.source is not ClockSource.UNKNOWN:  # as the boundary was told
+        elif (said := own(True)) is not None and said.source is not ClockSource.UNKNOWN:  # the boundary's statement
             self._take(_SIMULATED, said.now.utc_error_us, said.now.utc_us - said.now.monotonic_us)
 
     def question(self) -> int:
-        """The number that the boundary wants back from the vehicle, before it takes its time; 0 for none."""
+        """The number that the boundary wants back from the vehicle before it accepts its time; 0 for none."""
         said = None if self._own is None or not self.waits else self._own(False)
         return 0 if said is None else said.number
 
@@ -161,13 +159,14 @@ class UtcWatch:
 
     @property
     def waits(self) -> bool:
-        """Whether the vehicle's time would still be taken."""
+        """Whether the vehicle's time would still be used."""
         return self.bound.source == "unknown"
 
     @property
     def vehicle_may_tell(self) -> bool:
-        """Whether the vehicle is to be asked for its time: a boundary of its own takes it in answer to a number alone,
-        which it draws where the link has a key. One that has just taken it asks no more, and we have yet to follow it.
+        """Whether to ask the vehicle for its time: a separate boundary accepts it only in an answer to its number,
+        which it draws on a link with a key. After it has accepted the time it asks no more, until this object follows
+        it.
         """
         if not (self.waits and self.vehicle_counts):
             return False
@@ -175,7 +174,7 @@ class UtcWatch:
         return self._own is None or (said is not None and (said.number != 0 or said.source is not ClockSource.UNKNOWN))
 
     def look(self, told: SourceTime, flavour: str, now_us: int) -> bool:
-        """Take the vehicle's own time, if it is needed and told. Whether it was taken."""
+        """Use the vehicle's time, if it is needed and known; return whether it was used."""
         if self._own is not None:
             return self.waits and self._follow(self._own(False))
         utc = told.utc(now_us) if self.waits and self.vehicle_counts else None
@@ -186,10 +185,10 @@ class UtcWatch:
         return True
 
     def settle(self) -> None:
-        """The vehicle's time was waited for long enough: what the operator states holds, if it was stated."""
+        """End the waiting for the vehicle's time: the operator's bound holds, if stated."""
         if self._own is not None:
             if self.waits:
-                self._follow(self._own(True))  # as the boundary itself was told, if it was
+                self._follow(self._own(True))  # the boundary's own statement, if any
         elif self.waits and self._stated_us is not None:
             self._take("operator", self._stated_us)
 

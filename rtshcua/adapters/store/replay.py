@@ -42,17 +42,16 @@ _LARGEST = 16 << 20  # octets of a file here
 
 
 class FileReplayStore:
-    """The missions that were opened on the vehicle called `vehicle` (its identity)."""
+    """The opened missions of the vehicle with the identity `vehicle`."""
 
     def __init__(self, state: Path, vehicle: str) -> None:
         self.folder = _folder(state, vehicle)
         make_folder(self.folder, mode=PRIVATE_FOLDER)
 
     def open_once(self, digest: bytes, expires_us: int, now_utc_us: int, policy: str, version: int) -> MissionOpening:
-        """`OPENED` once for a mission, after that and its policy's version are on the disk.
-
-        `expires_us` is when nothing of the mission is valid any more. `DAMAGED` leaves all as it is.
-        Raises OSError when the disk cannot take it: the mission must not fly then.
+        """Return `OPENED` once for a mission, after that and its policy's version are on the disk. `expires_us` is the
+        end of the mission's validity. `DAMAGED` changes nothing. Raises OSError when the disk refuses: the mission must
+        not fly then.
         """
         marker = self.folder / digest.hex()
         with _alone(self.folder):
@@ -68,15 +67,15 @@ class FileReplayStore:
         return MissionOpening.OPENED
 
     def give_back(self, digest: bytes) -> None:
-        """Of a mission that was opened, nothing was sent: it opens again, once that is on the disk. Its policy's
-        version stays. Raises OSError, and then it may stay used up.
+        """Reopen a mission of which nothing was sent, once that is on the disk. Its policy's version stays. Raises
+        OSError; then it may stay used.
         """
         with _alone(self.folder):
             (self.folder / digest.hex()).unlink(missing_ok=True)
             sync_folder(self.folder)
 
     def expect_room(self) -> None:
-        """Whether a marker could be written; none is. Raises OSError."""
+        """Check that a marker could be written, without writing one. Raises OSError."""
         probe = self.folder / f"{UNFINISHED}{secrets.token_hex(8)}"
         write_new(probe, b"0\n", mode=PRIVATE_FILE)
         probe.unlink()
@@ -96,11 +95,12 @@ class FileReplayStore:
 
 
 def looked_up(state: Path, vehicle: str, digest: bytes, expires_us: int, policy: str, version: int) -> MissionOpening:
-    """What `open_once` would say; nothing is made, written or used up. Raises OSError."""
+    """The result of `open_once`, without writing anything or using the mission. Raises OSError."""
     folder = _folder(state, vehicle)
     try:
         folder.stat()
-    except FileNotFoundError:  # any other error is told: what is in the way of the folder is no absence
+    # every other error is reported: something else in place of the folder does not mean that it is missing
+    except FileNotFoundError:
         return MissionOpening.OPENED
     with _alone(folder):
         return _refusal(folder, digest, expires_us, policy, version) or MissionOpening.OPENED
@@ -123,7 +123,7 @@ def _refusal(folder: Path, digest: bytes, expires_us: int, policy: str, version:
 
 
 class _Damaged(Exception):
-    """A file that is there does not say what we write into it."""
+    """An existing file with invalid content."""
 
 
 def _floor(folder: Path) -> int:
@@ -149,20 +149,20 @@ def _versions(folder: Path) -> dict[str, int]:
 
 
 def _is_kept(path: Path) -> bool:
-    """Whether a file says that something was opened: a floor, or a marker, whatever a crash left of it."""
+    """Whether a file shows that something was opened: a floor, or a marker, even if damaged by a crash."""
     return path.name == _FLOOR or _MARKER.fullmatch(path.name) is not None
 
 
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
-    """Holds the folder's lock, which the system drops when its holder dies."""
+    """Lock the folder; the system unlocks it when the process dies."""
     with opened_folder(folder) as handle:
         fcntl.flock(handle, fcntl.LOCK_EX)
         yield
 
 
 def _expiry(marker: Path) -> int | None:
-    """When a marker's bundle expires; None for one that a crash left without it: it is kept for ever."""
+    """The expiry of a marker's bundle; None for one that a crash left without it: it is kept for ever."""
     try:
         bytes.fromhex(marker.name)  # other files here (floors, unfinished files) are not markers
         return int(read_regular(marker, _LARGEST))

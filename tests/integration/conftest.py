@@ -1,4 +1,4 @@
-"""`rtshcua run` as a user starts it: a process of its own, real keys, real files, real UDP, the simulated vehicle."""
+"""`rtshcua run` as a user starts it: a separate process, real keys, files and UDP, and the simulated vehicle."""
 
 import json
 import os
@@ -30,7 +30,7 @@ AFRESH = (sys.executable, "-m", "rtshcua")
 
 
 class Run:
-    """One `rtshcua run --json`, or another command that says what happens in JSON lines, under way in `folder`."""
+    """A running `rtshcua run --json`, or another command with JSON lines, in `folder`."""
 
     def __init__(self, folder: Path, process: "subprocess.Popen[bytes] | Started") -> None:
         self.cwd = folder
@@ -52,7 +52,7 @@ class Run:
             assert self._read(), f"it ended without {event} {fields}: {self.events} {self.end().stderr}"
 
     def end(self) -> "Run":
-        """Wait until it ends by itself."""
+        """Wait until it ends."""
         while self._read():
             pass
         self.stderr = self.process.stderr.read().decode()
@@ -64,7 +64,7 @@ class Run:
         self.process.send_signal(number)
 
     def child(self, module: str) -> int:
-        """The process of a module that it started."""
+        """Return the process of a module that it started."""
         pid = self.process.pid
         children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
         (found,) = [child for child in children if module in Path(f"/proc/{child}/cmdline").read_text()]
@@ -76,7 +76,7 @@ class Run:
 
     @property
     def folder(self) -> Path:
-        """The run's own folder; there is one."""
+        """Return the run's folder."""
         (folder,) = (self.cwd / "runs").iterdir()
         return folder
 
@@ -104,7 +104,7 @@ class Run:
 
 
 class Ground:
-    """A user's machine: keys, bundles, and what was started on it.
+    """A user's machine: keys, bundles, and started commands.
 
     Where `command` is None, what is started comes from `commands`, which has loaded it already; `afresh` is for those
     where the start counts too: some test starts each command that goes on for a while so.
@@ -179,7 +179,7 @@ def a_ground(folder: Path, data: Path, commands: Forked, **witnesses: int) -> It
             if run.process.poll() is None:
                 run.process.kill()
             run.process.communicate()
-    for log in folder.glob("runs/*/log.jsonl"):  # whatever became of it: two verifiers say the same of it
+    for log in folder.glob("runs/*/log.jsonl"):  # in any case two verifiers must agree about the log
         agree(log.read_bytes(), careful(log.read_bytes(), made.store.pin()), made.store.pin())
 
 
@@ -197,7 +197,7 @@ def grounds(commands: Forked) -> Callable[..., AbstractContextManager[Ground]]:
 
 @pytest.fixture(scope="session")
 def free_port() -> Callable[[], int]:
-    """A UDP port that nobody has now."""
+    """Return a free UDP port."""
 
     def found() -> int:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:

@@ -1,6 +1,6 @@
-"""A program on MAVSDK, as its users write them: `python mavsdk_flight.py FLAVOUR SERVER-PORT`. It says each thing done.
+"""A typical MAVSDK program: `python mavsdk_flight.py FLAVOUR SERVER-PORT`. It prints each completed action.
 
-It imports nothing of ours. Success is what telemetry shows, not what a call returns.
+It imports no code of the project. Telemetry decides about success, not the result of a call.
 """
 
 import asyncio

@@ -1,6 +1,6 @@
-"""The boundary's program for aarch64, under qemu: it answers what the one in Python answers, and flies.
+"""The boundary's program for aarch64 under qemu: it answers like the one in Python, and flies.
 
-qemu passes on few of the system calls that keep others out of it; those measures are named as missing.
+qemu passes on few of the system calls for hardening; those measures are reported as missing.
 """
 
 import os

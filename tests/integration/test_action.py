@@ -1,4 +1,4 @@
-"""`action.yml`: its steps as a runner of GitHub executes them, on a project that is sound and on one that is not."""
+"""`action.yml`: its steps, executed like on GitHub, on a valid and on an invalid project."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""docs/agents.md: its examples take a call of a model to the tool's result, for either API."""
+"""docs/agents.md: its examples turn a model's call into the tool's result, for either API."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""A sample of each benchmark: that it still measures what it says, whatever the figures are. `make bench` measures."""
+"""A sample run of each benchmark, without checking figures. `make bench` measures."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""A run whose boundary is a process of its own takes the time of day from that, and from nobody else."""
+"""A run with a boundary process takes the time of day only from that process."""
 
 import signal
 from pathlib import Path
@@ -16,7 +16,7 @@ pytestmark = [
 
 
 def clock_of(run: Any) -> str:
-    """What the log says last of where the time of day is from."""
+    """Return the last recorded source of the time of day."""
     told: list[str] = [
         record["detail"] for record in run.log() if record["type"] == "effect" and record["event"] == "clock"
     ]
@@ -32,7 +32,7 @@ def audited(ground: Any, folder: Path) -> dict[str, Any]:
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_signed_link_gives_the_vehicles_time(ground: Any, port: int, flavour: str) -> None:
-    """The boundary verifies the vehicle's SYSTEM_TIME itself, in answer to a number that it drew."""
+    """The boundary verifies the vehicle's SYSTEM_TIME itself, by a nonce."""
     key = ground.folder / "link.key"
     key.write_text("5a" * 32 + "\n")
     key.chmod(0o600)

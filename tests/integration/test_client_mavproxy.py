@@ -1,4 +1,4 @@
-"""MAVProxy flies the simulated vehicle: commands are typed at its console, effects are read there."""
+"""MAVProxy flies the simulated vehicle: the test types commands at its console and reads effects there."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""Ctrl-C while a command starts and works: the signal ends it, in silence, at whatever moment it comes."""
+"""Ctrl-C ends a starting or working command silently at any moment."""
 
 import os
 import signal
@@ -71,7 +71,7 @@ def test_sigint_ends_a_command_without_output() -> None:
 def test_entry_point_keeps_the_callers_signal_handling(
     monkeypatch: pytest.MonkeyPatch, before: str, after: str
 ) -> None:
-    """A shell starts what runs in the background with SIGINT ignored."""
+    """A shell starts background jobs with SIGINT ignored."""
     was = signal.signal(signal.SIGINT, getattr(signal, before))
     monkeypatch.setattr("rtshcua.front.cli.app.main", lambda: 0)
     try:
@@ -96,7 +96,7 @@ def test_commands_with_cleanup_handle_ctrl_c() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("words", ["campaign MISSION --flights 500 --jobs 2", "witness LOGS --watch 3600"])
 def test_long_running_command_ends_cleanly_on_ctrl_c(words: str, tmp_path: Path) -> None:
-    """While flights are flown by others, and amid an hour's wait."""
+    """During flights in worker processes, and during a long wait."""
     (tmp_path / "logs").mkdir()
     environment = {
         **os.environ,

@@ -1,4 +1,4 @@
-"""`make demo` in at most 40 lines of at most 80 columns: the flight told once, and at its end what to try next."""
+"""`make demo` prints at most 40 lines of at most 80 columns: the flight once, and next steps at the end."""
 
 import re
 import shlex

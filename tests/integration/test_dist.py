@@ -1,4 +1,4 @@
-"""What `make dist` builds can be built again by anybody: the same bytes, and all that it needs is listed."""
+"""`make dist` is reproducible, and lists all dependencies."""
 
 import json
 import os

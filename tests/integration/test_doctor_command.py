@@ -1,4 +1,4 @@
-"""`rtshcua doctor` beside a simulated vehicle that is a process of its own, and where there is none to be heard."""
+"""`rtshcua doctor` with a simulated vehicle in a separate process, and without a vehicle."""
 
 import json
 import socket

@@ -1,4 +1,4 @@
-"""docs/flying/first-flight.md: its sources compile, its commands are commands, and what it says of the bench is so."""
+"""docs/flying/first-flight.md: its sources compile, its commands exist, and its statements about the bench are true."""
 
 import re
 import shlex

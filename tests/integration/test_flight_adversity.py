@@ -1,4 +1,4 @@
-"""What goes wrong in flight, over real UDP: each ends with its own exit code and a whole log."""
+"""Faults in flight, over real UDP: each ends with its exit code and a valid log."""
 
 import os
 import signal
@@ -15,7 +15,7 @@ IDENTITY = ("--vehicle", "quad-07")
 
 
 def closed(run: Any, ending: str) -> None:
-    """The log is whole, and was closed with this ending."""
+    """Check that the log is valid and closed with this ending."""
     last = run.log()[-1]
     assert (last["type"], last["ending"]) == ("close", ending)
     assert last["seq"] == len(run.log()) - 1
@@ -92,7 +92,7 @@ def test_low_battery_on_the_ground_keeps_the_bundle_unused(ground: Any) -> None:
 
 @pytest.mark.soak
 def test_silent_vehicle_ends_the_run(ground: Any) -> None:
-    """It may come back as long as it can fly; who asks for the end waits for half a minute."""
+    """It is awaited for its endurance; after an interrupt for half a minute."""
     run = ground.run(ground.bundle(), "--fault", "link-silence,at=12s")
     run.until("link-lost")
     run.signal(signal.SIGINT)
@@ -117,7 +117,7 @@ def test_killed_view_does_not_stop_the_flight(ground: Any) -> None:
     run = ground.run(ground.bundle(case.low_steps(leg=False)))
     run.until("dispatched", step=1)
     os.kill(run.child("rtshcua.front.cli.render.live"), signal.SIGKILL)
-    assert run.end().code == 74  # it flew, and nobody was told all of it
+    assert run.end().code == 74  # the flight completed, but its output was lost
     assert run.log()[-1]["ending"] == "completed"
 
 
@@ -135,7 +135,7 @@ def test_stopped_view_does_not_stop_the_flight(ground: Any) -> None:
 
 
 class Relay(threading.Thread):
-    """Stands between vehicle and runtime, and adds garbage to what the vehicle says."""
+    """Forwards frames between vehicle and runtime, and adds garbage to the vehicle's."""
 
     def __init__(self, to: int) -> None:
         super().__init__(daemon=True)

@@ -1,4 +1,4 @@
-"""A flight from a cold start: nothing is ready before the estimator is, whatever the vehicle tells before."""
+"""A flight from a cold start: the vehicle is not ready before its estimator is, whatever it reports."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What is proved of a mission holds in flight: no step takes longer, more charge or more height than its bounds."""
+"""Proved bounds hold in flight: no step exceeds its duration, charge or height."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import cycle
@@ -18,7 +18,7 @@ POSITION_ERROR_MM = 3_000
 
 
 class Sample(NamedTuple):
-    """What was so at a time, whatever was reported."""
+    """The true state at a time."""
 
     at_us: int
     battery: int
@@ -26,7 +26,7 @@ class Sample(NamedTuple):
 
 
 def accepted(seeds: Iterable[int], count: int) -> Iterator[tuple[int, Drawn, Compiled]]:
-    """So many missions that are accepted, of those that seeds give."""
+    """Return so many accepted missions, generated from seeds."""
     for seed in seeds:
         drawn = draw(seed)
         made = compiled(drawn)
@@ -38,7 +38,7 @@ def accepted(seeds: Iterable[int], count: int) -> Iterator[tuple[int, Drawn, Com
 
 
 def flown(drawn: Drawn, made: Compiled, flavour: str) -> tuple[Flown, list[Sample]]:
-    """A flight of it, and what really was so at each turn."""
+    """Fly it, and record the true state at each turn."""
     assert made.mission is not None
     samples = []
 
@@ -52,7 +52,7 @@ def flown(drawn: Drawn, made: Compiled, flavour: str) -> tuple[Flown, list[Sampl
 
 
 def exceeded(drawn: Drawn, made: Compiled, flavour: str) -> Iterator[str]:
-    """Which bounds a flight of it exceeds."""
+    """Return the bounds that its flight exceeds."""
     flight, samples = flown(drawn, made, flavour)
     proven = bounds(made)
     if flight.ending is not Ending.COMPLETED:

@@ -1,4 +1,4 @@
-"""Missions with each of the seven published deadlines compile, are asked for as often as they need it, and fly."""
+"""Missions with each of the seven published deadlines compile, get reports at the needed rates, and fly."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What a flight does when the disk of its evidence fails, each fault put in at the file port: by policy, and told.
+"""Flights with a failing evidence disk, with faults injected at the file port: the reaction follows the policy.
 
 The flight climbs at 1.5 s, flies a leg from 15.9 to 27.2 s and then goes home; it seals every 10 s, and the steps'
 deadlines are 2 s.
@@ -30,7 +30,7 @@ Fault = Callable[[DiskSink], None]
 
 
 class Watched:
-    """A flight, and which skills' commands were really sent, at which second."""
+    """A flight with the times and skills of the commands that were really sent."""
 
     def __init__(self, folder: Path, without: WithoutEvidence) -> None:
         policy = replace(case.policy(), without_evidence=int(without))
@@ -73,7 +73,7 @@ def refuses(number: int) -> Fault:
 
 
 def fills(sink: DiskSink) -> None:
-    """There is room for a hundred bytes more."""
+    """Only a hundred bytes are free."""
     sink.disk.room = min(sink.disk.room, 100)
 
 
@@ -86,7 +86,7 @@ def hangs(sink: DiskSink) -> None:
 
 
 def verified(flown: Flown) -> None:
-    """Its log is whole, its chain without a hole."""
+    """Check that its log is valid and its chain complete."""
     assert flown.audit().report.verdict is LogVerdict.VERIFIED, flown.audit().report.failure
 
 

@@ -1,4 +1,4 @@
-"""Documents on whole flights in virtual time: it waits in the air for an answer, replans, and is called home."""
+"""Documents on whole flights in virtual time: approvals in the air, replacements, and recalls."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path

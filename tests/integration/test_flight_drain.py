@@ -1,4 +1,4 @@
-"""A battery that is emptied much faster than its policy says: what is left on landing, by what really was."""
+"""A battery that drains much faster than declared: the true charge left at landing."""
 
 from pathlib import Path
 from typing import Any
@@ -81,7 +81,7 @@ def test_fast_draining_battery_lands_with_its_reserve(tmp_path: Path, flavour: s
 
 @pytest.mark.soak
 def test_rising_gauge_lands_with_its_reserve(tmp_path: Path) -> None:
-    """Its drain was never known, and it landed with half of its reserve."""
+    """Regression: its drain was never known, and it landed with half of its reserve."""
     found = flown(tmp_path, "ardupilot", "", FAST_US, gauge_rise=2)
     assert found.vehicle.simulation.truth().battery >= RESERVE
 

@@ -37,7 +37,7 @@ def says_why(flight: Flight, case: str) -> None:
 
 @pytest.mark.parametrize("case", NARROW)
 def test_mission_beyond_the_own_fence_is_refused_with_a_reason(case: str) -> None:
-    """No waiting changes a parameter: it is not waited for until the mission is too old."""
+    """Waiting changes no parameter, so the run does not wait until the mission expires."""
     flight = narrow(case)
     while (ended := flight.turn()) is None:
         assert flight.clock.elapsed_us < SETTLED_US

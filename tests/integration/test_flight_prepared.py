@@ -1,4 +1,4 @@
-"""Parameters that an operator configured are set before a flight, make the mission fly, and are put back after it."""
+"""Parameters configured by an operator are set before a flight and restored after it."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -121,7 +121,7 @@ def test_next_run_restores_parameters_of_a_dead_run(flavour: str) -> None:
     owed: dict[str, Owed] = {}
     first = prepared(flavour, owed)
     assert first.prepare() is None
-    while first.vehicle.simulation.truth().up_mm < 8_000:  # as `fly` does, and then nobody goes on
+    while first.vehicle.simulation.truth().up_mm < 8_000:  # like `fly`, but the process dies here
         assert first.turn() is None
     assert set(owed) == set(had)
     assert has(first, tuple(had)) == settings

@@ -1,4 +1,4 @@
-"""A run that is killed in the air: the next one comes down and ends its log, and those after it go on from there."""
+"""A run killed in the air: the next one lands and ends its log, and later logs continue from there."""
 
 import json
 import signal
@@ -12,7 +12,7 @@ from rtshcua.adapters.store.vehicle_records import opened_root
 from rtshcua.evidence.merkle import leaf_hash
 from rtshcua.wire.keys import Duty
 
-#: so slow that a busy machine's hold-ups stay below what a permit lasts
+#: slow enough that delays of a busy machine stay below a permit's validity
 SPEED = 3
 BROKEN_OFF = b'{"_prev":"'
 
@@ -70,7 +70,7 @@ def test_next_run_lands_a_killed_flight_and_ends_its_log(ground: Any, port: int)
 
 @pytest.mark.slow
 def test_killed_flight_with_an_expired_root_lands(ground: Any, port: int) -> None:
-    """Nothing else of an expired root flies, and nobody is asked to trust the log of it."""
+    """An expired root allows nothing else, and its log is not trusted."""
     ground.vehicle(port, SPEED)
     bundle, words = ground.bundle(), ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07")
     first = ground.run(bundle, *words, speed=SPEED)

@@ -1,4 +1,4 @@
-"""Returns from behind a tower that is a keep-out lead over it, by what really was: ours, and a pilot's."""
+"""Returns from behind a tower, an exclusion zone, lead over it: the runtime's and a pilot's, by the true positions."""
 
 from collections.abc import Callable
 from math import hypot

@@ -1,7 +1,7 @@
-"""A link that is silent for a while, both ways or one, in every stage of a flight: nothing lands on the spot.
+"""Silences of the link, in one or both directions, in every stage of a flight: the vehicle does not land on the spot.
 
-The vehicle flies on under its standing command. When it is heard again its first messages come in any order, and
-nothing is judged before its state is fresh. A silence longer than the policy's `without link` ends the mission at home.
+The vehicle flies on under its last command. After the silence its first messages come in any order, and no condition is
+checked before the state is fresh. A silence longer than the policy's `without link` ends the mission at home.
 """
 
 from collections.abc import Callable, Sequence
@@ -130,7 +130,7 @@ class Killed(Exception):
 
 
 def resumed(flavour: str, seconds: float) -> Flown:
-    """Killed on a leg, and begun again while the vehicle does not hear us for so long."""
+    """Killed on a leg, and restarted while the uplink is silent for so long."""
     first = Flight(shipped("standard"), simulated(flavour), tick_us=TICK_US)
     since_us: list[int] = []
 
@@ -164,7 +164,7 @@ def resumed(flavour: str, seconds: float) -> Flown:
     ],
 )  # fmt: skip
 def test_restart_in_the_air_returns_home(flavour: str, seconds: float) -> None:
-    """PX4 streams all at once: what it said was judged before any of it had an age, and landed it there."""
+    """Regression: PX4's readings were checked before they had an age, and the vehicle landed on the spot."""
     flown = resumed(flavour, seconds)
     truth = flown.vehicle.simulation.truth()
     assert flown.dispatched() == ["hover", "return_home"]
@@ -181,7 +181,7 @@ def test_restart_in_the_air_returns_home(flavour: str, seconds: float) -> None:
     ],
 )
 def test_deaf_vehicle_is_not_awaited_forever(flavour: str, stage: str) -> None:
-    """It has no failsafe of its own for that: it does what it was told last, until its battery brings it down."""
+    """Without a failsafe of its own it keeps its last command until its battery is low."""
     flown = fly(flavour, stage, 1e5, Direction.UP)
     assert flown.audit().report.verdict is LogVerdict.VERIFIED
     told = f"{flown.ending} {flown.dispatched()}"

@@ -1,5 +1,5 @@
-"""A computer that stands still in flight, for as long as it may and at any point of what it does: swap storms, a frozen
-group of processes, a hypervisor, a debugger. Its log proves itself, and tells how long nothing was recorded.
+"""Stalls of the computer in flight, of any length and at any point: swap storms, frozen process groups, hypervisors,
+debuggers. The log verifies, and records the gaps.
 """
 
 from functools import cache
@@ -65,8 +65,8 @@ def test_log_verifies_and_records_every_stall(
     ("for_s", "height", "flavour"), each_once((28, 44, 60), (16 * case.M, 4 * case.M), ("px4", "ardupilot"))
 )
 def test_landing_during_a_stall_is_detected(for_s: int, height: int, flavour: str) -> None:
-    """What waited says that it flies, what comes then that its motors are off, and maybe, as of PX4, in another mode:
-    that is neither a crash nor a takeover.
+    """Waiting frames report flight, later ones stopped motors and, for PX4, another mode: neither a crash nor a
+    takeover.
     """
     flight = StallingFlight(bundle(), flavour, {})
     stood = False
@@ -89,7 +89,7 @@ def test_landing_during_a_stall_is_detected(for_s: int, height: int, flavour: st
 @pytest.mark.slow
 @pytest.mark.parametrize(("flavour", "at", "for_us"), [("px4", 464, 14_297_001), ("ardupilot", 427, 20_466_187)])
 def test_fresh_state_is_awaited_after_a_stall(flavour: str, at: int, for_us: int) -> None:
-    """The socket keeps what was said first: the newest of it is old when the computer goes on."""
+    """The socket keeps the oldest datagrams: even the newest of them is old after the stall."""
     flown = StallingFlight(bundle(), flavour, {at: for_us}).fly()
     (stood,) = flown.effects("stood-still")
     (fresh,) = flown.effects("fresh")

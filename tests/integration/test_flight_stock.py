@@ -1,4 +1,4 @@
-"""What ships flies on a stock copter: GPS, barometer and battery, and nothing else, booted as recorded."""
+"""The shipped missions fly on a stock copter: GPS, barometer and battery only, with the recorded boot."""
 
 from functools import cache
 from itertools import product
@@ -38,7 +38,7 @@ def bundle(name: str) -> bytes:
 
 
 def flown(name: str, flavour: str) -> tuple[Flown, set[str]]:
-    """A flight on the stock vehicle, and the names of all that it said."""
+    """Fly on the stock vehicle; return the flight and the names of all its messages."""
     flight = Flight(
         bundle(name), lambda policy: fitting(policy, flavour=AutopilotKind(flavour), extras=STOCK, boot=Boot.RECORDED),
     )  # fmt: skip

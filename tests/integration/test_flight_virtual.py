@@ -1,4 +1,4 @@
-"""Whole flights in virtual time: the shipped missions, and what goes wrong on them; `verify-log` accepts every log."""
+"""Whole flights in virtual time: the shipped missions, with and without faults; `verify-log` accepts every log."""
 
 import re
 from functools import cache
@@ -153,7 +153,7 @@ def test_breach_in_flight_flies_the_fallback_chain(fault: str, flavour: str) -> 
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", PX4_OR_SOAK)
 def test_link_dropout_does_not_end_the_flight(flavour: str) -> None:
-    """With charge and position good after it, a silence of 5 s landed the vehicle where it was (recorded, 3 of 3)."""
+    """Regression: a silence of 5 s landed the vehicle on the spot despite good charge and position (recorded)."""
     config = case.simulated(flavour, faults=(parse_fault("link-silence,at=18s,for=5s"),))
     flown = verified(Flight(case.seal(case.mission(case.short_steps())), config).fly())
     assert flown.dispatched() == ["takeoff", "goto", "return_home"]
@@ -269,7 +269,7 @@ def test_standard_mission_survives_a_poor_link(fault: str, flavour: str) -> None
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", ARDUPILOT_OR_SOAK)
 def test_lost_fix_stops_and_recovered_fix_returns_home(flavour: str) -> None:
-    """While the autopilot still vouches for the position nothing lands it on the spot."""
+    """While the position estimate is valid, the vehicle does not land on the spot."""
     flown = fly_on(flavour, "gps-loss,at=50s,for=3s")
     assert flown.ending is Ending.ABORTED
     assert [record["detail"].partition(":")[0] for record in flown.effects("violated")] == ["gps.fix >= fix_3d"]

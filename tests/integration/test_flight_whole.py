@@ -1,7 +1,7 @@
-"""Whole flights over real UDP: they complete, they are recorded, and what they leave behind proves them.
+"""Whole flights over real UDP: they complete, are recorded, and can be verified.
 
-Two are flown for all these tests: a PX4 that two witnesses watch, after a dry run of the same bundle, and an ArduCopter
-that insists on a signed link, with a witness that is not there.
+All tests share two flights: a PX4 with two witnesses, after a dry run of the same bundle, and an ArduCopter that
+requires a signed link, with an absent witness.
 """
 
 import json
@@ -240,7 +240,7 @@ def test_witnessed_flight_is_anchored_to_its_end(commands: Forked, watched: Flow
 
 
 def test_witness_detects_a_truncated_log(watched: Flown, tmp_path: Path) -> None:
-    """Who holds the log's keys still cannot cut it: the witness remembers."""
+    """A holder of the log's keys cannot truncate the log: the witness has its checkpoints."""
     log = kept(watched, tmp_path) / "log.jsonl"
     lines = log.read_bytes().splitlines(keepends=True)
     log.write_bytes(b"".join(lines[: len(lines) // 2]))

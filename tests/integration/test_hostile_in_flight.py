@@ -1,5 +1,5 @@
-"""Agents that mean ill, or fail, while a mission of theirs flies: what each hands in is answered as documented, the
-vehicle comes down by the policy, and each log is audited. Flights are in virtual time, with an agent's key of its own.
+"""Hostile or failing agents during a flight of their mission: each document is answered as specified, the vehicle lands
+by the policy, and each log is audited. Flights are in virtual time, with an agent's key.
 """
 
 from collections.abc import Callable, Generator, Sequence
@@ -80,7 +80,7 @@ class Hostile(VirtualFlight):
         )
 
     def hand(self, *documents: bytes) -> None:
-        """Hand documents in, all in one turn."""
+        """Submit documents, all in one turn."""
         self._queue += [Presented(self.clock.elapsed_us, each, number + 1) for number, each in enumerate(documents)]
 
     def until(self, words: str) -> Play:
@@ -233,7 +233,7 @@ def test_flight_ends_without_a_silent_agent(
 @pytest.mark.slow
 @pytest.mark.parametrize("late_us", [0, 3 * S])
 def test_late_replan_changes_only_unreleased_steps(missions: dict[str, tuple[Mission, Policy]], late_us: int) -> None:
-    """It meant to change the step that waits for a person; the step was approved and flies meanwhile."""
+    """It tries to change the step that waits for a person, but the step was approved meanwhile and flies."""
     of = Hostile(missions, INSPECTION)
 
     def play() -> Play:
@@ -306,7 +306,7 @@ def test_replayed_documents_cannot_revive_a_cancelled_mission(
 
 @pytest.mark.slow
 def test_replayed_replan_is_refused(missions: dict[str, tuple[Mission, Policy]]) -> None:
-    """Also its forerunner: there is no way back to a mission that was replaced."""
+    """Also the previous mission: a replaced mission cannot come back."""
     of = Hostile(missions, HOVERS)
 
     def play() -> Play:

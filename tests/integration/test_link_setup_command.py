@@ -1,4 +1,4 @@
-"""`rtshcua keys link --connect`: the key reaches a vehicle that is a process of its own, and what came of it."""
+"""`rtshcua keys link --connect` sets the key of a vehicle in a separate process and reports the result."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The log key signs the first record of a flight; after that the process holds it no more."""
+"""The log key signs the first record of a flight; after that the process no longer holds it."""
 
 import gc
 from typing import Any

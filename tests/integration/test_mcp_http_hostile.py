@@ -1,5 +1,5 @@
-"""`rtshcua mcp --http` as those meet it who should not: another user of the machine, or a page in a browser; and a host
-that has the token and misuses it. The real command, at a real port, spoken to byte by byte.
+"""Attacks on `rtshcua mcp --http`: by another user of the machine, by a page in a browser, and by a host that misuses
+its token. The real command on a real port, with raw bytes.
 """
 
 import http.client
@@ -176,7 +176,7 @@ def test_wrong_token_is_refused(served: Served, value: str) -> None:
     "path", ["/mcp?token={}", "/mcp?access_token={}", "/mcp#{}", "/mcp/{}", "/mcp;token={}", "//x:{}@127.0.0.1/mcp"]
 )
 def test_token_in_the_address_is_refused(served: Served, path: str) -> None:
-    """An address stands in histories and logs."""
+    """Addresses appear in histories and logs."""
     assert served.raw(served.head(f"POST {path.format(served.token)} HTTP/1.1")).startswith(b"HTTP/1.1 401")
 
 
@@ -254,7 +254,7 @@ def test_cors_preflight_allows_nothing(served: Served) -> None:
 
 @pytest.mark.parametrize("kind", ["text/plain", "application/x-www-form-urlencoded", "multipart/form-data", ""])
 def test_simple_cors_requests_are_refused(served: Served, kind: str) -> None:
-    """The kinds of body that a browser sends without a preflight."""
+    """The content types that a browser sends without a preflight."""
     assert served.status(GREETING, Content_Type=kind) in (400, 415)
 
 
@@ -284,7 +284,7 @@ def test_http_1_0_needs_a_host_header(served: Served) -> None:
 
 
 def test_each_pipelined_request_needs_the_token(served: Served) -> None:
-    """The first one has it, those behind it in the same packet do not."""
+    """The first request has the token, later ones in the same packet do not."""
     with served.dial() as link:
         with_it = served.head("GET /other HTTP/1.1", served.bearer())
         link.sendall(

@@ -1,4 +1,4 @@
-"""`rtshcua mcp` as a host has it: the SDK's own client over standard streams, and a vehicle that waits."""
+"""`rtshcua mcp` with the SDK's client over standard streams, and a waiting vehicle."""
 
 import asyncio
 import http.client
@@ -315,7 +315,7 @@ def test_key_with_other_roles_is_refused(ground: Any, base: str, place: Path) ->
 
 
 def test_key_without_a_trust_root_is_refused(ground: Any, base: str, place: Path) -> None:
-    """Without a trust root it was taken for an agent's."""
+    """Regression: without a trust root it counted as an agent's key."""
     (key,) = Path(ground.environment["RTSHCUA_DATA_DIR"]).rglob("mission-operator.key")
     lone = ground.folder / "lone.key"
     lone.write_bytes(key.read_bytes())

@@ -1,4 +1,4 @@
-"""What is made may be written by its owner alone, whatever the umask says, and what is secret be read by it alone."""
+"""Only the owner may write created files, with any umask, and only the owner may read secret ones."""
 
 import os
 import stat

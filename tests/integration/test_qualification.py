@@ -1,4 +1,4 @@
-"""`qualify` in virtual time: the right vehicles hold each check, and each wrong one fails the check made for it."""
+"""`qualify` in virtual time: correct vehicles pass each check, and each wrong one fails its check."""
 
 from collections.abc import Callable
 from functools import cache

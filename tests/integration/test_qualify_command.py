@@ -1,4 +1,4 @@
-"""`rtshcua qualify` over real UDP, and what `run` and `doctor` make of its record: one sortie for it all."""
+"""`rtshcua qualify` over real UDP, and its record in `run` and `doctor`: one sortie for all tests."""
 
 import signal
 import subprocess

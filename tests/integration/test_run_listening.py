@@ -1,4 +1,4 @@
-"""`rtshcua run --boundary-socket`: by a boundary that somebody else starts, under a user of its own, with the keys."""
+"""`rtshcua run --boundary-socket`: a boundary started separately, under its own user, with the keys."""
 
 import json
 import os

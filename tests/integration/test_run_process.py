@@ -1,4 +1,4 @@
-"""`rtshcua run --mode process`, over UDP: by a boundary of its own process, under a user of its own, with the keys."""
+"""`rtshcua run --mode process` over UDP: a boundary process under its own user, with the keys."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""What keeps a flight from beginning: a documented exit code, one clear message, no traceback, and nothing sent."""
+"""Refusals before a flight: the documented exit code, one clear message, no traceback, and no frame sent."""
 
 import os
 import pty

@@ -1,4 +1,4 @@
-"""`rtshcua run --scenario`: what a scenario lets go wrong goes wrong in a run, as life goes."""
+"""`rtshcua run --scenario` injects the scenario's faults into a run in real time."""
 
 from pathlib import Path
 from typing import Any

@@ -1,4 +1,4 @@
-"""A run that is stopped for longer than an epoch may last, and continued: over UDP, as the kernel stops it."""
+"""A run that is stopped (SIGSTOP) for longer than an epoch and continued, over UDP."""
 
 import signal
 import time
@@ -42,7 +42,7 @@ def test_stopped_run_records_a_gap_in_a_valid_log(ground: Any, flavour: str, mod
 
 @pytest.mark.slow
 def test_altered_log_is_reported(ground: Any) -> None:
-    """Something altered the log while it flew: a defect card does. The run reads it back before it vouches for it."""
+    """The log was altered during the flight, as by a defective card. The run verifies it before it reports success."""
     run = ground.run(ground.bundle(), speed=SPEED)
     run.until("dispatched", step=1)
     log = run.folder / "log.jsonl"

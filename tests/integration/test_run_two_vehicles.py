@@ -1,4 +1,4 @@
-"""`rtshcua run` and `doctor` at a port that two vehicles send to: neither is flown unless one is named."""
+"""`rtshcua run` and `doctor` on a port with two vehicles: neither is flown unless one is named."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack

@@ -1,4 +1,4 @@
-"""`rtshcua run --wait`: nothing flies until a bundle is handed in, which is admitted by what `run` asks of any."""
+"""`rtshcua run --wait` flies a submitted bundle after the same checks as `run`."""
 
 import signal
 import tempfile
@@ -15,7 +15,7 @@ from rtshcua.adapters.store.vehicle_records import opened_root
 from rtshcua.wire.keys import Duty
 from virtual import case
 
-#: so slow that a busy machine's hold-ups stay below what a permit lasts
+#: slow enough that delays of a busy machine stay below a permit's validity
 SPEED = 3
 #: one boundary over the waiting and the flight, which has the link's key, where there is a program of it
 APART = () if program() is None else ("--mode", "process")

@@ -1,4 +1,4 @@
-"""`make setup` in a project of one package: it says how far it is, is quiet when all is there, and mends what broke."""
+"""`make setup` in a project with one package: it shows progress, is quiet when complete, and repairs damage."""
 
 import hashlib
 import os

@@ -1,4 +1,4 @@
-"""The simulated vehicle as a process, over real UDP on loopback: it flies, it hears one peer, and it ends when told."""
+"""The simulated vehicle as a process, over UDP on loopback: it flies, hears one peer, and ends on request."""
 
 import json
 import select

@@ -1,4 +1,4 @@
-"""What `rtshcua init` makes, in CI: docs/ci.md as it is written, and the commands of the project's own workflow."""
+"""A project of `rtshcua init` in CI: docs/ci.md as written, and the commands of the project's workflow."""
 
 import re
 import shlex
@@ -103,7 +103,7 @@ def test_page_names_every_action_input_and_hook() -> None:
     ],
 )
 def test_workflow_never_installs_the_bare_name(place: Path, source: str, installs: bool) -> None:
-    """Whoever takes the name at a package index would run in the CI of everybody who trusted it."""
+    """An attacker who registers the name at a package index would run code in the CI of its users."""
     workflow = yaml.safe_load((place / ".github/workflows/policy.yml").read_text(encoding="utf-8"))
     (job,) = workflow["jobs"].values()
     assert job["env"] == {"RTSHCUA": ""}

@@ -1,4 +1,4 @@
-"""The units for permanent use: systemd takes them, they are shut in, and a run flies so."""
+"""The systemd units: systemd accepts them, they are sandboxed, and a run flies with them."""
 
 import re
 import shutil

@@ -1,4 +1,4 @@
-"""docs/tutorial.md, as somebody follows it: its files are written, its commands run, their output compared.
+"""docs/tutorial.md as written: its files are created, its commands run, their output compared.
 
 `...` stands for anything: at the end of a line for the rest of it, alone on a line for any lines.
 """

@@ -1,4 +1,4 @@
-"""Where the kernel does not vouch for this machine's clock, the vehicle's time of day decides; or nothing does."""
+"""If the kernel does not confirm this machine's clock, the vehicle's time of day bounds it, or it is unknown."""
 
 import json
 from typing import Any

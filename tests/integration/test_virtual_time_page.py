@@ -1,4 +1,4 @@
-"""docs/flying/virtual-time.md, as somebody follows it: its test is run by pytest in a project that `init` made."""
+"""docs/flying/virtual-time.md as written: pytest runs its test in a project of `rtshcua init`."""
 
 import re
 import subprocess

@@ -1,4 +1,4 @@
-"""The wind farm of `examples`: a project of several missions, with shifts, approvals and towers to stay out of."""
+"""The wind farm of `examples`: several missions, with shifts, approvals and towers as exclusion zones."""
 
 import re
 import shlex

@@ -1,4 +1,4 @@
-"""Witnesses that no flight can have. `test_flight_whole` has flights with witnesses."""
+"""Refused witnesses. `test_flight_whole` has flights with witnesses."""
 
 import os
 import shutil

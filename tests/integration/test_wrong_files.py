@@ -1,4 +1,4 @@
-"""A file of another kind than a command asks for is named, with what is done with one."""
+"""A file of a wrong kind is reported with the command for its kind."""
 
 from pathlib import Path
 
@@ -22,7 +22,7 @@ FILES = {
     "log.jsonl": ((CHECKOUT / "tests/vectors/log/sealed.jsonl").read_bytes(), "a flight log"),
     "a.bundle": (b"\x83nrtshcua/bundle\x01\x82\x40\x40", "a compiled bundle"),
 }
-#: commands by the kinds that they take, and how each is called
+#: commands by the accepted kinds of files, and their command lines
 COMMANDS = {
     "check {}": ("proposal.json", "short.rts"), "fmt --check {}": ("proposal.json", "short.rts", "zones.json"),
     "lint {}": ("proposal.json", "short.rts", "zones.json"), "test {}": ("proposal.json", "short.rts", "zones.json"),

@@ -91,10 +91,10 @@ def test_flights_that_are_flown_and_judged(here: Path, capsys: pytest.CaptureFix
 
 def fly_one_again(line: dict[str, Any]) -> CampaignResult:
     """Flight 0 once more, in this process, from what the folder says alone."""
+    from rtshcua.app.campaigns import _kinds, _space
     from rtshcua.app.programs import compile_sources
     from rtshcua.campaign.drawing import FLAVOURS
     from rtshcua.campaign.rounds import CampaignOrder, drawn
-    from rtshcua.front.cli.commands.campaign import _kinds, _space
 
     begun = json.loads(Path("made/campaign.json").read_text())
     compiled, _ = compile_sources([Path(SHORT)], mission=None, issued_at_us=begun["issued_at_us"])

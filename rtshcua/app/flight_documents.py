@@ -5,11 +5,12 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from rtshcua.adapters.agent_socket import flight_at
+from rtshcua.adapters.agent_socket import FlightReply, flight_at, hand_in
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore, read_root
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.store.vehicle_records import opened_root
+from rtshcua.adapters.store.writing import PRIVATE_FILE, write_out
 from rtshcua.app.documents import read_bundle
 from rtshcua.app.fly.vehicle_trust import LAPSED, REVOKED
 from rtshcua.decision.prepare import PreparedInvocation, prepare, prepare_mission
@@ -17,22 +18,23 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
-from rtshcua.wire import cose
+from rtshcua.wire import cose, names
 from rtshcua.wire.bundle import Bundle, BundleError, open_bundle
-from rtshcua.wire.document import MAX_DOCUMENT, MAX_LIFE_US
+from rtshcua.wire.document import MAX_DOCUMENT, MAX_LIFE_US, kind_of
 from rtshcua.wire.replacement import fit_replacement, open_replacement
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
 
 #: the longest that a document may be good for, in s
 MOST_S = MAX_LIFE_US // 1_000_000
-
+#: help for a missing flight
+WHOSE = "add `--flight ID` (32 hexadecimal digits, or a socket of the flight)"
 
 _FLIGHT = re.compile(r"[0-9a-f]{32}")
 
 
 def bundle_in_flight(
-    bundle: Path, replacements: list[Path], root: Path | None, now_us: int, *, stops: bool = False
+    bundle: Path, replacements: Sequence[Path], root: Path | None, now_us: int, *, stops: bool = False
 ) -> Bundle:
     """The bundle that flies, verified, with the replacements that were put into force since.
 
@@ -102,3 +104,22 @@ def _root(path: Path | None, now_us: int) -> TrustRoot:
     """The key store's root, or the one that was named, which is trusted for being named."""
     signed = KeyStore(data_folder()).root() if path is None else read_root(path)
     return open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=now_us)
+
+
+def send_document(document: bytes, to: Path | None, output: Path | None) -> FlightReply | None:
+    """Write a document, and send it to a flight: what that answers, or None where it is not sent. Raises OSError."""
+    if output is not None:
+        write_out(output, document, mode=PRIVATE_FILE)
+    return None if to is None else hand_in(to, document)
+
+
+def replacement_in(path: Path) -> bytes | Refusal:
+    """A signed replacement, not verified. Raises OSError."""
+    document = read_regular(path, MAX_DOCUMENT)
+    try:
+        kind = kind_of(document)
+    except Untrusted as error:
+        return Refusal("input", f"`{path}` is not a replacement: {error}")
+    return (
+        document if kind is names.REPLACEMENT else Refusal("input", f"`{path}` is not a replacement but `{kind.name}`")
+    )

@@ -5,16 +5,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 
-from rtshcua.adapters.agent_socket import hand_in
-from rtshcua.adapters.store.writing import PRIVATE_FILE, write_out
+from rtshcua.app.flight_documents import send_document
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.faults import error_object, fail
 from rtshcua.front.cli.stdout import out, out_json
 
 NO_HELP: Mapping[str, str] = MappingProxyType({})
-#: help for a missing flight, and for a missing destination
-WHOSE = "add `--flight ID` (32 hexadecimal digits, or a socket of the flight)"
+#: help for a missing destination
 WHERE = "add `--to SOCKET` (a socket of the flight) or `--output FILE`"
 
 
@@ -31,11 +29,9 @@ def deliver(
 
     `help`: the hint for each slug with which the flight may refuse. Raises OSError.
     """
-    if output is not None:
-        write_out(output, document, mode=PRIVATE_FILE)
-    if to is None:
+    said = send_document(document, to, output)
+    if said is None:
         return _say(ExitCode.OK, "written", f"{what}, written to {output}", as_json=as_json)
-    said = hand_in(to, document)
     code = ExitCode.OK if said.slug == "accepted" else ExitCode.REFUSED
     text = f"{what}: {said.text}" if code is ExitCode.OK else f"the flight refused it: {said.text} ({said.slug})"
     return _say(code, said.slug, text, as_json=as_json, help=help.get(said.slug))

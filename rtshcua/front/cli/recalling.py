@@ -1,50 +1,19 @@
 """Sign a recall, or send one signed earlier. No typer here: a recall must start fast."""
 
-import time
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Final
 
-from rtshcua.adapters.store.folders import data_folder
-from rtshcua.adapters.store.reading import read_regular
-from rtshcua.app.exit_codes import untrusted
-from rtshcua.app.flight_documents import bundle_in_flight, flight_id
+from rtshcua.app.recalls import recall_in, recall_of
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.documents import WHERE, WHOSE, deliver
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli.documents import WHERE, deliver
 from rtshcua.front.cli.faults import fail, refuse
-from rtshcua.wire import names
-from rtshcua.wire.bundle import Bundle
-from rtshcua.wire.document import MAX_DOCUMENT, kind_of
-from rtshcua.wire.keys import SigningKey
-from rtshcua.wire.recall import RecallDocument, sign_recall
-from rtshcua.wire.untrusted import Untrusted
 
 #: default validity of a recall, s
 GOOD_S: Final = 300
 #: help if another mission flies: one that an agent submitted has its own bundle
 HELP: Final = {"other-mission": "`--policy` recalls every mission under the policy of this bundle"}
 _SENT_HELP: Final = HELP | {"expired": "sign a new one: `rtshcua recall BUNDLE --to SOCKET`"}
-
-
-class Recalled(NamedTuple):
-    """What a recall covers: the flying bundle, and the id of the flight, or empty for all flights under its policy."""
-
-    flying: Bundle
-    flight: bytes
-
-    @property
-    def name(self) -> str:
-        """A description for messages."""
-        flying = self.flying
-        what = f"`{flying.mission.name}`" if self.flight else f"all under `{flying.policy.name}`"
-        return f"{what} on `{flying.policy.vehicle.identity}`"
-
-    def sign(self, key: SigningKey, now_us: int, seconds: int) -> bytes:
-        """Return the signed recall, valid for `seconds` from now. Raises `Untrusted`."""
-        flying = self.flying
-        digests = (flying.mission_digest, b"") if self.flight else (b"", flying.policy_digest)
-        vehicle = flying.policy.vehicle.identity
-        said = RecallDocument(vehicle, self.flight, *digests, now_us, now_us + seconds * 1_000_000)
-        return sign_recall(said, key)
 
 
 def recall(
@@ -62,20 +31,16 @@ def recall(
         )
     if to is None and output is None:
         return fail(ExitCode.USAGE, "no destination for the recall", WHERE)
-    now_us = time.time_ns() // 1000
-    from rtshcua.adapters.store.keystore import KeyStore  # slow to import, and not needed for `--send`
-    from rtshcua.front.cli.unlock import unlock_person
+    recalled = recall_of(bundle, root, flight, to, whole_policy=policy)
+    if isinstance(recalled, Refusal):
+        return refuse(recalled)
+    from rtshcua.front.cli.unlock import unlock_person  # slow to import, and not needed for `--send`
 
-    try:
-        flying = bundle_in_flight(bundle, [], root, now_us, stops=True)
-        named = b"" if policy else flight_id(flight, to)
-        if named is None:
-            return fail(ExitCode.USAGE, "the flight of the recall is unknown", f"{WHOSE}, or `--policy`")
-        recalled = Recalled(flying, named)
-        key = unlock_person(KeyStore(data_folder()), person, None, path=approval_key, passphrase_file=passphrase_file)
-        document = recalled.sign(key, now_us, seconds)
-    except Untrusted as error:
-        return refuse(untrusted(error))
+    document = recalled.signed(
+        lambda store: unlock_person(store, person, None, path=approval_key, passphrase_file=passphrase_file), seconds
+    )
+    if isinstance(document, Refusal):
+        return refuse(document)
     return deliver(document, f"recalled {recalled.name}", to=to, output=output, as_json=as_json, help=HELP)
 
 
@@ -84,12 +49,7 @@ def _send(path: Path, to: Path | None, *, alone: bool, as_json: bool) -> ExitCod
     if not alone or to is None:
         text = "`--send` requires `--to SOCKET`, and conflicts with BUNDLE and `--output`"
         return fail(ExitCode.USAGE, text, "`rtshcua recall --send FILE --to SOCKET`")
-    document = read_regular(path, MAX_DOCUMENT)
-    try:
-        kind = kind_of(document)
-    except Untrusted as error:
-        return refuse(untrusted(error))
-    if kind is not names.RECALL:
-        text = f"`{path}` is not a recall"
-        return fail(ExitCode.INPUT, text, "sign one with `rtshcua recall BUNDLE --flight ID -o FILE`")
+    document = recall_in(path)
+    if isinstance(document, Refusal):
+        return refuse(document)
     return deliver(document, f"sent `{path}`", to=to, output=None, as_json=as_json, help=_SENT_HELP)

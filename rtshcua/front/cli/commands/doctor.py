@@ -83,26 +83,33 @@ _SOFTWARE = "a run with `--mode software` decides in its own process, where an a
 _EXAMPLE = "missions/short.rts"  # its policy reads every shipped signal
 
 
+MissionBundle = Annotated[Path | None, typer.Argument(help="the bundle to fly (default: check the shipped signals)")]
+Seconds = Annotated[float, typer.Option(min=3, max=600, help="listening time")]
+AgentUser = Annotated[
+    str | None, typer.Option(metavar="USER", help="user of the agent: check that it differs from operators")
+]
+BoundarySocket = Annotated[
+    Path | None, typer.Option(metavar="PATH", help="socket of a listening boundary: check that one")
+]
+AsJson = Annotated[bool, typer.Option("--json", help="print one JSON object")]
+
+
 @app.command()
 def doctor(
     context: typer.Context,
     connect: Connect,
-    bundle: Annotated[Path | None, typer.Argument(help="the bundle to fly (default: check the shipped signals)")]
+    bundle: MissionBundle
     = None,
-    seconds: Annotated[float, typer.Option(min=3, max=600, help="listening time")] = 10.0,
+    seconds: Seconds = 10.0,
     signing_key: LinkKey = None,
     unsigned_radio: UnsignedRadio = False,
     system: System = None,
-    agent_user: Annotated[
-        str | None, typer.Option(metavar="USER", help="user of the agent: check that it differs from operators")
-    ] = None,
+    agent_user: AgentUser = None,
     set_: MeantSettings = None,
     utc_error: UtcError = None,
-    boundary_socket: Annotated[
-        Path | None, typer.Option(metavar="PATH", help="socket of a listening boundary: check that one")
-    ] = None,
+    boundary_socket: BoundarySocket = None,
     mode: DecidesIn = None,
-    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object")] = False,
+    as_json: AsJson = False,
 ) -> ExitCode:  # fmt: skip
     """Report what a vehicle supports and what would stop a mission. Arms, moves, sets and uploads nothing.
 

@@ -31,21 +31,30 @@ app = typer.Typer(add_completion=False)
 _AGENT = "agent"
 
 
+Bundle = Annotated[Path, typer.Argument(help="the bundle of `rtshcua run --wait`, whose policy is in force")]
+To = Annotated[Path, typer.Option(metavar="SOCKET", help="agent socket of the waiting vehicle")]
+With = Annotated[list[Path], typer.Option("--with", help="sources of that policy (repeatable)")]
+MissionKey = Annotated[Path | None, typer.Option(help="the agent's mission key [default: the key store's]")]
+PassphraseFile = Annotated[Path | None, typer.Option(help="file with the passphrase of the key")]
+Http = Annotated[
+    int | None,
+    typer.Option(metavar="PORT", min=0, max=65_535, help="serve HTTP on this port of 127.0.0.1; 0: any free port"),
+]
+TokenFile = Annotated[
+    Path | None, typer.Option(help="with --http: file of the token that hosts must send; created if missing")
+]
+
+
 @app.command()
 def mcp(
     context: typer.Context,
-    bundle: Annotated[Path, typer.Argument(help="the bundle of `rtshcua run --wait`, whose policy is in force")],
-    to: Annotated[Path, typer.Option(metavar="SOCKET", help="agent socket of the waiting vehicle")],
-    with_: Annotated[list[Path], typer.Option("--with", help="sources of that policy (repeatable)")],
-    mission_key: Annotated[Path | None, typer.Option(help="the agent's mission key [default: the key store's]")] = None,
-    passphrase_file: Annotated[Path | None, typer.Option(help="file with the passphrase of the key")] = None,
-    http: Annotated[
-        int | None,
-        typer.Option(metavar="PORT", min=0, max=65_535, help="serve HTTP on this port of 127.0.0.1; 0: any free port"),
-    ] = None,
-    token_file: Annotated[
-        Path | None, typer.Option(help="with --http: file of the token that hosts must send; created if missing")
-    ] = None,
+    bundle: Bundle,
+    to: To,
+    with_: With,
+    mission_key: MissionKey = None,
+    passphrase_file: PassphraseFile = None,
+    http: Http = None,
+    token_file: TokenFile = None,
 ) -> ExitCode:
     """Run an MCP server, over the standard streams or HTTP, with tools to check, propose, follow and replace missions.
 

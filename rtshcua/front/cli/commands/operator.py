@@ -18,6 +18,7 @@ from rtshcua.app.documents import Claimed
 from rtshcua.app.exit_codes import untrusted
 from rtshcua.app.flight_documents import MOST_S, bundle_in_flight
 from rtshcua.app.fly.narrator import REPLACED, Answering, asks
+from rtshcua.app.recalls import Recalled
 from rtshcua.diagnostics.excerpt import escaped, visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.suggest import nearest
@@ -34,7 +35,7 @@ from rtshcua.front.cli.options.document_options import (
     Person,
     SignedRoot,
 )
-from rtshcua.front.cli.recalling import GOOD_S, HELP, Recalled
+from rtshcua.front.cli.recalling import GOOD_S, HELP
 from rtshcua.front.cli.render.live.lines import asked
 from rtshcua.front.cli.render.showing.log import Names
 from rtshcua.front.cli.stdout import NewestLines

@@ -51,34 +51,41 @@ _CONSENT_HELP: Final = (
 )
 
 
+Source = Annotated[Path, typer.Argument(help="a source with a mission (.rts), under whose policy the sorties fly")]
+Vehicle = Annotated[str, typer.Option(metavar="IDENTITY", help="identity of this vehicle, as in its policy")]
+Sitl = Annotated[bool, typer.Option("--sitl", help="the vehicle is simulated: a second ground station takes over")]
+Pilot = Annotated[
+    str | None, typer.Option(metavar="NAME", help="the vehicle is real: this pilot consents and holds the switch")
+]
+Takeover = Annotated[bool, typer.Option("--takeover", help="with --pilot: ask the pilot to take over, and wait")]
+Only = Annotated[list[str] | None, typer.Option(metavar="SORTIE", help="fly only this sortie (repeatable)")]
+Mission = Annotated[str | None, typer.Option(help="the mission to use if the source has several")]
+Speed = Annotated[float, typer.Option(min=0.1, max=50, help="speed-up of the simulated flight")]
+PassphraseFile = Annotated[Path | None, typer.Option(help="file with the passphrase of the keys")]
+Runs = Annotated[Path, typer.Option(help="folder in which the folders of the sorties are created")]
+AsJson = Annotated[bool, typer.Option("--json", help="print one JSON object per event, the record last")]
+
+
 @app.command()
 def qualify(
     context: typer.Context,
-    source: Annotated[Path, typer.Argument(help="a source with a mission (.rts), under whose policy the sorties fly")],
+    source: Source,
     connect: Connect,
-    vehicle: Annotated[str, typer.Option(metavar="IDENTITY", help="identity of this vehicle, as in its policy")],
-    sitl: Annotated[
-        bool, typer.Option("--sitl", help="the vehicle is simulated: a second ground station takes over")
-    ] = False,
-    pilot: Annotated[
-        str | None, typer.Option(metavar="NAME", help="the vehicle is real: this pilot consents and holds the switch")
-    ] = None,
-    takeover: Annotated[
-        bool, typer.Option("--takeover", help="with --pilot: ask the pilot to take over, and wait")
-    ] = False,
-    only: Annotated[
-        list[str] | None, typer.Option(metavar="SORTIE", help="fly only this sortie (repeatable)")
-    ] = None,
-    mission: Annotated[str | None, typer.Option(help="the mission to use if the source has several")] = None,
-    speed: Annotated[float, typer.Option(min=0.1, max=50, help="speed-up of the simulated flight")] = 1.0,
-    passphrase_file: Annotated[Path | None, typer.Option(help="file with the passphrase of the keys")] = None,
+    vehicle: Vehicle,
+    sitl: Sitl = False,
+    pilot: Pilot = None,
+    takeover: Takeover = False,
+    only: Only = None,
+    mission: Mission = None,
+    speed: Speed = 1.0,
+    passphrase_file: PassphraseFile = None,
     signing_key: LinkKey = None,
     unsigned_radio: UnsignedRadio = False,
     system: System = None,
     no_fence: NoFence = False,
     utc_error: UtcError = None,
-    runs: Annotated[Path, typer.Option(help="folder in which the folders of the sorties are created")] = Path("runs"),
-    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object per event, the record last")] = False,
+    runs: Runs = Path("runs"),
+    as_json: AsJson = False,
 ) -> ExitCode:  # fmt: skip
     """Fly a short test of whether the autopilot meets the assumptions of its adapter, and sign a record of the result.
 

@@ -5,14 +5,12 @@ from typing import Annotated
 
 import typer
 
-from rtshcua.adapters.store.reading import read_regular
+from rtshcua.app.flight_documents import replacement_in
 from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.documents import deliver
-from rtshcua.front.cli.faults import fail
+from rtshcua.front.cli.faults import refuse
 from rtshcua.front.cli.options.document_options import AsJson
-from rtshcua.wire import names
-from rtshcua.wire.document import MAX_DOCUMENT, kind_of
-from rtshcua.wire.untrusted import Untrusted
 
 app = typer.Typer(add_completion=False)
 
@@ -27,11 +25,7 @@ def replace(
 
     The vehicle verifies it like the mission, under the same policy. `rtshcua compile --replaces` makes one.
     """
-    document = read_regular(replacement, MAX_DOCUMENT)
-    try:
-        kind = kind_of(document)
-    except Untrusted as error:
-        return fail(ExitCode.INPUT, f"`{replacement}` is not a replacement: {error}")
-    if kind is not names.REPLACEMENT:
-        return fail(ExitCode.INPUT, f"`{replacement}` is not a replacement but `{kind.name}`")
+    document = replacement_in(replacement)
+    if isinstance(document, Refusal):
+        return refuse(document)
     return deliver(document, f"replaced by `{replacement}`", to=to, output=None, as_json=as_json)

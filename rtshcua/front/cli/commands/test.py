@@ -35,33 +35,44 @@ app = typer.Typer(add_completion=False)
 _REPORT = "a report"
 
 
+Paths = Annotated[list[Path] | None, typer.Argument(help="sources (.rts) or folders (default: here)")]
+Chosen = Annotated[str, typer.Option("-k", metavar="TEXT", help="only cases whose name contains this text")]
+Coverage = Annotated[bool, typer.Option("--coverage", help="report the coverage of the policies by clause")]
+FailUnder = Annotated[int | None, typer.Option(min=0, max=100, metavar="N", help="fail if coverage is below N %")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="list also the rows of tables and the covered clauses")]
+AsJson = Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")]
+JunitFile = Annotated[
+    Path | None, typer.Option("--junit", metavar="FILE", help="write a JUnit report; an existing one is replaced")
+]
+Generating = Annotated[
+    bool, typer.Option("--generate", help="generate tests for both sides of every limit of a policy")
+]
+Policy = Annotated[str | None, typer.Option(help="--generate: the policy, if there are several")]
+Skill = Annotated[list[str] | None, typer.Option(help="--generate: only for this skill (repeatable)")]
+Nominal = Annotated[str | None, typer.Option(help="--generate: the nominal state to start from (default: the first)")]
+Output = Annotated[Path | None, typer.Option("--output", "-o", help="--generate: the file to write")]
+Force = Annotated[bool, typer.Option("--force", help="--generate: replace an existing file")]
+Config = Annotated[Path | None, typer.Option(help="use this configuration, not the nearest")]
+Isolated = Annotated[bool, typer.Option("--isolated", help="ignore all configuration files")]
+
+
 @app.command()
 def run_tests(
-    paths: Annotated[list[Path] | None, typer.Argument(help="sources (.rts) or folders (default: here)")] = None,
-    chosen: Annotated[str, typer.Option("-k", metavar="TEXT", help="only cases whose name contains this text")] = "",
-    coverage: Annotated[bool, typer.Option("--coverage", help="report the coverage of the policies by clause")] = False,
-    fail_under: Annotated[
-        int | None, typer.Option(min=0, max=100, metavar="N", help="fail if coverage is below N %")
-    ] = None,
-    verbose: Annotated[
-        bool, typer.Option("--verbose", "-v", help="list also the rows of tables and the covered clauses")
-    ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")] = False,
-    junit_file: Annotated[
-        Path | None, typer.Option("--junit", metavar="FILE", help="write a JUnit report; an existing one is replaced")
-    ] = None,
-    generating: Annotated[
-        bool, typer.Option("--generate", help="generate tests for both sides of every limit of a policy")
-    ] = False,
-    policy: Annotated[str | None, typer.Option(help="--generate: the policy, if there are several")] = None,
-    skill: Annotated[list[str] | None, typer.Option(help="--generate: only for this skill (repeatable)")] = None,
-    nominal: Annotated[
-        str | None, typer.Option(help="--generate: the nominal state to start from (default: the first)")
-    ] = None,
-    output: Annotated[Path | None, typer.Option("--output", "-o", help="--generate: the file to write")] = None,
-    force: Annotated[bool, typer.Option("--force", help="--generate: replace an existing file")] = False,
-    config: Annotated[Path | None, typer.Option(help="use this configuration, not the nearest")] = None,
-    isolated: Annotated[bool, typer.Option("--isolated", help="ignore all configuration files")] = False,
+    paths: Paths = None,
+    chosen: Chosen = "",
+    coverage: Coverage = False,
+    fail_under: FailUnder = None,
+    verbose: Verbose = False,
+    as_json: AsJson = False,
+    junit_file: JunitFile = None,
+    generating: Generating = False,
+    policy: Policy = None,
+    skill: Skill = None,
+    nominal: Nominal = None,
+    output: Output = None,
+    force: Force = False,
+    config: Config = None,
+    isolated: Isolated = False,
 ) -> ExitCode:
     """Run the `test` blocks of sources, fly their scenarios in virtual time, and report what they cover.
 

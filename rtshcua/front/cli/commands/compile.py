@@ -9,7 +9,7 @@ import typer
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.writing import replace_inside
-from rtshcua.app.compile import CompileRequest, SignedBundle, claimed_pins, compile_mission, sign_bundle
+from rtshcua.app.compile import CompileRequest, CompileResult, SignedBundle, claimed_pins, compile_mission, sign_bundle
 from rtshcua.app.exit_codes import exit_code
 from rtshcua.app.signing_keys import another_key
 from rtshcua.app.wording import moment
@@ -123,6 +123,18 @@ def compile(
             replaces, index_of(first), flight, root, mission_key, passphrase_file, issued_at, deny_warnings, target
         )  # fmt: skip
         return replace_with(compiled.policy, compiled.mission, order, store, findings, quiet=as_json)
+    keys = (policy_key, mission_key, passphrase_file)
+    return _sign(made, store, keys, findings, issued_at, deny_warnings=deny_warnings, quiet=as_json)
+
+
+def _sign(
+    made: CompileResult, store: KeyStore, keys: tuple[Path | None, Path | None, Path | None], findings: Findings,
+    issued_at: int, *, deny_warnings: bool, quiet: bool,
+) -> ExitCode:  # fmt: skip
+    """Sign a compiled mission into a bundle, and say so."""
+    compiled, target, (policy_key, mission_key, passphrase_file) = made.compiled, made.target, keys
+    assert compiled.policy is not None
+    assert compiled.mission is not None
     try:
         signers = (
             unlock(store, Duty.POLICY, path=policy_key, passphrase_file=passphrase_file),
@@ -136,7 +148,7 @@ def compile(
     if not warned(signed.warnings, findings, deny=deny_warnings):
         return ExitCode.UNTRUSTED
     replace_inside(target, signed.data)
-    if not as_json:
+    if not quiet:
         out(_told(compiled.policy, compiled.mission, target))
         if compiled.bounds is not None:
             out(bounds_told(compiled.bounds))

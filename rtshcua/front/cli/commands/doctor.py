@@ -4,11 +4,11 @@ import os
 import pwd
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Final, NamedTuple
 
 import msgspec
 import typer
@@ -34,7 +34,7 @@ from rtshcua.adapters.store.signing import LinkKeyError
 from rtshcua.adapters.store.vehicle_records import OwedParameters
 from rtshcua.adapters.utc import TimeSources, kernel_error_us, vehicle_counts
 from rtshcua.adapters.vehicle import address
-from rtshcua.adapters.vehicle.address import AddressError
+from rtshcua.adapters.vehicle.address import Address, AddressError
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.telemetry import UnknownSource
 from rtshcua.adapters.vehicle.transport import open_transport
@@ -134,39 +134,73 @@ def doctor(
         return distrust(error)
     if isinstance(wanted, Refusal):
         return refuse(wanted)
+    how = Examination(
+        link, seconds, signing_key, unsigned_radio, system, settings_of(set_), duration_us(utc_error), boundary_socket,
+        decides,
+    )  # fmt: skip
+    findings = _examine(wanted, how, agents, clock)
+    if isinstance(findings, Refusal):
+        return refuse(findings)
+    code = ExitCode.REFUSED if any(each.verdict is MissionVerdict.STOP for each in findings) else ExitCode.OK
+    if as_json:
+        out_json(msgspec.json.encode({"exit_code": int(code), "findings": findings}).decode())
+    else:
+        _print(findings)
+    return code
+
+
+class Examination(NamedTuple):
+    """How a vehicle is examined: at which link, for how long, with which key, and where a run would decide."""
+
+    link: Address
+    seconds: float
+    signing_key: Path | None
+    unsigned_radio: bool
+    system: int | None
+    settings: Mapping[str, int]
+    utc_error_us: int | None
+    boundary_socket: Path | None
+    decides: EnforcementMode
+
+
+def _examine(
+    wanted: tuple[Policy, Mission | None, TrustRoot | None], how: Examination, agents: list[VehicleFinding],
+    clock: SystemClock,
+) -> list[VehicleFinding] | Refusal:  # fmt: skip
+    """Listen to the vehicle, and return what was found."""
     policy, mission, root = wanted
     frames = FrameSession()
     with ExitStack() as stack:
         try:
-            signing = LinkSigning(signing_key, policy, frames, state_folder(), clock, unsigned_radio=unsigned_radio)
+            signing = LinkSigning(
+                how.signing_key, policy, frames, state_folder(), clock, unsigned_radio=how.unsigned_radio
+            )
         except LinkKeyError as error:
-            return fail(code_of(error.slug), str(error), error.help, slug=f"link-key-{error.slug}")
+            return Refusal(f"link-key-{error.slug}", str(error), error.help or "", code_of(error.slug))
         stack.callback(signing.close)
         try:
             steps = () if mission is None else mission.invocations
-            meant = settings_of(set_)
-            vehicle = ExaminingDriver(policy, clock, frames, signing.verifier, system, steps, meant)
+            vehicle = ExaminingDriver(policy, clock, frames, signing.verifier, how.system, steps, how.settings)
         except UnknownSource as error:
-            return fail(ExitCode.REFUSED, str(error))
+            return Refusal("refused", str(error), "", ExitCode.REFUSED)
         try:
-            socket = ConnectedVehicle(open_transport(link), vehicle, clock, lambda _utc_us, _frame: None)
+            socket = ConnectedVehicle(open_transport(how.link), vehicle, clock, lambda _utc_us, _frame: None)
         except OSError as error:
-            return refuse(unopened(link, error), ExitCode.LINK)
+            return unopened(how.link, error)._replace(code=ExitCode.LINK)
         stack.callback(socket.close)
-        if not _listen(socket, vehicle, clock, seconds):
-            return refuse(
-                unmet(f"a vehicle at `{link}`", _HEARTBEAT_S, system, signing.rejected, socket.silence), ExitCode.LINK
-            )
-        keyed = signing_key is not None
+        if not _listen(socket, vehicle, clock, how.seconds):
+            silent = unmet(f"a vehicle at `{how.link}`", _HEARTBEAT_S, how.system, signing.rejected, socket.silence)
+            return silent._replace(code=ExitCode.LINK)
+        keyed = how.signing_key is not None
         time_of_day = _time_of_day(
-            boundary_socket, duration_us(utc_error), keyed=keyed, apart=decides is EnforcementMode.PROCESS
+            how.boundary_socket, how.utc_error_us, keyed=keyed, apart=how.decides is EnforcementMode.PROCESS
         )
-        findings = _boundary(decides, boundary_socket) + agents + _settle(socket, vehicle, clock)
+        findings = _boundary(how.decides, how.boundary_socket) + agents + _settle(socket, vehicle, clock)
         findings += list(
             diagnose(
                 vehicle, policy, mission, keyed=keyed,
                 time=time_of_day,
-                unheard=signing.unheard, named=system is not None,
+                unheard=signing.unheard, named=how.system is not None,
                 qualified=None if root is None else partial(
                     standing, record_of(policy.vehicle.identity, root, clock.now().utc_us)
                 ),
@@ -175,12 +209,7 @@ def doctor(
     if mission is not None:
         findings += _expired(policy, mission, clock.now(), time_of_day)
         findings += _owed(OwedParameters(state_folder(), policy.vehicle.identity))
-    code = ExitCode.REFUSED if any(each.verdict is MissionVerdict.STOP for each in findings) else ExitCode.OK
-    if as_json:
-        out_json(msgspec.json.encode({"exit_code": int(code), "findings": findings}).decode())
-    else:
-        _print(findings)
-    return code
+    return findings
 
 
 def _boundary(mode: EnforcementMode, socket: Path | None = None) -> list[VehicleFinding]:

@@ -2,7 +2,7 @@
 
 import gc
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
@@ -76,19 +76,10 @@ def mcp(
     problem = conflict_of(context)
     if problem is not None:
         return problem
-    store = KeyStore(data_folder())
-    try:
-        envelope, _ = envelopes(read_bundle(bundle))
-        digest = policy_digest(cose.unverified(envelope, limit=MAX_BUNDLE).payload)
-        key = unlock(store, Duty.MISSION, path=mission_key, passphrase_file=passphrase_file, whose=_AGENT)
-        sources = _sources(store, key)
-    except Untrusted as error:
-        return distrust(error)
-    if sources != (_AGENT,):
-        what = f"is for {', '.join(sources)}" if sources else "is not a mission key in the key store's trust root"
-        text = f"key {key.kid.hex()} {what}; the MCP server requires a key for agents only"
-        help = "use `--mission-key mission-agent.key`, with the trust root (not secret) in the key store beside it"
-        return fail(ExitCode.UNTRUSTED, text, help)
+    found = _agent_key(bundle, mission_key, passphrase_file)
+    if isinstance(found, ExitCode):
+        return found
+    store, key, envelope, digest = found
     for path in with_:
         read_regular(path, 1)
 
@@ -110,6 +101,11 @@ def mcp(
         with breakable():
             serve(make)
         return ExitCode.OK
+    return _over_http(http, token_file, lambda listener, token: serve_http(make, listener, token))
+
+
+def _over_http(port: int, token_file: Path, serve: Callable[[socket.socket, bytes], None]) -> ExitCode:
+    """Listen on a port of this machine, and serve clients that send the token."""
     try:
         token = token_of(token_file)
     except BadToken as error:
@@ -117,14 +113,38 @@ def mcp(
     with socket.socket() as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            listener.bind((HOST, http))
+            listener.bind((HOST, port))
             listener.listen()
         except OSError as error:
-            return fail(ExitCode.INPUT, f"cannot listen at {HOST}:{http}: {words_of(error)}", "choose another port")
+            return fail(ExitCode.INPUT, f"cannot listen at {HOST}:{port}: {words_of(error)}", "choose another port")
         say(f"serving http://{HOST}:{listener.getsockname()[1]}{PATH} to clients that send the token in `{token_file}`")
         with breakable():
-            serve_http(make, listener, token)
+            serve(listener, token)
     return ExitCode.OK
+
+
+def _agent_key(
+    bundle: Path, mission_key: Path | None, passphrase_file: Path | None
+) -> tuple[KeyStore, SigningKey, bytes, bytes] | ExitCode:
+    """Return the key store, the agent's key, and the policy of a bundle with its digest."""
+    store = KeyStore(data_folder())
+    try:
+        envelope, _ = envelopes(read_bundle(bundle))
+        digest = policy_digest(cose.unverified(envelope, limit=MAX_BUNDLE).payload)
+        key = unlock(store, Duty.MISSION, path=mission_key, passphrase_file=passphrase_file, whose=_AGENT)
+        sources = _sources(store, key)
+    except Untrusted as error:
+        return distrust(error)
+    if sources != (_AGENT,):
+        return _not_for_agents(key, sources)
+    return store, key, envelope, digest
+
+
+def _not_for_agents(key: SigningKey, sources: tuple[str, ...]) -> ExitCode:
+    what = f"is for {', '.join(sources)}" if sources else "is not a mission key in the key store's trust root"
+    text = f"key {key.kid.hex()} {what}; the MCP server requires a key for agents only"
+    help = "use `--mission-key mission-agent.key`, with the trust root (not secret) in the key store beside it"
+    return fail(ExitCode.UNTRUSTED, text, help)
 
 
 @contextmanager

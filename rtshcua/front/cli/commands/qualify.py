@@ -2,6 +2,7 @@
 
 import tempfile
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Final
@@ -12,8 +13,6 @@ import typer
 from rtshcua.adapters.qualification.sortie import Sortie
 from rtshcua.adapters.store.folders import data_folder, state_folder
 from rtshcua.adapters.store.keystore import KeyStore
-from rtshcua.adapters.vehicle import address
-from rtshcua.adapters.vehicle.address import AddressError
 from rtshcua.app.exit_codes import exit_code, untrusted
 from rtshcua.app.fly.flight_request import FlightRequest
 from rtshcua.app.fly.sorties import QualificationResult, Qualifying, plan_sorties
@@ -23,7 +22,8 @@ from rtshcua.app.signing_keys import check_trusted
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.console import TerminalConsole
-from rtshcua.front.cli.faults import fail, misaddressed
+from rtshcua.front.cli.faults import fail
+from rtshcua.front.cli.options.addresses import address_of
 from rtshcua.front.cli.options.conflicts import conflict_of
 from rtshcua.front.cli.options.flight_options import (
     Connect,
@@ -92,30 +92,21 @@ def qualify(
     The vehicle flies, so consent is required: `--sitl` or `--pilot NAME`. Exit codes: 0 every check passed; 13 a check
     failed.
     """
-    if sitl and pilot is not None:
-        return fail(ExitCode.USAGE, "`qualify` requires consent: `--sitl` or `--pilot NAME`, not both", _CONSENT_HELP)
-    if sitl == (pilot is not None) or (pilot is not None and not pilot.strip()):
-        return fail(ExitCode.USAGE, "`qualify` requires consent: either `--sitl` or `--pilot NAME`", _CONSENT_HELP)
-    problem = conflict_of(context)
+    problem = _unconsented(sitl=sitl, pilot=pilot) or conflict_of(context)
     if problem is not None:
         return problem
-    try:
-        link = address.parse(connect)
-    except AddressError as error:
-        return misaddressed("--connect", error)
+    link = address_of(connect)
+    if isinstance(link, ExitCode):
+        return link
     if sitl and not link.is_loopback:
         what = f"`--sitl` requires a loopback address: the vehicle at `{link}` may be real"
         return fail(ExitCode.USAGE, what, "forward the simulation's port to this machine, or use `--pilot NAME`")
     if speed != 1 and not sitl:
         return fail(ExitCode.USAGE, "`--speed` requires a simulated vehicle: `--sitl`")
-    planned, missing = plan_sorties(sitl=sitl, takeover=takeover, keyed=signing_key is not None)
-    named = {each.name: each for each in planned}
-    unknown = sorted(set(only or ()) - named.keys())
-    if unknown:
-        return fail(ExitCode.USAGE, f"unknown sortie `{unknown[0]}`", f"accepted: {', '.join(named)}")
-    if only:
-        missing |= {name: "not flown (`--only`)" for name in named if name not in only}
-        planned = [each for each in planned if each.name in only]
+    plan = _sorties(only or (), sitl=sitl, takeover=takeover, keyed=signing_key is not None)
+    if isinstance(plan, ExitCode):
+        return plan
+    planned, missing = plan
     found = Findings(json=as_json)
     compiled, sources = compile_sources([source], mission=mission, issued_at_us=time.time_ns() // 1_000)
     if found.report(compiled.diagnostics, sources) or compiled.policy is None or compiled.mission is None:
@@ -123,7 +114,7 @@ def qualify(
     if compiled.policy.vehicle.identity != vehicle:
         text = f"the policy is for `{compiled.policy.vehicle.identity}`, this vehicle is `{vehicle}`"
         return fail(ExitCode.REFUSED, text, IDENTITY_HELP, slug="wrong-vehicle")
-    plan = Qualifying(
+    sorties = Qualifying(
         source, compiled.policy, compiled.mission, planned, missing, pilot=pilot or "", data=data_folder()
     )
     request = FlightRequest(
@@ -132,11 +123,34 @@ def qualify(
         system=system, utc_error_us=duration_us(utc_error),
     )  # fmt: skip
     console = TerminalConsole("json" if as_json else "lines", request.data, passphrase_file)
-    result = _qualify(plan, request, console)
-    if isinstance(result, Refusal):
+    if isinstance(result := _qualify(sorties, request, console), Refusal):
         return say_refused(result, as_json=as_json)
     _show(result, as_json=as_json)
     return result.code
+
+
+def _unconsented(*, sitl: bool, pilot: str | None) -> ExitCode | None:
+    """Report that nobody consented to the flight; None if somebody did."""
+    if sitl and pilot is not None:
+        return fail(ExitCode.USAGE, "`qualify` requires consent: `--sitl` or `--pilot NAME`, not both", _CONSENT_HELP)
+    if sitl == (pilot is not None) or (pilot is not None and not pilot.strip()):
+        return fail(ExitCode.USAGE, "`qualify` requires consent: either `--sitl` or `--pilot NAME`", _CONSENT_HELP)
+    return None
+
+
+def _sorties(
+    only: Sequence[str], *, sitl: bool, takeover: bool, keyed: bool
+) -> tuple[list[Sortie], dict[str, str]] | ExitCode:
+    """Return the sorties that are flown, and why each other is not."""
+    planned, missing = plan_sorties(sitl=sitl, takeover=takeover, keyed=keyed)
+    named = {each.name: each for each in planned}
+    unknown = sorted(set(only) - named.keys())
+    if unknown:
+        return fail(ExitCode.USAGE, f"unknown sortie `{unknown[0]}`", f"accepted: {', '.join(named)}")
+    if not only:
+        return planned, missing
+    missing |= {name: "not flown (`--only`)" for name in named if name not in only}
+    return [each for each in planned if each.name in only], missing
 
 
 def _qualify(plan: Qualifying, request: FlightRequest, console: TerminalConsole) -> QualificationResult | Refusal:

@@ -27,6 +27,7 @@ from rtshcua.front.cli.render.refused import say_refused
 from rtshcua.onboard.enforcement.load import EnforcementMode
 
 if TYPE_CHECKING:
+    from rtshcua.app.fly.dry_run import FlightRehearsal
     from rtshcua.app.fly.incidents import Incidents
     from rtshcua.simulation.config import AutopilotKind
 
@@ -40,70 +41,41 @@ _WAIT_US = 3_600_000_000
 
 @app.command()
 def run(
-    context: typer.Context,
-    bundle: options.Bundle,
-    connect: options.OtherVehicle = None,
-    mode: options.DecidesIn = None,
-    boundary_user: options.BoundaryUser = None,
-    boundary_socket: options.BoundarySocket = None,
-    speed: options.Speed = 1.0,
-    flavour: options.Flavour = None,
-    battery: options.Battery = None,
-    wind: options.Wind = None,
-    fault: options.Faults = None,
-    seed: options.Seed = None,
-    vehicle: options.Identity = None,
-    root: options.Roots = None,
-    log_key: options.LogKey = None,
-    boundary_key: options.BoundaryKeyFile = None,
-    passphrase_file: options.PassphraseFile = None,
-    signing_key: options.LinkKey = None,
-    unsigned_radio: options.UnsignedRadio = False,
-    system: options.System = None,
-    runs: options.Runs = Path("runs"),
-    state_dir: options.StateFolder = None,
-    fresh_state: options.FreshState = False,
-    no_fence: options.NoFence = False,
-    set_: options.Settings = None,
-    utc_error: options.UtcError = None,
-    agent_socket: options.AgentSocketPath = None,
-    operator_socket: options.OperatorSocket = None,
-    agent_group: options.AgentGroup = None,
-    witness: options.Witnesses = None,
-    scenario: options.ScenarioName = None,
-    wait: options.Wait = False,
-    wait_for: options.WaitFor = None,
-    rehearsal: options.DryRun = False,
-    plain: options.Plain = False,
-    as_json: options.AsJson = False,
-) -> ExitCode:
+    context: typer.Context, bundle: options.Bundle, connect: options.OtherVehicle = None,
+    mode: options.DecidesIn = None, boundary_user: options.BoundaryUser = None,
+    boundary_socket: options.BoundarySocket = None, speed: options.Speed = 1.0, flavour: options.Flavour = None,
+    battery: options.Battery = None, wind: options.Wind = None, fault: options.Faults = None,
+    seed: options.Seed = None, vehicle: options.Identity = None, root: options.Roots = None,
+    log_key: options.LogKey = None, boundary_key: options.BoundaryKeyFile = None,
+    passphrase_file: options.PassphraseFile = None, signing_key: options.LinkKey = None,
+    unsigned_radio: options.UnsignedRadio = False, system: options.System = None, runs: options.Runs = Path("runs"),
+    state_dir: options.StateFolder = None, fresh_state: options.FreshState = False,
+    no_fence: options.NoFence = False, set_: options.Settings = None, utc_error: options.UtcError = None,
+    agent_socket: options.AgentSocketPath = None, operator_socket: options.OperatorSocket = None,
+    agent_group: options.AgentGroup = None, witness: options.Witnesses = None,
+    scenario: options.ScenarioName = None, wait: options.Wait = False, wait_for: options.WaitFor = None,
+    rehearsal: options.DryRun = False, plain: options.Plain = False, as_json: options.AsJson = False,
+) -> ExitCode:  # fmt: skip
     """Fly a bundle, once. Each step is decided before it is sent, monitored while it flies, and recorded.
 
     Without `--connect`, the command starts a simulated vehicle. Ctrl-C triggers a fallback and lands the vehicle first.
     With `--wait`, BUNDLE provides only the policy: an agent submits one mission, which is admitted like BUNDLE's.
     """
     words = simulator_words(flavour=flavour, battery=battery, wind=wind, faults=fault, seed=seed)
-    link = _links(context, connect, witness)
-    if isinstance(link, ExitCode):
+    if isinstance(link := _links(context, connect, witness), ExitCode):
         return link
     decides_in, unbuilt = mode_of(
         mode, own=connect is None, named=boundary_user is not None or boundary_socket is not None
     )
-    user = _boundary_user(boundary_user, decides_in)
-    group = _group(agent_socket, operator_socket, agent_group)
-    problem = next((each for each in (user, group) if isinstance(each, str)), None)
-    if problem is not None:
-        return fail(ExitCode.USAGE, problem)
+    user, group = _boundary_user(boundary_user, decides_in), _group(agent_socket, operator_socket, agent_group)
     address_, witnesses = link
-    if isinstance(witnesses, AddressError):
-        return misaddressed("--witness", witnesses)
     too_fast = _too_fast(address_, speed, sets=bool(set_) and not rehearsal)
-    if too_fast is not None:
-        return fail(ExitCode.USAGE, *too_fast)
+    misused = _misused(user, group, witnesses, too_fast)
+    if misused is not None or isinstance(witnesses, AddressError):
+        return misused or ExitCode.USAGE
     with ExitStack() as stack:
         # open the port before the slow imports: the system then buffers the first heartbeat
         transport = _listening(address_, stack)
-        from rtshcua.app.fly.dry_run import FlightRehearsal
         from rtshcua.app.fly.flight_request import FlightRequest
         from rtshcua.app.fly.stages import fly
         from rtshcua.front.cli.console import TerminalConsole
@@ -115,44 +87,43 @@ def run(
         if isinstance(incidents, Refusal):
             return say_refused(incidents, as_json=as_json)
         request = FlightRequest(
-            bundle=bundle,
-            link=address_,
-            mode=decides_in,
-            data=data_folder(),
-            state=state,
-            runs=runs,
-            simulator=words if incidents is None else incidents.words,
-            speed=speed,
-            vehicle=vehicle,
-            roots=tuple(root or ()),
-            log_key=log_key,
-            fence=not no_fence and not rehearsal,
-            signing_key=signing_key,
-            unsigned_radio=unsigned_radio,
-            agent_socket=agent_socket,
-            operator_socket=operator_socket,
-            agent_group=group if isinstance(group, int) else None,
-            dry_run=rehearsal,
-            system=system,
-            witnesses=witnesses,
-            incidents=incidents,
-            utc_error_us=duration_us(utc_error),
-            settings=settings_of(set_),
+            bundle=bundle, link=address_, mode=decides_in, data=data_folder(), state=state, runs=runs,
+            simulator=words if incidents is None else incidents.words, speed=speed, vehicle=vehicle,
+            roots=tuple(root or ()), log_key=log_key, fence=not no_fence and not rehearsal, signing_key=signing_key,
+            unsigned_radio=unsigned_radio, agent_socket=agent_socket, operator_socket=operator_socket,
+            agent_group=group if isinstance(group, int) else None, dry_run=rehearsal, system=system,
+            witnesses=witnesses, incidents=incidents, utc_error_us=duration_us(utc_error), settings=settings_of(set_),
             wait_s=(duration_us(wait_for) or _WAIT_US) / 1_000_000 if wait else None,
-            boundary_user=user if isinstance(user, tuple) else None,
-            unbuilt=unbuilt,
-            boundary_key=boundary_key,
+            boundary_user=user if isinstance(user, tuple) else None, unbuilt=unbuilt, boundary_key=boundary_key,
             boundary_socket=boundary_socket,
-        )
+        )  # fmt: skip
         console = TerminalConsole(_style(plain=plain, as_json=as_json), request.data, passphrase_file)
         ended = fly(request, console, transport)
+    return _ended(ended, as_json=as_json)
+
+
+def _ended(ended: "ExitCode | FlightRehearsal | Refusal", *, as_json: bool) -> ExitCode:
+    """Show how a flight or a rehearsal ended, if it did not tell that itself."""
     if isinstance(ended, Refusal):
         return say_refused(ended, as_json=as_json)
-    if isinstance(ended, FlightRehearsal):
-        from rtshcua.front.cli.render.showing.rehearsed import show_rehearsal  # shows what would pass as `why` does
+    if isinstance(ended, ExitCode):
+        return ended
+    from rtshcua.front.cli.render.showing.rehearsed import show_rehearsal  # shows what would pass as `why` does
 
-        return show_rehearsal(ended, as_json=as_json)
-    return ended
+    return show_rehearsal(ended, as_json=as_json)
+
+
+def _misused(
+    user: tuple[int, int] | str | None, group: int | str | None, witnesses: tuple[Address, ...] | AddressError,
+    too_fast: tuple[str, str] | None,
+) -> ExitCode | None:  # fmt: skip
+    """Report the first problem of the options; None if there is none."""
+    problem = next((each for each in (user, group) if isinstance(each, str)), None)
+    if problem is not None:
+        return fail(ExitCode.USAGE, problem)
+    if isinstance(witnesses, AddressError):
+        return misaddressed("--witness", witnesses)
+    return None if too_fast is None else fail(ExitCode.USAGE, *too_fast)
 
 
 def _links(

@@ -12,12 +12,12 @@ from rtshcua.adapters.boundary_process import program
 from rtshcua.adapters.simulator import Simulator, SimulatorError
 from rtshcua.adapters.store.signing import LinkKeyError, read_link_key
 from rtshcua.adapters.utc import kernel_error_us, vehicle_counts
-from rtshcua.adapters.vehicle import address
-from rtshcua.adapters.vehicle.address import AddressError, LinkCarrier
+from rtshcua.adapters.vehicle.address import LinkCarrier
 from rtshcua.app.exit_codes import code_of
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.faults import fail, misaddressed
+from rtshcua.front.cli.faults import fail
 from rtshcua.front.cli.options import flight_options as simulated
+from rtshcua.front.cli.options.addresses import address_of
 from rtshcua.front.cli.stdout import out, out_json
 from rtshcua.simulation.config import Answers, AutopilotKind, Boot, Estimate
 
@@ -32,57 +32,64 @@ climb; and MAVProxy cannot encode PX4's modes (`mode RTL`)."""
 app = typer.Typer(add_completion=False)
 
 
+Port = Annotated[int | None, typer.Option(min=1, max=65_535, help=f"UDP port to send to (default: {PORT})")]
+Connect = Annotated[str | None, typer.Option(metavar="udpout:HOST:PORT", help="the port to send to, as a link address")]
+Speed = Annotated[float, typer.Option(min=0.1, max=200, help="speed-up of the simulation")]
+System = Annotated[int, typer.Option(min=1, max=255, help="MAVLink system id")]
+BootTime = Annotated[Boot, typer.Option(help="sensor start-up: 1 s, or as recorded (PX4 5 s, ArduCopter 42 s)")]
+AnswerTime = Annotated[Answers, typer.Option(help="response delays: none, or as recorded")]
+EstimateKind = Annotated[
+    Estimate, typer.Option(help="position estimate: within centimetres, or as with a real receiver")
+]
+SigningKey = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="accept only frames signed with this key (see `keys link`)")
+]
+Stock = Annotated[
+    bool, typer.Option("--stock", help="only GPS, barometer and battery: no radio, range finder, wind or voltage")
+]
+Parameter = Annotated[
+    list[str] | None, typer.Option(metavar="NAME=VALUE", help="set an autopilot parameter (repeatable)")
+]
+Usb = Annotated[bool, typer.Option("--usb", help="treat the link as USB, where ArduCopter accepts unsigned commands")]
+Release = Annotated[
+    str | None,
+    typer.Option(
+        metavar="MAJOR.MINOR",
+        callback=simulated.release,
+        help="firmware release to simulate: PX4 1.16 (no signing), 1.17 or 1.18",
+    ),
+]
+AsJson = Annotated[bool, typer.Option("--json", help="print one JSON object about the started vehicle")]
+
+
 @app.command()
 def sim(
     flavour: simulated.Flavour = None,
-    port: Annotated[int | None, typer.Option(min=1, max=65_535, help=f"UDP port to send to (default: {PORT})")] = None,
-    connect: Annotated[
-        str | None, typer.Option(metavar="udpout:HOST:PORT", help="the port to send to, as a link address")
-    ] = None,
-    speed: Annotated[float, typer.Option(min=0.1, max=200, help="speed-up of the simulation")] = 1.0,
-    system: Annotated[int, typer.Option(min=1, max=255, help="MAVLink system id")] = 1,
+    port: Port = None,
+    connect: Connect = None,
+    speed: Speed = 1.0,
+    system: System = 1,
     battery: simulated.Battery = None,
     wind: simulated.Wind = None,
     fault: simulated.Faults = None,
     seed: simulated.Seed = None,
     home: simulated.Home = None,
-    boot: Annotated[Boot, typer.Option(help="sensor start-up: 1 s, or as recorded (PX4 5 s, ArduCopter 42 s)")] = (
-        Boot.FAST
-    ),
-    answers: Annotated[Answers, typer.Option(help="response delays: none, or as recorded")] = Answers.RECORDED,
-    estimate: Annotated[
-        Estimate, typer.Option(help="position estimate: within centimetres, or as with a real receiver")
-    ] = Estimate.CLOSE,
-    signing_key: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="accept only frames signed with this key (see `keys link`)")
-    ] = None,
-    stock: Annotated[
-        bool, typer.Option("--stock", help="only GPS, barometer and battery: no radio, range finder, wind or voltage")
-    ] = False,
-    parameter: Annotated[
-        list[str] | None, typer.Option(metavar="NAME=VALUE", help="set an autopilot parameter (repeatable)")
-    ] = None,
-    usb: Annotated[
-        bool, typer.Option("--usb", help="treat the link as USB, where ArduCopter accepts unsigned commands")
-    ] = False,
-    release: Annotated[
-        str | None,
-        typer.Option(
-            metavar="MAJOR.MINOR",
-            callback=simulated.release,
-            help="firmware release to simulate: PX4 1.16 (no signing), 1.17 or 1.18",
-        ),
-    ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="print one JSON object about the started vehicle")] = False,
+    boot: BootTime = (Boot.FAST),
+    answers: AnswerTime = Answers.RECORDED,
+    estimate: EstimateKind = Estimate.CLOSE,
+    signing_key: SigningKey = None,
+    stock: Stock = False,
+    parameter: Parameter = None,
+    usb: Usb = False,
+    release: Release = None,
+    as_json: AsJson = False,
 ) -> ExitCode:
     """Run the simulated vehicle until Ctrl-C. It sends to a UDP port of this machine and obeys its peer there."""
     if port is not None and connect is not None:
         return fail(ExitCode.USAGE, "`--port` and `--connect` cannot be combined: both set the port")
     if connect is not None:
-        try:
-            link = address.parse(connect, (LinkCarrier.UDP_OUT,))
-        except AddressError as error:
-            return misaddressed("--connect", error)
+        if isinstance(link := address_of(connect, ways=(LinkCarrier.UDP_OUT,)), ExitCode):
+            return link
         if not link.is_loopback:
             return fail(
                 ExitCode.USAGE,
@@ -95,16 +102,11 @@ def sim(
     if home is not None:
         words.append(f"--home={home}")
     if signing_key is not None:
-        try:
-            read_link_key(signing_key)
-        except LinkKeyError as error:
-            return fail(code_of(error.slug), str(error), error.help, slug=f"link-key-{error.slug}")
-        except OSError as error:
-            return fail(ExitCode.INPUT, str(error))
+        if (unread := _unread(signing_key)) is not None:
+            return unread
         words.append(f"--signing-key={signing_key}")
     words += [f"--parameter={each}" for each in parameter or ()]
-    words += ["--usb"] if usb else []
-    words += ["--stock"] if stock else []
+    words += [*(["--usb"] if usb else []), *(["--stock"] if stock else [])]
     words += [f"--release={release}"] if release is not None else []
     words += [f"--boot={boot}", f"--answers={answers}", f"--estimate={estimate}"]
     try:
@@ -121,6 +123,17 @@ def sim(
         except KeyboardInterrupt:
             return ExitCode.OK
     return fail(ExitCode.FAULT, f"the simulated vehicle ended unexpectedly with code {code}")
+
+
+def _unread(path: Path) -> ExitCode | None:
+    """Report a link key that cannot be read; None if it can."""
+    try:
+        read_link_key(path)
+    except LinkKeyError as error:
+        return fail(code_of(error.slug), str(error), error.help, slug=f"link-key-{error.slug}")
+    except OSError as error:
+        return fail(ExitCode.INPUT, str(error))
+    return None
 
 
 def _options(signing_key: Path | None, speed: float) -> str:

@@ -11,7 +11,7 @@ from rtshcua.adapters.store.writing import write_out
 from rtshcua.app.exit_codes import exit_code
 from rtshcua.app.files import overwriting_a_source
 from rtshcua.app.testing.generate import GenerateRequest, NotGenerated, generate
-from rtshcua.app.testing.run import least_share, run_all, select_files
+from rtshcua.app.testing.run import TestResults, least_share, run_all, select_files
 from rtshcua.app.wording import many
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -111,6 +111,10 @@ def run_tests(
         every = (*case_suites(done.ran, done.sources, done.covered), *scenario_suites(done.flown, done.sources))
         write_out(junit_file, junit(every).encode())
     show.summary(least)
+    return _finished(done, least, findings)
+
+
+def _finished(done: TestResults, least: int | None, findings: Findings) -> ExitCode:
     shares = None if done.covered is None else coverage_json(done.covered, done.sources)
     return findings.finish(
         done.code(least),

@@ -98,7 +98,7 @@ class CampaignProgress(Protocol):
         """The flights are over."""
 
 
-class Stop(AbstractContextManager[object], Protocol):
+class CampaignStop(AbstractContextManager[object], Protocol):
     """Within it, `look` raises when the campaign is to stop."""
 
     def look(self) -> None:
@@ -146,7 +146,7 @@ def prepare(start: CampaignStart, say: Callable[[str], None]) -> Campaign | Refu
     return Campaign(request, start.folder, start.begun is not None, identity, field, space, start.folder.past())
 
 
-def fly(made: Campaign, progress: CampaignProgress, stop: Stop) -> CampaignSummary | Refusal:
+def fly(made: Campaign, progress: CampaignProgress, stop: CampaignStop) -> CampaignSummary | Refusal:
     """Fly what was not flown yet, shrink failing flights, and write the report. `progress` and `stop` may raise."""
     request, folder = made.request, made.folder
     try:

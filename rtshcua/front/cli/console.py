@@ -1,5 +1,6 @@
 """The console of a flight started from a terminal: its output, and its passphrase prompts."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +9,11 @@ from typing import Literal
 import msgspec
 
 from rtshcua.adapters.store.keystore import KeyStore
+from rtshcua.app.exit_codes import code_of
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli import faults
+from rtshcua.front.cli.faults import error_object, fail, tell
 from rtshcua.front.cli.render.live.feed import Feed
 from rtshcua.front.cli.render.showing import log
 from rtshcua.front.cli.stdout import out_json
@@ -53,3 +58,14 @@ class TerminalConsole:
     def unlock(self, duty: Duty, path: Path | None) -> SigningKey:
         """Return a key from a file or the key store; prompts for the passphrase if the key has one."""
         return unlock(KeyStore(self.data), duty, path=path, passphrase_file=self.passphrase_file)
+
+
+def say_refused(refusal: Refusal, *, as_json: bool) -> ExitCode:
+    """Print a refusal and return its exit code; with `as_json` print it also as a JSON event."""
+    slug, text, help, code = refusal
+    code = code or code_of(slug)
+    if not as_json:
+        return fail(code, text, help, slug=slug)
+    event: dict[str, object] = {"event": "refused", "slug": slug, "text": text, "help": help or None}
+    out_json(json.dumps(event | error_object(code, text, help, slug=slug), ensure_ascii=False))
+    return tell(code, text, help, slug=slug)

@@ -134,7 +134,7 @@ def doctor(
         return distrust(error)
     if isinstance(wanted, Refusal):
         return refuse(wanted)
-    how = Examination(
+    how = VehicleExamination(
         link, seconds, signing_key, unsigned_radio, system, settings_of(set_), duration_us(utc_error), boundary_socket,
         decides,
     )  # fmt: skip
@@ -149,7 +149,7 @@ def doctor(
     return code
 
 
-class Examination(NamedTuple):
+class VehicleExamination(NamedTuple):
     """How a vehicle is examined: at which link, for how long, with which key, and where a run would decide."""
 
     link: Address
@@ -164,7 +164,7 @@ class Examination(NamedTuple):
 
 
 def _examine(
-    wanted: tuple[Policy, Mission | None, TrustRoot | None], how: Examination, agents: list[VehicleFinding],
+    wanted: tuple[Policy, Mission | None, TrustRoot | None], how: VehicleExamination, agents: list[VehicleFinding],
     clock: SystemClock,
 ) -> list[VehicleFinding] | Refusal:  # fmt: skip
     """Listen to the vehicle, and return what was found."""

@@ -21,7 +21,7 @@ from rtshcua.app.programs import compile_sources
 from rtshcua.app.signing_keys import check_trusted
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli.console import TerminalConsole
+from rtshcua.front.cli.console import TerminalConsole, say_refused
 from rtshcua.front.cli.faults import fail
 from rtshcua.front.cli.options.addresses import address_of
 from rtshcua.front.cli.options.conflicts import conflict_of
@@ -35,7 +35,6 @@ from rtshcua.front.cli.options.flight_options import (
     duration_us,
 )
 from rtshcua.front.cli.render.findings import Findings
-from rtshcua.front.cli.render.refused import say_refused
 from rtshcua.front.cli.render.showing.qualification import described, told
 from rtshcua.front.cli.stdout import out, out_json
 from rtshcua.front.cli.unlock import unlock_for

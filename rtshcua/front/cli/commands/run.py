@@ -19,11 +19,11 @@ from rtshcua.adapters.vehicle.transport import Transport, open_transport
 from rtshcua.app.fly.witnesses import addresses
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli.console import say_refused
 from rtshcua.front.cli.faults import fail, misaddressed
 from rtshcua.front.cli.options import flight_options as options
 from rtshcua.front.cli.options.conflicts import conflict_of
 from rtshcua.front.cli.options.flight_options import duration_us, mode_of, settings_of, simulator_words
-from rtshcua.front.cli.render.refused import say_refused
 from rtshcua.onboard.enforcement.load import EnforcementMode
 
 if TYPE_CHECKING:

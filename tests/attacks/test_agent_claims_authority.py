@@ -110,7 +110,7 @@ def test_a_replacement_claims_no_more_than_a_mission(compiles: Compile) -> None:
 
 
 def test_a_mission_of_the_library_is_pinned_as_well(compiles: Compile) -> None:
-    """`--mission` picks one that the specification imports: it is held to what was said, too."""
+    """`--mission` selects an imported mission, which is restricted in the same way."""
     imports = [*PROPOSAL["imports"], "lib:missions/one_bridge.rts"]
     found = compiles(PROPOSAL | {"imports": imports}, *UNDER, "--role", "trainee", "--mission", "one_bridge")
     assert set(found[1]) == {"E0905"}
@@ -133,13 +133,13 @@ def test_compiler_refuses_to_sign_what_root_forbids(compiles: Compile, tmp_path:
 
 
 def rooted(**bound: tuple[str, ...]) -> TrustRoot:
-    """The root, with the mission key bound otherwise."""
+    """The root, with another authorisation of the mission key."""
     keys = tuple(replace(key, **bound) if key.duty is Duty.MISSION else key for key in ROOT.keys)
     return replace(ROOT, keys=keys)
 
 
 def opened(root: TrustRoot, mission: Mission = MISSION) -> str:
-    """What the boundary says to a mission that the attacker signed: a slug, or nothing."""
+    """The boundary's refusal slug for a mission signed by the attacker, or None."""
     found = load(
         sealed(POLICY, mission), root=root, vehicle=VEHICLE, now=START, mode=EnforcementMode.SOFTWARE,
         session_key=bytes(32), flight=bytes(16), peer_is_own_simulator=True,
@@ -170,7 +170,7 @@ def test_boundary_restricts_mission_key_to_source_role_and_policy() -> None:
     ],
 )
 def test_audit_restricts_mission_key_too(bound: dict[str, tuple[str, ...]], slug: str) -> None:
-    """The log of a flight whose boundary looked away."""
+    """The log of a flight whose boundary did not check."""
     made, _ = case.root()
     keys = tuple(replace(key, **bound) if key.duty is Duty.MISSION else key for key in made.keys)
     root = replace(made, keys=keys).sign(case.KEYS[Duty.ROOT])
@@ -179,7 +179,7 @@ def test_audit_restricts_mission_key_too(bound: dict[str, tuple[str, ...]], slug
 
 
 def test_agent_cannot_replace_steps_of_a_person() -> None:
-    """Its key signs a mission of its own in the place of an operator's, before that has begun."""
+    """Its key signs a mission that replaces steps of an operator which have not begun."""
     flying = world.loaded(POLICY, through(SourceKind.OPERATOR))
     taken = world.renewed(flying, rooted(sources=("agent",)))
     whole = replace(shorter(flying), invocations=tuple(
@@ -195,6 +195,6 @@ def test_agent_cannot_replace_steps_of_a_person() -> None:
 
 
 def test_the_payload_of_a_mission_names_no_key() -> None:
-    """Who signed is what the envelope says, and the root decides what that key may say."""
+    """The envelope names the signer, and the root decides what that key may sign."""
     _, mission = envelopes(sealed())
     assert cose.unverified(mission).kid == MISSION_KEY.kid

@@ -32,13 +32,13 @@ from rtshcua.adapters.agent_socket import (
 
 @pytest.fixture
 def path() -> Iterator[Path]:
-    """A short one: a socket's has at most 107 bytes."""
+    """A short path, because the path of a socket has at most 107 bytes."""
     with tempfile.TemporaryDirectory(dir="/tmp") as name:
         yield Path(name) / "s"
 
 
 class Endless:
-    """A listener to which somebody has always just connected, and hung up again."""
+    """A listener with an endless sequence of connections that are closed at once."""
 
     def __init__(self) -> None:
         self.accepted = 0
@@ -66,7 +66,7 @@ def test_flight_continues_under_connection_flood(path: Path, monkeypatch: pytest
 
 
 def test_one_turn_limits_greetings_and_output(path: Path) -> None:
-    """A greeting tells of a mission of any size, and whoever hangs up and comes again is sent it each time."""
+    """A greeting describes the mission, of any size, and is sent on each new connection."""
     greeting, greeted = b"x" * 150_000 + b"\n", list[int]()
 
     def greet() -> bytes:
@@ -101,7 +101,7 @@ def _now(link: socket.socket) -> bytes:
 
 
 def test_repeated_connections_are_rate_limited(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The others do not wait until all of its connections were greeted."""
+    """The other clients do not wait until all of its connections were greeted."""
     agents = AgentSocket(path, lambda: b"{}\n")
     peers, welcomed = chain(repeat(7, 3 * MOST_TAKEN), repeat(8)), list[int]()
     endless: Any = Endless()
@@ -119,7 +119,7 @@ def test_repeated_connections_are_rate_limited(path: Path, monkeypatch: pytest.M
 
 
 def test_silent_listener_does_not_delay_start(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its queue is full, so a connection would be waited for, for ever."""
+    """Its queue is full, so that a connection would wait for ever."""
     monkeypatch.setattr(agent_socket, "_PATIENCE_S", 0.01)
     with socket.socket(socket.AF_UNIX) as listener, socket.socket(socket.AF_UNIX) as first:
         listener.bind(str(path))
@@ -132,7 +132,7 @@ def test_silent_listener_does_not_delay_start(path: Path, monkeypatch: pytest.Mo
 
 @pytest.mark.parametrize("most", [MOST_OF_A_PEER, MOST_READERS])
 def test_recall_gets_a_slot_among_idle_readers(path: Path, monkeypatch: pytest.MonkeyPatch, most: int) -> None:
-    """Whether they are all of one process, or each of another."""
+    """The readers belong to one process or to several."""
     processes = repeat(1) if most == MOST_OF_A_PEER else count(1)
     monkeypatch.setattr(agent_socket, "peer_of", lambda _: Peer(next(processes), None))
     agents = AgentSocket(path, lambda: b"{}\n")
@@ -177,7 +177,7 @@ print(made)
 
 @pytest.mark.parametrize("operators", [True, False], ids=["their own socket", "the agents' socket"])
 def test_a_recall_gets_through_a_flood(path: Path, operators: bool) -> None:
-    """Two processes flood the agents' socket; the operator's recalls are answered all the same, one after the other."""
+    """Two processes flood the agents' socket; all recalls of the operator are answered, one after the other."""
     numbers = count(1)
     agents = AgentSocket(path, lambda: b"{}\n" * 100, numbers=numbers)
     own = AgentSocket(path.with_name("o"), lambda: b"{}\n", own=True, numbers=numbers)

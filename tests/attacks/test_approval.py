@@ -42,7 +42,7 @@ def fresh() -> Loaded:
 
 
 def asked(of: Loaded, **changed: object) -> Decision:
-    """What is decided about the step that must be confirmed, when its turn has come."""
+    """The decision about the step that needs an approval, at its turn."""
     for step in (0, 1):
         answer_to(of, request_for(of, step=step))
     answer = answer_to(of, request_for(of, step=ASKED, **changed))
@@ -124,7 +124,7 @@ def test_key_of_another_duty_is_refused(key: SigningKey) -> None:
 
 
 def entitled(**fields: object) -> Loaded:
-    """The mission in a world where the supervisor's key may speak for something else."""
+    """The mission in a world where the supervisor's key has another authorisation."""
     rest = [key for key in ROOT.keys if key.duty is not Duty.APPROVAL]
     usual: dict[str, object] = {"roles": ("supervisor",), "sources": ("operator",), "vehicles": (VEHICLE,)}
     root = replace(ROOT, keys=(*rest, APPROVAL_KEY.verification(**(usual | fields))))  # type: ignore[arg-type]
@@ -147,7 +147,7 @@ def entitled(**fields: object) -> Loaded:
     ],
 )
 def test_unauthorised_key_is_refused(fields: dict[str, object], slug: str) -> None:
-    """Above all: a key that an agent's host holds answers nothing in a person's place."""
+    """Most importantly, a key on an agent's host cannot answer in a person's place."""
     of = entitled(**fields)
     assert presented(of, approval(of)).slug == slug
 
@@ -195,7 +195,7 @@ def test_approval_by_other_role_is_refused() -> None:
 
 
 def test_approval_of_another_step_is_refused() -> None:
-    """Id of one step, binding of another: neither is approved."""
+    """The id of one step and the binding of another approve neither."""
     of = fresh()
     other = of.bundle.mission.invocations[1]
     assert presented(of, approval(of, binding=other.binding)).slug == "binding-mismatch"
@@ -204,7 +204,7 @@ def test_approval_of_another_step_is_refused() -> None:
 
 
 def test_approval_of_earlier_flight_is_refused() -> None:
-    """The same mission, compiled again: other ids."""
+    """The same mission compiled again has other ids."""
     earlier = approval(OF)
     again = loaded(mission=replace(low_mission(), issued_at_us=ISSUED + S))
     assert presented(again, earlier).slug == "other-mission"
@@ -256,14 +256,14 @@ def test_time_that_goes_back_is_refused() -> None:
 
 
 def awaited() -> Run:
-    """A run whose approval was recorded and read; closed."""
+    """A closed run whose approval was recorded and used."""
     run = Run(fresh())
     hand(run, approval(run.loaded, now=run.clock.now()))
     return run.until_over()
 
 
 def test_log_with_invented_document_fails() -> None:
-    """Whoever holds the log's key invents an approval in the inputs of a decision, or in an effect."""
+    """A holder of the log's key invents an approval in the inputs of a decision, or in an effect."""
     run = awaited()
     lines = [*run.lines, run.recorder.close(run.clock.now(), ending=str(run.ending), tlog=None)]
     assert run.events.count("approval") == 1

@@ -36,13 +36,13 @@ OTHER = bytes([7]) * 16
 
 
 def in_another_flight(of: Loaded = OF) -> Loaded:
-    """The same bundle once more, on a vehicle that lost its memory of the first flight."""
+    """The same bundle on a vehicle that lost its state of the first flight."""
     in_force = InForce(of.bundle, of.policy, of.invocations, ROOT, VEHICLE, OTHER, 0)
     return session(in_force, of.mode, bytes(32))
 
 
 def another_mission() -> Loaded:
-    """A mission whose step has the id and the binding of the one that was approved, and whose end is another one."""
+    """A mission with a step of the approved id and binding, but with another end."""
     bundle = with_fields(OF.bundle, mission_digest=bytes(32))
     in_force = InForce(bundle, OF.policy, OF.invocations, ROOT, VEHICLE, FLIGHT, 0)
     return session(in_force, OF.mode, bytes(32))
@@ -63,7 +63,9 @@ def test_document_is_valid_for_one_mission(document: Callable[[Loaded], bytes], 
 
 
 def test_an_approval_names_the_mission_that_is_in_force() -> None:
-    """One for a step that stays, signed before a replacement came, is asked for anew; one that was taken counts on."""
+    """An approval of a kept step that was signed before the replacement must be repeated; one that was accepted stays
+    valid.
+    """
     of = renewed(OF)
     before = approval(of)
     first, second, third, last = of.bundle.mission.invocations

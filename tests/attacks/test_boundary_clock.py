@@ -59,7 +59,7 @@ def machine(error_us: int = 1_000) -> Now:
 
 
 class Held:
-    """A boundary's process with its own clock, and whoever speaks for the runtime."""
+    """A boundary's process with its own clock, and a client in the runtime's place."""
 
     def __init__(
         self, state: Path, *, issued_us: int | None = None, expires_us: int | None = None, **more: Any
@@ -132,7 +132,7 @@ def test_step_with_foreign_time_is_not_decided(held: Held, which: str, by_us: in
 
 @pytest.mark.parametrize("by_us", [5 * HOUR_US, -5 * HOUR_US])
 def test_wrong_clock_error_is_refused(held: Held, by_us: int) -> None:
-    """As large as it takes, everything that asks for the time of day is in doubt by itself."""
+    """A sufficiently large error makes every condition on the time of day unknown."""
     here = machine()
     assert held.ask(replace(here, utc_us=here.utc_us + by_us, utc_error_us=abs(by_us) - APART_US - S_US)) is (
         Status.CLOCK_APART
@@ -143,7 +143,7 @@ def test_wrong_clock_error_is_refused(held: Held, by_us: int) -> None:
 
 
 def test_expired_bundle_is_refused_despite_claimed_time(tmp_path: Path) -> None:
-    """Five hours after its issue; by the true time it is refused, and by no other it is decided."""
+    """Five hours after its issue, it is refused by the true time, and not decided at any other."""
     held = Held(tmp_path, issued_us=machine().utc_us - 5 * HOUR_US, utc_error_us=1_000)
     held.own(settle=True)
     early = replace(machine(), utc_us=held.issued_us + 60 * S_US)
@@ -192,7 +192,7 @@ def test_claimed_time_is_refused_without_boundary_time(tmp_path: Path) -> None:
 
 
 class Keyed(Held):
-    """One whose link has a key, and a vehicle at the other end."""
+    """A boundary whose link has a key, and a vehicle at the other end."""
 
     def __init__(self, state: Path, **more: Any) -> None:
         key = state / "link.key"
@@ -205,7 +205,7 @@ class Keyed(Held):
             pytest.skip("this machine's clock is synchronised")
 
     def said(self, message: Any, codec: Codec = AUTOPILOT) -> bytes:
-        """A frame as the vehicle sends it."""
+        """A frame as sent by the vehicle."""
         return self.vehicle.sign(codec.pack(message), machine().monotonic_us)
 
     def hear(self, *frames: bytes) -> None:
@@ -247,7 +247,7 @@ def test_boundary_time_comes_from_verified_frames(keyed: Keyed) -> None:
 
 @pytest.mark.parametrize(("autopilot", "least_us"), [(None, 6_000_000), (12, 6_000_000), (3, 1_000_000)])
 def test_clock_error_is_autopilot_tolerance(keyed: Keyed, autopilot: int | None, least_us: int) -> None:
-    """As its HEARTBEAT says, which was verified too; the worse of both where none was heard."""
+    """According to its verified HEARTBEAT; the larger error if none was received."""
     if autopilot is not None:
         keyed.hear(keyed.said(m.MAVLink_heartbeat_message(2, autopilot, 0, 0, 4, 3)))
     keyed.hear(keyed.answers(), keyed.tells(machine().utc_us))
@@ -255,7 +255,7 @@ def test_clock_error_is_autopilot_tolerance(keyed: Keyed, autopilot: int | None,
 
 
 def test_delayed_frames_do_not_set_time(keyed: Keyed) -> None:
-    """The hour that is past was signed before the boundary drew its number, or the answer to another."""
+    """The frame with the past time was signed before the boundary drew its number, or answers another number."""
     past = keyed.tells(machine().utc_us - 5 * HOUR_US)
     keyed.hear(past, keyed.answers())
     assert keyed.own().source is ClockSource.UNKNOWN
@@ -284,7 +284,7 @@ def test_time_of_other_component_or_unsigned_frame_is_ignored(keyed: Keyed) -> N
 
 
 def test_keys_are_checked_again_once_time_is_known(tmp_path: Path) -> None:
-    """The bundle was opened while nobody knew; by the vehicle's time its root has expired."""
+    """The bundle was opened while the time was unknown; by the vehicle's time its root has expired."""
     keyed = Keyed(tmp_path, expires_us=machine().utc_us + HOUR_US)
     assert isinstance(keyed.load(), Loaded)
     keyed.hear(keyed.answers(), keyed.tells(machine().utc_us + 2 * HOUR_US))
@@ -297,7 +297,7 @@ def test_keys_are_checked_again_once_time_is_known(tmp_path: Path) -> None:
 
 
 def test_statement_contains_boundary_time(held: Held) -> None:
-    """Whatever time the runtime asks for it at."""
+    """The statement has the boundary's time, whatever time the runtime sends."""
     held.loaded.attestation.begin(BoundaryKey(case.BOUNDARY_KEY, 1, bytes(32)))
     data = held.loaded.attestation.statement(Now(1, 1, 0))
     assert data is not None
@@ -308,7 +308,7 @@ def test_statement_contains_boundary_time(held: Held) -> None:
 
 
 def of_own_clock(number: int, source: ClockSource, ahead_us: int, error_us: int = 1_000) -> bytes:
-    """The line of a statement, as a boundary signs it whose clock is so far ahead of what the record claims."""
+    """The line of a statement by a boundary whose clock differs by this much from the record's claim."""
     record = read(LINES[number])
     said = replace(
         open_statement_of(record["detail"]), source=source, at_us=record["at_us"],

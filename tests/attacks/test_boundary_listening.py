@@ -42,7 +42,7 @@ def now() -> Now:
 
 
 class Provisioned:
-    """A boundary that listens, what its folder holds, and a bundle for it."""
+    """A boundary that listens, the contents of its folder, and a bundle for it."""
 
     def __init__(self, made: Listening) -> None:
         self.made, self.socket = made, made.socket
@@ -96,7 +96,7 @@ def test_listening_boundary_uses_keys_of_its_folder(provisioned: Provisioned) ->
 
 
 def as_user(user: int, act: Callable[[], int]) -> int:
-    """What a program of another user comes to, which acts so; 101 where it fails."""
+    """The result of a program that acts as another user; 101 if it fails."""
     child = os.fork()
     if child == 0:
         try:
@@ -155,7 +155,7 @@ def test_a_second_connection_is_turned_away(provisioned: Provisioned) -> None:
 
 @pytest.mark.parametrize("pending", [False, True])
 def test_halted_boundary_ends(provisioned: Provisioned, pending: bool) -> None:
-    """Whoever connected may not kill it: the kernel does, and the next one begins no step of the bundle again."""
+    """The connected user may not kill it: the kernel does, and the next one begins no step of the bundle again."""
     process = ListeningBoundary(provisioned.socket)
     provisioned.load(process)
     (halted,) = provisioned.made.boundaries()
@@ -192,7 +192,7 @@ def test_passed_descriptors_are_closed(provisioned: Provisioned) -> None:
 
 
 def test_unread_answer_ends_session(provisioned: Provisioned) -> None:
-    """Whoever fills the socket harms the boundary that it has, and the next one serves."""
+    """Filling the socket only affects the present boundary, and the next one serves."""
     process = ListeningBoundary(provisioned.socket)
     process._socket.settimeout(0.5)
     with suppress(TimeoutError):
@@ -204,7 +204,7 @@ def test_unread_answer_ends_session(provisioned: Provisioned) -> None:
 
 
 def test_hanging_boundary_is_awaited(provisioned: Provisioned, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run that is begun again at once finds it serving: on a link with a key nothing else brings the vehicle down."""
+    """A run that restarts at once finds it serving; on a link with a key nothing else can bring the vehicle down."""
     monkeypatch.undo()
     process = ListeningBoundary(provisioned.socket)
     (halted,) = provisioned.made.boundaries()
@@ -214,7 +214,7 @@ def test_hanging_boundary_is_awaited(provisioned: Provisioned, monkeypatch: pyte
 
 
 def test_invented_time_is_refused(provisioned: Provisioned) -> None:
-    """And no run may ask it to: `--speed` needs one that was started so."""
+    """No run can request invented time either: `--speed` requires a boundary that was started with it."""
     process = ListeningBoundary(provisioned.socket)
     provisioned.load(process)
     at = struct.pack(">q", now().monotonic_us + 10_000_000)
@@ -228,7 +228,7 @@ def test_invented_time_is_refused(provisioned: Provisioned) -> None:
 
 @pytest.mark.parametrize("name", ["root.trust", "root.pin", "log.seed"])
 def test_missing_file_is_reported(provisioned: Provisioned, name: str) -> None:
-    """It is named among what to look at."""
+    """The message names the file."""
     (provisioned.made.own / name).unlink()
     with pytest.raises(BoundaryError) as refused:
         ListeningBoundary(provisioned.socket)
@@ -238,7 +238,7 @@ def test_missing_file_is_reported(provisioned: Provisioned, name: str) -> None:
 
 @pytest.mark.parametrize("name", ["root.trust", "root.pin", "log.seed", "boundary.seed", "link.key"])
 def test_unreadable_file_is_reported(provisioned: Provisioned, name: str) -> None:
-    """A link key that is not read would leave the vehicle with one that signs nothing."""
+    """Without its link key the vehicle would have a boundary that signs nothing."""
     place = provisioned.made.own / name
     kept = place.read_bytes()
     place.rename(place.with_name("elsewhere"))
@@ -256,13 +256,13 @@ def test_unreadable_file_is_reported(provisioned: Provisioned, name: str) -> Non
 
 @pytest.mark.parametrize("octets", [b"", b"\n", b"no key\n", b"5a" * 600, b" " * 200])
 def test_invalid_pin_is_reported(provisioned: Provisioned, octets: bytes) -> None:
-    """A development root is not trusted for want of one."""
+    """A development root is not trusted when the pin is missing."""
     provisioned.put("root.pin", octets)
     assert provisioned.why_not() == "untrusted"
 
 
 def test_runtime_gone_before_answer_is_handled(provisioned: Provisioned) -> None:
-    """The bundle is given back, for nothing was sent of it."""
+    """The bundle is released, because nothing of it was sent."""
     process = ListeningBoundary(provisioned.socket)
     (halted,) = provisioned.made.boundaries()
 
@@ -319,7 +319,7 @@ def test_invalid_files_are_reported(provisioned: Provisioned) -> None:
 
 
 def test_boundary_serves_only_its_vehicle(provisioned: Provisioned) -> None:
-    """A runtime that says another one changes nothing: there is no folder of it."""
+    """Another vehicle in the runtime's request changes nothing, because there is no folder for it."""
     provisioned.made.own.rename(provisioned.made.folder / "quad-08")
     assert provisioned.why_not() == "not-begun"
 

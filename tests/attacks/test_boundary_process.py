@@ -69,7 +69,7 @@ def now() -> Now:
 
 
 class Held:
-    """A boundary's process with a bundle in force, and the runtime's reading of it."""
+    """A boundary's process with a bundle in force, and the runtime's copy of the bundle."""
 
     def __init__(
         self, state: Path, user: tuple[int, int] | None = None, *, issued: int | None = None, **more: Any
@@ -116,7 +116,7 @@ def armed_frame() -> bytes:
 
 @ROOT_USER
 def test_another_user_cannot_read_boundary(tmp_path: Path) -> None:
-    """As the runtime's user: not its memory, nor by ptrace, nor a core dump of it; and it may do next to nothing."""
+    """As the runtime's user: no memory, no ptrace, no core dump; the process itself has few rights."""
     held = Held(tmp_path, (65_534, 65_534))
     try:
         assert Measure.OWN_USER in held.process.measures
@@ -133,7 +133,7 @@ def test_another_user_cannot_read_boundary(tmp_path: Path) -> None:
 
 
 def as_user(user: int, pid: int) -> int:
-    """A program of another user that tries to read a process; 0 where it reads nothing."""
+    """A program of another user that tries to read a process; 0 if it reads nothing."""
     child = os.fork()
     if child == 0:
         try:
@@ -165,7 +165,7 @@ def test_second_runtime_finds_boundary_in_use(held: Held, tmp_path: Path) -> Non
 
 
 def test_permit_cannot_be_forged_or_reused(held: Held, tmp_path: Path) -> None:
-    """One that the runtime seals, with any key that it has; and one of another session of the same bundle."""
+    """Permits sealed by the runtime with any of its keys, and permits of another session of the same bundle."""
     at = struct.pack(">q", now().monotonic_us)
     step = Permit(STEP, 0, -1, 1, 0, 0, 1 << 62)
     for key in (bytes(32), b"\x01" * 32, os.urandom(32)):
@@ -184,7 +184,7 @@ def test_step_out_of_turn_is_refused_by_process(held: Held) -> None:
 
 
 def test_invented_time_is_refused_by_process(held: Held) -> None:
-    """Nothing is decided ahead of its time, nor by a time that is long past: it has a clock of its own."""
+    """Nothing is decided ahead of time, or for a time long past, because the boundary has its own clock."""
     here = now()
     for by_us in (10_000_000, -10_000_000):
         at = replace(here, monotonic_us=here.monotonic_us + by_us, utc_us=here.utc_us + by_us)
@@ -195,7 +195,9 @@ def test_invented_time_is_refused_by_process(held: Held) -> None:
 
 
 def test_bundle_flies_once_despite_runtime(tmp_path: Path) -> None:
-    """Its marks are the boundary's own. A restart of it takes the bundle, and lets no step of it begin."""
+    """The boundary stores the opened missions itself. After a restart it loads the bundle, but lets no step of it
+    begin.
+    """
     first = Held(tmp_path)
     first.load()
     os.kill(first.process.pid, signal.SIGKILL)
@@ -208,7 +210,7 @@ def test_bundle_flies_once_despite_runtime(tmp_path: Path) -> None:
 
 
 def test_frames_without_bundle_are_equal_in_both_processes(tmp_path: Path) -> None:
-    """It lets out a greeting, and the id of its next flight is known; a bundle that it refuses changes neither."""
+    """It passes a greeting, and the id of its next flight is known; a refused bundle changes neither."""
     made = Held(tmp_path)
     at = struct.pack(">q", now().monotonic_us)
     assert made.caller.flight() == made.caller.flight()
@@ -225,7 +227,7 @@ def test_frames_without_bundle_are_equal_in_both_processes(tmp_path: Path) -> No
 
 
 def test_a_bundle_of_which_nothing_was_sent_may_be_loaded_again(tmp_path: Path) -> None:
-    """By the next process, and by this one, which then has forgotten what it decided."""
+    """By the next process, and by this one, which drops its decisions."""
     first = Held(tmp_path)
     first.load()
     first.process.close()
@@ -238,7 +240,7 @@ def test_a_bundle_of_which_nothing_was_sent_may_be_loaded_again(tmp_path: Path) 
 
 @pytest.mark.parametrize("emptied", [b"", b"\0", first_kept()[:-1], bytes(len(first_kept()))])
 def test_emptied_state_file_is_damage(emptied: bytes, tmp_path: Path) -> None:
-    """Else what was opened before flies again. The first start finds what says that nothing was kept."""
+    """Otherwise opened missions could fly again. At the first start the file says that there is no state."""
     held = Held(tmp_path)
     held.load()
     held.process.close()
@@ -264,7 +266,7 @@ def test_interrupted_first_start_counts_as_first_start(tmp_path: Path) -> None:
 
 
 def test_mission_issued_before_provisioning_is_refused(tmp_path: Path) -> None:
-    """Whatever an earlier folder opened, this one does not know of."""
+    """The new folder does not know the missions that an earlier one opened."""
     (tmp_path / "boundary").mkdir()
     path = kept_file(tmp_path, VEHICLE)
     issued = issued_us()
@@ -364,7 +366,7 @@ def test_malformed_call_is_answered_without_effect(held: Held) -> None:
 
 
 def test_longest_statement_is_transferred_completely(tmp_path: Path) -> None:
-    """Whoever floods it with requests must not make its evidence unreadable: all marks that one statement may hold."""
+    """A flood of requests must not make its evidence unreadable: all marks that a statement may contain."""
     held = Held(tmp_path, own_seed=case.BOUNDARY_KEY.private.private_bytes_raw())
     held.load()
     held.loaded.attestation.begin(BoundaryKey(case.BOUNDARY_KEY, 1, bytes(32)))
@@ -389,7 +391,7 @@ def test_unresponsive_boundary_counts_as_lost(held: Held) -> None:
 
 
 def test_stall_of_whole_machine_loses_nothing(held: Held, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The runtime goes on first, and its patience is over; the answer comes right after."""
+    """The runtime continues first, and its time limit is over; the answer comes right after."""
     monkeypatch.setattr(boundary_process, "AGAIN_S", PATIENCE_S)  # right after, on a busy machine too
     os.kill(held.process.pid, signal.SIGSTOP)
     goes_on = threading.Timer(ANSWER_S + AGAIN_S / 2, os.kill, (held.process.pid, signal.SIGCONT))
@@ -414,7 +416,7 @@ def test_dead_boundary_sends_only_frames_signed_ahead(held: Held) -> None:
 
 
 def tried(state: Path) -> BoundaryProcess | Refusal:
-    """As `run` begins one."""
+    """Start it as `run` does."""
     _, signed = case.root(issued_us())
     of = request(state=state, link=Address(LinkCarrier.UDP_IN, "127.0.0.1", 1), mode=EnforcementMode.PROCESS)
     return start_process(of, VEHICLE, signed, None, case.KEYS[Duty.LOG], {})
@@ -460,7 +462,7 @@ def test_ending_boundary_is_awaited(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root may mount a disk that is small")
 def test_full_disk_at_first_start_is_not_damage(tmp_path: Path) -> None:
-    """What was half written is not there afterwards."""
+    """A partly written file does not remain."""
     mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(tmp_path)]
     if subprocess.run(mount, check=False, capture_output=True).returncode != 0:
         pytest.skip("no file system may be mounted here")

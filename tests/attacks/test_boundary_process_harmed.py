@@ -54,7 +54,7 @@ AT_US = START.monotonic_us
 
 
 class Held:
-    """A boundary's process whose time is its caller's, and the bundle that it is given."""
+    """A boundary's process with its caller's time, and a bundle for it."""
 
     def __init__(self, state: Path, *, own: bool = False) -> None:
         seed = b"the seed of its own signing key." if own else None
@@ -62,7 +62,7 @@ class Held:
         self.caller = Caller(self.process.call)
 
     def session(self, proposed: int) -> tuple[int, bytes]:
-        """Begin a session of its own evidence: its number, and the digest of the one before."""
+        """Begin a session of its own evidence; returns its number, and the digest of the previous one."""
         answer = self.caller(BEGIN, proposed.to_bytes(8, "big"), bytes([proposed]) * 32)
         assert isinstance(answer, bytes)
         return int.from_bytes(answer[:8], "big"), answer[8:]
@@ -95,7 +95,7 @@ def held(tmp_path: Path) -> Iterator[Held]:
 
 
 def test_permit_of_another_session_is_refused(tmp_path: Path) -> None:
-    """The same bundle, in the process before: its permits were sealed with a key that is gone."""
+    """The same bundle in the previous process: its permits were sealed with a key that no longer exists."""
     first = Held(tmp_path)
     permit = allowed(first.loaded())
     first.process.close()
@@ -119,7 +119,7 @@ def test_step_out_of_turn_is_refused(held: Held) -> None:
 
 
 def test_two_runtimes_at_one_socket_get_no_more_than_one(held: Held) -> None:
-    """They ask at once, and read each other's answers: whatever comes of it, a permit is dispatched once."""
+    """They call at once and read each other's answers; a permit is dispatched only once."""
     of = held.loaded()
     permit, sent = allowed(of), list[bytes]()
     call = bytes([5]) + struct.pack(">q", AT_US) + permit
@@ -149,7 +149,7 @@ def test_a_call_that_is_too_long_is_not_read_beyond_its_end(held: Held) -> None:
 
 
 def test_partial_bundle_is_refused(held: Held) -> None:
-    """Cut anywhere, in whatever parts it comes, and with the size of the whole claimed for it."""
+    """Truncated anywhere, in any parts, with the size of the whole."""
     bundle, times = sealed(), struct.pack(">qqq", AT_US, START.utc_us, START.utc_error_us)
     for size in (0, 1, len(bundle) // 2, len(bundle) - 1):
         assert held.caller.put(LOAD, bundle[:size]) is None
@@ -164,7 +164,7 @@ def test_partial_bundle_is_refused(held: Held) -> None:
 
 
 def test_parts_of_two_objects_do_not_combine(held: Held) -> None:
-    """A part that does not go on where the last one ended is refused, whatever came between."""
+    """A part that does not continue the previous one is refused, whatever came between."""
     bundle, random = sealed(), Random(3)
     for _ in range(30):
         at = 0
@@ -182,7 +182,7 @@ def test_parts_of_two_objects_do_not_combine(held: Held) -> None:
 
 
 def long_ways(legs: int) -> tuple[Policy, Mission]:
-    """A survey of so many legs beside an area whose edges all run through nearly all heights."""
+    """A survey of many legs beside an area whose edges all run through nearly all heights."""
     band = outlines.polygon(tuple((x + 300 * M, y) for x, y in outlines.zig_zag(2_000)))
     airspace = flat.POLICY.airspace
     assert airspace is not None
@@ -225,7 +225,7 @@ POINTS = ("begun", "half a bundle", "handed over", "in force", "asked", "sent", 
 
 
 def up_to(held: Held, point: str) -> Loaded | None:
-    """A session up to a point of it."""
+    """A session up to a given point."""
     number = POINTS.index(point)
     of = None
     if number == 1:
@@ -245,7 +245,7 @@ def up_to(held: Held, point: str) -> Loaded | None:
 
 @pytest.mark.parametrize("point", POINTS)
 def test_killed_boundary_passes_nothing_and_keeps_state(point: str, tmp_path: Path) -> None:
-    """From when the bundle is in force, no step of it begins after a restart; before, all of it may be flown."""
+    """Once the bundle is in force, no step of it begins after a restart; before that, all of it may fly."""
     first = Held(tmp_path)
     of = up_to(first, point)
     first.kill()
@@ -264,7 +264,7 @@ def test_killed_boundary_passes_nothing_and_keeps_state(point: str, tmp_path: Pa
 
 
 def test_state_file_is_intact_after_kill_during_write(tmp_path: Path) -> None:
-    """Whatever moment the write is broken off at, the place before it is left."""
+    """If a write is interrupted at any moment, the other copy remains."""
     random = Random(7)
     for _ in range(25):
         held = Held(tmp_path)  # raises where what was kept is damaged
@@ -317,7 +317,7 @@ def test_boundary_ends_when_runtime_is_killed(point: str, tmp_path: Path) -> Non
 
 
 def test_mission_beyond_memory_limit_is_refused(tmp_path: Path) -> None:
-    """Its file says that as many were opened as it remembers, and that none of them has expired yet."""
+    """The file says that the greatest number of missions is opened, none of which has expired."""
     Held(tmp_path).process.close()
     path = kept_file(tmp_path, VEHICLE)
     data = path.read_bytes()
@@ -343,7 +343,7 @@ def test_mission_beyond_memory_limit_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root may mount a disk that is small")
 def test_full_disk_prevents_start(tmp_path: Path) -> None:
-    """What cannot be kept is not opened; with room again it is, and what was kept before is whole."""
+    """A mission that cannot be recorded is not opened; with room again it is, and the earlier state is intact."""
     mounted = subprocess.run(
         ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(tmp_path)], check=False, capture_output=True
     )
@@ -391,7 +391,7 @@ def test_restored_state_file_forgets_opened_missions(tmp_path: Path) -> None:
 
 
 def test_a_file_that_is_cut_or_changed_is_damage(tmp_path: Path) -> None:
-    """But for one place of the two, of which the other is left."""
+    """Except for damage to one of the two copies, when the other is used."""
     for _ in range(2):
         Held(tmp_path).process.close()
     path = kept_file(tmp_path, VEHICLE)
@@ -408,7 +408,7 @@ def test_a_file_that_is_cut_or_changed_is_damage(tmp_path: Path) -> None:
 
 
 def rewritten(path: Path, layout: int, opened: int) -> None:
-    """Its file as the layout before this one has it, with so many missions opened, the last of which expires last."""
+    """Its file in the previous layout, with so many missions opened, the last of which expires last."""
     data = path.read_bytes()
     slot = len(data) // 2
     body = bytearray(data[:slot])
@@ -423,7 +423,7 @@ def rewritten(path: Path, layout: int, opened: int) -> None:
 
 @pytest.mark.parametrize(("before", "opened"), [(1, 0), (1, 3), (1, MOST_OPENED + 1), (2, 3), (2, MOST_OPENED + 2)])
 def test_state_file_of_older_layout_is_accepted(before: int, opened: int, tmp_path: Path) -> None:
-    """It has no sessions; where it is full, the mission that has no room any more is not opened again either."""
+    """The old layout has no sessions; if it is full, the mission that no longer fits cannot be opened again."""
     Held(tmp_path, own=True).process.close()
     path = kept_file(tmp_path, VEHICLE)
     rewritten(path, LAYOUT - before, opened)
@@ -443,7 +443,7 @@ def test_state_file_of_older_layout_is_accepted(before: int, opened: int, tmp_pa
 
 
 def test_boundary_counts_its_sessions(tmp_path: Path) -> None:
-    """A state folder that was put back does not make it begin to count anew; one that is ahead counts."""
+    """A restored state folder does not reset its count; a folder that is ahead counts."""
     digests = []
     for proposed, found in ((1, 1), (1, 2), (0, 3), (3, 4), (9, 9), (1, 10)):
         held = Held(tmp_path, own=True)
@@ -465,7 +465,7 @@ def test_boundary_counts_its_sessions(tmp_path: Path) -> None:
 
 
 def test_boundary_keys_are_not_in_files_or_core_dumps(tmp_path: Path) -> None:
-    """Crashed, it leaves no core; what it keeps, and its command line, have no octets of the keys that it was given."""
+    """A crash leaves no core; its file and its command line contain no octets of its keys."""
     key, seed = tmp_path / "link.key", b"the seed of its own signing key."
     key.write_bytes(b"the key of the link, 32 octets..")
     key.chmod(0o600)

@@ -26,7 +26,7 @@ def flipped(at: int, bit: int) -> bytes:
 
 
 def test_bundle_with_flipped_bit_in_any_byte_is_refused() -> None:
-    """In each byte another bit; all of them in soak."""
+    """One bit in each byte; all bits in soak."""
     assert [at for at in range(len(SEALED)) if opens(flipped(at, at % 8))] == []
 
 

@@ -51,7 +51,7 @@ def fresh() -> Loaded:
 
 
 def with_agent(mission: Mission, **rights: object) -> Loaded:
-    """A mission that the key of both sources signed, in a world that knows the agent's key too."""
+    """A mission signed by the key of both sources, in a world that knows the agent's key too."""
     usual: dict[str, object] = {
         "roles": ("operator",), "sources": ("agent",), "vehicles": (VEHICLE,), "policies": (POLICY.name,),
     }  # fmt: skip
@@ -69,7 +69,7 @@ def with_agent(mission: Mission, **rights: object) -> Loaded:
 
 
 def ordered(first: int) -> Mission:
-    """The mission, of which steps from `first` on are a person's."""
+    """The mission, whose steps from `first` on are a person's."""
     steps = (replace(each, source=SourceKind.OPERATOR) for each in MISSION.invocations[first:])
     return replace(MISSION, invocations=(*MISSION.invocations[:first], *steps))
 
@@ -132,7 +132,7 @@ def test_recall_after_cancellation_is_accepted() -> None:
 
 
 def test_no_step_is_decided_or_sent_afterwards() -> None:
-    """Also for a runtime that was taken over and acts as if it had not come."""
+    """This includes a compromised runtime that ignores the document."""
     of = fresh()
     permit = allowed(of)
     assert presented(of, cancellation(of)).accepted
@@ -203,7 +203,7 @@ def test_cancellation_of_other_flight_or_mission_is_refused() -> None:
 
 
 def test_cancellation_reaches_replacement_with_authorised_key() -> None:
-    """Who cancels and who replaces need not agree on which came first."""
+    """Canceller and replacer need not agree on the order."""
     of = with_agent(low_mission())
     first = cancellation(of, AGENT)
     assert presented(of, replacement(of)).accepted

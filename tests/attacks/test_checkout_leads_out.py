@@ -24,7 +24,7 @@ SECRET = "TOKEN=hunter2 {"
 
 @pytest.fixture(autouse=True)
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The checkout, in which somebody works; beside it are files of theirs."""
+    """A checkout that is the working folder; other files of the user are beside it."""
     place = tmp_path / "checkout"
     (place / ".git").mkdir(parents=True)
     for name in ("mine.rts", "mine.geojson", ".env"):

@@ -26,7 +26,7 @@ FULL = flat.apply(flat.Op.GT, flat.signal(flat.BATTERY), flat.const(10_000))
 
 
 def held_to(text: str, step: int = 0) -> Mission:
-    """A step asks for more than a full battery, and says something else."""
+    """A step with a clause that requires more than a full battery, and a text that says something else."""
     of = MISSION.invocations[step]
     contract = replace(of.contract, assume=(*of.contract.assume, flat.clause(text, FULL)))
     contract = replace(contract, reads=tuple(sorted({*contract.reads, flat.BATTERY})))

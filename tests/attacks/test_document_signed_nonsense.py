@@ -53,7 +53,7 @@ def signed(kind: Artefact, payload: bytes) -> bytes:
 
 
 def odd(value: object, of: Random) -> object:
-    """The value with something odd somewhere in it."""
+    """The value with an invalid part."""
     if isinstance(value, tuple) and value and of.random() < 0.95:
         at = of.randrange(len(value))
         match of.randrange(12):
@@ -67,7 +67,7 @@ def odd(value: object, of: Random) -> object:
 
 
 def bound(payload: bytes) -> bytes:
-    """The same nonsense, its ids and bindings made good again, so that it is looked at more closely."""
+    """The same malformed data with correct ids and bindings, so that later checks are reached."""
     said = parse(names.REPLACEMENT, payload, ReplacementDocument)
     mission = bind(said.mission, OF.bundle.policy_digest, after=_after(said.flight, said.supersedes, said.kept))
     return artefact.wrap(names.REPLACEMENT, to_builtins(replace(said, mission=mission), builtin_types=(bytes,)))

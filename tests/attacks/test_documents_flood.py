@@ -45,7 +45,7 @@ HOSTILE = hostile(MISSION_KEY)
 
 
 class Flooded(Run):
-    """A run, and somebody at its socket; counts what is decoded in which thread."""
+    """A run with a client at its socket; counts what each thread decodes."""
 
     def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, of: Loaded, *, operators: bool = False) -> None:
         path = folder / "s"
@@ -85,7 +85,7 @@ class Flooded(Run):
         monkeypatch.setattr(where, name, watched)
 
     def hand(self, document: bytes, *, over: bool = False) -> str:
-        """What is answered; how much the flight's thread decoded meanwhile is kept."""
+        """Present a document; returns the answer and records how much the flight's thread decoded meanwhile."""
         self.agents._sockets[0].socket._budgets.clear()
         line = json.dumps({"id": 5, "document": b64encode(document).decode()}).encode() + b"\n"
         sender = threading.Thread(target=self.link.sendall, args=(line,))
@@ -132,7 +132,7 @@ def run(monkeypatch: pytest.MonkeyPatch) -> Iterator[Flooded]:
 
 
 def elsewhere() -> tuple[Loaded, list[int]]:
-    """The same flight by a boundary elsewhere, and the kinds of calls that it gets."""
+    """The same flight with a boundary elsewhere, and the kinds of calls that it gets."""
     served, kinds = Served(ROOT, VEHICLE), list[int]()
 
     def call(octets: bytes) -> bytes:
@@ -153,7 +153,7 @@ def elsewhere() -> tuple[Loaded, list[int]]:
 def test_replacement_is_prepared_in_another_thread(
     mode: EnforcementMode, operators: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """All that takes as long as it has steps; what is left is to put it in force, and to record it."""
+    """Everything that takes time in proportion to its steps; activation and the record remain."""
     of = low() if mode is EnforcementMode.SOFTWARE else elsewhere()[0]
     with flooded(of, monkeypatch, operators=operators) as run:
         document = large(of)
@@ -181,7 +181,7 @@ def test_refused_document_is_not_sent_to_other_boundary(monkeypatch: pytest.Monk
 
 
 def test_misfitting_document_is_not_sent_to_other_boundary(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Rightly signed, each other octets: it would verify each, while the flight waits."""
+    """Correctly signed documents with different octets: the boundary would verify each, while the flight waits."""
     of, kinds = elsewhere()
     with flooded(of, monkeypatch) as run:
         anew = [large(of, steps) for steps in (20, 21, 22)]

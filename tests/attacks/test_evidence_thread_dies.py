@@ -9,7 +9,7 @@ from rtshcua.model.durability import WRITTEN
 
 
 class Breaking(EvidenceFile):
-    """Fails as no file should."""
+    """A file that fails with an unexpected error."""
 
     def append(self, line: bytes, durability: int) -> None:
         if line == b"bad\n":

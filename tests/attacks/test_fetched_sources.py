@@ -22,7 +22,9 @@ BACK_ENDS = {"pymonocypher": "", "pynacl": 'build-backend = "setuptools.build_me
 
 
 def distribution(folder: Path, name: str, mark: Path, files: Any) -> str:
-    """A source distribution whose set-up leaves a mark, and which needs what does not exist to be built; its hash."""
+    """A source distribution whose setup code leaves a mark, and which requires a package that does not exist; and its
+    hash.
+    """
     top = f"{name}-{PINNED[name]}"
     texts = {each: f"/* {each} */" for each in files}
     texts["PKG-INFO"] = f"Metadata-Version: 2.1\nName: {name}\nVersion: {PINNED[name]}\n"
@@ -39,7 +41,7 @@ def distribution(folder: Path, name: str, mark: Path, files: Any) -> str:
 
 @pytest.fixture(scope="module")
 def files() -> Any:
-    """What is unpacked, by distribution: two constants of the script, which runs as soon as it is imported."""
+    """The unpacked files of each distribution: two constants of the script, which runs when it is imported."""
     source = SCRIPT.read_text(encoding="utf-8")
     found: dict[str, Any] = {}
     exec(source[source.index("SODIUM =") : source.index("def unpacked")], found)
@@ -47,7 +49,7 @@ def files() -> Any:
 
 
 def fetch(place: Path, links: Path, pins: dict[str, str]) -> "subprocess.CompletedProcess[str]":
-    """Unpack what is pinned by these hashes, from a folder alone."""
+    """Unpack the distributions with these hashes, from a local folder only."""
     for folder in (".make", "requirements"):
         (place / folder).mkdir(parents=True, exist_ok=True)
     shutil.copy(SCRIPT, place / ".make")
@@ -60,7 +62,7 @@ def fetch(place: Path, links: Path, pins: dict[str, str]) -> "subprocess.Complet
 
 
 class Fetched(NamedTuple):
-    """A checkout that both distributions were fetched into: from where, their hashes, the mark of a set-up that ran."""
+    """A checkout with both distributions: their source, their hashes, and the mark of setup code that ran."""
 
     place: Path
     links: Path

@@ -42,7 +42,7 @@ def pack(message: Any) -> bytes:
 
 
 class Thief:
-    """A runtime that is taken over: it keeps each permit that it was given, and asks for what it likes."""
+    """A compromised runtime: it keeps every permit, and makes arbitrary requests."""
 
     def __init__(self, of: Apart) -> None:
         self.of = of
@@ -57,7 +57,7 @@ class Thief:
         of._answer = spied
 
     def ask(self, permit: bytes, kind: int, link: int, *frames: bytes) -> bytes | str:
-        """What the boundary signs, or why not."""
+        """The frames that the boundary signs, or the refusal."""
         now_us = self.of.flight.clock.monotonic_us
         listed = b"".join(len(each).to_bytes(2) + each for each in frames)
         answer = self.of._answer(bytes([AHEAD]) + struct.pack(">qBb", now_us, kind, link) + permit + listed)
@@ -69,7 +69,7 @@ class Thief:
         return with_flags(frame, FLAG_SIGNED) + answer[8:]
 
     def until(self, step: int) -> "Thief":
-        """Fly on until five seconds into a step."""
+        """Fly until five seconds into a step."""
         since = None
         while since is None or self.of.flight.clock.elapsed_us - since < 5 * S:
             assert self.of.flight.turn() is None
@@ -79,7 +79,7 @@ class Thief:
         return self
 
     def stated(self) -> Statement:
-        """What the boundary signs of its own evidence."""
+        """The boundary's signed statement of its own evidence."""
         now = self.of.flight.clock.now()
         times = struct.pack(">qqq", now.monotonic_us, now.utc_us, now.utc_error_us)
         return claimed(self.of._answer(bytes([STATEMENT, 0]) + times)[1:])
@@ -89,7 +89,7 @@ class Thief:
 
     @property
     def mode(self) -> FlightMode:
-        """The vehicle's, as it really is."""
+        """The true mode of the vehicle."""
         return self.of.vehicle.simulation.truth().mode
 
 
@@ -156,7 +156,7 @@ def test_request_at_wrong_moment_is_refused(thief: Thief) -> None:
 
 @pytest.mark.slow
 def test_delayed_frame_signed_ahead_expires(thief: Thief) -> None:
-    """Kept from the first leg, for another: while normal frames went on the vehicle does not take it any more."""
+    """A frame kept from the first leg: while normal frames continue, the vehicle no longer accepts it."""
     thief.until(1)
     kept = thief.signed(thief.permits[-1], FALLBACK_LINK, 1, pack(RETURN))
     since_us = thief.of.flight.clock.elapsed_us
@@ -169,7 +169,7 @@ def test_delayed_frame_signed_ahead_expires(thief: Thief) -> None:
 
 
 def test_early_use_of_frame_voids_frames_signed_before(thief: Thief) -> None:
-    """No more than standing in for the link; the other frames that are held by then are lost."""
+    """It only replaces the link's own dispatch; the other frames held by then are void."""
     thief.until(2)
     permit = thief.permits[-1]
     hold, home = (
@@ -188,7 +188,7 @@ def test_early_use_of_frame_voids_frames_signed_before(thief: Thief) -> None:
 
 
 def test_links_flown_with_boundary_are_only_counted(thief: Thief) -> None:
-    """No entry tells of them. Its statement says how many frames it signed ahead, and has a digest over them."""
+    """No entry reports them. The statement has the number of frames signed ahead, and a digest over them."""
     thief.until(2)
     permit, frames = thief.permits[-1], [pack(RETURN), pack(messages.set_mode(1, Px4Mode.LAND))]
     before = thief.stated()
@@ -265,14 +265,16 @@ def test_nothing_leaves_that_was_not_signed_ahead(flavour: str, modes: Any, key:
 
 
 def told(of: Apart, message: Any, link: int = 0, timestamp: int | None = None, key: bytes = bytes(32)) -> bytes:
-    """What somebody without the key sends as the vehicle: signed in form."""
+    """A frame in the vehicle's name by somebody without the key, with a well-formed signature."""
     stamp = timestamp if timestamp is not None else max(last for last, _ in of.gate._heard.values()) + 50
     signer = SignedLink(key, SigningState(stamp - 1, {}), EPOCH_US, 0, link)
     return signer.sign(Codec(1, 1).pack(message), 0)
 
 
 def test_replayed_frames_and_other_streams_are_refused(apart: Make) -> None:
-    """Nor what claims to come a long time from now. What goes on where the vehicle left off is, for nobody can tell."""
+    """Frames with a time far in the future are refused too. A frame that continues the vehicle's stream is accepted,
+    because it cannot be distinguished.
+    """
     of = apart("px4")
     Thief(of).until(1)
     of.lose()
@@ -292,7 +294,7 @@ def test_replayed_frames_and_other_streams_are_refused(apart: Make) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 def test_forged_telemetry_can_only_select_a_link(flavour: str, apart: Make) -> None:
-    """That it landed, that somebody took over, that it is elsewhere: what leaves is a link, or nothing."""
+    """Forged reports of a landing, a takeover or another position: only a link is sent, or nothing."""
     of = apart(flavour)
     sent: list[bytes] = []
     of.vehicle.lose = lambda frame: sent.append(frame) is not None

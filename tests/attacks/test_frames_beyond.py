@@ -53,7 +53,7 @@ def target(autopilot: int, point: tuple[int, int]) -> bytes:
 
 
 def test_forged_home_in_flight_changes_no_height() -> None:
-    """PX4 is told heights above sea: who says that home lies a kilometre higher would send it there."""
+    """PX4 receives heights above sea: a home that is reported a kilometre too high would send it there."""
     opened = gate(PX4, MotionKind.CLIMB)
     for home in (HOME + 1_000_000, HOME - 1_000_000, HOME + HOME_MOVES + 1):
         opened.observe(at(*A, home=home))
@@ -79,7 +79,7 @@ def test_home_may_drift_until_next_takeoff() -> None:
 
 @pytest.mark.parametrize("autopilot", [ARDUPILOT, PX4])
 def test_path_points_are_sent_one_by_one(autopilot: int) -> None:
-    """From where it is straight to the last point is a leg that nobody checked."""
+    """The direct leg from the start to the last point was never checked."""
     opened = gate(autopilot, MotionKind.COVER, A, B, C)
     opened.observe(at(*C))
     first, second, third = (target(autopilot, point) for point in (A, B, C))
@@ -102,7 +102,7 @@ def test_vehicle_without_position_is_sent_to_first_point_only() -> None:
 
 @pytest.mark.parametrize("current", [1, 2, 3])
 def test_fence_item_cannot_command_motion(current: int) -> None:
-    """ArduPilot flies to an item whose `current` is 2 at once, and takes its height for 3."""
+    """ArduPilot flies at once to an item whose `current` is 2, and takes only its height for 3."""
     opened = FrameSession()
     opened.observe(says(mavlink.MAVLink_heartbeat_message(2, ARDUPILOT, 0, 0, 0, 3)))
 

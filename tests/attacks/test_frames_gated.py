@@ -29,7 +29,7 @@ def flown() -> tuple[tuple[bytes, ...], Entries]:
 
 
 def found(entries: Iterable[tuple[int, bytes]]) -> Finding | None:
-    """What the audit says of the flight with these frames."""
+    """The audit's findings for the flight with these frames."""
     frames = FrameAudit(iter(entries))
     auditor = Auditor(ROOT_KEY, frames=frames)
     for line in flown()[0]:
@@ -86,7 +86,7 @@ def test_repeated_command_frame_at_end_is_detected() -> None:
 
 
 def test_harmless_alteration_of_frame_is_detected() -> None:
-    """Its sequence number: nothing else would tell."""
+    """Its sequence number, which nothing else covers."""
     entries = list(flown()[1])
     number = commands()[0]
     at_us, octets = entries[number]

@@ -35,7 +35,7 @@ def flown(kind: str) -> tuple[tuple[bytes, ...], tuple[tuple[int, bytes], ...]]:
 
 @cache
 def told(kind: str) -> tuple[tuple[bytes, ...], tuple[tuple[int, bytes], ...]]:
-    """The same without the frames of the vehicle that tell nothing new."""
+    """The same flight without redundant frames of the vehicle."""
     lines, entries = flown(kind)
     return lines, (*entries[:400], *(entry for entry in entries[400:] if from_us(entry[1])))
 
@@ -55,7 +55,7 @@ def judged(lines: list[bytes] | tuple[bytes, ...], entries: Entries) -> Finding 
 
 
 def moment(lines: tuple[bytes, ...], event: str, step: int) -> int:
-    """When something happened to a step, UTC us."""
+    """The time of an event of a step, UTC us."""
     found = [read(line) for line in lines]
     return next(each["utc_us"] for each in found if each.get("event") == event and each["step"] == step)
 
@@ -70,7 +70,7 @@ def command(number: int, *parameters: float) -> bytes:
 
 
 def beside(kind: str, frame: bytes, when: Callable[[tuple[bytes, ...]], int]) -> str | None:
-    """The slug of what is found where a frame lies among those of a flight."""
+    """The slug of the finding for a frame inserted into a flight."""
     lines, entries = told(kind)
     added = sorted([*entries, (when(lines), frame)], key=lambda entry: entry[0])
     found = judged(lines, added)
@@ -208,7 +208,7 @@ def test_all_systems_count_as_ours_before_first_heartbeat() -> None:
 @rows("late", [False, True])
 @rows("autopilot", [3, 12])
 def test_heartbeat_of_another_system_hides_nothing(kind: str, late: bool, autopilot: int) -> None:
-    """Whoever reaches the link can send one: our frames are still held against the log."""
+    """Anybody on the link can send one: our frames are still compared with the log."""
     lines, entries = told(kind)
     heartbeat = Codec(77, 1).pack(mavlink.MAVLink_heartbeat_message(2, autopilot, 0, 0, 0, 3))
     home = Codec(77, 1).pack(mavlink.MAVLink_global_position_int_message(1, 473_990_000, 85_460_000, 9, 8, 0, 0, 0, 0))
@@ -240,7 +240,7 @@ def test_a_fence_is_switched_on_before_the_flight_alone(kind: str) -> None:
 
 
 def test_preflight_frames_pass_until_first_command() -> None:
-    """A simulated vehicle's clock stood still from the one to the other."""
+    """The clock of a simulated vehicle stood still between the two."""
 
     def at(after_us: int) -> Callable[[tuple[bytes, ...]], int]:
         return lambda lines: moment(lines, "dispatched", 0) + after_us

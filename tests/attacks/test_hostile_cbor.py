@@ -42,7 +42,7 @@ BOUND_S = 6.0
 
 
 def items(kind: str, octets: int) -> bytes:
-    """One item of so many octets at most, of tiny ones."""
+    """One item of at most so many octets that consists of tiny ones."""
     match kind:
         case "arrays":
             return head(4, octets - 5) + b"\x80" * (octets - 5)
@@ -70,7 +70,7 @@ def claiming(kind: Artefact, payload: bytes) -> bytes:
 
 
 def bundle(kind: str) -> bytes:
-    """A bundle of which the policy's payload is hostile."""
+    """A bundle with a hostile policy payload."""
     policy = claiming(names.POLICY, wrapped(names.POLICY, items(kind, MAX_BUNDLE // 2)))
     return cbor.encode((names.BUNDLE.name, names.BUNDLE.version, (policy, claiming(names.MISSION, b""))))
 

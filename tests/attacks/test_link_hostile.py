@@ -39,7 +39,7 @@ def test_vehicle_is_heard_during_flood(flavour: str) -> None:
 
 
 def test_without_a_key_the_vehicles_own_id_can_be_borrowed() -> None:
-    """The limit of a link without a key, stated: its frames prove nothing. What flies is bounded all the same."""
+    """A known limit: without a key, frames prove nothing. The flight is bounded nevertheless."""
     target = Target("px4", keyed=False)
     attacker = Attacker(target.heard, seed=3, impersonate=True)
     before = target.known()
@@ -51,7 +51,7 @@ def test_without_a_key_the_vehicles_own_id_can_be_borrowed() -> None:
 
 @pytest.mark.parametrize("keyed", [False, True], ids=["without-key", "with-key"])
 def test_reflected_frames_are_ignored(keyed: bool) -> None:
-    """Rightly signed, and fresh: by us."""
+    """Correctly signed and fresh, but by us."""
     target = Target("px4", keyed=keyed)
     sent = [frame for at_s in range(1, 5) for frame in target.driver.tick(at_s * 1_000_000)[1]]
     assert len(sent) >= 4

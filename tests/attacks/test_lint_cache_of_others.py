@@ -49,7 +49,7 @@ def entries() -> list[Path]:
 
 
 def forge(result: object) -> int:
-    """Write another result into all entries, as whoever could write there would."""
+    """Write another result into all entries, as an attacker with write access would."""
     for file in entries():
         data = json.dumps(json.loads(file.read_bytes().partition(b"\n")[2]) | {"result": result}).encode()
         file.write_bytes(sha256(data).hexdigest().encode() + b"\n" + data)
@@ -134,7 +134,7 @@ def test_fixes_never_come_from_cache(here: Path, lint: Lint) -> None:
     ],
 )  # fmt: skip
 def test_cache_entry_belongs_to_content_that_was_read(here: Path, lint: Lint, found: list[object]) -> None:
-    """Even of what we wrote, as an earlier fault of ours would."""
+    """This includes our own entries, in case of a fault of ours."""
     lint(".")
     forge([[found], []])
     assert lint(".") == (ExitCode.DIAGNOSTICS, HABITS)

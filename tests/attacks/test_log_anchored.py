@@ -19,7 +19,7 @@ SEEN = 4  # the signed record that the witnesses saw, and so its size
 
 
 def judged(lines: list[bytes], *anchors: str) -> LogReport:
-    """The report of the audit, with which the independent verifier agrees."""
+    """The report of the audit, confirmed by the independent verifier."""
     auditor = Auditor(ROOT_KEY, derive=False, anchors=anchors)
     for line in lines:
         auditor.take(line)
@@ -76,13 +76,13 @@ def test_log_truncated_before_anchor_is_detected() -> None:
 
 
 def test_another_record_over_the_same_lines() -> None:
-    """The tree before the seal is the same, the seal is not: the witness saw its own hash, too."""
+    """The tree before the seal is the same, but the seal differs: the witness saw its hash too."""
     forged = log(genesis(), effect(10), seal(20, 1), effect(30), seal(41, 2), effect(50), close(60))
     assert found(forged, anchor(LINES[SEEN], [ONE, TWO])) == "anchor/root"
 
 
 def test_a_rewrite_that_records_its_own_anchor() -> None:
-    """The forger cannot make witnesses sign again; strangers who do count for nothing."""
+    """The forger cannot make the witnesses sign again, and unknown witnesses do not count."""
     note = read(LINES[2])["checkpoint"]
     stranger = anchor(LINES[2], [ONE]).replace(ONE, "rtshcua/witness/9")
     for detail in (note, stranger):
@@ -91,7 +91,7 @@ def test_a_rewrite_that_records_its_own_anchor() -> None:
 
 
 def test_a_recorded_anchor_of_another_tree() -> None:
-    """The log itself says that it was rewritten."""
+    """The log itself shows that it was rewritten."""
     other = log(genesis(), effect(10, detail="other"), seal(20, 1), close(30))
     detail = anchor(other[2], [ONE])
     lines = log(genesis(), effect(10), seal(20, 1), effect(30, event="anchored", detail=detail), close(60))
@@ -100,7 +100,7 @@ def test_a_recorded_anchor_of_another_tree() -> None:
 
 
 def test_an_anchor_of_another_log() -> None:
-    """Another flight of the same vehicle has another origin, and says nothing about this one."""
+    """Another flight of the same vehicle has another origin, and is irrelevant to this one."""
     other = log(genesis(boot="22" * 16), effect(11), seal(20, 1), close(30))
     report = judged(LINES, anchor(other[2], [ONE, TWO]))
     assert (report.verdict, report.anchored) == (LogVerdict.VERIFIED, 0)
@@ -132,6 +132,6 @@ def test_one_witness_that_signs_twice_is_one() -> None:
 
 
 def test_one_lying_witness_of_two() -> None:
-    """It cosigned two trees: what it saw of the other contradicts the log, whatever it says of this one."""
+    """It cosigned two trees: its cosignature of the other one contradicts the log."""
     other = log(genesis(), effect(10, detail="other"), seal(20, 1), close(30))
     assert found(LINES, anchor(LINES[SEEN], [ONE, TWO]), anchor(other[2], [TWO])) == "anchor/root"

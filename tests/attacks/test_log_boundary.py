@@ -36,12 +36,12 @@ CLOSE = len(LINES) - 1
 
 
 def said(number: int) -> Statement:
-    """What a statement says."""
+    """The content of a statement."""
     return open_statement(b64decode(read(LINES[number])["detail"]), KEYS)
 
 
 def stating(number: int, envelope: bytes) -> bytes:
-    """Another statement in the place of one."""
+    """A statement with another content."""
     return edit(LINES[number], detail=b64encode(envelope).decode())
 
 
@@ -54,12 +54,12 @@ def without(*numbers: int) -> list[bytes]:
 
 
 def moment(number: int) -> dict[str, Any]:
-    """When a record was written."""
+    """The time of a record."""
     return {name: read(LINES[number])[name] for name in ("at_us", "utc_us", "utc_error_us")}
 
 
 def entry_after(number: int) -> int:
-    """The next record that the boundary made an entry for."""
+    """The next record with an entry of the boundary."""
     return next(each for each in range(number + 1, CLOSE) if each in (*DECISIONS, *SENT, APPROVAL))
 
 
@@ -95,7 +95,7 @@ def test_a_field_of_a_decision_is_altered(field: str, value: object) -> None:
 
 
 def test_a_state_that_decides_alike_is_altered() -> None:
-    """The decision derives again from it, so that nothing else could tell."""
+    """The decision derives from it unchanged, so that no other check detects it."""
     number = DECISIONS[0]
     state = read(LINES[number])["state"]
     ages = [state["ages"][0] + 1, *state["ages"][1:]]
@@ -177,7 +177,7 @@ def test_a_refused_permit_is_invented() -> None:
 
 
 def test_a_refused_frame_is_denied() -> None:
-    """What is only counted stands in the statement alone: to count otherwise is to sign."""
+    """Counters are only in the statement, so another number needs another signature."""
     number = STATEMENTS[-1]
     lie = replace(said(number), stopped=0)
     payload = artefact.pack(names.STATEMENT, lie)
@@ -253,7 +253,7 @@ def test_the_records_of_another_session() -> None:
 
 
 def test_another_flight() -> None:
-    """Its id is the genesis': the attacker signs that one too, but not the boundary's statements."""
+    """The flight's id is in the genesis, which the attacker signs too, but not the boundary's statements."""
     genesis = edit(LINES[0], boot="11" * 16)
     assert expect(signed([genesis, *LINES[1:]])) == ("boundary/other-flight", STATEMENTS[0])
 
@@ -268,7 +268,7 @@ def test_another_mode() -> None:
 
 @pytest.mark.parametrize("seal", SEALS[1:2])
 def test_a_log_cut_off_and_called_a_crash_says_what_is_not_shown(seal: int) -> None:
-    """The holder of the log key ends it as recovery does. The next session names what this one kept."""
+    """The holder of the log key ends it like a recovery. The next session names the last state of this one."""
     close = edit(LINES[CLOSE], **moment(seal), ending="recovered")
     head = edit(LINES[seal], type="recover", discarded_bytes=0, discarded_digest="00" * 32)
     report = prove(signed([*LINES[:seal], head, close])).report
@@ -290,7 +290,7 @@ def lost_at(number: int, *more: int) -> list[bytes]:
 
 @rows("number", [*DECISIONS[2:], *SENT[1:], CLOSE])
 def test_a_loss_is_claimed_to_leave_out_what_follows(number: int) -> None:
-    """Nothing contradicts it, and the log is not whole: whoever reads it is told from where on."""
+    """Nothing contradicts the claim, but the log is incomplete: the report names the first record."""
     assert expect(signed(lost_at(number))) == ("boundary/lost", number)
     report = prove(signed(lost_at(number))).report
     assert report.failure is None
@@ -299,7 +299,7 @@ def test_a_loss_is_claimed_to_leave_out_what_follows(number: int) -> None:
 
 
 def test_recorded_loss_does_not_hide_signed_entries() -> None:
-    """Its last statement speaks of entries that no record before the claim tells of."""
+    """The last statement covers entries that no earlier record contains."""
     statement = next(each for each in STATEMENTS if each > SENT[0])
     lines = [line for number, line in enumerate(LINES) if number != SENT[0]]
     claimed = edit(LINES[SENT[0]], event="boundary-lost", kind=-1, step=-1, link=-1, token=-1, detail="gone")
@@ -310,7 +310,7 @@ def test_recorded_loss_does_not_hide_signed_entries() -> None:
 
 @rows("kind", [DECISIONS, STATEMENTS, [APPROVAL], [each for each in SENT if read(LINES[each])["kind"] == 0]])
 def test_nothing_that_a_boundary_makes_follows_its_loss(kind: list[int]) -> None:
-    """A decision, a statement, a document, a step: links alone may fly then."""
+    """A decision, a statement, a document or a step: only links may fly then."""
     at = SENT[0] + 1
     made = next(each for each in kind if each > at)
     lines = lost_at(at, made)

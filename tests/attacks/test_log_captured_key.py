@@ -32,7 +32,7 @@ AFTER = [number for number in range(TAKEN + 1, len(LINES)) if number not in SIGN
 
 
 def by_the_thief(lines: list[bytes]) -> list[bytes]:
-    """All that can be done with the key of the epoch: from then on the thief names keys of its own."""
+    """Everything that the epoch's key allows: the thief names new keys from then on."""
     own = public_of(STRANGER).hex()
     named = [
         edit(line, next_key=own) if number > TAKEN and read(line)["type"] == "seal" else line
@@ -51,14 +51,14 @@ def closed_at(number: int) -> bytes:
 
 
 def test_log_signed_with_stolen_key_verifies() -> None:
-    """Else these attacks would fail for the wrong reason."""
+    """Otherwise these attacks would fail for the wrong reason."""
     assert by_the_thief(list(LINES))[: TAKEN + 1] == list(LINES[: TAKEN + 1])
     assert prove(by_the_thief(list(LINES))).report.verdict is LogVerdict.VERIFIED
 
 
 @rows("number", BEFORE)
 def test_earlier_epochs_cannot_be_rewritten(number: int) -> None:
-    """Whatever is changed before, its epoch was sealed by a key that is gone."""
+    """Every earlier epoch was sealed by a key that no longer exists."""
     seal = next(each for each in SIGNED if each > number)
     assert expect(by_the_thief(edited(number))) == ("seal/root", seal)
 
@@ -70,7 +70,7 @@ def test_nothing_can_be_taken_out_of_earlier_epochs(number: int) -> None:
 
 
 def test_the_seals_of_earlier_epochs_cannot_be_moved() -> None:
-    """Two epochs made one, so that the thief's own key would seal what was sealed already."""
+    """Two epochs are merged, so that the thief's key would seal records that were sealed already."""
     for number in SIGNED[1:3]:
         slug, _ = expect(by_the_thief([*LINES[:number], *LINES[number + 1 :]]))
         assert slug in ("seal/key", "seal/size")
@@ -78,14 +78,14 @@ def test_the_seals_of_earlier_epochs_cannot_be_moved() -> None:
 
 @pytest.mark.parametrize("number", AFTER)
 def test_the_present_epoch_can_be_rewritten_and_the_report_says_so(number: int) -> None:
-    """This is what the key is worth: what comes after the last seal. Only a witness outside tells."""
+    """This is the power of the key: the records after the last seal. Only an outside witness can show it."""
     audit = prove(by_the_thief(edited(number)))
     assert audit.report.verdict is LogVerdict.VERIFIED
     assert any("unanchored tail" in claim.text for claim in audit.report.unproven)
 
 
 def test_truncation_with_stolen_key_is_reported() -> None:
-    """The thief may end the log early, where it was taken. Only a witness that saw more can tell."""
+    """The thief may end the log at the capture. Only a witness that saw more can show it."""
     forged = by_the_thief([*LINES[: TAKEN + 1], closed_at(TAKEN)])
     report = prove(forged).report
     assert report.verdict is LogVerdict.VERIFIED
@@ -93,20 +93,20 @@ def test_truncation_with_stolen_key_is_reported() -> None:
 
 
 def test_a_rollback_to_an_earlier_checkpoint() -> None:
-    """The log ends at an older seal: nobody has the key to close it there."""
+    """The log ends at an older seal, which nobody has the key to close."""
     for back in SIGNED[:2]:
         assert expect(by_the_thief([*LINES[: back + 1], closed_at(back)]))[0] == "seal/key"
         assert expect(LINES[: back + 1]) == ("close/missing", back + 1)
 
 
 def test_a_rollback_that_goes_on_from_an_older_seal() -> None:
-    """What came after an older seal is written anew, and the seals that followed are left out."""
+    """The records after an older seal are rewritten, and the following seals removed."""
     later = [line for number, line in enumerate(LINES) if number > SIGNED[1] and number not in SIGNED[2:-1]]
     assert expect(by_the_thief([*LINES[: SIGNED[1] + 1], *later]))[0] in ("seal/key", "seal/missing")
 
 
 def test_a_recover_by_the_key_of_the_epoch() -> None:
-    """A recovery would let the thief discard what it likes: only the log key signs one."""
+    """A recovery would let the thief discard records, so only the log key signs one."""
     dropped = ("ending", "tlog")
     recover = {name: value for name, value in read(closed_at(TAKEN)).items() if name not in dropped}
     recover |= {"type": "recover", "discarded_bytes": 0, "discarded_digest": "00" * 32}
@@ -119,7 +119,7 @@ def test_a_recover_by_the_key_of_the_epoch() -> None:
 
 
 def test_log_key_can_rewrite_whole_log() -> None:
-    """No epoch key is needed: who holds the log key names them. Where it lies aboard, only a witness tells."""
+    """A holder of the log key needs no epoch key, because the log key names them. Only a witness can show this."""
     own, secret = public_of(STRANGER).hex(), LOG_KEY.private.private_bytes_raw()
     named = [edit(line, next_key=own) if "next_key" in read(line) else line for line in edited(1)]
     forged = captured(named, secret, STRANGER)

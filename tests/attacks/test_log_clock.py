@@ -21,7 +21,7 @@ def test_monotonic_time_going_too_far() -> None:
 
 
 def test_both_clocks_going_too_far() -> None:
-    """A silence of ten minutes: the epoch should have been sealed long before."""
+    """After a silence of ten minutes the epoch should have been sealed long before."""
     far = [edit(line, **{key: read(line)[key] + 600_000_000 for key in ("at_us", "utc_us")}) for line in LINES[EFFECT:]]
     assert expect(signed([*LINES[:EFFECT], *far])) == ("seal/missing", EFFECT)
 
@@ -31,7 +31,7 @@ def test_utc_set_back_by_more_than_its_error() -> None:
 
 
 def test_utc_set_back_within_its_error_is_accepted() -> None:
-    """The clocks are in order, and so only the seal tells that the record was edited."""
+    """The clocks are valid, so only the seal shows that the record was edited."""
     error = read(LINES[EFFECT])["utc_error_us"]
     seal = next(number for number in signers(LINES) if number > EFFECT)
     assert error > 0
@@ -39,7 +39,7 @@ def test_utc_set_back_within_its_error_is_accepted() -> None:
 
 
 def test_utc_running_away_from_monotonic_time() -> None:
-    """Each step is small, and each is beyond what the errors allow in sum."""
+    """Each step is small, but their sum exceeds the stated errors."""
     fast = [edit(line, utc_us=read(line)["utc_us"] + 700 * number) for number, line in enumerate(LINES)]
     error = read(LINES[0])["utc_error_us"]
     first = next(number for number in range(len(LINES)) if 700 * number > 2 * error)

@@ -50,7 +50,7 @@ def test_an_edited_answer(field: str) -> None:
 
 @rows("field", EDITS)
 def test_an_edited_answer_that_was_rehashed(field: str) -> None:
-    """The chain is whole again; the seal of the epoch is not, whether it counts right or not."""
+    """The chain is valid again, but the seal of the epoch is not."""
     changed = with_fields(FIRST, **{field: EDITS[field]})
     assert expect(rehashed(changed)) in (("seal/bytes", FIRST_SEAL), ("seal/digest", FIRST_SEAL))
     assert expect(rewritten(changed)) == ("seal/root", FIRST_SEAL)
@@ -58,7 +58,7 @@ def test_an_edited_answer_that_was_rehashed(field: str) -> None:
 
 @rows("field", EDITS)
 def test_an_edited_answer_that_the_key_holder_signed_again(field: str) -> None:
-    """All is sealed; but the decision does not follow from its inputs."""
+    """Everything is sealed, but the decision does not follow from its inputs."""
     changed = signed(with_fields(FIRST, **{field: EDITS[field]}))
     assert expect(changed) == (f"decision/{field.replace('_', '-')}", FIRST)
 
@@ -118,7 +118,7 @@ def test_an_edited_question(fields: dict[str, object], slug: str) -> None:
 
 
 def test_edited_state_that_changes_decision_is_detected() -> None:
-    """The battery that sent the flight home is said to have been full: then no rule sends it home."""
+    """The battery that caused the return is recorded as full, which matches no rule."""
     lines = other_flight()
     records = [read(line) for line in lines]
     number, record = next((n, each) for n, each in enumerate(records) if "state" in each and each["kind"] == 1)
@@ -127,7 +127,7 @@ def test_edited_state_that_changes_decision_is_detected() -> None:
 
 
 def test_used_id_recorded_as_unused_is_detected() -> None:
-    """The key holder lets a step be decided twice, and calls its id fresh each time."""
+    """The key holder lets a step be decided twice, and records its id as unused each time."""
     number = FIRST
     again = [*LINES[: number + 1], LINES[number], *LINES[number + 1 :]]
     assert expect(signed(again)) == ("decision/consumed", number + 1)

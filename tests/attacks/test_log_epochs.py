@@ -51,7 +51,7 @@ def test_a_seal_taken_out() -> None:
 
 
 def test_all_seals_taken_out_by_the_key_holder() -> None:
-    """Who held all keys wrote the log anew, and still may not leave longer than 20 s unsealed."""
+    """A holder of all keys rewrites the log, but still cannot leave records unsealed for longer than 20 s."""
     bare = signed(without(*SIGNED[1:-1]))
     first = next(n for n, line in enumerate(bare) if read(line)["at_us"] > read(bare[0])["at_us"] + 20_000_000)
     assert read(bare[first])["type"] != "close"
@@ -59,7 +59,7 @@ def test_all_seals_taken_out_by_the_key_holder() -> None:
 
 
 def test_empty_epochs_taken_out_by_the_key_holder() -> None:
-    """The vehicle hung in the air for a minute: that nothing happened is said every ten seconds."""
+    """The vehicle hovered for a minute: a seal every ten seconds shows that nothing happened."""
     empty = [number for number in SIGNED[1:-1] if read(LINES[number])["records"] == 1]
     assert len(empty) > 2
     found = expect(signed(without(*empty)))
@@ -84,7 +84,7 @@ def test_the_longest_time_of_an_epoch(ms: int, whole: bool) -> None:
 
 
 def test_resealed_with_a_later_key() -> None:
-    """Who took the vehicle knows the key of that epoch, and seals an earlier one with it."""
+    """The thief knows the key of that epoch, and seals an earlier one with it."""
     origin = read(LINES[0])["checkpoint"].partition("\n")[0]
     for number in SIGNED[1:-1]:
         for later in SIGNED[SIGNED.index(number) : -1]:
@@ -96,13 +96,13 @@ def test_resealed_with_a_later_key() -> None:
 
 
 def test_sealed_by_the_log_key() -> None:
-    """The log key signs the genesis and recoveries, and no epoch."""
+    """The log key signs the genesis and recoveries, but no epoch."""
     forged = by_one_key(LINES, seed_of(read(LINES[0])["log_key"]))
     assert expect(forged) == ("seal/key", FIRST)
 
 
 def test_another_key_named_for_what_follows() -> None:
-    """A seal that names the thief's key was not signed so, and a signature over another key is not the record's."""
+    """The signature of a seal covers the next key, so the thief's key cannot be named in it."""
     thief = public_of(b"\x66" * 32).hex()
     swapped = [*LINES[:FIRST], edit(LINES[FIRST], next_key=thief), *LINES[FIRST + 1 :]]
     assert expect(swapped) == ("seal/self", FIRST)
@@ -119,7 +119,7 @@ def test_another_key_named_for_what_follows() -> None:
 
 
 def test_invalid_epoch_key_is_rejected() -> None:
-    """Not every 32 octets are a point of the curve, and a point of small order fits many signatures."""
+    """Some 32 octets are not a point of the curve, and a point of small order matches many signatures."""
     for key in ("00" * 32, "01" + "00" * 31, "ff" * 32, "ec" + "ff" * 30 + "7f"):
         odd = [edit(LINES[0], next_key=key), *LINES[1:]]
         assert expect(signed(odd))[0] in ("seal/key", "seal/signature")

@@ -10,7 +10,7 @@ from rtshcua.evidence.verify import verify
 
 
 def noticed(data: bytes, at: int, bit: int) -> bool:
-    """By the chain alone, without any key but the one that the log names."""
+    """Detected by the chain alone, with no other key than the one in the log."""
     changed = data[:at] + bytes([data[at] ^ 1 << bit]) + data[at + 1 :]
     return verify(_lines(changed)).verdict is not LogVerdict.VERIFIED
 
@@ -28,7 +28,7 @@ def short() -> bytes:
 
 
 def test_the_forger_writes_what_the_recorder_writes() -> None:
-    """Else the attacks in these files would fail for the wrong reason."""
+    """Otherwise the attacks in these files would fail for the wrong reason."""
     assert tuple(signed(flight())) == flight()
     assert rewritten(flight()) == list(flight())
     assert prove(flight()).report.verdict is LogVerdict.VERIFIED

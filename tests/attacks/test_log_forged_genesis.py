@@ -33,7 +33,9 @@ def flipped(field: str, at: int) -> str:
     ],
 )
 def test_a_forged_field(fields: dict[str, object], slug: str) -> None:
-    """Each is seen at once, even when the log key's holder wrote the rest anew; without that, by its own signature."""
+    """Each is detected at once, even if the holder of the log key rewrote the rest; otherwise by the genesis'
+    signature.
+    """
     assert expect(signed(begun(**fields))) == (slug, 0)
     assert expect(begun(**fields)) == ("seal/key" if "vehicle" in fields else "seal/self", 0)
 
@@ -76,7 +78,7 @@ def test_the_bundle_of_another_mission() -> None:
 
 
 def test_a_flight_that_says_it_was_never_enforced() -> None:
-    """Mode `none` would free every dispatch of its permit; but each decision records the mode too."""
+    """Mode `none` would free every dispatch of its permit, but each decision records the mode too."""
     assert expect(signed(begun(mode="none")))[0] == "decision/mode"
 
 

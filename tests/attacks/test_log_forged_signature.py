@@ -28,7 +28,7 @@ def test_signed_by_another_key() -> None:
 
 
 def test_another_key_named_in_the_genesis() -> None:
-    """The chain alone is then sound in itself; only the root under the pinned key tells."""
+    """The chain alone is consistent; only the root under the pinned key shows it."""
     forged = signed(as_log_key(LINES, STRANGER), STRANGER)
     assert verify(forged).verdict is LogVerdict.VERIFIED
     assert expect(forged) == ("trust/log-key", 0)
@@ -47,7 +47,7 @@ def test_the_name_of_the_right_key_beside_another() -> None:
 
 
 def test_a_root_of_the_forgers_own() -> None:
-    """Everything is made anew: keys, root, log. Only what was pinned beforehand is not."""
+    """Keys, root and log are all new. Only the pin is not."""
     root_key = SigningKey.from_seed(b"\x01\x02" * 16, duty=Duty.ROOT, development=True)
     real, _ = case.root()
     own = type(real)(
@@ -78,7 +78,9 @@ def test_one_byte_of_the_signature() -> None:
 
 
 def test_the_key_holder_may_rewrite_and_the_report_says_so() -> None:
-    """No key tells what its holder wrote first. Effects that decide nothing can be rewritten: only a witness knows."""
+    """No key proves what its holder wrote first. Effects without a decision can be rewritten: only a witness can show
+    it.
+    """
     number = next(n for n, line in enumerate(LINES) if read(line).get("event") == "succeeded")
     forged = signed([*LINES[:number], edit(LINES[number], detail="rewritten"), *LINES[number + 1 :]])
     report = prove(forged).report

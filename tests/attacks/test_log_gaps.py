@@ -90,7 +90,7 @@ def test_gap_cannot_be_removed_without_key() -> None:
 
 
 def test_gap_made_with_stolen_epoch_key_is_reported() -> None:
-    """Who took the vehicle can leave out what it recorded since the last seal, as ever; that it was silent is told."""
+    """The thief can remove records since the last seal, as always; the report names the silence."""
     taken = SIGNED[2]
     gap = line_of(gap_after(LINES[taken], 40 * S))
     end = edit(LINES[-1], **{key: read(gap)[key] for key in ("at_us", "utc_us")})
@@ -104,7 +104,7 @@ def test_gap_made_with_stolen_epoch_key_is_reported() -> None:
 
 
 def test_gap_cannot_hide_boundary_entries() -> None:
-    """Not by who holds the log key and all epoch keys: only the boundary signs for that."""
+    """Not even with the log key and all epoch keys, because only the boundary signs these entries."""
     lines = list(attested())
     made = next(n for n, line in enumerate(lines) if read(line).get("event") == "dispatched")
     for number in (made, made - 1):
@@ -116,7 +116,7 @@ def test_gap_cannot_hide_boundary_entries() -> None:
 
 @pytest.mark.parametrize("recovered", [False, True])
 def test_gap_before_older_boundary_statement_is_detected(*, recovered: bool) -> None:
-    """Who holds the log's keys cuts the flight behind a statement, and has the boundary vouch that nothing came."""
+    """A holder of the log's keys truncates the flight after a statement, which would confirm that nothing followed."""
     lines, by_us = list(attested()), 990 * S
     kinds = [read(line)["type"] for line in lines]
     number = next(
@@ -139,7 +139,7 @@ def test_gap_before_older_boundary_statement_is_detected(*, recovered: bool) -> 
 
 
 def test_gaps_cannot_leave_records_unsealed_even_with_all_keys() -> None:
-    """A gap for each silence, and no seal: one counts in an epoch, and only while nothing is recorded."""
+    """A gap for each silence and no seal: only one gap counts in an epoch, and only while nothing is recorded."""
     gaps = [effect(9_000 * number, event="stalled", detail=f"{9 * S} us") for number in range(1, 7)]
     assert expect(log(genesis(), *gaps, close(55_000))) == ("seal/gap", 2)
 

@@ -28,7 +28,7 @@ def test_wrong_discarded_digest_is_rejected(fields: dict[str, object]) -> None:
 
 
 def test_removed_recovery_is_detected() -> None:
-    """What was torn is then said never to have been."""
+    """The log then claims that there was no damage."""
     without = [*LINES[:AT], *LINES[AT + 1 :]]
     assert expect(without)[0] in ("chain/sequence", "chain/broken")
     assert expect(rewritten(without))[0] in ("clock/backwards", "clock/utc-jump", "seal/key")
@@ -53,7 +53,7 @@ def test_monotonic_time_restarts_only_at_recovery() -> None:
 
 
 def test_utc_does_not_restart_at_recovery() -> None:
-    """A recovery is no way to go back in the time of day."""
+    """A recovery does not allow the time of day to go back."""
     fields = read(LINES[AT])
     back = [line_of(fields | {"utc_us": fields["utc_us"] - 3_600_000_000})]
     assert expect(resealed([*LINES[:AT], *back, *LINES[AT + 1 :]], seed_of)) == ("clock/utc-backwards", AT)
@@ -66,7 +66,7 @@ def test_clocks_advance_alike_after_recovery() -> None:
 
 
 def test_recovery_does_not_extend_epoch() -> None:
-    """Recoveries are signed: the records between two are as many as between two seals."""
+    """Recoveries are signed: the limit of records between two is that between two seals."""
     recover = read(LINES[AT]) | {"at_us": MONOTONIC_US, "utc_us": read(LINES[0])["utc_us"] + 20_000}
     many = [genesis(), *(effect(10) for _ in range(2_048)), recover]
     data = b"".join(log(*many))
@@ -81,7 +81,7 @@ def test_data_after_close_of_recovered_log_is_rejected() -> None:
 
 
 def test_unsigned_records_are_excluded_from_claims() -> None:
-    """Records of the last epoch, written anew while the log had no end: the recovery signs what it finds."""
+    """Records of the last epoch were rewritten while the log had no end: the recovery signs what it finds."""
     claims = {claim.slug: claim.text for claim in prove(LINES).report.proven}
     last = max(number for number in range(AT) if read(LINES[number])["type"] in ("genesis", "seal"))
     many = AT - last - 1

@@ -71,7 +71,7 @@ def newer(
 def judged(
     *roots: bytes, lines: tuple[bytes, ...] = (), pinned: bytes = ROOT_KEY.public, anchors: tuple[str, ...] = ()
 ) -> LogReport:
-    """The report on a log (the flight) under these roots."""
+    """The report on a log (of the flight) under these roots."""
     auditor, revoked = Auditor(pinned, anchors=anchors), RevokedKeys(roots)
     for line in lines or flown():
         auditor.take(line)
@@ -81,13 +81,13 @@ def judged(
 
 
 def found(report: LogReport) -> tuple[str, str, int]:
-    """Verdict, and what is the matter, at which record."""
+    """The verdict and the flaw, with its record."""
     finding = report.failure or report.shortfall
     return report.verdict.value, finding.slug if finding else "", finding.record if finding else -1
 
 
 def told(report: LogReport) -> set[str]:
-    """The slugs of what is told of revocations."""
+    """The slugs of the claims about revocations."""
     proven = {f"+{each.slug}" for each in report.proven}
     return {each for each in proven | {each.slug for each in report.unproven} if "revo" in each}
 
@@ -114,7 +114,7 @@ def test_signature_after_revocation_is_not_trusted(key: SigningKey, slug: str, r
 
 @rows("key", [POLICY_KEY, MISSION_KEY, APPROVAL_KEY])
 def test_signature_before_revocation_stays_valid(key: SigningKey) -> None:
-    """The log key vouches for when it was; that it was revoked since is told."""
+    """The log key proves the time; the report mentions the later revocation."""
     report = judged(newer(AFTER, key))
     assert found(report) == ("verified", "", -1)
     assert told(report) == {"revoked"}
@@ -160,7 +160,7 @@ def vectors_root(*keys: SigningKey, issued_us: int = AFTER) -> bytes:
 
 
 def test_witnesses_prove_signatures_before_revocation() -> None:
-    """A log is whole where they saw it to its end before the key was revoked; what came later may be anybody's."""
+    """A log is complete if they saw it to its end before the revocation; later logs may be forged."""
     key = case.KEYS[Duty.LOG]
 
     def under(root: bytes, *notes: str) -> tuple[str, str, int]:
@@ -197,7 +197,7 @@ def test_a_root_of_a_revoked_root_key_counts_where_it_is_given_itself() -> None:
 
 
 def test_root_of_same_time_must_contain_revocation() -> None:
-    """Whoever has the root key signs a later version that leaves out what was revoked."""
+    """A holder of the root key signs a later version that omits the revocations."""
     forged = vectors.b64encode(newer(BEFORE - S, version=5)).decode()
     lines = tuple(signed([edit(flown()[0], root=forged), *flown()[1:]], LOG_KEY))
     assert found(judged(newer(AFTER, MISSION_KEY), lines=lines)) == ("failed", "trust/revoked-key", 0)

@@ -1,4 +1,6 @@
-"""Both boundaries at once: every call is made of the one in Python and of the one in C, and both answer the same."""
+"""Runs both boundaries at once: every call is made to the one in Python and to the one in C, and both must answer the
+same.
+"""
 
 import ctypes
 from collections import deque
@@ -53,7 +55,7 @@ LINKS = [
 
 
 class Differs(AssertionError):
-    """The two answered otherwise."""
+    """The answers of the two boundaries differ."""
 
 
 def same(what: str, one: Any, other: Any) -> None:
@@ -67,7 +69,7 @@ def _none() -> int:
 
 
 def library(boundary: ctypes.CDLL, own_us: Callable[[], int] = _none) -> Callable[[bytes], bytes]:
-    """The boundary in C, called in this process; the caller's time is the only one, or it has a monotonic clock."""
+    """The boundary in C, called in this process; it uses the caller's time, or a monotonic clock of its own."""
     out = ctypes.create_string_buffer(2_048)
 
     def call(octets: bytes) -> bytes:
@@ -82,7 +84,7 @@ def begin(
     settings: Mapping[str, int] = MappingProxyType({}), owed: Mapping[str, Owed] = MappingProxyType({}),
     link_key: bytes | None = None, stated_us: int = -1, own_us: Callable[[], int] = _none,
 ) -> Caller:  # fmt: skip
-    """A boundary in C that begins, nothing opened on its vehicle before."""
+    """A new boundary in C, without opened missions."""
     boundary.rt_test_boundary_begin.restype = ctypes.c_char_p
     boundary.rt_test_boundary_forget()
     name = vehicle.encode()
@@ -109,7 +111,7 @@ class _Preparation(ctypes.Structure):
 
 
 def listed(parameters: Mapping[str, Owed]) -> Any:
-    """Parameters as the boundary in C is given them when it begins."""
+    """Parameters in the form in which the boundary in C receives them at its start."""
     made = _Preparation(count=len(parameters))
     for at, (name, each) in enumerate(parameters.items()):
         made.writes[at] = _Write(name.encode(), each.before, each.value)
@@ -180,7 +182,7 @@ class BothBoundaries:
 
 
 class BothGates:
-    """`frames.Gate`; whatever else is asked of it, Python answers."""
+    """`frames.Gate`; Python answers all other calls."""
 
     def __init__(self, here: Any, there: IsolatedGate, counts: dict[str, int]) -> None:
         self._here, self._there, self._counts = here, there, counts
@@ -223,7 +225,7 @@ class BothExecutors:
         return one
 
     def _look_ahead(self) -> None:
-        """Both sign the same ahead, of each link, by the permit that came last."""
+        """Both sign the same frames ahead for each link, by the last permit."""
         for kind, link in product((STEP, FALLBACK_LINK, CONTINGENCY_LINK), range(-1, 4)):
             for frames in ((), LINKS[:2], *([frame] for frame in (*LINKS, *self.frames.lately))):
                 one = self._here.ahead(self._sealed, kind, link, frames, self._now_us)
@@ -263,7 +265,7 @@ class BothExecutors:
 
 
 class Shadow:
-    """Puts both in the place of the one in Python, wherever `load` is called with a root that it was told of."""
+    """Replaces the boundary in Python by both, wherever `load` is called with a known root."""
 
     def __init__(self, boundary: ctypes.CDLL) -> None:
         self._library = boundary

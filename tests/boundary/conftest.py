@@ -1,4 +1,4 @@
-"""The boundary in C, built once and called as it is."""
+"""The boundary in C, built once and called in this process."""
 
 import ctypes
 import fcntl

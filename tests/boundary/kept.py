@@ -20,7 +20,9 @@ SLOT = _STREAMS_AT + MOST_STREAMS * STREAM.size + _CHECK
 
 
 class Kept(NamedTuple):
-    """What one slot says. `opened` is the expiry of each mission by digest, `versions` are by SHA-256 of the name."""
+    """The content of one slot. `opened` is the expiry of each mission by digest, `versions` are by SHA-256 of the
+    name.
+    """
 
     turn: int
     restarts: int
@@ -32,14 +34,14 @@ class Kept(NamedTuple):
 
 
 def read(path: Path) -> Kept:
-    """What the newer of its whole slots says."""
+    """The content of the newer intact slot."""
     data = path.read_bytes()
     assert len(data) in (SLOT, 2 * SLOT), len(data)
     return max(_slot(data[at : at + SLOT]) for at in range(0, len(data), SLOT) if _is_whole(data[at : at + SLOT]))
 
 
 def spoil_older(path: Path) -> None:
-    """Damage the slot that does not count."""
+    """Damage the older slot."""
     data = bytearray(path.read_bytes())
     if len(data) == 2 * SLOT:
         first, second = (_slot(bytes(data[at : at + SLOT])).turn for at in (0, SLOT))

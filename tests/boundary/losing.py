@@ -1,4 +1,4 @@
-"""Flights in virtual time whose boundary is the one in C, and is lost on the way."""
+"""Flights in virtual time with the boundary in C, which is lost during the flight."""
 
 import ctypes
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""Bytes that nearly are what they were: flipped bits, cut and spliced pieces, integers of other sizes, other values."""
+"""Mutated bytes: flipped bits, removed and inserted pieces, integers of other sizes, other values."""
 
 from random import Random
 from typing import Any
@@ -10,7 +10,7 @@ INTEGERS = (0, 1, -1, 23, 24, 255, 256, 1 << 16, 1 << 32, (1 << 63) - 1, -(1 << 
 
 
 def damaged(data: bytes, random: Random) -> bytes:
-    """A few bytes of it are others, more or fewer."""
+    """Some bytes are changed, added or removed."""
     out = bytearray(data)
     for _ in range(random.choice((1, 1, 1, 2, 4))):
         at = random.randrange(len(out) + 1)
@@ -34,7 +34,7 @@ def damaged(data: bytes, random: Random) -> bytes:
 
 
 def widened(data: bytes, random: Random) -> bytes:
-    """One head is written longer than need be, where a walk from the beginning finds one."""
+    """One head is written longer than necessary, if a walk from the beginning finds one."""
     heads, at = [], 0
     try:
         while at < len(data) and len(heads) < 400:
@@ -53,7 +53,7 @@ def widened(data: bytes, random: Random) -> bytes:
 
 
 def changed(value: Any, random: Random) -> Any:
-    """A decoded value of which one part, somewhere, is another, is missing, or is there twice."""
+    """A decoded value with one part changed, removed or duplicated."""
     if isinstance(value, tuple) and value and random.random() < 0.93:
         at = random.randrange(len(value))
         if random.random() < 0.06:
@@ -99,7 +99,7 @@ def in_range(value: Any) -> Any:
 
 
 def altered(data: bytes, random: Random) -> bytes:
-    """Canonical bytes of something that differs in one place or two."""
+    """Canonical bytes of a value that differs in one or two places."""
     value = cbor.decode(data)
     for _ in range(random.choice((1, 1, 2))):
         value = changed(value, random)

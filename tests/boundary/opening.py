@@ -1,4 +1,4 @@
-"""Trust roots and bundles: what Python and C say of the same bytes, and bytes that are worth asking about."""
+"""Trust roots and bundles: the results of Python and C on the same bytes, and interesting inputs."""
 
 import ctypes
 from random import Random
@@ -35,7 +35,7 @@ MANY = replace(
 
 
 class Boundary:
-    """The C side, which keeps the root that it opened last."""
+    """The C side, which keeps the last opened root."""
 
     def __init__(self, library: ctypes.CDLL) -> None:
         self._c = library
@@ -82,7 +82,7 @@ def agree_on_bundle(
 
 
 def signed_with(payload: bytes, key: SigningKey, kind: Artefact, random: Random) -> bytes:
-    """An envelope that the key signed, of which some part may be another than it ought to be."""
+    """An envelope that the key signed, of which some part may be wrong."""
     header: Any = {1: cose.ED25519, 3: kind.content_type, 4: key.kid}
     parts: list[Any] = [cbor.encode(header), {}, payload]
     duty = key.duty
@@ -103,14 +103,14 @@ def signed_with(payload: bytes, key: SigningKey, kind: Artefact, random: Random)
 
 
 def envelope(payload: bytes, key: SigningKey, kind: Artefact, random: Random) -> bytes:
-    """Mostly as it ought to be."""
+    """An envelope that is usually correct."""
     if random.random() < 0.2:
         return signed_with(payload, key, kind, random)
     return cose.sign1(payload, key=key, duty=key.duty, content_type=kind.content_type)
 
 
 def some_root(random: Random) -> bytes:
-    """A root, more or less."""
+    """A random root, mostly valid."""
     trust = random.choice((root(), MANY))
     match random.randrange(6):
         case 0:
@@ -125,7 +125,7 @@ def some_root(random: Random) -> bytes:
 
 
 def renamed(trust: TrustRoot, random: Random) -> TrustRoot:
-    """A root that is well-formed and says something else of one key, or of itself."""
+    """A well-formed root with another value for one key, or for itself."""
     at = random.randrange(len(trust.keys))
     key: VerificationKey = trust.keys[at]
     fields: list[dict[str, Any]] = [
@@ -158,7 +158,7 @@ def renamed(trust: TrustRoot, random: Random) -> TrustRoot:
 
 
 def some_bundle(random: Random) -> bytes:
-    """A bundle, more or less."""
+    """A random bundle, mostly valid."""
     policy, mission = THE_POLICY, THE_MISSION
     if random.random() < 0.15:
         policy = replace(

@@ -70,7 +70,7 @@ def test_a_flight_is_the_same_under_both(flavour: str, shadow: Shadow) -> None:
 
 
 def meddled(seed: int) -> None:
-    """A flight that an agent meddles with, and people answer and recall at random."""
+    """A flight with a random agent, and people who answer and recall at random."""
     of = Random(seed)
     run = agents.meddled(of)
     run = world.Run(agents.loaded(low_mission()))

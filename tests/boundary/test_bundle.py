@@ -30,7 +30,7 @@ def c(boundary: ctypes.CDLL) -> Boundary:
 
 
 def compare(c: Boundary, seed: int, count: int) -> Counter[str]:
-    """How many mutants of roots and bundles were accepted and refused, and why, alike by both."""
+    """How many mutants of roots and bundles were accepted and refused by both, and why."""
     random, found = Random(seed), Counter[str]()
     for number in range(count):
         pin = random.choice(

@@ -36,7 +36,7 @@ def test_both_answer_the_same(tmp_path: Path) -> None:
 
 @pytest.mark.soak
 def test_both_stop_signing_ahead_at_the_same_frame(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A link that is signed ahead again and again, until no more is."""
+    """Sign a link ahead repeatedly, until it is refused."""
     monkeypatch.setattr(c_and_python, "FLOODS", 1)
     assert {"floods", "ahead frame/too-many-ahead"} <= ask_both(0, 600, tmp_path).keys()
 
@@ -76,7 +76,7 @@ def answers_done() -> Path:
 @pytest.mark.soak
 @pytest.mark.parametrize("chunk", range(1, CHUNKS + 1))
 def test_both_answer_a_million_requests_the_same(chunk: int, tmp_path: Path) -> None:
-    """What was done before goes unasked: it goes on where it stopped."""
+    """Requests that were compared before are skipped: the test resumes where it stopped."""
     done = answers_done() / f"{chunk}.json"
     if not done.exists():
         counts = ask_both(chunk * CHUNK, CHUNK, tmp_path)

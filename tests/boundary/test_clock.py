@@ -1,4 +1,4 @@
-"""The boundary's own clock, in Python and in C: each source, challenge and frame is taken or left alike."""
+"""The boundary's own clock, in Python and in C: both accept the same sources, challenges and frames."""
 
 import ctypes
 from collections import Counter
@@ -115,7 +115,7 @@ def test_both_accept_the_same_claimed_times(boundary: ctypes.CDLL) -> None:
 
 @pytest.mark.parametrize("stated", [-1, 1_000])
 def test_both_use_only_their_own_clock(boundary: ctypes.CDLL, stated: int) -> None:
-    """The same clock for both, and times that are named beside it, in every direction."""
+    """The same clock for both, with claimed times that differ in every direction."""
     random = Random(33)
     moment, unknown = START.monotonic_us, replace(START, utc_error_us=UTC_UNKNOWN_US)
     own = OwnClock(unknown, None if stated < 0 else stated)

@@ -1,4 +1,4 @@
-"""Both implementations agree on hashes and MACs, and on which Ed25519 keys and signatures count."""
+"""Both implementations agree on hashes and MACs, and on the validity of Ed25519 keys and signatures."""
 
 import ctypes
 import hashlib
@@ -39,7 +39,7 @@ TORSION = torsion()
 
 
 def agreed(boundary: ctypes.CDLL, key: bytes, signature: bytes, message: bytes) -> bool:
-    """What both say of a signature, provided that they say the same."""
+    """The common verdict on a signature."""
     here = verified(key, signature, message)
     assert bool(boundary.rt_test_verify(key, signature, message, len(message)) & 1) is here
     return here
@@ -104,7 +104,7 @@ def test_altered_signature_is_refused(boundary: ctypes.CDLL) -> None:
 
 
 def test_points_of_small_order_and_other_encodings_are_refused(boundary: ctypes.CDLL) -> None:
-    """These verify by the equation, and OpenSSL takes some: everybody can make them."""
+    """These satisfy the equation, and OpenSSL accepts some: anybody can make them."""
     taken_by_openssl = 0
     assert len(set(TORSION)) == 8
     for weak in TORSION:
@@ -127,7 +127,7 @@ def test_points_of_small_order_and_other_encodings_are_refused(boundary: ctypes.
 
 
 def test_verification_is_without_cofactor(boundary: ctypes.CDLL) -> None:
-    """A key or an R with a part of small order counts only where the equation holds without the cofactor."""
+    """A key or an R with a part of small order is only valid if the equation holds without the cofactor."""
     random, outcomes = Random(2), set()
     for weak in TORSION[1:]:
         for case in range(4):

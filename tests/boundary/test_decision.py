@@ -1,5 +1,5 @@
-"""The decision in C against the one in Python: the same outcome, reason, step, clause, target and `valid_until`, the
-same links that may fly, and the same policies and missions that are refused.
+"""Compares the decision in C with the one in Python: the same outcome, reason, step, clause, target and
+`valid_until`, the same links that may fly, and the same refused policies and missions.
 """
 
 import ctypes
@@ -51,21 +51,21 @@ def native(boundary: ctypes.CDLL) -> Native:
 
 
 def load(native: Native, policy: Policy, mission: Mission) -> tuple[PreparedInvocation, ...] | None:
-    """Both are given a policy and a mission under it; None where both refuse either."""
+    """Load a policy and a mission into both; None if both refuse either."""
     prepared = prepare(policy)
     assert (native.policy(policy) is not None) is isinstance(prepared, Refusal), prepared
     return None if isinstance(prepared, Refusal) else fly(native, prepared, mission)
 
 
 def fly(native: Native, policy: PreparedPolicy, mission: Mission) -> tuple[PreparedInvocation, ...] | None:
-    """Both are given a mission; None where both refuse it."""
+    """Load a mission into both; None if both refuse it."""
     invocations = prepare_mission(mission, policy)
     assert (native.mission(mission) is not None) is isinstance(invocations, Refusal), invocations
     return None if isinstance(invocations, Refusal) else invocations
 
 
 def agree(native: Native, invocation: PreparedInvocation, questions: list[Question]) -> None:
-    """Both answer alike about the step that is prepared."""
+    """Compare the answers about the prepared step."""
     for question, answer in zip(questions, native.ask(questions), strict=True):
         assert answer == expected(invocation, question), question
 
@@ -85,7 +85,7 @@ def test_reference_case(native: Native, name: str) -> None:
 
 
 def asked(native: Native, seed: int, situations: int) -> int:
-    """Ask about the missions of a random policy; how often both decided."""
+    """Compare the answers about missions of a random policy; returns how often both decided."""
     of, count = Random(seed), 0
     rich = seed % 2 == 1
     policy = prepare(rich_worlds.policy(of) if rich else worlds.policy(of))
@@ -115,7 +115,7 @@ def test_random_worlds_are_decided_alike(native: Native) -> None:
 
 @pytest.mark.soak
 def test_a_million_random_situations_are_decided_alike(native: Native) -> None:
-    """It goes on where it was stopped, and begins with other worlds once it is through."""
+    """It resumes where it was stopped, and begins with other worlds at the end."""
     PROGRESS.parent.mkdir(exist_ok=True)
     done = json.loads(PROGRESS.read_text()) if PROGRESS.exists() else {"seed": 1_000_000, "asked": 0}
     if done["asked"] >= SOAK:
@@ -184,7 +184,7 @@ def test_altered_input_is_refused_alike(native: Native, count: int) -> None:
 
 
 def test_sums_that_cancel_out_and_such_as_exceed_64_bits(native: Native) -> None:
-    """What is merged may cancel out, so that the bound is on the merged sum."""
+    """Merged terms may cancel, so the bound applies to the merged sum."""
     wide = Parameter("wide", QUANTITY, "length", 0, -MAX_VALUE, MAX_VALUE, ())
     for terms in (
         [1, 511], [512], [513], [512, 1], [512, -512, 512], [-512, -1], [1 << 52, -(1 << 52)],
@@ -289,7 +289,7 @@ def test_local_times_are_equal(native: Native) -> None:
 
 
 def test_the_way_home_takes_as_much(native: Native) -> None:
-    """With speeds and heights at the ends of their ranges the charge is of more than 64 bits."""
+    """With speeds and heights at the ends of their ranges the charge exceeds 64 bits."""
     of = Random(4)
     for _ in range(80):
         made = rich_worlds.vehicle(of, flat.POLICY.vehicle)
@@ -375,7 +375,7 @@ def test_an_outline_of_as_many_corners_as_fit(native: Native) -> None:
 
 
 def test_a_long_survey_is_remembered_with_its_step(native: Native) -> None:
-    """What a path answers about a zone is asked once; another start gives another leg."""
+    """The result of a path for a zone is computed once; another start gives another leg."""
     inspect = flat.INVOCATIONS[flat.INSPECTION_STEP]
     path = tuple(part for at in range(300) for part in (110 * M + 200 * at, 20 * M * (-1) ** at))
     long = replace(inspect, plan=replace(inspect.plan, kind=MotionKind.COVER, path=path))
@@ -391,7 +391,7 @@ def test_a_long_survey_is_remembered_with_its_step(native: Native) -> None:
 
 
 def test_paths_that_are_compared_with_too_many_edges_are_refused_alike(native: Native) -> None:
-    """A request waits for what its step's path answers about each zone, and in flight none may take long."""
+    """A request waits for the results of its step's path for each zone, which must not take long in flight."""
     band = outlines.polygon(tuple((x + 300 * M, y) for x, y in outlines.zig_zag(2_000)))
     policy = replace(flat.POLICY, zones=(*flat.ZONES, band))
     prepared = prepare(policy)
@@ -459,7 +459,7 @@ def test_every_source_and_timing_class(native: Native) -> None:
 
 
 def test_an_admission_that_rests_on_a_temporal_monitor(native: Native) -> None:
-    """It stands for `MAX_GAP`, though nothing that was read is stale by then."""
+    """It is valid for `MAX_GAP`, even if no value that was read is stale by then."""
     charged = flat.clause("charged", flat.apply(Op.GT, flat.signal(flat.BATTERY), flat.const(0)))
     asked_for = flat.clause("charged for 1 s", (Op.MONITOR, 0, 0))
     inspect = flat.CONTRACTS[flat.INSPECT]
@@ -484,7 +484,7 @@ def test_an_admission_that_rests_on_a_temporal_monitor(native: Native) -> None:
 
 
 def test_heights_at_floor_and_ceiling(native: Native) -> None:
-    """Both are outside, for what may not be there and for what must be."""
+    """Both are outside, for places that must not and that must be inside."""
     inside: tuple[int, ...] = (Op.POSITION_IN, flat.BRIDGE_GROWN, 0)
     zones = tuple(
         replace(one, floor=20 * M, ceiling=30 * M) if at == flat.BRIDGE_GROWN else one
@@ -512,7 +512,7 @@ def test_heights_at_floor_and_ceiling(native: Native) -> None:
 
 
 def test_sums_of_the_height_over_a_volume(native: Native) -> None:
-    """The height is the one number that ranges; what of it cancels out does not."""
+    """Only the height ranges over a volume; its terms may cancel."""
     height, level = flat.signal(flat.HEIGHT), flat.const(15 * M)
     sums = (height, flat.scaled(height, -1), flat.apply(Op.SUB, level, height), flat.apply(Op.SUB, height, height))
     for op, number in product((Op.LT, Op.LE, Op.GT, Op.GE, Op.EQ, Op.NE), sums):

@@ -1,4 +1,6 @@
-"""Documents for a vehicle under way: C takes those that Python takes, and refuses the others alike."""
+"""Documents for a vehicle in flight: C accepts the same documents as Python, and refuses the others for the same
+reason.
+"""
 
 import ctypes
 from collections import Counter
@@ -70,7 +72,7 @@ TRUST = replace(
 
 
 class Flight:
-    """One flight on both sides, which take the same documents in the same order."""
+    """One flight on both sides, with the same documents in the same order."""
 
     def __init__(self, library: ctypes.CDLL, trust: TrustRoot = TRUST) -> None:
         self._c = library
@@ -85,7 +87,7 @@ class Flight:
         library.rt_test_begin(self._kept[2], len(VEHICLE.encode()), self._kept[3])
 
     def take(self, document: bytes, now: Now = START, released: int = 0, current: int = 0) -> str:
-        """Why a document is refused, or `accepted`, provided that both say the same."""
+        """The common result of a document: its refusal slug, or `accepted`."""
         out, moment = (ctypes.c_int64 * 7)(), self._moment(now)
         issued = self.bundle.mission.issued_at_us
         slug = self._c.rt_test_document(
@@ -159,7 +161,7 @@ def flight(boundary: ctypes.CDLL) -> Flight:
 
 
 def some_mission(of: Loaded, random: Random) -> Mission:
-    """What may take the place of the mission in force."""
+    """A mission that may replace the one in force."""
     mission = of.bundle.mission
     mission = shorter(of) if len(mission.invocations) == 4 and random.random() < 0.5 else mission
     steps = mission.invocations
@@ -210,7 +212,7 @@ def some_mission(of: Loaded, random: Random) -> Mission:
 
 
 def unchecked(mission: Mission, of: Loaded, kept: int, key: SigningKey, flight: bytes) -> bytes:
-    """A replacement that is signed although the steps that stay may be others."""
+    """A signed replacement whose kept steps may differ."""
     over = replace_bundle(of, mission) if kept >= 0 else of.bundle
     return sign_replacement(
         mission, over=over, flight=flight, kept=max(0, min(kept, len(mission.invocations))), key=key
@@ -223,7 +225,7 @@ def replace_bundle(of: Loaded, mission: Mission) -> Any:
 
 
 def some_document(flight: Flight, random: Random) -> bytes:
-    """A document, more or less."""
+    """A random document, mostly valid."""
     of = flight.loaded()
     utc, bundle = START.utc_us, of.bundle
     steps = len(bundle.mission.invocations)
@@ -309,7 +311,7 @@ def some_document(flight: Flight, random: Random) -> bytes:
 
 
 def compare(library: ctypes.CDLL, seed: int, count: int) -> Counter[str]:
-    """How many documents were accepted and refused, and why, alike by both, over many flights."""
+    """How many documents were accepted and refused by both, and why, over many flights."""
     random, found, flight = Random(seed), Counter[str](), Flight(library)
     for number in range(count):
         if number % 40 == 39:

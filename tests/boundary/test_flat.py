@@ -1,4 +1,4 @@
-"""CBOR and the flat form: C reads what Python reads, field for field, and refuses what it refuses."""
+"""CBOR and the flat form: C decodes the same fields as Python, and refuses the same bytes."""
 
 import ctypes
 from functools import cache
@@ -52,7 +52,7 @@ def c(boundary: ctypes.CDLL) -> ctypes.CDLL:
 
 
 def read(c: ctypes.CDLL, data: bytes, kind: str) -> tuple[str | None, ctypes.Structure]:
-    """Why C refuses a payload, and what it read."""
+    """The refusal of a payload by C, and the decoded value."""
     pointer = ctypes.c_void_p()
     slug = getattr(c, f"rt_test_{kind}")(data, len(data), ctypes.byref(pointer))
     assert pointer.value
@@ -68,7 +68,7 @@ def refusal(data: bytes, kind: str) -> str | None:
 
 
 def same(c: ctypes.CDLL, data: bytes) -> bool:
-    """Whether both accept a payload, provided that they agree, on what it says too."""
+    """Whether both accept a payload, with the same value."""
     for kind in ("policy", "mission"):
         (slug, there), expected = read(c, data, kind), refusal(data, kind)
         assert slug == expected, (kind, data.hex())

@@ -1,4 +1,4 @@
-"""Both boundaries where their tables are full: they answer the same, and what they do not keep any more they refuse."""
+"""Both boundaries with full tables: they answer the same, and refuse what no longer fits."""
 
 import ctypes
 
@@ -65,7 +65,7 @@ def both(shadow: Shadow, policy: Policy = flat.POLICY, mission: Mission = flat.M
 
 @pytest.mark.soak
 def test_greatest_number_of_answers(shadow: Shadow) -> None:
-    """People may answer more than is kept: what is kept stays, and the next one is told so."""
+    """People may answer more than the limit: stored answers stay, and the next one is refused."""
     first, *_, last = flat.MISSION.invocations
     steps = [
         replace(first, step=number, invocation_id=bytes([number]) * 16, arguments=(first.arguments[0] + number,))
@@ -88,7 +88,7 @@ def test_greatest_number_of_answers(shadow: Shadow) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("granted", [1, 0])
 def test_more_confirm_rules_than_kept_answers(granted: int, shadow: Shadow) -> None:
-    """An answer is one to each of them, and the second person's counts as the first one's does."""
+    """One answer applies to each of the rules, and the second person's as the first one's."""
     asks = tuple(replace(ASKS, text=f"asks {number}") for number in range(MAX_ANSWERS + 1))
     of = both(shadow, replace(flat.POLICY, rules=(*flat.POLICY.rules, *asks)))
     for key, answer in ((PEOPLE[0], 1), (PEOPLE[1], granted)):

@@ -1,5 +1,5 @@
-"""The gate and the signing of frames in C do what those in Python do: the same frames leave, the others for the same
-reason, the same octets, and what came in is believed alike.
+"""The gate and the signing of frames in C match those in Python: the same frames pass, the others are refused for the
+same reason, with the same octets, and the same incoming frames are accepted.
 """
 
 import ctypes
@@ -83,7 +83,7 @@ def drawn_command(random: Random, home: Projection) -> Command:
 
 
 def drawn_frame(random: Random, of: Command) -> bytes:
-    """A frame that carries the command out, or nearly, or housekeeping, or anything else, and now and then damaged."""
+    """A frame that carries out the command, or nearly, or housekeeping, or anything else, sometimes damaged."""
     x, y = random.choice([*zip(of.geo[::2], of.geo[1::2], strict=True), (2**31 - 1, 2**31 - 1), (1, 2)])
     height = of.altitude / 1000 + random.choice((0, 0, 0.001, 0.003, 1.999, 2.002, -5.0))
     speed = of.speed / 1000 + random.choice((0, 0, 0.0015, 0.0025))
@@ -130,7 +130,7 @@ def drawn_frame(random: Random, of: Command) -> bytes:
 
 
 def drawn_report(random: Random, of: Command, autopilot: int) -> bytes:
-    """Something that the vehicle says of itself."""
+    """A random report of the vehicle about itself."""
     x, y = random.choice([*zip(of.geo[::2], of.geo[1::2], strict=True), (0, 0)])
     off = random.choice((0, 200, 440, 460, 700))
     above = random.randrange(50_000)
@@ -157,7 +157,7 @@ def drawn_report(random: Random, of: Command, autopilot: int) -> bytes:
 
 
 def compare_gates(boundary: ctypes.CDLL, seed: int) -> int:
-    """One session of each, and how many frames both let out."""
+    """One session of each; returns how many frames both passed."""
     random = Random(seed)
     here, there = FrameSession(), InC(boundary)
     autopilot, home, now_us, left = random.choice(AUTOPILOTS), random.choice(HOMES), 1_000_000, 0
@@ -196,7 +196,7 @@ def compare_gates(boundary: ctypes.CDLL, seed: int) -> int:
 
 
 def compare_links(boundary: ctypes.CDLL, seed: int) -> int:
-    """One signed link of each, and how many frames both believed."""
+    """One signed link of each; returns how many frames both accepted."""
     random = Random(seed)
     key, other_key = random.randbytes(32), random.randbytes(32)
     utc_us, now_us = EPOCH_US + random.randrange(10**15), random.randrange(10**9)

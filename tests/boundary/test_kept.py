@@ -1,4 +1,4 @@
-"""What a boundary's process keeps, over starts without its link's key, and when it is killed."""
+"""The stored state of a boundary's process, after starts without its link's key, and after kills."""
 
 import os
 import signal
@@ -21,7 +21,7 @@ from rtshcua.onboard.enforcement.isolated import Caller, IsolatedGate
 
 
 def link_after(state: Path, key: Path | None) -> keeping.LinkState:
-    """What is kept of the link after a start that opened a bundle, with or without the key."""
+    """The stored state of the link after a start that opened a bundle, with or without the key."""
     process = BoundaryProcess(SIGNED_ROOT, PIN, VEHICLE, state, link_key=key, paced=True)
     assert isinstance(Caller(process.call).load(sealed(), START), bytes)
     process.close()
@@ -29,7 +29,7 @@ def link_after(state: Path, key: Path | None) -> keeping.LinkState:
 
 
 def test_start_without_link_key_keeps_timestamps(tmp_path: Path) -> None:
-    """Else a frame that was recorded before counts as new where the clock was set back."""
+    """Otherwise a recorded frame would be accepted as new after the clock was set back."""
     key = tmp_path / "link.key"
     key.write_bytes(bytes(range(32)))
     key.chmod(0o600)
@@ -52,7 +52,7 @@ def test_released_mission_stays_released_after_kill(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("heard", [1, 40])
 def test_next_frame_is_accepted_after_kill(tmp_path: Path, heard: int) -> None:
-    """ArduPilot's timestamp rises by one a frame: what is kept of it must not be ahead of what was heard."""
+    """ArduPilot's timestamp rises by one a frame: the stored one must not be ahead of the last received one."""
     key = tmp_path / "link.key"
     key.write_bytes(bytes(range(32)))
     key.chmod(0o600)

@@ -1,4 +1,4 @@
-"""Requests, answers, permits, preparations and receipts: both read and write the same octets, and nothing else."""
+"""Requests, answers, permits, preparations and receipts: both implementations read and write the same octets."""
 
 import ctypes
 from random import Random

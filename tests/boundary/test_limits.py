@@ -1,4 +1,4 @@
-"""The headers that are made from Python's limits, reasons and layouts are those that it makes now."""
+"""The headers generated from Python's limits, reasons and layouts are up to date."""
 
 import subprocess
 import sys

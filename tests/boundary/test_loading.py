@@ -1,4 +1,4 @@
-"""One boundary in C may take a bundle in the place of another, as long as nothing flies."""
+"""A boundary in C may load a bundle in place of another one while nothing flies."""
 
 import ctypes
 
@@ -30,7 +30,7 @@ def into(caller: Caller, bundle: bytes) -> Loaded:
 
 
 def test_a_permit_of_the_bundle_before_sends_nothing(boundary: ctypes.CDLL) -> None:
-    """Its number means another step now, which was not asked for."""
+    """Its number now means another step, which was not requested."""
     caller = held(boundary)
     permit = allowed(into(caller, sealed()))
     other = into(caller, sealed(mission=replace(MISSION, name="other")))

@@ -1,4 +1,4 @@
-"""The boundary is lost in flight: what was signed ahead brings the vehicle down, as a fallback by the boundary does."""
+"""The boundary is lost in flight: frames signed ahead bring the vehicle down, like a fallback by the boundary."""
 
 import ctypes
 from collections.abc import Callable
@@ -45,7 +45,7 @@ def at(moment_us: int) -> Callable[[Apart], bool]:
 
 
 def flies(step: int) -> Callable[[Apart], bool]:
-    """Five seconds after the vehicle was seen to do this step."""
+    """Five seconds after the vehicle was observed to fly this step."""
     since: list[int] = []
 
     def dies(of: Apart) -> bool:
@@ -66,7 +66,7 @@ def after_loss(flown: Any) -> list[tuple[int, int, int]]:
 
 
 def came_down(flown: Any) -> None:
-    """It did, by us, and the log proves as much as the boundary signed, and no more."""
+    """The vehicle came down by our command, and the log proves as much as the boundary signed, and no more."""
     assert flown.ending is Ending.ABORTED
     truth = flown.vehicle.simulation.truth()
     assert not truth.in_air
@@ -154,7 +154,7 @@ def test_frames_that_are_lost_on_the_way_are_sent_again_from_the_copies(flavour:
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_where_a_link_fails_the_next_one_flies(flavour: str, apart: Make) -> None:
-    """No frame of the first link arrives, however often it is sent."""
+    """No frame of the first link arrives, even after retries."""
     of = apart(flavour)
     moving: list[str] = []
 
@@ -186,7 +186,7 @@ def test_return_continues_after_boundary_loss(flavour: str, apart: Make) -> None
 
 @pytest.mark.slow
 def test_frames_ahead_are_renewed_silently_during_flight(apart: Make) -> None:
-    """A long flight in which it is not lost: no note says that something could not be signed."""
+    """A long flight without a loss: no note reports a failed signature."""
     flown = apart("px4", legs=8).fly(lambda _: False)
     assert flown.ending is Ending.COMPLETED
     report = flown.audit().report
@@ -201,7 +201,7 @@ def test_frames_ahead_are_renewed_silently_during_flight(apart: Make) -> None:
 def test_earlier_decision_is_recorded_before_loss_despite_late_seal(
     call: int, apart: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It dies by the call that comes after its decision about a leg, in the same step."""
+    """It dies in the call after its decision about a leg, in the same step."""
     of = apart("px4", legs=4)
     answer, calls = of._answer, []
 

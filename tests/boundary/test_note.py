@@ -87,7 +87,7 @@ def test_nothing_is_signed_before_a_flight(boundary: ctypes.CDLL) -> None:
 
 
 def compare(boundary: ctypes.CDLL, seed: int) -> bool:
-    """A text with some octets changed: it is signed if Python reads the beginning of this log in it."""
+    """A text with some changed octets: it is signed if Python reads it as the beginning of this log."""
     of = Random(seed)
     caller, flight = held(boundary)
     text = bytearray(begins(flight).encode())

@@ -1,6 +1,4 @@
-"""Parameters are permitted and set through the boundary in C as through the one in Python: the same permits, the same
-frames, the same evidence.
-"""
+"""Parameters through the boundary in C and in Python: the same permits, the same frames, the same evidence."""
 
 import ctypes
 from random import Random
@@ -61,7 +59,7 @@ def both(boundary: ctypes.CDLL, settings: dict[str, int], owed: dict[str, Owed])
 
 
 def walk(boundary: ctypes.CDLL, seed: int) -> int:
-    """One session of both, and how many preparations both began."""
+    """One session of both; returns how many preparations both began."""
     of = Random(seed)
     names = (*SETTABLE, "ARMING_CHECK")
     settings = {name: fitting(of, name) for name in of.sample(names, of.randrange(1, 6))}

@@ -1,4 +1,4 @@
-"""Which Ed25519 signatures count: the product in Python and in C, the independent verifier, and the page taken
+"""The validity of Ed25519 signatures: the product in Python and in C, the independent verifier, and the page taken
 literally, on vectors in Wycheproof's form.
 """
 
@@ -43,7 +43,7 @@ def test_all_implementations_agree_on_signature_vectors(
 
 
 def test_some_refused_signatures_satisfy_the_equation() -> None:
-    """Else the refusal of points of small order, and of large s, would show nothing."""
+    """Otherwise the refusal of points of small order, and of large s, would not be tested."""
     flags = {
         case["flags"][0] for key, signature, message, case in CASES
         if len(signature) == 64 and case["result"] == "invalid" and equation_holds(key, signature, message)

@@ -1,4 +1,4 @@
-"""The stack that the boundary in C takes at most is known, and small."""
+"""The stack usage of the boundary in C is known, and small."""
 
 import ctypes
 import subprocess

@@ -1,4 +1,4 @@
-"""What becomes of a step of which nothing was sent, by hand: both boundaries give its id back, and nothing else."""
+"""Withdrawn permits, by hand: both boundaries release the id of a step of which nothing was sent, and nothing else."""
 
 import ctypes
 from collections.abc import Callable
@@ -56,7 +56,7 @@ def _heartbeat() -> Any:
 
 
 class Script:
-    """Does what it is told with the permits of steps, by the words of a line."""
+    """Interprets the words of a line as actions on the permits of steps."""
 
     def __init__(self, of: Loaded) -> None:
         self.of = of
@@ -100,7 +100,7 @@ class Script:
         self.said = self.of.executor.withdraw(self.permits[name], AT).slug
 
     def again(self, step: int) -> str:
-        """What is said to a request for a step."""
+        """The answer to a request for a step."""
         answer = answer_to(self.of, request_for(self.of, step=step))
         return str(answer.reason) if isinstance(answer, Decision) else answer.name
 

@@ -64,7 +64,7 @@ LAX = {"require": (), "assume": (), "maintain": (), "energy": 0}
 
 
 def opened(mission: Mission, key: SigningKey = AGENT) -> Loaded | Refusal:
-    """What the boundary makes of a mission that somebody signed under the policy."""
+    """The boundary's result for a mission that somebody signed under the policy."""
     payload = bundle.policy_payload(POLICY)
     bound = binding.bind(mission, bundle.policy_digest(payload))
     data = bundle.seal(payload, bundle.mission_payload(bound), policy_key=POLICY_KEY, mission_key=key)
@@ -76,7 +76,7 @@ def opened(mission: Mission, key: SigningKey = AGENT) -> Loaded | Refusal:
 
 
 def proposed(of: Random) -> Mission:
-    """A mission of the agent's own making: it names sources, roles and policies, and writes contracts as it likes."""
+    """A mission of the agent: arbitrary sources, roles and policies, and arbitrary contracts."""
     mission = of.choice([MISSION, low_mission()])
     steps = list(mission.invocations)
     for _ in range(of.choice([0, 1, 1, 2])):
@@ -89,7 +89,7 @@ def proposed(of: Random) -> Mission:
 
 
 def twisted(of: Random, step: Invocation) -> Invocation:
-    """A step with something that suits the agent."""
+    """A step with a change in the agent's favour."""
     match of.randrange(6):
         case 0:
             return replace(step, source=of.choice([*SourceKind]))
@@ -108,7 +108,7 @@ def twisted(of: Random, step: Invocation) -> Invocation:
 
 
 def broken(of: Random) -> list[str]:
-    """What of the corollary does not hold for one agent."""
+    """The violations of the corollary by one agent."""
     found = opened(proposed(of))
     if isinstance(found, Refusal):
         return []
@@ -136,7 +136,7 @@ def told(of: Random, step: Invocation) -> State:
 
 
 def judged(found: Loaded, step: Invocation, state: State) -> list[str]:
-    """Something flew: by the oracle, under the policy's own contract, as what agents may do."""
+    """Judge a dispatched command by the oracle, under the policy's own contract, with the rights of agents."""
     as_agent = replace(step, source=SourceKind.AGENT, contract=POLICY.contracts[step.skill])
     approvals = found.in_force.approvals(step, START)
     context = Context(step.binding, VEHICLE, POLICY.version, 0, START.monotonic_us, step.phase, 20_000, approvals)
@@ -148,7 +148,7 @@ def judged(found: Loaded, step: Invocation, state: State) -> list[str]:
 
 
 def papers(of: Random, found: Loaded) -> list[str]:
-    """It signs documents too: approvals and recalls as somebody, and a replacement of what a person ordered."""
+    """Documents of the agent: approvals and recalls in another name, and a replacement of a person's steps."""
     step = of.randrange(len(found.bundle.mission.invocations))
     for paper in (approval(found, step, AS_APPROVER), recall(found, AS_APPROVER, expires_at_us=START.utc_us + MIN)):
         receipt = read_receipt(found.boundary.present(paper, START, 0))
@@ -171,7 +171,7 @@ def test_no_agent_strategy_does_forbidden_actions(of: Random) -> None:
 
 
 def test_agent_cannot_cancel_mission_of_a_person() -> None:
-    """A person's mission, of the key for both, is replaced and cancelled by that person and not by the agent."""
+    """A person's mission, by a key for both, can be replaced and cancelled by that person and not by the agent."""
     ordered = replace(
         MISSION, invocations=tuple(replace(each, source=SourceKind.OPERATOR) for each in MISSION.invocations)
     )
@@ -200,7 +200,7 @@ def test_agent_cannot_cancel_mission_of_a_person() -> None:
 
 @given(worlds.CHANCES)
 def test_cancelled_mission_flies_only_contingency(of: Random) -> None:
-    """Whatever it proposed, and after whichever step: the links of the policy are decided as ever."""
+    """For any proposal and any step: the links of the policy are decided as usual."""
     found = opened(proposed(of))
     if isinstance(found, Refusal):
         return
@@ -290,7 +290,7 @@ def test_flight_ends_by_policy_for_many_agents(of: Random) -> None:
 
 
 def test_permitted_agent_mission_flies() -> None:
-    """Else nothing could be broken."""
+    """Otherwise there would be nothing to break."""
     found = opened(MISSION)
     assert isinstance(found, Loaded)
     for step in MISSION.invocations[:3]:

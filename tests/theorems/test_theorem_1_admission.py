@@ -70,8 +70,9 @@ STRANGE = {BATTERY: 1_000, WIND: 20 * M, OBSTACLE: None, HEIGHT: 130 * M, POSITI
 
 
 class TakenOver:
-    """A runtime in the hands of an attacker, and a notary who knows what was admissible. `broken` says what of the
-    theorem did not hold."""
+    """A runtime controlled by an attacker, and a notary who knows what was admissible. `broken` lists the violations
+    of the theorem.
+    """
 
     def __init__(self, of: Random, template: Loaded = OF) -> None:
         self.of, self.loaded, self.now = of, renewed(template), START
@@ -109,7 +110,7 @@ class TakenOver:
     # ------------------------------------------------------------------------------------------------ what it does
 
     def fly(self) -> None:
-        """What an honest runtime would do, so that the rest of the mission is reached."""
+        """The actions of an honest runtime, to reach the rest of the mission."""
         steps = self.loaded.bundle.mission.invocations
         if self.step >= len(steps):
             return
@@ -183,7 +184,7 @@ class TakenOver:
             self.hold(permit in self.sent, "a link stood in for a step that never flew")
 
     def signed(self) -> bytes:
-        """A document: what people signed, or what strangers did."""
+        """A document signed by people, or by strangers."""
         of, now, steps = self.of, self.now, len(self.loaded.bundle.mission.invocations)
         match of.randrange(8):
             case 0:
@@ -215,7 +216,7 @@ class TakenOver:
     # ------------------------------------------------------------------------------------------- what must hold of it
 
     def judge(self, asked: Request, meant: Invocation, permit: bytes) -> None:
-        """A permit was made for a step: was it admissible?"""
+        """A permit was made for a step: check that it was admissible."""
         approvals = self.loaded.in_force.approvals(meant, asked.now)
         context = Context(asked.binding, VEHICLE, 7, 0, asked.released_us, asked.phase, asked.remaining_us, approvals)
         try:
@@ -230,7 +231,7 @@ class TakenOver:
         self.admitted[permit] = meant, min(due, valid)
 
     def witness(self, command: Command, permit: bytes) -> None:
-        """Something was sent."""
+        """Check a dispatched command."""
         self.hold(permit in self.permits, "a permit that nobody made")
         self.hold(permit not in self.sent, "a permit was used twice")
         self.sent.add(permit)
@@ -263,12 +264,14 @@ def test_no_longer_history_dispatches_unadmitted_step(of: Random) -> None:
 
 
 def breaks(what: str = "", template: Loaded = OF, most: int = 300) -> bool:
-    """Whether some history breaks the theorem, in such a way."""
+    """Whether some history violates the theorem in a given way."""
     return any(what in each for seed in range(most) for each in TakenOver(Random(seed), template).go(60))
 
 
 def test_histories_reach_all_cases_of_theorem() -> None:
-    """Steps are sent, also one that was confirmed, and some mission is recalled; else nothing could be broken."""
+    """Steps are sent, including a confirmed one, and some mission is recalled; otherwise there would be nothing to
+    break.
+    """
     reached: set[object] = set()
     for seed in range(300):
         history = TakenOver(Random(seed))

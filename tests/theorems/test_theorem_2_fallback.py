@@ -73,7 +73,7 @@ TROUBLES: tuple[Callable[[Run, Random], object], ...] = (
 
 
 def flown(of: Random, troubles: int = 8) -> Run | None:
-    """A flight in trouble; None for one that did not end."""
+    """A flight with faults; None if it did not end."""
     run = Run(renewed(TEMPLATE), FakeVehicle())
     for _ in range(troubles):
         for _ in range(of.choice([0, 1, 5, 30, 80])):
@@ -92,7 +92,7 @@ def flown(of: Random, troubles: int = 8) -> Run | None:
 
 
 def broken(run: Run | None) -> list[str]:
-    """What of the theorem did not hold in a flight."""
+    """The violations of the theorem in a flight."""
     if run is None:
         return ["it did not end"]
     policy, steps = run.loaded.bundle.policy, run.loaded.bundle.mission.invocations
@@ -139,7 +139,7 @@ def test_every_flight_with_more_faults_falls_back_and_ends(of: Random) -> None:
 
 
 def breaks(what: str, most: int = 120) -> bool:
-    """Whether some flight breaks the theorem, in this way."""
+    """Whether some flight violates the theorem in this way."""
     return any(what in broken(flown(Random(seed))) for seed in range(most))
 
 
@@ -159,7 +159,7 @@ def test_search_detects_unsigned_command(monkeypatch: pytest.MonkeyPatch) -> Non
 
 
 def test_search_detects_restarted_chain(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither the executor nor the runtime remembers which link was flown."""
+    """Neither the executor nor the runtime remembers the last link."""
     monkeypatch.setattr(Executor, "_refuse_link", lambda *_: None)
     choose = Fallback._choose
 

@@ -49,7 +49,7 @@ TUPLE = ("invocation", "state", "context", "outcome", "reason", "at_us", "utc_us
 
 
 def bent(of: Random, lines: tuple[bytes, ...], least: int = 0) -> list[bytes]:
-    """The log with some change in or after line `least`, and everything made to fit that needs no key."""
+    """The log with a change in or after line `least`, and everything recomputed that needs no key."""
     made = list(lines)
     for _ in range(of.choice([1, 1, 2, 3])):
         at, other = (of.randrange(least, len(made)) for _ in range(2))
@@ -70,7 +70,7 @@ def bent(of: Random, lines: tuple[bytes, ...], least: int = 0) -> list[bytes]:
 
 
 def edited(of: Random, line: bytes) -> bytes:
-    """A line with one field changed, to something of its kind."""
+    """A line with one changed field, of the same type."""
     fields = read(line)
     name = of.choice(sorted(fields))
     value = fields[name]
@@ -90,12 +90,12 @@ def edited(of: Random, line: bytes) -> bytes:
 
 
 def accepted(lines: list[bytes]) -> bool:
-    """Whether the log is taken for whole, by whoever pins the root key."""
+    """Whether the log verifies under the pinned root key."""
     return audit(lines, ROOT_KEY).report.verdict is LogVerdict.VERIFIED
 
 
 def survives(of: Random) -> bool:
-    """Whether some forgery without a key is taken for a log."""
+    """Whether some forgery without a key verifies."""
     lines = flight()
     forged = of.choice(FITTED)(bent(of, lines))
     if of.random() < 0.1:
@@ -104,7 +104,7 @@ def survives(of: Random) -> bool:
 
 
 def survives_captured(of: Random) -> bool:
-    """Whether who holds the last epoch's key changes what was sealed before, unnoticed."""
+    """Whether a holder of the last epoch's key can change sealed records undetected."""
     lines = flight()
     sealed = signers(lines)[:-1]
     last = read(lines[sealed[-1]])["next_key"]
@@ -133,7 +133,7 @@ def test_many_more_changes_are_detected(of: Random) -> None:
 
 @pytest.mark.parametrize("lines", [flight, other_flight], ids=["completed", "came home early"])
 def test_each_command_has_its_evidence_tuple_before_it(lines: Callable[[], tuple[bytes, ...]]) -> None:
-    """The log verifies and each decision derives again, so the tuples are those of what was decided."""
+    """The log verifies and each decision derives again, so the tuples belong to the decisions."""
     records = [read(line) for line in lines()]
     sound(lines())
     granted: set[tuple[int, int]] = set()
@@ -154,13 +154,15 @@ def breaks(survivor: Callable[[Random], bool], most: int = 150) -> bool:
 
 
 def test_search_detects_verifier_without_signatures(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What the signatures are for: with them believed, a forged segment is found by no hash."""
+    """If signatures are not checked, no hash reveals a forged segment."""
     monkeypatch.setattr(seals, "open_note", lambda text, *_: note.parse(note.split(text)[0]))
     assert breaks(by_a_stranger)
 
 
 def by_a_stranger(of: Random) -> bool:
-    """All counts, roots and texts made anew, signed by somebody: taken for a log only where nobody verifies."""
+    """All counts, roots and texts are recomputed and signed by a stranger: it only verifies if signatures are not
+    checked.
+    """
     lines = flight()
     forged = by_one_key(bent(of, lines, 1), STRANGER.private.private_bytes_raw())
     return tuple(forged) != lines and accepted(forged)
@@ -172,7 +174,7 @@ def test_signatures_of_strangers_are_refused(of: Random) -> None:
 
 
 def test_search_detects_auditor_without_derivation(monkeypatch: pytest.MonkeyPatch) -> None:
-    """With all keys a decision can be signed that does not follow from what it read: only deriving finds it."""
+    """With all keys a decision can be signed that does not follow from its inputs: only derivation detects it."""
     lines = flight()
     number = next(n for n, line in enumerate(lines) if read(line)["type"] == "decision")
     forged = signed([*lines[:number], edit(lines[number], reason="state/violated"), *lines[number + 1 :]])

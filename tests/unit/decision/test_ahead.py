@@ -32,7 +32,7 @@ VELOCITY = tuple(
 
 
 def braking(deceleration: int, reaction_us: int, **more: int) -> Policy:
-    """The reference policy, whose vehicle says how it brakes."""
+    """The reference policy with a vehicle that declares its braking."""
     vehicle = replace(
         flat.POLICY.vehicle, braking=deceleration, reaction_us=reaction_us, north=NORTH, east=EAST, down=DOWN, **more
     )
@@ -57,7 +57,7 @@ Point = tuple[float, float, float]
 
 
 def flown(place: Point, velocity: Point, goes_s: float, deceleration: float) -> Iterator[Point]:
-    """Where it is, every 10 ms: first it flies on, then it loses `deceleration` of its speed, and then it stands."""
+    """The position every 10 ms: first it flies on, then it loses `deceleration` of its speed, and then it stands."""
     step_s, (x, y, z), (vx, vy, vz) = 0.01, place, velocity
     yield (x, y, z)
     while goes_s > 0:
@@ -76,7 +76,7 @@ def flown(place: Point, velocity: Point, goes_s: float, deceleration: float) -> 
 
 
 def margin(point: Point, error: float) -> float:
-    """How deep in the airspace of the reference policy a place is with everything within its error, in mm."""
+    """The depth of a place within the airspace of the reference policy, including its position error, in mm."""
     x, y, z = point
     across = min(500 * M - error - abs(x), 500 * M - error - abs(y))
     nearest = hypot(max(abs(x) - error, 0), max(abs(y - 300 * M) - error, 0))
@@ -189,7 +189,7 @@ def test_without_one_of_its_signals_nothing_is_known(slot: int) -> None:
 
 @pytest.mark.parametrize(("x", "airspace"), [(0, UNKNOWN), (499 * M, FALSE)])
 def test_without_its_height_it_is_known_where_over_ground_it_leads(x: int, airspace: int) -> None:
-    """Whatever its age: of a height that is missing it means nothing."""
+    """At any age: the age of a missing height has no meaning."""
     state = moving((x, 0, 20 * M), (12 * M, 0, 0))
     values = tuple(None if number == HEIGHT else value for number, value in enumerate(state.values))
     for age in (0, 4 * STALE):

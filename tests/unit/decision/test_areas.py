@@ -1,4 +1,4 @@
-"""Areas with holes, by hand; the tables that containment and sweeps use, and how much they hold."""
+"""Areas with holes, by hand; and the tables for containment and sweeps, with their sizes."""
 
 from random import Random
 

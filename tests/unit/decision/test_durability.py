@@ -1,4 +1,4 @@
-"""How durable a decision's record is to be: a table by hand, and what the words of a contract mean."""
+"""The durability of a decision's record: a table by hand, and the `record` clause of a contract."""
 
 import pytest
 from hypothesis import given

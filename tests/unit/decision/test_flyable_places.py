@@ -1,4 +1,4 @@
-"""What a link or a plan may name: speeds that the vehicle has, places that lie on the earth, one zone to cover."""
+"""Limits of links and plans: the vehicle's speed, places on the earth, one zone to cover."""
 
 import pytest
 from msgspec.structs import replace

@@ -1,4 +1,4 @@
-"""How long things take at most by declared speeds, and the charge for the way home that follows from it."""
+"""Durations by declared speeds, and the resulting charge for the way home."""
 
 from math import sqrt
 

@@ -1,4 +1,4 @@
-"""What stands against waiting in the air."""
+"""The conditions that prevent waiting in the air."""
 
 from msgspec.structs import replace
 

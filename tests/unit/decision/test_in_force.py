@@ -1,5 +1,5 @@
-"""What documents change in one flight, taken in directly: each is accepted, or refused for its reason, and what then is
-in force.
+"""The effects of documents within one flight, presented directly: each is accepted, or refused for its reason, and
+changes what is in force.
 """
 
 from dataclasses import replace as with_fields
@@ -54,7 +54,7 @@ def as_replacement(mission: Mission, kept: int = 2, supersedes: bytes = OF.bundl
 
 
 def forged(mission: Mission, kept: int = 2, supersedes: bytes | None = None, *, bound: bool = True) -> bytes:
-    """A replacement that an honest compiler would not make, rightly signed."""
+    """A correctly signed replacement that an honest compiler would not make."""
     over = OF.bundle.mission_digest if supersedes is None else supersedes
     whole = as_replacement(mission, kept, over) if bound else mission
     return sign_document(names.REPLACEMENT, ReplacementDocument(FLIGHT, over, kept, whole), MISSION_KEY, Duty.MISSION)
@@ -334,7 +334,7 @@ def test_a_new_step_with_the_id_of_one_that_stays_is_refused() -> None:
 
 
 def test_a_replacement_that_brings_back_an_id_seen_before_is_refused() -> None:
-    """Nobody can choose an id: so this flight's last step has, against all odds, the one that a new step will have."""
+    """Ids cannot be chosen; here the last step of this flight has the id that a new step will have."""
     first, second = shorter(OF), replace(shorter(OF), issued_at_us=shorter(OF).issued_at_us + 1)
     plain = flight()
     assert take(plain, forged(first)).accepted

@@ -1,4 +1,4 @@
-"""Which link flies, and what is watched while a skill runs."""
+"""The choice of links, and the conditions that are watched while a skill runs."""
 
 from typing import Any
 

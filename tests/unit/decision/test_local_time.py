@@ -219,7 +219,7 @@ def test_time_zone_offsets_in_policy(given: dict[str, object], good: bool) -> No
 
 
 def on_monday(**offsets: object) -> PreparedPolicy:
-    """The hand-written policy, whose first permit holds on a Monday from 08:00 to 18:00."""
+    """The hand-written policy with a first permit that holds on a Monday from 08:00 to 18:00."""
     code = flat.clause("times", (Op.WEEK_IN, len(flat.POLICY.sets), 0))
     rules = tuple(replace(rule, when=code) if rule.kind == 1 else rule for rule in flat.POLICY.rules)
     vehicle = replace(flat.POLICY.vehicle, utc_offset_us=0, **offsets)

@@ -1,4 +1,4 @@
-"""Zones that loading refuses: areas whose numbers, rings or times are not what they should be."""
+"""Zones that loading refuses: areas with wrong numbers, rings or times."""
 
 import pytest
 from msgspec.structs import replace

@@ -1,4 +1,4 @@
-"""Conditions that ask temporal monitors or the mission's phase: what is refused, read, believed, how long it holds."""
+"""Conditions on temporal monitors or the mission's phase: refusals, slots that are read, truths, and validity."""
 
 from typing import Any
 
@@ -267,7 +267,7 @@ def test_an_admission_holds_no_longer_than_the_observation_it_rests_on() -> None
 
 
 def test_an_admission_ends_when_what_a_monitor_looked_at_is_stale() -> None:
-    """Nothing but monitor 2, through which it reads, asks for the obstacle."""
+    """Only monitor 2 reads the obstacle."""
     near = clause("obstacle", apply(Op.GT, flat.signal(flat.OBSTACLE), const(0)))
     monitors = (CALM_FOR_3_S, Monitor(WITHIN, S, near), Monitor(RISING, 0, asks(1)))
     contract = replace(P.contracts[INSPECT], assume=(), maintain=())

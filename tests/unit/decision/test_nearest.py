@@ -1,4 +1,4 @@
-"""What would have passed: by hand, and tried out in random worlds."""
+"""The nearest passing changes: by hand, and tried in random worlds."""
 
 from random import Random
 from typing import Any
@@ -242,7 +242,7 @@ def test_nearest_allowed_value(change: NearestChange, value: Any, answer: int) -
 @settings(max_examples=settings().max_examples * 2)
 @given(worlds.CHANCES)
 def test_made_together_the_changes_help(of: Random) -> None:
-    """Whatever the condition of the permit: an invocation changed as offered, in a state as offered, is permitted."""
+    """For any condition of the permit: an invocation and a state that are changed as offered are permitted."""
     when = clause("", worlds.condition(of, flat.CONTRACTS[INSPECT], depth=3))
     policy = loaded(replace(flat.POLICY, rules=(rule(RuleKind.PERMIT, INSPECT, when=when),)))
     now, state = replace(NOW, utc_error_us=0), worlds.state(of)

@@ -1,4 +1,4 @@
-"""What is malformed is refused, with what is wrong; nothing that a bundle may hold makes deciding fail."""
+"""Malformed policies and missions are refused with a reason; no bundle makes deciding fail."""
 
 from random import Random
 from typing import Any
@@ -402,7 +402,7 @@ def phases(step: int, bits: int) -> Mission:
 
 
 def saying(text: str) -> Mission:
-    """A clause of the mission's own that is worded like this."""
+    """A mission with a clause of its own that has this text."""
     goto = MISSION.invocations[1]
     worded = replace(goto.contract, assume=(*goto.contract.assume, replace(S.contract.assume[0], text=text)))
     steps = (*MISSION.invocations[:1], replace(goto, contract=worded), *MISSION.invocations[2:])

@@ -1,4 +1,4 @@
-"""How often reports are needed: by times to stale and by deadlines, within what vehicles report."""
+"""Required message rates: by stale times and deadlines, within the rates of vehicles."""
 
 import pytest
 from msgspec.structs import replace

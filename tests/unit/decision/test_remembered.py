@@ -1,4 +1,4 @@
-"""What is remembered of the last situation changes no answer: not between states, moments, invocations or policies."""
+"""The cache of the last situation changes no answer: between states, moments, invocations or policies."""
 
 from random import Random
 from typing import Any

@@ -1,4 +1,4 @@
-"""The way home goes up to the height that the vehicle returns at, before it comes down."""
+"""The way home climbs to the vehicle's return altitude before it descends."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""The rules of a session, by hand: whose turn it is, which ids are used up, and what is decided about links."""
+"""The rules of a session, by hand: turns, used ids, and decisions about links."""
 
 from dataclasses import replace as with_fields
 from typing import Any

@@ -1,4 +1,4 @@
-"""A single situation as sets of values: a slot that is missing, stale or beyond all sense is MISSING, no other is."""
+"""A single situation as sets of values: exactly the slots that are missing, stale or out of range are MISSING."""
 
 from reference import flat_case as flat
 from reference.asking import POLICY

@@ -290,7 +290,7 @@ def test_a_release_still_to_come_lengthens_no_permit() -> None:
 
 
 def test_age_of_missing_slot_is_ignored() -> None:
-    """Nothing that was admitted rests on a value that is not there, so its age bounds no permit."""
+    """No admission rests on a missing value, so its age limits no permit."""
     either = clause("calm or free", (*flat.CALM.code, *flat.FREE.code, Op.OR, 0, 0))
     reads = (*flat.CONTRACTS[flat.GOTO].reads, flat.OBSTACLE)
     policy, contract = with_contract(flat.GOTO, require=(flat.FIX_IS_GOOD, either), reads=reads)

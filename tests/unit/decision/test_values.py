@@ -1,4 +1,4 @@
-"""What a slot may hold, by hand."""
+"""The values of a slot, by hand."""
 
 from rtshcua.decision.values import ABSENT, MAYBE, MISSING, PRESENT, interval, maybe, members, point
 

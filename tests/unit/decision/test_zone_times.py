@@ -1,4 +1,4 @@
-"""When zones exist, at one moment and over many, with a clock that errs; and what that means for a flight."""
+"""The existence of zones, at one moment and over a time, with a clock error; and the effect on a flight."""
 
 import pytest
 from hypothesis import given
@@ -80,7 +80,7 @@ def airspace(zone: int, **times: tuple[int, ...]) -> PreparedPolicy:
 
 
 def in_school(**times: tuple[int, ...]) -> tuple[Outcome, Reason]:
-    """What is decided where the school, a zone to be kept out of, lies across the way and exists at some times."""
+    """The decision if the school, which is to be avoided, is on the way and exists at some times."""
     zones = list(flat.ZONES)
     for number in (flat.SCHOOL, flat.SCHOOL_GROWN):
         zones[number] = replace(zones[number], data=(150 * M, 0, (20 * M) ** 2), **times)
@@ -132,7 +132,7 @@ def test_staying_in(times: dict[str, tuple[int, ...]], answer: tuple[Outcome, Re
 
 
 def test_the_same_volume_at_two_times() -> None:
-    """What is remembered of a place does not depend on the time."""
+    """The cached result of a place does not depend on the time."""
     policy = airspace(flat.POLICY.airspace.inside[0], dates=(UTC - H, UTC + H))
     step = ready(STEP, policy)
     state, later = flat.state(), replace(flat.NOW, utc_us=UTC + 2 * H)
@@ -146,7 +146,7 @@ def test_the_same_volume_at_two_times() -> None:
 
 @pytest.mark.parametrize(("end", "index"), [(UTC + H, 1), (UTC + MIN, 2)])
 def test_a_link_counts_for_as_long_as_it_may_take(end: int, index: int) -> None:
-    """Hovering leads nowhere; going home takes up to five minutes, and landing is the last."""
+    """Hovering moves nothing; going home takes up to five minutes, and landing is the last."""
     policy = airspace(flat.POLICY.airspace.inside[0], dates=(0, end))
     choice = choose_fallback(ready(STEP, policy), flat.state(), policy, flat.NOW, after=0)
     assert choice is not None

@@ -186,7 +186,7 @@ def test_the_circle_itself_is_outside(path: tuple[int, ...], answer: int) -> Non
     ],
 )
 def test_a_box_that_reaches_to_one_side(turn: int, east: int, reach: tuple[int, int], answer: int) -> None:
-    """Of a circle of one metre, from west and east, and turned to the other points of the compass."""
+    """A circle of one metre, from west and east, and rotated to the other directions."""
     x, y, west, south, east_side, north = east, 0, -reach[0], 0, reach[1], 0
     for _ in range(turn):
         x, y, west, south, east_side, north = -y, x, -north, west, -south, east_side
@@ -305,7 +305,7 @@ def test_unknown_place_counts_only_if_height_is_undecided(height: int, located: 
 
 
 def test_the_largest_coordinates_stay_within_64_bits() -> None:
-    """A witness for the bound in the module's docstring: the extreme cross product."""
+    """An example for the bound in the module's docstring: the extreme cross product."""
     far = MAX_COORDINATE
     zone = PreparedZone(0, polygon(-far, -far, far, -far, far, far, -far, far))
     assert zone.along((-far + 1, -far + 1, far - 1, far - 1), (0, 0, 0, 0)) == T

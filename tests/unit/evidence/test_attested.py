@@ -1,4 +1,4 @@
-"""The boundary's own evidence against the records: what it finds, and where."""
+"""Compares the boundary's own evidence with the records: the flaws, and their records."""
 
 from base64 import b64decode, b64encode
 from hashlib import sha256
@@ -40,7 +40,7 @@ NEVER = b"\x01" * 32
 
 
 class Log:
-    """A log in the making, with the boundary's true chain; each record says what is found at it."""
+    """A log with the boundary's true chain; each added record returns the flaw found at it."""
 
     def __init__(self, genesis: Genesis = GENESIS, root: TrustRoot = ROOT) -> None:
         self.evidence = BoundaryEvidence(root, genesis)
@@ -51,7 +51,7 @@ class Log:
         self.seq = 0
 
     def take(self, record: AnyRecord) -> tuple[str, int] | None:
-        """Slug and record of what is found, None where nothing is."""
+        """Slug and record of the flaw, None if there is none."""
         self.seq += 1
         found = self.evidence.check(replace(record, seq=self.seq), 100 * self.seq)
         if found is None:
@@ -70,7 +70,7 @@ class Log:
         return replace(said, **fields)
 
     def state(self, **fields: object) -> tuple[str, int] | None:
-        """What the boundary signs now."""
+        """The boundary's present statement."""
         return self.take(stated(self.statement(**fields)))
 
     def refuse(self, slug: str = "permit/late", *, made: bool = True) -> tuple[str, int] | None:
@@ -90,7 +90,7 @@ def stated(said: Statement) -> Effect:
 
 @pytest.fixture
 def log() -> Log:
-    """One that has its first statement."""
+    """A log with its first statement."""
     made = Log()
     assert made.state() is None
     return made

@@ -1,4 +1,4 @@
-"""What the recorder writes."""
+"""The lines that the recorder writes."""
 
 import json
 from base64 import b64encode

@@ -1,4 +1,4 @@
-"""What is told of a gap, and who vouches for it."""
+"""The claim about a gap, and who vouches for it."""
 
 from rtshcua.evidence.gaps import RecordGap, seconds, told
 from virtual.rows import rows

@@ -1,4 +1,4 @@
-"""Where a log stands, against the same worked out line by line from the page (docs/log-format.md, sections 1 and 3)."""
+"""The head of a log, compared with one computed line by line from docs/log-format.md, sections 1 and 3."""
 
 from hashlib import sha256
 

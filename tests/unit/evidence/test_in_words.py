@@ -1,4 +1,4 @@
-"""Decisions in the words of a log, and what a record is about."""
+"""Decisions in the form of log records, and the subject of a record."""
 
 from collections.abc import Callable
 

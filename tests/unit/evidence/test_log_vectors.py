@@ -1,4 +1,4 @@
-"""The test vectors of docs/log-format.md: two verifiers, written apart, find what is written down."""
+"""The test vectors of docs/log-format.md: two independent verifiers give the expected results."""
 
 import json
 from pathlib import Path
@@ -67,7 +67,7 @@ def test_this_verifier(name: str) -> None:
 
 @rows("name", EXPECTED)
 def test_the_audit_and_the_quick_verifier(name: str) -> None:
-    """All that this program asks of a log, the bundle too; what it says agrees with the page, either way."""
+    """Every check of this program, including the bundle; its results agree with the page."""
     found = audit(lines_of(name), ROOT_KEY)
     assert found.report.failure is None
     assert found.report.verdict.value == WORDS[EXPECTED[name]["verdict"]]

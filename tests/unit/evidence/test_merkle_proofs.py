@@ -1,4 +1,4 @@
-"""Proofs against the recursive definitions of RFC 9162, and whatever is not a proof."""
+"""Proofs compared with the recursive definitions of RFC 9162, and invalid proofs."""
 
 from functools import cache
 from hashlib import sha256

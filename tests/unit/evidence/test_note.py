@@ -1,4 +1,4 @@
-"""Signed notes: the published example, a round trip, and every way to be no such note."""
+"""Signed notes: the published example, a round trip, and every kind of invalid note."""
 
 from base64 import b64decode, b64encode
 from hashlib import sha256
@@ -25,7 +25,7 @@ def note(log_key: SigningKey) -> str:
 
 
 def test_text_begins_with_origin_size_and_root() -> None:
-    """The published example, with the lines that ours has besides."""
+    """The published example, with our additional lines."""
     root = b64decode("CsUYapGGPo4dkMgIAUqom/Xajj7h2fB2MPA3j2jxq2I=")
     text = "example.com/behind-the-sofa\n20852163\nCsUYapGGPo4dkMgIAUqom/Xajj7h2fB2MPA3j2jxq2I=\n"
     checkpoint = Checkpoint("example.com/behind-the-sofa", 20852163, root, bytes(32), bytes(32))
@@ -95,7 +95,7 @@ def test_signature_without_its_newline_or_too_short(note: str, key: bytes) -> No
 
 
 def test_spare_bits_of_base64_are_not_free(note: str, key: bytes) -> None:
-    """68 bytes end in one `=` and two unused bits: they must be zero."""
+    """68 bytes end in one `=` and two unused bits, which must be zero."""
     assert note.endswith("=\n")
     letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
     changed = note[:-3] + letters[letters.index(note[-3]) + 1] + note[-2:]

@@ -1,4 +1,4 @@
-"""The quick verification: it says yes where the careful one does, and nothing where that one finds anything."""
+"""The fast verification accepts what the full one accepts, and nothing in which that one finds a flaw."""
 
 import json
 from collections.abc import Callable
@@ -257,7 +257,7 @@ def test_a_record_between_that_signs_is_no_segment(log: Log) -> None:
 
 
 def test_text_that_resembles_an_anchor_is_ignored(log: Log) -> None:
-    """It is linked, and nobody reads it here."""
+    """It is linked, and the fast verification does not parse it."""
     line = b'{"_prev":"' + log.lines[1][10:74] + b'","at_us":5000000,"event":"anchored"'
     part = scan(log.lines[0] + line)
     assert part is not None
@@ -351,7 +351,7 @@ def test_a_part_of_another_place(log: Log) -> None:
     ],
 )
 def test_report_names_what_fast_verification_skips(log: Log, slug: str, fields: dict[str, object] | None) -> None:
-    """Who holds the key signs lines that are no records: the quick verification reads none, and says so."""
+    """A holder of the key signs lines that are not records: the fast verification parses none, and says so."""
     line = log.lines[7]
     if fields is None:
         other = line[:84] + b'0,"junk":1,"type":"effect"}\n'

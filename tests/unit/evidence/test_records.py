@@ -140,7 +140,7 @@ def test_a_line_is_canonical_and_reads_back(record: AnyRecord) -> None:
 
 
 def test_a_state_names_its_temporal_monitors_only_where_there_are_any() -> None:
-    """So that a log from before there were any is read as it was written."""
+    """So that a log from before monitors existed is read unchanged."""
     bare = RecordedState(ages=(5,), values=(None,))
     assert msgspec.json.encode(bare) == b'{"ages":[5],"values":[null]}'
     some = RecordedState(ages=(5,), monitors=(1, 4), values=(None,))

@@ -1,4 +1,4 @@
-"""What is kept of a log after a crash, and what is no crash."""
+"""The kept part of a log after a crash, and damage that no crash causes."""
 
 import json
 from collections.abc import Iterable

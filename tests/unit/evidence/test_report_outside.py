@@ -1,4 +1,4 @@
-"""What a report says of witnesses outside: of those that are too few, and of notes that say nothing."""
+"""The report about witnesses: too few of them, and irrelevant notes."""
 
 import pytest
 

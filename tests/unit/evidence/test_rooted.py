@@ -1,4 +1,4 @@
-"""The trust of a log: its root under the pinned key, and the duty of its log key under that root."""
+"""The trust in a log: its trust root under the pinned key, and the duty of its log key under that root."""
 
 from base64 import b64encode
 

@@ -64,12 +64,12 @@ def changed(log: list[bytes], number: int, **fields: object) -> list[bytes]:
 
 
 def rewritten(log: list[bytes], number: int, **fields: object) -> list[bytes]:
-    """The log with some fields of one record set, and all the rest written anew but for the fields that are set."""
+    """The log with some fields of one record set, and everything else recomputed except those fields."""
     return anew(changed(log, number, **fields))
 
 
 def chained(lines: list[bytes]) -> list[bytes]:
-    """The lines, numbered and linked anew: all that anyone can do without a key."""
+    """The lines with new numbers and links, which need no key."""
     done: list[bytes] = []
     for seq, line in enumerate(lines):
         done.append(edit(line, seq=seq, _prev=leaf_hash(done[-1]).hex() if done else "0" * 64))

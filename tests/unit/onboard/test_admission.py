@@ -1,4 +1,4 @@
-"""Which step's turn it is, what a deferred one waits for and how long, and `L_rem`: what admission takes."""
+"""The current step, the wait for a deferred one and its limit, and `L_rem`, the latency of admission."""
 
 import json
 from collections import deque
@@ -23,7 +23,9 @@ TIMES = st.lists(st.integers(-10, 1 << 40), max_size=2 * WINDOW)
 
 
 def naive(times: list[int]) -> int:
-    """The smallest measured value that at least 99 of 100 do not exceed; never less than assumed with under eight."""
+    """The smallest measured value that at least 99 of 100 do not exceed; never less than the default with fewer than
+    eight.
+    """
     last = [max(each, 0) for each in times[-WINDOW:]]
     high = min((each for each in last if sum(other <= each for other in last) * 100 >= 99 * len(last)), default=0)
     return high if len(last) >= 8 else max(high, CONSERVATIVE_US)
@@ -48,7 +50,7 @@ def test_the_remaining_latency_covers_99_of_100_measurements(times: list[int], s
 
 
 def test_latency_is_measured_until_the_first_frame_went_out() -> None:
-    """From the decision to `Sent`: the record that the command waits for is part of it."""
+    """From the decision to `Sent`: this includes the record that the command waits for."""
     run = Run(loaded())
     token = run.vehicle.commands[-1].token
     run.step(Sent(run.clock.now().monotonic_us + 70_000, token))
@@ -103,7 +105,7 @@ def test_approval_is_used_in_the_step_of_its_arrival() -> None:
 
 
 def test_a_deadline_runs_from_the_approval() -> None:
-    """What the step waited for the approval is not taken off it, not even when its state is unknown by then."""
+    """The wait for the approval is not subtracted, not even when the state is unknown by then."""
     run = waiting()
     for _ in range(10 * S // TICK):
         run.tick()

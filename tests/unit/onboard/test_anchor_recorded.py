@@ -1,4 +1,4 @@
-"""What a witness cosigned is recorded whole, waited for by nothing, and changes nothing of the flight."""
+"""A cosigned checkpoint is recorded completely; nothing waits for it, and the flight does not change."""
 
 from reference.documents import low
 from reference.world import START, Run, renewed

@@ -1,4 +1,4 @@
-"""What the boundary signs of its own evidence, and that all of its parts keep one chain."""
+"""The boundary's statements of its own evidence; all of its parts keep one chain."""
 
 from hashlib import sha256
 
@@ -140,7 +140,7 @@ def test_another_gate_counts_in_the_same_chain() -> None:
 
 
 def test_nothing_happens_after_the_end_was_signed() -> None:
-    """Whoever took over the runtime has it signed before the end, and would fly then without a record."""
+    """A compromised runtime has the end signed early, to fly on without a record."""
     of = loaded()
     of.attestation.begin(KEY)
     first, sealed_ = allowed(of), preparation.seal(Preparation(1, False, NOW_US, ()), SESSION_KEY)

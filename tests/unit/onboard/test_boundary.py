@@ -1,4 +1,4 @@
-"""What the boundary answers to requests for links, and what its answers name."""
+"""The boundary's answers to requests for links, and what they name."""
 
 from msgspec.structs import replace
 

@@ -1,4 +1,4 @@
-"""Documents, good and bad, in any order and at any moment of a flight: it ends, and its log proves itself."""
+"""Valid and invalid documents in any order and at any moment of a flight: it ends, and its log verifies."""
 
 import pytest
 from hypothesis import Phase, given, settings
@@ -21,7 +21,7 @@ MOMENT = st.integers(0, 80)  # ticks
 
 
 def other(of: Loaded, work: int) -> Mission:
-    """Another mission in the place of the one in force: with a leg more, without its inspection, or issued anew."""
+    """Another mission in place of the one in force: with one more leg, without its inspection, or issued anew."""
     mission = of.bundle.mission
     first, second, *_, last = mission.invocations
     inspection = OF.bundle.mission.invocations[2]
@@ -32,7 +32,7 @@ def other(of: Loaded, work: int) -> Mission:
 
 
 class Hands:
-    """Whoever hands documents in; remembers them, to play them again."""
+    """Presents documents and keeps them for replays."""
 
     def __init__(self, run: Run) -> None:
         self.run = run
@@ -81,7 +81,7 @@ class Hands:
 
 
 def lengthen(hands: Hands, of: Loaded, number: int) -> None:
-    """A replacement that keeps all that the flight has, and adds a leg before the way home."""
+    """A replacement that keeps the steps of the flight, and adds a leg before the way home."""
     steps = of.bundle.mission.invocations
     plan = Plan(MotionKind.FLY, (0, 0), 8 * M, 0)
     leg = invocation(len(steps) - 1, INSPECTION, GOTO, plan, 0, 0, 8 * M)

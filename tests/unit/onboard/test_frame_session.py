@@ -1,4 +1,6 @@
-"""The frame session: what leaves, by tables written by hand, and by turning every octet of what may leave."""
+"""The frame session: which frames pass, by tables written by hand, and with every octet of a permitted frame
+flipped.
+"""
 
 import struct
 from collections.abc import Iterable
@@ -364,7 +366,7 @@ def test_the_first_autopilot_that_is_known_is_the_vehicle() -> None:
 
 @pytest.mark.parametrize("message", BEFORE_FLIGHT, ids=named)
 def test_a_fence_is_not_handed_to_a_vehicle_that_is_armed(message: Any) -> None:
-    """Whoever armed it: a run may begin while it flies."""
+    """Whoever armed it, because a run may begin while it flies."""
     gate = FrameSession()
     gate.observe(pack(heartbeat(PX4), component=1))
     gate.observe(pack(parameter("FENCE_TYPE", 7), component=1))
@@ -378,7 +380,7 @@ def test_a_fence_is_not_handed_to_a_vehicle_that_is_armed(message: Any) -> None:
 
 
 def test_before_a_vehicle_is_known_only_a_greeting_leaves() -> None:
-    """Over some links a vehicle waits to be spoken to."""
+    """On some links a vehicle waits for a first message."""
     gate = FrameSession()
     who = long(512, 0)  # asks for a HEARTBEAT
     for greeting in (ALWAYS[0], who):
@@ -420,7 +422,7 @@ def test_a_command_begins_in_its_time_and_goes_on_after_it() -> None:
 
 @pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT])
 def test_a_path_is_flown_point_after_point(autopilot: int) -> None:
-    """Out of its order, a leg would lead through where nobody looked. A path may come by one place twice."""
+    """A leg out of order would be unchecked. A path may pass one place twice."""
     a, b, c = (100, 100), (200, 100), (200, 300)
     path = (a, b, a, c)
     covering = Command(
@@ -474,7 +476,7 @@ def test_only_one_whole_unsigned_frame_leaves() -> None:
 def test_no_octet_that_the_autopilot_acts_on_may_change(
     autopilot: int, message: Any, kinds: tuple[MotionKind, ...]
 ) -> None:
-    """Every octet of the whole payload is turned, in every bit; what passes must mean the same."""
+    """Every bit of the whole payload is flipped; a frame that passes must mean the same."""
     gate = session(autopilot, command(kinds[0]))
     frame = pack(message)
     size = LAYOUTS[message.get_msgId()].fields.size
@@ -505,7 +507,7 @@ def meaning(name: str, frame: bytes) -> tuple[Any, ...]:
 
 
 def same(got: tuple[Any, ...], meant: tuple[Any, ...]) -> bool:
-    """The same but for what a float rounds off, home's height, and what kind of NaN it is."""
+    """Equal except for the rounding of floats, home's height, and the kind of NaN."""
     return all(
         one == other or (one != one and other != other) or (isinstance(one, float) and abs(one - other) <= 2.002)
         for one, other in zip(got, meant, strict=True)

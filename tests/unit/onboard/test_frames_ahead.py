@@ -1,4 +1,4 @@
-"""What is kept of frames that were signed ahead: their order, their copies, and until when they are good."""
+"""The stored frames that were signed ahead: their order, their copies, and their validity."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -33,7 +33,7 @@ SENDINGS = 1 + RETRIES
 
 
 class Boundary:
-    """Signs whatever it is given, under tokens of its own; `refused` are links that it refuses."""
+    """Signs everything under tokens of its own; `refused` are links that it refuses."""
 
     def __init__(self, *, signs: bool = True) -> None:
         self.link = SignedLink(KEY, SigningState(0, {}), UTC, 0)
@@ -126,7 +126,7 @@ def test_links_go_forward_only() -> None:
 
 
 def test_a_link_that_was_passed_over_is_void() -> None:
-    """Its frames are older than what the vehicle heard: they would not be taken."""
+    """Its frames are older than those that the vehicle accepted, so it would refuse them."""
     of = made()
     of.begin(CONTINGENCY_LINK, 0)
     of.take(frame("hover"))
@@ -151,7 +151,7 @@ def test_the_last_link_may_be_sent_as_often_as_a_run_insists_on_it() -> None:
 
 
 def test_the_last_link_is_signed_often_enough() -> None:
-    """A run that is left alone meanwhile begins with it once more (`Runtime.leave`); each time under a permit."""
+    """An unattended run begins with it once more (`Runtime.leave`), each time under a permit."""
     assert 2 * (Limits().tries + 1) <= LAST <= AGAIN
 
 
@@ -169,7 +169,7 @@ def test_ended_link_passes_no_frame() -> None:
 
 @pytest.mark.parametrize("kind_of_place", ["height", "time"])
 def test_home_and_time_fields_do_not_distinguish_frames(kind_of_place: str) -> None:
-    """Home moved by a little since it was signed, and time went on: it goes to the same place."""
+    """Home moved a little since the signature, and time went on: the target is the same."""
 
     def target(of: float, at_ms: int = 0) -> bytes:
         if kind_of_place == "height":
@@ -205,7 +205,7 @@ def test_it_is_signed_anew_before_it_is_void() -> None:
 
 
 def test_it_is_signed_anew_where_timestamps_run_faster_than_our_time() -> None:
-    """A recorded ArduCopter's do, for a while, and ours follow."""
+    """The timestamps of a recorded ArduCopter do so for a while, and ours follow."""
     boundary = Boundary()
     of = made(boundary)
     for second in range(1, 12):

@@ -1,4 +1,4 @@
-"""A link that this computer was too late to send is tried again: no vehicle lands in a field for a busy computer."""
+"""A link that this computer sent too late is tried again: a busy computer must not make a vehicle land in a field."""
 
 from collections.abc import Iterator
 
@@ -32,7 +32,7 @@ def start(*deaf: str) -> Run:
 
 
 def fail(run: Run, reason: str) -> None:
-    """What was dispatched last was not sent."""
+    """The last dispatched command was not sent."""
     run.tick(CommandFailed(0, run.vehicle.commands[-1].token, reason))
 
 
@@ -104,7 +104,7 @@ def test_late_link_is_retried_a_bounded_number_of_times() -> None:
 
 
 def refusing(run: Run, sent: int, times: int) -> list[int]:
-    """The executor finds permits too late, so often, once so many commands were sent."""
+    """An executor that finds permits too late, so many times, after so many commands."""
     executor, left = run.loaded.executor, [times]
     dispatch = executor.dispatch
 

@@ -1,4 +1,4 @@
-"""What a run that broke off left the vehicle doing, by its log."""
+"""What an interrupted run left the vehicle doing, according to its log."""
 
 from collections.abc import Sequence
 
@@ -25,7 +25,7 @@ def in_force(run: Run, lines: Sequence[bytes] | None = None) -> list[tuple[str, 
 
 
 def obeys(run: Run, target: tuple[int, int, int] | None = None) -> None:
-    """The vehicle is seen to do what it was told last."""
+    """The vehicle is observed to obey the last command."""
     run.tick(Obeyed(0, run.vehicle.commands[-1].token, target))
 
 
@@ -50,7 +50,7 @@ def test_succeeded_command_counts_as_obeyed() -> None:
 
 
 def test_allowed_command_may_have_been_sent() -> None:
-    """The record of a fallback may be the last that was written, and its frame is out already."""
+    """The record of a fallback may be the last one written, after its frame was sent."""
     run = Run().until_flies("goto")
     obeys(run, THERE)
     run.vehicle.fails.add("goto")

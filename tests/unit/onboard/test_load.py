@@ -1,4 +1,4 @@
-"""What `load` refuses, and why."""
+"""The refusals of `load`."""
 
 import pytest
 from msgspec.structs import replace

@@ -1,4 +1,4 @@
-"""The rehearsal: what is decided on each step, where it is judged, and that nothing comes of it."""
+"""The rehearsal: the decision on each step, the state that it uses, and that it has no effect."""
 
 from msgspec.structs import replace
 

@@ -1,4 +1,4 @@
-"""Whatever ends a run after a command was sent says that the vehicle may be flying, unless it was seen to land."""
+"""Every end of a run after a command warns that the vehicle may be flying, unless a landing was observed."""
 
 from collections.abc import Callable
 
@@ -92,7 +92,7 @@ GIVEN_UP: dict[str, Callable[[Run], object]] = {
 
 @pytest.mark.parametrize("name", GIVEN_UP)
 def test_exhausted_links_are_named_after_any_abort(name: str) -> None:
-    """That somebody had ended it before is no reason."""
+    """An earlier request to end the run is not the reason."""
     run = flying()
     run.vehicle.fails = {"hover", "return_home", "emergency_land"}
     GIVEN_UP[name](run)
@@ -110,7 +110,7 @@ def test_standstill_warning_says_what_to_do() -> None:
 
 @pytest.mark.parametrize("way", [Interrupted(0), EvidenceFailed(0, "the disk is full"), None])
 def test_obeying_vehicle_that_never_flew_has_not_landed(way: Event | None) -> None:
-    """It says all the while that it rests, and obeyed a takeoff: the landing that was sent failed."""
+    """It always reports that it rests, but obeyed a takeoff: the landing that was sent failed."""
     run = start(vehicle=FakeVehicle(deaf={"takeoff"}, fails={"emergency_land"})).until_flies("takeoff")
     token = run.vehicle.commands[-1].token
     run.tick(Obeyed(0, token))
@@ -148,7 +148,7 @@ def test_observed_landing_gives_no_warning(ending: Interrupted | None) -> None:
 
 
 def test_obeyed_command_that_failed_on_ground_is_reported() -> None:
-    """The vehicle says that it rests, and may have been told to climb all the same."""
+    """The vehicle reports that it rests, but may still have the command to climb."""
     run = start(vehicle=FakeVehicle(deaf={"takeoff"})).until_flies("takeoff")
     token = next(each["token"] for each in run.records if each.get("event") == "dispatched")
     run.tick(Obeyed(0, token))

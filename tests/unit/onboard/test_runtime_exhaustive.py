@@ -34,7 +34,7 @@ DEPTH = 3
 
 
 class Watched(Executor):
-    """Remembers what it let through, and is asked for nothing else."""
+    """An executor that remembers what it dispatched."""
 
     def __init__(self, commands: Commands) -> None:
         super().__init__(SESSION_KEY, commands)

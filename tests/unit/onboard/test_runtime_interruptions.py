@@ -1,4 +1,4 @@
-"""What may come between: the pilot, the operator, a lost link, a full disk, a boundary that does not answer."""
+"""Interruptions: the pilot, the operator, a lost link, a full disk, a boundary that does not answer."""
 
 import json
 from collections.abc import Callable
@@ -234,7 +234,7 @@ def test_landing_by_the_air_state_alone_ends_a_fallback() -> None:
 
 
 class Deaf:
-    """A boundary that answers until it is told not to; it is there all the same, as far as anybody can tell."""
+    """A boundary that stops answering on command, without any other sign."""
 
     lost: str | None = None
 
@@ -330,7 +330,7 @@ def test_a_vehicle_that_never_moves_again_is_stood_down_from() -> None:
 
 
 class Echo:
-    """A boundary whose answers are kept, and played again when told to."""
+    """A boundary whose answers are kept, and replayed on command."""
 
     lost = None
 

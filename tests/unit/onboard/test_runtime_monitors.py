@@ -47,7 +47,7 @@ RUNS: list[Run] = []
 
 @pytest.fixture(autouse=True)
 def all_audited() -> Iterator[None]:
-    """Every decision of these runs derives again from its record, what the monitors said included."""
+    """Every decision of these runs derives again from its record, including the truths of the monitors."""
     yield
     while RUNS:
         assert_audited(RUNS.pop())
@@ -84,7 +84,7 @@ def seconds(run: Run) -> float:
 
 
 def recorded(run: Run) -> list[Any]:
-    """What the monitors said at each recorded decision."""
+    """The truths of the monitors at each recorded decision."""
     return [record["state"]["monitors"] for record in run.records if record["type"] == "decision"]  # type: ignore[index]
 
 
@@ -114,7 +114,7 @@ def test_a_gust_begins_the_three_seconds_again() -> None:
 
 
 def test_a_gap_of_telemetry_is_not_calm() -> None:
-    """The wind is silent for a second, and stale after half of one: what it was then, nobody knows."""
+    """The wind is silent for a second, and stale after half of one: it is unknown then."""
     run = start(world(TAKEOFF, require=(FOR_3_S,)))
     run.until(lambda run: seconds(run) >= 2.0)
     run.vehicle.silent.add(WIND)

@@ -1,4 +1,4 @@
-"""Whole runs over a fake vehicle: what the mission does on each outcome (design section 4.4)."""
+"""Whole runs over a fake vehicle: the mission's reaction to each outcome (design section 4.4)."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -39,7 +39,7 @@ RUNS: list[Run] = []
 
 @pytest.fixture(autouse=True)
 def all_covered() -> Iterator[None]:
-    """Whatever a run of this file does, each of its commands is covered by an earlier record."""
+    """Each command of every run in this file is covered by an earlier record."""
     yield
     while RUNS:
         assert_audited(RUNS.pop())
@@ -275,7 +275,7 @@ def test_held_for_in_vain_falls_back_at_the_deadline() -> None:
 
 
 def waiting_to_be_replaced() -> Run:
-    """The inspection is not admitted, and its mission asks for another step."""
+    """The inspection is not admitted, and its mission requests another step."""
     run = start(loaded(mission=on_inadmissible(2, OnInadmissible.REPLAN))).until_flies("goto")
     run.vehicle.values[OBSTACLE] = M
     run.until_flies("hover")
@@ -479,7 +479,7 @@ def test_unsent_late_step_is_tried_again(skill: str, reason: str) -> None:
 
 
 def released(run: Run) -> int:
-    """When the step that was decided last was released."""
+    """When the last decided step was released."""
     context = [record["context"] for record in run.records if record["type"] == "decision"][-1]
     assert isinstance(context, dict)
     return int(context["released_us"])

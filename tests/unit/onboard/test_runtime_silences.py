@@ -1,4 +1,4 @@
-"""A silence of the vehicle, in every stage: nothing is judged on what was known before it."""
+"""A silence of the vehicle, in every stage: nothing is judged on the state from before it."""
 
 from collections.abc import Callable
 from itertools import permutations
@@ -134,7 +134,7 @@ Situation = Callable[[AfterSilence], Run]
 
 
 def pass_time(run: Run, us: int) -> None:
-    """The vehicle says nothing."""
+    """The vehicle is silent."""
     until_us = run.clock.now().monotonic_us + us
     while run.clock.now().monotonic_us < until_us:
         run.clock.advance(min(TICK, until_us - run.clock.now().monotonic_us))
@@ -142,7 +142,7 @@ def pass_time(run: Run, us: int) -> None:
 
 
 def be_silent(run: Run, seconds: float) -> None:
-    """Nothing is heard for so long; after a second the link counts as lost."""
+    """Nothing is received for this time; after a second the link counts as lost."""
     whole_us = int(seconds * S)
     pass_time(run, min(whole_us, LOST_US))
     if whole_us > LOST_US:
@@ -151,7 +151,7 @@ def be_silent(run: Run, seconds: float) -> None:
 
 
 def come_back(run: Run, order: int, missing: frozenset[int] = frozenset()) -> None:
-    """The first messages, one by one in any order; the one that tells that the link is back is the first of all."""
+    """The first messages, one by one in any order, after the one that shows that the link is back."""
     if run.runtime.view(run.clock.now()).linked is False:
         run.step(LinkBack(run.clock.now().monotonic_us))
     slots = [(POSITION_X, POSITION_Y), *((slot,) for slot in (BATTERY, HEIGHT, WIND, LINK, FIX, OBSTACLE))]
@@ -163,7 +163,7 @@ def come_back(run: Run, order: int, missing: frozenset[int] = frozenset()) -> No
 
 
 def after_it(run: Run) -> list[str]:
-    """What was recorded from the moment on at which the link was lost."""
+    """The records from the loss of the link on."""
     return run.events[run.events.index("link-lost") :] if "link-lost" in run.events else []
 
 
@@ -297,7 +297,7 @@ def test_signal_missing_before_silence_is_not_awaited() -> None:
 
 
 def test_value_measured_before_loss_is_not_fresh() -> None:
-    """A link that was slow hands over what it held."""
+    """A slow link delivers buffered values."""
     run = running(AfterSilence.CONTINUE)
     be_silent(run, 5)
     run.step(LinkBack(0))
@@ -310,7 +310,7 @@ def test_value_measured_before_loss_is_not_fresh() -> None:
 
 
 def test_a_position_that_is_not_vouched_for_yet_is_waited_for() -> None:
-    """After a silence the estimator's word on a position comes behind the position: till then it is not known."""
+    """After a silence the estimator's report on a position comes after the position, which is unknown until then."""
     run = falling(AfterSilence.CONTINUE)
     be_silent(run, 45)
     where = {slot: run.vehicle.values[slot] for slot in (POSITION_X, POSITION_Y, HEIGHT)}
@@ -417,7 +417,7 @@ def violations(run: Run) -> list[str]:
 @pytest.mark.slow
 @pytest.mark.parametrize("gaps", [(0,), (8,), (3, 3, 3), (2, 2, 2, 2, 2, 2, 2, 2)])
 def test_step_time_limit_excludes_silence_and_names_it(gaps: tuple[int, ...]) -> None:
-    """What flies it waits in link time, too: a limit by the clock on the wall ended a hover of 20 s for a silence."""
+    """The flight waits in link time too: a limit by wall-clock time once ended a hover of 20 s because of a silence."""
     run = limited()
     began_us = run.clock.now().monotonic_us
     away_us = 0
@@ -515,7 +515,7 @@ def test_pilot_takeover_during_silence_ends_run(situation: Situation, moment: st
 
 
 def test_a_take_off_that_was_lost_waits_for_word_on_whether_it_flies() -> None:
-    """What was last heard is that it stood on the ground: it may have risen, and is not told to land for that."""
+    """It was last reported on the ground: it may have risen, and is not told to land for that."""
     run = start(vehicle=FakeVehicle(deaf={"takeoff"}))
     run.tick(AirState(0, True, False))
     be_silent(run, 45)
@@ -544,7 +544,7 @@ def test_a_vehicle_that_can_still_fly_is_waited_for(situation: Situation) -> Non
 
 @pytest.mark.parametrize("before", [0, 5, 120])
 def test_stop_request_during_silence_is_bounded(before: int) -> None:
-    """The vehicle has its chance to come back; then it is given up, as it would be on the ground."""
+    """The vehicle may still return; then it is given up, as on the ground."""
     run = running(AfterSilence.CONTINUE)
     run.step(LinkLost(0))
     pass_time(run, before * S)
@@ -572,7 +572,7 @@ DEAF = {"takeoff", "goto", "inspect_area", "hover", "return_home", "emergency_la
 
 
 def mute(run: Run) -> Run:
-    """What is sent does not arrive any more; the vehicle is heard all the while."""
+    """Commands do not arrive any more; the vehicle is heard all the while."""
     run.vehicle.deaf = DEAF
     run.tick(VehicleAnswers(0, answers=False))
     return run
@@ -587,7 +587,7 @@ def go_on(run: Run, us: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("situation", AIR)
 def test_unresponsive_vehicle_is_awaited_while_it_can_fly(situation: Situation) -> None:
-    """Its chain is flown meanwhile, as far as it may arrive, and its end is not the end of the run."""
+    """Its chain flies meanwhile, as far as commands may arrive, and its end does not end the run."""
     run = mute(situation(AfterSilence.CONTINUE))
     go_on(run, SHORT.endurance_us + Limits().silent_us - TICK)
     assert run.ending is None

@@ -1,4 +1,4 @@
-"""The computer stands still in flight: what it knew before is not judged when it goes on; its log names the stall."""
+"""The computer stands still in flight: it does not judge the state from before that; its log names the stall."""
 
 import pytest
 from msgspec.structs import replace
@@ -67,13 +67,13 @@ def falling() -> Run:
 
 
 def stand_still(run: Run, for_us: int, *events: Event) -> None:
-    """It goes on after `for_us`, and reads `events` first."""
+    """It continues after `for_us`, and reads `events` first."""
     run.clock.advance(for_us)
     run.step(*events)
 
 
 def pass_time(run: Run, us: int) -> None:
-    """The vehicle says nothing."""
+    """The vehicle is silent."""
     for _ in range(us // TICK):
         run.clock.advance(TICK)
         run.step()
@@ -145,7 +145,7 @@ def test_wait_after_stall_is_as_long_as_after_silence() -> None:
 
 @rows("awake_s", (0, 1))
 def test_repeated_stalls_delay_judgement_boundedly(awake_s: int) -> None:
-    """Also where it does nothing but stall."""
+    """Even if it does nothing but stall."""
     run = running()
     run.vehicle.values[POSITION_X] = None
     stalls = 0
@@ -159,7 +159,7 @@ def test_repeated_stalls_delay_judgement_boundedly(awake_s: int) -> None:
 
 
 def test_a_stall_takes_none_of_a_skills_own_time() -> None:
-    """The manoeuvre does not get on in it either: its time is counted with a link, too."""
+    """The manoeuvre does not progress meanwhile: its time counts only time with a link, too."""
     run = running()
     limit_us = max(contract.duration_us for contract in CONTRACTS)
     stand_still(run, limit_us + 2 * S)
@@ -170,7 +170,7 @@ def test_a_stall_takes_none_of_a_skills_own_time() -> None:
 
 
 def test_a_stall_counts_for_no_long_silence() -> None:
-    """What the vehicle said meanwhile was heard, though late."""
+    """The vehicle's messages of that time were received, though late."""
     run = running()
     stand_still(run, POLICY.silence_us + 20 * S)
     report(run)

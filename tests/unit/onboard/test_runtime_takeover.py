@@ -1,6 +1,6 @@
 """A takeover and a crash end the run at once, whatever else happens at the same moment.
 
-And a hold that does not hold is not left flying.
+A hold that fails is not left flying.
 """
 
 from collections.abc import Callable

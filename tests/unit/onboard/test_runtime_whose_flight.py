@@ -1,4 +1,6 @@
-"""Whose flight it is: nothing is sent to one that somebody else began, and a landing that nobody ordered is one."""
+"""Foreign flights: nothing is sent to a flight that somebody else began, and an unordered landing counts as a
+takeover.
+"""
 
 from collections.abc import Callable
 

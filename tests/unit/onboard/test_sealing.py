@@ -1,4 +1,4 @@
-"""When the runtime seals: an epoch that is over when nothing is sent, one that is long over before anything else."""
+"""When the runtime seals: a finished epoch when nothing is sent, and an overdue one before anything else."""
 
 import json
 from functools import partial
@@ -109,7 +109,7 @@ def test_records_of_a_reflex_are_made_when_they_are_taken_and_not_before(journal
 
 
 def test_seal_follows_record_of_boundary_loss(journal: Journal) -> None:
-    """Else an epoch would end without its statement, and nothing would say why."""
+    """Otherwise an epoch would end without its statement, and nothing would explain it."""
     lost: list[str] = []
     journal.recorder.attest = lambda now, **_: None
     journal.recorder.lost = lambda: lost[0] if lost else None
@@ -128,7 +128,7 @@ def test_late_seal_does_not_hide_boundary_loss(journal: Journal) -> None:
 
 
 def test_boundary_entries_are_recorded_before_its_loss(journal: Journal) -> None:
-    """The seal is late in the very step in which the loss is found: it waits for what was told before."""
+    """The seal is late in the same step in which the loss is found: it waits for earlier reports."""
     late = EPOCH_US + EPOCH_US // 5
     decision = partial(journal.recorder.effect, at(late), "approval")
     journal.tell(lambda: journal.record(decision, at(late), SYNCED, awaited=True))

@@ -1,4 +1,4 @@
-"""What is told of the values where something did not hold."""
+"""The values that are recorded with a condition that did not hold."""
 
 import pytest
 from msgspec.structs import replace

@@ -1,4 +1,4 @@
-"""What the state monitor keeps of what the frames carried."""
+"""The values that the state monitor keeps of the frames."""
 
 from reference import flat_case as flat
 from reference.asking import POLICY

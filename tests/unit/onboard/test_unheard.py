@@ -1,4 +1,4 @@
-"""Signals that cannot come on a link, and who waits for them."""
+"""Signals that cannot arrive on a link, and the steps that wait for them."""
 
 from msgspec.structs import replace
 

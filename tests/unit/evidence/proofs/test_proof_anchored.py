@@ -1,4 +1,4 @@
-"""Whether a proof that was made is anchored, and which checkpoints witnesses may have cosigned."""
+"""Whether a proof is anchored, and which checkpoints witnesses may have cosigned."""
 
 from reference.proof_mutations import cosigned
 from reference.sealed_log import sealed_log

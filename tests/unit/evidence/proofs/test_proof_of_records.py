@@ -1,4 +1,4 @@
-"""Proofs made of logs, and what they prove to who holds the file and a pinned root key."""
+"""Proofs made from logs, and their content for a holder of the file and a pinned root key."""
 
 import json
 

@@ -35,7 +35,7 @@ def body(note: str) -> str:
 
 
 def put(name: str, value: Any) -> Change:
-    """Sets a part that stands in the extra."""
+    """Replace a part of the extra data."""
 
     def change(parts: Parts) -> None:
         parts.extra[name] = value
@@ -81,7 +81,7 @@ def named(name: str) -> Change:
 
 
 def renamed(_: tuple[str, ...], parts: Parts) -> tuple[str, ...]:
-    """The log key vouches for another log in the name of this one."""
+    """The log key signs another log in the name of this one."""
     first = parts.extra["chain"][0]
     mixed = body(first).replace(origin(LOG), origin(OTHER)).replace("\n0\n", "\n1\n")
     return (first, signed(mixed, LOG_KEY, origin(LOG)))
@@ -124,7 +124,7 @@ def test_a_changed_proof_of_inclusion_is_refused(change: Change, slug: str) -> N
 
 
 def test_a_record_in_part_is_no_proof_any_more() -> None:
-    """Earlier versions made them: whoever held the last epoch's key could state other fields of any record."""
+    """Earlier versions made them: a holder of the last epoch's key could state other fields of any record."""
     parts = inclusion(3)
     parts.kind = "rtshcua/disclosure-proof@v1"
     assert parts.slug() == "proof/malformed"

@@ -1,4 +1,4 @@
-"""The proofs in tests/vectors/proof, byte for byte: their form is a promise. `UPDATE_GOLDENS=1` writes them."""
+"""The proofs in tests/vectors/proof, byte for byte, because their format is stable. `UPDATE_GOLDENS=1` writes them."""
 
 import os
 from collections.abc import Callable

@@ -1,4 +1,6 @@
-"""Proofs and receipts verified after docs/proofs.md, with hashlib, cbor2 and cryptography, by no code of `rtshcua`."""
+"""Verifies proofs and receipts as docs/proofs.md says, with hashlib, cbor2 and cryptography, without code of
+`rtshcua`.
+"""
 
 import json
 from base64 import b64decode
@@ -36,7 +38,7 @@ def trusted_log_key(envelope: bytes) -> bytes:
 
 
 def open_chain(body: dict[str, Any], note: str) -> list[list[str]]:
-    """The lines of the checkpoints, each signed by the key that the one before names."""
+    """The lines of the checkpoints, each signed by the key that the previous one names."""
     public, heads = trusted_log_key(body["root"]), []
     for each in (*body["chain"], note):
         text, _, signature = each.rpartition("\n\n")

@@ -1,4 +1,4 @@
-"""Anchors against a log: how far it is anchored, what contradicts it, and what says nothing."""
+"""Anchors compared with a log: how far it is anchored, contradictions, and irrelevant anchors."""
 
 from itertools import permutations
 
@@ -22,7 +22,7 @@ def log() -> Log:
 
 
 def outcome(log: Log, anchors: list[str], threshold: int = 1, keys: list[bytes] = PUBLIC) -> AnchoredExtent | Flaw:
-    """The same, whichever comes first: the anchors, the checkpoints, or each after the other."""
+    """The result, which must be the same for any order of anchors and checkpoints."""
     steps = [[("anchor", each) for each in anchors], [("checkpoint", each) for each in log.notes]]
     found = []
     for order in (steps[0] + steps[1], steps[1] + steps[0]):
@@ -58,7 +58,7 @@ def test_a_checkpoint_anchors_all_before_it_and_its_own_record(log: Log) -> None
 
 
 def test_the_threshold_counts_witnesses(log: Log) -> None:
-    """Each witness stands for all smaller trees: the second of two that went as far as 5 and 9 makes it 5."""
+    """Each witness covers all smaller trees: with two that saw 5 and 9, the threshold of two is at 5."""
     far, near = Judge(), Judge(WITNESSES[1])
     marks = [far.blindly(log.notes[3]), near.blindly(log.notes[1])]
     assert anchored(log, marks, 1) == (9, 0)

@@ -1,4 +1,4 @@
-"""Cosignatures: the example of c2sp.org/tlog-cosignature, and everything that is none."""
+"""Cosignatures: the example of c2sp.org/tlog-cosignature, and invalid ones."""
 
 from base64 import b64decode, b64encode
 from hashlib import sha256
@@ -21,7 +21,7 @@ def line_of(key: SigningKey = KEY, text: str = TEXT, time_s: int = TIME) -> str:
 
 
 def test_a_cosignature_as_the_page_says_it() -> None:
-    """Built anew from the words of the page: name, id, time, and the signed message."""
+    """Built from the text of the page: name, id, time, and the signed message."""
     line = line_of()
     mark, name, encoded = line.split(" ")
     octets = b64decode(encoded)

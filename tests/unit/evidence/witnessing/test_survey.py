@@ -1,4 +1,4 @@
-"""A log handed to a witness as a file."""
+"""A log that a witness gets as a file."""
 
 import pytest
 
@@ -49,7 +49,7 @@ def test_a_file_is_cosigned_in_one_step_from_wherever_the_witness_is(log: Log) -
 
 
 def test_a_log_that_is_not_its_checkpoints(log: Log) -> None:
-    """As with Yeti 2022: everything is signed and consistent, and an entry is not what was signed."""
+    """As with Yeti 2022: everything is signed and consistent, but an entry differs from the signed one."""
     log.lines[10] = log.lines[10].replace(b"said", b"sand")
     found = survey(log.lines)
     assert isinstance(found, Finding)
@@ -68,7 +68,7 @@ def test_nothing_follows_the_close(more: bytes) -> None:
 
 
 def test_an_edited_field_of_a_signed_record_is_found(log: Log) -> None:
-    """The tree of the lines before it is as it was: the checkpoint is over the record too."""
+    """The tree of the lines before it is unchanged, but the checkpoint covers the record too."""
     edited = log.lines[4].replace(b'"epoch":0', b'"epoch":1')
     assert edited != log.lines[4]
     for line, slug in ((edited, "seal/self"), (log.lines[4].replace(b'"seq"', b'"sex"'), "record/malformed")):

@@ -1,4 +1,4 @@
-"""What a witness cosigns, and everything that it refuses; requests as bytes; and how a log is shown to it."""
+"""The checkpoints that a witness cosigns or refuses; requests as bytes; and the submission of a log."""
 
 import pytest
 from hypothesis import given
@@ -265,7 +265,7 @@ def test_a_chain_of_another_log_gives_no_key() -> None:
 
 
 def test_a_first_note_that_is_no_genesis() -> None:
-    """Whoever holds the log key could begin in the middle: it is not taken."""
+    """A holder of the log key could begin in the middle, so it is refused."""
     log = Log()
     log.effects(1)
     log.recover()
@@ -359,7 +359,7 @@ SAMPLE.seal()
 
 @given(st.data())
 def test_arbitrary_input_raises_nothing(data: st.DataObject) -> None:
-    """A mutated request is refused, or is the same checkpoint."""
+    """A mutated request is refused, or contains the same checkpoint."""
     witness = Judge()
     cosigned(witness, asked(SAMPLE, None, 7))
     octets = bytearray(asked(SAMPLE, 6).encode())

@@ -1,6 +1,4 @@
-"""Foreign flights: nothing is sent to a flight that somebody else began, and an unordered landing counts as a
-takeover.
-"""
+"""Foreign flights: nothing is sent to a flight that somebody else began, and an unordered landing ends the mission."""
 
 from collections.abc import Callable
 

@@ -62,7 +62,7 @@ def test_configuration_cannot_move_the_cache(here: Path, lint: Lint, folder: str
     before = sorted(tmp_path.rglob("*"))
     code, found = lint(".")
     assert (code, found[0][0]) == (ExitCode.INPUT, "configuration")
-    assert "`cache` in `[lint]` is a text" in found[0][1]
+    assert "`cache` in `[lint]` is a string" in found[0][1]
     assert sorted(tmp_path.rglob("*")) == before
 
 

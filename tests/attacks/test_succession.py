@@ -227,7 +227,7 @@ def test_the_key_of_a_link_is_revoked_by_its_fingerprint(
     name = fingerprint(read_link_key(Path("link.key")))
     assert name in capsys.readouterr().out
     assert main(["keys", "revoke", "--link", "link.key"]) == ExitCode.OK
-    assert f"{name} the key of a link" in " ".join(capsys.readouterr().out.split())
+    assert f"{name} link key" in " ".join(capsys.readouterr().out.split())
     root = opened_root(fleet.root())
     signing = LinkSigning(Path("link.key"), POLICY, FrameSession(), Path("state"), SystemClock(), unsigned_radio=True)
     if resumed:

@@ -1,13 +1,12 @@
-"""A local socket on which agents, or operators, follow a flight and hand documents in (docs/agents.md).
+"""A local socket on which agents or operators follow a flight and hand in documents (docs/agents.md).
 
-A Unix stream socket that its owner alone may use, or a group of users besides. Operators have one of their own, so that
-a recall gets through whatever agents do to theirs: it takes nobody but its owner, by what the kernel says of the peer
-(SO_PEERCRED). One process never has all places of a socket.
+A Unix stream socket for its owner alone, or also for a group of users. Operators have their own socket, so that agents
+cannot block a recall: it accepts only its owner, by the kernel's information about the peer (SO_PEERCRED). One process
+never occupies all places of a socket.
 
-Every record of the log goes out as its line, and beside it `hello`, `mission` and `answer`; documents come in as JSON
-lines. Nothing here ever waits: what a reader does not take stays in a bounded buffer, and a reader that lets it fill is
-dropped, as is one that sends what is no line of the kind. A document that is taken up here is only bytes; the
-enforcement boundary says whether it is to be trusted.
+Every record of the log is sent as its line, together with `hello`, `mission` and `answer`; documents come in as JSON
+lines. No call here waits: unsent data stays in a bounded buffer, and a reader that fills it is dropped, as is one that
+sends malformed lines. A document is only bytes here; the enforcement boundary decides whether it can be trusted.
 """
 
 import errno
@@ -29,30 +28,29 @@ import msgspec
 from rtshcua.onboard.ports import Presented
 from rtshcua.wire.document import FLIGHT_BYTES, MAX_DOCUMENT, MAX_WITHOUT_MISSION
 
-#: how many may follow a flight at once at one socket; one more takes the place of whoever was quiet for longest
+#: the most readers at one socket; another one takes the place of the reader that was silent for longest
 MOST_READERS: Final = 8
-#: how many of them may be of one process; one more takes the place of one of its own
+#: the most readers of one process; another one takes the place of one of its own
 MOST_OF_A_PEER: Final = 4
-#: how many are welcomed in one turn of the flight: each costs some 50 us. How many are taken from the queue for that,
-#: most of them to be hung up on, at 15 us; and how many may wait in the queue
+#: how many connections are accepted in one turn of the flight, at about 50 us each; how many are taken from the queue
+#: for that, most of them to be closed, at 15 us; and how many may wait in the queue
 MOST_WELCOMED: Final = 2
 MOST_TAKEN: Final = 5
 MOST_QUEUED: Final = 32
-#: one process is welcomed once in so long, in us, and may be so often ahead of that: who comes oftener is hung up on
+#: the interval of accepted connections of one process, in us, and how many it may be ahead; others are closed
 WELCOME_US: Final = 20_000
 AHEAD: Final = 4
-#: how much may wait for one reader, in bytes
+#: the most unsent bytes for one reader
 MOST_WAITING: Final = 4 << 20
-#: how much is told one reader at once, in bytes: more waits for the next turn
+#: the most bytes sent to one reader at once: the rest waits for the next turn
 AT_ONCE: Final = 1 << 14
-#: the longest line that may come in: a document in base64, with what stands around it
+#: the longest inbound line: a document in base64 with its envelope
 LONGEST: Final = MAX_DOCUMENT * 4 // 3 + 1024
-#: a document comes in no sooner than this after the one before it, in us: verifying takes a third of a millisecond
+#: the least interval between two documents, in us: verifying one takes a third of a millisecond
 GAP_US: Final = 20_000
 #: the longest path of a Unix socket, in bytes (unix(7))
 LONGEST_PATH: Final = 107
-#: how much of long lines is read of one user, in bytes: so many a second, and so many at once. Shorter ones, which a
-#: recall is, count for nothing
+#: the limits on long lines of one user, in bytes: a second, and at once. Shorter ones, such as a recall, do not count
 WORK_RATE: Final = 1 << 17
 WORK_AT_ONCE: Final = 1 << 19
 SHORT: Final = MAX_WITHOUT_MISSION * 4 // 3 + 64
@@ -60,34 +58,34 @@ _CHUNK: Final = 1 << 16
 _CREDENTIALS: Final = struct.Struct("iII")
 _TIME: Final = struct.Struct("ll")  # timeval
 _PATIENCE_S: Final = 1.0
-#: after how long who found no place tries again
+#: how long a client that found no place waits before it tries again
 AGAIN_S: Final = 0.02
 
 
 class SocketTaken(OSError):
-    """Another program listens at the path, or something else is there."""
+    """Another program listens at the path, or another kind of file is there."""
 
 
 class _Handed(msgspec.Struct, forbid_unknown_fields=True):
-    """A line that comes in: a document in base64, and the sender's own number for it."""
+    """An inbound line: a document in base64, and the sender's number for it."""
 
     document: str
     id: int = 0
 
 
-#: what is said to whoever sends something else than a document
+#: the answer to a line without a document
 NO_LINE: Final = ("malformed", "expected a line `{id, document}` with the document in base64")
 
 
 class Encoded(NamedTuple):
-    """A document that somebody handed over, in base64 as far as is known."""
+    """A document in base64, not decoded yet."""
 
     at_us: int
     text: str
     sender: int
 
     def decoded(self) -> Presented:
-        """The document, or that it is none."""
+        """The document, or the error for an invalid one."""
         try:
             return Presented(self.at_us, b64decode(self.text, validate=True), self.sender)
         except ValueError:
@@ -95,7 +93,7 @@ class Encoded(NamedTuple):
 
 
 class _Numbered(msgspec.Struct):
-    """What is read of a line that is wrong otherwise: the number to answer to."""
+    """The readable part of an otherwise malformed line: its number, for the answer."""
 
     id: int = 0
 
@@ -106,7 +104,7 @@ _encode = msgspec.json.Encoder().encode
 
 
 class Peer(NamedTuple):
-    """Who is at the other end, by what the kernel says: the process and its user. 0 and None where it does not say."""
+    """The process and user at the other end, from the kernel; 0 and None where it does not say."""
 
     process: int
     user: int | None
@@ -119,19 +117,19 @@ class _Reader:
         self.link = link
         self.peer = peer
         self.incoming = bytearray()
-        self.seen = 0  # how much of that was looked at, and has no line's end
-        self.waiting: deque[memoryview] = deque()  # lines, and the rest of one
-        self.waits = 0  # how many bytes these are
+        self.seen = 0  # how much of that was searched without finding the end of a line
+        self.waiting: deque[memoryview] = deque()  # unsent lines, and the rest of one
+        self.waits = 0  # their size in bytes
 
     def tell(self, line: bytes) -> bool:
-        """Send a line, or keep it for later; False when the reader is to be dropped."""
+        """Send a line, or queue it; return False when the reader is to be dropped."""
         waits = bool(self.waiting)
         self.waiting.append(memoryview(line))
         self.waits += len(line)
         return (waits or self.flush()) and self.waits <= MOST_WAITING
 
     def flush(self, most: int = AT_ONCE) -> bool:
-        """Send what waits, as far as the reader takes it now, and no more than so many bytes."""
+        """Send queued data as far as the reader accepts it now, up to this many bytes."""
         while self.waiting and most > 0:
             first = self.waiting[0]
             try:
@@ -150,7 +148,7 @@ class _Reader:
 
     @property
     def unread(self) -> bool:
-        """Whether something came of it that was not looked at yet."""
+        """Whether received data was not processed yet."""
         if self.incoming.find(b"\n", self.seen) >= 0:
             return True
         try:
@@ -159,7 +157,7 @@ class _Reader:
             return False
 
     def line(self) -> bytes | None:
-        """The next whole line, if there is one; raises OSError for a connection that ended or sends too long a line."""
+        """The next whole line, if any. Raises OSError for a closed connection or a line that is too long."""
         end = self.incoming.find(b"\n", self.seen)
         if end < 0:
             self.seen = len(self.incoming)
@@ -183,11 +181,9 @@ class _Reader:
 
 
 class AgentSocket:
-    """Listens at a path until it is closed. `greeting` gives what a new reader is told first, as whole lines.
-
-    `own`: nobody but the user that this runs as, and root, is listened to, whatever the socket's mode says. `group`:
-    the id of a group whose users may open it too. `numbers` are for what comes in; sockets of one flight share them.
-    `encoded`: what is long is left as it came, in base64.
+    """Listens at a path until it is closed. `greeting` returns the first lines for a new reader. `own`: only its own
+    user and root are accepted, whatever the socket's mode. `group`: the id of a group whose users may connect too.
+    `numbers` counts documents; the sockets of one flight share it. `encoded`: long documents are returned in base64.
     """
 
     def __init__(
@@ -205,18 +201,19 @@ class AgentSocket:
         self._greeting = greeting
         self._own = own
         self.readers: list[_Reader] = []
-        #: the users that were welcomed
+        #: the users whose connections were accepted
         self.users: set[int] = set()
         self._senders: dict[int, tuple[_Reader, int]] = {}
         self._numbers = count(1) if numbers is None else numbers
         self._next_us = 0
-        self._budgets: dict[int | None, tuple[int, int]] = {}  # by user: when it was counted, and what was left
-        self._welcomed: dict[int, int] = {}  # by process: until when it has been welcomed often enough
+        # by user: the time of the last count, and the remaining budget
+        self._budgets: dict[int | None, tuple[int, int]] = {}
+        self._welcomed: dict[int, int] = {}  # by process: until when it has used its share of connections
         self._listener = _listen(path, group)
         self._place = _place(path)
 
     def poll(self, now_us: int) -> Presented | Encoded | None:
-        """The next document, if one came in: one of each reader in turn, and at most one in `GAP_US`."""
+        """The next document, if any: one of each reader in turn, and at most one in `GAP_US`."""
         self._welcome(now_us)
         for reader in list(self.readers):
             if not reader.flush():
@@ -237,18 +234,18 @@ class AgentSocket:
         return None
 
     def tell(self, line: bytes) -> None:
-        """Tell every reader a line, newline included."""
+        """Send a line, newline included, to every reader."""
         for reader in list(self.readers):
             self._send(reader, line)
 
     def answer(self, sender: int, slug: str, text: str) -> None:
-        """Tell the reader that handed a document in what became of it."""
+        """Send the result of a document to the reader that handed it in."""
         reader, number = self._senders.pop(sender, (None, 0))
         if reader is not None:
             self._send(reader, _answer(number, slug, text))
 
     def close(self) -> None:
-        """Hang up on all readers, after a last try to send what waits, and take the path away. Twice does nothing."""
+        """Close all connections after a last attempt to send, and remove the path. Closing twice does nothing."""
         if self._listener.fileno() < 0:
             return
         for reader in list(self.readers):
@@ -256,11 +253,11 @@ class AgentSocket:
             self._drop(reader)
         self._listener.close()
         with suppress(OSError):
-            if self._place == _place(self.path):  # what somebody put there since is theirs
+            if self._place == _place(self.path):  # a file that another program put there since is kept
                 self.path.unlink()
 
     def _welcome(self, now_us: int) -> None:
-        """Take in some of who waits, and no more: whoever connects again and again must not keep us here."""
+        """Accept some of the waiting connections, but no more: repeated connections must not keep the flight busy."""
         welcomed = 0
         for _ in range(MOST_TAKEN):
             try:
@@ -270,7 +267,7 @@ class AgentSocket:
             link.setblocking(False)
             reader = _Reader(link, peer_of(link))
             if not self._may_come(reader.peer.process, now_us) or not self._has_place(reader.peer):
-                link.close()  # it may come again
+                link.close()  # it may try again
                 continue
             self.readers.append(reader)
             if reader.peer.user is not None:
@@ -281,7 +278,7 @@ class AgentSocket:
                 return
 
     def _may_come(self, process: int, now_us: int) -> bool:
-        """Whether a process may be welcomed once more now; that it may, is counted. 0: nobody says which one it is."""
+        """Whether another connection of a process may be accepted now, which is then counted. 0: unknown process."""
         if process == 0:
             return True
         until_us = max(self._welcomed.get(process, 0), now_us)
@@ -292,8 +289,8 @@ class AgentSocket:
         return True
 
     def _has_place(self, peer: Peer) -> bool:
-        """Whether one more of this peer is taken in; who makes place for it was quiet for longest, and is of the same
-        process where that has its share. Nobody makes place who said something that was not looked at yet.
+        """Whether another reader of this peer is accepted. It may replace the reader that was silent for longest, or
+        one of its own process if that has used its share. A reader with unprocessed data is never replaced.
         """
         if self._own and peer.user not in (None, 0, os.geteuid()):
             return False
@@ -308,7 +305,7 @@ class AgentSocket:
         return True
 
     def _has_budget(self, user: int | None, octets: int, now_us: int) -> bool:
-        """Whether so much more of a user is looked at now; what is, is counted."""
+        """Whether this many more bytes of a user may be processed now, which are then counted."""
         at_us, left = self._budgets.get(user, (now_us, WORK_AT_ONCE))
         left = min(WORK_AT_ONCE, left + (now_us - at_us) * WORK_RATE // 1_000_000)
         may = octets <= left
@@ -343,7 +340,7 @@ class AgentSocket:
 
 
 def _number(line: bytes) -> int:
-    """The sender's own number for a line that is none of ours, as far as it can be read; else 0."""
+    """The sender's number in a malformed line, as far as it can be read; else 0."""
     try:
         return _read_number(line).id
     except (ValueError, msgspec.DecodeError, RecursionError):
@@ -355,7 +352,7 @@ def _answer(number: int, slug: str, text: str) -> bytes:
 
 
 def peer_of(link: socket.socket) -> Peer:
-    """Who is at the other end, on Linux (unix(7), SO_PEERCRED); elsewhere nobody says."""
+    """The process and user at the other end, on Linux (unix(7), SO_PEERCRED); unknown elsewhere."""
     option = getattr(socket, "SO_PEERCRED", None)
     if option is None:
         return Peer(0, None)
@@ -367,14 +364,14 @@ def peer_of(link: socket.socket) -> Peer:
 
 
 def _place(path: Path) -> tuple[int, int]:
-    """What lies there, whatever it is called."""
+    """The identity of the file at a path."""
     found = path.lstat()
     return found.st_dev, found.st_ino
 
 
 def _listen(path: Path, group: int | None) -> socket.socket:
-    """A listening socket of mode 0600 at `path`, or 0660 with a group; one that a crash left behind is replaced,
-    nothing else ever is.
+    """A listening socket at `path` with mode 0600, or 0660 with a group. It replaces a socket that a crash left, and
+    nothing else.
     """
     if len(os.fsencode(path)) > LONGEST_PATH:
         text = f"a socket's path has at most {LONGEST_PATH} bytes"
@@ -403,7 +400,7 @@ def _listen(path: Path, group: int | None) -> socket.socket:
 
 def _answers(path: Path) -> bool:
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as link:
-        link.settimeout(_PATIENCE_S)  # one whose queue is full does not answer, and is there
+        link.settimeout(_PATIENCE_S)  # a socket with a full queue does not answer, but it is in use
         try:
             link.connect(str(path))
         except ConnectionRefusedError:
@@ -413,18 +410,18 @@ def _answers(path: Path) -> bool:
         return True
 
 
-# -------------------------------------------------------------------------------- the end of who hands in
+# -------------------------------------------------------------------------------- the client's side
 
 
 class FlightReply(NamedTuple):
-    """What the flight said: `accepted`, or why not, and a text for a person."""
+    """The flight's answer: `accepted`, or the slug of a refusal, and a text for people."""
 
     slug: str
     text: str
 
 
 class _Line(msgspec.Struct):
-    """What is read of a line; most are records of the log."""
+    """The readable fields of a line; most lines are records of the log."""
 
     type: str = ""
     id: int = 0
@@ -436,24 +433,24 @@ class _Line(msgspec.Struct):
 _read_line = msgspec.json.Decoder(_Line).decode
 _NUMBER = 1
 _FLIGHT = re.compile(rf"[0-9a-f]{{{2 * FLIGHT_BYTES}}}")
-#: the longest line that a client waits for the end of, in bytes: a flight tells of a mission in one
+#: the longest line that a client accepts, in bytes: a flight sends a mission in one
 LONGEST_TOLD: Final = 16 << 20
 
 
 def hand_in(path: Path, document: bytes, *, patience_s: float = 10.0) -> FlightReply:
-    """Hand a document to the flight that listens at `path`. Raises OSError, TimeoutError without an answer."""
+    """Send a document to the flight that listens at `path`. Raises OSError, and TimeoutError without an answer."""
     line = msgspec.json.encode({"id": _NUMBER, "document": b64encode(document).decode()}) + b"\n"
     said = _asked(path, line, lambda said: said.type == "answer" and said.id in (0, _NUMBER), patience_s)
     return FlightReply(said.slug, said.text)
 
 
 def flight_at(path: Path, *, patience_s: float = 10.0) -> bytes:
-    """The id of the flight that listens at `path`, as it says itself. Raises OSError."""
+    """The id of the flight that listens at `path`, by its own statement. Raises OSError."""
     return _named(_asked(path, b"", lambda said: said.type == "hello", patience_s), path)
 
 
 def _flight_of(line: bytes, path: Path) -> bytes:
-    """The id of a flight, by the first line that it says. Raises OSError where that is another."""
+    """The flight's id in its first line. Raises OSError for another line."""
     said = _told(line)
     if said.type != "hello":
         raise ConnectionError("the program that listens there is not a flight: it did not send the identity line first")
@@ -467,14 +464,14 @@ def _named(said: _Line, path: Path) -> bytes:
 
 
 class _Told:
-    """Lines out of octets as they come from whoever listens; none is looked through twice."""
+    """Splits received octets into lines; none is searched twice."""
 
     def __init__(self) -> None:
         self.longest = LONGEST_TOLD
         self._rest = bytearray()
 
     def take(self, chunk: bytes) -> list[bytes]:
-        """The lines that end in it, without their ends. Raises OSError where one does not end."""
+        """The lines that end in this chunk, without their ends. Raises OSError for an endless line."""
         first, *more = chunk.split(b"\n")
         self._rest += first
         if len(self._rest) > self.longest:
@@ -487,9 +484,8 @@ class _Told:
 
 
 class FlightFollower:
-    """A connection that stays: what the flight at `path` tells, and what is handed in to it. Raises OSError where none
-    listens, or its first line does not say which flight it is, for which it has so long in all. From then on nothing is
-    waited for.
+    """A persistent connection to the flight at `path`, for its lines and for documents. Raises OSError where none
+    listens, or its first line with the flight's id does not come in time. After that no call waits.
     """
 
     def __init__(self, path: Path, *, patience_s: float = 10.0) -> None:
@@ -498,7 +494,7 @@ class FlightFollower:
         self._unsent = bytearray()
         self._link = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         self._lines = _Told()
-        #: the id of the flight, as it says itself
+        #: the flight's id, by its own statement
         self.flight = b""
         until_s = time.monotonic() + patience_s
         try:
@@ -515,7 +511,7 @@ class FlightFollower:
         return self._link.fileno()
 
     def _first(self, until_s: float) -> list[bytes]:
-        """The first lines, as they come in one piece; it may come in several, and all have but so long."""
+        """The first lines; they may come in pieces, within the total time limit."""
         self._lines.longest = _CHUNK
         while (left_s := until_s - time.monotonic()) > 0:
             self._link.settimeout(left_s)
@@ -557,11 +553,11 @@ class FlightFollower:
 
     @property
     def unsent(self) -> bool:
-        """Whether something waits until the flight reads: `flush` once the descriptor can be written."""
+        """Whether data waits to be sent: call `flush` once the descriptor can be written."""
         return bool(self._unsent)
 
     def flush(self) -> None:
-        """Send what waits, as far as the flight takes it now. Raises OSError where the client closed the connection."""
+        """Send queued data as far as the flight accepts it now. Raises OSError where the flight has closed it."""
         while self._unsent:
             try:
                 sent = self._link.send(self._unsent)
@@ -570,7 +566,7 @@ class FlightFollower:
             del self._unsent[:sent]
 
     def close(self) -> None:
-        """Hang up. Twice does nothing."""
+        """Close the connection. Closing twice does nothing."""
         self._link.close()
 
     def __enter__(self) -> "FlightFollower":
@@ -581,9 +577,8 @@ class FlightFollower:
 
 
 def _asked(path: Path, line: bytes, wanted: Callable[[_Line], bool], patience_s: float) -> _Line:
-    """The first line that is wanted, after sending one; tried again where the queue is full, or there is no place.
-
-    Raises OSError, TimeoutError without an answer.
+    """Send a line and return the first wanted one; repeated where the queue is full or no place is free. Raises
+    OSError, and TimeoutError without an answer.
     """
     until_s = time.monotonic() + patience_s
     last: OSError | None = None
@@ -595,7 +590,7 @@ def _asked(path: Path, line: bytes, wanted: Callable[[_Line], bool], patience_s:
                 raise
             last = error
         except (FileNotFoundError, ConnectionRefusedError) as error:
-            raise last or error from None  # the flight ended meanwhile
+            raise last or error from None  # the flight ended in the meantime
         time.sleep(AGAIN_S)
 
 
@@ -618,11 +613,10 @@ def _asked_once(path: Path, line: bytes, wanted: Callable[[_Line], bool], until_
 
 
 def _connect(link: socket.socket, path: Path, patience_s: float) -> None:
-    """Raises OSError, which names the path; BlockingIOError where others wait to be taken in, as many as may, for so
-    long.
-    """
+    """Connect. Raises OSError, which names the path; BlockingIOError where the queue stays full for this long."""
     patience = divmod(max(1, int(patience_s * 1e6)), 1_000_000)
-    link.settimeout(None)  # with Python's own it would not wait for a place in the queue, and others were faster
+    # Python's own timeout would not wait for a place in the queue, and other clients would be faster
+    link.settimeout(None)
     link.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, _TIME.pack(*patience))
     try:
         link.connect(str(path))
@@ -637,7 +631,7 @@ def _connect(link: socket.socket, path: Path, patience_s: float) -> None:
 
 
 def _told(line: bytes) -> _Line:
-    """A line, of whoever listens there. Raises OSError for what is none of a flight's."""
+    """A line from the program that listens there. Raises OSError for a line that is not a flight's."""
     try:
         return _read_line(line)
     except (ValueError, msgspec.DecodeError, RecursionError):

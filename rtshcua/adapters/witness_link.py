@@ -1,10 +1,10 @@
 """Witnesses over a link: requests and answers in MAVLink 2 TUNNEL frames over UDP.
 
-Nobody is believed for where a frame comes from: requests carry the log's signatures, answers the witness's.
+A sender's address proves nothing: requests carry the log's signatures, answers the witness's.
 
-The log's end shows its witnesses the log as it grows, in a thread of its own. It reads the log from its file, so the
-flight gives it nothing and never waits for it. What is shown is on the disk: a witness must never have seen what a loss
-of power takes away.
+The logging side shows its witnesses the log as it grows, in a separate thread. It reads the log from its file, so the
+flight neither feeds it nor waits for it. Only lines on the disk are shown: a witness must never have seen what a power
+failure can remove.
 """
 
 import select
@@ -35,27 +35,27 @@ from rtshcua.evidence.witnessing.witness import (  # fmt: skip
 )
 from rtshcua.onboard.enforcement.frames import OURS
 
-#: kinds of messages in the tunnel
+#: the kinds of tunnel messages
 REQUEST: Final = 1
 ANSWER: Final = 2
-#: what a witness calls itself: a ground station (MAVLink's customary id) and its logger
+#: the ids of a witness: a ground station (MAVLink's customary id) and its logger
 GROUND: Final = (255, 155)
 _LARGEST: Final = 65_535
 _BUFFER: Final = 1 << 20
-#: the most datagrams that are taken in before anything else is looked at
+#: the most datagrams that are processed in a row
 _BATCH: Final = 256
-#: how often the log is looked at, in seconds
+#: the interval at which the log is checked, in seconds
 EVERY_S: Final = 0.1
-#: a request is sent again after so long without an answer, in seconds; each time twice as long, up to
+#: the wait before an unanswered request is repeated, in seconds, doubled each time up to the second value
 AGAIN_S: Final = 1.0
 LONGEST_S: Final = 8.0
-#: How long the witnesses are waited for after the log was closed, in seconds.
+#: How long to wait for the witnesses after the log was closed, in seconds.
 LAST_S: Final = 3.0
-#: How much of a log is read at once, in octets, so that a long one does not keep the flight's thread from running.
+#: The most octets of a log that are read at once, so that a long log does not hold up the flight's thread.
 _SLICE: Final = 1 << 18
 _GRACE_S: Final = 1.0
 _MOST_WORDS: Final = 200
-#: what we call ourselves on the witnesses' link
+#: our ids on the witnesses' link
 _SYSTEM: Final = 1
 
 Consider = Callable[[CosignRequest], WitnessResponse | Declined]
@@ -64,7 +64,7 @@ _Heard = tuple[ReceivedFrame, Whole, Address]
 
 
 class _Tunnel:
-    """A UDP socket that never blocks, and the messages that go through it in frames of `codec`."""
+    """A non-blocking UDP socket, and the messages in frames of `codec`."""
 
     def __init__(self, address: Address, codec: Codec) -> None:
         """Raises OSError where the address cannot be bound."""
@@ -81,12 +81,12 @@ class _Tunnel:
 
     @property
     def port(self) -> int:
-        """The port listened at (the system's choice when 0 was asked for)."""
+        """The local port (chosen by the system for 0)."""
         return int(self._socket.getsockname()[1])
 
     def hear(self, wait_s: float, known: Collection[Address] | None = None) -> Iterator[_Heard]:
-        """The messages that came, each with the frame that completed it, of those who are `known`, if that is given;
-        the first is waited for.
+        """The received messages with the frames that completed them, from `known` senders if given; waits for the first
+        one.
         """
         if not select.select([self._socket], [], [], wait_s)[0]:
             return
@@ -96,7 +96,7 @@ class _Tunnel:
             except BlockingIOError:
                 return
             except ConnectionError:
-                continue  # an ICMP answer to something we sent: nobody listens there
+                continue  # an ICMP answer to an earlier datagram: nobody listens there
             if known is None or sender in known:
                 for received in self._codec.parse(datagram):
                     whole = self._assembler.take(sender, received)
@@ -104,31 +104,30 @@ class _Tunnel:
                         yield received, whole, sender
 
     def send(self, kind: int, name: bytes, data: bytes, address: Address, target: tuple[int, int] = (0, 0)) -> None:
-        """Sends a message to an address, for a system and component there (0: all)."""
+        """Send a message to an address, for a system and component there (0: all)."""
         for message in messages(kind, name, data, target):
-            with suppress(OSError):  # lost, as any datagram may be: it is asked again
+            with suppress(OSError):  # lost, as any datagram may be: the request is repeated
                 self._socket.sendto(self._codec.pack(message), address)
 
     def close(self) -> None:
-        """Gives the port back."""
+        """Close the port."""
         self._socket.close()
 
 
 class WitnessLink:
-    """Listens at an address and answers every request that comes there, whoever sends it.
-
-    `consider` says what to; when it raises, nothing is answered, and the sender asks again.
+    """Listens at an address and answers every request, whoever sends it. `consider` computes the answer; if it raises,
+    there is no answer, and the sender repeats the request.
     """
 
     def __init__(self, address: Address, consider: Consider) -> None:
         """Raises OSError where the address cannot be bound."""
         self._tunnel = _Tunnel(address, Codec(*GROUND))
         self._consider = consider
-        self.port = self._tunnel.port  # the one listened at
+        self.port = self._tunnel.port  # the local port
         self.close = self._tunnel.close
 
     def serve(self, wait_s: float) -> None:
-        """Wait so long for requests, and answer those that came. Raises what `consider` raises, and OSError."""
+        """Wait this long for requests, and answer them. Raises what `consider` raises, and OSError."""
         for received, whole, sender in self._tunnel.hear(wait_s):
             if whole.kind == REQUEST and whole.name == name_of(whole.data):
                 self._answer(whole, (received.system, received.component), sender)
@@ -138,29 +137,29 @@ class WitnessLink:
         found = request if isinstance(request, Declined) else self._consider(request)
         if isinstance(found, Declined):
             if found.status == MALFORMED:
-                return  # nobody of ours sends such, and whoever does need not be answered
+                return  # not sent by our software, so no answer is needed
             found = found.answer()
         answer = found.encode()
         self._tunnel.send(ANSWER, answer_name(whole.name, answer), answer, sender, asker)
 
 
-# ------------------------------------------------------------------------------------- the end of the log
+# ------------------------------------------------------------------------------------- the logging side
 
 
 class Anchor(NamedTuple):
-    """A checkpoint that a witness cosigned: the note with the witness's line."""
+    """A checkpoint that a witness cosigned: the note with its line."""
 
     note: str
 
 
 class WitnessTrouble(NamedTuple):
-    """What an operator should know of a witness; told once."""
+    """A problem with a witness, reported once to the operator."""
 
     text: str
 
 
 class _Peer:
-    """One witness: what it is thought to know, and what it was asked."""
+    """One witness: its assumed state and the pending request."""
 
     def __init__(self, address: Address) -> None:
         self.address = address
@@ -170,21 +169,20 @@ class _Peer:
         self.due_s = 0.0
         self.wait_s = AGAIN_S
         self.anchored = -1  # the size of the largest tree that it cosigned
-        self.heard = False  # lately; who is silent is asked for what is little to send in vain
-        self.lost = False  # it saw another log: there is nothing more to be had from it
+        self.heard = False  # recently; a silent witness is only sent small requests
+        self.lost = False  # it saw another log: it will cosign nothing more
         self.told: set[str] = set()
 
 
 class WitnessClient:
-    """Shows a log to its witnesses until it is finished. `witnesses` are the public keys that the trust root names.
-
-    `synced` gives how many lines of the log, from the first on, are on the disk; it is called from the thread.
+    """Shows a log to its witnesses until it is finished. `witnesses` are the public keys in the trust root. `synced`
+    returns how many lines of the log, from the first on, are on the disk; the thread calls it.
     """
 
     def __init__(
         self, addresses: Sequence[Address], log: Path, synced: Callable[[], int], witnesses: frozenset[bytes]
     ) -> None:
-        """`addresses` are numbers, not names. Raises OSError where there is no socket to be had, or no log."""
+        """`addresses` are numeric. Raises OSError where no socket or no log is available."""
         self._log = log
         self._file = open_regular(log)
         try:
@@ -204,18 +202,17 @@ class WitnessClient:
         self._thread.start()
 
     def news(self) -> list[Anchor | WitnessTrouble]:
-        """What came since the last call; never waits."""
-        return [self._news.get_nowait() for _ in range(self._news.qsize())]  # nobody else takes from it
+        """The results since the last call; never waits."""
+        return [self._news.get_nowait() for _ in range(self._news.qsize())]  # only this thread takes from it
 
     def finish(self, last_s: float = LAST_S) -> list[WitnessTrouble]:
-        """The log is closed, or nothing more comes: wait up to so long for the witnesses to cosign its end.
-
-        What they cosigned and no record holds is put beside the log. Gives what went wrong.
+        """Wait up to this long for the witnesses to cosign the end of the closed log. Cosignatures that no record holds
+        are stored beside the log. Returns the problems.
         """
         self._until_s = time.monotonic() + last_s
         self._over.set()
         self._thread.join(last_s + _GRACE_S)
-        if not self._thread.is_alive():  # else the disk does not answer, and the process ends without it
+        if not self._thread.is_alive():  # otherwise the disk does not answer, and the process ends without the thread
             self._tunnel.close()
             self._file.close()
         news = self.news()
@@ -260,7 +257,7 @@ class WitnessClient:
         return whole and all(peer.lost or (last is not None and peer.anchored >= last) for peer in self._peers)
 
     def _read(self) -> None:
-        """Take in whole lines; what the disk took of one more is not touched, for it may be cut off again."""
+        """Read whole lines; a partial line is left, because the writer may cut it off again."""
         self._file.seek(self._offset)
         data = self._file.read(_SLICE)
         if b"\n" not in data and len(data) == _SLICE:
@@ -281,7 +278,7 @@ class WitnessClient:
         self._tunnel.send(REQUEST, peer.name, data, peer.address)
 
     def _wanted(self, peer: _Peer) -> CosignRequest | None:
-        """What to ask of it, if anything: what lies ahead, and before that whether it is there, and where it stands."""
+        """The request to a witness, if any: the next checkpoints or, before that, its presence and state."""
         records = min(self._synced(), self._submission.records)
         request = self._submission.request(peer.known, records)
         if peer.known is None:
@@ -324,7 +321,7 @@ class WitnessClient:
 
     def _conflict(self, peer: _Peer, asked: CosignRequest, size: int) -> None:
         if size == 0 and asked.old:
-            peer.known = None  # it has forgotten
+            peer.known = None  # it has lost its state
         elif size != asked.old and self._submission.has(size):
             peer.known = size
         else:

@@ -1,9 +1,8 @@
-"""The sorties of a qualification, and the driver that flies and observes one: the real one, which is the only way that
-anything of ours reaches the vehicle, with two habits of its own.
-
-A motion that is to be stopped on its way ends early: the manoeuvre counts as done once the vehicle is under way, so
-that the mission's next step, a hover, stops it. And in a silence nothing is let through for a while, in either
-direction. Every frame that moves the vehicle is still of a permitted command, and passes the gate.
+"""The sorties of a qualification, and the driver that flies and observes one: the real driver, the only way of our
+frames to the vehicle, with two changes. A motion that is to be stopped on its way ends early: the manoeuvre counts as
+done once the vehicle is under way, so that the mission's next step, a hover, stops it. And in a silence nothing passes
+for a while, in either direction. Every frame that moves the vehicle still belongs to a permitted command, and passes
+the gate.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -46,8 +45,8 @@ from rtshcua.onboard.ports import Command, Event
 
 @dataclass(frozen=True, slots=True)
 class Sortie:
-    """One of them. `steps` names the kinds of its motions; those of `shortened` end on their way. `silences` are held
-    back while it holds, us each. `takeover`: how it is taken over, on its way to a place.
+    """One sortie. `steps` names the kinds of its motions; those of `shortened` end on their way. `silences` are applied
+    while it holds, in us. `takeover`: how it is taken over, on its way to a place.
     """
 
     name: str
@@ -73,23 +72,23 @@ SORTIES: Final = (
     Sortie("pause", "is taken over by a pause", (_CLIMB, _FLY, _HOME), takeover=TakeoverKind.PAUSE),
     Sortie("target", "is taken over by another target", (_CLIMB, _FLY, _HOME), takeover=TakeoverKind.TARGET),
 )  # fmt: skip
-#: by the pilot of a real vehicle, who says when it is: while it holds
+#: by the pilot of a real vehicle, who is asked while it holds
 BY_PILOT: Final = Sortie("mode", "is taken over by its pilot", (_CLIMB, _HOLD, _HOME), takeover=TakeoverKind.MODE)
 
 
-# ---------------------------------------------------------------- motions that are to be stopped on their way
+# ---------------------------------------------------------------- motions that are stopped on their way
 
-#: a climb ends early once it rose so far, mm, and a leg so far: at most so much of it is left to brake in
+#: mm: a climb ends early at this height, and a leg after this distance: at most so much of it is left for braking
 _ROSE: Final = 3_000
 _FLOWN: Final = 10_000
-#: 1/100 of the speed that was asked for at which it counts as under way
+#: 1/100 of the commanded speed at which it counts as under way
 _FAST: Final = 80
-#: 1/100 of a leg, of which the rest is left to brake in
+#: 1/100 of a leg; the rest is left for braking
 _MOST: Final = 50
 
 
 def shortened(stages: Stages, kinds: frozenset[MotionKind]) -> Stages:
-    """How a flavour flies, but for motions of these kinds, which end on their way."""
+    """A flavour's stages, with motions of these kinds ending on their way."""
 
     def fly(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
         made = stages(command, seen, system)
@@ -116,7 +115,7 @@ def _rose(height: int, seen: ObservedVehicle) -> bool:
 
 
 def _is_under_way(start: tuple[int, int], command: Command, seen: ObservedVehicle) -> bool:
-    """At the speed that was asked for, or half-way."""
+    """At the commanded speed, or half-way."""
     if not seen.located or seen.speed is None:
         return False
     flown = apart(seen.latitude, seen.longitude, *start)
@@ -127,25 +126,26 @@ def _is_under_way(start: tuple[int, int], command: Command, seen: ObservedVehicl
 
 # ---------------------------------------------------------------- flying and observing
 
-#: us after it stands until the first silence, and between two of them
+#: us from standing still to the first silence, and between two of them
 _SETTLES_US: Final = 1_500_000
 _BETWEEN_US: Final = 3_000_000
-#: us: a takeover that does not show is given up after this long; and a landing is told again after that
+#: us after which an undetected takeover is given up, and a landing command is repeated
 _SHOWS_US: Final = 15_000_000
 _AGAIN_US: Final = 2_000_000
-#: mm flown before somebody takes over
+#: mm flown before the takeover
 _FAR: Final = 4_000
-#: us without a look at the link that are our own: a run that stood down closes its log before it watches the landing
+#: us without a check of the link that have an internal reason: a run that stood down closes its log before it watches
+#: the landing
 _HELD_UP_US: Final = 100_000
 _IN_PROGRESS: Final = 5
-#: what is asked, and not what is commanded
+#: requests, which are not commands
 _QUESTIONS: Final = frozenset({messages.SET_INTERVAL, messages.RUN_PREARM_CHECKS, enums.MAV_CMD_REQUEST_MESSAGE})
 _MOVING: Final = ("COMMAND_LONG", "COMMAND_INT", "SET_POSITION_TARGET_GLOBAL_INT")
 
 
 class QualifyingDriver(Driver):
-    """Flies one sortie, and writes down what it sees. `sends`: a second ground station takes it over, in a simulation;
-    else a pilot is asked to, by `ask`.
+    """Flies one sortie and records its observations. `sends`: a second ground station takes the vehicle over, in a
+    simulation; otherwise `ask` asks a pilot to.
     """
 
     def __init__(
@@ -168,20 +168,20 @@ class QualifyingDriver(Driver):
         self._command: Command | None = None
         self._began: tuple[int, int] | None = None  # where the command began
         self._left = list(sortie.silences)
-        self._silent: ObservedSilence | None = None  # the present one, or the one after which it is not fresh yet
+        self._silent: ObservedSilence | None = None  # the present silence, or the last one until everything is fresh
         self._awaited: set[str] = set()
         self._mode_before: int | None = None
         self._due_us: int | None = None  # when the next silence begins
-        self._landed_us: int | None = None  # when it was told to land by the second ground station
+        self._landed_us: int | None = None  # when the second ground station commanded the landing
         self._up_us: int | None = None
         self._air_asked = False
         self._mode_asked_us: int | None = None
         self._looked_us = 0
 
-    # -------------------------------------------------------- what comes in and goes out
+    # -------------------------------------------------------- receiving and sending
 
     def receive(self, datagram: bytes, now_us: int) -> DatagramContents:
-        """As any driver, but that nothing is heard in a silence."""
+        """Like any driver, but nothing is received in a silence."""
         if self._is_silent(now_us):
             return DatagramContents([], [], [])
         self._look_again(now_us)
@@ -193,7 +193,7 @@ class QualifyingDriver(Driver):
         return heard
 
     def tick(self, now_us: int) -> tuple[list[Event], list[bytes]]:
-        """As any driver, and do what the sortie has it do now."""
+        """Like any driver, and do what is due in the sortie."""
         self._look_again(now_us)
         events, frames = super().tick(now_us)
         if self.flavour is None:
@@ -209,7 +209,7 @@ class QualifyingDriver(Driver):
         return events, [*frames, *self._others_act(now_us)]
 
     def begin(self, command: Command, now_us: int) -> tuple[list[Event], list[bytes]]:
-        """As any driver, and write it down."""
+        """Like any driver, and record the command."""
         current = self._current
         if current is not None and current.ended_us is None:
             current.ended_us, current.how = now_us, "replaced"
@@ -221,13 +221,13 @@ class QualifyingDriver(Driver):
         if self._home is None and self.seen.located:
             self._home = self.seen.latitude, self.seen.longitude
         if self._silent is not None and self._is_silent(now_us):
-            self._silent.for_us = now_us - self._silent.began_us  # whatever is commanded now is no test: it must leave
+            self._silent.for_us = now_us - self._silent.began_us  # this command is not part of the test: it must leave
         events, frames = super().begin(command, now_us)
         self._note(events, now_us)
         return events, frames
 
     def finish(self, ending: str) -> ObservedSortie:
-        """The sortie is over: what was observed."""
+        """End the sortie; return the observations."""
         found, seen = self.found, self.seen
         found.ending, found.down = ending, seen.down
         if self.flavour is None:
@@ -261,7 +261,7 @@ class QualifyingDriver(Driver):
         return frames
 
     def _questions(self, now_us: int) -> list[Message]:
-        """Its identity on the ground; and in the air, whether its fence is switched on."""
+        """The questions about its identity on the ground and, in the air, whether its fence is on."""
         assert self.flavour is not None
         if self.questions is None:
             self.asks = self.questions = IdentityQuestions(self.flavour, self._slack)
@@ -274,7 +274,9 @@ class QualifyingDriver(Driver):
         return out + self.questions.due(self.system, now_us) if self.seen.airborne else out
 
     def _asks_mode(self, now_us: int) -> list[Message]:
-        """Once something showed the takeover a driver asks no more who flies: how soon the mode does is of interest."""
+        """The question for the mode after a takeover showed, when a driver asks no more: the delay of the mode is
+        measured.
+        """
         takeover = self.found.takeover
         if takeover is None or takeover.kind is not TakeoverKind.MODE or takeover.sent_us is None:
             return []
@@ -285,12 +287,12 @@ class QualifyingDriver(Driver):
         return [messages.request(self.system, "HEARTBEAT")] if now_us - takeover.sent_us < _SHOWS_US else []
 
     def _look_again(self, now_us: int) -> None:
-        """Somebody looks at the link, after how long?"""
+        """Note a check of the link, and the time since the last one."""
         takeover, looked_us, self._looked_us = self.found.takeover, self._looked_us, now_us
         if takeover is not None and takeover.mode_us is None and now_us - looked_us > _HELD_UP_US * self._slack:
             takeover.unwatched_us += now_us - looked_us
 
-    # -------------------------------------------------------- what is seen
+    # -------------------------------------------------------- observing
 
     def _observe(self, frame: ReceivedFrame, now_us: int) -> None:
         name, message, found = frame.name, frame.message, self.found
@@ -396,15 +398,15 @@ class QualifyingDriver(Driver):
             self._due_us = now_us + self._silent.for_us + _BETWEEN_US
 
     def _come(self) -> set[str]:
-        """The streams that came, in the last measurement."""
+        """The streams that came in the last measurement."""
         measured = self.stream_requests.measured
         came = set(self.stream_requests.plan.intervals) if measured is None else set(measured[1])
         return came - IN_THE_AIR - {"POSITION_TARGET_GLOBAL_INT"}
 
-    # -------------------------------------------------------- somebody else
+    # -------------------------------------------------------- taking over
 
     def _others_act(self, now_us: int) -> list[bytes]:
-        """What a second ground station sends now; where there is none, the pilot is asked."""
+        """The frames of the second ground station now; without one, ask the pilot."""
         kind, takeover, flavour = self.sortie.takeover, self.found.takeover, self.flavour
         if kind is None or flavour is None or self._home is None:
             return []
@@ -429,7 +431,7 @@ class QualifyingDriver(Driver):
         return self._station.lands()
 
     def _is_due(self) -> bool:
-        """Whether it flies as it is to be taken over: on its way, or, where a pilot does it, as it holds."""
+        """Whether the takeover is due: on its way or, by a pilot, while it holds."""
         command, current, began = self._command, self._current, self._began
         if command is None or current is None or current.sent_us is None or current.ended_us is not None:
             return False

@@ -42,11 +42,11 @@ _CHUNK = 1 << 20
 
 
 class InUse(Exception):
-    """The log is still being written, or recovered, by another process."""
+    """Another process is writing or recovering the log."""
 
 
 class LogEnder(NamedTuple):
-    """Who ends logs: signs with the log key `public`, at a moment; `draw` gives 32 secret random bytes."""
+    """Ends logs: signs with the log key `public`, at a given time; `draw` returns 32 secret random bytes."""
 
     public: bytes
     certify: Callable[[bytes], bytes]
@@ -55,9 +55,8 @@ class LogEnder(NamedTuple):
 
 
 class Recovered(NamedTuple):
-    """What came of it: how the log was found, where what was discarded is now, the hash of the log's last line.
-
-    `done` False: the log is as it was. `last` is then that of the last line that verifies, hexadecimal.
+    """The result: how the log was found, where the discarded part is now, and the hash of the log's last line. `done`
+    False: the log is unchanged. `last` is then the hash of the last line that verifies, in hexadecimal.
     """
 
     found: FoundLog
@@ -67,8 +66,8 @@ class Recovered(NamedTuple):
 
 
 def examine(path: Path, public: bytes | None) -> FoundLog:
-    """The log as it is, for the log key `public` or any, and for the notes of witnesses beside it. Raises OSError."""
-    anchors = read_anchors(path)  # before the log: see there
+    """The state of a log, for the log key `public` or any, and for the notes of witnesses beside it. Raises OSError."""
+    anchors = read_anchors(path)  # before the log: see `read_anchors`
     examination, checkpoints = Examination(public), list[str]()
     with open_regular(path) as file:
         for line in lines(file):
@@ -80,8 +79,8 @@ def examine(path: Path, public: bytes | None) -> FoundLog:
 
 
 def _witnessed(found: FoundLog, checkpoints: Iterable[str], anchors: Iterable[str]) -> FoundLog:
-    """The log as it was found, unless a witness of its own trust root saw another. That root is taken at its word: who
-    ends the log has the key that signed it, and whether it is to be trusted is for whoever verifies it.
+    """The state of a log, unless a witness of its own trust root saw another log. That root is not verified: whoever
+    ends the log has the key that signed it, and verifiers decide whether to trust it.
     """
     genesis = found.genesis
     data = None if genesis is None else octets(genesis.root)
@@ -102,7 +101,7 @@ def _witnessed(found: FoundLog, checkpoints: Iterable[str], anchors: Iterable[st
 
 @contextmanager
 def alone(path: Path) -> Iterator[None]:
-    """Holds the log, as long as its writer lives; the system lets go of it when the process dies. Raises `InUse`."""
+    """Lock the log for as long as it is written; the system unlocks it when the process dies. Raises `InUse`."""
     with open_regular(path) as file:
         try:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -114,14 +113,16 @@ def alone(path: Path) -> Iterator[None]:
 
 
 def look(path: Path) -> Recovered:
-    """The log, as it is left where nobody has the key that ends it. Raises `InUse` and OSError."""
+    """The state of a log where nobody has the key that ends it. Raises `InUse` and OSError."""
     with alone(path):
         found = examine(path, None)
         return Recovered(found, False, None, found.head.prev)
 
 
 def recover(path: Path, signer: LogEnder, *, disk: Disk = SYSTEM) -> Recovered:
-    """Ends a log that has no close, unless it was tampered with. Raises `InUse` and OSError; it can be called again."""
+    """End a log without a close record, unless it was tampered with. Raises `InUse` and OSError; it may be called
+    again.
+    """
     with alone(path):
         begun = _begun(path, signer.public)
         if begun is not None:
@@ -136,18 +137,18 @@ def recover(path: Path, signer: LogEnder, *, disk: Disk = SYSTEM) -> Recovered:
         return Recovered(found, True, discarded, _last(tail))
 
 
-# ------------------------------------------------------------------------------------------ what was begun
+# ------------------------------------------------------------------------------------------ interrupted recoveries
 
 
 def _begun(path: Path, public: bytes) -> tuple[FoundLog, bytes] | None:
-    """What an earlier recovery found and the two lines that it meant to append, if it got far enough."""
+    """The state found by an interrupted recovery and the two lines that it meant to append, if it got that far."""
     if not _plan_of(path).is_file():
         return None
     tail = read_regular(_plan_of(path), _LONGEST_PLAN, path.parent)
     first, newline, second = tail.partition(b"\n")
     recover, close = read(first + newline), read(second)
     if not isinstance(recover, Recover) or not isinstance(close, Close):
-        return None  # torn itself: then nothing was cut yet
+        return None  # torn itself: nothing was cut yet then
     examination = Examination(public)
     with open_regular(path) as file:
         for line in islice(lines(file), recover.seq):
@@ -171,7 +172,7 @@ def _finish(path: Path, found: FoundLog, tail: bytes, disk: Disk) -> Recovered:
         _forget(path, disk)
     else:
         if not tail.startswith(behind) and not _same(path, found.kept, found):
-            _keep(path, found.kept, disk, besides=discarded)  # what the power left of the two lines
+            _keep(path, found.kept, disk, besides=discarded)  # what a power failure left of the two lines
         _end(path, found.kept, tail, disk)
     return Recovered(found, True, discarded, _last(tail))
 
@@ -191,21 +192,21 @@ def _kept_before(path: Path, found: FoundLog) -> Path | None:
 
 
 def _same(path: Path, start: int, found: FoundLog) -> bool:
-    """Whether the file, from there on, is what is discarded."""
+    """Whether the file, from there on, is the discarded part."""
     size = path.stat().st_size - start
     return size == found.discarded and _digest(path, start, size) == found.discarded_digest
 
 
-# --------------------------- the steps, each on the disk when it returns, and to be taken again if it was broken off
+# --------------------------- the steps; each is on the disk when it returns, and can be repeated
 
 
 def _plan_of(path: Path) -> Path:
-    """Where the end of a log lies until it is written."""
+    """The file that holds the end of a log until it is appended."""
     return path.with_suffix(".recovering")
 
 
 def _places(path: Path) -> Iterator[Path]:
-    """Where what is discarded of a log may lie, the first place first."""
+    """The possible files of the discarded part of a log, the first one first."""
     first = path.with_suffix(".discarded")
     yield first
     for number in count(2):
@@ -213,8 +214,8 @@ def _places(path: Path) -> Iterator[Path]:
 
 
 def _keep(path: Path, kept: int, disk: Disk, *, besides: Path | None = None) -> Path:
-    """Copies what stands behind the first `kept` octets; where that is now. A copy that was begun is written anew, but
-    nothing that is another, nor what is kept in `besides`.
+    """Copy the part after the first `kept` octets, and return where it is. An interrupted copy is written anew, but no
+    other file is changed, nor that in `besides`.
     """
     size = path.stat().st_size - kept
     for place in _places(path):
@@ -227,14 +228,14 @@ def _keep(path: Path, kept: int, disk: Disk, *, besides: Path | None = None) -> 
             break
         there = found.st_size
         if _own(found) and there <= size and _digest(place, 0, there) == _digest(path, kept, there):
-            file = disk.reopen(place)  # ours, whole or torn
+            file = disk.reopen(place)  # ours, complete or torn
             break
     _write(file, _chunks(path, kept, size))
     return place
 
 
 def _write_plan(path: Path, data: bytes, disk: Disk) -> None:
-    """The file with this content, on the disk once this returns; until then it may hold anything."""
+    """Write the file, synced when this returns; until then it may hold anything."""
     if path.is_symlink():
         raise OSError(errno.ELOOP, os.strerror(errno.ELOOP), str(path))
     there = path.exists()
@@ -244,17 +245,17 @@ def _write_plan(path: Path, data: bytes, disk: Disk) -> None:
 
 
 def _end(path: Path, kept: int, tail: bytes, disk: Disk) -> None:
-    """Cuts the log off after so many octets, and appends its end."""
+    """Cut the log off after so many octets, and append its end."""
     _write(disk.reopen(path), [tail], kept)
     _forget(path, disk)
 
 
 def _write(file: LogFile, chunks: Iterable[bytes], kept: int = 0) -> None:
-    """Puts these behind the first `kept` octets of a file, in the place of what is there, and closes it."""
+    """Replace everything after the first `kept` octets of a file by these chunks, and close it."""
     try:
         file.truncate(kept)
         if kept:
-            file.sync()  # else the power could leave what was cut behind what is appended
+            file.sync()  # otherwise a power failure could leave the cut part after the appended one
         for chunk in chunks:
             write_all(file, chunk)
         file.sync()
@@ -263,19 +264,19 @@ def _write(file: LogFile, chunks: Iterable[bytes], kept: int = 0) -> None:
 
 
 def _forget(path: Path, disk: Disk) -> None:
-    """What was begun is done. If this fails, who comes next finds the log closed, and tries again."""
+    """Remove the plan. If this fails, the next call finds the log closed, and tries again."""
     with suppress(OSError):
         _plan_of(path).unlink()
         disk.sync_folder(path.parent)
 
 
 def _own(found: os.stat_result) -> bool:
-    """Whether it is a file that has no other name: another's content is not written over."""
+    """Whether a file has no other name: another's content is not overwritten."""
     return stat.S_ISREG(found.st_mode) and found.st_nlink == 1
 
 
 def _digest(path: Path, start: int, size: int) -> bytes:
-    """SHA-256 of so many octets of a file, or of as many as there are."""
+    """SHA-256 of so many octets of a file, or as many as there are."""
     hasher = sha256()
     for chunk in _chunks(path, start, size):
         hasher.update(chunk)

@@ -35,12 +35,12 @@ _LONGEST: Final = 1_024
 _LARGEST: Final = 1 << 20  # octets of a state
 
 
-#: the slug of a key that another run signs with
+#: the slug for a key in use by another run
 IN_USE: Final = "in-use"
 
 
 class LinkKeyError(Exception):
-    """A key file, or what is kept for its key, does not serve: `exposed`, `malformed`, `in-use`, `damaged`."""
+    """A key file, or the stored state of its key, cannot be used: `exposed`, `malformed`, `in-use`, `damaged`."""
 
     def __init__(self, slug: str, text: str, help: str | None = None) -> None:
         super().__init__(text)
@@ -49,12 +49,12 @@ class LinkKeyError(Exception):
 
 
 def open_link_key(path: Path) -> BinaryIO:
-    """The file of a key, which its owner alone may read; it is not read here, for it may be another process that signs.
-    Raises LinkKeyError and OSError.
+    """Open the file of a key, which only its owner may read. It is not read here, because another process may do the
+    signing. Raises LinkKeyError and OSError.
     """
     file = open_regular(path)
     wrong = no_link_key(path) if os.fstat(file.fileno()).st_size > _LONGEST else _exposed(path, file)
-    if wrong is not None:  # what is no key is told as that, not by its mode
+    if wrong is not None:  # a file without a key is reported as that, not by its mode
         file.close()
         raise wrong
     return file
@@ -68,7 +68,7 @@ def _exposed(path: Path, file: BinaryIO) -> LinkKeyError | None:
 
 
 def read_link_key(path: Path) -> bytes:
-    """The key in such a file. Raises LinkKeyError and OSError."""
+    """The key in a file. Raises LinkKeyError and OSError."""
     with open_regular(path) as file:
         key = _key_in(file.read(_LONGEST + 1))
         wrong = no_link_key(path) if key is None else _exposed(path, file)
@@ -78,7 +78,7 @@ def read_link_key(path: Path) -> bytes:
 
 
 def _key_in(data: bytes) -> bytes | None:
-    """The key that a file holds, as it is or in hexadecimal digits."""
+    """The key in a file's content, as octets or hexadecimal digits."""
     if len(data) != KEY_OCTETS:
         try:
             data = bytes.fromhex(data.decode("ascii"))
@@ -88,25 +88,25 @@ def _key_in(data: bytes) -> bytes | None:
 
 
 def no_link_key(path: Path) -> LinkKeyError:
-    """What a file says is no key."""
+    """The error for a file without a key."""
     what = f"{KEY_OCTETS} octets, or {2 * KEY_OCTETS} hexadecimal digits, not all 0"
     return LinkKeyError("malformed", f"`{path}` is not a link key", f"{what}; `rtshcua keys link` makes one")
 
 
 def write_link_key(path: Path, key: bytes) -> None:
-    """Put a key into a new file. Raises FileExistsError, and OSError."""
+    """Write a key to a new file. Raises FileExistsError, and OSError."""
     write_new(path, key.hex().encode() + b"\n", mode=PRIVATE_FILE)
 
 
 def fingerprint(key: bytes) -> str:
-    """A name for a key that gives nothing of it away."""
+    """A name for a key that reveals nothing about it."""
     return hashlib.sha256(b"rtshcua/link-key\0" + key).hexdigest()[:16]
 
 
 class HeardStamps:
-    """The last timestamp of each stream, in memory that outlives this process; nothing where there is none."""
+    """The last timestamp of each stream, in memory that outlives this process; empty without such memory."""
 
-    _SLOT: Final = struct.Struct("<BBB5xQ")  # system, component, link; the timestamp, 0 in a slot that is free
+    _SLOT: Final = struct.Struct("<BBB5xQ")  # system, component, link; the timestamp, 0 in a free slot
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -114,7 +114,7 @@ class HeardStamps:
         self._slots: dict[Stream, int] = {}
 
     def load(self) -> dict[Stream, int]:
-        """What an earlier process left there."""
+        """The timestamps of an earlier process."""
         if self._memory is None and memory_file(self._name).exists():
             self._memory = self._open()
         if self._memory is None:
@@ -123,12 +123,12 @@ class HeardStamps:
 
     @property
     def refused(self) -> Path | None:
-        """What lies where the memory would be, and is not this user's own: then it serves nobody."""
+        """The file in place of the memory that does not belong to this user; then there is no memory."""
         path = memory_file(self._name)
         return path if self._memory is None and os.path.lexists(path) else None
 
     def start(self, streams: dict[Stream, int]) -> None:
-        """Remember these, and nothing else."""
+        """Store these, and nothing else."""
         self._memory = self._memory or self._open()
         if self._memory is None:
             return
@@ -139,7 +139,7 @@ class HeardStamps:
             self._SLOT.pack_into(self._memory, slot * self._SLOT.size, *stream, streams.get(stream, 0))
 
     def remember(self, stream: Stream, timestamp: int) -> None:
-        """A frame of this stream was believed. Another stream than those known takes the place of the oldest."""
+        """Store the timestamp of an accepted frame. A new stream takes the place of the oldest."""
         memory, size = self._memory, self._SLOT.size
         if memory is None:
             return
@@ -154,7 +154,7 @@ class HeardStamps:
         return open_memory(self._name, MOST_STREAMS * self._SLOT.size)
 
     def close(self, *, forget: bool) -> None:
-        """Give the memory back; `forget` it where all of it is on the disk."""
+        """Release the memory; `forget` it where all of it is on the disk."""
         if self._memory is not None:
             self._memory.close()
             self._memory = None
@@ -164,7 +164,7 @@ class HeardStamps:
 
 
 class LinkStore:
-    """The state of one key on one vehicle. Held by one process at a time, until it is closed or dies."""
+    """The state of one key on one vehicle. One process holds it at a time, until it is closed or dies."""
 
     def __init__(self, folder: Path, vehicle: str, key: bytes) -> None:
         """Raises LinkKeyError (`in-use`), and OSError."""
@@ -176,10 +176,10 @@ class LinkStore:
         except BlockingIOError:
             raise LinkKeyError(IN_USE, f"another run signs for `{vehicle}` with this key") from None
         self.heard = HeardStamps(hashlib.sha256(os.fsencode(self.path.absolute())).hexdigest()[:16])
-        self._exact = False  # the file has all that `heard` has
+        self._exact = False  # the file has everything in `heard`
 
     def load(self) -> SigningState:
-        """What was kept; nothing for a new key. Raises LinkKeyError (`damaged`), and OSError."""
+        """The stored state; empty for a new key. Raises LinkKeyError (`damaged`), and OSError."""
         data = read_if_there(self.path, _LARGEST)
         if data is None:
             return SigningState(0, {})
@@ -194,7 +194,7 @@ class LinkStore:
             raise LinkKeyError("damaged", text, "use a new key on both ends; `rtshcua keys link` makes one") from None
 
     def save(self, state: SigningState, ahead: int = 0) -> None:
-        """Keep a state, our own timestamp so many ahead. Raises OSError."""
+        """Store a state, with our timestamp so far ahead. Raises OSError."""
         self._exact = False
         streams = [[*stream, last] for stream, last in sorted(state.streams.items())]
         kept = json.dumps({"timestamp": state.timestamp + ahead, "streams": streams})
@@ -202,16 +202,15 @@ class LinkStore:
         self._exact = not ahead
 
     def close(self) -> None:
-        """Let another run have it."""
+        """Release the state for another run."""
         self.heard.close(forget=self._exact)
         os.close(self._lock)
 
 
 class LinkKeeper:
-    """Keeps the state of a link while it is used: at once (OSError: do not fly), and from then on in a thread.
-
-    `us_in` gives the us of the link's clock in real seconds. `trouble` is what went wrong since, if anything: the link
-    is used on all the same, for a vehicle in the air must go on being told to land.
+    """Stores the state of a link in use: at once (OSError: do not fly), and later in a thread. `us_in` returns the us
+    of the link's clock in real seconds. `trouble` is the last error: the link stays in use all the same, because a
+    vehicle in the air must still be commanded to land.
     """
 
     def __init__(self, store: LinkStore, link: SignedLink, us_in: Callable[[float], int]) -> None:
@@ -230,7 +229,7 @@ class LinkKeeper:
         self._thread.start()
 
     def close(self) -> None:
-        """Keep the exact state, and let another run have it. Never raises: see `trouble`."""
+        """Store the exact state, and release it. Never raises: see `trouble`."""
         self._over = True
         self._due.set()
         self._thread.join()

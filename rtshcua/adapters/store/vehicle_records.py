@@ -43,13 +43,13 @@ from rtshcua.wire.untrusted import Untrusted
 
 
 class RootStore:
-    """The root of the vehicle called `vehicle` (its identity)."""
+    """The trust root of the vehicle with the identity `vehicle`."""
 
     def __init__(self, state: Path, vehicle: str) -> None:
         self.path = state / "trust" / f"vehicle-{quote(vehicle, safe='')}"
 
     def kept(self) -> bytes | None:
-        """The signed root that was accepted last, if one was. Raises `RootError` (`damaged`) and OSError."""
+        """The last accepted signed root, if any. Raises `RootError` (`damaged`) and OSError."""
         data = read_if_there(self.path, MAX_ROOT)
         try:
             if data is not None:
@@ -59,21 +59,20 @@ class RootStore:
         return data
 
     def keep(self, signed: bytes) -> None:
-        """Remembers a root, once it is on the disk. Raises OSError."""
+        """Store a root, synced. Raises OSError."""
         make_folder(self.path.parent, mode=PRIVATE_FOLDER)
         replace(self.path, signed, mode=PRIVATE_FILE)
 
 
 def opened_root(signed: bytes) -> TrustRoot:
-    """A root that is trusted for where it was found, expired or not. Raises `Untrusted`."""
+    """A root that is trusted because of its place, expired or not. Raises `Untrusted`."""
     return open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=0)
 
 
 def root_in_force(kept: bytes | None, chain: Sequence[bytes], *, named: bool, now_us: int) -> bytes:
-    """The root that counts, of what a vehicle accepted last and of roots from the oldest to the newest.
-
-    Roots that are `named` must lead from the accepted one to a newer one, or be it; where nothing was accepted, the
-    first is trusted for being named. A key store's, which nobody named, may lag behind. Raises `Untrusted`.
+    """The root that counts, from the last one that a vehicle accepted and roots from the oldest to the newest. `named`
+    roots must lead from the accepted one to a newer one, or be it; without an accepted one, the first is trusted
+    because it was named. Those of a key store, which were not named, may be older. Raises `Untrusted`.
     """
     if kept is None:
         first, *newer = chain if named else chain[-1:]
@@ -84,8 +83,8 @@ def root_in_force(kept: bytes | None, chain: Sequence[bytes], *, named: bool, no
     return follow(chain, current=kept, now_us=now_us)
 
 
-#: the folder, in the state folder, of what simulated vehicles that a run starts itself leave behind: nothing of them
-#: hangs in the air, or has parameters to be put back, when the real one of that identity is connected
+#: the subfolder of the state folder for simulated vehicles that a run starts itself: the real vehicle with the same
+#: identity must not inherit their flights or owed parameters
 SIMULATED_FOLDER: Final = "simulated"
 
 _LARGEST_LAST_LOG = 1 << 16  # octets of the file
@@ -94,7 +93,7 @@ _Hash = Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]
 
 
 class _Kept(msgspec.Struct):
-    """The file."""
+    """The content of the file."""
 
     log: str
     before: _Hash | None = None
@@ -102,9 +101,8 @@ class _Kept(msgspec.Struct):
 
 
 class PreviousLog(NamedTuple):
-    """The log before the next one: the hash of its last line, None where there is none or it is not known; what there
-    is to tell of it, empty where all is as it should be; where it lies, if its flight is not known to have ended it;
-    where it lies, if it may be believed; and whether it is gone, so that nobody knows.
+    """The log before the next one: the hash of its last line, None if unknown or without one; a note, empty if all is
+    well; its path, if its flight may not have ended; its path, if it can be trusted; and whether it is missing.
     """
 
     last: str | None
@@ -115,15 +113,15 @@ class PreviousLog(NamedTuple):
 
 
 class LastLog:
-    """Remembers the last log of the vehicle called `vehicle` (its identity). One process at a time writes. What a
-    simulation of our own leaves lies in a state folder of its own (`SIMULATED_FOLDER` below the other).
+    """Stores the last log of the vehicle with the identity `vehicle`. One process at a time writes. Simulations of a
+    run have their own state folder (`SIMULATED_FOLDER` below the other).
     """
 
     def __init__(self, state: Path, vehicle: str) -> None:
         self.path = state / "logs" / f"vehicle-{quote(vehicle, safe='')}"
 
     def settle(self, recover: Callable[[Path], Recovered]) -> PreviousLog:
-        """The last log; `recover` ends it where it has no end, if it can. Never raises: no flight waits for a log."""
+        """The last log; `recover` ends it if it has no end. Never raises: no flight waits for a log."""
         try:
             known = _remembered(self.path)
         except (OSError, ValueError) as error:
@@ -139,16 +137,16 @@ class LastLog:
             text = f"the previous log, `{log}`, is missing, so it is not known whether its flight ended"
             return PreviousLog(None, text, log, gone=True)
         except (OSError, InUse) as error:
-            living = isinstance(error, InUse)  # its run flies on, and broke off nowhere
+            living = isinstance(error, InUse)  # its run still flies
             text = f"the previous log, `{log}`, was not closed and cannot be: {_words(error)}"
             return PreviousLog(None, text, None if living else log)
 
     def begin(self, log: Path, before: str | None) -> None:
-        """A log was made that will name `before`. Raises OSError."""
+        """Store a new log, whose genesis names `before`. Raises OSError."""
         self._write(log, before, None)
 
     def end(self, log: Path, before: str | None, last: str) -> None:
-        """It was closed; `last` is the hash of its last line. Raises OSError."""
+        """Store that it was closed; `last` is the hash of its last line. Raises OSError."""
         self._write(log, before, last)
 
     def _write(self, log: Path, before: str | None, last: str | None) -> None:
@@ -158,7 +156,7 @@ class LastLog:
 
 
 def known_end(state: Path, log: Path) -> str | None:
-    """The hash of the last line of a log that a vehicle here wrote last, if it was closed; None where nobody knows."""
+    """The hash of the last line of a log, if it is the last one of a vehicle here and was closed; None if unknown."""
     where = str(log.resolve())
     for path in sorted(each for of in (state, state / SIMULATED_FOLDER) for each in (of / "logs").glob("vehicle-*")):
         with suppress(OSError, ValueError):
@@ -169,7 +167,7 @@ def known_end(state: Path, log: Path) -> str | None:
 
 
 def _remembered(path: Path) -> _Kept | None:
-    """What is kept of the last log. Raises OSError, and ValueError for what was not written by this."""
+    """The stored last log. Raises OSError, and ValueError for an invalid file."""
     data = read_if_there(path, _LARGEST_LAST_LOG)
     try:
         return None if data is None else msgspec.json.decode(data, type=_Kept)
@@ -202,17 +200,17 @@ def _words(error: Exception) -> str:
 
 
 def qualification_path(data: Path, vehicle: str) -> Path:
-    """Where the record of the vehicle of this identity is."""
+    """The file of the record of a vehicle."""
     return data / "qualifications" / f"vehicle-{quote(vehicle, safe='')}.cbor"
 
 
 def kept_qualification(data: Path, vehicle: str) -> bytes | None:
-    """The signed record, unverified; None where the vehicle has none. Raises OSError."""
+    """The signed record, unverified; None without one. Raises OSError."""
     return read_if_there(qualification_path(data, vehicle), MAX_QUALIFICATION)
 
 
 def keep_qualification(data: Path, vehicle: str, signed: bytes) -> Path:
-    """Keep it in place of the one before, and give where. Raises OSError."""
+    """Replace the stored record, and return its file. Raises OSError."""
     path = qualification_path(data, vehicle)
     make_folder(path.parent, mode=PRIVATE_FOLDER)
     replace(path, signed)
@@ -223,11 +221,11 @@ _LARGEST_OWED = 1 << 16  # octets of the file
 
 
 class OwedParameters:
-    """What is owed to the vehicle called `vehicle` (its identity), as it was found when this was made.
+    """The owed parameters of the vehicle with the identity `vehicle`, when this was made. `left` holds the ones to
+    restore; if they are unknown, it is empty and `trouble` says why: nothing is set then.
 
-    `left` is what is to be put back; where nobody can tell, it is empty, and `trouble` says why: nothing is set then.
-    `sets` is whether a run sets something; None for one who only looks. A run that does, or to which something is left,
-    holds it until it is closed or its process dies; where another run holds it, nothing is left to this one.
+    `sets` says whether a run sets parameters; None for a reader. A run that does, or that owes some, locks the file
+    until it is closed or its process dies; while another run has it, nothing is left to this one.
     """
 
     def __init__(self, state: Path, vehicle: str, *, sets: bool | None = None) -> None:
@@ -241,7 +239,7 @@ class OwedParameters:
             if sets or (sets is not None and left):
                 make_folder(self.path.parent, mode=PRIVATE_FOLDER)
                 self._lock = lock(self.path.with_name(f"lock-{name}"))
-                left = self._read()  # whoever held it before has put back some of it since
+                left = self._read()  # its former owner may have restored some since
             self.left = left
         except BlockingIOError:
             self.trouble = f"another run of `{vehicle}` has changed its parameters and will restore them"
@@ -250,7 +248,7 @@ class OwedParameters:
             self.trouble = f"the parameters to restore are not known: {why}"
 
     def close(self) -> None:
-        """Let another run have it."""
+        """Release the file for another run."""
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
@@ -268,7 +266,7 @@ class OwedParameters:
         return {name: self._owed(name, values) for name, values in told.items()}
 
     def keep(self, owed: Mapping[str, Owed]) -> None:
-        """From now on this is owed; it is on the disk then. Raises OSError."""
+        """Store what is owed now, synced. Raises OSError."""
         make_folder(self.path.parent, mode=PRIVATE_FOLDER)
         told = {name: [shown(each.before), shown(each.value)] for name, each in owed.items()}
         replace(self.path, json.dumps(told, sort_keys=True).encode() + b"\n", mode=PRIVATE_FILE)
@@ -300,17 +298,17 @@ class BoundarySession(NamedTuple):
 
 
 class DamagedState(Exception):
-    """The file is there, and does not say what we write into it."""
+    """An existing file with invalid content."""
 
 
 class BoundaryStore:
-    """The sessions of the boundary on the vehicle called `vehicle` (its identity)."""
+    """The sessions of the boundary on the vehicle with the identity `vehicle`."""
 
     def __init__(self, state: Path, vehicle: str) -> None:
         self.path = state / "boundary" / f"vehicle-{quote(vehicle, safe='')}"
 
     def kept(self) -> BoundarySession:
-        """What was kept last. Raises DamagedState, and OSError."""
+        """The last stored session. Raises DamagedState, and OSError."""
         data = read_if_there(self.path, _LARGEST_KEPT)
         if data is None:
             return BoundarySession(0, START)
@@ -320,6 +318,6 @@ class BoundaryStore:
         return BoundarySession(int(said[1]), bytes.fromhex(said[2].decode()))
 
     def keep(self, session: int, digest: bytes) -> None:
-        """Keep the digest of a session; it is on the disk then. Raises OSError."""
+        """Store the digest of a session, synced. Raises OSError."""
         make_folder(self.path.parent, mode=PRIVATE_FOLDER)
         replace(self.path, b"%d %s\n" % (session, digest.hex().encode()), mode=PRIVATE_FILE)

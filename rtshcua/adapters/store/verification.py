@@ -1,4 +1,4 @@
-"""A log file verified: quickly and by several processes where it is sound, else line by line (`rtshcua.evidence`)."""
+"""Verify a log file: quickly and in several processes if it is valid, otherwise line by line (`rtshcua.evidence`)."""
 
 import gc
 import os
@@ -19,22 +19,22 @@ from rtshcua.ground.audit.audit import Audit, Auditor, anchors_of, trusted
 from rtshcua.ground.audit.frames import FrameAudit
 from rtshcua.ground.audit.trust import establish
 
-#: octets of a log that is worth more than one process
+#: octets of a log from which on several processes are used
 LONG: Final = 32 << 20
 
 _GROUP: Final = 16  # segments that a process takes at a time
-_PIECE: Final = 1 << 18  # octets that are read at a time to be hashed alone
+_PIECE: Final = 1 << 18  # octets that are read at a time for hashing
 
 
 class VerificationInputs(NamedTuple):
-    """What is known before a log is read: the pinned root key, the bundle that it should be of, notes of anchors."""
+    """The inputs of a verification: the pinned root key, the expected bundle, and the notes of anchors."""
 
     pinned: bytes
     bundle: bytes | None = None
     anchors: tuple[str, ...] = ()
 
 
-#: takes how many octets of the log are done
+#: gets the number of octets that are done
 Progress = Callable[[int], None]
 
 
@@ -47,8 +47,8 @@ def verify_carefully(
     each: Callable[[AnyRecord], None] | None = None,
     progress: Progress = lambda _: None,
 ) -> Audit:
-    """The audit of a log line by line, in constant memory. `frames` follow it where it derives; `each` takes its sound
-    records.
+    """The audit of a log line by line, in constant memory. `frames` are compared with it if it derives; `each` gets its
+    valid records.
     """
     auditor = Auditor(asked.pinned, bundle=asked.bundle, derive=derive, anchors=asked.anchors, frames=frames)
     with open_regular(path) as file:
@@ -61,9 +61,9 @@ def follow(
     each: Callable[[bytes, AnyRecord], None] | None = None,
     progress: Progress = lambda _: None,
 ) -> Audit:
-    """What an auditor says of the lines of an open log. `each` takes its sound records, with their lines."""
+    """The audit of the lines of an open log. `each` gets its valid records with their lines."""
     collecting = gc.isenabled()
-    gc.disable()  # nothing here makes cycles, and looking for them costs a tenth
+    gc.disable()  # nothing here makes reference cycles, and searching for them costs a tenth of the time
     try:
         for number, line in enumerate(lines(file)):
             if not number & 0xFFF:
@@ -81,10 +81,8 @@ def follow(
 def verify_quickly(
     path: Path, asked: VerificationInputs, *, fast: bool = False, jobs: int = 0, progress: Progress = lambda _: None
 ) -> Audit:
-    """The audit of a log by what was signed; line by line where that does not hold.
-
-    `fast` looks at nothing but the octets of the segments. `jobs` is how many processes (threads, if `fast`) work; 0 is
-    one for each core where the log is long.
+    """The audit of a log by its signatures; line by line where that fails. `fast` only checks the octets of the
+    segments. `jobs` is the number of processes (threads, if `fast`); 0 is one for each core if the log is long.
     """
     with open_regular(path) as file:
         size = os.fstat(file.fileno()).st_size
@@ -120,7 +118,7 @@ def _jobs(size: int) -> int:
 
 
 def _reader(handle: int) -> Octets:
-    """Reads an open file at any place, by whichever thread."""
+    """A function that reads an open file at any offset, in any thread."""
 
     def read(offset: int, length: int) -> bytes:
         pieces = []
@@ -133,7 +131,9 @@ def _reader(handle: int) -> Octets:
 
 
 def _digests(log: LogOutline, jobs: int) -> Iterator[SegmentPart | None]:
-    """The parts of a log by their octets alone. Hashing lets other threads run: signatures are verified meanwhile."""
+    """The parts of a log by their octets alone. Hashing releases the interpreter lock, so signatures are verified
+    meanwhile.
+    """
     threads = ThreadPoolExecutor(jobs)
     try:
         yield from threads.map(lambda start, end: _digest(log.octets, start, end), log.offsets, log.offsets[1:])
@@ -167,7 +167,7 @@ def _scanned(path: Path, log: LogOutline, jobs: int) -> Iterator[SegmentPart | N
 
 
 def _scan(path: Path, spans: list[tuple[int, int]]) -> list[SegmentPart | None]:
-    """The parts of some segments, up to the first that is out of place."""
+    """The parts of some segments, up to the first one out of place."""
     parts: list[SegmentPart | None] = []
     with open_regular(path) as file:
         read = _reader(file.fileno())

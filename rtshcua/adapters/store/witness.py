@@ -1,9 +1,8 @@
-"""A witness: what it remembers, the requests that it considers, and the logs that it cosigns as files.
+"""A witness: its state, the requests that it considers, and the log files that it cosigns.
 
-It remembers of each log the last checkpoint that it cosigned. One process at a time.
-
-A checkpoint is on the disk before its cosignature leaves. So after a crash the witness may have forgotten that it
-answered, never what. Whoever deletes the folder makes the witness forget: that nobody else can is why it is not aboard.
+It stores the last checkpoint that it cosigned of each log. One process at a time. A checkpoint is on the disk before
+its cosignature leaves, so after a crash the witness may have forgotten that it answered, but never what it cosigned.
+Deleting the folder deletes this memory: a witness is not on board, so that nobody else can do that.
 """
 
 import os
@@ -35,18 +34,18 @@ from rtshcua.evidence.witnessing.witness import (  # fmt: skip
 from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.untrusted import Untrusted
 
-#: notes that contradict what was cosigned are kept, as proof, up to so many
+#: how many contradicting notes are kept as proof
 MOST_CONTRADICTIONS: Final = 100
 _FOLDER: Final = "contradictions"
 _LARGEST: Final = 1 << 20  # octets of a checkpoint that is kept
 
 
 class WitnessError(Untrusted):
-    """What a witness remembers does not serve: `in-use`, `damaged`. It does not cosign then."""
+    """The state of a witness cannot be used: `in-use`, `damaged`. It does not cosign then."""
 
 
 class _Kept(msgspec.Struct, forbid_unknown_fields=True):
-    """One file: the text that was cosigned, who signed it, and when it was cosigned (seconds since the Unix epoch)."""
+    """One file: the cosigned text, its signer, and the time of the cosignature (seconds since the Unix epoch)."""
 
     text: str
     signer: str
@@ -54,7 +53,7 @@ class _Kept(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class WitnessStore:
-    """The memory of one witness key. Held by one process at a time, until it is closed or dies."""
+    """The state of one witness key. One process holds it at a time, until it is closed or dies."""
 
     def __init__(self, state: Path, key: SigningKey) -> None:
         """Raises WitnessError (`in-use`), and OSError."""
@@ -66,7 +65,7 @@ class WitnessStore:
             raise WitnessError("in-use", f"another process cosigns with key {key.kid.hex()}") from None
 
     def seen(self, origin: str) -> tuple[LastCosigned, int] | None:
-        """What was cosigned last of a log, and when. Raises WitnessError (`damaged`), and OSError."""
+        """The last cosigned checkpoint of a log, and its time. Raises WitnessError (`damaged`), and OSError."""
         path = self._path(origin)
         data = read_if_there(path, _LARGEST)
         if data is None:
@@ -82,12 +81,12 @@ class WitnessStore:
         return LastCosigned(kept.text, signer), kept.time_s
 
     def keep(self, origin: str, seen: LastCosigned, time_s: int) -> None:
-        """Remember. Raises OSError; then what was remembered before still is, or this."""
+        """Store a checkpoint. Raises OSError; then the earlier one is still stored, or this one."""
         kept = _Kept(seen.text, seen.signer.hex(), time_s)
         replace(self._path(origin), msgspec.json.encode(kept) + b"\n", mode=PRIVATE_FILE)
 
     def contradicted(self, note: str) -> Path | None:
-        """Keep a note that contradicts what was cosigned; gives where it is. Raises OSError."""
+        """Store a note that contradicts a cosigned checkpoint; return its file. Raises OSError."""
         folder = self.folder / _FOLDER
         make_folder(folder, mode=PRIVATE_FOLDER)
         path = folder / f"{sha256(note.encode()).hexdigest()[:32]}.note"
@@ -98,7 +97,7 @@ class WitnessStore:
         return path
 
     def close(self) -> None:
-        """Let another process have it."""
+        """Release the state for another process."""
         os.close(self._lock)
 
     def _path(self, origin: str) -> Path:
@@ -106,9 +105,8 @@ class WitnessStore:
 
 
 class FileWitness:
-    """A witness: judges requests, remembers, cosigns.
-
-    `now_s` is UTC in seconds; for `log_keys` see `evidence.witnessing.witness`.
+    """A witness: considers requests, stores checkpoints, cosigns. `now_s` is UTC in seconds; for `log_keys` see
+    `evidence.witnessing.witness`.
     """
 
     def __init__(self, store: WitnessStore, key: SigningKey, log_keys: LogKeys, now_s: Callable[[], int]) -> None:
@@ -123,12 +121,12 @@ class FileWitness:
         return self._key.public
 
     def known(self, origin: str) -> int | None:
-        """How large the tree is that was cosigned last of a log; None for a log that is not known. Raises as `seen`."""
+        """The size of the last cosigned tree of a log; None for an unknown log. Raises as `seen`."""
         before = self.store.seen(origin)
         return None if before is None else int(before[0].text.split("\n", 2)[1])
 
     def consider(self, request: CosignRequest) -> WitnessResponse | Declined:
-        """The cosignature, once it is remembered what for; or why there is none. Raises WitnessError and OSError."""
+        """The cosignature, once its checkpoint is stored; or why there is none. Raises WitnessError and OSError."""
         origin = request.note.partition("\n")[0]
         before = self.store.seen(origin)
         found = judge(request, None if before is None else before[0], self._log_keys)
@@ -142,11 +140,11 @@ class FileWitness:
         return self._key.sign(message, duty=Duty.WITNESS)
 
 
-# ------------------------------------------------------------------------------------ logs that are files
+# ------------------------------------------------------------------------------------ log files
 
 
 class Cosigned(NamedTuple):
-    """A log of so many records, of which this witness has cosigned `anchored`; `fresh`: more than before."""
+    """A log with so many records, `anchored` of them cosigned by this witness; `fresh`: more than before."""
 
     log: Path
     records: int
@@ -155,8 +153,8 @@ class Cosigned(NamedTuple):
 
 
 class NotCosigned(NamedTuple):
-    """A log that is not cosigned, and why. `contradiction`: it contradicts what was cosigned before; `proof`: where the
-    note is kept that shows it, if it is one that the log's own key signed.
+    """A log that is not cosigned, and why. `contradiction`: it contradicts an earlier cosignature; `proof`: the file of
+    the note that shows it, if the log's own key signed it.
     """
 
     log: Path
@@ -167,15 +165,15 @@ class NotCosigned(NamedTuple):
 
 
 def logs_in(path: Path) -> list[Path]:
-    """The logs in a folder and those below it, whatever can be read of them; a file is one itself."""
+    """The logs in a folder and below it, as far as it can be read; a file stands for itself."""
     if not path.is_dir():
         return [path]
     return sorted(Path(place, name) for place, _, files in walk(path) for name in files if name.endswith(".jsonl"))
 
 
 def drop(log: Path, witness: FileWitness, root: Path | None = None) -> Cosigned | NotCosigned:
-    """Cosign the end of a log that is a file, and put the anchor beside it; below `root`, the folder that logs are put
-    into, no link is followed. Raises WitnessError and OSError.
+    """Cosign the end of a log file, and put the anchor beside it. Below `root`, the folder for logs, no link is
+    followed. Raises WitnessError and OSError.
     """
     found = survey(_lines(log, root))
     if isinstance(found, Finding):
@@ -187,7 +185,8 @@ def drop(log: Path, witness: FileWitness, root: Path | None = None) -> Cosigned 
     answer = witness.consider(request)
     if isinstance(answer, Declined):
         proof = witness.store.contradicted(request.note) if answer.contradiction else None
-        # all of the log is here, and the proof was made here of its lines: it is the log that does not go on from there
+        # the whole log is here, and the proof was made here from its lines: so the log does not continue the cosigned
+        # one
         unlike = answer.status in (CONFLICT, INCONSISTENT) and known is not None
         contradiction = answer.contradiction or unlike
         return NotCosigned(log, f"witness/{answer.status}", answer.text, contradiction, proof)
@@ -200,7 +199,7 @@ def drop(log: Path, witness: FileWitness, root: Path | None = None) -> Cosigned 
 
 
 def _beside(log: Path, text: str, public: bytes) -> bool:
-    """Whether the anchor of this text by this witness is beside the log."""
+    """Whether this witness's anchor of this text is beside the log."""
     mine = (cosignatures(each, (public,)) for each in read_notes(anchors_path(log)) if each.startswith(text))
     return any(not isinstance(found, Flaw) and found[1] for found in mine)
 

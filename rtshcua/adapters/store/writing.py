@@ -1,6 +1,5 @@
-"""Writing so that a crash, Ctrl-C or a full disk leaves either the old file or the new one, and nothing beside it.
-
-Nothing is written through a link: one that stands where a file is to go is replaced by the file.
+"""Write files so that a crash, Ctrl-C or a full disk leaves either the old file or the new one, and no other file.
+Nothing is written through a link: a link in place of the file is replaced by the file.
 """
 
 import errno
@@ -23,32 +22,32 @@ from rtshcua.adapters.store.reading import (
     unfollowed,
 )
 
-#: modes of what is made; the umask takes away more, and where it takes nothing, no other user may write all the same
+#: modes of new files; the umask removes more, and without a umask no other user may write all the same
 PRIVATE_FILE: Final = 0o600
 PUBLIC_FILE: Final = 0o644
 PRIVATE_FOLDER: Final = 0o700
 PUBLIC_FOLDER: Final = 0o755
-#: what the names of files begin with that are not finished; a loss of power may leave one
+#: the prefix of unfinished files; a power failure may leave one
 UNFINISHED: Final = ".rtshcua-"
 
 _NEW: Final = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC
 _MORE: Final = os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_NOFOLLOW | UNAWAITED
 
-#: syncs a file's bytes, and of its metadata only what reading them back needs
+#: syncs a file's bytes, and only the metadata that reading them needs
 sync_data = getattr(os, "fdatasync", os.fsync)
 
 
 class NotWritten(PermissionError):
-    """A file that may not be written where it was asked for."""
+    """A file that may not be written in this place."""
 
 
 class Changed(OSError):
-    """The file was written by somebody else meanwhile, so it is left alone."""
+    """The file was changed by another program in the meantime, so it is left alone."""
 
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """An error of writing names the file that was asked for, whatever the system was doing."""
+    """Make an error of writing name the requested file, whatever system call failed."""
     try:
         yield
     except PermissionError as error:
@@ -60,7 +59,7 @@ def naming(path: Path) -> Iterator[None]:
 
 
 def write_all(handle: int, data: bytes) -> None:
-    """Writes every byte, however often the system takes only some of them."""
+    """Write every byte, in as many calls as the system needs."""
     view = memoryview(data)
     while view:
         view = view[os.write(handle, view) :]
@@ -68,10 +67,9 @@ def write_all(handle: int, data: bytes) -> None:
 
 @contextmanager
 def replacing(path: Path, *, mode: int = PUBLIC_FILE, synced: bool = True, root: Path | None = None) -> Iterator[int]:
-    """A descriptor of a new file that takes the place of `path`, in one step, when the block ends; if it is to be
-    `synced`, it is on the disk then. When the block raises, all is as it was.
-
-    The `mode` is subject to the umask. Below `root`, where one is given, no link is followed. Raises OSError.
+    """A descriptor of a new file that atomically replaces `path` when the block ends; with `synced` it is on the disk
+    then. If the block raises, nothing changes. The `mode` is subject to the umask. Below `root`, if given, no link is
+    followed. Raises OSError.
     """
     fresh = f"{UNFINISHED}{os.urandom(8).hex()}.new"
     with naming(path), opened_folder(path.parent, root) as folder:
@@ -93,17 +91,15 @@ def replacing(path: Path, *, mode: int = PUBLIC_FILE, synced: bool = True, root:
 
 
 def replace(path: Path, data: bytes, *, mode: int = PUBLIC_FILE, synced: bool = True, root: Path | None = None) -> None:
-    """Puts a file with this content in place of whatever was there: see `replacing`."""
+    """Replace a file by this content: see `replacing`."""
     with replacing(path, mode=mode, synced=synced, root=root) as handle:
         write_all(handle, data)
 
 
 def rewrite(path: Path, before: bytes, data: bytes) -> None:
-    """Puts `data` where `before` was. A symbolic link stays one, a hard link is parted from the others. Permissions
-    stay, and owner and group where we may.
-
-    Raises NotWritten where nobody may write to the file or its folder, or links lead out of its checkout, Changed where
-    it no longer says `before`, and OSError for what else the system refuses.
+    """Replace the content `before` by `data`. A symbolic link stays one, a hard link is separated from the others.
+    Permissions stay, and owner and group if possible. Raises NotWritten where nobody may write to the file or its
+    folder, or links lead out of its checkout, Changed where it no longer holds `before`, and OSError for other errors.
     """
     with naming(path):
         real, root = expect_inside(path)
@@ -113,17 +109,17 @@ def rewrite(path: Path, before: bytes, data: bytes) -> None:
             raise PermissionError(errno.EACCES, "the file is read-only")
         with replacing(real, mode=PRIVATE_FILE, root=root) as handle:
             write_all(handle, data)
-            with suppress(OSError):  # not ours to give away
+            with suppress(OSError):  # changing the owner is not permitted
                 os.fchown(handle, known.st_uid, known.st_gid)
-            os.fchmod(handle, stat.S_IMODE(known.st_mode))  # after that: giving it away takes set-id bits
+            os.fchmod(handle, stat.S_IMODE(known.st_mode))  # afterwards, because changing the owner clears set-id bits
             if read_regular(real, len(before), root) != before:
                 raise Changed(errno.EBUSY, "it was changed in the meantime")
 
 
 def write_out(path: Path, data: bytes, *, mode: int = PUBLIC_FILE) -> None:
-    """Puts what somebody asked for into the file that they named, in one step, where a link leads too, unless it leads
-    out of their checkout; but for what is no file to be replaced, it is written to: `/dev/stdout`, even where that
-    leads to a file. A pipe that nobody reads is not waited for. Raises NotWritten, and OSError.
+    """Write to a file that the user named, atomically and through a link, unless it leads out of the checkout. Other
+    kinds of files are written to: `/dev/stdout`, even where that leads to a file. A pipe without a reader is not waited
+    for. Raises NotWritten, and OSError.
     """
     with naming(path):
         real, root = expect_inside(path)
@@ -144,8 +140,8 @@ def write_out(path: Path, data: bytes, *, mode: int = PUBLIC_FILE) -> None:
 
 
 def replace_inside(path: Path, data: bytes) -> None:
-    """Puts a file in place of whatever was there, a link too, in a folder to which no links lead out of the checkout of
-    whoever named it. Raises NotWritten, and OSError.
+    """Replace whatever is there, also a link, by a file, in a folder to which no link leads out of the user's checkout.
+    Raises NotWritten, and OSError.
     """
     with naming(path):
         folder, root = expect_inside(path.parent)
@@ -153,8 +149,8 @@ def replace_inside(path: Path, data: bytes) -> None:
 
 
 def publish(fresh: Path, place: Path, root: Path | None = None) -> None:
-    """Gives a finished file its name, synced, in place of whatever was there. Below `root`, where one is given, no link
-    is followed. Raises OSError.
+    """Rename a finished file to its final name, synced, replacing whatever is there. Below `root`, if given, no link is
+    followed. Raises OSError.
     """
     with naming(place), opened_folder(fresh.parent, root) as here, opened_folder(place.parent, root) as there:
         with open_regular(fresh, root) as file:
@@ -164,10 +160,7 @@ def publish(fresh: Path, place: Path, root: Path | None = None) -> None:
 
 
 def open_new(path: Path, *, mode: int = PUBLIC_FILE) -> int:
-    """A descriptor of a file that did not exist before, to be appended to; its name is synced.
-
-    Raises FileExistsError and OSError.
-    """
+    """Create a file for appending, its name synced, and return its descriptor. Raises FileExistsError and OSError."""
     with opened_folder(path.parent) as folder:
         handle = os.open(path.name, _NEW | os.O_APPEND, mode, dir_fd=folder)
         try:
@@ -179,14 +172,14 @@ def open_new(path: Path, *, mode: int = PUBLIC_FILE) -> int:
 
 
 def open_existing(path: Path) -> int:
-    """A descriptor of a regular file that is there, or a link to one, to be appended to. Raises OSError."""
+    """Open an existing regular file, or a link to one, for appending. Raises OSError."""
     handle = os.open(path, os.O_RDWR | os.O_APPEND | UNAWAITED)
     expect_regular(handle, path)
     return handle
 
 
 def write_new(path: Path, data: bytes, *, mode: int = PUBLIC_FILE, root: Path | None = None) -> None:
-    """Creates a file with its content, synced. Raises FileExistsError; leaves nothing behind when it fails."""
+    """Create a file with its content, synced. Raises FileExistsError; leaves nothing behind on failure."""
     with naming(path), opened_folder(path.parent, root) as folder:
         handle = os.open(path.name, _NEW, mode, dir_fd=folder)
         try:
@@ -202,8 +195,8 @@ def write_new(path: Path, data: bytes, *, mode: int = PUBLIC_FILE, root: Path | 
 
 
 def create_whole(path: Path, data: bytes, *, mode: int = PUBLIC_FILE) -> None:
-    """Creates a file that has its content from the first moment on, synced. One that is there stays as it is, whatever
-    it holds. Raises OSError.
+    """Create a file that has its content from the first moment on, synced. An existing one stays unchanged. Raises
+    OSError.
     """
     fresh = f"{UNFINISHED}{os.urandom(8).hex()}.new"
     with naming(path), opened_folder(path.parent) as folder:
@@ -216,7 +209,7 @@ def create_whole(path: Path, data: bytes, *, mode: int = PUBLIC_FILE) -> None:
                 os.fsync(handle)
             finally:
                 os.close(handle)
-            with suppress(FileExistsError):  # somebody else was first
+            with suppress(FileExistsError):  # another program was first
                 os.link(fresh, path.name, src_dir_fd=folder, dst_dir_fd=folder, follow_symlinks=False)
         finally:
             with suppress(FileNotFoundError):
@@ -225,8 +218,8 @@ def create_whole(path: Path, data: bytes, *, mode: int = PUBLIC_FILE) -> None:
 
 
 def append(path: Path, data: bytes, root: Path | None = None) -> None:
-    """Puts data behind that of a regular file, which is made where there is none, and on the disk; no link is followed
-    to it, nor below `root`, and a file of several names, any of which may be elsewhere, is left alone. Raises OSError.
+    """Append data to a regular file, synced; a missing file is created. No link is followed to it, nor below `root`,
+    and a file with several names, any of which may be elsewhere, is left alone. Raises OSError.
     """
     with naming(path), unfollowed(path), opened_folder(path.parent, root) as folder:
         handle = os.open(path.name, _MORE, PUBLIC_FILE, dir_fd=folder)
@@ -242,7 +235,7 @@ def append(path: Path, data: bytes, root: Path | None = None) -> None:
 
 
 def make_folder(folder: Path, *, mode: int = PUBLIC_FOLDER, root: Path | None = None) -> None:
-    """Makes a folder and those above it that are missing, each synced; one that is there stays as it is."""
+    """Make a folder and its missing parents, each synced; an existing one is left unchanged."""
     with naming(folder):
         above = root or next(each for each in (folder, *folder.parents) if each.exists())
         with opened_folder(folder, above, make=mode):
@@ -250,15 +243,14 @@ def make_folder(folder: Path, *, mode: int = PUBLIC_FOLDER, root: Path | None = 
 
 
 def sync_folder(folder: Path) -> None:
-    """Makes the names in a folder survive a crash."""
+    """Make the names in a folder survive a crash."""
     with opened_folder(folder) as handle:
         os.fsync(handle)
 
 
 def lock(path: Path, *, mode: int = PRIVATE_FILE) -> int:
-    """A descriptor that holds a file, made where it is missing, until it is closed or its holder dies.
-
-    Raises BlockingIOError where somebody holds it, and OSError.
+    """Lock a file, made if missing, until the returned descriptor is closed or the process dies. Raises BlockingIOError
+    where it is locked, and OSError.
     """
     with unfollowed(path):
         handle = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | UNAWAITED, mode)

@@ -1,4 +1,4 @@
-"""A small fleet's logs, and what an archive should say of them, worked out from the lines by hand."""
+"""Logs of a small fleet, and the expected answers of an archive, computed from the lines by hand."""
 
 import json
 from collections.abc import Iterable
@@ -27,7 +27,7 @@ def write_fleet(folder: Path) -> None:
 
 
 def records(log: Path) -> list[dict[str, Any]]:
-    """The records of a log that are signed for: all of a closed one, else those up to the last signature."""
+    """Return the records that are covered by a signature: all of a closed log, else those up to the last one."""
     found = [json.loads(line) for line in log.read_bytes().splitlines()]
     last = max(number for number, record in enumerate(found) if "checkpoint" in record)
     return found[: last + 1]

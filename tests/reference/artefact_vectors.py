@@ -1,6 +1,6 @@
-"""The artefacts of the present versions in tests/vectors/artefacts, which whoever raises a version writes anew.
+"""Writes the artefacts of the present versions in tests/vectors/artefacts, after a version was raised.
 
-`python tests/reference/artefact_vectors.py` writes them, always the same octets; those of earlier versions stay.
+`python tests/reference/artefact_vectors.py` writes them, always the same octets. Those of earlier versions stay.
 """
 
 import sys
@@ -17,7 +17,7 @@ FOLDER = Path(__file__).parents[1] / "vectors" / "artefacts"
 
 
 def made() -> dict[str, bytes]:
-    """Each by the name of its file."""
+    """Return the artefacts by file name."""
     of = low()
     return {
         f"root-{names.ROOT.version}": ROOT.sign(ROOT_KEY),

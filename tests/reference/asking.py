@@ -1,4 +1,4 @@
-"""Asks about one step of the hand-written mission, with what the test changes, in both ways that there are to ask."""
+"""Decide one step of the hand-written mission, with changes by the test, by both functions that decide."""
 
 from typing import Any
 
@@ -39,7 +39,7 @@ def ask(
     policy: PreparedPolicy = POLICY,
     **context: Any,
 ) -> Decision:
-    """The decision; `possible` over the one situation must give the same and nothing else."""
+    """Return the decision. `possible` over the single situation must return exactly this decision."""
     prepared, state = ready(invocation, policy), flat.state(values, ages)
     circumstances = flat.context(invocation, **context)
     decision = decide(prepared, state, policy, circumstances, now)
@@ -53,7 +53,7 @@ def with_rules(*rules: Rule) -> PreparedPolicy:
 
 
 def with_contract(skill: int, **fields: Any) -> tuple[PreparedPolicy, Contract]:
-    """The policy with one contract changed, and that contract."""
+    """Return the policy with one changed contract, and that contract."""
     contract = replace(flat.CONTRACTS[skill], **fields)
     contracts = tuple(contract if n == skill else other for n, other in enumerate(flat.CONTRACTS))
     return loaded(replace(flat.POLICY, contracts=contracts)), contract

@@ -1,4 +1,4 @@
-"""A flight whose boundary signs its own evidence: it waits in the air for an approval, and refuses what is forged."""
+"""A flight whose boundary signs its own evidence. It waits in the air for an approval, and receives forged input."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -19,7 +19,7 @@ _LEG = 1
 
 
 def _bundle() -> bytes:
-    """Up, a leg that a supervisor must agree to, and home."""
+    """Return a bundle: take off, fly a leg that a supervisor must approve, and return."""
     policy = case.policy()
     rules = list(policy.rules)
     rules[flat.CONFIRM_RULE] = replace(rules[flat.CONFIRM_RULE], skills=(flat.GOTO,), when=None)
@@ -59,11 +59,11 @@ def fly(session: int = 1, before: bytes = START) -> tuple[bytes, ...]:
 
 @cache
 def attested() -> tuple[bytes, ...]:
-    """Its first session."""
+    """Return the first session of the boundary."""
     return once("attested", fly)
 
 
 @cache
 def second() -> tuple[bytes, ...]:
-    """The next session of the same boundary, with the same bundle."""
+    """Return the next session of the same boundary with the same bundle."""
     return once("attested_again", lambda: fly(2, bytes([2]) * 32))

@@ -1,5 +1,6 @@
-"""Random missions of a vehicle that declares random speeds, and the simulated vehicle that keeps just these: what the
-proven bounds on time, height and charge are held against in flight.
+"""Random missions of a vehicle with random declared speeds, and a simulated vehicle with exactly these speeds.
+
+Tests compare the proved bounds on time, height and charge with these flights.
 """
 
 from math import cos, radians, sin
@@ -17,13 +18,13 @@ from rtshcua.virtual.fitting import fitting
 from virtual import case
 
 LIBRARY = str(Path(__file__).resolve().parents[2])
-#: metres for a degree of latitude, and of longitude at home: near enough to place steps by
+#: metres for a degree of latitude, and of longitude at home: exact enough to place steps
 NORTH, EAST = 111_200.0, 75_500.0
 HOME = (47.39774, 8.54559)
 
 
 class Keeps(NamedTuple):
-    """What the vehicle declares that it keeps at least: m/s, m, and m/s in a second."""
+    """The declared least speeds of the vehicle: m/s, m, and m/s per second."""
 
     cruise: float
     climb: float
@@ -37,7 +38,7 @@ class Keeps(NamedTuple):
 
 
 class Drawn(NamedTuple):
-    """A mission in text, what its vehicle keeps, where the wind comes from, and how high it may come, m."""
+    """A mission as text, the least speeds of its vehicle, the direction of the wind, and the largest height in m."""
 
     text: str
     keeps: Keeps
@@ -46,7 +47,7 @@ class Drawn(NamedTuple):
 
 
 def draw(seed: int) -> Drawn:
-    """The mission of a seed."""
+    """Draw the mission of a seed."""
     of = Random(seed)
     cruise, air = of.choice([3.0, 5.0, 7.0]), of.choice([12.0, 14.0])
     keeps = Keeps(
@@ -134,12 +135,12 @@ def _text(keeps: Keeps, steps: list[str], area: str, wide: int) -> str:
 
 
 def _named(step: str) -> str:
-    """A flight that asks for no speed is of the skill that has none."""
+    """Return a step with the right skill: a flight without a speed uses the skill without one."""
     return step.replace("fly(", "go(") if step.startswith("fly(") and "pace" not in step else step
 
 
 def compiled(drawn: Drawn) -> Compiled:
-    """The mission, compiled, with what is found on it."""
+    """Compile the mission, with its findings."""
 
     def read(path: str) -> bytes:
         return drawn.text.encode() if path == "probe.rts" else Path(path).read_bytes()
@@ -150,7 +151,7 @@ def compiled(drawn: Drawn) -> Compiled:
 
 
 def simulated(drawn: Drawn, of: Compiled, flavour: str) -> SimulationConfig:
-    """The vehicle that keeps what is declared, and no more, in the most wind."""
+    """Return a vehicle with exactly the declared speeds, in the strongest wind."""
     keeps = drawn.keeps
     if flavour == "px4":
         parameters: dict[str, float] = {
@@ -173,6 +174,6 @@ def simulated(drawn: Drawn, of: Compiled, flavour: str) -> SimulationConfig:
 
 
 def bounds(of: Compiled) -> Bounds:
-    """What is proved of it."""
+    """Return the proved bounds of the mission."""
     assert of.bounds is not None
     return of.bounds

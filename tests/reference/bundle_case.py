@@ -1,4 +1,4 @@
-"""A small signed bundle by hand: one hover under one policy, and the trust root that it opens under."""
+"""A small hand-written signed bundle: one hover under one policy, with its trust root."""
 
 from collections.abc import Callable
 

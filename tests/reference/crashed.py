@@ -1,4 +1,4 @@
-"""Logs of flights that break off, and what must be true of them once they were recovered."""
+"""Logs of aborted flights, and the properties that a recovered log must have."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -29,7 +29,7 @@ def signer(chance: Random, *, utc_us: int = UTC_US + 86_400_000_000) -> LogEnder
 
 
 def writes(chance: Random, *, seals: int = 40) -> Iterator[tuple[bytes, int]]:
-    """The lines of a log without end, each with its class of durability; one in `seals` is a seal."""
+    """Yield the lines of an endless log, each with its durability; one line in `seals` is a seal."""
     recorder = Recorder(certify, LOG_KEY.public, lambda: chance.randbytes(32))
     at_us = 5_000_000
 
@@ -65,7 +65,7 @@ def _decision(recorder: Recorder, now: Now, durability: int) -> bytes:
 
 
 def unverified(path: Path, lines: list[bytes], acknowledged: int) -> str:
-    """What is wrong with a recovered log of these lines, of which so many were acknowledged; nothing: empty."""
+    """Return the fault of a recovered log of these lines, a number of which were acknowledged; empty if none."""
     data = path.read_bytes()
     report = verify(data.splitlines(keepends=True))
     if report.verdict is not LogVerdict.VERIFIED:

@@ -1,4 +1,4 @@
-"""Small sources with tests, and what these come to. They build on the frozen library of the checker's twins."""
+"""Small sources with tests, and their results. They use the frozen library of the checker's twins."""
 
 from pathlib import Path
 
@@ -23,7 +23,7 @@ WHEN = "when inspect_area(bridge_a, altitude = 20 m)"
 
 
 def program(text: str, **files: str) -> Program:
-    """A source, with others beside it by their names without `.rts`."""
+    """Load a source, with other files by their names without `.rts`."""
     beside = {f"{name}.rts": content for name, content in files.items()}
 
     def read(path: str) -> bytes:
@@ -35,24 +35,24 @@ def program(text: str, **files: str) -> Program:
 
 
 def made(text: str, before: str = IMPORT + NOMINAL, **files: str) -> CaseSuite:
-    """The cases of a source."""
+    """Return the test suite of a source."""
     return suite(program(before + text, **files), dialect.load())
 
 
 def found(text: str, before: str = IMPORT + NOMINAL, **files: str) -> list[tuple[str, str, str | None]]:
-    """The codes, messages and helps of what is found in a source."""
+    """Return codes, messages and helps of the findings in a source."""
     return [(each.code.id, each.message, each.help) for each in made(text, before, **files).diagnostics]
 
 
 def ran(text: str, before: str = IMPORT + NOMINAL, **files: str) -> list[CaseResult]:
-    """The cases of a source in which nothing is found, decided."""
+    """Decide the test cases of a source without findings."""
     cases = made(text, before, **files)
     assert cases.diagnostics == (), cases.diagnostics
     return [run_case(case) for case in cases.cases]
 
 
 def decided(*parts: str, before: str = IMPORT + NOMINAL) -> str:
-    """The outcome, the target and the reason of one test with these parts and whatever expectation."""
+    """Return outcome, target and reason of one test with these parts."""
     (one,) = ran('test "it" {\n  ' + "\n  ".join((*parts, "expect allow")) + "\n}\n", before)
     decision = one.trace.decision
     flies = [] if decision.target is None else [decision.target.text]

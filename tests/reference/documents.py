@@ -1,4 +1,4 @@
-"""A mission whose inspection asks a supervisor first, and documents for flights in the world of `world`."""
+"""A mission whose inspection needs a supervisor's approval, and documents for flights in the world of `world`."""
 
 from typing import Any
 
@@ -22,12 +22,12 @@ from rtshcua.wire.replacement import sign_replacement
 
 MIN = 60 * S
 LOW = 8 * M
-#: the step that the supervisor is asked about
+#: the step that needs the supervisor's approval
 ASKED = 2
 
 
 def low_mission() -> Mission:
-    """The inspection is flown low, and so it must be confirmed."""
+    """Return the mission with a low inspection, which must be confirmed."""
     first = invocation(0, DEPARTURE, TAKEOFF, Plan(MotionKind.CLIMB, (), LOW, 0), LOW)
     last = MISSION.invocations[-1]
     goto = invocation(1, INSPECTION, GOTO, Plan(MotionKind.FLY, PATH[:2], LOW, 0), *PATH[:2], LOW)
@@ -36,12 +36,12 @@ def low_mission() -> Mission:
 
 
 def low() -> Loaded:
-    """That mission in force."""
+    """Load that mission."""
     return loaded(mission=low_mission())
 
 
 def approval(of: Loaded, step: int = ASKED, key: SigningKey = APPROVAL_KEY, now: Now = START, **changed: Any) -> bytes:
-    """The supervisor's signed approval of a step, but for what is `changed`."""
+    """Return the supervisor's signed approval of a step, with fields `changed`."""
     invocations = of.bundle.mission.invocations
     said = ApprovalDocument(
         flight=of.in_force.flight,
@@ -58,26 +58,26 @@ def approval(of: Loaded, step: int = ASKED, key: SigningKey = APPROVAL_KEY, now:
 
 
 def recall(of: Loaded, key: SigningKey = APPROVAL_KEY, now: Now = START, **changed: Any) -> bytes:
-    """A signed recall of the mission, but for what is `changed`."""
+    """Return a signed recall of the mission, with fields `changed`."""
     said = RecallDocument(VEHICLE, of.in_force.flight, of.bundle.mission_digest, b"", now.utc_us, now.utc_us + MIN)
     return sign_recall(replace(said, **changed), key)
 
 
 def cancellation(of: Loaded, key: SigningKey = MISSION_KEY, now: Now = START, **changed: Any) -> bytes:
-    """A signed cancellation of the mission, but for what is `changed`."""
+    """Return a signed cancellation of the mission, with fields `changed`."""
     said = CancellationDocument(of.in_force.flight, of.bundle.mission_digest, now.utc_us, now.utc_us + MIN)
     return sign_cancellation(replace(said, **changed), key)
 
 
 def shorter(of: Loaded) -> Mission:
-    """The mission in force without its inspection."""
+    """Return the mission without its inspection."""
     mission = of.bundle.mission
     first, second, _, last = mission.invocations
     return replace(mission, issued_at_us=mission.issued_at_us + S, invocations=(first, second, replace(last, step=2)))
 
 
 def large(of: Loaded, steps: int = 60) -> bytes:
-    """A signed replacement of many steps: the second one of the low mission again and again."""
+    """Return a signed replacement of many steps, all copies of the low mission's second step."""
     mission = of.bundle.mission
     first, second, _, last = mission.invocations
     more = [replace(second, step=number, invocation_id=number.to_bytes(16)) for number in range(2, steps)]
@@ -87,19 +87,19 @@ def large(of: Loaded, steps: int = 60) -> bytes:
 
 
 def replacement(of: Loaded, kept: int = 2, mission: Mission | None = None, key: SigningKey = MISSION_KEY) -> bytes:
-    """A signed replacement, by the mission without its inspection if nothing else is said."""
+    """Return a signed replacement, by default by the mission without its inspection."""
     return sign_replacement(mission or shorter(of), over=of.bundle, flight=of.in_force.flight, kept=kept, key=key)
 
 
 def presented(of: Loaded, document: bytes, now: Now = START, released: int = 0) -> Receipt:
-    """What the boundary says to a document."""
+    """Return the answer of the boundary to a document."""
     receipt = decode(of.boundary.present(document, now, released))
     assert isinstance(receipt, Receipt)
     return receipt
 
 
 def hand(run: Run, document: bytes, sender: int = 1) -> str:
-    """Hand a document to a run; the slug of what it answers, or `over` where the run ended just before."""
+    """Pass a document to a run and return the slug of the answer, or `over` if the run had just ended."""
     replies = [action for action in run.tick(Presented(0, document, sender)) if isinstance(action, Reply)]
     assert [reply.sender for reply in replies] == ([sender] if replies else [])
     assert replies or run.ending is not None
@@ -107,7 +107,7 @@ def hand(run: Run, document: bytes, sender: int = 1) -> str:
 
 
 def asked(of: Loaded) -> tuple[Outcome, Reason]:
-    """What is decided about the step that the supervisor is asked about."""
+    """Return outcome and reason of the decision on the step that needs the supervisor's approval."""
     answer = answer_to(of, request_for(of, step=ASKED))
     assert isinstance(answer, Decision)
     return answer.outcome, answer.reason

@@ -1,4 +1,4 @@
-"""Ed25519 from its definition (RFC 8032, section 5.1), slow and plain: points, signatures, and whether one counts."""
+"""Ed25519 by its definition (RFC 8032, section 5.1), slow and simple: points, signatures, verification."""
 
 import hashlib
 
@@ -20,12 +20,12 @@ def add(a: Point, b: Point) -> Point:
 
 
 def negative(point: Point) -> Point:
-    """The point that makes the neutral one with it."""
+    """Return the inverse of a point."""
     return -point[0] % P, point[1]
 
 
 def times(n: int, point: Point) -> Point:
-    """The point so many times, by the same sum with a common denominator Z (section 5.1.4: X, Y, Z, T = XY / Z)."""
+    """Return a multiple of a point, by that sum with a common denominator Z (section 5.1.4: X, Y, Z, T = XY / Z)."""
     x, y = point
     total, doubled = (0, 1, 1, 0), (x, y, 1, x * y % P)
     while n:
@@ -59,12 +59,12 @@ def point_of(y: int, odd: int) -> Point | None:
 
 
 def encoded(point: Point) -> bytes:
-    """The 32 octets of a point (section 5.1.2)."""
+    """Encode a point in 32 octets (section 5.1.2)."""
     return (point[1] | (point[0] & 1) << 255).to_bytes(32, "little")
 
 
 def decoded(octets: bytes) -> Point | None:
-    """The point of 32 octets; None where they are none, or another encoding of one (section 5.1.3)."""
+    """Decode 32 octets; None if they are not a point or not its canonical encoding (section 5.1.3)."""
     number = int.from_bytes(octets, "little")
     y, odd = number & ((1 << 255) - 1), number >> 255
     point = point_of(y, odd) if y < P else None
@@ -100,7 +100,7 @@ def equation_holds(key: bytes, signature: bytes, message: bytes) -> bool:
 
 
 def counts(key: bytes, signature: bytes, message: bytes) -> bool:
-    """Whether a signature counts by the rule of docs/log-format.md, section 6, taken literally."""
+    """Whether a signature is valid by the rule of docs/log-format.md, section 6, taken literally."""
     if len(key) != 32 or len(signature) != 64:
         return False
     a, r, s = decoded(key), decoded(signature[:32]), int.from_bytes(signature[32:], "little")

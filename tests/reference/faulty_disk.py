@@ -1,4 +1,4 @@
-"""A disk, as the evidence's file port has it, that does what a test tells it to."""
+"""A disk for the evidence's file port with faults that a test controls."""
 
 import errno
 import os
@@ -12,7 +12,7 @@ PATIENCE_S = 20.0
 
 
 class FaultyDisk:
-    """Passes everything on to the real one, as far as it is told to.
+    """A disk that forwards to the real one, with injected faults.
 
     `room` is how many bytes it still takes, `step` how many a call. An error number in `failing`, by the name of a
     method, is what each call of it fails with; `once` are those of the next calls, None for one
@@ -42,7 +42,7 @@ class FaultyDisk:
         self.ask("sync_folder")
 
     def ask(self, method: str) -> None:
-        """Note a call; hang or fail, if that is what is to happen."""
+        """Record a call, and hang or fail if requested."""
         gate = self.open.get(method)
         assert gate is None or gate.wait(PATIENCE_S)
         self.calls.append(method)
@@ -52,7 +52,7 @@ class FaultyDisk:
             raise OSError(number, os.strerror(number))
 
     def heal(self) -> None:
-        """From now on everything works."""
+        """Remove all faults."""
         self.failing.clear()
         self.once.clear()
         self.room, self.step = 1 << 40, 1 << 30
@@ -61,7 +61,7 @@ class FaultyDisk:
 
     @property
     def synced(self) -> int:
-        """How often something was synced."""
+        """Return the number of syncs."""
         return self.calls.count("sync")
 
 
@@ -96,7 +96,7 @@ class FaultyFile:
 
 
 def until(holds: Callable[[], bool]) -> None:
-    """Let another thread run until something holds; it does so at once, or never."""
+    """Let another thread run until a condition holds."""
     pause, left = Event(), 2_000
     while not holds():
         left -= 1

@@ -1,4 +1,4 @@
-"""A policy and a mission in the flat form, written by hand: what the compiler would make of the example in the design.
+"""A hand-written policy and mission in the flat form, as the compiler would lower the example of the design.
 
 Lengths mm, speeds mm/s, times us, ratios 1/10000. East of home is x, north is y.
 """
@@ -48,7 +48,7 @@ def argument(cell: int) -> Code:
 
 
 def apply(op: Op, *operands: Code) -> Code:
-    """The operands' code, then the instruction."""
+    """Return the operands' code followed by the instruction."""
     return (*(number for operand in operands for number in operand), op, 0, 0)
 
 
@@ -57,7 +57,7 @@ def scaled(operand: Code, factor: int) -> Code:
 
 
 def clause(text: str, code: Code) -> Clause:
-    """A clause at a place that depends on its text only."""
+    """Return a clause at a source place that depends only on its text."""
     return Clause(text, 0, 100, 100 + len(text), code)
 
 
@@ -126,7 +126,7 @@ ALTITUDE = Parameter("altitude", QUANTITY, "altitude", 0, 2 * M, 60 * M, ())
 
 
 def contract(name: str, motion: Motion, **fields: object) -> Contract:
-    """A contract that asks for nothing but what `fields` say."""
+    """Return a contract without conditions, with `fields` changed."""
     nothing = Contract(
         name=name,
         parameters=(),
@@ -287,7 +287,7 @@ DEPARTURE, INSPECTION, RECOVERY = range(3)  # phases
 
 
 def invocation(step: int, phase: int, skill: int, plan: Plan, *arguments: int, **fields: object) -> Invocation:
-    """A step by an operator through an agent, valid in its own phase."""
+    """Return a step by an operator through an agent, valid in its own phase."""
     plain = Invocation(
         invocation_id=bytes([step]) * 16,
         step=step,
@@ -348,7 +348,7 @@ NOMINAL: dict[int, int | None] = {
 
 
 def state(values: dict[int, int | None] | None = None, ages: dict[int, int] | None = None) -> State:
-    """At the bridge, everything well and fresh, but for what is given."""
+    """Return a nominal, fresh state at the bridge, with some values changed."""
     all_values, all_ages = NOMINAL | (values or {}), ages or {}
     return State(
         tuple(all_values[slot] for slot in range(SLOTS)), tuple(all_ages.get(slot, 10_000) for slot in range(SLOTS))
@@ -356,7 +356,7 @@ def state(values: dict[int, int | None] | None = None, ages: dict[int, int] | No
 
 
 def context(of: Invocation = INVOCATIONS[INSPECTION_STEP], **fields: object) -> Context:
-    """The step has just been released, in its own phase."""
+    """Return the context of a step that was just released, in its own phase."""
     plain = Context(
         binding=of.binding,
         vehicle="quad-07",

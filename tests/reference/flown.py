@@ -1,4 +1,4 @@
-"""What the scenarios of a program find when they are flown."""
+"""Fly the scenarios of a program and return their findings."""
 
 from rtshcua.app.testing.flying import Flying
 from rtshcua.diagnostics.diagnostic import Diagnostic
@@ -8,6 +8,6 @@ from rtshcua.mavlink import dialect
 
 
 def flown(program: Program) -> tuple[Diagnostic, ...]:
-    """The findings on flights that are not as expected."""
+    """Return the findings about flights that differ from the expectations."""
     found = scenarios(program, dialect.load(), 0).found
     return tuple(each for one in Flying(with_coverage=False, say=lambda text: None).fly(found) for each in one.findings)

@@ -1,7 +1,8 @@
-"""Random programs, and what dense sampling of places, heights and times says of each: an oracle of the compiler's
-proofs, which shares nothing with them. It imports none of the package, counts in metres and seconds, and in floats.
+"""Random programs, and an oracle for the compiler's proofs by dense sampling of places, heights and times.
 
-What it is sure of counts alone: a program is `bad` where some sample is wrong by more than `SURE` (in metres, a moment
+The oracle shares no code with the proofs. It does not import the package, and uses floats in metres and seconds.
+
+Only certain verdicts count: a program is `bad` where some sample is wrong by more than `SURE` (in metres, a moment
 in seconds is wrong or not), and `good` where all keep more than the margins that belong to a plan (ADR 55).
 """
 
@@ -36,7 +37,7 @@ NORTH, EAST = _scale()
 
 
 def written(x: float, y: float) -> str:
-    """A place as sources write it."""
+    """Format a place as in sources."""
     return f"{HOME[0] + y / NORTH:.7f} N, {HOME[1] + x / EAST:.7f} E"
 
 
@@ -53,7 +54,7 @@ class Zone(NamedTuple):
     dates: tuple[int, int] | None
 
     def source(self) -> str:
-        """Its declaration."""
+        """Return its declaration in the language."""
         x, y, w, h = self.x, self.y, self.wide, self.high
         corners = [(x - w, y - h), (x + w, y - h), (x + w, y + h), (x - w, y + h)]
         shape = (
@@ -77,7 +78,7 @@ class Zone(NamedTuple):
         return min(flat, self.ceiling - z)
 
     def exists(self, at: float) -> bool:
-        """Whether it exists at a moment of UTC."""
+        """Whether it exists at a UTC time."""
         if self.dates and not self.dates[0] <= at <= self.dates[1]:
             return False
         if not self.daily:
@@ -119,7 +120,7 @@ class Drawn(NamedTuple):
 
 
 def zone(of: Random, name: str, dated: bool) -> Zone:
-    """Some zone near home."""
+    """Draw a zone near home."""
     daily, dates = None, None
     kind = of.random()
     if kind < 0.45:
@@ -137,7 +138,7 @@ def zone(of: Random, name: str, dated: bool) -> Zone:
 
 
 def draw(seed: int) -> Drawn:
-    """The program of a seed."""
+    """Draw the program of a seed."""
     of = Random(seed)
     issued = 0 if of.random() < 0.3 else MIDNIGHT + of.randrange(DAY) // 60 * 60 + 7
     zones = tuple(zone(of, f"z{number}", bool(issued)) for number in range(of.randint(1, 4)))
@@ -245,7 +246,7 @@ def _extent(zone: Zone, places: list[tuple[float, float]], low: float, high: flo
 
 
 def _moments(low: float, high: float) -> list[float]:
-    """Every 10 s, and both ends."""
+    """Return the times to sample: every 10 s, and both ends."""
     return [*(low + 10 * k for k in range(int((high - low) / 10) + 1)), high]
 
 
@@ -286,7 +287,7 @@ def _stay(
 
 
 def needs(program: Drawn) -> Needs:
-    """What a program needs."""
+    """Return the needs of a program."""
     found: list[tuple[bool, Need | None]] = []
     airspace = [*((each, True) for each in program.inside), *((each, False) for each in program.outside)]
     last = program.legs[-1].ended
@@ -350,7 +351,7 @@ def _met(need: Need, issued: int) -> bool:
 
 
 def judged(program: Drawn) -> bool | None:
-    """Whether a program is good; None where the margins say."""
+    """Return whether a program is good; None if it is within the margins."""
     needed = needs(program)
     if needed.never:
         return False

@@ -1,4 +1,4 @@
-"""The context of a flight that a test asks one stage of."""
+"""The context of a flight for tests of a single stage."""
 
 from contextlib import ExitStack
 from pathlib import Path
@@ -12,7 +12,7 @@ from rtshcua.onboard.enforcement.load import EnforcementMode
 
 
 def request(**changed: Any) -> FlightRequest:
-    """What a flight of the simulated vehicle asks for, with these changes."""
+    """Return a request for a flight of the simulated vehicle, with these changes."""
     usual = {
         "bundle": Path("short.bundle"), "link": None, "mode": EnforcementMode.SOFTWARE, "data": Path(), "state": Path(),
         "runs": Path("runs"),
@@ -21,7 +21,7 @@ def request(**changed: Any) -> FlightRequest:
 
 
 def context(of: FlightRequest | None = None, clock: Any = None, **changed: Any) -> FlightContext:
-    """Its context; what a stage has no use for is not there."""
+    """Return the context of a flight, without the parts that the stage does not use."""
     never: Any = SimpleNamespace(wish=lambda: None)
     usual: dict[str, Any] = {
         "request": of or request(), "console": None, "clock": clock or SystemClock(), "utc": None, "listening": None,
@@ -31,6 +31,6 @@ def context(of: FlightRequest | None = None, clock: Any = None, **changed: Any) 
 
 
 def refusal_of(found: object) -> Refusal:
-    """The refusal that a stage gave."""
+    """Return the refusal of a stage."""
     assert isinstance(found, Refusal), found
     return found

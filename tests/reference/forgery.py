@@ -1,4 +1,4 @@
-"""A real log, and what an attacker would do to it: lines are forged here without any code of `rtshcua.evidence`.
+"""A real log, and forgeries of an attacker, made without any code of `rtshcua.evidence`.
 
 `expect` gives the slug and the record at which the audit of forged lines ends. Four attackers: without keys (`edit`,
 `rehashed`, `renumbered`), without keys but diligent (`rewritten`), with the key of the epoch in which the vehicle was
@@ -52,7 +52,7 @@ def other_flight() -> tuple[bytes, ...]:
 
 
 def prove(lines: Iterable[bytes], pinned: bytes = ROOT_KEY) -> Audit:
-    """The audit under the right root key; a verifier written apart must come to the same."""
+    """Audit under the right root key. The independent verifier must reach the same result."""
     lines = list(lines)
     found = audit(lines, pinned)
     agree(b"".join(lines), found, pinned)
@@ -71,7 +71,7 @@ def sound(lines: Iterable[bytes]) -> Audit:
 
 
 def expect(lines: Iterable[bytes], pinned: bytes = ROOT_KEY) -> tuple[str, int]:
-    """Slug and record of what is wrong."""
+    """Return slug and record of the flaw."""
     report = prove(lines, pinned).report
     finding = report.failure or report.shortfall
     assert finding is not None, "the forgery was not noticed"

@@ -1,4 +1,4 @@
-"""Logs of a fleet that never flew: the real format, seals and trust, made as fast as the recorder makes lines.
+"""Generated logs of a fleet that never flew, in the real format, with seals and trust.
 
 What they say of each flight is random, from a seed: such a log verifies, but its decisions do not follow from their
 inputs. Used by bench/archive.py and by tests of the archive.
@@ -106,7 +106,7 @@ def lines(
 
 
 def write(path: Path, vehicle: str, number: int, **options: object) -> str:
-    """Writes such a log to a file, and gives the hash of its last line."""
+    """Write such a log to a file, and return the hash of its last line."""
     last = b""
     with path.open("wb") as file:
         for line in lines(vehicle, number, **options):  # type: ignore[arg-type]

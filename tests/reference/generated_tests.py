@@ -1,4 +1,4 @@
-"""Tests that are generated of a policy in a text, and what they notice when it changes."""
+"""Tests generated from a policy, and the changes of the policy that they detect."""
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -44,7 +44,7 @@ def generated(text: str, name: str, imports: str, skills: tuple[str, ...] = ()) 
 
 
 def wrong(of: GeneratedTests, others: Mapping[str, str]) -> Iterator[str]:
-    """The cases that the language refuses, then those that are not met, as they are found."""
+    """Yield the cases that the language refuses, then those that fail."""
     assert of.text is not None
     played = play(of.text, others)
     yield from (each.code.id for each in played.diagnostics if each.severity is Severity.ERROR)
@@ -52,10 +52,10 @@ def wrong(of: GeneratedTests, others: Mapping[str, str]) -> Iterator[str]:
 
 
 def failures(of: GeneratedTests, others: Mapping[str, str]) -> list[str]:
-    """The cases that are not met, or that the language refuses."""
+    """Return the cases that fail or that the language refuses."""
     return list(wrong(of, others))
 
 
 def noticed(of: GeneratedTests, others: Mapping[str, str]) -> bool:
-    """Whether any is; the first one is enough."""
+    """Whether any case fails or is refused."""
     return next(wrong(of, others), None) is not None

@@ -1,4 +1,4 @@
-"""Which findings comments ignore: a naive reading of docs/linting.md, character by character, written apart."""
+"""An oracle for ignored findings: a naive, independent reading of docs/linting.md, character by character."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -25,7 +25,7 @@ class Remark(NamedTuple):
 
 
 def remarks(text: str) -> list[Remark]:
-    """The comments of a text."""
+    """Return the comments of a text."""
     found: list[tuple[int, int]] = []
     other: list[int] = []
     at = 0
@@ -67,7 +67,7 @@ def _remark(text: str, start: int, end: int, other: list[int]) -> Remark:
 
 
 def ignored(source: Source, found: Iterable[Diagnostic]) -> set[Diagnostic]:
-    """The findings that the comments of a text ignore."""
+    """Return the findings that the comments of a text ignore."""
     whole: set[str] = set()
     lines: dict[int, set[str]] = {}
     for remark in remarks(source.text):

@@ -1,4 +1,4 @@
-"""The boundary's own evidence (docs/log-format.md, section 7), worked out a second time from the records alone."""
+"""The boundary's own evidence (docs/log-format.md, section 7), computed independently from the records alone."""
 
 import hashlib
 import re
@@ -18,7 +18,7 @@ _MOST_MARKS = 128
 
 
 class Disputed(Exception):
-    """The records are not what the boundary signed."""
+    """The records differ from those that the boundary signed."""
 
 
 def after(digest: bytes, tag: int, payload: bytes, label: bytes = b"rtshcua/boundary") -> bytes:
@@ -108,7 +108,7 @@ class Boundary:
         self.claim = genesis if genesis["utc_error_us"] < _UNKNOWN else None  # the first since the statement before
 
     def line(self, record: dict) -> None:
-        """One record more, behind the genesis. Raises `Disputed`."""
+        """Read the next record after the genesis. Raises `Disputed`."""
         kind = record["type"]
         if not self.keys:
             return
@@ -138,7 +138,7 @@ class Boundary:
             self.stated, self.gap_end = False, 0
 
     def _alone(self, record: dict) -> None:
-        """A record from which on there was no boundary."""
+        """Read a record after which there was no boundary."""
         event = record.get("event")
         by_standing = event == "dispatched" and record["kind"] in (1, 2)
         if record["type"] == "decision" or event == "boundary":

@@ -13,7 +13,7 @@ _SIZE = re.compile(r"0|[1-9][0-9]{0,15}", re.ASCII)
 
 
 class Broken(Exception):
-    """What a log must not say; the text tells what."""
+    """A log violates its format; the text is the reason."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The raw frames of a flight in virtual time, as they would lie beside its log."""
+"""The raw frames of a flight in virtual time, as they are stored next to its log."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,4 +1,4 @@
-"""What may happen on a flight, each flown once: its log, and the raw frames beside it."""
+"""One flight for each kind of fault: its log and its raw frames."""
 
 from functools import cache
 from typing import NamedTuple
@@ -45,7 +45,7 @@ def recorded(fault: str, flavour: str, mode: EnforcementMode = EnforcementMode.S
 
 @cache
 def fallen_back(flavour: str) -> Recorded:
-    """The wind rises above the limit on the leg: the chain of the step flies."""
+    """Fly a mission with wind above the limit on a leg, so that the step's chain flies."""
     return once(f"fallen_back-{flavour}", lambda: _fly(flavour, (WindStep(20 * S, 14 * M),), case.short_steps()))
 
 

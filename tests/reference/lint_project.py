@@ -1,9 +1,9 @@
-"""A project to lint: a policy with one habit, and two missions under it with another."""
+"""A project for lint tests: a policy with one finding, and two missions with another."""
 
 from collections.abc import Callable
 from pathlib import Path
 
-#: an import that may go without harm to anyone: the same stands further down
+#: an unused import that is safe to delete, since it is repeated below
 UNUSED = 'import  "lib:skills/hover.rts"'
 POLICY = f"""import "lib:policies/site.rts"
 {UNUSED}
@@ -28,7 +28,7 @@ mission Look under meadow_flight@2 on quad {
   phase recovery   { return_home() }
 }
 """
-#: what is found in them: by code, and the file
+#: the expected findings: code and file
 HABITS = [("E1302", "one.rts"), ("E1305", "policy.rts"), ("E1302", "two.rts")]
 
 Lint = Callable[..., tuple[int, list[tuple[str, str]]]]

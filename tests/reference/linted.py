@@ -1,4 +1,4 @@
-"""Small programs against what ships, and which habits are found in them."""
+"""Small programs with the shipped library, and their lint findings."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -28,7 +28,7 @@ skill rise(top: altitude in 5 m .. 50 m, tag: one of a, b = a) {
 
 
 def program(files: Mapping[str, str], first: str = "main.rts") -> Program:
-    """A program of files by name, and of what ships."""
+    """Load a program from files by name and the shipped library."""
 
     def read(path: str) -> bytes:
         name = Path(path).name
@@ -38,26 +38,24 @@ def program(files: Mapping[str, str], first: str = "main.rts") -> Program:
 
 
 def linted(one: Program) -> tuple[Diagnostic, ...]:
-    """What the rules find in the first file of a program, its policies lowered, and what is wrong with its ignores; but
-    for what its comments ignore.
-    """
+    """Return the lint findings in the first file of a program, with its policies lowered and its ignores applied."""
     grounds = examine_program(one, dialect.load()).grounds
     return filter_findings(lint(one, None, grounds), one.sources, [one.units[0].file], {}).found
 
 
 def decided(text: str) -> list[tuple[str, str]]:
-    """The code and the underlined text of each finding of `linted`."""
+    """Return code and underlined text of each finding of `linted`."""
     one = program({"main.rts": text})
     return [(each.code.id, underlined(one, each)) for each in linted(one)]
 
 
 def found(text: str, **others: str) -> list[tuple[str, str]]:
-    """The code and the underlined text of each finding."""
+    """Return code and underlined text of each finding."""
     one = program({"main.rts": text} | {f"{name}.rts": other for name, other in others.items()})
     return [(each.code.id, underlined(one, each)) for each in lint(one)]
 
 
 def underlined(one: Program, each: Diagnostic) -> str:
-    """The text that a finding is about."""
+    """Return the text under a finding."""
     assert each.span is not None
     return one.sources[each.span.file].slice(each.span)

@@ -1,4 +1,4 @@
-"""Every small change of a log of 200 records, and every verifier's word on each: none may take one for the log."""
+"""Every small change of a log of 200 records, and the result of every verifier: none may accept one as the log."""
 
 import copyreg
 import io

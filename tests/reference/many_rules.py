@@ -1,4 +1,4 @@
-"""Policies with many rules, of kinds that have little, much or everything in common."""
+"""Policies with many rules that overlap little, much or completely."""
 
 from collections.abc import Callable, Mapping
 
@@ -48,12 +48,12 @@ KINDS: Mapping[str, Callable[[int], str]] = {
 }
 
 
-#: those that the rules name, besides `operator`
+#: the roles that the rules name, besides `operator`
 ROLES = f"role supervisor, {', '.join(f'r{number}' for number in range(60))}\n"
 
 
 def policy(kind: str, rules: int) -> str:
-    """A source with a policy of so many rules of a kind."""
+    """Return a source with a policy of many rules of a kind."""
     lines = "".join(f"  {KINDS[kind](number)}\n" for number in range(rules))
     return (
         f"{IMPORTS}{ROLES}policy many version 1 {{\n  permit hover, return_home, emergency_land by any\n{lines}"

@@ -1,4 +1,4 @@
-"""What a trusted witness makes of the checkpoints of a log: anchors."""
+"""Anchors: the checkpoints of a log, cosigned by a trusted witness."""
 
 import json
 from collections.abc import Sequence
@@ -12,13 +12,13 @@ WITNESS = case.KEYS[Duty.WITNESS]
 
 
 def note_of(lines: Sequence[bytes], number: int) -> str:
-    """The checkpoint of a signed record."""
+    """Return the checkpoint of a signed record."""
     note: str = json.loads(lines[number])["checkpoint"]
     return note
 
 
 def mark(note: str, key: SigningKey = WITNESS) -> str:
-    """The checkpoint, cosigned."""
+    """Return the checkpoint, cosigned."""
     text = note.rpartition("\n\n")[0] + "\n"
     line = cosign(text, 1_750_000_000, key.public, lambda data: key.sign(data, duty=Duty.WITNESS))
     made = anchor(note, line, [key.public])

@@ -1,4 +1,4 @@
-"""An interpreter of conditions over sets of situations, by definition: slow, obvious, written apart from `evaluate`.
+"""A naive interpreter of conditions over sets of situations, independent of `evaluate`.
 
 Truths are the letters T, F and U, and what a condition may be is a set of them. A single value is a set of one.
 """

@@ -1,4 +1,4 @@
-"""What a condition of the source means, by definition: on the IR itself, over a history of observations, in fractions.
+"""The meaning of a condition by its definition: on the IR, over a history of observations, in fractions.
 
 Written apart from the lowering: no linear forms, no code, no whole numbers. A number is an interval of what it can be,
 where a missing signal can be anything; a comparison is decided where the intervals leave no doubt. Truths are T, F, U.

@@ -1,4 +1,4 @@
-"""Geometry by definition, exact: slow, obvious, and written apart from `rtshcua.decision.zones`."""
+"""Exact geometry by its definitions, slow and simple, independent of `rtshcua.decision.zones`."""
 
 from fractions import Fraction
 from itertools import combinations, pairwise

@@ -1,5 +1,6 @@
-"""Temporal monitors by definition: the whole history is kept, and each question looks at the step function of a
-condition moment by moment. Slow, obvious, written apart from `rtshcua.decision.temporal`.
+"""Temporal monitors by their definition, independent of `rtshcua.decision.temporal`.
+
+The whole history is kept, and each question evaluates the step function of a condition moment by moment.
 
 Truths are letters, F < U < T. A condition's history is its truth at each observation, with the moment in us.
 """

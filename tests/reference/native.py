@@ -1,4 +1,4 @@
-"""The decision in C, asked in batches, and the same questions asked of the reference."""
+"""The decision in C, called in batches, and the same decisions by the reference."""
 
 import ctypes
 from array import array
@@ -46,29 +46,29 @@ class Native:
         self._identity = ""
 
     def policy(self, policy: Policy) -> str | None:
-        """Load it; the slug of the refusal."""
+        """Load a policy and return the slug of a refusal."""
         self._identity = policy.vehicle.identity
         return self.policy_bytes(bundle.policy_payload(policy))
 
     def policy_bytes(self, payload: bytes) -> str | None:
-        """The same, of bytes."""
+        """Do the same for encoded bytes."""
         self._kept[0] = payload
         slug = self._library.rt_test_prepare_policy(payload, len(payload))
         return None if slug is None else slug.decode()
 
     def mission(self, mission: Mission) -> str | None:
-        """Load it under the policy; the slug of the refusal."""
+        """Load a mission under the policy and return the slug of a refusal."""
         self._mission = mission
         return self.mission_bytes(bundle.mission_payload(mission))
 
     def mission_bytes(self, payload: bytes) -> str | None:
-        """The same, of bytes."""
+        """Do the same for encoded bytes."""
         self._kept[1] = payload
         slug = self._library.rt_test_prepare_mission(payload, len(payload))
         return None if slug is None else slug.decode()
 
     def unchecked(self, mission: Mission, step: int) -> None:
-        """Prepare a step of a mission that was never looked at whole; the step itself was."""
+        """Prepare a step of a mission that was not checked as a whole."""
         self._mission, self._kept[1] = mission, bundle.mission_payload(mission)
         assert self._library.rt_test_read_mission(self._kept[1], len(self._kept[1])) is None
         self.step(step)
@@ -89,7 +89,7 @@ class Native:
         return [tuple(found[at : at + SIZE]) for at in range(0, len(found), SIZE)]
 
     def again(self, question: Question, times: int) -> None:
-        """Ask the same so many times, without looking at the answers."""
+        """Repeat the same decisions and discard the answers."""
         numbers = array("q", self._numbers(question))
         self._library.rt_test_again(ctypes.c_void_p(numbers.buffer_info()[0]), times)
 

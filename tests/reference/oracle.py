@@ -1,4 +1,4 @@
-"""`decide` over single situations, by the text of design 4.1 and 4.4: slow, obvious, written apart."""
+"""A naive, independent `decide` over single situations, by the text of design 4.1 and 4.4."""
 
 from itertools import pairwise
 from math import ceil, isqrt

@@ -1,4 +1,4 @@
-"""Random areas on a small grid, so that corners, edges and places often fall on one another."""
+"""Random areas on a small grid, so that corners, edges and places often coincide."""
 
 from random import Random
 

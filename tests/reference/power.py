@@ -1,4 +1,4 @@
-"""A disk that can fail at any operation, and whose power can be cut: the files are real, what was synced is remembered.
+"""A disk that can fail at any operation, and whose power can be cut. The files are real; synced content is recorded.
 
 What was not synced when the power goes is lost page by page, as the disk pleases: of each page either the old octets
 are there or the new ones, or zeros where the file was shorter; the file ends anywhere between its old end and its new.
@@ -14,7 +14,7 @@ PAGE = 4096
 
 
 class Died(BaseException):
-    """The process is no more: nothing of it may run on."""
+    """The process has died and must not continue."""
 
 
 class PowerDisk:

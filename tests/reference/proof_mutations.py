@@ -1,4 +1,4 @@
-"""Proofs that somebody tampered with, and whether what is made of them is true of the logs that they are of.
+"""Mutated proofs, and a check that every accepted one is true of its log.
 
 Octets are changed as they are; and what a proof carries is taken apart, changed, exchanged with what other proofs
 carry, and put together in its one form again, so that the verifier gets past its form.
@@ -62,12 +62,12 @@ def _sound(proof: bytes | Flaw) -> bytes:
 
 
 def mutated(of: Random) -> bytes:
-    """Some proof, changed once or a few times."""
+    """Return a random proof, changed once or a few times."""
     return changed(of.choice(proofs()), of)
 
 
 def changed(data: bytes, of: Random) -> bytes:
-    """The octets, changed once or a few times."""
+    """Return the octets, changed once or a few times."""
     for _ in range(of.choice((1, 1, 1, 2, 3))):
         data = of.choice(_MUTATIONS)(data, of)
     return data

@@ -1,4 +1,4 @@
-"""Proofs and receipts taken apart, and put together without any code of `rtshcua.evidence`: for whoever forges one."""
+"""Take proofs and receipts apart and assemble them without any code of `rtshcua.evidence`, for forgeries."""
 
 import json
 from base64 import b64decode, b64encode

@@ -1,4 +1,4 @@
-"""A log written anew by who holds all of its keys: numbered, linked, counted and signed, without our evidence code.
+"""Rewrite a log with all of its keys: number, link, count and sign it, without the evidence code.
 
 `resealed(lines, keys)` takes lines as they should be but for that; `keys` gives the secret seed of a public key;
 where it gives none, the checkpoint stays as it is, as do fields named in `keep` in all signed records.

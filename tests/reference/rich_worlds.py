@@ -1,5 +1,7 @@
-"""Random worlds with what `worlds` leaves out: declared speeds, time zones, days of the week, rings with holes, clocks
-that nobody vouches for, and numbers at the ends of their ranges.
+"""Random worlds with features that `worlds` omits.
+
+These are declared speeds, time zones, days of the week, rings with holes, clocks without a source, and numbers at the
+ends of their ranges.
 """
 
 from random import Random
@@ -115,7 +117,7 @@ def zone(of: Random, plain: Zone) -> Zone:
 
 
 def policy(of: Random) -> Policy:
-    """A random policy, made richer."""
+    """Return a random policy with these features."""
     plain = worlds.policy(of)
     windows = len(plain.sets)
     codes = [

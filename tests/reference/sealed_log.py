@@ -1,4 +1,4 @@
-"""A log of some epochs with the keys of `virtual.case`, for whatever is proven of one."""
+"""A log of some epochs with the keys of `virtual.case`, for tests of proofs."""
 
 from functools import cache
 from hashlib import sha256
@@ -71,7 +71,7 @@ def sealed_log(epochs: int = 3, records: int = 5, *, recovers: bool = False, clo
 
 
 def resumed(lines: list[bytes], draw: object) -> Recorder:
-    """A recorder that goes on after these lines."""
+    """Return a recorder that continues after these lines."""
     head = Head()
     from reference.forgery import read
 

@@ -15,5 +15,5 @@ class _Seeds:
 
 
 def epoch_seeds() -> Callable[[], bytes]:
-    """What a recorder draws its epoch keys from."""
+    """Return the source of epoch keys for a recorder."""
     return _Seeds()

@@ -1,4 +1,4 @@
-"""A plug-in of pytest that asks the decision in C whatever a test asks the one in Python, and fails where they differ:
+"""A pytest plug-in that repeats every decision of a test in C, and fails if the results differ:
 
     RTSHCUA_BOUNDARY=build/boundary/librtshcua.so pytest -p reference.shadow tests/unit tests/integration
 
@@ -31,7 +31,7 @@ _test: Final = SimpleNamespace(altered=False)  # whether the one that runs decid
 def decide(
     invocation: PreparedInvocation, state: State, policy: PreparedPolicy, context: Context, now: Now
 ) -> Decision:
-    """The decision of the reference, once C has decided the same."""
+    """Return the decision of the reference, after checking that C decides the same."""
     decision = _decide(invocation, state, policy, context, now)
     if _test.altered:
         return decision
@@ -67,15 +67,15 @@ def pytest_configure() -> None:
 
 
 def pytest_collection_finish() -> None:
-    """And in the tests."""
+    """Replace `decide` in the tests too."""
     pytest_configure()
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Let those alone that are marked."""
+    """Skip marked tests."""
     _test.altered = item.get_closest_marker("altered") is not None
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say how often both were asked."""
+    """Report the number of compared decisions."""
     terminalreporter.write_line(f"asked of the decision in C too: {dict(_asked)}")

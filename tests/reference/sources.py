@@ -1,4 +1,4 @@
-"""Small programs in text, and what checking them finds."""
+"""Small programs as text, and their findings."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -21,7 +21,7 @@ IMPORTS = "".join(
 
 
 def findings(text: str) -> tuple[Diagnostic, ...]:
-    """All findings on one source."""
+    """Return all findings of a source."""
 
     def read(path: str) -> bytes:
         return text.encode() if path == "probe.rts" else Path(path).read_bytes()
@@ -30,12 +30,12 @@ def findings(text: str) -> tuple[Diagnostic, ...]:
 
 
 def found(text: str) -> list[tuple[str, str]]:
-    """The codes and messages of all findings."""
+    """Return codes and messages of all findings of a source."""
     return [(each.code.id, each.message) for each in findings(text)]
 
 
 def skill(name: str, **parts: str) -> str:
-    """A skill that holds, with other parts instead; a part of the value "" is left out."""
+    """Return a skill that holds, with some parts replaced. A part with the value "" is omitted."""
     written = {
         "motion": "hold",
         "class": "tactical",
@@ -50,13 +50,13 @@ def skill(name: str, **parts: str) -> str:
 
 
 def policy(*rules: str, contingency: str = "return_home, emergency_land") -> str:
-    """A policy that permits everything, with further rules."""
+    """Return a policy that permits everything, with further rules."""
     lines = ["permit any by any through agent, operator, onboard, reflex", *rules, f"contingency {contingency}"]
     return "policy rules version 1 {\n" + "".join(f"  {line}\n" for line in lines) + "}\n"
 
 
 def mission(*steps: str, under: str = "rules@1") -> str:
-    """A mission of one phase, after whose name `departure` the library's `takeoff` asks."""
+    """Return a mission of one phase, named `departure` because the library's `takeoff` requires it."""
     body = "".join(f"    {step}\n" for step in steps)
     header = f"mission flight under {under} on quad {{\n  proposed by agent openclaw for role operator\n"
     return f"{header}  phase departure {{\n{body}  }}\n}}\n"
@@ -67,5 +67,5 @@ ROLES = "role supervisor, rescuer, pilot, trainee, chief"
 
 
 def program(*parts: str, imports: Iterable[str] = (IMPORTS,)) -> str:
-    """Parts of one source, with their imports, and the roles that they may name."""
+    """Join parts to one source, with their imports and the roles that they may name."""
     return "".join((*imports, *parts, f"{ROLES}\n"))

@@ -1,4 +1,4 @@
-"""What the tests of a program find when they are run."""
+"""Run the tests of a program and return their findings."""
 
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.ground.language.load import Program
@@ -8,6 +8,6 @@ from rtshcua.mavlink import dialect
 
 
 def unmet(program: Program) -> tuple[Diagnostic, ...]:
-    """The findings on expectations that are not met."""
+    """Return the findings about failed expectations."""
     ran = (run_case(case) for case in suite(program, dialect.load()).cases)
     return tuple(each.finding for each in ran if each.finding is not None)

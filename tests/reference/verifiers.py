@@ -1,4 +1,4 @@
-"""What the verifiers make of some octets: the careful one, the quick one, and the independent one."""
+"""The results of the careful, the quick and the independent verifier on some octets."""
 
 import io
 from functools import lru_cache
@@ -62,7 +62,7 @@ def _established(genesis: Genesis, pinned: bytes) -> Basis | Flaw:
 
 
 def independent(data: bytes, pinned: bytes = ROOT_KEY) -> str:
-    """The word of the independent verifier."""
+    """Return the result of the independent verifier."""
     return independent_verifier.verify(data, pinned).kind
 
 

@@ -111,7 +111,7 @@ _kept = lru_cache(maxsize=64)
 
 
 def sealed(policy: Policy = POLICY, mission: Mission = MISSION) -> bytes:
-    """A bundle of both, bound and signed."""
+    """Return the bound and signed bundle of a policy and a mission."""
     return _sealed(The(policy), The(mission))
 
 
@@ -132,7 +132,7 @@ def _signed_root() -> bytes:
 
 
 def sealed_again(of: Loaded) -> bytes:
-    """The bundle that this came from."""
+    """Return the bundle of a loaded one."""
     return _seal(The(of.bundle.policy), The(of.bundle.mission))
 
 
@@ -155,7 +155,7 @@ def try_load(
 def loaded(
     policy: Policy = POLICY, mission: Mission = MISSION, mode: EnforcementMode = EnforcementMode.SOFTWARE
 ) -> Loaded:
-    """The bundle of both, in force."""
+    """Load the bundle of a policy and a mission."""
     return renewed(_loaded(The(policy), The(mission), mode))
 
 
@@ -173,7 +173,7 @@ def renewed(of: Loaded, root: TrustRoot = ROOT) -> Loaded:
 
 
 class ManualClock:
-    """Moves when it is told to."""
+    """A clock that only a test moves."""
 
     def __init__(self, start: Now = START) -> None:
         self._now = start
@@ -409,14 +409,14 @@ def request_for(of: Loaded, kind: int = 0, step: int = 0, link: int = -1, **chan
 
 
 def answer_to(of: Loaded, request: bytes) -> Decision | Status:
-    """What the boundary answers."""
+    """Return the answer of the boundary."""
     answer = read_answer(of, request, of.boundary.enforce(request))
     assert not isinstance(answer, Refusal)
     return answer
 
 
 def read_answer(of: Loaded, request: bytes, answer: bytes) -> Decision | Status | Refusal:
-    """What the answer to a request says."""
+    """Decode the answer to a request."""
     policy, steps = of.bundle.policy, of.invocations
     asked = decode_request(request, policy.slots, len(policy.monitors))
     known = not isinstance(asked, Refusal) and 0 <= asked.step < len(steps)
@@ -424,7 +424,7 @@ def read_answer(of: Loaded, request: bytes, answer: bytes) -> Decision | Status 
 
 
 def allowed(of: Loaded, kind: int = 0, step: int = 0, link: int = -1) -> bytes:
-    """The permit of a request that must be allowed."""
+    """Return the permit for a request that must be allowed."""
     answer = answer_to(of, request_for(of, kind, step, link))
     assert isinstance(answer, Decision)
     assert answer.outcome is Outcome.ALLOW, answer

@@ -72,10 +72,7 @@ class LoweredPolicy:
 def lower_policy(
     context: CheckContext, policy: PolicyDecl, vehicle: VehicleDecl, files: frozenset[str], names: Mapping[str, str]
 ) -> LoweredPolicy | None:
-    """Lower a policy for a vehicle. Returns None after a finding.
-
-    `files` is its import closure. `names` maps files to their names in signed artefacts.
-    """
+    """Lower a policy with its import closure `files`; `names` are the signed names of files. None after a finding."""
     before = len(context.report.found)
     skills = _skills(context, policy, files)
     read = read_by_all(vehicle)
@@ -88,12 +85,10 @@ def lower_policy(
     slots = SignalSlots(context, 1 if vehicle.cells is None else vehicle.cells.value)
     flat_vehicle = lower_vehicle(vehicle, *map(slots.of, read))
     projection = projection_at(vehicle.home.latitude, vehicle.home.longitude)
-    conditions = ConditionLowering(
-        context, slots, ZoneTable(projection, zones, context.report, vehicle, context.data), sources
-    )
-    contracts = ContractLowering(
-        context, {skill.name.text: number for number, skill in enumerate(skills)}, conditions, flat_vehicle
-    )
+    zone_table = ZoneTable(projection, zones, context.report, vehicle, context.data)
+    conditions = ConditionLowering(context, slots, zone_table, sources)
+    numbers = {skill.name.text: number for number, skill in enumerate(skills)}
+    contracts = ContractLowering(context, numbers, conditions, flat_vehicle)
     roles = {role: number for number, role in enumerate(_roles(policy))}
     flat_contracts = tuple(contracts.contract(skill) for skill in skills)
     rules = RuleLowering(context, roles, contracts).lowered(policy)

@@ -104,7 +104,7 @@ def test_references_are_found_in_all_programs(desk: Workspace) -> None:
         (LOOK, "class    tac|tical", ["timing class `tactical`: Begins within 30 s"]),
         (LOOK, "gr|ace    1 s", ["How long a clause may be unknown"]),
         (LAKE, "height_above <= t|op", ["parameter of `near`", "required"]),
-        (LAKE, "contin|gency hover", ["What flies when a step is denied in the air."]),
+        (LAKE, "contin|gency hover", ["The chain that flies if a step is denied in the air."]),
         (LAKE, "who = oper|ator", ["role `operator`"]),
         (DIP, "manner = fa|st", ["a choice for `manner` of `look`"]),
         (DIP, "sea.mood == ca|lm", ["`calm` = 0, a value of `mood`"]),

@@ -25,7 +25,7 @@ def test_findings_beyond_limit_are_counted(
     said = capsys.readouterr().err
     assert said.count("error[E0108]") == MOST_SHOWN
     assert "1000 errors; run `rtshcua explain E0108` for details" in said
-    assert f"{MANY - MOST_SHOWN} of them are not shown, the least severe: `--json` has all" in said
+    assert f"the {MANY - MOST_SHOWN} least severe are not shown; use `--json` for all" in said
     assert len(said) < 100_000
     assert app.main([command, "a.rts", "--json"]) == ExitCode.DIAGNOSTICS
     assert len(json.loads(capsys.readouterr().out)["diagnostics"]) == MANY

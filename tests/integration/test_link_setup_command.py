@@ -71,7 +71,7 @@ def test_invalid_options_are_refused_before_sending(
     path = tmp_path / "link.key"
     at = ["--connect", AT.format(free_port())]
     for words, code, says in (
-        (at, ExitCode.USAGE, "nobody vouches"),
+        (at, ExitCode.USAGE, "requires `--trusted-link`"),
         (["--trusted-link"], ExitCode.USAGE, "`--connect`"),
         (["--system", "2"], ExitCode.USAGE, "`--connect`"),
         (["--connect", "nonsense", "--trusted-link"], ExitCode.USAGE, "nonsense"),

@@ -1,1 +1,1 @@
-"""The command line: one module a command, and the only place where the parts are put together."""
+"""The command line: one module for each command, which calls the services of `rtshcua.app`."""

@@ -1,12 +1,11 @@
 """Reads plain command lines of `check`, `lint` and `recall` without typer, whose start takes longer than they do.
 
-A command line that holds anything else than the options listed here, in their usual forms, is left to typer: help,
-mistakes, abbreviations, and whatever is not understood.
+Every other command line is left to typer: help, errors, abbreviations, and unlisted options.
 
 Processor time of a command with this, against typer's: 0.66 for `check` of a short mission (bench/startup.py), 0.44
 for `lint` of 20 files that it has seen before (bench/lint.py), 0.50 for `recall` (bench/recall.py). Two of them run in
-hooks at each commit, and the third has to be quick. tests/unit/front/cli/test_fast_path.py holds the lists against the
-options that typer knows, and what is read here against what typer reads.
+commit hooks, and a recall must be fast. tests/unit/front/cli/test_fast_path.py compares the lists and the results with
+typer.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -60,7 +59,7 @@ RECALL: Mapping[str, tuple[str, Kind]] = {
 
 
 def read(words: Sequence[str], known: Mapping[str, tuple[str, Kind]]) -> tuple[tuple[Path, ...], dict[str, Any]] | None:
-    """The paths of a command line and its options by name; None where typer must read it."""
+    """Return the paths of a command line and its options by name; None if typer must read it."""
     paths: list[Path] = []
     options: dict[str, Any] = {}
     left = iter(words)
@@ -89,7 +88,7 @@ def read(words: Sequence[str], known: Mapping[str, tuple[str, Kind]]) -> tuple[t
 
 
 def lint(words: Sequence[str]) -> ExitCode | None:
-    """`rtshcua lint`; None where typer must read the command line."""
+    """Run `rtshcua lint`; None if typer must read the command line."""
     found = read(words, LINT)
     if found is None or not found[0]:
         return None
@@ -100,7 +99,7 @@ def lint(words: Sequence[str]) -> ExitCode | None:
 
 
 def check(words: Sequence[str]) -> ExitCode | None:
-    """`rtshcua check`; None where typer must read the command line."""
+    """Run `rtshcua check`; None if typer must read the command line."""
     found = read(words, CHECK)
     if found is None or not found[0]:
         return None
@@ -110,7 +109,7 @@ def check(words: Sequence[str]) -> ExitCode | None:
 
 
 def recall(words: Sequence[str]) -> ExitCode | None:
-    """`rtshcua recall`; None where typer must read the command line."""
+    """Run `rtshcua recall`; None if typer must read the command line."""
     found = read(words, RECALL)
     if found is None or len(found[0]) > 1:
         return None

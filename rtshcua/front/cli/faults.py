@@ -1,8 +1,7 @@
-"""How commands fail: one line on the standard error, a documented exit code, and never a traceback.
+"""Report errors of commands: one line on standard error, a documented exit code, and no traceback.
 
-A command that was given `--json` also says it in one JSON object on the standard output.
-
-RTSHCUA_DEBUG=1 shows the traceback of an internal fault.
+With `--json`, the error is also one JSON object on standard output. RTSHCUA_DEBUG=1 shows the traceback of an internal
+fault.
 """
 
 import os
@@ -21,16 +20,16 @@ from rtshcua.wire.untrusted import Untrusted
 if TYPE_CHECKING:
     from rtshcua.adapters.vehicle.address import AddressError
 
-_json = ContextVar("json", default=False)  # whether this command was asked for JSON
+_json = ContextVar("json", default=False)  # whether `--json` is in effect
 
 
-#: errors that are told with the slug of their exit code, where they have none of their own
+#: exit codes whose slug is printed if the error has no slug of its own
 _NAMED = (ExitCode.USAGE, ExitCode.INPUT, ExitCode.UNTRUSTED)
 
 
 @contextmanager
 def as_json(*, wanted: bool) -> Iterator[None]:
-    """Within this, `fail` also prints {"error": {"slug", "text", "help"}, "exit_code"}, if that is wanted."""
+    """Within this context, `fail` also prints {"error": {"slug", "text", "help"}, "exit_code"} if `wanted`."""
     before = _json.set(wanted)
     try:
         yield
@@ -41,9 +40,9 @@ def as_json(*, wanted: bool) -> Iterator[None]:
 def fail(
     code: ExitCode, message: str, help: str | None = None, *, slug: str | None = None, usage: str | None = None
 ) -> ExitCode:
-    """Says `message` (and `help`) on the standard error, and gives `code` back: `return fail(ExitCode.INPUT, ...)`.
+    """Print `message` and `help` on standard error and return `code`: `return fail(ExitCode.INPUT, ...)`.
 
-    `slug` is given where there is a more exact one than the exit code's own; `usage` is how the command is called.
+    `slug`: a more specific one than the exit code's; `usage`: the usage line of the command.
     """
     if _json.get():
         _print_object(error_object(code, message, help, slug=slug))
@@ -58,13 +57,13 @@ def error_object(
     slug: str | None = None,
     at: Mapping[str, str | int] | None = None,
 ) -> dict[str, object]:
-    """The one form of errors for programs, whatever stands beside it: `help` is null where there is none."""
+    """Return the common JSON form of errors; `help` is null if there is none."""
     error = {"slug": slug or code.slug, "text": text, "help": help or None}
     return {"error": error | ({} if at is None else {"at": at}), "exit_code": int(code)}
 
 
 def misaddressed(option: str, error: "AddressError") -> ExitCode:
-    """Fails for an option's address: what is wrong, the address with that part marked below, and what is accepted."""
+    """Report an invalid address of an option, with the wrong part marked, and return the exit code."""
     from rtshcua.diagnostics.excerpt import visible
 
     span: dict[str, str | int] = {"option": option, "value": error.address, "start": error.start, "end": error.end}
@@ -80,12 +79,12 @@ def misaddressed(option: str, error: "AddressError") -> ExitCode:
 
 
 def distrust(error: Untrusted, help: str = "", *, where: str = "") -> ExitCode:
-    """Fails for something that is not to be trusted; `where` says what it was, before the text."""
+    """Report an untrusted input and return the exit code; `where` is put before the text."""
     return refuse(Refusal(error.slug, f"{where}{error}", help or remedy(error)))
 
 
 def refuse(refusal: Refusal, code: ExitCode | None = None) -> ExitCode:
-    """Fails with a refusal, and with the exit code of its slug unless there is another."""
+    """Report a refusal and return `code`, its own exit code, or that of its slug."""
     return fail(code or refusal.code or code_of(refusal.slug), refusal.text, refusal.help, slug=refusal.slug)
 
 
@@ -102,7 +101,7 @@ def tell(
 
 
 def _head(code: ExitCode, slug: str | None = None) -> str:
-    """How an error begins: with its slug where a person may look it up, or tell somebody of it."""
+    """Return the beginning of an error line, with its slug if it is worth showing."""
     slug = slug or code.slug
     return f"error[{slug}]" if slug != code.slug or code in _NAMED else "error"
 
@@ -117,24 +116,22 @@ def _print_object(told: Mapping[str, object]) -> None:
 
 
 def say(line: str) -> None:
-    """Prints one line on the standard error, harmless whatever is in it, or several where it is longer than a terminal
-    is wide; when even that is gone there is nobody left to tell.
-    """
+    """Print a line on standard error, escaped and wrapped; errors in writing are ignored."""
     from rtshcua.diagnostics.excerpt import visible
-    from rtshcua.front.cli.width import fitted  # the door opens without these
+    from rtshcua.front.cli.width import fitted  # not needed at start-up
 
     for each in fitted(visible(line)):
         _say(each)
 
 
 def say_lines(text: str) -> None:
-    """`say` for each line of a text of our own making."""
+    """Call `say` for each line of a trusted text."""
     for line in text.split("\n"):
         say(line)
 
 
 def say_rendered(text: str) -> None:
-    """Prints on the standard error what is harmless already, and may be coloured by us."""
+    """Print an already escaped text on standard error; it may contain our colours."""
     _say(text)
 
 
@@ -148,7 +145,7 @@ def _say(line: str) -> None:
 
 
 def barrier(command: Callable[[], int]) -> int:
-    """Runs `command` and gives its exit code back, whatever rises out of it; SystemExit alone passes, if meant."""
+    """Run `command` and return its exit code, whatever exception it raises; only SystemExit may pass."""
     try:
         code = command()
         _flush()  # a full disk or a closed pipe shows here, not after the exit code is out
@@ -156,11 +153,13 @@ def barrier(command: Callable[[], int]) -> int:
     except KeyboardInterrupt:
         return fail(ExitCode.INTERRUPTED, "interrupted")
     except SystemExit as end:
-        if isinstance(end.__context__, BrokenPipeError):  # rich's own way of leaving when the reader has left
+        if isinstance(end.__context__, BrokenPipeError):  # rich exits this way if the reader has closed the pipe
             return ExitCode.FULL
         raise
     except BrokenPipeError:
-        return ExitCode.FULL  # quiet, for the reader left on purpose; not 0, for it may have missed the verdict
+        return (
+            ExitCode.FULL
+        )  # no message, because the reader closed the pipe; not 0, because it may have missed the result
     except OSError as error:
         return unreadable(error)
     except Untrusted as error:
@@ -177,7 +176,7 @@ def barrier(command: Callable[[], int]) -> int:
 
 
 def _interrupted(error: BaseException | None) -> bool:
-    """Whether it came of Ctrl-C: what is interrupted may say so by an error of its own, as `__set_name__` does."""
+    """Return whether Ctrl-C caused the error; interrupted code may raise another error, as `__set_name__` does."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None
@@ -200,7 +199,7 @@ def _flush() -> None:
 
 
 def unreadable(error: OSError) -> ExitCode:
-    """Fails for what the operating system would not do."""
+    """Report an error of the operating system and return the exit code."""
     text, help = _words_of(error), None
     if isinstance(error, FileNotFoundError) and isinstance(error.filename, str):
         from rtshcua.app.files import missing
@@ -210,8 +209,9 @@ def unreadable(error: OSError) -> ExitCode:
 
 
 def of_each(paths: Iterable[Path], work: Callable[[Path, bool], ExitCode]) -> ExitCode:
-    """The first exit code that is not 0, of `work` on each file; it is also told which is the first. One that cannot be
-    read is told, and the others come all the same.
+    """Run `work` on each path and return the first exit code that is not 0.
+
+    `work` also receives whether the path is the first. An unreadable file is reported, and the others follow.
     """
     codes = []
     for number, path in enumerate(paths):
@@ -219,19 +219,19 @@ def of_each(paths: Iterable[Path], work: Callable[[Path, bool], ExitCode]) -> Ex
             codes.append(work(path, number == 0))
         except OSError as error:
             if error.filename is None:
-                raise  # what we write on
+                raise  # our own output failed
             codes.append(unreadable(error))
     return next((code for code in codes if code is not ExitCode.OK), ExitCode.OK)
 
 
 def _words_of(error: OSError) -> str:
-    """What the system says, and of which file: "no such file or directory: `x.rts`"."""
+    """Return the system's error text with the file: "no such file or directory: `x.rts`"."""
     words = words_of(error)
     return f"{words}: `{error.filename}`" if error.filename is not None else words
 
 
 def _discard(name: str) -> None:
-    """Points a standard stream that cannot be written any more at nothing, or exiting would fail on it again."""
+    """Redirect a broken standard stream to the null device, so that the exit does not fail on it again."""
     stream = getattr(sys, name)
     try:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())

@@ -1,4 +1,4 @@
-"""Ctrl-C and other requests to stop a command that looks for them between two pieces of work."""
+"""Requests to stop (Ctrl-C, SIGTERM) for commands that check for them between two pieces of work."""
 
 import signal
 from threading import current_thread, main_thread
@@ -9,13 +9,13 @@ from rtshcua.app.fly.stop_wishes import breakable as breakable
 
 
 class Stopped(Exception):
-    """Somebody asked for the end; raised by `StopRequest.look` alone, never amid other work."""
+    """A stop was requested; raised only by `StopRequest.look`."""
 
 
 class StopRequest:
-    """While entered, in the main thread, SIGINT and SIGTERM set a flag, which `look` reads between two pieces of work.
+    """A context in which SIGINT and SIGTERM set a flag, which `look` checks; only in the main thread.
 
-    A signal that is ignored stays so: a shell ignores SIGINT for what it starts in the background.
+    Ignored signals stay ignored: a shell ignores SIGINT for background processes.
     """
 
     def __init__(self) -> None:
@@ -36,7 +36,7 @@ class StopRequest:
             signal.signal(number, handler)
 
     def look(self) -> None:
-        """Raises Stopped once a signal came."""
+        """Raise Stopped if a signal was received."""
         if self.asked:
             raise Stopped
 

@@ -1,4 +1,4 @@
-"""Standard streams that were closed before we began (`>&-`): what is written to them fails, as on a closed pipe."""
+"""Handle closed standard streams (`>&-`): writing to them fails, as on a closed pipe."""
 
 import io
 import os
@@ -7,28 +7,28 @@ from typing import IO, cast
 
 
 class _Closed(io.BufferedIOBase):
-    """Takes nothing: whoever wanted to read is not there."""
+    """An output without a reader."""
 
     def writable(self) -> bool:
         return True
 
     def fileno(self) -> int:
-        return 1  # where nothing can be written
+        return 1  # opened read-only by `mend_streams`
 
     def write(self, data: object) -> int:
         raise BrokenPipeError
 
 
 def mend_streams() -> None:
-    """Occupy the standard descriptors that are closed, and let output that has nowhere to go fail rather than vanish.
+    """Occupy closed standard descriptors, and make writing to a closed standard output fail.
 
-    Else the next file that is opened, an evidence log perhaps, would be what this process or a library of it takes for
-    its standard output. A child is given none of them.
+    Otherwise the next opened file, such as an evidence log, would get the descriptor of standard output. Children do
+    not inherit these descriptors.
     """
     for number in range(3):
         try:
             os.fstat(number)
         except OSError:
-            os.open(os.devnull, os.O_RDONLY)  # the lowest that is free, which is this one
+            os.open(os.devnull, os.O_RDONLY)  # gets the lowest free number, which is this one
     if sys.stdout is None:
         sys.stdout = cast("IO[str]", io.TextIOWrapper(_Closed(), encoding="utf-8", write_through=True))

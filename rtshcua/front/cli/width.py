@@ -1,4 +1,4 @@
-"""How wide the text of commands is: 80 columns, on a terminal or not, unless the environment asks for more or fewer."""
+"""The width of printed text: 80 columns, unless the environment variable COLUMNS sets another width."""
 
 import os
 import shlex
@@ -7,24 +7,24 @@ from typing import Final
 
 from rtshcua.diagnostics.wrapped import WIDTH, wrapped
 
-#: the fewest columns that text is laid out for
+#: the minimum width, columns
 _LEAST: Final = 40
 
 
 def fitted(line: str) -> list[str]:
-    """A line as lines of 80 columns, or of as many as `COLUMNS` says."""
+    """Wrap a line at the width of printed text."""
     return wrapped(line, columns())
 
 
 def columns() -> int:
-    """How many columns text is laid out for."""
+    """Return the width of printed text in columns."""
     asked = os.environ.get("COLUMNS", "")
     width = int(asked) if asked.isascii() and asked.isdecimal() and len(asked) < 6 else WIDTH
     return max(width, _LEAST)
 
 
 def typed(words: Sequence[str], width: int) -> list[str]:
-    """A command over as many lines as it takes, which can be copied into a shell as they are."""
+    """Return a shell command, broken into lines that can be pasted into a shell."""
     lines = [""]
     for word in map(shlex.quote, words):
         if lines[-1] and len(lines[-1]) + 1 + len(word) > width - 2:

@@ -1,1 +1,1 @@
-"""The commands of `rtshcua`, one file a command."""
+"""The commands of `rtshcua`, one file for each."""

@@ -329,8 +329,8 @@ def link(
     if connect is None and (trusted_link or system is not None):
         return fail(ExitCode.USAGE, "`--trusted-link` and `--system` require `--connect`")
     if connect is not None and not trusted_link:
-        help = "a cable, or a network of its own; `--trusted-link` says that you vouch for it"
-        return fail(ExitCode.USAGE, "the key would cross the link in clear: nobody vouches for it", help)
+        help = "use a cable or a separate network, and confirm it with `--trusted-link`"
+        return fail(ExitCode.USAGE, "the key is sent in clear: `--connect` requires `--trusted-link`", help)
     address = None if connect is None else address_of(connect)
     if isinstance(address, ExitCode):
         return address

@@ -1,1 +1,1 @@
-"""Options that several commands share, and what is known about the options of all."""
+"""Options shared by several commands, and tables about the options of all commands."""

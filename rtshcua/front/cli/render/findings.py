@@ -1,4 +1,4 @@
-"""How commands that read sources report: findings for a person, or one JSON object for a machine."""
+"""Report the findings of commands that read sources, as text or as one JSON object."""
 
 import json
 import os
@@ -23,7 +23,7 @@ _COLOURS = {"error": _RED, "warning": _YELLOW, "note": _CYAN}
 
 
 class Findings:
-    """Collects what a command has to say. With `json` nothing else is on the standard output."""
+    """Collects the findings of a command. With `json`, standard output contains only the JSON object."""
 
     def __init__(self, *, json: bool, deny_warnings: bool = False) -> None:
         self._json = json
@@ -32,7 +32,7 @@ class Findings:
         self._object: dict[str, Any] = as_json((), {})
 
     def report(self, diagnostics: Iterable[Diagnostic], sources: Mapping[str, Source]) -> bool:
-        """Report findings; true when they forbid going on."""
+        """Report findings; return whether they prevent the command from continuing."""
         self._found = found = tuple(diagnostics)
         if self._json:
             self._object = as_json(found, sources)
@@ -42,23 +42,23 @@ class Findings:
             say_rendered((_coloured(text) if _wants_colour() else text).rstrip("\n"))
             say_lines(f"\n{_count(found)}")
             if len(found) > MOST_SHOWN:
-                say(f"{len(found) - MOST_SHOWN:,} of them are not shown, the least severe: `--json` has all")
+                say(f"the {len(found) - MOST_SHOWN:,} least severe are not shown; use `--json` for all")
         forbidding = {Severity.ERROR, Severity.WARNING} if self._deny_warnings else {Severity.ERROR}
         return any(each.severity in forbidding for each in found)
 
     def refuse(self, code: ExitCode, slug: str, message: str, help: str | None = None) -> ExitCode:
-        """End with a refusal that is about no source."""
+        """End with an error that is not about a source."""
         if not self._json:
             return fail(code, message, help, slug=slug)
         return self.finish(code, **_error(code, message, help, slug))
 
     def end(self, refusal: Refusal) -> ExitCode:
-        """`refuse` for a value, whose slug says the exit code."""
+        """End with a refusal; its slug determines the exit code unless it has one."""
         slug, text, help, code = refusal
         return self.refuse(code or code_of(slug), slug, text, help)
 
     def finish(self, code: ExitCode, **result: Any) -> ExitCode:
-        """End; with `json`, print everything."""
+        """Return the exit code; with `json`, print the object."""
         if self._json:
             told = self._object | ended(code, self._found) | result
             out_json(json.dumps(told, indent=2, ensure_ascii=False))
@@ -66,14 +66,14 @@ class Findings:
 
 
 def ended(code: ExitCode, found: Iterable[Diagnostic]) -> dict[str, Any]:
-    """How a command that reports findings ended; a file that cannot be read is an error in the one form, too."""
+    """Return the exit members of the JSON object; an unreadable file is also an error in the common form."""
     unread = next((each for each in found if is_unreadable(each)), None)
     error = {} if unread is None or code is not ExitCode.INPUT else _error(code, unread.message, unread.help)
     return {"exit": code.slug, "exit_code": int(code)} | error
 
 
 def _error(code: ExitCode, text: str, help: str | None, slug: str | None = None) -> dict[str, Any]:
-    """An error in the one form of errors; `message` is what its text was called first."""
+    """Return an error in the common form; `message` is the former name of `text`."""
     told: dict[str, Any] = error_object(code, text, help, slug=slug)
     told["error"]["message"] = text
     return told
@@ -91,7 +91,7 @@ def _wants_colour() -> bool:
 
 
 def laid_out(text: str) -> str:
-    """What is said, in lines of a terminal; lines of a source stay as they are cut."""
+    """Wrap a text at the terminal's width; excerpts of sources stay unchanged."""
     lines = text.split("\n")
     return "\n".join("\n".join([line] if " | " in line else fitted(line)) for line in lines)
 
@@ -101,7 +101,7 @@ def _coloured(text: str) -> str:
 
 
 def _line(line: str) -> str:
-    """Colour one rendered line by how it begins; the text itself stays as it is."""
+    """Colour one rendered line by its beginning, without changing its text."""
     head, bar, rest = line.partition(" | ")
     severity, bracket, _ = line.partition("[")
     if bracket and severity in _COLOURS:

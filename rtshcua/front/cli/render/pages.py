@@ -1,4 +1,4 @@
-"""The pages of diagnostic codes, as they ship: `docs/codes/E0310.md`."""
+"""The shipped pages of diagnostic codes, such as `docs/codes/E0310.md`."""
 
 import re
 from typing import NamedTuple
@@ -14,7 +14,7 @@ _SECTION = re.compile(r"^## (.+)\n", re.MULTILINE)
 
 
 class Page(NamedTuple):
-    """A page whole, and its four sections without their headings."""
+    """A page, and its four sections without headings."""
 
     text: str
     what: str
@@ -24,7 +24,7 @@ class Page(NamedTuple):
 
 
 def read_page(code: Code) -> Page:
-    """The page of a code. Raises OSError when the installation lacks it."""
+    """Return the page of a code. Raises OSError if the installation lacks it."""
     text = (root() / "docs" / "codes" / f"{code.id}.md").read_text(encoding="utf-8")
     parts = _SECTION.split(text)
     sections = dict(zip(parts[1::2], (part.strip() for part in parts[2::2]), strict=True))
@@ -32,6 +32,6 @@ def read_page(code: Code) -> Page:
 
 
 def example(section: str) -> str | None:
-    """The source in a section; None where no source can show it."""
+    """Return the source in a section; None if the section has no source."""
     found = re.search(r"^```rts\n(.*?)^```$", section, re.DOTALL | re.MULTILINE)
     return None if found is None else found[1]

@@ -1,4 +1,4 @@
-"""How far a long command is, for a person who waits."""
+"""Show the progress of long commands on a terminal."""
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -9,13 +9,13 @@ from rtshcua.diagnostics.excerpt import visible
 
 T = TypeVar("T", bound=tuple[object, ...])
 
-#: fewer are done before anyone asks
+#: no progress is shown for fewer items
 _FEW = 4
 _CLEAR = "\r\033[K"
 
 
 def watched(items: Sequence[T]) -> Iterator[T]:
-    """The items, each by its first field, and on a terminal a line that says which one is in hand."""
+    """Yield the items; on a terminal, show the number and the first field of the current one."""
     shows = len(items) >= _FEW and sys.stderr is not None and sys.stderr.isatty()
     try:
         for number, item in enumerate(items, 1):
@@ -30,7 +30,7 @@ def watched(items: Sequence[T]) -> Iterator[T]:
 
 
 def counting(*, quiet: bool) -> Callable[[str], None]:
-    """What shows on a terminal how far something is, each text in the place of the one before; nothing if `quiet`."""
+    """Return a function that shows progress texts on a terminal, each replacing the previous one; none if `quiet`."""
     shows = not quiet and sys.stderr is not None and sys.stderr.isatty()
 
     def say(text: str) -> None:

@@ -1,1 +1,1 @@
-"""The live view of a run: drawn by a process of its own, fed over a pipe, so that it can never hold up a flight."""
+"""The live view of a run, drawn by a separate process and fed over a pipe, so that it cannot delay a flight."""

@@ -1,4 +1,4 @@
-"""`python -m rtshcua.front.cli.render.live STYLE`: draws what it is told on its standard input, until that ends."""
+"""`python -m rtshcua.front.cli.render.live STYLE`: draw the messages from standard input until it ends."""
 
 import os
 import signal
@@ -15,17 +15,17 @@ EXIT_OK, EXIT_GONE = 0, 1
 
 
 def messages() -> Iterator[Message]:
-    """What the flying process tells, one by one."""
+    """Yield the messages of the flying process."""
     decode = msgspec.json.Decoder(Message).decode
     for line in sys.stdin.buffer:
         yield decode(line)
 
 
 def main() -> int:
-    """Draw until the input ends; 1 when nobody reads any more, or nobody ever did."""
+    """Draw until the input ends; return 1 if standard output is closed."""
     if sys.stdout is None:
         return EXIT_GONE
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # it ends with the flight, not before
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the view ends with the flight
     try:
         if sys.argv[1] == "screen":
             from rtshcua.front.cli.render.live.screen import draw
@@ -35,8 +35,8 @@ def main() -> int:
             structured = sys.argv[1] == "json"
             _print(as_json if structured else plain, bell=not structured and sys.stdout.isatty())
         sys.stdout.flush()
-    except OSError:  # the reader left, or the disk that the output goes to is full
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or exiting would fail on it again
+    except OSError:  # closed pipe or full disk
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # otherwise the exit would fail on it again
         return EXIT_GONE
     return EXIT_OK
 

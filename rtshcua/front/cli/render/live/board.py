@@ -1,4 +1,4 @@
-"""What the screen shows, brought together from what it was told; no drawing here."""
+"""The state of the screen, collected from messages; no drawing."""
 
 from collections import deque
 from typing import NamedTuple
@@ -12,7 +12,7 @@ _LATEST = 40
 _TRACK = 2_000
 _DIMENSIONS = {dimension.value: dimension for dimension in Dimension}
 
-#: what an event makes of a step
+#: the step state after each event
 _STATES = {"dispatched": "running", "succeeded": "done", "skipped": "skipped"} | dict.fromkeys(
     ("failed", "violated", "replaced", "released", "time-over", "landed"), "failed"
 )
@@ -55,7 +55,7 @@ class Board:
         self._counting: tuple[str, int, str] | None = None
 
     def take(self, message: Message) -> None:
-        """Take in one message."""
+        """Process one message."""
         match message:
             case FlightPlanView():
                 self.plan = message
@@ -71,11 +71,11 @@ class Board:
 
     @property
     def here(self) -> tuple[int, int] | None:
-        """Where the vehicle is, in mm east and north of home."""
+        """The position of the vehicle, in mm east and north of home."""
         return self.track[-1] if self.track else None
 
     def banner(self, width: int) -> list[str]:
-        """What a person must see at once: whom the step waits for, with what to type, or that the flight was ended."""
+        """The banner: the pending approval with its command, or the reason for the end of the flight."""
         waits, view = self._waits, self.view
         if self._alarm is not None or waits is None:
             return [] if self._alarm is None else alarm(self._alarm, width)
@@ -85,7 +85,7 @@ class Board:
         return waiting_for(waits.step, waits.subject, waits.asks, left_us, waits.agreed, width)
 
     def value(self, reading: SignalReading) -> str:
-        """A signal's value with its unit, `?` while it is not known."""
+        """Return a signal's value with its unit, or `?` if it is unknown."""
         signal = next((each for each in self.plan.signals if each.name == reading.name), None) if self.plan else None
         if signal is None or None in reading.values:
             return "?"
@@ -138,5 +138,5 @@ class Board:
 
 
 def line(what: Happening) -> str:
-    """A happening with its time."""
+    """Return an event as a line with its time."""
     return f"{tenths(what.t_us // 1_000):>8} s  {sentence(what)}"

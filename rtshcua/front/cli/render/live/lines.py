@@ -1,4 +1,4 @@
-"""The view in a pipe: one plain line an event, or one JSON object."""
+"""The view in a pipe: one plain line or JSON object for each event."""
 
 import textwrap
 from collections.abc import Iterable, Sequence
@@ -50,7 +50,7 @@ def _plain(message: Message) -> Iterable[str]:
 
 
 def sentence(what: Happening) -> str:
-    """A happening as one line: the outcome or event, what it is about, and why."""
+    """Return an event as one line: its outcome or name, its subject, and the reason."""
     return visible(_sentence(what))
 
 
@@ -127,7 +127,7 @@ def _ending(summary: Summary) -> Iterable[str]:
 
 
 def as_json(message: Message) -> Iterable[str]:
-    """One object a line; snapshots are for screens."""
+    """Yield one JSON object for each message, except for snapshots."""
     match message:
         case Snapshot():
             return

@@ -1,4 +1,4 @@
-"""The view in a terminal: drawn in place, a few times a second, from the newest that is known."""
+"""The view in a terminal, redrawn in place several times a second with the newest state."""
 
 import queue
 import textwrap
@@ -25,7 +25,7 @@ _BAR: Final = 16
 _MAP_COLUMNS: Final = 36
 _MOST_MAP_ROWS: Final = 16
 _LEAST_MAP_ROWS: Final = 4
-#: from how many columns on there is a map beside the steps
+#: minimum width for a map next to the steps, columns
 _BESIDE: Final = 64
 #: rows of the latest happenings at least
 _LEAST_LATEST: Final = 4
@@ -45,7 +45,7 @@ _OUTCOME_STYLES = {"allow": "green", "deny": "red", "defer": "yellow", "fallback
 
 
 def draw(messages: Iterator[Message]) -> None:
-    """Draw until the messages end; reading never waits for drawing."""
+    """Draw until the messages end; drawing does not block reading."""
     console, board, inbox = Console(), Board(), queue.SimpleQueue[Message | None]()
 
     def read() -> None:

@@ -1,1 +1,1 @@
-"""What `rtshcua show` prints: one file for each thing that can be shown."""
+"""The output of `rtshcua show`, one module for each kind of file."""

@@ -1,4 +1,4 @@
-"""A bundle: who signed it, and all that it says."""
+"""Show a bundle: its signatures and complete contents."""
 
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
@@ -11,7 +11,7 @@ from rtshcua.wire.untrusted import Untrusted
 
 
 def show_bundle(page: TextPage, data: bytes, now_us: int) -> dict[str, object]:
-    """Adds a bundle to the page, and gives it for a program. Raises `Untrusted`."""
+    """Add a bundle to the page, and return it as JSON. Raises `Untrusted`."""
     trusted, verdict = _verdict(data, now_us)
     what = claimed(data, trusted=trusted)
     page.head(f"Bundle of {len(data)} bytes")
@@ -35,7 +35,7 @@ def show_bundle(page: TextPage, data: bytes, now_us: int) -> dict[str, object]:
 
 
 def _verdict(data: bytes, now_us: int) -> tuple[bool, str]:
-    """Whether the key store's root trusts the bundle now, and in words."""
+    """Return whether the key store's root trusts the bundle now, and a text about it."""
     store = KeyStore(data_folder())
     try:
         root = open_root(store.root(), pinned=store.pin(), now_us=now_us)

@@ -58,7 +58,7 @@ class Said(NamedTuple):
 
 
 def said(document: bytes) -> Said:
-    """Takes a document apart without trusting it. Raises `Untrusted`."""
+    """Parse a document without verifying it. Raises `Untrusted`."""
     kind = kind_of(document)
     envelope = cose.unverified(document)
     return Said(kind, envelope.kid, parse_unverified(kind, envelope.payload, _SHAPES[kind]))
@@ -73,7 +73,7 @@ def recorded(detail: str, people: People = NOBODY) -> str:
 
 
 def kind_of_document(data: bytes) -> Artefact | None:
-    """Which kind of document these bytes are, if they are one."""
+    """Return the kind of a document; None if the bytes are not a document."""
     try:
         return kind_of(data)
     except Untrusted:
@@ -81,7 +81,7 @@ def kind_of_document(data: bytes) -> Artefact | None:
 
 
 def show_document(page: TextPage, data: bytes) -> dict[str, object]:
-    """Adds a document to the page, and gives it for a program. Raises `Untrusted`."""
+    """Add a document to the page, and return it as JSON. Raises `Untrusted`."""
     what = said(data)
     kind = _NAMES[what.kind]
     page.head(f"{kind.capitalize()} of {len(data)} bytes (not verified: the flight does that)")

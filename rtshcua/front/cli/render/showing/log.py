@@ -1,4 +1,4 @@
-"""A log as a timeline. Nothing is verified here; a line that is no record ends it."""
+"""Show a log as a timeline, without verification; it ends at the first line that is not a record."""
 
 import re
 from base64 import b64decode
@@ -39,7 +39,7 @@ _KINDS = {STEP: "step", FALLBACK_LINK: "fallback of step", CONTINGENCY_LINK: "co
 
 
 def show_log(page: TextPage, lines: Iterable[bytes]) -> dict[str, object]:
-    """Adds a log to the page, and gives it for a program."""
+    """Add a log to the page, and return it as JSON."""
     start_us, names, entries, stopped = 0, Names(None), [], None
     for number, record in enumerate(_records(lines)):
         if isinstance(record, Flaw):

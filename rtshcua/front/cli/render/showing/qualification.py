@@ -72,7 +72,7 @@ def is_qualification(data: bytes) -> bool:
 
 
 def show_qualification(page: TextPage, data: bytes) -> dict[str, object]:
-    """Adds a record to the page, and gives it for a program. Raises `Untrusted`."""
+    """Add a record to the page, and return it as JSON. Raises `Untrusted`."""
     envelope = cose.unverified(data, limit=max(len(data), MAX_QUALIFICATION))
     record = read_qualification(envelope.payload)
     page.head(f"Qualification record of {len(data)} bytes (not verified: `run` and `doctor` do that)")

@@ -30,7 +30,7 @@ _MEANS = (
 
 
 class Told:
-    """Takes the records of a log in order, and keeps those that tell of record `number`: a few."""
+    """Receives the records of a log in order, and keeps the few that explain record `number`."""
 
     def __init__(self, number: int) -> None:
         self.record: AnyRecord | None = None
@@ -80,7 +80,7 @@ class Told:
 
 
 def show_record(page: TextPage, told: Told, report: LogReport) -> dict[str, object]:
-    """Adds the record to the page, and gives it for a program."""
+    """Add the record to the page, and return it as JSON."""
     record, genesis = told.record, told.genesis
     assert record is not None
     assert genesis is not None

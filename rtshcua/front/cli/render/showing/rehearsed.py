@@ -1,4 +1,4 @@
-"""What `run --dry-run` found, on a page or as an object."""
+"""Show the result of `run --dry-run` as text or JSON."""
 
 import msgspec
 
@@ -13,7 +13,7 @@ from rtshcua.model.step_number import number_of
 
 
 def show_rehearsal(rehearsal: FlightRehearsal, *, as_json: bool) -> ExitCode:
-    """Print it, and give how the command ends."""
+    """Print the result, and return the exit code."""
     if as_json:
         out_json(msgspec.json.encode(_object(rehearsal)).decode())
     else:

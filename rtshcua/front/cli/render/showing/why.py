@@ -59,7 +59,7 @@ def show_assumed(page: TextPage, subject: Subject, assumed: AssumedCase) -> dict
 
 
 def show_why(page: TextPage, trace: Trace, case: Case) -> dict[str, object]:
-    """Adds a trace to the page, and gives it for a program."""
+    """Add a trace to the page, and return it as JSON."""
     invocation = case.invocation
     policy, flat = invocation.policy.policy, invocation.invocation
     decision = trace.decision

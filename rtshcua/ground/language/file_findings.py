@@ -78,7 +78,7 @@ def is_no_file(name: str, error: OSError | ValueError) -> bool:
 
 
 def is_missing(error: OSError | ValueError) -> bool:
-    """Whether the file does not exist, as opposed to cannot be read."""
+    """Whether the file does not exist, rather than being unreadable."""
     return isinstance(error, FileNotFoundError | NotADirectoryError)
 
 

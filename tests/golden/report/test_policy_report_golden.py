@@ -1,4 +1,4 @@
-"""What the handbook of the shipped policy says, word for word.
+"""The text of the policy report of the shipped policy.
 
 `UPDATE_GOLDENS=1 pytest tests/golden/report` writes it anew; read the difference before you keep it.
 """

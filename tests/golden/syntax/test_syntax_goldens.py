@@ -1,4 +1,4 @@
-"""Each `*.rts` here is wrong, and the `*.txt` beside it says exactly what is reported, underlined and proposed.
+"""Each `*.rts` here has syntax errors; the `*.txt` beside it has their messages, spans, helps and fixes.
 
 `UPDATE_GOLDENS=1 pytest tests/golden/syntax` writes them anew; read the difference before you keep it.
 """

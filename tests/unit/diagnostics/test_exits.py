@@ -1,4 +1,4 @@
-"""The table of exit codes is a promise: a change here breaks scripts."""
+"""Exit codes are a stable interface: a change breaks scripts."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""One missing name is one finding with a count."""
+"""Findings on one missing name are merged."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""What a file is, is told by how it begins, and nothing of ours is taken for something else."""
+"""Kinds of files are recognised by their first bytes, and shipped files are not mistaken."""
 
 from pathlib import Path
 

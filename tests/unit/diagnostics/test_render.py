@@ -1,4 +1,4 @@
-"""What a person reads: the line, the underline exactly under what is meant, and nothing that a terminal would obey."""
+"""Rendered findings: the source line, the exact underline, and no control characters."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""What is offered for a word that is not known."""
+"""Suggestions for unknown words."""
 
 from rtshcua.diagnostics.suggest import LISTED, listed, nearest
 from virtual.rows import rows

@@ -1,4 +1,4 @@
-"""Lines of at most 80 columns, whatever is said."""
+"""Lines are wrapped to 80 columns."""
 
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,4 +1,4 @@
-"""Workflow commands of GitHub, read back as its runner reads them."""
+"""Workflow commands of GitHub, parsed by the rules of its runner."""
 
 import re
 

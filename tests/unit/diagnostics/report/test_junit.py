@@ -1,4 +1,4 @@
-"""JUnit XML: well formed whatever it tells, valid by the schema of Jenkins, counted right."""
+"""JUnit XML: well formed for any content, valid by the schema of Jenkins, with correct counts."""
 
 from functools import cache
 from pathlib import Path

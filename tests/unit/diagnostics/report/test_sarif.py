@@ -1,4 +1,4 @@
-"""SARIF: valid by the published schema whatever the findings say, and every place, fix and reason where it belongs."""
+"""SARIF: valid by the published schema for any findings, with places, fixes and reasons."""
 
 import json
 from functools import cache

@@ -1,4 +1,4 @@
-"""An approval is awaited no longer than the decision on the step is valid, by its skill or by its own words."""
+"""The time for an approval must not exceed the validity of the skill or of the step."""
 
 from reference.sources import found, mission, policy, program, skill
 from virtual.rows import rows

@@ -1,4 +1,4 @@
-"""Constants are exact fractions, whatever makes them, until they are stored, where they are whole or refused."""
+"""Constants are exact fractions; stored constants are whole, or refused."""
 
 from fractions import Fraction
 from pathlib import Path

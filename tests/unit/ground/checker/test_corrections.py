@@ -1,4 +1,4 @@
-"""What "did you mean" proposes can be done: the finding brings the fix, where the name stands in the text."""
+"""A "did you mean" comes with a fix if the name is in the text, and the fix works."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ from unit.ground.analysis.test_rule_checks import HEAD, LIBRARY, POLICY
 
 
 def fixed(found: tuple[Diagnostic, ...], text: str) -> str:
-    """A text in which the one finding is followed."""
+    """A text after the fix of its only finding."""
     (one,) = found
     (fix,) = one.fixes
     assert fix.applicability is Applicability.SUGGESTED

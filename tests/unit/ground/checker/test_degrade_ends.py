@@ -1,4 +1,4 @@
-"""What a `degrade` rule flies must end, for the chain comes after it."""
+"""The target of a `degrade` rule must end, because its chain follows."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""An edge reads its condition both ways, so it reads no zone whose band is known to within an error only."""
+"""An edge needs its condition exactly, so it cannot read a zone with an inexact band."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Areas from GeoJSON files: what RFC 7946 allows is read to the last digit, all else is refused in words."""
+"""Areas from GeoJSON files: valid ones (RFC 7946) are read exactly, all others are refused with a message."""
 
 import json
 from decimal import Decimal

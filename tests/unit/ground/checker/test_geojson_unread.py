@@ -1,4 +1,4 @@
-"""Heights, times and radii in a GeoJSON file are refused by name and place; what else it says is let be."""
+"""Heights, times and radii in a GeoJSON file are refused with their place; other members are accepted."""
 
 import json
 from typing import Any
@@ -122,7 +122,7 @@ GATHERED = {"type": "GeometryCollection", "geometries": [OUTLINE]}
 
 @pytest.mark.parametrize("other", [CIRCLE, GATHERED])
 def test_area_in_another_form_counts_as_an_area(other: Any) -> None:
-    """Without `feature`, the one polygon of a file is meant only where no other area stands beside it."""
+    """Without `feature`, the only polygon of a file is selected only if there is no other area."""
     tree = {"type": "FeatureCollection", "features": [feature(), feature(other) | {"id": "other"}]}
     found = refused(tree)
     assert found is not None

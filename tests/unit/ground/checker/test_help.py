@@ -1,4 +1,4 @@
-"""What a finding offers is what the author can do about it, and one mistake is one finding."""
+"""One mistake gives one finding, with a help that the author can follow."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What a mission's first line and its steps name must exist, each by itself, and so must the zones of an airspace."""
+"""Names in a mission and in an airspace must be declared."""
 
 import pytest
 

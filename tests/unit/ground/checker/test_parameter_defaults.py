@@ -1,4 +1,4 @@
-"""A default is an argument like any other: of the parameter's type, and in its range, both ends included."""
+"""A default must have the parameter's type and be in its range, ends included."""
 
 from reference.sources import found, program, skill
 from virtual.rows import rows

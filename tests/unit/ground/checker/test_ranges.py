@@ -1,4 +1,4 @@
-"""E0325: what a signal never is, by the fields that it is read from."""
+"""Values outside the range of a signal's fields are reported."""
 
 from reference.sources import findings, policy, program
 from rtshcua.diagnostics.diagnostic import Diagnostic
@@ -16,7 +16,7 @@ signal seen  : count   = GPS_RAW_INT.satellites_visible  stale after 2 s  // uin
 
 
 def beyond(when: str) -> list[Diagnostic]:
-    """The findings on a rule's condition of values that are never had."""
+    """The findings on values outside a signal's range in a rule's condition."""
     found = findings(program(SIGNALS, policy(f"degrade takeoff when {when} to return_home")))
     return [each for each in found if each.code.id == "E0325"]
 

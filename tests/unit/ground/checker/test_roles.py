@@ -1,4 +1,4 @@
-"""Roles are declared: once in a file, by as many files as like, and under a name that something else may have too."""
+"""Roles are declared once per file, by any number of files, in a name space of their own."""
 
 import pytest
 
@@ -8,7 +8,7 @@ TEMPLATE = "template asked(low: altitude, who: role) { confirm hover by role who
 
 
 def told(*parts: str) -> list[tuple[str, str]]:
-    """What is said of roles: the code, and the name."""
+    """The code and the name of each finding on roles."""
     said = found(IMPORTS + "".join(parts))
     return [(code, text.split("`")[1]) for code, text in said if code in ("E0208", "E0202", "E0203")]
 

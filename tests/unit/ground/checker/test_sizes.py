@@ -1,4 +1,4 @@
-"""Sizes: a contract is as if the numbers had been written in it, and the library's have those that they had."""
+"""Sizes: a contract with sizes equals one with written numbers."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -60,7 +60,7 @@ def contract(text: str, name: str = "probe") -> Contract:
 
 
 def numbers(one: Contract) -> Any:
-    """A contract without its texts and their places."""
+    """A contract without spans and texts."""
     clauses = [[each.code for each in part] for part in (one.require, one.assume, one.maintain)]
     return clauses, one.parameters, one.deadline_us, one.validity_us, one.duration_us, one.grace_us, one.energy
 

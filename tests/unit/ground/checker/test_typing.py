@@ -1,4 +1,4 @@
-"""Units and datum are types: a table of conditions, and what the checker says of each."""
+"""Units and datums are types: a table of conditions with their findings."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Each figure of a vehicle is of its dimension, and a reserve leaves something to fly with."""
+"""Fields of a vehicle must have their dimension and a valid value."""
 
 from reference.sources import found
 from virtual.rows import rows

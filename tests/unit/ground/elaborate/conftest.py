@@ -1,4 +1,4 @@
-"""How the tests of elaboration compile a text against what ships."""
+"""Helpers of the elaboration's tests: compile a text with the shipped library."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path

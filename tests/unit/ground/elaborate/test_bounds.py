@@ -1,4 +1,4 @@
-"""What a mission takes at most, by hand."""
+"""Bounds of a mission, computed by hand."""
 
 from collections.abc import Callable
 
@@ -60,7 +60,7 @@ def test_bounds_are_sums_over_all_steps(compile_text: Compile, site: str, waits:
 
 
 def test_bound_of_a_return_includes_the_way_home(compile_text: Compile, site: str) -> None:
-    """What its contract allows, or the way from the farthest planned place, whichever is more: not both."""
+    """The bound is the contract's, or the way from the farthest planned place if that is more."""
     compiled = compile_text(site + mission())
     assert compiled.mission is not None
     taken = [_taken(replace(step.contract, energy=300), 309) for step in compiled.mission.invocations]

@@ -1,4 +1,4 @@
-"""Delegation: who may what afterwards, against a naive reading of the policy; and what is refused."""
+"""Delegation: the resulting permissions against a naive interpretation, and refused delegations."""
 
 import re
 from collections.abc import Callable, Iterable
@@ -31,7 +31,7 @@ HEIGHTS = range(6)
 
 @dataclass(frozen=True)
 class Line:
-    """A rule or a delegation; no skills: any, no roles: any, no sources: as the language says, `most` in metres."""
+    """A rule or a delegation; no skills or roles: any; no sources: the default; `most` in metres."""
 
     kind: str
     skills: tuple[str, ...]

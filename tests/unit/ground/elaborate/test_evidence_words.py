@@ -1,4 +1,4 @@
-"""How durable records are to be, and what is done without them or without the link, from the words to the flat form."""
+"""Durability of records, `without evidence` and `without link`, from the source to the flat form."""
 
 from collections.abc import Callable
 

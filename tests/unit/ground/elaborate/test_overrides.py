@@ -1,4 +1,4 @@
-"""What a step is held to beyond its skill: only tighter, taken on board, and without a trace in the policy."""
+"""Overrides of a step only tighten its contract, are part of the bundle, and do not change the policy."""
 
 from collections.abc import Callable
 

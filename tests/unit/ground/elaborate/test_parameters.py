@@ -1,4 +1,4 @@
-"""Missions with parameters: what is compiled has the values that are given, what is checked has all that may be."""
+"""Missions with parameters: compiled with the given values, checked with all possible ones."""
 
 from collections.abc import Callable, Mapping
 
@@ -221,7 +221,7 @@ def test_each_setting_is_a_line() -> None:
 
 
 def test_long_mission_is_checked_with_fewer_values() -> None:
-    """So that no source takes minutes: each instance is proved step by step."""
+    """Each instance is proved step by step, which could take minutes."""
     assert MAX_INSTANCES * 64 <= MOST_STEPS <= 1 << 13
 
 

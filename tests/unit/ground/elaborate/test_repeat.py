@@ -1,4 +1,4 @@
-"""`repeat`: unrolled, however nested, and never beyond what fits on board."""
+"""`repeat` is unrolled at any nesting, up to the onboard limit."""
 
 from collections.abc import Callable
 from typing import Any

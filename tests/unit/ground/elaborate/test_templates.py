@@ -1,4 +1,4 @@
-"""Templates: what is used is what could have been written out, and findings say where."""
+"""Templates: a use equals the written rules, and findings name the use."""
 
 from collections.abc import Callable
 
@@ -36,7 +36,7 @@ def policy(*parts: str) -> str:
 
 
 def meaning(rule: Rule) -> tuple[object, ...]:
-    """What a rule does, without where it stands."""
+    """A rule without its spans."""
     code = None if rule.when is None else rule.when.code
     target = None if rule.target is None else (rule.target.skill, rule.target.arguments)
     return rule.kind, rule.skills, rule.roles, rule.sources, code, rule.approver, rule.within_us, target

@@ -1,4 +1,4 @@
-"""Comments: each stays in its place, whatever is laid out around it; no `//` ever swallows code."""
+"""Comments stay between their tokens, and a `//` never hides code."""
 
 from fuzz.targets.format import pieces
 from rtshcua.diagnostics.span import Source
@@ -52,7 +52,7 @@ def test_comments_at_special_places_are_kept(before: str) -> None:
 
 @rows("comment", ["// a\n", "/* a */", "/* a\n b */", "\n// a\n", "\n/* a */\n", '// */ "\n'])
 def test_comments_between_any_two_tokens_are_kept(comment: str) -> None:
-    """The words before and after a comment are those that were there."""
+    """The tokens before and after a comment stay the same."""
     for text in (CONTRACT, 'mission m under p@1 on v { intent "x"  phase a { b(c = 1, 2 m) } }'):
         words = text.replace("(", " ( ").replace(")", " ) ").replace(",", " , ").replace("@", " @ ").split()
         for at in range(len(words) + 1):

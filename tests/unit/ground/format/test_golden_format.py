@@ -1,4 +1,4 @@
-"""What sources look like before and after: `tests/golden/format` has pairs, and what is right already."""
+"""Pairs of sources before and after formatting, in `tests/golden/format`."""
 
 import re
 from pathlib import Path
@@ -38,7 +38,7 @@ def test_formatting_page_shows_formatted_examples() -> None:
 
 
 def test_language_page_shows_formatted_examples() -> None:
-    """Their columns are their own; none is refused."""
+    """The columns of the examples may differ, but none is refused."""
     page = read(GOLDEN.parents[2] / "docs" / "language.md")
     for block in re.findall(r"^```rts\n(.*?)^```$", page, re.DOTALL | re.MULTILINE):
         assert formatted(Source("x.rts", block)).diagnostics == ()

@@ -1,4 +1,4 @@
-"""Lines: what fits stays together, what does not is broken by rule, and what the author broke stays broken."""
+"""Lines: short items stay on one line, long ones are broken by rule, and some breaks of the author stay."""
 
 import pytest
 

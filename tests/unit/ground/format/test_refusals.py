@@ -1,4 +1,4 @@
-"""What is refused: sources that the parser does not take, and results that would not say the same."""
+"""The formatter refuses sources with syntax errors, and results with another meaning."""
 
 from collections.abc import Callable
 
@@ -81,7 +81,7 @@ def test_changed_result_is_refused(name: str, monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_same_tokens_with_another_tree_are_refused() -> None:
-    """Brackets are words, so no text of ours shows it; the rules that were applied are compared all the same."""
+    """Brackets are tokens, so no source shows this difference; the comparison of the rules detects it."""
     one = read("skill s() { require a < 1 }")
     assert one is not None
     found = difference(one, one._replace(rules=one.rules[:-1]))

@@ -1,4 +1,4 @@
-"""Every declaration and every item that the grammar has is known to the formatter, and no other."""
+"""The style has exactly the declarations and items of the grammar."""
 
 import re
 from random import Random

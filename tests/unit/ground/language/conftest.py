@@ -1,4 +1,4 @@
-"""How the tests of the language read a text, and look at what it became."""
+"""Helpers of the language's tests: parse a text, and make its nodes comparable."""
 
 from collections.abc import Callable
 from typing import Any

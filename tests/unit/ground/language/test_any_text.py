@@ -1,4 +1,4 @@
-"""Whatever the text, parsing ends with findings, never with an exception; and it agrees with Lark on what fits."""
+"""Parsing any text ends without an exception, and accepts the same texts as Lark."""
 
 from pathlib import Path
 
@@ -46,7 +46,7 @@ TOKENS = sorted(
 
 
 def sound(text: str) -> None:
-    """Findings are in order, within the text, and speak."""
+    """Check that findings are in order, inside the text, and have a message."""
     source = Source("x", text)
     parsed = parse(source)
     starts = []
@@ -76,7 +76,7 @@ def as_lark_reads_it(text: str) -> str | None:
 
 
 def agree(text: str) -> None:
-    """We take what Lark takes, except that words must be apart: its contextual lexer reads `skillhover` as two."""
+    """Check that the parser agrees with Lark, except that words must be separated: Lark reads `skillhover` as two."""
     spaced = as_lark_reads_it(text)
     if spaced is None:
         assert not fits(text)

@@ -1,4 +1,4 @@
-"""Every form of condition and value, and how they bind."""
+"""All forms of conditions and values, and their precedence."""
 
 from collections.abc import Callable
 from typing import Any
@@ -71,7 +71,7 @@ def test_condition(plain: Plain, unit: Read, text: str, expected: dict[str, Any]
 
 
 def shape(found: Any) -> Any:
-    """Only how operators nest: comparisons as the name on their left."""
+    """The nesting of operators, with each comparison as the name on its left."""
     if found["kind"] == "junction":
         return (found["operator"], *(shape(operand) for operand in found["operands"]))
     if found["kind"] in ("not", "for-last", "within-last"):

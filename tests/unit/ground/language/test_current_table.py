@@ -1,4 +1,4 @@
-"""The committed table is the one that Lark makes of the committed grammar, and the grammar has no surprises."""
+"""The committed table is the one that Lark makes of the committed grammar."""
 
 import logging
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The import closure, and the files that zones are read from: each once, every fault a finding."""
+"""Imports and zone files are read once, and every fault of a file is a finding."""
 
 from collections.abc import Iterable
 
@@ -58,7 +58,7 @@ def test_imports_are_loaded_in_order_of_reach() -> None:
 
 
 def circles(program: Program) -> list[tuple[str, str]]:
-    """The file of each import that closes a circle, and the circle by the first letters of its files."""
+    """The file of each import that closes a cycle, and the cycle by the first letters of its files."""
     found = [each for each in program.diagnostics if each.code is IMPORT_CYCLE]
     assert all(each.severity is Severity.WARNING for each in found)
     said = [each.message.removeprefix("import cycle: ").strip("`") for each in found]

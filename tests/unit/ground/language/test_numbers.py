@@ -1,4 +1,4 @@
-"""Numbers are read as they are written, or not at all."""
+"""Numbers are read exactly or refused."""
 
 from rtshcua.diagnostics.span import Source
 from rtshcua.ground.language.parse import parse

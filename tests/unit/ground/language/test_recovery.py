@@ -1,4 +1,4 @@
-"""All errors of a text are reported, each once, and what is good is kept."""
+"""All errors of a text are reported once, and valid declarations are kept."""
 
 import pytest
 
@@ -82,7 +82,7 @@ def test_unclosed_block_is_reported() -> None:
 
 
 def test_unclosed_block_among_steps_is_reported() -> None:
-    """The next declaration's first word may be a step's name there."""
+    """The keyword of the next declaration may be the name of a step there."""
     for block in ("", "repeat 2 {", "repeat 2 { repeat 3 {", "x() {"):
         parsed = run(f"mission bad under p@1 on v {{ phase a {{ x() {block}\n" + GOOD.format(1))
         assert codes(parsed) == [UNCLOSED.slug], block

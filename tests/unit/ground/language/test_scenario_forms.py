@@ -1,4 +1,4 @@
-"""What scenarios become, and what is said where one is not written as it must be."""
+"""Scenarios: their IR, and the findings on invalid ones."""
 
 from collections.abc import Callable
 from typing import Any

@@ -1,4 +1,4 @@
-"""What ships parses, and depends on neither the hour nor the place where it is tried."""
+"""Shipped sources are parsed without findings, at any time and in any folder."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Words of the language are names wherever the grammar asks for a name."""
+"""Keywords are names wherever the grammar expects a name."""
 
 import pytest
 

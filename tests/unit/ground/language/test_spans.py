@@ -1,4 +1,4 @@
-"""Every node's span is the exact text that it came from."""
+"""The span of every node is its exact source text."""
 
 from collections.abc import Iterator
 from pathlib import Path

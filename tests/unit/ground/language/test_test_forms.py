@@ -1,4 +1,4 @@
-"""What nominals and tests become, and that nothing of them is reserved."""
+"""Nominals and tests: their IR, and keywords that stay names elsewhere."""
 
 from collections.abc import Callable
 from typing import Any

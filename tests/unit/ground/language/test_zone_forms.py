@@ -1,4 +1,4 @@
-"""Every form of a zone, and the IR that it becomes."""
+"""All forms of zones, and their IR."""
 
 from collections.abc import Callable
 from typing import Any

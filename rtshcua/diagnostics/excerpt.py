@@ -73,11 +73,11 @@ def excerpt(source: Source, number: int, marks: Sequence[Mark], width: int = MAX
         begin, end = min(max(begin, first), last), min(max(end, first), last)
         indent = " " * (len(before) + starts[begin] - starts[first])
         underline = character * max(starts[max(end, begin)] - starts[begin], 1)
-        said = visible(words)
-        if len(indent) + len(underline) + 1 + len(said) <= width:
-            underlines.append(f"{indent}{underline} {said}".rstrip())
+        label = visible(words)
+        if len(indent) + len(underline) + 1 + len(label) <= width:
+            underlines.append(f"{indent}{underline} {label}".rstrip())
         else:
-            underlines += [indent + underline, " " * max(0, min(len(indent), width - len(said))) + said]
+            underlines += [indent + underline, " " * max(0, min(len(indent), width - len(label))) + label]
     return before + rendered + after, underlines
 
 

@@ -84,7 +84,7 @@ class Report:
         for found in self.found:
             plain, among = self._plain.get(found, (found, 0))
             groups.setdefault(plain, ({}, among))[0][found] = None
-        told = {
+        merged = {
             plain: plain if len(group) == among > 1 else _joined(list(group))
             for plain, (group, among) in groups.items()
         }
@@ -96,11 +96,11 @@ class Report:
             worst = max(some, key=lambda each: self._amounts[each])
             for each in some:
                 if each is not worst:
-                    del told[each]
+                    del merged[each]
             if len(some) > 1:
                 others = "it also fails for other values of the mission's parameters"
-                told[worst] = replace(told[worst], help="; ".join(filter(None, (worst.help, others))))
-        return tuple(told.values())
+                merged[worst] = replace(merged[worst], help="; ".join(filter(None, (worst.help, others))))
+        return tuple(merged.values())
 
     def text(self, span: Span) -> str:
         """The source text under a span with its white space folded, for messages."""

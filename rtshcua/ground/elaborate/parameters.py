@@ -42,9 +42,9 @@ def value_of(bound: Bound, argument: Argument, span: Span) -> Value:
     return Quantity(span=span, value=bound, dimension=argument.type.dimension, datum=argument.type.datum)
 
 
-def bound_value(context: CheckContext, argument: Argument, written: Value, *, heard: bool = True) -> Value | None:
+def bound_value(context: CheckContext, argument: Argument, written: Value, *, reporting: bool = True) -> Value | None:
     """Return the bound form of a written value; None after a finding. A default is reported at its declaration."""
-    report = context.report if heard else Report(context.report.sources)
+    report = context.report if reporting else Report(context.report.sources)
     before = len(report.found)
     bound = bind_value(Scope(context.symbols, report), argument, written)
     if bound is None or len(report.found) > before:
@@ -112,7 +112,7 @@ def assigned(context: CheckContext, mission: MissionDecl, settings: ParameterSet
         written = given.get(name, parameter.default)
         if name not in known:
             return None  # reported at its declaration
-        value = None if written is None else bound_value(context, known[name], written, heard=name in given)
+        value = None if written is None else bound_value(context, known[name], written, reporting=name in given)
         if value is not None:
             values[name] = value
         elif written is None and name not in {each.text for each, _ in settings.values}:
@@ -225,7 +225,7 @@ def _candidates(context: CheckContext, mission: MissionDecl, argument: Argument,
     default = parameter.default
     found: list[Value] = []
     if default is not None:
-        value = bound_value(context, argument, default, heard=False)
+        value = bound_value(context, argument, default, reporting=False)
         found += [] if value is None else [value]
     at = parameter.span
     if argument.type.kind is Kind.NUMBER and argument.low is not None and argument.high is not None:

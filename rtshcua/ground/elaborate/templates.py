@@ -60,7 +60,7 @@ def _possible(context: CheckContext, argument: Argument) -> Value | None:
     """A sample value of a parameter: its default, or a value of its type."""
     parameter = argument.declaration
     if parameter.default is not None:
-        return bound_value(context, argument, parameter.default, heard=False)
+        return bound_value(context, argument, parameter.default, reporting=False)
     if argument.type.kind is Kind.NUMBER and argument.low is not None:
         return value_of(argument.low, argument, parameter.span)
     zones = sorted(context.symbols.zones.values(), key=lambda zone: zone.entry is None)  # those with an entry first
@@ -87,7 +87,7 @@ def _bound(context: CheckContext, template: TemplateDecl, use: Use) -> TemplateB
             continue
         if argument is None:  # reported where the parameter is declared
             return None
-        value = bound_value(context, argument, written, heard=name in pairs)
+        value = bound_value(context, argument, written, reporting=name in pairs)
         good = good and value is not None
         if value is not None:
             given.values[name] = value

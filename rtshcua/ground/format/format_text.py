@@ -76,8 +76,8 @@ def _first(one: list[str] | list[tuple[int, str]], other: list[str] | list[tuple
     return next((number for number, (a, b) in pairs if a != b), min(len(one), len(other)))
 
 
-def _offset_of(said: _Comparable, word: int) -> int:
-    return said.starts[word] if word < len(said.starts) else max(said.starts, default=0)
+def _offset_of(text: _Comparable, word: int) -> int:
+    return text.starts[word] if word < len(text.starts) else max(text.starts, default=0)
 
 
 def _comparable(read: TokenizedText) -> _Comparable:
@@ -110,7 +110,7 @@ class _CommentLines:
 
     def __init__(self, read: TokenizedText) -> None:
         self._text, self._starts = read.text, read.starts
-        self._begin = self._asked = 0  # where the line begins of what was asked for last, and what that was
+        self._begin = self._asked = 0  # the line start of the last request, and the request
         self._next, self._after = -1, 0  # a token, and where its line ends
 
     def about(self, offset: int) -> tuple[int, int]:

@@ -396,8 +396,8 @@ def _columns(run: list[OutputLine], width: int) -> None:
 
 def _comments(run: list[OutputLine], width: int) -> None:
     """Align the comments of a run, if that does not make a line too wide."""
-    told = [line for line in run if line.comment]
-    column = max((line.width for line in told), default=0) + _APART
-    fits = all(column + len(line.comment) <= max(width, line.width + _APART + len(line.comment)) for line in told)
-    for line in told:
+    commented = [line for line in run if line.comment]
+    column = max((line.width for line in commented), default=0) + _APART
+    fits = all(column + len(line.comment) <= max(width, line.width + _APART + len(line.comment)) for line in commented)
+    for line in commented:
         line.comment = " " * (column - line.width if fits else _APART) + line.comment

@@ -80,35 +80,35 @@ def phrase(automaton: Automaton, word: str) -> str:
 def describe(automaton: Automaton, symbols: set[str]) -> str:
     """`symbols` as a list for a sentence: names of groups where possible, keywords and marks in backticks."""
     rest = set(symbols)
-    said: list[str] = []
+    alternatives: list[str] = []
     if beginnings(automaton) <= rest:
         rest -= beginnings(automaton)
-        said.append("a declaration")
+        alternatives.append("a declaration")
     if rest >= VALUE:
-        said.append("a condition" if rest & CONDITION else "a value")
+        alternatives.append("a condition" if rest & CONDITION else "a value")
         rest -= VALUE | CONDITION
     if "<COMPARE>" in rest:
-        said.append("a comparison")
+        alternatives.append("a comparison")
         rest -= ARITHMETIC | {"<COMPARE>", "in", "inside", "outside"}
     elif "+" in rest:
-        said.append("an operator")
+        alternatives.append("an operator")
         rest -= ARITHMETIC | (CONNECTING if "and" in rest else set())
     if rest >= NUMBER:
-        said.append("a number")
+        alternatives.append("a number")
         rest -= NUMBER
     if rest >= SHAPE:
-        said.append("a shape")
+        alternatives.append("a shape")
         rest -= SHAPE
     items = parts(automaton, rest)
     whose = owner(automaton)
     if len(items) > 3 and whose is not None:
         rest -= items
-        said.append(f"another part of the {whose[0]}")
-    if said:
+        alternatives.append(f"another part of the {whose[0]}")
+    if alternatives:
         rest.discard(END)
-    said += sorted(WORDS[symbol] for symbol in rest if symbol in WORDS)
-    said += sorted(f"`{phrase(automaton, symbol)}`" for symbol in rest if symbol not in WORDS)
-    return " or ".join([", ".join(said[:-1]), said[-1]] if len(said) > 1 else said)
+    alternatives += sorted(WORDS[symbol] for symbol in rest if symbol in WORDS)
+    alternatives += sorted(f"`{phrase(automaton, symbol)}`" for symbol in rest if symbol not in WORDS)
+    return " or ".join([", ".join(alternatives[:-1]), alternatives[-1]] if len(alternatives) > 1 else alternatives)
 
 
 def words(symbols: Iterable[str]) -> set[str]:

@@ -1,8 +1,8 @@
 """Each code of the checker has twins: two sources that differ in one assumption, which their first line names.
 
 The accepted one compiles without a finding. The rejected one has findings of that code only; the goldens beside this
-file have their rendered text. `UPDATE_GOLDENS=1` rewrites them: check the diff. Only twins of lint codes are linted, because
-all others import one set of skills.
+file have their rendered text. `UPDATE_GOLDENS=1` rewrites them: check the diff. Only twins of lint codes are linted,
+because all others import one set of skills.
 """
 
 import os

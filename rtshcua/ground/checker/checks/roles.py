@@ -58,7 +58,7 @@ def _given(context: CheckContext, use: Use) -> Iterator[Name]:
         value = argument.value
         if parameter is None or parameter.type.text != ROLE or not isinstance(value, Reference):
             continue
-        if value.name not in context.symbols.declared:  # else it is something else than a role, which is told elsewhere
+        if value.name not in context.symbols.declared:  # another kind of declaration is reported elsewhere
             yield Name(span=value.span, text=value.name)
 
 

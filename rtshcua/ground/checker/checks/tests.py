@@ -198,7 +198,7 @@ def _column(context: CheckContext, column: Subject, arguments: dict[str, Argumen
     name = column.name.text
     if name in arguments or skill is None:
         return
-    if context.symbols.kind_of(name) is not None:  # something else, which is said
+    if context.symbols.kind_of(name) is not None:  # another kind of declaration, which is reported
         check_subject(context, column)
     elif name not in context.symbols.broken:
         near = suggestion(name, [*context.symbols.signals, *arguments])

@@ -132,8 +132,8 @@ def _not_exact(
 def _place(reader: Reader, written: str, span: Span) -> bool:
     """Whether a number is part of `47.4, 8.5`, probably coordinates; reports both numbers once."""
     text, last = reader.source.text, reader.diagnostics[-1] if reader.diagnostics else None
-    told = last.span if last is not None and last.code is NOT_EXACT else None
-    if told is not None and told.start <= span.start and span.end <= told.end:
+    previous = last.span if last is not None and last.code is NOT_EXACT else None
+    if previous is not None and previous.start <= span.start and span.end <= previous.end:
         return True
     before = _NUMBER_BEFORE.search(text[max(0, span.start - LOOK_BACK) : span.start])
     start = span.start

@@ -11,7 +11,7 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the limits of the counts of `make size`: lower a limit in the commit that lowers the count
 HELD = {
-    "modules": 722,
+    "modules": 719,
     "code lines": 84_422,  # rose once, with a supervision of the judge's own and typed services
     "shared class names": 0,
     "of them across packages": 0,
@@ -19,7 +19,7 @@ HELD = {
     "import cycles": 0,
     "modules below 80 lines with one importer": 13,
     "functions of more than 60 lines": 1,
-    "functions of a complexity over 15": 73,
+    "functions of a complexity over 15": 66,
     "functions of a complexity over 25": 0,
     "lines of application logic in the command line": 881,
 }

@@ -97,7 +97,7 @@ def test_a_document_comes_in_and_its_sender_alone_gets_the_answer(agents: AgentS
         assert heard(other) == [HELLO.strip()]
 
 
-def test_one_document_of_each_reader_in_turn_and_no_more_than_the_flight_bears(agents: AgentSocket) -> None:
+def test_documents_are_taken_in_turn_and_rate_limited(agents: AgentSocket) -> None:
     with reader(agents) as one, reader(agents) as other:
         one.sendall(b"".join(handed(b"%d" % number) for number in range(3)))
         other.sendall(handed(b"x"))
@@ -164,7 +164,7 @@ def test_a_line_without_an_end_is_not_kept_for_ever(agents: AgentSocket) -> None
         assert most <= LONGEST + (1 << 18)
 
 
-def test_a_reader_that_takes_nothing_is_dropped_and_the_others_go_on(agents: AgentSocket) -> None:
+def test_stalled_reader_is_dropped_without_affecting_others(agents: AgentSocket) -> None:
     line = b"y" * 4095 + b"\n"
     with reader(agents) as slow, reader(agents) as good:
         agents.poll(0)
@@ -181,7 +181,7 @@ def test_a_reader_that_takes_nothing_is_dropped_and_the_others_go_on(agents: Age
         assert slow.fileno() >= 0
 
 
-def test_a_reader_that_hung_up_is_forgotten_with_what_it_waits_for(agents: AgentSocket) -> None:
+def test_disconnected_reader_and_its_pending_answer_are_dropped(agents: AgentSocket) -> None:
     link = reader(agents)
     link.sendall(handed(b"paper"))
     event = agents.poll(0)
@@ -210,7 +210,7 @@ def test_no_more_readers_than_that(agents: AgentSocket) -> None:
         link.close()
 
 
-def test_one_process_has_no_more_places_than_its_share(agents: AgentSocket) -> None:
+def test_connections_of_one_process_are_limited(agents: AgentSocket) -> None:
     links = []
     for number in range(MOST_OF_A_PEER + 2):
         links.append(reader(agents))
@@ -270,7 +270,7 @@ def test_a_group_may_open_the_agents_socket(folder: Path) -> None:
     agents.close()
 
 
-def test_where_nobody_says_who_connects(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_peer_is_unknown_without_peer_credentials(monkeypatch: pytest.MonkeyPatch) -> None:
     one, other = socket.socketpair()
     with one, other:
         assert peer_of(one) == Peer(os.getpid(), os.geteuid())
@@ -442,7 +442,7 @@ def test_follower_refuses_other_program(folder: Path, says: tuple[bytes, ...], f
         FlightFollower(path)
 
 
-def test_a_follower_hears_what_came_with_the_first_line_and_a_long_line_in_pieces(folder: Path) -> None:
+def test_follower_reassembles_lines_split_across_reads(folder: Path) -> None:
     hello = b'{"type":"hello","flight":"' + b"ab" * 16 + b'"}\n'
     long = b'{"type":"mission","x":"' + b"x" * 300_000 + b'"}\n'
     answer = b'{"type":"answer","id":1,"slug":"accepted","text":"well"}\n'

@@ -205,7 +205,7 @@ def test_doctor_stops_for_other_than_multirotor() -> None:
     assert "autopilot/kind" in stops(found)
 
 
-def test_a_link_that_is_too_slow_stops_a_mission_and_one_that_delivers_less_is_told() -> None:
+def test_slow_link_stops_a_mission_and_sparse_link_warns() -> None:
     def narrow(vehicle: VirtualVehicle) -> None:
         vehicle.driver.carried_by(960)
 
@@ -226,7 +226,7 @@ def test_a_link_that_is_too_slow_stops_a_mission_and_one_that_delivers_less_is_t
 
 
 @FLAVOURS
-def test_without_a_position_it_would_not_fly(flavour: str) -> None:
+def test_missing_position_stops_a_mission(flavour: str) -> None:
     found = examine(case.simulated(flavour, faults=(GpsLoss(0),)))
     assert {"vehicle/ready", "sensor/gps", "signal/fix"} & stops(found) >= {"vehicle/ready", "sensor/gps"}
     assert found["sensor/gps"].needed == "a 3D fix"
@@ -277,7 +277,7 @@ def test_parameter_that_changes_way_home_stops_mission(flavour: str, parameter: 
     ("px4", (1, 17), "`rtshcua keys link` makes a key"),
     ("ardupilot", None, "`rtshcua keys link` makes a key"),
 ])  # fmt: skip
-def test_it_advises_a_key_only_where_the_release_takes_one(
+def test_signing_key_is_advised_only_if_the_release_supports_it(
     flavour: str, release: tuple[int, int] | None, says: str
 ) -> None:
     assert says in examine(case.simulated(flavour, release=release))["link/signing"].advice
@@ -344,7 +344,7 @@ def test_doctor_names_what_is_still_settling() -> None:
 
 
 @rows(("seconds", "needed"), [(60.0, "at least 1080 s"), (1_079.0, "at least 1080 s"), (1_080.0, ""), (0.0, "")])
-def test_a_simulation_of_px4_that_empties_its_battery_faster_than_declared_is_told(seconds: float, needed: str) -> None:
+def test_fast_simulated_battery_drain_of_px4_warns(seconds: float, needed: str) -> None:
     """As it is delivered in a minute (`SIM_BAT_DRAIN`): each flight there would turn home soon."""
     (found,) = settings_told("px4", {"SIM_BAT_DRAIN": seconds}, case.policy(), FlightReach())
     assert (found.slug, found.needed) == ("settings/sim_bat_drain", needed)
@@ -353,7 +353,7 @@ def test_a_simulation_of_px4_that_empties_its_battery_faster_than_declared_is_to
         assert found.advice == "set `SIM_BAT_DRAIN` to 1080"
 
 
-def test_of_several_batteries_it_says_the_one_that_a_run_would_use() -> None:
+def test_doctor_reports_the_battery_that_a_run_uses() -> None:
     others = (OtherBattery(Purpose.PAYLOAD, 500), OtherBattery(Purpose.PROPULSION, 6_000))
     found = examine(case.simulated("px4", other_batteries=others))["sensor/battery"]
     assert found.found == (

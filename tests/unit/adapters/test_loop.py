@@ -122,14 +122,14 @@ def test_unrecorded_command_is_withheld() -> None:
     ]  # fmt: skip
 
 
-def test_a_fallback_goes_out_even_when_nothing_can_be_recorded() -> None:
+def test_fallback_is_sent_even_if_recording_fails() -> None:
     world = World([Append(b"1", WRITTEN), command(7, 1_000, needs_record=False)])
     world.full = True
     world.loop.turn()
     assert world.did == [("begin", 7)]
 
 
-def test_a_record_that_failed_before_withholds_nothing_now() -> None:
+def test_earlier_recording_failure_does_not_withhold_a_step() -> None:
     world = World([Append(b"1", WRITTEN)], [Append(b"2", WRITTEN), command(7, 1_000, needs_record=True)])
     world.full = True
     world.loop.turn()
@@ -187,7 +187,7 @@ def test_a_record_that_takes_too_long_makes_its_step_late() -> None:
     assert world.did == []
 
 
-def test_a_record_that_comes_when_it_is_too_late_changes_nothing() -> None:
+def test_record_written_after_the_deadline_changes_nothing() -> None:
     world = held()
     world.now_us, world.kept = 5_001, 2
     world.loop.turn()
@@ -238,7 +238,7 @@ def test_standing_down_drops_a_step_that_waits(action: Any) -> None:
     assert ("begin", 7) not in world.did
 
 
-def test_a_disk_that_fails_withholds_a_step_that_waits() -> None:
+def test_disk_failure_withholds_a_waiting_step() -> None:
     world = held()
     world.troubles = ["input/output error"]
     world.loop.turn()
@@ -248,7 +248,7 @@ def test_a_disk_that_fails_withholds_a_step_that_waits() -> None:
     assert world.did == []
 
 
-def test_a_failure_is_told_though_nothing_waits() -> None:
+def test_recording_failure_is_reported_without_a_waiting_step() -> None:
     world = World([Append(b"1", SYNCED)])
     world.slow = True
     world.loop.turn()
@@ -259,7 +259,7 @@ def test_a_failure_is_told_though_nothing_waits() -> None:
 
 
 @pytest.mark.parametrize("durability", [WRITTEN, SYNCED])
-def test_a_step_whose_record_is_to_be_written_or_synced_later_waits_until_it_is_written(durability: int) -> None:
+def test_step_waits_until_its_record_is_written(durability: int) -> None:
     world = World([Append(b"allowed", durability), command(7, 5_000, needs_record=True)])
     world.slow = True
     world.loop.turn()
@@ -281,7 +281,7 @@ def test_a_step_whose_record_is_to_be_synced_first_waits_for_the_disk() -> None:
     assert world.did == [b"allowed", ("begin", 7)]
 
 
-def test_a_seal_before_it_makes_no_step_wait() -> None:
+def test_step_does_not_wait_for_an_earlier_seal() -> None:
     seal = Append(b"seal", SYNCED_FIRST, awaited=False)
     world = World([seal, Append(b"allowed", SYNCED), command(7, 5_000, needs_record=True)])
     world.slow = True
@@ -291,7 +291,7 @@ def test_a_seal_before_it_makes_no_step_wait() -> None:
     assert ("begin", 7) in world.did
 
 
-def test_a_step_whose_record_is_buffered_waits_for_nothing_but_is_withheld_where_no_record_is_taken() -> None:
+def test_step_with_buffered_record_is_withheld_only_if_it_is_refused() -> None:
     effects = [Append(effect, WRITTEN, awaited=False) for effect in (b"succeeded", b"replaced")]
     step = [effects[0], Append(b"allowed", BUFFERED), effects[1], command(7, 5_000, needs_record=True)]
     world = World(step)
@@ -304,7 +304,7 @@ def test_a_step_whose_record_is_buffered_waits_for_nothing_but_is_withheld_where
     assert world.did == []
 
 
-def test_that_the_sink_took_everything_again_is_told_once() -> None:
+def test_recovered_recording_is_reported_once() -> None:
     world = World([Append(b"1", WRITTEN)], [Append(b"2", WRITTEN)])
     world.slow = True
     world.loop.turn()

@@ -72,7 +72,7 @@ def test_a_pack_is_imported_by_its_name(install: Install) -> None:
 
 
 @pytest.mark.parametrize("path", ["acme:../other/x.rts", "acme:skills/../../x.rts", "acme:/etc/passwd", "acme:./x.rts"])
-def test_nothing_leaves_a_pack(install: Install, path: str) -> None:
+def test_imports_cannot_leave_a_pack(install: Install, path: str) -> None:
     package(install, "acme")
     read: list[str] = []
 
@@ -93,7 +93,7 @@ def test_a_pack_that_is_not_there() -> None:
     assert found.help == "install the package with the entry point `nobody` of `rtshcua.skills`"
 
 
-def test_a_manoeuvre_is_taken_only_from_packs_that_the_policy_was_compiled_from(install: Install) -> None:
+def test_manoeuvres_come_only_from_packs_of_the_policy(install: Install) -> None:
     package(install, "acme", "[rtshcua.manoeuvres]\npx4.spray = acme_code:stages\n", OWN)
     assert set(packs.manoeuvres(frozenset({"lib"}))) == {"px4", "ardupilot"}
     own = packs.manoeuvres(frozenset({"lib", "acme"}))
@@ -114,7 +114,7 @@ def test_no_pack_replaces_how_everything_else_is_flown(install: Install) -> None
         ("", "cannot be loaded"),
     ],
 )
-def test_a_broken_manoeuvre_stops_the_flight_before_it_begins(install: Install, more: str, says: str) -> None:
+def test_broken_manoeuvre_stops_a_flight_before_takeoff(install: Install, more: str, says: str) -> None:
     package(install, "acme", "[rtshcua.manoeuvres]\npx4.spray = acme_code:stages\n", more)
     with pytest.raises(packs.BrokenPack, match=says):
         packs.manoeuvres(frozenset({"acme"}))

@@ -47,7 +47,7 @@ def writes(of: Flight) -> list[Any]:
     return found
 
 
-def test_nothing_is_read_or_written_where_nothing_is_configured() -> None:
+def test_no_parameters_are_accessed_without_configuration() -> None:
     one = flight({}, flavour="px4")
     sent = writes(one)
     assert one.prepare() is None
@@ -63,7 +63,7 @@ def test_parameter_with_wanted_value_is_not_written() -> None:
     assert (sent, owed) == ([], {})
 
 
-def test_a_parameter_that_it_does_not_have_refuses_the_mission() -> None:
+def test_unknown_parameter_refuses_the_mission() -> None:
     one = flight({"GF_ACTION": 3.0, "FENCE_ALT_MAX": 80.0})
     sent = writes(one)
     flown = one.fly()
@@ -165,7 +165,7 @@ def test_unrecorded_parameters_are_not_set(what: str) -> None:
     assert has(one) == 15.0
 
 
-def test_where_nobody_knows_what_is_owed_nothing_is_set() -> None:
+def test_damaged_restore_record_prevents_parameter_writes() -> None:
     one = flight({"FENCE_ALT_MAX": 80.0})
     sent = writes(one)
     one.preparations._trouble = "it is damaged"
@@ -173,7 +173,7 @@ def test_where_nobody_knows_what_is_owed_nothing_is_set() -> None:
     assert sent == []
 
 
-def test_a_vehicle_that_never_says_that_it_stands_is_not_written_to() -> None:
+def test_parameters_are_not_written_unless_the_vehicle_is_landed() -> None:
     one = flight({"FENCE_ALT_MAX": 80.0})
     sent = writes(one)
     one.vehicle.hurt = lambda datagram: [
@@ -212,7 +212,7 @@ def test_a_value_that_the_parameter_cannot_keep_is_not_written(flavour: str) -> 
     assert sent == []
 
 
-def test_a_type_that_changes_before_it_is_written_ends_as_not_set() -> None:
+def test_parameter_of_changed_type_is_not_set() -> None:
     one = flight({"GF_MAX_HOR_DIST": 300.0}, flavour="px4")
     one.preparations._keep_owed = lambda _: one.vehicle.driver.settings._types.update(GF_MAX_HOR_DIST=1)
     sent = writes(one)
@@ -231,7 +231,7 @@ def test_a_permit_that_is_refused_is_recorded_alone(monkeypatch: pytest.MonkeyPa
     assert said["detail"] == f"not set as it was to be ({LATE.slug})"
 
 
-def test_nothing_is_asked_for_any_more_where_it_broke_off() -> None:
+def test_aborted_preparation_requests_no_more_parameters() -> None:
     one = flight({"FENCE_ALT_MAX": 80.0})
 
     def turn() -> bool:

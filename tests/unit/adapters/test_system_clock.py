@@ -46,7 +46,7 @@ def test_both_times_go_on_while_the_machine_is_suspended(machine: Machine) -> No
     assert after.utc_us - before.utc_us == HOUR_US
 
 
-def test_a_suspend_is_no_step_of_the_time_of_day_and_a_step_beside_it_is_one(machine: Machine) -> None:
+def test_suspend_is_not_reported_as_a_clock_step(machine: Machine) -> None:
     clock, watch = SystemClock(), StepWatch()
     machine.wait(60 * S, suspended=True)
     assert watch.events(clock.now()) == []
@@ -57,7 +57,7 @@ def test_a_suspend_is_no_step_of_the_time_of_day_and_a_step_beside_it_is_one(mac
 
 
 @pytest.mark.parametrize(("clock", "found"), [(7, 900 * S), (None, 100 * S)])
-def test_where_a_system_has_no_such_clock_its_monotonic_one_is_taken(
+def test_monotonic_clock_is_used_without_a_boottime_clock(
     machine: Machine, monkeypatch: pytest.MonkeyPatch, clock: int | None, found: int
 ) -> None:
     monkeypatch.setattr("rtshcua.adapters.clock._BOOTTIME", clock)

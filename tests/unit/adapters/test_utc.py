@@ -45,7 +45,7 @@ def says(us: int | None) -> Callable[[], int | None]:
         (0, 0, -3, None),
     ],
 )
-def test_the_kernel_vouches_for_its_clock_only_while_it_is_synchronised(
+def test_kernel_clock_is_trusted_only_while_synchronised(
     state: int, status: int, maxerror: int, us: int | None
 ) -> None:
     assert synchronised_us(state, status, maxerror) == us
@@ -82,7 +82,7 @@ def test_the_first_that_tells_is_believed(
         assert now.utc_us - now.monotonic_us == ahead_us, "its time of day replaces ours"
 
 
-def test_the_vehicle_may_tell_late_and_once_it_did_nothing_moves_any_more() -> None:
+def test_vehicle_may_set_the_time_late_and_only_once() -> None:
     clock = SystemClock()
     watch = UtcWatch(clock, None, says(None))
     watch.settle()
@@ -126,7 +126,7 @@ def test_the_vehicles_time_is_known_as_well_as_its_clock() -> None:
     assert abs(100_020_000 + ahead_us - NOW_US) <= open_us
 
 
-def test_where_utc_is_unknown_so_is_whatever_asks_for_it() -> None:
+def test_unknown_utc_makes_dependent_conditions_unknown() -> None:
     """Freshness and the hours of a permit: the step waits, and is not permitted."""
     policy = prepare(flat.POLICY)
     assert not isinstance(policy, Refusal)
@@ -211,7 +211,7 @@ def test_stated_utc_error_holds_once_waiting_ends() -> None:
     assert not unstated.vehicle_may_tell, "the boundary draws no number, for the link has no key"
 
 
-def test_a_boundary_that_took_the_vehicles_time_since_we_looked_is_still_followed() -> None:
+def test_time_taken_by_the_boundary_meanwhile_is_followed() -> None:
     """Else the vehicle counts as ready before anybody here knows the time of day, and its first step is deferred."""
     own = Own(number=77)
     watch = UtcWatch(SystemClock(), None, kernel_us=lambda: None)

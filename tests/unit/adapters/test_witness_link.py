@@ -233,7 +233,7 @@ def test_a_witness_that_is_not_there_yet(serve: Callable[..., Served], writer: W
     assert client.finish(PATIENCE_S) == []
 
 
-def test_a_witness_that_was_restarted_and_one_that_forgot(
+def test_client_handles_restarted_and_reset_witnesses(
     serve: Callable[..., Served], writer: Writer, tmp_path: Path
 ) -> None:
     first = serve()
@@ -386,9 +386,7 @@ def test_malformed_witness_answers_are_ignored(writer: Writer) -> None:
         client.finish(0)
 
 
-def test_a_witness_that_went_away_is_asked_little_until_it_is_back(
-    serve: Callable[..., Served], writer: Writer
-) -> None:
+def test_unreachable_witness_is_polled_slowly(serve: Callable[..., Served], writer: Writer) -> None:
     first = serve()
     client = writer.client(first.address)
     writer.epoch()
@@ -413,7 +411,7 @@ def test_a_witness_that_went_away_is_asked_little_until_it_is_back(
     assert len({note.split("\n")[1] for note in notes}) == len(notes), "nothing is recorded twice"
 
 
-def test_it_waits_only_so_long(writer: Writer, port: int) -> None:
+def test_finish_times_out(writer: Writer, port: int) -> None:
     client = writer.client((HOST, port))
     writer.close()
     began_s = time.monotonic()

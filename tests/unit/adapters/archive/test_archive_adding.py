@@ -64,7 +64,7 @@ def test_archive_entry_describes_its_log(take: Add, fleet: Path, folder: Archive
     assert entries(folder) == [entry, second.entry]
 
 
-def test_copies_of_one_log_that_come_together_are_one_log_and_all_are_told_of(
+def test_copies_of_a_log_are_added_once_and_each_is_reported(
     take: Add, fleet: Path, folder: ArchiveFolder, tmp_path: Path
 ) -> None:
     """A sound one is never called failed: what came of the first came of each."""
@@ -123,9 +123,7 @@ def test_adding_again_changes_nothing(take: Add, fleet: Path, folder: ArchiveFol
 
 
 @pytest.mark.slow
-def test_a_log_that_fails_is_kept_and_nothing_of_it_is_indexed(
-    take: Add, fleet: Path, folder: ArchiveFolder, tmp_path: Path
-) -> None:
+def test_failed_log_is_kept_but_not_indexed(take: Add, fleet: Path, folder: ArchiveFolder, tmp_path: Path) -> None:
     data = bytearray((fleet / "quad-07-1.jsonl").read_bytes())
     data[len(data) // 2] ^= 1
     changed = tmp_path / "changed.jsonl"
@@ -144,9 +142,7 @@ def test_a_log_that_fails_is_kept_and_nothing_of_it_is_indexed(
     assert (log, name, status, finding) == (failed.entry.log, str(changed), "failed", failed.entry.finding)
 
 
-def test_a_log_under_another_root_says_nothing_until_its_own_is_named(
-    take: Add, fleet: Path, folder: ArchiveFolder
-) -> None:
+def test_log_under_another_root_is_indexed_only_with_that_root(take: Add, fleet: Path, folder: ArchiveFolder) -> None:
     stranger = SigningKey.from_seed(bytes([99]) * 32, duty=Duty.ROOT, development=True)
     (untrusted,) = take([fleet / "quad-07-0.jsonl"], CHECK._replace(pinned=stranger.public))
     assert (untrusted.entry.status, untrusted.entry.vehicle) == ("failed", None)
@@ -202,7 +198,7 @@ def test_changed_archive_file_is_found_and_excluded(take: Add, fleet: Path, fold
 
 
 @pytest.mark.slow
-def test_a_crash_before_the_catalogue_leaves_nothing_twice(
+def test_crash_before_the_catalogue_duplicates_nothing(
     take: Add, fleet: Path, folder: ArchiveFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     take([fleet / "quad-07-0.jsonl"])
@@ -411,7 +407,7 @@ def test_an_archive_of_another_version_is_left_alone(folder: ArchiveFolder) -> N
         ArchiveFolder(folder.path)
 
 
-def test_an_archive_that_nothing_was_added_to_has_no_answer(folder: ArchiveFolder) -> None:
+def test_query_of_an_empty_archive_is_refused(folder: ArchiveFolder) -> None:
     with pytest.raises(Untrusted, match="no log was added yet"):
         ArchiveReader(folder)
 

@@ -49,7 +49,9 @@ def test_shipped_queries_describe_themselves_and_run(name: str, asker: ArchiveRe
     assert asker.ask(question.sql).columns
 
 
-def test_who_was_refused_what(wanted: list[tuple[object, ...]], filled: ArchiveFolder) -> None:
+def test_refusals_are_counted_by_vehicle_skill_and_reason(
+    wanted: list[tuple[object, ...]], filled: ArchiveFolder
+) -> None:
     found = rows(filled, "refused-by-vehicle")
     keys = [(row[0], row[2], row[3], row[4], row[5]) for row in found]
     counts = Counter((each[VEHICLE], each[VERSION], each[SKILL], each[OUTCOME], each[REASON]) for each in wanted)

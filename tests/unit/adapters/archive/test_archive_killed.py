@@ -17,7 +17,7 @@ KILLS = 20
 
 
 @pytest.mark.soak
-def test_nothing_is_lost_or_there_twice(fleet: Path, tmp_path: Path) -> None:
+def test_killed_add_loses_and_duplicates_nothing(fleet: Path, tmp_path: Path) -> None:
     logs = sorted(fleet.glob("*.jsonl"))
     wanted, random = refused(logs), Random(5)
 

@@ -164,7 +164,7 @@ def silenced(**about: Any) -> ObservedSortie:
         ({"for_us": 4 * S}, UNCHECKED),
     ],
 )
-def test_a_silence_changes_nothing_and_is_over_at_once(about: dict[str, Any], outcome: CheckOutcome) -> None:
+def test_silence_changes_nothing_and_ends_at_once(about: dict[str, Any], outcome: CheckOutcome) -> None:
     assert checks(BRAKED, silenced(**about))["silence/3s"].outcome == outcome
 
 
@@ -186,7 +186,7 @@ def climbed(climb: int, mean: int) -> ObservedSortie:
     return ObservedSortie("climb", samples, [command], ending="completed", down=True)
 
 
-def test_a_climb_is_judged_by_the_speed_that_it_comes_to() -> None:
+def test_climb_is_judged_by_its_final_speed() -> None:
     """A stock PX4 takes off at MPC_TKO_SPEED, 1.5 m/s, to which it comes slowly; over 3 m its mean is 0.9 m/s."""
     tenth, height, samples = S // 10, 0, []
     for at in range(50):
@@ -221,7 +221,7 @@ def test_settings_that_a_doctor_warns_of_are_told_and_fail_nothing() -> None:
     assert found["settings/others"].measured.startswith("1 other")
 
 
-def test_a_fence_that_its_parameters_leave_off_is_no_fence() -> None:
+def test_fence_check_requires_the_fence_parameters() -> None:
     flown = leg(7_000, 4 * S, fence="set", fence_read=True, switches={"FENCE_ENABLE": (1, 1.0), "FENCE_TYPE": (4, 3.0)})
     found = checks(BRAKED, flown)
     assert found["fence/read-back"].outcome == HELD
@@ -270,7 +270,7 @@ def returned(from_mm: int, *heights: int) -> ObservedSortie:
         (40 * M, (), UNCHECKED),
     ],
 )
-def test_how_low_a_return_flies_across(from_mm: int, heights: tuple[int, ...], outcome: CheckOutcome) -> None:
+def test_return_check_measures_the_lowest_cruise(from_mm: int, heights: tuple[int, ...], outcome: CheckOutcome) -> None:
     assert checks(BRAKED, returned(from_mm, *heights))["return/across"].outcome == outcome
 
 

@@ -84,7 +84,7 @@ def test_parameters_switched_by_runs_do_not_matter() -> None:
     assert those_that_matter(ARDUPILOT, values) == {"FENCE_RADIUS": as_octets(150)}
 
 
-def test_it_asks_for_what_was_recorded_until_that_is_told() -> None:
+def test_identity_is_requested_until_it_is_reported() -> None:
     questions = IdentityQuestions(PX4, names=["GF_ACTION"])
     asked = [message.get_type() for message in questions.due(1, 1_000_000)]
     assert asked == ["PARAM_REQUEST_READ", "COMMAND_LONG"]
@@ -100,7 +100,7 @@ def test_it_asks_for_what_was_recorded_until_that_is_told() -> None:
     assert sum(asks) == 6, "one that does not tell its version is not asked for ever"
 
 
-def test_one_record_a_vehicle_and_the_last_one_counts(tmp_path: Path) -> None:
+def test_last_record_of_a_vehicle_counts(tmp_path: Path) -> None:
     assert kept_qualification(tmp_path, "quad/07") is None
     keep_qualification(tmp_path, "quad/07", b"one")
     path = keep_qualification(tmp_path, "quad/07", b"two")

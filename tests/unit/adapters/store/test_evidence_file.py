@@ -108,7 +108,7 @@ def test_closing_on_a_full_disk_says_so_and_closes(tmp_path: Path) -> None:
     log.close()
 
 
-def test_a_line_that_cannot_be_cut_off_goes_on_where_it_stopped(tmp_path: Path) -> None:
+def test_partial_line_is_continued_if_it_cannot_be_truncated(tmp_path: Path) -> None:
     disk = FaultyDisk(2)
     disk.failing["truncate"] = errno.EIO
     log = EvidenceFile(tmp_path / "log", disk)

@@ -50,9 +50,7 @@ def test_stalled_disk_blocks_nobody(writer: EvidenceWriter, disk: FaultyDisk, pa
     assert path.read_bytes() == b"x\n" * 4
 
 
-def test_a_line_is_kept_when_it_is_written_and_one_of_the_highest_class_is_synced_at_once(
-    disk: FaultyDisk, path: Path
-) -> None:
+def test_synced_first_line_is_synced_at_once(disk: FaultyDisk, path: Path) -> None:
     writer = EvidenceWriter(EvidenceFile(path, disk), sync_s=60.0, sync_after_s=60.0)
     disk.open["sync"].clear()
     for line, durability in ((b"plain\n", WRITTEN), (b"later\n", SYNCED)):
@@ -81,9 +79,7 @@ def test_synced_line_is_synced_in_time_under_load(disk: FaultyDisk, path: Path) 
     keeper.close()
 
 
-def test_a_line_that_is_not_on_the_disk_in_time_is_told_and_then_counts_as_a_failure(
-    disk: FaultyDisk, path: Path
-) -> None:
+def test_late_line_is_reported_and_then_counts_as_failed(disk: FaultyDisk, path: Path) -> None:
     writer = EvidenceWriter(EvidenceFile(path, disk), sync_after_s=0.001, stuck_s=0.02)
     disk.open["sync"].clear()
     writer.append(b"promised\n", SYNCED_FIRST)
@@ -134,9 +130,7 @@ def test_a_disk_that_never_comes_back_ends_the_log_and_leaves_no_hole(
     assert writer.waiting == 4
 
 
-def test_a_refused_line_is_told_once_and_written_as_soon_as_it_can_be(
-    writer: EvidenceWriter, disk: FaultyDisk, path: Path
-) -> None:
+def test_refused_line_is_reported_once_and_retried(writer: EvidenceWriter, disk: FaultyDisk, path: Path) -> None:
     disk.once["write"] = [errno.ENOSPC] * 3
     writer.append(b"one\n", WRITTEN)
     until(lambda: writer.kept == 1)
@@ -158,7 +152,7 @@ def test_lines_that_wait_together_are_synced_together(writer: EvidenceWriter, di
     assert path.read_bytes() == b"one\ntwo\nthree\n"
 
 
-def test_after_a_failed_sync_nothing_more_counts_as_kept(writer: EvidenceWriter, disk: FaultyDisk, path: Path) -> None:
+def test_no_line_counts_as_kept_after_a_failed_sync(writer: EvidenceWriter, disk: FaultyDisk, path: Path) -> None:
     disk.failing["sync"] = errno.EIO
     writer.append(b"one\n", SYNCED_FIRST)
     told: list[str | None] = []
@@ -171,7 +165,7 @@ def test_after_a_failed_sync_nothing_more_counts_as_kept(writer: EvidenceWriter,
     assert writer.trouble() is None
 
 
-def test_closing_writes_what_waits_and_says_what_is_kept(disk: FaultyDisk, path: Path) -> None:
+def test_close_writes_waiting_lines(disk: FaultyDisk, path: Path) -> None:
     writer = EvidenceWriter(EvidenceFile(path, disk))
     disk.open["write"].clear()
     for _ in range(3):
@@ -216,7 +210,7 @@ def test_settle_waits_until_all_is_on_disk(disk: FaultyDisk, path: Path) -> None
     assert writer.synced == 4
 
 
-def test_buffered_lines_that_wait_are_no_failure(disk: FaultyDisk, path: Path) -> None:
+def test_waiting_buffered_lines_do_not_fail(disk: FaultyDisk, path: Path) -> None:
     keeper = Keeper(EvidenceFile(path, disk))
     keeper.take([(b"buffered\n", BUFFERED)], 0.0)
     assert (keeper.failing, keeper.busy, keeper.written) == (False, True, 0)

@@ -59,7 +59,7 @@ def test_a_mission_key_is_for_one_source_and_for_named_roles_and_policies(
         assert (key.sources, key.roles, key.policies) == ((source,), ("pilot",), ("field",))
 
 
-def test_nobody_else_can_read_any_of_it(store: KeyStore) -> None:
+def test_key_folder_is_private(store: KeyStore) -> None:
     assert store.folder.stat().st_mode & 0o777 == 0o700
     assert {file.stat().st_mode & 0o777 for file in store.folder.iterdir()} == {0o600}
     assert [path.name for path in store.folder.parent.iterdir()] == ["keys"]
@@ -113,12 +113,12 @@ def test_a_key_under_another_name_is_for_its_own_duty(store: KeyStore) -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"\xff" * 100, b"x" * 1_000_000])
-def test_garbage_is_no_key(data: bytes, store: KeyStore) -> None:
+def test_malformed_key_file_is_refused(data: bytes, store: KeyStore) -> None:
     store.key_path(Duty.LOG).write_bytes(data)
     assert slug_of(lambda: store.signing_key(Duty.LOG)) == "malformed"
 
 
-def test_a_huge_file_is_no_root(tmp_path: Path) -> None:
+def test_oversized_root_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "root").write_bytes(bytes((1 << 20) + 1))
     with pytest.raises(KeyStoreError) as refused:
         read_root(tmp_path / "root")

@@ -55,7 +55,7 @@ def test_a_log_that_never_began_is_passed_over(last: LastLog, tmp_path: Path) ->
     assert last.settle(mend) == PreviousLog("cd" * 32, broken_off=tmp_path / "log.jsonl")
 
 
-def test_a_log_that_was_tampered_with_is_told_and_named_as_far_as_it_goes(last: LastLog, tmp_path: Path) -> None:
+def test_tampered_log_is_reported_and_linked_to_its_last_good_record(last: LastLog, tmp_path: Path) -> None:
     path, lines = unfinished(tmp_path)
     path.write_bytes(b"".join(lines[:4] + lines[5:]))
     last.begin(path, None)

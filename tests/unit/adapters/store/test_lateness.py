@@ -28,7 +28,7 @@ def test_a_disk_that_does_not_answer_hangs(lateness: Lateness) -> None:
     assert looked(lateness, 100 + STUCK_S, 101 + STUCK_S) == "the disk has not answered for 5 s"
 
 
-def test_a_process_that_stood_still_says_nothing_of_its_disk(lateness: Lateness) -> None:
+def test_stopped_process_does_not_count_as_a_slow_disk(lateness: Lateness) -> None:
     """Both threads were stopped, and the one that looks may go on first."""
     assert looked(lateness, 100, 101) is None
     assert lateness.stuck(0, 131.0) is None
@@ -37,6 +37,6 @@ def test_a_process_that_stood_still_says_nothing_of_its_disk(lateness: Lateness)
     assert looked(lateness, 134, 136) == "the disk has not answered for 5 s", "if it goes on not to"
 
 
-def test_a_line_that_is_on_the_disk_when_it_goes_on_was_never_late(lateness: Lateness) -> None:
+def test_line_on_disk_after_a_stop_is_not_late(lateness: Lateness) -> None:
     assert lateness.stuck(0, 160.0) is None
     assert lateness.kept(1)

@@ -72,7 +72,7 @@ def failing_at(number: int, real: Callable[..., Any], left: list[int]) -> Callab
 
 
 @pytest.mark.parametrize("name", ["write", "rename", "replace", "mkdir"])
-def test_wherever_the_disk_gives_up_nothing_changes(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_disk_failure_at_any_point_changes_nothing(tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "made").mkdir()
     (tmp_path / "made/a.rts").write_bytes(b"old a")
     before = tree(tmp_path)
@@ -92,7 +92,7 @@ def test_wherever_the_disk_gives_up_nothing_changes(tmp_path: Path, name: str, m
         before = tree(tmp_path)
 
 
-def test_a_folder_appears_with_all_that_is_in_it_or_not_at_all(tmp_path: Path) -> None:
+def test_folder_appears_complete_or_not_at_all(tmp_path: Path) -> None:
     with suppress(KeyboardInterrupt), appearing(tmp_path / "x") as folder:
         (folder / "a").write_bytes(b"a")
         raise KeyboardInterrupt

@@ -84,7 +84,7 @@ def test_a_key_that_is_not_there(tmp_path: Path) -> None:
         read_link_key(tmp_path / "key")
 
 
-def test_the_fingerprint_tells_keys_apart_and_nothing_of_them() -> None:
+def test_fingerprint_identifies_a_key_without_revealing_it() -> None:
     assert fingerprint(KEY) == fingerprint(bytes(KEY))
     assert fingerprint(KEY) != fingerprint(bytes(32))
     assert KEY.hex()[:8] not in fingerprint(KEY)
@@ -105,7 +105,7 @@ def test_link_state_is_loaded_by_vehicle_and_key(tmp_path: Path) -> None:
     store.close()
 
 
-def test_one_run_at_a_time(tmp_path: Path) -> None:
+def test_second_run_on_a_link_key_is_refused(tmp_path: Path) -> None:
     store = LinkStore(tmp_path, "quad-07", KEY)
     assert slug(lambda: LinkStore(tmp_path, "quad-07", KEY)) == "in-use"
     store.close()
@@ -124,7 +124,7 @@ def test_a_damaged_state_stops_the_run(tmp_path: Path, data: bytes) -> None:
     store.close()
 
 
-def test_after_a_crash_no_timestamp_comes_again_and_nothing_old_is_heard(tmp_path: Path) -> None:
+def test_timestamps_stay_monotonic_after_a_crash(tmp_path: Path) -> None:
     """The clock is set back besides; what is on the disk is all that is left."""
     store = LinkStore(tmp_path, "quad-07", KEY)
     link = SignedLink(KEY, store.load(), UTC, 0)
@@ -141,9 +141,7 @@ def test_after_a_crash_no_timestamp_comes_again_and_nothing_old_is_heard(tmp_pat
 
 
 @pytest.mark.parametrize("moment", range(0, 150, 3))
-def test_after_a_kill_the_next_frame_of_a_vehicle_that_counts_its_frames_is_believed(
-    tmp_path: Path, moment: int
-) -> None:
+def test_next_frame_of_ardupilot_is_accepted_after_a_kill(tmp_path: Path, moment: int) -> None:
     """ArduPilot's timestamp rises by one a frame (recorded), so one second of frames is a millisecond of timestamps."""
     store = LinkStore(tmp_path, "quad-07", KEY)
     link = SignedLink(KEY, store.load(), UTC, 0)
@@ -158,7 +156,7 @@ def test_after_a_kill_the_next_frame_of_a_vehicle_that_counts_its_frames_is_beli
     keeper.close()
 
 
-def test_without_memory_that_outlives_the_process_the_disk_is_at_most_a_second_behind(
+def test_disk_state_lags_at_most_one_second_without_shared_memory(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(memory, "_FOLDER", tmp_path / "none")
@@ -195,9 +193,7 @@ def test_memory_of_somebody_else_is_not_used(tmp_path: Path, monkeypatch: pytest
     assert target.read_bytes() == b"as it was"
 
 
-def test_memory_keeps_the_newest_streams_and_is_given_back_at_an_orderly_end(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_memory_keeps_the_newest_streams_until_an_orderly_exit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(memory, "_FOLDER", tmp_path)
     many = {(1, component, 0): 100 + component for component in range(20)}
     heard = signing.HeardStamps("name")
@@ -247,7 +243,7 @@ def test_a_leap_of_time_is_kept_at_once(tmp_path: Path) -> None:
     keeper.close()
 
 
-def test_a_disk_that_fails_stops_the_run_before_it_and_not_during_it(tmp_path: Path) -> None:
+def test_disk_failure_stops_a_run_only_before_it_starts(tmp_path: Path) -> None:
     store = LinkStore(tmp_path, "quad-07", KEY)
     link = SignedLink(KEY, SigningState(5, {}), 0, 0)
 

@@ -41,7 +41,7 @@ def test_recovery_keeps_discarded_octets_beside_log(tmp_path: Path) -> None:
     assert path.read_bytes() == b"".join(log)
 
 
-def test_where_nothing_is_discarded_there_is_no_file_for_it(tmp_path: Path) -> None:
+def test_recovery_without_discarded_bytes_writes_no_extra_file(tmp_path: Path) -> None:
     path, lines = torn(tmp_path, b"")
     assert recover(path, signer(Random(1))).discarded is None
     assert unverified(path, lines, len(lines)) == ""
@@ -130,7 +130,7 @@ def test_a_file_with_another_name_elsewhere_is_not_written_to(tmp_path: Path) ->
 
 @pytest.mark.slow
 @pytest.mark.parametrize("what", ["died", "torn", "late", "refused", "failed", "short"])
-def test_it_may_be_broken_off_anywhere_and_called_again(tmp_path: Path, what: str) -> None:
+def test_interrupted_recovery_can_be_repeated(tmp_path: Path, what: str) -> None:
     number, over = 0, False
     while not over:
         folder = tmp_path / str(number)
@@ -157,7 +157,7 @@ def test_it_may_be_broken_off_anywhere_and_called_again(tmp_path: Path, what: st
 
 
 @pytest.mark.parametrize("full", [False, True])
-def test_a_signed_record_is_written_once_all_before_it_is_on_the_disk(tmp_path: Path, full: bool) -> None:
+def test_signed_record_is_written_after_earlier_records_are_synced(tmp_path: Path, full: bool) -> None:
     path, kept = tmp_path / "log.jsonl", list[bool]()
 
     def fault(number: int, name: str) -> str:

@@ -67,7 +67,7 @@ def test_file_readable_by_others_is_reported(mode: int, told: str | None, root: 
         assert exposed(file) == (told and f"its mode is {told}")
 
 
-def test_whose_file_it_is_counts_too(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_file_of_another_user_is_exposed(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (root / "sub/a").chmod(0o600)
     own = os.geteuid()
     monkeypatch.setattr(reading, "ROOT", -1)

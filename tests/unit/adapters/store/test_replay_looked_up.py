@@ -8,7 +8,7 @@ from rtshcua.onboard.ports import MissionOpening
 DIGEST, LATER = bytes(32), 1 << 52
 
 
-def test_it_says_what_opening_would_and_opens_nothing(tmp_path: Path) -> None:
+def test_lookup_predicts_the_opening_without_opening(tmp_path: Path) -> None:
     state = tmp_path / "state"
     assert looked_up(state, "quad", DIGEST, LATER, "city", 2) is MissionOpening.OPENED
     assert not state.exists()

@@ -40,7 +40,7 @@ def test_mission_given_back_opens_again_at_same_policy(tmp_path: Path) -> None:
     assert store.open_once(ONE, 1000, 10, *POLICY) is OPENED
 
 
-def test_one_that_expired_is_not_opened_again_by_giving_it_back(tmp_path: Path) -> None:
+def test_expired_mission_stays_used_when_given_back(tmp_path: Path) -> None:
     store = FileReplayStore(tmp_path, "quad-07")
     assert store.open_once(ONE, 1000, 10, *POLICY) is OPENED
     assert store.open_once(TWO, 9000, 1001, *POLICY) is OPENED
@@ -65,7 +65,7 @@ def test_expired_markers_are_pruned(tmp_path: Path) -> None:
     )
 
 
-def test_setting_the_clock_back_opens_nothing_again(tmp_path: Path) -> None:
+def test_clock_set_back_does_not_reopen_missions(tmp_path: Path) -> None:
     store = FileReplayStore(tmp_path, "quad-07")
     assert store.open_once(ONE, 1000, 10, *POLICY) is OPENED
     assert store.open_once(TWO, 9000, 1001, *POLICY) is OPENED
@@ -106,7 +106,7 @@ def test_unfinished_floor_file_is_ignored(tmp_path: Path) -> None:
     assert (store.folder / "floor").read_bytes() == b"1000\n"
 
 
-def test_a_disk_that_does_not_take_it_opens_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_mission_is_not_opened_if_the_disk_refuses_the_marker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store = FileReplayStore(tmp_path, "quad-07")
 
     def fails(handle: int) -> None:
@@ -118,7 +118,7 @@ def test_a_disk_that_does_not_take_it_opens_nothing(tmp_path: Path, monkeypatch:
             store.open_once(ONE, 1000, 10, *POLICY)
 
 
-def test_marker_and_folder_are_on_disk_before_it_opens(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_marker_and_folder_are_synced_before_a_mission_opens(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     store = FileReplayStore(tmp_path, "quad-07")
     synced: list[str] = []
     real = os.fsync

@@ -41,7 +41,7 @@ def test_a_link_stays_a_link(file: Path, tmp_path: Path) -> None:
     assert names(link.parent) == ["b.rts"]
 
 
-def test_a_file_that_lies_beside_it_is_not_ours(file: Path) -> None:
+def test_neighbouring_file_is_left_alone(file: Path) -> None:
     file.with_name("a.rts.new").write_bytes(b"mine")
     rewrite(file, b"old", b"new")
     assert file.with_name("a.rts.new").read_bytes() == b"mine"
@@ -64,7 +64,9 @@ def test_rewrite_keeps_concurrent_change(file: Path) -> None:
 
 @pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), KeyboardInterrupt()])
 @pytest.mark.parametrize("at", ["write", "fsync", "replace"])
-def test_nothing_is_lost(file: Path, error: BaseException, at: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failed_rewrite_keeps_the_old_file(
+    file: Path, error: BaseException, at: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def fails(*_: object, **__: object) -> None:
         raise error
 

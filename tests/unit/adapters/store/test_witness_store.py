@@ -42,7 +42,7 @@ def time_of(answer: WitnessResponse | Declined, request: CosignRequest) -> int:
     return found.time_s
 
 
-def test_it_goes_on_after_it_died(tmp_path: Path, log: Log) -> None:
+def test_witness_continues_after_a_crash(tmp_path: Path, log: Log) -> None:
     first = made(tmp_path)
     assert first.known(ORIGIN) is None
     first.consider(asked(log, None, 4))
@@ -57,7 +57,7 @@ def test_it_goes_on_after_it_died(tmp_path: Path, log: Log) -> None:
     assert {path.stat().st_mode & 0o077 for path in (second.store.folder, *second.store.folder.iterdir())} == {0}
 
 
-def test_one_process_at_a_time(tmp_path: Path) -> None:
+def test_second_process_on_a_witness_store_is_refused(tmp_path: Path) -> None:
     first = made(tmp_path)
     with pytest.raises(WitnessError) as refused:
         made(tmp_path)
@@ -84,7 +84,7 @@ def test_damaged_witness_memory_prevents_cosigning(tmp_path: Path, log: Log, con
     assert first.known(ORIGIN) == 3
 
 
-def test_killed_at_any_point_it_contradicts_nothing(tmp_path: Path, log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_killed_witness_never_contradicts_itself(tmp_path: Path, log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever step of keeping fails, no cosignature left; and the witness knows the old checkpoint, or the new one."""
     steps = [("write", 1), ("fsync", 1), ("replace", 1), ("fsync", 2)]  # the file is synced, then its folder
     for number, (step, turn) in enumerate(steps):
@@ -113,7 +113,7 @@ def test_killed_at_any_point_it_contradicts_nothing(tmp_path: Path, log: Log, mo
         second.store.close()
 
 
-def test_it_is_kept_before_it_is_cosigned(tmp_path: Path, log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_checkpoint_is_stored_before_it_is_cosigned(tmp_path: Path, log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
     order: list[str] = []
     keep, cosign = WitnessStore.keep, witness.cosign
     monkeypatch.setattr(WitnessStore, "keep", lambda *a: (order.append("keep"), keep(*a)))

@@ -118,7 +118,7 @@ def test_below_a_root_no_folder_that_is_a_link_is_written_into(write: Callable[.
     assert (tmp_path / "root/c/d/b").read_bytes() == b"one"
 
 
-def test_nothing_is_put_behind_what_is_no_file(tmp_path: Path) -> None:
+def test_append_refuses_special_files(tmp_path: Path) -> None:
     append(tmp_path / "a", b"one")
     append(tmp_path / "a", b"two")
     assert (tmp_path / "a").read_bytes() == b"onetwo"
@@ -156,7 +156,7 @@ def test_folders_are_made_as_far_as_they_are_missing(tmp_path: Path) -> None:
     assert [(tmp_path / name).stat().st_mode & 0o777 for name in ("a", "a/b", "a/b/c")] == [0o755, 0o700, 0o700]
 
 
-def test_nothing_stays_open_when_the_folder_cannot_be_synced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_failed_folder_sync_leaves_no_open_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     open_ = len(list(Path("/proc/self/fd").iterdir()))
     with monkeypatch.context() as patched:
         patched.setattr(os, "fsync", full)

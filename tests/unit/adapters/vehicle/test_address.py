@@ -45,16 +45,14 @@ def test_parts() -> None:
     ("serial:/dev/ttyAMA0:fast", "fast", "is not a baud rate", "is a number"),
     ("serial:/dev/ttyAMA0:57601", "57601", "not a baud rate of this system", "the nearest is 57600"),
 ])  # fmt: skip
-def test_each_bad_one_says_what_is_wrong_where_and_what_is_accepted(
-    text: str, marked: str, says: str, accepted: str
-) -> None:
+def test_bad_address_is_marked_and_explained(text: str, marked: str, says: str, accepted: str) -> None:
     with pytest.raises(AddressError, match=says) as error:
         parse(text)
     assert text[error.value.start : error.value.end] == marked
     assert accepted in error.value.help
 
 
-def test_a_way_that_is_not_for_this_option_is_told_from_one_that_is_none() -> None:
+def test_unsupported_carrier_is_distinguished_from_an_unknown_one() -> None:
     with pytest.raises(AddressError, match="cannot be used here") as error:
         parse("tcp:127.0.0.1:5760", (LinkCarrier.UDP_OUT,))
     assert error.value.help == "write `udpout:127.0.0.1:14550`"

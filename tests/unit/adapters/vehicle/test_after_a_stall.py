@@ -27,7 +27,7 @@ def in_a_leg(flavour: str) -> Flyer:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_where_it_came_to_stand_for_us_meanwhile_is_ours(flavour: str) -> None:
+def test_stopping_point_reached_during_a_stall_is_ours(flavour: str) -> None:
     """It was told to stop just before, and to come home just after: it names its place between the two."""
     one = copied(in_a_leg(flavour))
     one.begin(MotionKind.HOLD)

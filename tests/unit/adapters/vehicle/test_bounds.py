@@ -17,7 +17,7 @@ COPTER = {"FENCE_TYPE": 7.0, "FENCE_ENABLE": 0.0, "FENCE_RADIUS": 100.0, "FENCE_
           "FENCE_MARGIN": 2.0}  # fmt: skip
 
 
-def test_a_mission_reaches_as_far_as_its_targets_from_where_it_stands() -> None:
+def test_mission_reach_is_measured_from_the_start() -> None:
     steps = case.mission(case.short_steps()).invocations
     here = reach_of(steps, case.policy(), (0, 0))
     points = [point for step in steps for point in zip(step.plan.path[::2], step.plan.path[1::2], strict=True)]

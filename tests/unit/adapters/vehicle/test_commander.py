@@ -72,7 +72,7 @@ def test_a_refusal_of_the_repetition_is_not_one_of_the_first() -> None:
 
 
 @pytest.mark.parametrize(("after_us", "refused"), [(LATE_US - 1, None), (LATE_US, DENIED)])
-def test_a_late_answer_is_not_taken_for_one_to_the_next_command_of_its_kind(after_us: int, refused: int | None) -> None:
+def test_late_answer_is_not_matched_to_the_next_command(after_us: int, refused: int | None) -> None:
     commander = begun()
     commander.start(stage(), after_us)
     commander.acknowledge(messages.DO_SET_MODE, DENIED, after_us + 1)

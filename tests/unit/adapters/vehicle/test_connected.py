@@ -89,7 +89,7 @@ def poll(link: ConnectedVehicle) -> list[Event]:
     return list(link.poll(now_us, 1_000_000))
 
 
-def test_nothing_is_sent_before_a_vehicle_was_heard(link: ConnectedVehicle, stranger: Peer) -> None:
+def test_link_is_silent_until_a_vehicle_is_heard(link: ConnectedVehicle, stranger: Peer) -> None:
     stranger.socket.send(b"\xfd garbage")
     assert poll(link) == []
     stranger.send(mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, 8, 0, 0, 4, 3))  # a ground station
@@ -120,7 +120,7 @@ def test_the_first_vehicle_is_answered_and_nobody_else_is_heard(
 
 
 @pytest.mark.parametrize("key", ["the link's", "another"])
-def test_a_vehicle_whose_signing_clock_is_behind_is_greeted_and_then_believed(key: str) -> None:
+def test_vehicle_with_late_signing_clock_is_accepted_after_a_greeting(key: str) -> None:
     """ArduPilot that heard nobody for over a minute: it counts frames, and takes a later timestamp."""
     now, frames = SystemClock().now(), FrameSession()
     ours = SignedLink(bytes(range(32)), SigningState(0, {}), now.utc_us, now.monotonic_us)
@@ -189,7 +189,7 @@ def test_a_second_vehicle_keeps_the_first_from_being_ready(
     other.socket.close()
 
 
-def test_a_ground_station_is_no_vehicle(link: ConnectedVehicle, vehicle: Peer) -> None:
+def test_ground_station_is_not_taken_for_a_vehicle(link: ConnectedVehicle, vehicle: Peer) -> None:
     vehicle.beat()
     crowd(link)
     other = Peer(port(link))

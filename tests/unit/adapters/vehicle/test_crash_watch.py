@@ -73,7 +73,7 @@ class Watched:
             self.at(at_us + later * S + 20_000, 16_000)
 
 
-def test_motors_that_stop_just_after_it_flew_are_a_crash_as_soon_as_two_reports_say_so() -> None:
+def test_two_reports_of_stopped_motors_in_flight_are_a_crash() -> None:
     one = Watched().flew()
     one.beat(12_500_000, armed=False)
     assert not one.told
@@ -81,7 +81,7 @@ def test_motors_that_stop_just_after_it_flew_are_a_crash_as_soon_as_two_reports_
     assert one.told == ["the motors stopped 16 m above home"]
 
 
-def test_a_crash_in_what_waited_is_told_however_late_it_is_read() -> None:
+def test_crash_in_queued_frames_is_reported_late() -> None:
     one = Watched()
     one.now_us = 90 * S
     one.flew()
@@ -89,7 +89,7 @@ def test_a_crash_in_what_waited_is_told_however_late_it_is_read() -> None:
     assert one.told == ["the motors stopped 16 m above home"]
 
 
-def test_motors_that_are_off_after_a_gap_stopped_at_a_height_that_nobody_knows() -> None:
+def test_motors_off_after_a_gap_are_not_a_crash() -> None:
     one = Watched()
     one.now_us = 70 * S
     one.flew()
@@ -98,7 +98,7 @@ def test_motors_that_are_off_after_a_gap_stopped_at_a_height_that_nobody_knows()
     assert not one.told
 
 
-def test_the_first_report_after_a_gap_may_be_as_old_as_what_waited_and_is_not_taken_to_be() -> None:
+def test_first_report_after_a_gap_is_not_dated_by_queued_frames() -> None:
     """A heartbeat has no stamp: its earliest time is that of the last stamp before."""
     one = Watched()
     one.now_us = 70 * S
@@ -112,7 +112,7 @@ def test_the_first_report_after_a_gap_may_be_as_old_as_what_waited_and_is_not_ta
     assert not one.told
 
 
-def test_a_place_that_was_sent_before_the_motors_stopped_does_not_tell_when() -> None:
+def test_overtaken_position_does_not_date_a_motor_stop() -> None:
     one = Watched()
     one.now_us = 70 * S
     one.flew()
@@ -124,7 +124,7 @@ def test_a_place_that_was_sent_before_the_motors_stopped_does_not_tell_when() ->
     assert not one.told
 
 
-def test_a_hill_on_which_it_landed_in_the_gap_is_no_height_from_which_it_fell() -> None:
+def test_landing_on_a_hill_during_a_gap_is_not_a_crash() -> None:
     one = Watched().flew()
     one.at(70 * S, 16_000)  # whether it flies is not known yet
     one.beat(70_100_000, armed=False)
@@ -133,7 +133,7 @@ def test_a_hill_on_which_it_landed_in_the_gap_is_no_height_from_which_it_fell() 
     assert not one.told
 
 
-def test_motors_stopping_on_a_hill_after_landing_are_no_crash() -> None:
+def test_motor_stop_on_a_hill_after_landing_is_not_a_crash() -> None:
     one = Watched().flew()
     one.flies(13 * S, state=LANDING)
     one.motors_off(14 * S)
@@ -159,7 +159,7 @@ def test_tilt_in_flight_is_a_crash() -> None:
     assert one.told == ["the vehicle is tilted by 86 degrees"]
 
 
-def test_tilt_after_a_gap_is_no_crash() -> None:
+def test_tilt_after_a_gap_is_a_crash_only_if_armed() -> None:
     one = Watched().flew()
     for step in range(5):
         one.leans(70 * S + 200_000 * step, 1.5)
@@ -168,7 +168,7 @@ def test_tilt_after_a_gap_is_no_crash() -> None:
     assert one.told, "it is still armed"
 
 
-def test_two_reports_of_a_tilt_on_both_sides_of_a_gap_are_a_single_one_each() -> None:
+def test_tilt_reports_on_both_sides_of_a_gap_do_not_add_up() -> None:
     one = Watched().flew()
     one.leans(12_500_000, 1.5)
     one.beat(70 * S)
@@ -187,7 +187,7 @@ def test_a_fall_that_ends_at_once_is_an_impact_by_the_time_of_the_reports() -> N
     assert one.told == ["the vehicle came down at 8.0 m/s"]
 
 
-def test_a_descent_that_is_read_at_once_with_its_end_is_no_impact() -> None:
+def test_descent_read_together_with_its_landing_is_not_an_impact() -> None:
     one = Watched()
     one.now_us = 14 * S
     one.flew()
@@ -198,7 +198,7 @@ def test_a_descent_that_is_read_at_once_with_its_end_is_no_impact() -> None:
     assert not one.told
 
 
-def test_lying_long_after_a_hard_stop_is_no_crash() -> None:
+def test_lying_long_after_a_hard_stop_is_not_a_crash() -> None:
     one = Watched().flew()
     one.at(12_500_000, 16_000, sinks=3_500)
     one.at(12_600_000, 16_000)

@@ -69,7 +69,7 @@ def ready(flavour: str) -> Watched:
     return copied(watched(flavour))
 
 
-def test_a_position_that_is_delayed_by_3_s_is_unknown_when_it_is_stale_after_2_s(flavour: str) -> None:
+def test_position_delayed_beyond_its_staleness_is_unknown(flavour: str) -> None:
     one = ready(flavour)
     assert any(isinstance(event, Ready) for event in one.events)
     assert set(REPORTED) <= one.known()

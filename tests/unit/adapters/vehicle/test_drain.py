@@ -48,7 +48,7 @@ def test_a_steady_drain_is_measured_within_a_tenth() -> None:
         assert abs(found - rate) * 10 <= rate, (rate, found)
 
 
-def test_nothing_is_measured_before_several_changes_nor_of_a_charge_that_stands() -> None:
+def test_drain_needs_several_changes_of_charge() -> None:
     assert measured(630, 12) is None
     assert measured(0, 300) is None
 
@@ -118,7 +118,7 @@ def test_a_charge_that_rises_now_and_then_is_drained_all_the_same(every: int, ri
     assert all(abs(each - 1_760) * 5 <= 1_760 for each in known[20:])
 
 
-def test_steps_of_ten_percent_are_a_drain_and_more_at_once_is_none() -> None:
+def test_drain_accepts_steps_of_at_most_ten_percent() -> None:
     meter, known = DrainMeter(), list[int | None]()
     for second in range(200):
         known.append(meter.take(-(-(10_000 - 1_760 * second // 60) // 1_000) * 1_000, second * S))
@@ -225,7 +225,7 @@ def legs(meter: PaceMeter, *speeds: int, seconds: int = 60, climb: int = 0) -> t
     return meter.flown(0)
 
 
-def test_only_steady_level_flight_tells_how_it_gets_on() -> None:
+def test_pace_is_measured_only_in_steady_level_flight() -> None:
     time_us, way = legs(PaceMeter(), 0, 5_000, 0, 4_000)
     assert 100 * S <= time_us <= 120 * S
     assert 4_400 <= way * S // time_us <= 4_600
@@ -267,7 +267,7 @@ SPEEDS = Speeds(
 
 
 @pytest.mark.parametrize(("asked", "counted_at"), [(0, 5_000), (3_000, 3_000), (6_000, 5_000)])
-def test_a_vehicle_that_gets_on_slower_than_counted_takes_more_for_its_way_home(asked: int, counted_at: int) -> None:
+def test_slow_progress_raises_the_drain_of_the_return(asked: int, counted_at: int) -> None:
     """Against more wind than declared. What a minute takes is as declared; what a metre takes is not."""
     policy = replace(POLICY, vehicle=replace(POLICY.vehicle, speeds=SPEEDS))
     assert over_ground(SPEEDS, asked or SPEEDS.homeward) == counted_at
@@ -295,7 +295,7 @@ def test_a_vehicle_that_gets_on_slower_than_counted_takes_more_for_its_way_home(
         assert energy.way_home(distance, (0, 0), found) >= distance * per_km * 9 // 10 // 1_000_000
 
 
-def test_a_vehicle_that_gets_on_faster_than_counted_takes_what_a_minute_does() -> None:
+def test_fast_progress_does_not_lower_the_drain_per_minute() -> None:
     policy = replace(POLICY, vehicle=replace(POLICY.vehicle, speeds=SPEEDS))
     of, found = flown_with(policy, 9_000, 1_760)
     assert found is not None
@@ -309,7 +309,7 @@ def drained_policy() -> Any:
     return replace(POLICY, signals=(*POLICY.signals, signal), slots=POLICY.slots + 1)
 
 
-def test_telemetry_tells_the_drain_beside_the_charge_and_says_when_it_is_more_than_declared() -> None:
+def test_telemetry_reports_drain_and_warns_above_the_declared_value() -> None:
     policy = drained_policy()
     telemetry, slot = Telemetry(policy), policy.slots - 1
     declared = drained(policy.vehicle)

@@ -85,7 +85,7 @@ def test_its_own_failsafe_takes_over(aloft: Make, kind: MotionKind) -> None:
 
 
 @ONE_FLAVOUR
-def test_nothing_more_is_sent_after_release(aloft: Make) -> None:
+def test_released_vehicle_receives_no_commands(aloft: Make) -> None:
     one = aloft()
     one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000)
     one.vehicle.release()
@@ -171,7 +171,7 @@ def test_flies_on_a_poor_and_slow_link(flyer: Make) -> None:
 
 
 @OTHER_FLAVOUR
-def test_no_answer_at_all_is_no_success_and_is_waited_out(flyer: Make) -> None:
+def test_unanswered_command_neither_succeeds_nor_fails(flyer: Make) -> None:
     """It hears nothing of ours, though we hear it: nothing is known of the command but that it did not arrive."""
     one = flyer()
     one.until(Ready)
@@ -186,7 +186,7 @@ def test_no_answer_at_all_is_no_success_and_is_waited_out(flyer: Make) -> None:
     assert [event.answers for event in one.events if isinstance(event, VehicleAnswers)] == [False, True]
 
 
-def test_in_the_air_it_is_ready_once_it_answers_and_what_it_says_has_its_time(aloft: Make) -> None:
+def test_airborne_vehicle_is_ready_once_it_answers(aloft: Make) -> None:
     """What brings it home is chosen by what is known of it; while it answers nothing, nothing would arrive anyway."""
     one = aloft()
     one.vehicle.lose = lambda frame: True
@@ -205,7 +205,7 @@ def test_in_the_air_it_is_ready_once_it_answers_and_what_it_says_has_its_time(al
     assert one.until((Succeeded, CommandFailed, TakenOver), 120) == Succeeded(one.now_us, token)
 
 
-def test_in_the_air_one_that_tells_no_time_is_ready_all_the_same(aloft: Make) -> None:
+def test_airborne_vehicle_without_time_is_ready(aloft: Make) -> None:
     """It answers, so that it can be brought down: but what it says has no age."""
     one = aloft()
     one.vehicle.lose = lambda frame: Codec(1, 1).parse(frame)[0].name == "TIMESYNC"
@@ -214,7 +214,7 @@ def test_in_the_air_one_that_tells_no_time_is_ready_all_the_same(aloft: Make) ->
     assert 5 * SECOND <= one.until(Ready, 20).at_us - began_us <= 11 * SECOND
 
 
-def test_a_heartbeat_that_a_newer_one_overtook_is_no_takeover(aloft: Make) -> None:
+def test_overtaken_heartbeat_is_not_a_takeover(aloft: Make) -> None:
     """Both were sent between the same two stamps: only the numbers of their frames tell which was first."""
     one = aloft()
     one.begin(MotionKind.FLY, (100_000, 0), altitude=20_000, speed=5_000)
@@ -384,7 +384,7 @@ def test_a_battery_too_low_to_arm_is_not_ready(flyer: Make) -> None:
 
 
 @pytest.mark.slow
-def test_a_pilot_who_changes_the_mode_before_it_is_armed_has_taken_over(flyer: Make, flavour: str) -> None:
+def test_mode_change_before_arming_is_a_takeover(flyer: Make, flavour: str) -> None:
     one = flyer()
     one.until(Ready)
     armings: list[int] = []

@@ -144,7 +144,7 @@ def test_each_reason_in_its_turn(autopilot: int) -> None:
 
 
 @BOTH
-def test_without_a_clock_nothing_is_known_and_it_is_not_ready(autopilot: int) -> None:
+def test_vehicle_is_not_ready_without_a_clock(autopilot: int) -> None:
     one = Bench(autopilot)
     one.answers = False
     one.well()
@@ -156,7 +156,7 @@ def test_without_a_clock_nothing_is_known_and_it_is_not_ready(autopilot: int) ->
 
 
 @BOTH
-def test_it_is_not_ready_before_the_time_of_day_is_known_or_was_waited_for(autopilot: int) -> None:
+def test_vehicle_is_not_ready_until_utc_is_known_or_timed_out(autopilot: int) -> None:
     """The first step is released when the vehicle is ready, and its deadline runs from then on."""
 
     def live(seconds: float) -> str:
@@ -197,7 +197,7 @@ def test_a_vehicle_that_signs_and_does_not_answer_asks_for_the_key(autopilot: in
     assert unready(deaf=False) != KEYLESS, "it signs, and obeys anyone"
 
 
-def test_it_is_asked_why_it_would_not_arm_and_not_too_often() -> None:
+def test_prearm_reasons_are_requested_at_a_limited_rate() -> None:
     one = Bench(ARDUPILOT)
     one.well()
     for _ in range(250):
@@ -240,7 +240,7 @@ def test_a_place_that_nobody_vouches_for_is_reported_as_unknown() -> None:
     (ARDUPILOT, CopterMode.GUIDED, CopterMode.LAND, "LAND"),
     (ARDUPILOT, CopterMode.GUIDED, 99, "mode 99"),
 ])  # fmt: skip
-def test_a_mode_that_changes_in_the_air_is_taken_over_without_a_manoeuvre_of_ours(
+def test_mode_change_in_flight_without_a_command_is_a_takeover(
     autopilot: int, flies: int, other: int, name: str
 ) -> None:
     one = Bench(autopilot)
@@ -257,7 +257,7 @@ def test_a_mode_that_changes_in_the_air_is_taken_over_without_a_manoeuvre_of_our
     assert one.taken() == [name]
 
 
-def test_one_report_of_another_mode_among_those_of_the_flown_one_takes_nothing_over() -> None:
+def test_single_report_of_another_mode_is_not_a_takeover() -> None:
     one = Bench()
     one.landed(1)
     one.beat(Px4Mode.HOLD, armed=True)
@@ -269,7 +269,7 @@ def test_one_report_of_another_mode_among_those_of_the_flown_one_takes_nothing_o
     assert one.taken() == []
 
 
-def test_the_end_of_a_takeoff_and_what_happens_on_the_ground_take_nothing_over() -> None:
+def test_takeoff_end_and_ground_modes_are_not_a_takeover() -> None:
     one = Bench()
     one.landed(1)
     one.beat(Px4Mode.LAND)

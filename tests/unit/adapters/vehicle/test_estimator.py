@@ -54,7 +54,7 @@ def test_a_report_that_was_overtaken_is_set_aside() -> None:
     assert estimator.position(2 * S), "of two that bear the same time the later counts"
 
 
-def test_it_says_what_is_missing() -> None:
+def test_missing_estimates_are_named() -> None:
     estimator = Estimator("ESTIMATOR_STATUS")
     estimator.take(0x0E5, S)
     assert estimator.missing(S) == "the estimator has no position (flags 0xe5)"

@@ -110,7 +110,7 @@ def test_a_hole_of_the_inside_is_an_exclusion(flavour: Any) -> None:
     assert made.left_out == ()
 
 
-def test_two_zones_to_be_inside_of_at_once_are_both_there_where_that_is_what_it_means() -> None:
+def test_fence_has_both_inclusion_zones_if_the_autopilot_intersects() -> None:
     both = fence(ARDUPILOT, [zone(), zone("part", data=SMALL)])
     assert len(both.items) == 8
     smallest = fence(PX4, [zone(), zone("part", data=SMALL)])
@@ -128,7 +128,7 @@ def test_a_zone_of_two_parts_is_there_where_inclusions_are_joined() -> None:
     assert "2 parts" in none.left_out[0]
 
 
-def test_without_an_airspace_there_is_no_fence() -> None:
+def test_policy_without_airspace_has_no_fence() -> None:
     assert fence_of(POLICY, PX4.fence) == Fence((), ("the policy has no airspace",))
 
 

@@ -23,7 +23,7 @@ def leg(begins: ObservedVehicle) -> Stage:
     return found
 
 
-def test_that_it_moves_still_at_the_end_of_its_takeoff_is_no_sign_of_it() -> None:
+def test_residual_takeoff_motion_does_not_start_a_leg() -> None:
     """It names no target before the first leg. The frame of that was lost, and was never sent again."""
     begun = leg(vehicle(473_977_398, 19_600, 300)).done
     assert begun is not None
@@ -32,7 +32,7 @@ def test_that_it_moves_still_at_the_end_of_its_takeoff_is_no_sign_of_it() -> Non
     assert begun(vehicle(473_977_498, 19_900, 900)), "it is a metre nearer"
 
 
-def test_its_own_word_counts_where_it_names_a_target() -> None:
+def test_reported_target_decides_whether_a_leg_began() -> None:
     begun = leg(vehicle(473_977_398, 19_600, 0)).done
     assert begun is not None
     assert begun(vehicle(473_977_398, 19_600, 0, (*PLACE, 508_000)))

@@ -103,7 +103,9 @@ def test_an_unsigned_radio_is_heard_at_its_worst() -> None:
         (51, 68, "HEARTBEAT", None, False),
     ],
 )
-def test_a_radio_is_heard_as_who_it_is(system: int, component: int, name: str, named: int | None, heard: bool) -> None:
+def test_radio_frames_keep_their_own_identity(
+    system: int, component: int, name: str, named: int | None, heard: bool
+) -> None:
     link = VehicleLink(FrameSession(), None, named)
     link.settle(1)
     status = mavlink.MAVLink_radio_status_message(200, 200, 80, 0, 0, 0, 0)

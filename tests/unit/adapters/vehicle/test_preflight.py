@@ -159,7 +159,7 @@ def test_arducopters_fence_is_switched_on_and_its_other_kinds_stay_on() -> None:
                                      "set `RTL_ALT_M` to 30"),
     (ARDUPILOT, {}, "the vehicle does not report its return altitude (`RTL_ALT` or `RTL_ALT_M`)"),
 ])  # fmt: skip
-def test_another_return_altitude_keeps_it_from_being_ready(flavour: Flavour, parameters: Any, says: str) -> None:
+def test_different_return_altitude_prevents_readiness(flavour: Flavour, parameters: Any, says: str) -> None:
     one = preflight(flavour, fence=False)
     Port(flavour, parameters).settle(one)
     assert (one.unready or "").startswith(says)
@@ -199,7 +199,7 @@ def test_parameter_that_changes_way_home_prevents_readiness(
     assert says is None if one.unready is None else (says or "nothing") in one.unready
 
 
-def test_the_limits_of_the_way_home_by_their_new_names_and_for_another_height() -> None:
+def test_return_limits_are_read_under_old_and_new_names() -> None:
     high = replace(CITY, vehicle=replace(CITY.vehicle, return_altitude=60_000))
     new = {"RTL_ALT_M": 60.0, "RTL_CONE_SLOPE": 0.0, "RTL_CLIMB_MIN_M": 0.0, "WP_RADIUS_M": 2.0, "RTL_ALT_TYPE": 0.0}
     for flavour, parameters, ready in (
@@ -235,7 +235,7 @@ def test_a_limit_of_the_way_home_that_stays_silent_is_told_once(flavour: Flavour
 
 
 @pytest.mark.parametrize(("count", "told"), [(1, "1 rally point"), (7, "7 rally points")])
-def test_px4s_rally_points_keep_it_from_being_ready(count: int, told: str) -> None:
+def test_rally_points_of_px4_prevent_readiness(count: int, told: str) -> None:
     """A return leads to the one that is nearest, with RTL_TYPE 0 too; no parameter tells of them."""
     one, port = preflight(PX4), Port(PX4)
     port.rally = lambda: [mavlink.MAVLink_mission_count_message(1, 191, count, 2)]
@@ -260,7 +260,7 @@ def test_px4_that_knows_no_rally_points_has_none() -> None:
     assert not [note for note in one.notes if "rally" in note]
 
 
-def test_px4_that_tells_of_no_rally_points_is_asked_again_and_that_is_told() -> None:
+def test_missing_rally_point_count_is_requested_again_and_noted() -> None:
     one, port = preflight(PX4, fence=False), Port(PX4)
     port.rally = list
     port.settle(one, 3)
@@ -294,7 +294,7 @@ def test_a_vehicle_that_takes_no_fence_flies_without_and_says_so(flavour: Flavou
 
 
 @FLAVOURS
-def test_a_fence_that_is_refused_or_kept_otherwise_keeps_it_from_being_ready(flavour: Flavour) -> None:
+def test_refused_or_altered_fence_prevents_readiness(flavour: Flavour) -> None:
     one, port = preflight(flavour), Port(flavour)
     port.result = mavlink.MAV_MISSION_NO_SPACE
     port.settle(one)
@@ -322,7 +322,7 @@ def test_a_fence_that_is_refused_or_kept_otherwise_keeps_it_from_being_ready(fla
 
 
 @FLAVOURS
-def test_a_vehicle_that_asks_for_what_is_not_there_is_not_answered(flavour: Flavour) -> None:
+def test_request_for_an_unknown_fence_item_is_not_answered(flavour: Flavour) -> None:
     one, port = preflight(flavour), Port(flavour)
     port.ask = lambda number: mavlink.MAVLink_mission_request_int_message(1, 191, 9, 1)  # type: ignore[method-assign]
     port.settle(one)
@@ -337,7 +337,7 @@ def test_silence_is_not_waited_for_for_ever(flavour: Flavour) -> None:
     assert "it does not answer" in (one.unready or "")
 
 
-def test_a_fence_without_its_switch_is_none() -> None:
+def test_fence_without_its_enable_parameter_prevents_readiness() -> None:
     one = preflight(ARDUPILOT)
     Port(ARDUPILOT, {"RTL_ALT": 3_000.0, "FENCE_TYPE": 7.0}).settle(one)
     assert (
@@ -373,7 +373,7 @@ def test_failed_upload_is_started_again(flavour: Flavour) -> None:
     ]
 
 
-def test_a_switch_that_is_no_number_is_off() -> None:
+def test_nan_fence_parameter_counts_as_off() -> None:
     one, port = preflight(ARDUPILOT), Port(ARDUPILOT)
     port.parameters["FENCE_TYPE"] = float("nan")
     port.settle(one)

@@ -30,7 +30,7 @@ def flown() -> Recorded:
 
 
 @pytest.mark.slow
-def test_it_knows_no_place_before_its_estimator_uses_gps(watched: Recorded) -> None:
+def test_position_is_unknown_until_the_estimator_uses_gps(watched: Recorded) -> None:
     """GLOBAL_POSITION_INT began 39 seconds before, and the receiver had its fix for 31 seconds."""
     for signal in ("position", "height"):
         (first, _), *_ = watched.known(signal)
@@ -39,12 +39,12 @@ def test_it_knows_no_place_before_its_estimator_uses_gps(watched: Recorded) -> N
     assert first == 11
 
 
-def test_it_is_ready_then_and_not_when_the_prearm_bit_turned_good(watched: Recorded) -> None:
+def test_readiness_follows_the_estimator_not_the_prearm_bit(watched: Recorded) -> None:
     ((ready, _),) = watched.of(Ready)
     assert USING_GPS < ready < ARMED
 
 
-def test_the_lost_receiver_is_seen_at_once_and_the_lost_position_when_the_estimator_gives_up(watched: Recorded) -> None:
+def test_lost_gps_is_seen_before_the_lost_position(watched: Recorded) -> None:
     (_, lost), (found, last) = watched.known("gps.fix")
     assert GPS_OFF < lost + 1 <= GPS_OFF + 2
     assert GPS_ON < found <= GPS_ON + 2
@@ -62,7 +62,7 @@ def test_arducopter_signal_without_report_is_unknown(watched: Recorded) -> None:
     assert watched.known("obstacle.distance") == watched.known("link.quality") == []
 
 
-def test_no_estimate_of_the_wind_is_no_calm(watched: Recorded) -> None:
+def test_missing_wind_estimate_is_unknown(watched: Recorded) -> None:
     """8 m/s blew from 65.9 on, and WIND said 0 all the while, for a copter does not estimate it unless it is tuned."""
     assert watched.known("wind.speed") == []
 
@@ -71,18 +71,18 @@ def test_the_battery_is_known_with_its_stream(watched: Recorded) -> None:
     assert watched.known("battery") == [(3, 162)]
 
 
-def test_the_failsafe_is_a_mode_taken_over_though_nothing_of_ours_flew(watched: Recorded) -> None:
+def test_failsafe_is_a_takeover_without_a_command(watched: Recorded) -> None:
     taken = [(at, event.how) for at, event in watched.of(TakenOver)]
     assert [mode for _, mode in taken] == ["LAND", "RTL"]
     assert abs(taken[0][0] - TAKEN) < 0.2
     assert abs(taken[1][0] - RETURN) < 0.2
 
 
-def test_modes_that_change_on_the_ground_take_nothing_over(watched: Recorded) -> None:
+def test_mode_changes_on_the_ground_are_not_takeovers(watched: Recorded) -> None:
     assert watched.of(TakenOver)[0][0] > 60
 
 
-def test_it_says_when_it_is_armed_and_in_the_air(watched: Recorded) -> None:
+def test_armed_and_airborne_states_are_reported(watched: Recorded) -> None:
     states = [(at, event.armed, event.airborne) for at, event in watched.of(AirState)]
     assert [state[1:] for state in states] == [
         (False, False), (True, False), (True, True), (True, False), (False, False),
@@ -116,7 +116,7 @@ def test_after_our_last_command_the_failsafe_takes_over(flown: Recorded) -> None
     assert taken.how == "LAND"
 
 
-def test_nothing_answers_so_streams_are_asked_for_and_their_rates_told(watched: Recorded) -> None:
+def test_unanswered_stream_requests_are_noted(watched: Recorded) -> None:
     """The recorded client had asked for 1 Hz of some; a 4 Hz stream was what it got of most."""
     notes = [event.text for _, event in watched.of(Noted)]
     assert "the vehicle's own fence was left unchanged" in notes
@@ -134,6 +134,6 @@ def test_a_critical_state_is_told_though_the_mode_stays(watched: Recorded) -> No
     assert 111 < told[2][0] < 113
 
 
-def test_a_return_altitude_that_differs_keeps_it_from_being_ready() -> None:
+def test_recorded_return_altitude_prevents_readiness() -> None:
     other = Recorded("arducopter", 1_000_000, at_home(*HOME), {"RTL_ALT": 1_500.0}, until_s=ARMED)
     assert not [at for at, _ in other.of(Ready) if at < ARMED]

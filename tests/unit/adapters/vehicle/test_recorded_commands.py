@@ -86,7 +86,7 @@ def find(name: str, number: int, where: Callable[[Any], bool] = lambda m: True) 
     return [each for each in judged(name, estimator) if each.number == number and where(each.message)]
 
 
-def test_px4_acknowledges_a_bogus_mode_as_it_does_a_good_one() -> None:
+def test_px4_acknowledges_invalid_modes() -> None:
     (bogus,) = find("px4-commands", MODE, lambda m: m.param2 == 99)
     assert bogus.outcome == "accepted"
     assert bogus.seen.mode == Px4Mode.TAKEOFF, "only the heartbeat tells that nothing changed"
@@ -112,7 +112,7 @@ def test_px4_wants_its_flag_with_a_reposition() -> None:
     assert without.outcome == "refused 3"
 
 
-def test_arducopter_says_why_it_does_not_arm() -> None:
+def test_arducopter_reports_why_arming_failed() -> None:
     refused = find("arducopter-commands", ARM, lambda m: m.param1 == 1 and m.target_system == 1)[0]
     assert (refused.outcome, refused.seen.text) == ("refused 4", "Arm: Accels inconsistent")
 
@@ -122,7 +122,7 @@ def test_arducopter_knows_no_mode_99_and_says_so() -> None:
     assert (refused.outcome, refused.seen.text) == ("refused 4", "No such mode 99")
 
 
-def test_arducopter_accepts_a_takeoff_in_loiter_and_stays_where_it_is() -> None:
+def test_arducopter_accepts_a_takeoff_in_loiter_without_moving() -> None:
     in_loiter = find("arducopter-commands", TAKEOFF)[1]
     assert (in_loiter.outcome, in_loiter.seen.mode) == ("accepted", 5)
 

@@ -53,7 +53,7 @@ def test_a_hover_that_does_not_stop_is_seen_within_seconds() -> None:
     assert 28 < at < 30
 
 
-def test_a_landing_between_two_heartbeats_is_seen_and_the_next_leg_never_leaves() -> None:
+def test_landing_between_heartbeats_prevents_the_next_leg() -> None:
     """No HEARTBEAT shows the pilot's Land: the landed state does from 17.38 s on, the target before it."""
     seen = flown("px4-takeover-race", (12.0, hover()), (18.15, leg(3)), until_s=40)
     (at, taken), *_ = seen.of(TakenOver)
@@ -114,7 +114,7 @@ def test_a_velocity_and_a_pause_in_guided_are_seen_and_not_fought(
     assert not modes
 
 
-def test_a_land_that_was_undone_is_not_seen_and_our_leg_asks_for_no_mode_now() -> None:
+def test_leg_after_an_undone_land_changes_no_mode() -> None:
     """Nothing in the recording shows it: what leaves must not be able to undo it."""
     seen = flown("px4-land-undone", (30.86, hover()), (33.45, leg(3)), until_s=38)
     sent = [frame.message for _, frame in seen.sent if frame.name == "COMMAND_INT"]
@@ -141,7 +141,7 @@ def test_after_a_dropout_all_is_known_again_before_a_second_is_over() -> None:
     assert not [frame for _, frame in seen.sent if frame.name == "COMMAND_LONG" and frame.message.command in LANDS]
 
 
-def test_a_battery_that_sags_is_seen_by_its_cells_and_one_that_drains_by_its_drain() -> None:
+def test_sagging_cells_and_fast_drain_are_both_detected() -> None:
     """10.2 V of three cells from 21.79 s on: flown on for 245 s, and landed with 7 % of a charge that was to be 15 %.
 
     ArduCopter's own failsafe said so 10 s later. The rule that ships, read by three cells, takes hold at the next look.

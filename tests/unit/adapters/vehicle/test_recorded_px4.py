@@ -32,14 +32,14 @@ def flown() -> Recorded:
     ))  # fmt: skip
 
 
-def test_it_knows_its_place_once_its_estimator_does(watched: Recorded) -> None:
+def test_position_is_known_with_the_estimator(watched: Recorded) -> None:
     """The first reports of the estimator, at 2.4 s, have a height and no place."""
     assert watched.known("position") == [(3, 150)]
     assert watched.known("height") == [(3, 150)]
     assert watched.known("gps.fix")[0][0] <= 2
 
 
-def test_it_is_ready_when_it_would_arm(watched: Recorded) -> None:
+def test_px4_is_ready_when_it_can_arm(watched: Recorded) -> None:
     """PX4 sets the health bit of its pre-arm check without declaring that it has one. A battery's second report is
     waited for.
     """
@@ -58,13 +58,13 @@ def test_a_text_in_two_chunks_is_one(watched: Recorded) -> None:
     assert len(texts) == 7
 
 
-def test_the_end_of_a_takeoff_takes_nothing_over_and_a_return_does(watched: Recorded) -> None:
+def test_return_is_a_takeover_and_takeoff_end_is_not(watched: Recorded) -> None:
     ((at, taken),) = watched.of(TakenOver)
     assert abs(at - RETURN) < 0.2
     assert taken.how == "Return"
 
 
-def test_it_says_when_it_is_armed_and_in_the_air(watched: Recorded) -> None:
+def test_armed_and_airborne_states_are_reported(watched: Recorded) -> None:
     states = [(round(at), event.armed, event.airborne) for at, event in watched.of(AirState)]
     assert [state[1:] for state in states] == [
         (False, False), (True, False), (True, True), (True, False), (False, False),

@@ -43,7 +43,7 @@ def seen(mode: int, target: tuple[int, int, int] | None = None) -> ObservedVehic
 
 
 @pytest.mark.parametrize("flavour", [PX4, ARDUPILOT], ids=lambda each: each.name)
-def test_the_mode_tells_whose_flight_it_is(flavour: AutopilotFlavour) -> None:
+def test_flight_mode_shows_who_flies(flavour: AutopilotFlavour) -> None:
     for kind in MotionKind:
         ours = OURS[flavour.name, kind].split(", ")
         for mode, name in flavour.mode_names.items():
@@ -119,7 +119,7 @@ def test_a_target_of_its_own_is_not_compared() -> None:
     assert flown_by(Left((told(MotionKind.HOME),)), PX4, seen(Px4Mode.RETURN, FAR)) == ""
 
 
-def test_where_nobody_knows_where_it_is_a_hold_may_be_anywhere() -> None:
+def test_hold_at_an_unknown_position_is_ours() -> None:
     lost = seen(Px4Mode.HOLD, FAR)
     lost.located = False
     assert flown_by(Left((told(MotionKind.HOLD),)), PX4, lost) == ""

@@ -69,7 +69,7 @@ def test_a_restart_in_the_air_is_soon_ready(flavour: str, phase_ms: int) -> None
 
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 @pytest.mark.parametrize("phase_ms", [0, 250, 610])
-def test_without_a_radio_it_is_ready_at_once_and_its_place_is_known(flavour: str, phase_ms: int) -> None:
+def test_link_without_radio_is_ready_at_once(flavour: str, phase_ms: int) -> None:
     """A link home is chosen by it: where it came before its estimator vouched for it, it landed where it was."""
     one = copied(left_climbing(flavour))
     one.wait(phase_ms / 1_000)
@@ -87,7 +87,7 @@ def test_foreign_target_is_seen_without_waiting() -> None:
     assert begun_again(one).until(Ready, 0.6).others == "another target"
 
 
-def test_where_frames_are_lost_a_target_is_waited_for_as_before() -> None:
+def test_lossy_link_waits_for_a_target_report() -> None:
     one = copied(left_climbing("ardupilot"))
     one.vehicle.simulation.inject(LinkLoss(0, 3_000))
     one.vehicle.simulation.inject(PilotGoto(0, 100_000, 0, 30_000))
@@ -96,7 +96,7 @@ def test_where_frames_are_lost_a_target_is_waited_for_as_before() -> None:
 
 
 @pytest.mark.parametrize(("armed", "taken"), [(False, []), (True, ["Return"])])
-def test_landing_during_a_silence_is_no_takeover(armed: bool, taken: list[str]) -> None:
+def test_landing_during_a_silence_is_not_a_takeover(armed: bool, taken: list[str]) -> None:
     """The last word that it flies is old, and the first that is new says that its motors are off, in another mode."""
     one = begun_again(copied(left_climbing("px4")))
     one.until(Ready, 1)
@@ -120,7 +120,7 @@ def questions(frames: Any) -> list[tuple[int, int]]:
 
 
 @pytest.mark.parametrize("hurries", [True, False])
-def test_who_speaks_is_asked_before_its_heartbeat_came(hurries: bool) -> None:
+def test_sender_is_identified_before_its_heartbeat(hurries: bool) -> None:
     driver = VirtualVehicle(POLICY, SimulationConfig()).driver
     driver.hurries = hurries
     position = mavlink.MAVLink_global_position_int_message(1, 0, 0, 0, 0, 0, 0, 0, 0)
@@ -131,7 +131,7 @@ def test_who_speaks_is_asked_before_its_heartbeat_came(hurries: bool) -> None:
     assert driver.receive(others, 10 * S).answers == []
 
 
-def test_one_report_of_each_kind_is_asked_for_once_in_a_while() -> None:
+def test_missing_reports_are_requested_one_at_a_time() -> None:
     rates = {name: Rate(S // 4, S) for name in ("BATTERY_STATUS", "GPS_RAW_INT", "SYS_STATUS")}
     streams = StreamRequests(plan_streams(rates, None, signed=False), [frozenset({name}) for name in rates])
     assert streams.due_once(1, 0) == []  # nothing is awaited yet

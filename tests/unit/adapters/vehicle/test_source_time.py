@@ -79,7 +79,7 @@ def test_a_stamp_is_moved_to_our_clock(message: Any, made_us: int) -> None:
     assert ear.hear(message, 10 * S) == made_us - DRIFT_US
 
 
-def test_nothing_is_known_before_the_first_answer() -> None:
+def test_source_time_is_unknown_before_the_first_answer() -> None:
     source = SourceTime()
     assert source.unready == "the vehicle's clock is not known yet: no TIMESYNC answer"
     for number, message in enumerate([place(4_000), HEARTBEAT, gps(4_000_000), radio()]):
@@ -125,7 +125,7 @@ def test_burst_after_a_stall_is_as_old_as_the_stall() -> None:
     assert ear.hear(radio(), 10_990_000, component=68) == 10_200_000 - 4 * DRIFT_US
 
 
-def test_a_message_that_was_overtaken_is_as_old_as_what_was_sent_before_it() -> None:
+def test_overtaken_message_has_the_age_of_its_predecessor() -> None:
     ear = Ear()
     ear.place(10_100_000, 10_110_000, number=10)
     ear.place(10_200_000, 10_210_000, number=12)
@@ -137,7 +137,7 @@ def test_a_message_that_was_overtaken_is_as_old_as_what_was_sent_before_it() -> 
     assert ear.hear(radio(), 10_330_000, component=68) == 10_330_000 - held_us, "the link was seen to hold one so long"
 
 
-def test_a_stamp_that_was_overtaken_says_nothing_of_what_was_sent_before_it() -> None:
+def test_overtaken_stamp_does_not_date_earlier_messages() -> None:
     ear = Ear()
     ear.place(10_100_000, 10_110_000, number=10)
     ear.place(10_300_000, 10_400_000, number=13)
@@ -147,7 +147,7 @@ def test_a_stamp_that_was_overtaken_says_nothing_of_what_was_sent_before_it() ->
     assert ear.hear(HEARTBEAT, 10_430_000, number=16) == 10_350_000 - 2 * DRIFT_US
 
 
-def test_the_link_holds_back_what_it_held_back_in_the_last_seconds() -> None:
+def test_link_delay_is_that_of_the_last_seconds() -> None:
     ear = Ear()
 
     def age_us(now_us: int) -> int:
@@ -244,7 +244,7 @@ def test_unix_time_is_translated_by_system_time() -> None:
     assert ear.hear(gps(UNIX_US - 5 * S), 10 * S) == S - 1_000 - DRIFT_US
 
 
-def test_a_stamp_far_ahead_is_none_of_this_clocks_and_has_it_ask_soon() -> None:
+def test_stamp_far_ahead_is_ignored_and_triggers_a_time_request() -> None:
     ear = Ear()
     for step in range(10):
         ear.synchronise(10 * S + step * 200_000)
@@ -255,7 +255,7 @@ def test_a_stamp_far_ahead_is_none_of_this_clocks_and_has_it_ask_soon() -> None:
     assert ear.source.clock.due(now_us) is not None
 
 
-def test_clocks_that_ran_apart_faster_than_allowed_make_ages_older_not_younger() -> None:
+def test_excess_clock_drift_only_raises_ages() -> None:
     ear = Ear()
     ahead_us = 50_000
     assert ear.hear(place(4_000 + ahead_us // 1_000), 10 * S) == 10 * S
@@ -312,7 +312,7 @@ def test_another_component_has_a_clock_of_its_own() -> None:
     assert ear.hear(sensor(900_200), 10_170_000, component=158) == later
 
 
-def test_messages_that_are_addressed_to_somebody_hold_the_time_of_whoever_asks() -> None:
+def test_stamps_of_addressed_messages_are_ignored() -> None:
     ear = Ear()
     sent = ear.place(10_050_000, 10_060_000)
     ping = mavlink.MAVLink_ping_message(3_000_000, 1, 1, 191)
@@ -353,7 +353,7 @@ links = st.builds(
     st.integers(-30_000, 9_900),
     st.sampled_from([0, 1, 3 * S, (1 << 32) * 1_000 - 5 * S]),
 )
-def test_nothing_is_ever_taken_for_younger_than_it_is(link: LinkKind, seed: int, ppm: int, uptime_us: int) -> None:
+def test_age_is_never_underestimated(link: LinkKind, seed: int, ppm: int, uptime_us: int) -> None:
     """Whatever the link does to frames, within what the order of numbers can tell (127 frames, half a second)."""
     vehicle, source = StampedVehicle(seed, link, ppm, uptime_us=uptime_us), SourceTime()
     known = 0
@@ -389,7 +389,7 @@ def kinds() -> list[Any]:
 
 @settings(max_examples=settings().max_examples * 2)
 @given(st.data())
-def test_hostile_frames_neither_raise_nor_make_anything_younger_than_it_came(data: st.DataObject) -> None:
+def test_hostile_frames_do_not_raise_or_lower_ages(data: st.DataObject) -> None:
     ear = Ear()
     now_us = 10 * S
     for _ in range(data.draw(st.integers(1, 8))):

@@ -85,7 +85,7 @@ def test_a_vehicle_that_still_gathers_speed_is_stopped_over_a_slow_link(aloft: M
 
 
 @pytest.mark.parametrize(("delay_us", "flavour"), each_once([0, 700_000], ["ardupilot", "px4"]))
-def test_the_place_where_it_stops_is_nobody_elses_target(aloft: Make, delay_us: int) -> None:
+def test_own_stopping_point_is_not_a_foreign_target(aloft: Make, delay_us: int) -> None:
     one = aloft()
     one.begin(MotionKind.FLY, FAR, altitude=20_000, speed=12_000)
     one.wait(8)
@@ -126,9 +126,7 @@ def _drift(vehicle: Multirotor, dt: float, *_: object) -> None:
     body.east += body.v_east * dt
 
 
-def test_a_hold_that_is_blown_along_when_its_time_is_over_has_not_succeeded_yet(
-    aloft: Make, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_drifting_hold_does_not_succeed(aloft: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     """A campaign found it: a gust that it could not stand against began while it held, and it had held all the same."""
     one = aloft()
     one.begin(MotionKind.HOLD, hold_us=3 * S)
@@ -161,7 +159,7 @@ BRAKES = Brakes(2_000, 500_000)
     ("passed_s", "fastest"),
     [(0, 10_000), (0.5, 10_000), (2.5, 10_000), (3.5, 8_000), (5.0, 5_000), (7.0, 1_000), (7.5, STILL), (60, STILL)],
 )
-def test_the_fastest_that_it_may_be(passed_s: float, fastest: int) -> None:
+def test_fastest_allowed_speed_while_braking(passed_s: float, fastest: int) -> None:
     """10 m/s, 2 m/s^2 after 0.5 s, and 2 s for reports, filters and gusts."""
     assert BRAKES.fastest(10_000, round(passed_s * S)) == fastest
 
@@ -194,24 +192,24 @@ def test_measured_stops_do_not_fail() -> None:
     assert speeds(stop_from(10_100), lambda s: max(300, round(10_100 - 9_700 * s / 4.6))) is None
 
 
-def test_one_that_flies_on_fails_soon() -> None:
+def test_stop_without_braking_fails_soon() -> None:
     failed = speeds(stop_from(10_000), lambda s: 10_000)
     assert failed is not None
     assert 2.5 < failed < 3.5
 
 
-def test_one_that_slows_down_too_little_fails_later() -> None:
+def test_stop_with_weak_braking_fails_later() -> None:
     failed = speeds(stop_from(10_000), lambda s: max(2_000, round(10_000 - 2_000 * s)))
     assert failed is not None
     assert 5 < failed < 8
 
 
-def test_one_that_creeps_on_fails_at_the_end() -> None:
+def test_stop_with_residual_speed_fails_at_the_end() -> None:
     failed = speeds(stop_from(10_000), lambda s: 800)
     assert failed == pytest.approx((BRAKES.stands_us(10_000)) / S, abs=0.2)
 
 
-def test_time_counts_from_when_it_obeyed() -> None:
+def test_braking_time_counts_from_acceptance() -> None:
     failed = speeds(stop_from(10_000), lambda s: 10_000, obeyed_s=5)
     assert failed is not None
     assert 7.5 < failed < 8.5

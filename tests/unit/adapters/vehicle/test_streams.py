@@ -15,7 +15,7 @@ POSITION, TIME = "GLOBAL_POSITION_INT", "SYSTEM_TIME"
 RATES = {POSITION: Rate(100_000, 250_000), "GPS_RAW_INT": Rate(50_000, 100_000), "HEARTBEAT": Rate(100_000, S)}
 
 
-def test_a_message_is_counted_as_it_goes_over_the_wire() -> None:
+def test_message_size_is_counted_as_sent() -> None:
     beat = Codec(1, 191).pack(messages.heartbeat())
     assert frame_octets("HEARTBEAT", signed=False) == len(beat) == 21
     assert frame_octets("HEARTBEAT", signed=True) == 21 + SIGNATURE
@@ -34,7 +34,7 @@ def test_with_room_for_all_each_comes_as_asked() -> None:
 
 @pytest.mark.parametrize("signed", [False, True])
 @pytest.mark.parametrize("capacity", [1_200, 1_500, 1_920, 5_760])
-def test_a_narrow_link_is_not_oversubscribed_and_nothing_is_slower_than_suffices(capacity: int, signed: bool) -> None:
+def test_stream_plan_fits_the_link_and_the_required_rates(capacity: int, signed: bool) -> None:
     plan = plan_streams(RATES, capacity, signed=signed)
     for name, rate in RATES.items():
         assert rate.asked <= plan.intervals[name] <= rate.suffices

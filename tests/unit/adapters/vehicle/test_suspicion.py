@@ -13,7 +13,7 @@ def judged(suspicion: Suspicion, found: tuple[str, str, int] | None, up_us: int 
     return suspicion.judge(found, up_us, disputed=more.get("disputed", False), at_once=more.get("at_once", False))
 
 
-def test_a_second_report_of_the_kind_confirms_and_the_same_one_seen_again_does_not() -> None:
+def test_suspicion_needs_a_second_report_of_its_kind() -> None:
     one = Suspicion()
     assert judged(one, LAND) is None
     assert judged(one, LAND) is None, "nothing new came"
@@ -22,14 +22,14 @@ def test_a_second_report_of_the_kind_confirms_and_the_same_one_seen_again_does_n
     assert not one.stands
 
 
-def test_another_report_refutes_it_and_that_is_told() -> None:
+def test_refuted_suspicion_is_reported() -> None:
     one = Suspicion()
     judged(one, LAND)
     assert judged(one, None) is None
     assert (one.stands, one.refuted) == (False, "Land")
 
 
-def test_another_kind_is_no_confirmation() -> None:
+def test_report_of_another_kind_does_not_confirm() -> None:
     one = Suspicion()
     judged(one, LAND)
     assert judged(one, ("target", "another target", 30)) is None
@@ -41,7 +41,7 @@ def test_near_a_frame_of_ours_one_report_counts_but_not_while_two_speak() -> Non
     assert judged(Suspicion(), LAND, at_once=True, disputed=True) is None
 
 
-def test_while_two_speak_it_counts_when_nothing_else_is_said_for_a_while() -> None:
+def test_suspicion_with_two_senders_is_confirmed_by_time() -> None:
     one = Suspicion()
     judged(one, LAND, S, disputed=True)
     assert judged(one, ("mode", "Land", 9), S + UNBROKEN_US - 1, disputed=True) is None
@@ -64,7 +64,7 @@ def test_values_that_only_go_on_are_of_one() -> None:
     assert not one.stand(2 * S)
 
 
-def test_one_frame_with_a_number_far_ahead_does_not_make_the_others_late_for_long() -> None:
+def test_forged_sequence_number_makes_few_frames_late() -> None:
     """All that the vehicle said after it counted as overtaken, up to 127 frames."""
     source = SourceTime()
     for number in range(20):

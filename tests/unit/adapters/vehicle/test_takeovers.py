@@ -167,7 +167,7 @@ def test_a_velocity_in_guided_is_a_takeover_at_once() -> None:
 
 @pytest.mark.parametrize("kind", [MotionKind.HOLD, MotionKind.HOME, MotionKind.FLY])
 @pytest.mark.parametrize("after_ms", [40, 220, 300])
-def test_nothing_leaves_later_than_w_after_a_velocity(kind: MotionKind, after_ms: int) -> None:
+def test_command_after_a_pilot_velocity_leaves_only_within_the_window(kind: MotionKind, after_ms: int) -> None:
     one = copied(in_a_leg("ardupilot"))
     one.vehicle.simulation.inject(PilotVelocity(one.vehicle.simulation.now_us + 20 * MS, -3_000, 0))
     takes_us = one.now_us + 20 * MS
@@ -184,7 +184,7 @@ def test_nothing_leaves_later_than_w_after_a_velocity(kind: MotionKind, after_ms
 
 
 @pytest.mark.parametrize("loss", [2_000, 5_000, 9_000])
-def test_reports_that_are_lost_are_no_takeover(loss: int) -> None:
+def test_lost_reports_are_not_a_takeover(loss: int) -> None:
     one = copied(in_a_leg("ardupilot"))
     one.vehicle.simulation.inject(LinkLoss(0, loss))
     assert not any(isinstance(event, TakenOver) for event in one.wait(40))
@@ -222,7 +222,7 @@ def test_vehicle_standing_for_a_reason_is_not_paused(name: str) -> None:
     assert taken in ([], ["LAND"]), taken  # without a position it lands
 
 
-def test_the_end_of_a_leg_is_no_pause(aloft: Make) -> None:
+def test_end_of_a_leg_is_not_a_takeover(aloft: Make) -> None:
     """It stands there, names its target, and nothing of ours follows for a while."""
     one = aloft()
     assert isinstance(one.fly(MotionKind.FLY, (60_000, 0), altitude=20_000, speed=8_000), Succeeded)
@@ -322,7 +322,7 @@ def test_climb_held_down_by_others_is_a_takeover(name: str, height: int, within_
 
 
 @pytest.mark.parametrize("ceiling_mm", [7_000, 17_000])
-def test_stalled_climb_without_intervention_is_no_takeover(ceiling_mm: int) -> None:
+def test_stalled_climb_without_intervention_is_not_a_takeover(ceiling_mm: int) -> None:
     """Its weight, weak motors or a fence end it: that was called a pause, and it was left in the air."""
     one = Flyer("ardupilot", ceiling_mm=ceiling_mm)
     one.until(Ready)
@@ -359,7 +359,7 @@ def test_the_end_of_the_takeoff_is_ours_where_arducopter_tells_it(up_mm: int, fo
 
 
 @pytest.mark.parametrize(("off_mm", "foreign"), [(400, False), (600, True)])
-def test_a_target_that_was_reported_stays_what_it_is(off_mm: int, foreign: bool) -> None:
+def test_reported_target_becomes_foreign_only_if_it_changes(off_mm: int, foreign: bool) -> None:
     """However far from what we asked for it was: PX4 rounds, and says itself where it stops."""
     seen = ObservedVehicle(up_us=S)
     targets = TargetWatch()
@@ -371,7 +371,7 @@ def test_a_target_that_was_reported_stays_what_it_is(off_mm: int, foreign: bool)
 
 
 @pytest.mark.parametrize(("name", "flavour"), each_once(["go-to", "land", "position"], ["px4", "ardupilot"]))
-def test_a_takeover_is_seen_while_nothing_of_ours_is_under_way(aloft: Make, name: str) -> None:
+def test_takeover_is_detected_without_a_running_command(aloft: Make, name: str) -> None:
     one = aloft()
     assert isinstance(one.fly(MotionKind.FLY, (30_000, 0), altitude=20_000, speed=5_000), Succeeded)
     one.wait(3)
@@ -380,7 +380,7 @@ def test_a_takeover_is_seen_while_nothing_of_ours_is_under_way(aloft: Make, name
 
 
 @pytest.mark.parametrize("name", ["pause", "go-to", "land", "position"])
-def test_a_takeover_is_seen_while_it_holds(flavour: str, name: str) -> None:
+def test_takeover_is_detected_during_a_hold(flavour: str, name: str) -> None:
     """ArduCopter obeys no pause in BRAKE: there is nothing to see."""
     one = copied(held(flavour))
     sent = Sent(one)
@@ -407,7 +407,7 @@ def unstreamed(one: Any) -> None:
     streams(one, "POSITION_TARGET_GLOBAL_INT", -1)
 
 
-def test_another_target_is_seen_before_our_next_one_leaves_though_none_is_streamed(flavour: str) -> None:
+def test_foreign_target_is_requested_before_the_next_command(flavour: str) -> None:
     """Both answer REQUEST_MESSAGE of POSITION_TARGET_GLOBAL_INT: it is asked for with the mode."""
     one = copied(in_a_leg(flavour))
     unstreamed(one)
@@ -434,7 +434,7 @@ def test_an_arducopter_that_tells_its_target_no_more_is_taken_over() -> None:
 
 @pytest.mark.parametrize("flavour", ["px4"])
 @pytest.mark.parametrize("delay_us", [0, 150 * MS])
-def test_a_target_that_is_never_told_holds_nothing_up_for_long(aloft: Make, delay_us: int) -> None:
+def test_missing_target_report_delays_a_command_briefly(aloft: Make, delay_us: int) -> None:
     one = under_way(aloft, delay_us)
     one.vehicle.simulation.inject(MessageSilence(0, "POSITION_TARGET_GLOBAL_INT"))
     one.wait(1)
@@ -456,7 +456,7 @@ def test_sticks_end_what_px4_does_by_itself(flavour: str) -> None:
 
 
 @pytest.mark.slow
-def test_our_targets_are_no_takeover(aloft: Make) -> None:
+def test_own_targets_are_not_a_takeover(aloft: Make) -> None:
     """Leg after leg, a hold, and another leg."""
     one = aloft()
     path = [(20_000, 0), (20_000, 20_000), (0, 20_000), (0, 0), (20_000, 0)]
@@ -486,7 +486,7 @@ def test_the_old_mode_chosen_again_right_after_ours_is_a_takeover(flavour: str) 
 OLD = {"px4": FlightMode.LOITER, "ardupilot": FlightMode.GUIDED}
 
 
-def test_nothing_is_begun_once_somebody_else_flies(aloft: Make) -> None:
+def test_no_command_begins_after_a_takeover(aloft: Make) -> None:
     """Neither what waited for its record while the takeover showed, nor anything after it."""
     one = aloft()
     one.vehicle.simulation.inject(PilotMode(0, FlightMode.POSITION))
@@ -499,7 +499,7 @@ def test_nothing_is_begun_once_somebody_else_flies(aloft: Make) -> None:
 @pytest.mark.parametrize(
     ("mode", "others"), [(FlightMode.POSITION, True), (FlightMode.LAND, True), (FlightMode.LOITER, None)]
 )
-def test_a_program_that_begins_in_the_air_says_who_flies(
+def test_program_started_in_flight_reports_who_flies(
     aloft: Make, flavour: str, mode: FlightMode, others: bool | None
 ) -> None:
     """PX4 loiters for us too; ArduCopter's LOITER is a pilot's."""
@@ -588,7 +588,7 @@ def test_no_frame_leaves_later_than_w_at_any_moment(aloft: Make, flavour: str, n
     try_all(aloft, flavour, name, whole=True)
 
 
-def test_before_a_command_without_a_target_shows_another_target_is_a_takeover() -> None:
+def test_target_change_before_an_untargeted_command_shows_is_a_takeover() -> None:
     """Two heartbeats later, for what our own command changes shows in the mode by then."""
     ours, theirs = (470_000_000, 80_000_000, 500_000), (470_001_000, 80_000_000, 500_000)
     targets, seen = TargetWatch(), ObservedVehicle()

@@ -65,7 +65,7 @@ def test_reads_what_the_policy_declares(message: Any, values: dict[int, int | No
     assert all(value is None or type(value) is int for value in read.values())
 
 
-def test_a_vehicle_that_crosses_longitude_180_goes_on_where_it_was() -> None:
+def test_position_is_continuous_across_longitude_180() -> None:
     there = replace(PROJECTION, longitude=1_799_999_000)
     east = Telemetry(replace(POLICY, projection=there))
     here = Telemetry(POLICY)
@@ -99,7 +99,7 @@ def radio(rssi: int) -> Any:
     return mavlink.MAVLink_radio_status_message(1, 1, rssi, 1, 1, 0, 0)
 
 
-def test_another_component_does_not_say_where_it_is_or_what_charge_it_has() -> None:
+def test_position_and_charge_come_only_from_the_autopilot() -> None:
     telemetry = Telemetry(POLICY)
     assert telemetry.read("BATTERY_STATUS", battery(99), COMPANION) == ()
     assert telemetry.read("GLOBAL_POSITION_INT", position(*HOME), COMPANION) == ()
@@ -169,7 +169,7 @@ def test_a_flight_battery_that_falls_silent_makes_the_charge_unknown() -> None:
 
 
 @pytest.mark.parametrize("function", [mavlink.MAV_BATTERY_FUNCTION_ALL, mavlink.MAV_BATTERY_FUNCTION_PAYLOAD])
-def test_one_report_of_a_battery_with_a_new_number_counts_for_nothing(function: int) -> None:
+def test_single_report_of_a_new_battery_is_ignored(function: int) -> None:
     """Somebody else's frame on a link without a key, or an odd one of the vehicle's; also of one that says that the
     battery feeds no motor. Such a frame every other minute is no battery either.
     """
@@ -185,7 +185,7 @@ def test_one_report_of_a_battery_with_a_new_number_counts_for_nothing(function: 
 
 
 @pytest.mark.parametrize("every", [6, 7, 10, 30, 60])
-def test_a_battery_that_is_reported_seldom_counts_and_is_missed_by_its_own_distance(every: int) -> None:
+def test_staleness_of_a_battery_follows_its_report_interval(every: int) -> None:
     """A smart battery on a slow bus, or a link that loses its reports."""
     telemetry, said = Telemetry(POLICY), dict[int, Any]()
     for second in range(5 * every):
@@ -202,7 +202,7 @@ def test_a_battery_that_is_reported_seldom_counts_and_is_missed_by_its_own_dista
     assert {said[each] for each in range(ends + 1, 8 * every)} == {((BATTERY, None),)}
 
 
-def test_one_report_before_the_motors_turn_is_waited_on_for_a_minute_and_once() -> None:
+def test_new_battery_before_arming_is_awaited_for_one_minute() -> None:
     telemetry = Telemetry(POLICY)
     assert [charge(telemetry, 0, 90, at_us=second * S) for second in (0, 1)] == [(), ((BATTERY, 9_000),)]
     assert charge(telemetry, 7, 5, at_us=2 * S) == ((BATTERY, None),)
@@ -271,7 +271,7 @@ def naive(reports: Reports, armed: list[bool], *, begun: bool) -> Any:
     st.sampled_from([0, S, 2 * S, STALE_US, STALE_US + 1, 20 * S, 60 * S + 1]), st.sampled_from([0, 0, 1, 2, 3]),
     st.sampled_from([None, 20, 50, 90]), st.sampled_from([False, False, False, True]),
 ), max_size=20))  # fmt: skip
-def test_the_charge_is_that_of_the_batteries_that_count(steps: list[tuple[int, int, int | None, bool]]) -> None:
+def test_charge_matches_the_naive_battery_model(steps: list[tuple[int, int, int | None, bool]]) -> None:
     telemetry, reports, armed, at_us, begun = Telemetry(POLICY), Reports(), list[bool](), 0, False
     for later_us, number, percent, arms in steps:
         at_us += later_us
@@ -294,7 +294,7 @@ def test_a_signal_may_name_one_battery() -> None:
     assert telemetry.read("BATTERY_STATUS", one_of(0, 10)) == ()
 
 
-def test_of_range_finders_the_one_that_looks_where_the_signal_says() -> None:
+def test_range_finder_is_chosen_by_orientation() -> None:
     """Also where the one that looks down has the lower number, and each counts on its own."""
 
     def sees(instance: int, orientation: int, cm: int) -> Any:
@@ -315,7 +315,7 @@ def test_of_range_finders_the_one_that_looks_where_the_signal_says() -> None:
 
 
 @pytest.mark.parametrize("source", ["BATTERY_STATUS.nope", "NO_SUCH.x", "BATTERY_STATUS.voltages", "STATUSTEXT.text"])
-def test_a_source_that_is_no_number_is_refused_before_anything_flies(source: str) -> None:
+def test_non_numeric_source_is_refused(source: str) -> None:
     message, field = source.split(".")
     (first, *others) = POLICY.signals
     read = replace(first, sources=(SignalSource(message, (field,), 1, 1, ()),))
@@ -360,7 +360,7 @@ class Held:
         return self._source.of(ReceivedFrame(message, message.get_type(), 1, 1, self._number, False, b""), now_us)
 
 
-def test_a_measurement_that_is_repeated_makes_nothing_younger() -> None:
+def test_repeated_measurement_keeps_its_age() -> None:
     """A receiver that hangs: the autopilot goes on reporting its last measurement, and its fix, for ever."""
     held = Held(POLICY)
     assert held.hear(gps(3, S), S)[0] == 3
@@ -377,7 +377,7 @@ def test_stamp_of_zero_is_unknown() -> None:
         assert (fix, age_us < S + 20_000) == (3, True), "as old as the last answer to TIMESYNC"
 
 
-def test_that_there_is_no_fix_counts_however_often_it_is_said() -> None:
+def test_repeated_no_fix_report_is_fresh() -> None:
     """ArduPilot's time of a lost fix is that of the last one."""
     assert Held(POLICY).hear(gps(1, S), S)[0] == 1
     unknown = replace(POLICY.signals[2], sources=(SignalSource("GPS_RAW_INT", ("fix_type",), 1, 1, (0, 1, 2)),))
@@ -400,7 +400,7 @@ def test_unconfirmed_values_are_unknown() -> None:
     assert dict(telemetry.read("GLOBAL_POSITION_INT", somewhere, AUTOPILOT, every))[HEIGHT] is None
 
 
-def test_no_estimate_of_the_wind_is_no_calm() -> None:
+def test_missing_wind_estimate_is_unknown() -> None:
     telemetry = Telemetry(POLICY)
     assert telemetry.read("WIND", mavlink.MAVLink_wind_message(-180.0, 0.0, 0.0)) == ((WIND, None),)
     assert telemetry.read("WIND", mavlink.MAVLink_wind_message(0.0, 0.0, 0.0)) == ((WIND, 0),)

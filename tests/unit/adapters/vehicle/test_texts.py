@@ -43,7 +43,7 @@ def test_a_missing_chunk_does_not_join_what_does_not_belong_together() -> None:
     assert texts.take(text("third", 5, 2), 3) == [StatusText(3, 6, "b" * 50), StatusText(3, 6, "third")]
 
 
-def test_a_text_whose_end_never_comes_is_taken_as_it_is() -> None:
+def test_incomplete_text_is_reported_as_received() -> None:
     texts = StatusTexts()
     texts.take(text("a" * 50, 3, 0), 0)
     assert texts.due(CHUNK_US) == []
@@ -58,7 +58,7 @@ def test_a_text_that_never_ends_is_bounded() -> None:
     assert all(len(one.text) <= LONGEST for one in said)
 
 
-def test_an_empty_text_is_none() -> None:
+def test_empty_text_is_ignored() -> None:
     assert StatusTexts().take(text("\t"), 0) == []
 
 

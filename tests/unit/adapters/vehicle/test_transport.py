@@ -53,7 +53,7 @@ def notes(events: list[Event]) -> list[str]:
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", [AutopilotKind.PX4, AutopilotKind.ARDUPILOT])
 @pytest.mark.parametrize("baud", [57_600, 921_600])
-def test_a_vehicle_on_a_serial_line_gets_ready_and_the_line_is_not_oversubscribed(
+def test_vehicle_on_a_serial_line_becomes_ready_within_its_capacity(
     terminal: Terminal, baud: int, flavour: AutopilotKind
 ) -> None:
     vehicle = lined(terminal, baud, SimulationConfig(flavour=flavour, boot=Boot.FAST))
@@ -73,7 +73,7 @@ def test_a_vehicle_on_a_serial_line_gets_ready_and_the_line_is_not_oversubscribe
     vehicle.close()
 
 
-def test_a_cable_that_is_pulled_is_told_and_found_again_when_it_is_put_back(terminal: Terminal) -> None:
+def test_pulled_serial_cable_is_reported_and_reconnected(terminal: Terminal) -> None:
     vehicle = lined(terminal)
     live(vehicle, 10, lambda: vehicle.driver.flavour is not None)
     live(vehicle, 3)
@@ -99,7 +99,7 @@ def test_a_busy_port_says_so(terminal: Terminal) -> None:
     SerialTransport(address).close()
 
 
-def test_file_that_is_no_serial_device_is_refused(tmp_path: Path) -> None:
+def test_regular_file_as_serial_device_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(OSError, match="not a serial device"):
         SerialTransport(Address(LinkCarrier.SERIAL, str(tmp_path / "file"), 57_600))
@@ -133,7 +133,7 @@ def test_a_vehicle_that_speaks_the_old_protocol_is_told(terminal: Terminal) -> N
     vehicle.close()
 
 
-def test_a_port_that_takes_nothing_more_holds_nobody_up() -> None:
+def test_full_port_does_not_block() -> None:
     far, near = pty.openpty()
     transport = SerialTransport(Address(LinkCarrier.SERIAL, os.ttyname(near), 57_600))
     for _ in range(2_000):
@@ -155,7 +155,7 @@ def listening() -> socket.socket:
     return made
 
 
-def test_it_connects_and_connects_again() -> None:
+def test_tcp_client_reconnects() -> None:
     server = listening()
     port = server.getsockname()[1]
     vehicle = LinedVehicle(POLICY, CONFIG, Address(LinkCarrier.TCP, HERE, port), None, 100_000)
@@ -182,7 +182,7 @@ def test_it_connects_and_connects_again() -> None:
     server.close()
 
 
-def test_nobody_there_is_the_reason_for_silence() -> None:
+def test_refused_connection_is_reported_as_the_reason() -> None:
     server = listening()
     port = server.getsockname()[1]
     server.close()
@@ -192,7 +192,7 @@ def test_nobody_there_is_the_reason_for_silence() -> None:
     vehicle.close()
 
 
-def test_it_waits_for_a_connection_and_a_second_one_is_no_vehicle_of_ours() -> None:
+def test_tcp_listener_refuses_a_second_connection() -> None:
     vehicle = LinedVehicle(POLICY, CONFIG, Address(LinkCarrier.TCP_IN, HERE, 0), None, 100_000)
     assert isinstance(vehicle.transport, TcpListener)
     assert vehicle.connected.silence == "nobody has connected"

@@ -107,7 +107,7 @@ def asked_within(clock: VehicleClock, from_us: int, to_us: int) -> list[int]:
     return [now_us for now_us in range(from_us, to_us, 10_000) if clock.due(now_us) is not None]
 
 
-def test_it_asks_quickly_at_first_then_each_second() -> None:
+def test_time_requests_start_fast_and_then_slow_down() -> None:
     clock, now_us = VehicleClock(), 10 * S
     for _ in range(FIRST_ANSWERS):
         trip(clock, now_us, now_us - S, now_us + 5_000)
@@ -117,7 +117,7 @@ def test_it_asks_quickly_at_first_then_each_second() -> None:
     assert clock.due(now_us - FIRST_US + EACH_US) is not None
 
 
-def test_it_asks_quickly_again_while_answers_fail_to_come() -> None:
+def test_time_requests_speed_up_without_answers() -> None:
     clock, now_us = VehicleClock(), 10 * S
     for _ in range(FIRST_ANSWERS):
         trip(clock, now_us, now_us - S, now_us)
@@ -134,7 +134,7 @@ def test_a_vehicle_that_never_answers_is_not_flooded() -> None:
     assert 60 * S // RETRY_US - 20 <= len(asked) <= 60 * S // RETRY_US + 20
 
 
-def test_a_doubt_has_it_ask_soon_but_not_without_end() -> None:
+def test_doubt_triggers_a_bounded_number_of_time_requests() -> None:
     clock, now_us = VehicleClock(), 10 * S
     for _ in range(FIRST_ANSWERS):
         trip(clock, now_us, now_us - S, now_us)

@@ -68,7 +68,7 @@ STRANGERS = [
 
 
 @rows(("name", "kind", "autopilot"), STRANGERS)
-def test_sender_that_is_no_vehicle_is_never_chosen(name: str, kind: int, autopilot: int) -> None:
+def test_sender_other_than_a_vehicle_is_never_chosen(name: str, kind: int, autopilot: int) -> None:
     driver = Driver(POLICY, FrameSession())
     driver.receive(Codec(255, 1).pack(beat(kind, autopilot)), S)
     assert driver.flavour is None
@@ -104,9 +104,7 @@ def test_the_gate_takes_no_other_heartbeat_for_the_vehicles(name: str, kind: int
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [(26, NONE), (18, NONE), (26, 0), (2, NONE)])
-def test_a_heartbeat_of_no_autopilot_under_its_ids_is_no_mode_and_is_noted_once(
-    aloft: Make, kind: tuple[int, int]
-) -> None:
+def test_non_autopilot_heartbeat_is_ignored_and_noted_once(aloft: Make, kind: tuple[int, int]) -> None:
     one = aloft()
     one.begin(MotionKind.FLY, (60_000, 0), altitude=20_000, speed=5_000)
     one.wait(2)
@@ -120,7 +118,7 @@ def test_a_heartbeat_of_no_autopilot_under_its_ids_is_no_mode_and_is_noted_once(
     assert len([text for text in noted(one) if text.startswith("two senders use the ids 1/1")]) == 1
 
 
-def test_a_heartbeat_of_another_under_its_ids_is_no_sign_of_life(aloft: Make) -> None:
+def test_foreign_heartbeat_does_not_keep_the_link_alive(aloft: Make) -> None:
     one = aloft()
     one.vehicle.lose = lambda frame: True
     one.vehicle.hurt = lambda datagram: []
@@ -141,7 +139,7 @@ def test_the_simulated_second_voice_does_no_harm_from_the_start(flavour: str, vo
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", [(2, ARDUPILOT), (13, PX4), (1, ARDUPILOT), (13, ARDUPILOT)])
-def test_another_vehicle_under_its_ids_keeps_it_from_being_ready(flavour: str, kind: tuple[int, int]) -> None:
+def test_second_vehicle_with_the_same_ids_prevents_readiness(flavour: str, kind: tuple[int, int]) -> None:
     if kind == (2, OWN[flavour]):
         kind = (2, PX4)
     one = Flyer(flavour)
@@ -185,7 +183,7 @@ def test_a_denial_to_somebody_else_refuses_no_command(aloft: Make, target: tuple
 
 
 @pytest.mark.parametrize("target", [(2, OURS), (255, 190)])
-def test_an_answer_to_somebody_else_does_not_show_that_it_hears_us(flavour: str, target: tuple[int, int]) -> None:
+def test_answer_to_another_sender_does_not_prove_reception(flavour: str, target: tuple[int, int]) -> None:
     one = Flyer(flavour)
     one.vehicle.lose = lambda frame: True
     one.wait(1)
@@ -229,7 +227,7 @@ BAD = TakenOver | CommandFailed | Crashed
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "after_s"), each_once(FORGED, (2.0, 2.31, 4.07)))
-def test_one_forged_frame_ends_no_leg(aloft: Make, name: str, after_s: float) -> None:
+def test_forged_frame_does_not_end_a_leg(aloft: Make, name: str, after_s: float) -> None:
     one = aloft()
     one.begin(MotionKind.FLY, (60_000, 0), altitude=20_000, speed=5_000)
     one.wait(after_s)
@@ -250,7 +248,7 @@ def test_answers_that_are_held_back_make_no_forged_frame_count_for_longer(aloft:
 
 
 @pytest.mark.parametrize("name", ["motors off", "on the ground"])
-def test_one_forged_frame_ends_no_takeoff(flavour: str, name: str) -> None:
+def test_forged_frame_does_not_end_a_takeoff(flavour: str, name: str) -> None:
     one = Flyer(flavour)
     one.until(Ready)
     one.begin(MotionKind.CLIMB, altitude=20_000)
@@ -264,9 +262,7 @@ def test_one_forged_frame_ends_no_takeoff(flavour: str, name: str) -> None:
 @pytest.mark.parametrize(
     ("says_", "each_us"), each_once((Voice.STRAYED, Voice.DISARMED), (100_000, 250_000, 1_000_000))
 )
-def test_who_contradicts_the_vehicle_in_the_air_is_noted_and_ends_nothing(
-    aloft: Make, says_: Voice, each_us: int
-) -> None:
+def test_contradicting_sender_in_flight_is_noted_and_ends_nothing(aloft: Make, says_: Voice, each_us: int) -> None:
     one = aloft()
     one.begin(MotionKind.FLY, (60_000, 0), altitude=20_000, speed=5_000)
     one.wait(2)
@@ -286,7 +282,7 @@ def test_contradiction_on_the_ground_prevents_readiness(flavour: str, says_: Voi
     one.until(Ready, 60)
 
 
-def test_a_takeover_is_still_seen_beside_a_voice_that_contradicts_the_vehicle(aloft: Make) -> None:
+def test_takeover_is_detected_despite_a_contradicting_sender(aloft: Make) -> None:
     one = aloft()
     one.begin(MotionKind.FLY, (200_000, 0), altitude=20_000, speed=5_000)
     one.wait(2)
@@ -316,9 +312,7 @@ def test_a_vehicle_that_only_needs_time_is_not_given_up(flavour: str) -> None:
 
 
 @pytest.mark.parametrize("next_", [None, MotionKind.HOME, MotionKind.LAND, MotionKind.FLY])
-def test_a_takeover_is_not_hidden_by_a_voice_that_goes_on_reporting_our_mode(
-    aloft: Make, next_: MotionKind | None
-) -> None:
+def test_takeover_is_detected_despite_forged_reports_of_our_mode(aloft: Make, next_: MotionKind | None) -> None:
     """Each true report was refuted by a forged one: the vehicle was the pilot's for 10 s, and none of ours knew it."""
     one = aloft()
     one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
@@ -338,7 +332,7 @@ def test_a_takeover_is_not_hidden_by_a_voice_that_goes_on_reporting_our_mode(
 
 
 @pytest.mark.parametrize("kind", [MotionKind.HOLD, MotionKind.HOME, MotionKind.LAND])
-def test_a_command_that_begins_where_one_report_says_that_a_mode_was_left_leaves_it_to_the_pilot(
+def test_command_begun_after_one_report_of_a_left_mode_yields(
     kind: MotionKind,
 ) -> None:
     """Nothing of ours flies, as after a restart: the mode that is left counts as the one before."""

@@ -226,7 +226,7 @@ def test_frames_without_bundle_are_equal_in_both_processes(tmp_path: Path) -> No
     made.process.close()
 
 
-def test_a_bundle_of_which_nothing_was_sent_may_be_loaded_again(tmp_path: Path) -> None:
+def test_bundle_with_nothing_sent_may_be_loaded_again(tmp_path: Path) -> None:
     """By the next process, and by this one, which drops its decisions."""
     first = Held(tmp_path)
     first.load()

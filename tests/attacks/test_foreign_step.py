@@ -101,7 +101,7 @@ def test_a_chain_never_goes_backwards() -> None:
     assert isinstance(of.executor.dispatch(permits[2], AT), Command)
 
 
-def test_a_hold_may_be_left_for_the_step_that_it_waited_for() -> None:
+def test_awaited_step_may_follow_a_hold() -> None:
     of = loaded()
     first = allowed(of)
     of.executor.dispatch(first, AT)

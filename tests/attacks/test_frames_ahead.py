@@ -98,7 +98,7 @@ def thief(apart: Make) -> Thief:
     return Thief(apart("px4", legs=12))
 
 
-def test_nothing_is_signed_before_a_step_was_sent(thief: Thief) -> None:
+def test_boundary_signs_nothing_before_the_first_step(thief: Thief) -> None:
     for _ in range(20):
         thief.of.flight.turn()
         if not thief.permits:
@@ -226,7 +226,7 @@ def test_frame_refused_ahead_is_not_counted_as_stopped(thief: Thief) -> None:
     assert (thief.stated().stopped, thief.stated().aside) == (before.stopped, before.aside)
 
 
-def test_after_a_landing_nothing_is_signed(apart: Make) -> None:
+def test_boundary_signs_nothing_after_a_landing(apart: Make) -> None:
     of = apart("px4", legs=2)
     thief = Thief(of)
     of.fly(lambda _: False)
@@ -240,7 +240,9 @@ def test_after_a_landing_nothing_is_signed(apart: Make) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("key", [KEY, None], ids=("signed", "keyless"))
 @pytest.mark.parametrize(("flavour", "modes"), [("px4", Px4Mode), ("ardupilot", CopterMode)])
-def test_nothing_leaves_that_was_not_signed_ahead(flavour: str, modes: Any, key: bytes | None, apart: Make) -> None:
+def test_only_frames_signed_ahead_leave_after_the_loss(
+    flavour: str, modes: Any, key: bytes | None, apart: Make
+) -> None:
     of = apart(flavour, key)
     thief = Thief(of).until(1)
     of.lose()

@@ -38,7 +38,7 @@ def out(of: Loaded, at_us: int = AT) -> set[bytes]:
     return {each for each in EVERYTHING if isinstance(of.executor.frames.seal(each, at_us), bytes)}
 
 
-def test_nothing_moves_before_the_first_permit() -> None:
+def test_vehicle_does_not_move_before_the_first_permit() -> None:
     assert out(heard()) == set()
 
 

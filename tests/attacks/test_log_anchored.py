@@ -126,12 +126,12 @@ def test_a_forged_cosignature(at: int) -> None:
     assert said == (at >= 4), "a line of nobody we know is passed over without a word"
 
 
-def test_one_witness_that_signs_twice_is_one() -> None:
+def test_two_cosignatures_of_one_witness_count_once() -> None:
     twice = anchor(LINES[SEEN], [ONE, ONE])
     assert judged(LINES, twice, anchor(LINES[SEEN], [ONE])).anchored == 0
 
 
-def test_one_lying_witness_of_two() -> None:
+def test_one_of_two_witnesses_colludes() -> None:
     """It cosigned two trees: its cosignature of the other one contradicts the log."""
     other = log(genesis(), effect(10, detail="other"), seal(20, 1), close(30))
     assert found(LINES, anchor(LINES[SEEN], [ONE, TWO]), anchor(other[2], [TWO])) == "anchor/root"

@@ -309,7 +309,7 @@ def test_recorded_loss_does_not_hide_signed_entries() -> None:
 
 
 @rows("kind", [DECISIONS, STATEMENTS, [APPROVAL], [each for each in SENT if read(LINES[each])["kind"] == 0]])
-def test_nothing_that_a_boundary_makes_follows_its_loss(kind: list[int]) -> None:
+def test_boundary_output_after_its_loss_is_refused(kind: list[int]) -> None:
     """A decision, a statement, a document or a step: only links may fly then."""
     at = SENT[0] + 1
     made = next(each for each in kind if each > at)

@@ -64,7 +64,7 @@ def test_earlier_epochs_cannot_be_rewritten(number: int) -> None:
 
 
 @rows("number", BEFORE)
-def test_nothing_can_be_taken_out_of_earlier_epochs(number: int) -> None:
+def test_records_of_earlier_epochs_cannot_be_removed(number: int) -> None:
     seal = next(each for each in SIGNED if each > number)
     assert expect(by_the_thief([*LINES[:number], *LINES[number + 1 :]])) == ("seal/size", seal - 1)
 

@@ -35,7 +35,7 @@ def test_the_forger_writes_what_the_recorder_writes() -> None:
     assert verify(_lines(short())).verdict is LogVerdict.VERIFIED
 
 
-def test_one_bit_of_each_line() -> None:
+def test_flipped_bit_in_any_line_is_detected() -> None:
     lines = flight()
     for number, line in enumerate(lines):
         at = line.index(b'"utc_us":') + 24  # the microseconds

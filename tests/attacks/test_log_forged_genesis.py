@@ -60,12 +60,12 @@ def test_a_field_that_no_genesis_has(fields: dict[str, object], slug: str) -> No
 
 
 @rows("at", [0, 3, 30, 60, 200, 400, -70, -10, -1])
-def test_one_bit_of_the_bundle(at: int) -> None:
+def test_flipped_bit_in_the_bundle_is_detected(at: int) -> None:
     assert expect(signed(begun(bundle=flipped("bundle", at))))[0].startswith("trust/bundle-")
 
 
 @rows("at", [0, 3, 30, 60, 200, 400, -70, -10, -1])
-def test_one_bit_of_the_root(at: int) -> None:
+def test_flipped_bit_in_the_root_is_detected(at: int) -> None:
     assert expect(signed(begun(root=flipped("root", at))))[0].startswith("trust/root-")
 
 
@@ -77,7 +77,7 @@ def test_the_bundle_of_another_mission() -> None:
     assert expect(signed(begun(bundle=bundle)))[0] == "decision/invocation"
 
 
-def test_a_flight_that_says_it_was_never_enforced() -> None:
+def test_false_mode_none_is_detected() -> None:
     """Mode `none` would free every dispatch of its permit, but each decision records the mode too."""
     assert expect(signed(begun(mode="none")))[0] == "decision/mode"
 

@@ -68,7 +68,7 @@ def test_a_signature_over_another_log_of_the_same_key() -> None:
     assert expect([*LINES[:-1], swapped]) == ("seal/key", LAST)
 
 
-def test_one_byte_of_the_signature() -> None:
+def test_changed_byte_in_the_signature_is_detected() -> None:
     note = read(LINES[-1])["checkpoint"]
     head, _, encoded = note.rstrip("\n").rpartition(" ")
     data = bytearray(b64decode(encoded))

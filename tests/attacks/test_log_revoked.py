@@ -187,7 +187,7 @@ def test_witnesses_prove_signatures_before_revocation() -> None:
     assert under(both, anchor(LINES[4], [ONE, THREE])) == whole
 
 
-def test_a_root_of_a_revoked_root_key_counts_where_it_is_given_itself() -> None:
+def test_root_of_a_revoked_root_key_is_accepted_if_given_directly() -> None:
     both = replace(ROOT, keys=(*ROOT.keys, NEW_ROOT_KEY.verification()))
     chain = newer(AFTER, of=both), newer(AFTER + S, ROOT_KEY, version=3, of=both, by=NEW_ROOT_KEY)
     assert found(judged(*chain)) == ("failed", "trust/root-revoked-key", 0)

@@ -45,7 +45,7 @@ def test_the_size_in_the_signed_text_cannot_be_changed() -> None:
     assert expect(cut) == ("seal/signature", LAST - 1)
 
 
-def test_a_cut_log_says_what_it_does_not_show() -> None:
+def test_cut_log_lists_the_close_as_unproven() -> None:
     report = prove(LINES[:-1]).report
     assert "signed-close" in [claim.slug for claim in report.unproven]
     assert "signed-close" not in [claim.slug for claim in report.proven]

@@ -71,7 +71,7 @@ def test_monitor_truth_cannot_be_used_later() -> None:
     assert answer.valid_until_us <= START.monotonic_us + S
 
 
-def test_a_request_for_a_policy_without_monitors_is_no_request_here() -> None:
+def test_request_with_the_wrong_number_of_monitors_is_malformed() -> None:
     of, without = armed(), loaded()
     assert answer_to(of, request_for(without)) is Status.MALFORMED
     assert answer_to(without, claiming(of, 1)) is Status.MALFORMED

@@ -68,7 +68,7 @@ def permit(of: Loaded, ask: bytes = RADIUS) -> bytes:
     return found
 
 
-def test_nothing_is_set_that_was_not_configured() -> None:
+def test_unconfigured_parameter_is_not_set() -> None:
     of = prepares({})
     assert of.preparation.permit(RADIUS, AT) is NOT_CONFIGURED
     assert sent(of, 300.0) is NOT_LISTED
@@ -144,7 +144,7 @@ def test_permit_of_another_session_passes_no_frame() -> None:
 
 
 @pytest.mark.parametrize(("landed", "armed"), [(IN_AIR, True), (IN_AIR, False), (ON_GROUND, True), (0, False)])
-def test_nothing_is_set_in_flight(landed: int, armed: bool) -> None:
+def test_parameters_are_not_set_in_flight(landed: int, armed: bool) -> None:
     of = prepares({"FENCE_RADIUS": 300.0})
     says(of, landed, armed=armed)
     assert of.executor.prepare(permit(of), AT) is NOT_DOWN
@@ -154,7 +154,7 @@ def test_nothing_is_set_in_flight(landed: int, armed: bool) -> None:
     assert sent(of, 300.0) is FRAME_NOT_DOWN, "nor where it takes off meanwhile"
 
 
-def test_nothing_is_set_while_a_command_is_under_way() -> None:
+def test_parameters_are_not_set_during_a_command() -> None:
     of = prepares({"FENCE_RADIUS": 300.0})
     early = permit(of)
     of.executor.prepare(early, AT)

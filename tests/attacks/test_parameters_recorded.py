@@ -159,7 +159,7 @@ def test_the_audit_and_the_gate_accept_the_same(name: str) -> None:
         assert (flaw is None) == (unsettable(name, bits) is None), value
 
 
-def test_nothing_is_listed_while_a_command_is_under_way() -> None:
+def test_preparation_recorded_during_a_command_is_refused() -> None:
     lines = [line for line in flown(attested=False)[0] if read(line).get("event") != "permitted"]
     first = next(at for at, line in enumerate(lines) if read(line).get("event") == "preparation")
     sent = next(at for at, line in enumerate(lines) if read(line).get("event") == "dispatched")

@@ -168,7 +168,7 @@ def test_a_record_that_does_not_carry_the_checkpoint() -> None:
     assert parts.slug() == "proof/record"
 
 
-def test_the_key_holder_signs_a_seal_as_if_it_were_a_recovery() -> None:
+def test_seal_signed_as_a_recovery_is_refused() -> None:
     """A seal is signed by the key of its epoch: the log key signs geneses and recoveries alone."""
     parts = inclusion(3)
     parts.note = signed(parts.note.rpartition("\n\n")[0] + "\n", LOG_KEY, origin(LOG))

@@ -64,7 +64,7 @@ def test_in_the_air_the_contingency_flies(skill: str) -> None:
     assert_audited(run)
 
 
-def test_on_the_ground_nothing_begins() -> None:
+def test_recall_on_the_ground_prevents_the_takeoff() -> None:
     run = Run(fresh(), ready=False)
     assert not run.runtime.used_up
     assert hand(run, recall(run.loaded)) == "accepted"
@@ -114,14 +114,14 @@ def test_no_step_is_decided_or_sent_afterwards() -> None:
     assert isinstance(of.executor.dispatch(home, START.monotonic_us), Command)
 
 
-def test_after_it_no_document_revives_the_mission() -> None:
+def test_no_document_revives_a_recalled_mission() -> None:
     of = fresh()
     documents = (recall(of), approval(of), replacement(of))
     assert presented(of, documents[0]).accepted
     assert [presented(of, each).slug for each in documents] == ["recalled"] * 3
 
 
-def test_while_it_falls_back_approvals_and_replacements_are_refused() -> None:
+def test_approvals_and_replacements_are_refused_during_a_fallback() -> None:
     run = Run(fresh()).until_flies("goto")
     run.vehicle.fails.add("goto")
     run.until_flies("hover")

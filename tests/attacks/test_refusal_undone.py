@@ -83,7 +83,7 @@ def test_a_replayed_grant_does_not_undo_a_refusal() -> None:
 
 
 @pytest.mark.parametrize("kept", [0, 1, ASKED])
-def test_a_refusal_stays_with_what_was_refused_wherever_it_stands_now(kept: int) -> None:
+def test_refusal_follows_a_moved_step(kept: int) -> None:
     of = renewed(OF)
     assert presented(of, approval(of, granted=0)).accepted
     first, second, third, last = of.bundle.mission.invocations

@@ -244,7 +244,7 @@ def test_vehicle_obeys_only_permitted_command(taken_over: TakenOver) -> None:
 
 
 @enforcing
-def test_a_preparation_sets_what_was_configured_and_nothing_else(taken_over: TakenOver) -> None:
+def test_preparation_sets_only_configured_parameters(taken_over: TakenOver) -> None:
     issuer, name = taken_over.loaded.preparation, taken_over.name.encode()
     other = bits_of(77.0)
     assert other is not None

@@ -68,7 +68,7 @@ def test_two_people_of_a_role_are_two_people() -> None:
     assert asked(of) == ALLOWED
 
 
-def test_one_person_in_two_roles_is_one_person() -> None:
+def test_person_with_two_roles_approves_once() -> None:
     of = flying(OPERATOR)
     assert presented(of, approval(of, key=ADA)).accepted
     assert presented(of, approval(of, key=ADA_AS_OPERATOR, role="operator")).accepted

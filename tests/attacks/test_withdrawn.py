@@ -50,7 +50,7 @@ def withdrawn(thief: Thief, permit: bytes) -> str:
     return answer[1:].decode() if answer[0] else "unsent"
 
 
-def test_a_step_of_which_frames_left_is_not_given_back(apart: Callable[..., Apart]) -> None:
+def test_step_with_sent_frames_is_not_withdrawn(apart: Callable[..., Apart]) -> None:
     thief = Thief(apart("px4", legs=2)).until(1)
     up, leg = thief.permits[:2]
     assert {withdrawn(thief, permit) for permit in (up, leg)} == {"permit/sent"}
@@ -58,7 +58,7 @@ def test_a_step_of_which_frames_left_is_not_given_back(apart: Callable[..., Apar
     assert withdrawn(thief, leg) == "permit/sent", "nor once it ended"
 
 
-def test_a_step_of_which_something_was_signed_ahead_is_not_given_back(apart: Callable[..., Apart]) -> None:
+def test_step_with_frames_signed_ahead_is_not_withdrawn(apart: Callable[..., Apart]) -> None:
     """The frames of its links may have been sent, which the boundary does not see."""
     thief = Thief(apart("px4", legs=1))
     while not thief.permits:
@@ -165,7 +165,7 @@ def test_a_step_that_was_flown_is_not_called_unsent(attested: bool, event: str) 
     assert slug in (("boundary/differs", "boundary/invented") if attested else ("dispatch/was-sent",))
 
 
-def test_a_step_that_runs_or_whose_link_flew_is_not_called_unsent() -> None:
+def test_running_step_is_not_recorded_as_unsent() -> None:
     lines, _ = tried_twice(False)
     (unsent,), (failed,) = where(lines, "refused"), where(lines, "failed")
     assert expect(signed([*lines[:failed], *lines[failed + 1 :]])) == ("dispatch/was-sent", unsent - 1)

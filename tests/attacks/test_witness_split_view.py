@@ -102,7 +102,7 @@ def test_retracted_history_is_refused(futures: tuple[Log, Log]) -> None:
     assert slug(early, [mark], 1) == "anchor/root"
 
 
-def test_one_of_two_witnesses_lies(futures: tuple[Log, Log]) -> None:
+def test_split_view_of_one_witness_is_detected(futures: tuple[Log, Log]) -> None:
     """It cosigns both futures, and a later end of the forged one. With the honest one's anchor all of it comes out."""
     flown, told = futures
     honest, liar = Judge(), Judge(WITNESSES[1])

@@ -360,7 +360,7 @@ def test_artefacts_of_each_version_that_there_was(boundary: ctypes.CDLL, name: s
     assert flight.take(data) == ("accepted" if current else "unknown-version")
 
 
-def test_a_refusal_outlives_the_step_that_it_was_about(flight: Flight) -> None:
+def test_refusal_outlives_its_step(flight: Flight) -> None:
     of, about = flight.loaded(), flight.bundle.mission.invocations[2]
     assert flight.take(replacement(of)) == "accepted"
     assert flight.take(replacement(of)) == "superseded"
@@ -377,7 +377,7 @@ def test_a_refusal_outlives_the_step_that_it_was_about(flight: Flight) -> None:
     )
 
 
-def test_as_many_replacements_as_a_flight_takes(flight: Flight) -> None:
+def test_number_of_replacements_is_limited(flight: Flight) -> None:
     for number in range(MAX_REPLACEMENTS):
         mission = replace(low_mission(), issued_at_us=START.utc_us - S + number)
         document = sign_replacement(mission, over=flight.bundle, flight=FLIGHT, kept=2, key=MISSION_KEY)

@@ -101,7 +101,7 @@ def test_ten_minutes_after_takeoff(flavour: str, key: str, apart: Make) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("vehicle", "second"), each_once(product(FLAVOURS, KEYS), (12, 30, 20)))
-def test_whenever_it_is_lost_the_vehicle_comes_down(vehicle: tuple[str, str], second: int, apart: Make) -> None:
+def test_vehicle_lands_after_the_loss_of_the_boundary(vehicle: tuple[str, str], second: int, apart: Make) -> None:
     flavour, key = vehicle
     came_down(apart(flavour, KEYS[key]).fly(at(second * S)))
 
@@ -153,7 +153,7 @@ def test_frames_that_are_lost_on_the_way_are_sent_again_from_the_copies(flavour:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_where_a_link_fails_the_next_one_flies(flavour: str, apart: Make) -> None:
+def test_next_link_flies_when_one_fails(flavour: str, apart: Make) -> None:
     """No frame of the first link arrives, even after retries."""
     of = apart(flavour)
     moving: list[str] = []

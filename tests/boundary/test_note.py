@@ -68,7 +68,7 @@ def test_both_sign_the_first_record_of_a_log_alike(boundary: ctypes.CDLL) -> Non
     lambda flight: begins(flight).partition("key ")[0],
     lambda flight: begins(flight).replace("record ", "record  "),
 ])  # fmt: skip
-def test_nothing_else_is_signed(text: object, boundary: ctypes.CDLL) -> None:
+def test_text_other_than_a_checkpoint_is_not_signed(text: object, boundary: ctypes.CDLL) -> None:
     caller, flight = held(boundary)
     assert callable(text)
     refused = caller.sign_log(text(flight).encode())
@@ -77,7 +77,7 @@ def test_nothing_else_is_signed(text: object, boundary: ctypes.CDLL) -> None:
     assert isinstance(caller.sign_log(begins(flight).encode()), bytes), "and it is none the worse for it"
 
 
-def test_nothing_is_signed_before_a_flight(boundary: ctypes.CDLL) -> None:
+def test_checkpoint_is_not_signed_before_a_flight(boundary: ctypes.CDLL) -> None:
     caller = begin(boundary, ROOT.sign(ROOT_KEY), ROOT_KEY.verification().public, VEHICLE, SESSION_KEY, START)
     flight = caller.flight()
     assert isinstance(flight, bytes)

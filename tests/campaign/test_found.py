@@ -52,7 +52,7 @@ def record(line: bytes) -> dict[str, object]:
     return found
 
 
-def test_motor_stop_low_in_a_takeoff_is_no_landing() -> None:
+def test_motor_stop_low_in_a_takeoff_is_not_a_landing() -> None:
     """Regression: below 3 m a slow vehicle counted as landed, also at the top of its path."""
     for kills_s in (6.3, 6.68, 7.3):
         assert slugs(flown(of("ardupilot", at(kills_s, faults.Kill(0))))) == set()
@@ -163,7 +163,7 @@ def test_restarted_run_brings_down_an_untouched_vehicle(flavour: str, kind: str)
 
 
 @pytest.mark.slow
-def test_frame_that_arrives_after_the_restart_is_no_takeover() -> None:
+def test_frame_arriving_after_a_restart_is_not_a_takeover() -> None:
     """Regression: the hold of the recall was in flight when the process died. Its mode showed later, and counted as a
     pilot's.
     """
@@ -174,7 +174,7 @@ def test_frame_that_arrives_after_the_restart_is_no_takeover() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("flavour", "at_s"), [("px4", 38.283), ("ardupilot", 35.447)])
-def test_leg_that_arrives_after_the_stop_is_no_takeover(flavour: str, at_s: float) -> None:
+def test_leg_arriving_after_a_stop_is_not_a_takeover(flavour: str, at_s: float) -> None:
     """Regression: on a slow link the run stood down in the air without a takeover."""
     was = flown(of(flavour, at(1.5, faults.LinkDelay(0, 400_000)), at(at_s, faults.Recall(0))))
     assert (was.ending, slugs(was), was.samples[-1].in_air) == ("recalled", set(), False)

@@ -239,7 +239,7 @@ def test_clock_step_is_recorded_and_moves_no_record(tmp_path: Path) -> None:
     verified(flown)
 
 
-def test_small_clock_difference_is_no_step() -> None:
+def test_small_clock_difference_is_not_a_step() -> None:
     machine = Machine()
     steps, now = StepWatch(machine), Now(0, case.flat.ISSUED, 0)
     for second in range(1, 50):

@@ -137,7 +137,7 @@ def test_wait_for_parameters_is_sealed() -> None:
 
 @pytest.mark.soak
 @pytest.mark.parametrize("seed", range(1_000, 1_060))
-def test_stall_is_no_takeover(seed: int) -> None:
+def test_stall_is_not_a_takeover(seed: int) -> None:
     """The standard mission, with stalls of 1 to 20 s, in each third flight one soon after the other."""
     chance, flavour = Random(seed), ("px4", "ardupilot")[seed % 2]
     at, apart = chance.randrange(4_800), 60 if seed % 3 == 0 else 4_800

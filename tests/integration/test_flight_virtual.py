@@ -108,7 +108,7 @@ def test_the_longer_missions_complete(name: str, flavour: str) -> None:
 
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
-def test_ground_stations_hear_each_decision_and_the_log_what_the_vehicle_said(flavour: str) -> None:
+def test_decisions_reach_ground_stations_and_vehicle_texts_the_log(flavour: str) -> None:
     flown, heard = short(flavour)
     assert heard == ("allow takeoff(altitude = 10 m)", "allow hover(time = 5 s)", "allow return_home()")
     assert [re.split(r" \(|: ", record["detail"])[0] for record in flown.effects("noted")] == [

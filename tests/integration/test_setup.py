@@ -81,7 +81,7 @@ def test_setup_shows_progress_and_is_quiet_when_complete(project: Path) -> None:
     assert setup(project) == ""
 
 
-def test_added_file_is_no_damage(project: Path) -> None:
+def test_added_file_is_kept(project: Path) -> None:
     added = module(project).parent / "mine.py"
     added.write_text("")
     (module(project).parent / "__pycache__").mkdir(exist_ok=True)

@@ -51,7 +51,7 @@ def test_every_state_of_a_tiny_run() -> None:
     assert found.endings == expected
 
 
-def test_a_run_that_silence_ended_does_nothing_more() -> None:
+def test_run_ended_by_silence_sends_nothing() -> None:
     found = Search(with_fields(TINY, profiles=("good",), events=("ready", "link lost", "time"))).run()
     assert "link-lost" in found.endings
 

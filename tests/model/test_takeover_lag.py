@@ -137,7 +137,7 @@ def check_after(lag_us: int, phase_ms: int, after_ms: int, kind: MotionKind) -> 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ANY_KIND)
-def test_a_command_that_begins_before_a_takeover_is_confirmed_leaves_it_to_the_pilot(kind: MotionKind) -> None:
+def test_command_before_a_confirmed_takeover_leaves_the_pilot_in_control(kind: MotionKind) -> None:
     """One report of it may have come by then: it is neither forgotten, nor taken for the mode of what flew before."""
     for after_ms in (*range(0, 140, 30), *range(140, 190, 10)):
         check_after(0, 0, after_ms, kind)

@@ -81,7 +81,7 @@ def test_names_across_files_that_are_not_saved(editor: Editor, folder: Path) -> 
     editor.close(mission)
 
 
-def test_what_is_written_is_helped_along(editor: Editor, folder: Path) -> None:
+def test_completion_and_signature_help_follow_the_text(editor: Editor, folder: Path) -> None:
     uri = uri_of(str(folder / "writing.rts"))
     editor.open(uri, MISSION.replace("return_home() }", "takeoff( }"))
     client = editor.client
@@ -116,7 +116,7 @@ def test_what_is_written_is_helped_along(editor: Editor, folder: Path) -> None:
 @pytest.mark.parametrize(
     "uri", ["untitled:Untitled-1", "file:///c%3A/work/odd%20name.rts", "vscode-vfs://host/a/b.rts"]
 )
-def test_texts_that_are_no_files_here(editor: Editor, uri: str) -> None:
+def test_documents_without_a_local_file_are_checked(editor: Editor, uri: str) -> None:
     assert [each.code for each in editor.open(uri, "zone a = union(nothing)\n")] == ["E0201"]
     assert editor.change(uri, 2, HEAD) == []
     editor.close(uri)

@@ -18,7 +18,7 @@ T = TypeVar("T")
 
 
 @pytest.mark.slow
-def test_where_a_file_is_imported(editor: Editor, folder: Path) -> None:
+def test_references_list_the_imports_of_a_file(editor: Editor, folder: Path) -> None:
     one, other = (uri_of(str(folder / name)) for name in ("near.rts", "far.rts"))
     editor.open(one, HEAD)
     editor.open(
@@ -32,7 +32,7 @@ def test_where_a_file_is_imported(editor: Editor, folder: Path) -> None:
         editor.close(uri)
 
 
-def test_a_search_tells_how_far_it_is_and_findings_do_not_wait_for_it(editor: Editor, folder: Path) -> None:
+def test_search_reports_progress_without_delaying_findings(editor: Editor, folder: Path) -> None:
     many = folder / "many"
     many.mkdir()
     for n in range(30):
@@ -90,7 +90,7 @@ def test_formatting_is_as_wide_as_the_project_says(editor: Editor, folder: Path)
 
 @pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
-def test_it_ends_when_the_editor_dies(tmp_path: Path) -> None:
+def test_server_exits_when_the_editor_dies(tmp_path: Path) -> None:
     """Without a word, in the middle of a message; and so does the process that proves."""
     command = [sys.executable, "-P", "-m", "rtshcua", "lsp"]
     server = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=tmp_path)

@@ -60,7 +60,7 @@ def test_unverifiable_frame_without_successor_is_scanned() -> None:
     assert stream.feed(b"x" + BEAT * 20)[-1] == BEAT
 
 
-def test_garbage_is_counted_and_holds_nothing_back_for_long() -> None:
+def test_garbage_is_counted_without_delaying_frames() -> None:
     stream, chance = FrameStream(), Random(1)
     assert stream.feed(chance.randbytes(5_000)) == []
     assert stream.counts.frames == 0

@@ -157,7 +157,7 @@ def unkept(state: State, policy: PreparedPolicy = POLICY) -> list[tuple[str, int
         (478 * M, 8 * M, 125_000, False),
     ],
 )
-def test_the_border_counts_where_it_would_stand(east: int, speed: int, age_us: int, breaks: bool) -> None:
+def test_border_is_checked_at_the_stopping_point(east: int, speed: int, age_us: int, breaks: bool) -> None:
     found = unkept(moving((east, 0, 20 * M), (speed, 0, 0), age_us))
     assert found == ([(AIRSPACE, FALSE)] if breaks else [])
 
@@ -169,7 +169,7 @@ def test_a_climb_is_stopped_before_the_height_that_must_be_kept() -> None:
     assert unkept(moving((110 * M, -20 * M, 24_999), (0, 0, -3 * M))) == []
 
 
-def test_the_way_home_is_that_from_where_it_would_stand() -> None:
+def test_way_home_starts_at_the_stopping_point() -> None:
     """100 m at 12 m/s are 77.2 of 10000, 120 m are 92.6; the reserve is 1000."""
     still, outward = moving((0, -100 * M, 20 * M), (0, 0, 0)), moving((0, -100 * M, 20 * M), (0, -8 * M, 0))
     for state, enough in ((still, 1_078), (outward, 1_093)):
@@ -179,7 +179,7 @@ def test_the_way_home_is_that_from_where_it_would_stand() -> None:
 
 
 @pytest.mark.parametrize("slot", [POSITION_X, NORTH, EAST, DOWN])
-def test_without_one_of_its_signals_nothing_is_known(slot: int) -> None:
+def test_stopping_point_is_unknown_without_a_signal(slot: int) -> None:
     state = moving((0, 0, 20 * M), (1 * M, 0, 0))
     values = tuple(None if number == slot else value for number, value in enumerate(state.values))
     found = unkept(State(values, state.ages))
@@ -188,7 +188,7 @@ def test_without_one_of_its_signals_nothing_is_known(slot: int) -> None:
 
 
 @pytest.mark.parametrize(("x", "airspace"), [(0, UNKNOWN), (499 * M, FALSE)])
-def test_without_its_height_it_is_known_where_over_ground_it_leads(x: int, airspace: int) -> None:
+def test_stopping_point_over_ground_is_known_without_height(x: int, airspace: int) -> None:
     """At any age: the age of a missing height has no meaning."""
     state = moving((x, 0, 20 * M), (12 * M, 0, 0))
     values = tuple(None if number == HEIGHT else value for number, value in enumerate(state.values))
@@ -205,7 +205,7 @@ def test_speed_out_of_range_is_unknown() -> None:
     assert ahead(slots, state.ages, POLICY) is UNKNOWN_AHEAD
 
 
-def test_without_braking_it_is_where_it_was_measured() -> None:
+def test_stopping_point_without_braking_is_the_measured_position() -> None:
     policy = loaded(replace(braking(0, 0), vehicle=replace(flat.POLICY.vehicle, position_error=0)))
     assert unkept(moving((499 * M, 0, 20 * M), (12 * M, 0, 0)), policy) == []
     assert unkept(moving((499 * M, 0, 20 * M), (None, None, None)), policy) == []

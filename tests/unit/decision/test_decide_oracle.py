@@ -81,7 +81,7 @@ def test_possible_outcomes_include_decision(of: Random) -> None:
 
 
 @given(worlds.CHANCES)
-def test_one_situation_has_one_answer(of: Random) -> None:
+def test_decision_is_the_only_possible_answer(of: Random) -> None:
     policy, invocation = prepared(of)
     state, now, context = (
         worlds.state(of, len(policy.monitors)),

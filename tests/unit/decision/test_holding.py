@@ -34,6 +34,6 @@ def test_holding(values: dict[int, int | None], unkept: list[tuple[str, int]]) -
     assert list(holding(ready(STEP, POLICY), flat.state(values), POLICY, NOW)) == unkept
 
 
-def test_without_an_airspace_there_is_none_to_leave() -> None:
+def test_hold_never_leaves_a_missing_airspace() -> None:
     policy = loaded(replace(flat.POLICY, airspace=None))
     assert holding(ready(STEP, policy), flat.state({POSITION_X: 600 * M}), policy, NOW) == ()

@@ -89,12 +89,12 @@ def test_a_document_that_is_too_large_or_unknown_is_refused() -> None:
     assert take(flight(), long).slug == "too-large"
 
 
-def test_nothing_is_accepted_under_a_root_that_may_have_expired() -> None:
+def test_documents_are_refused_under_a_possibly_expired_root() -> None:
     of = flight(replace(ROOT, expires_at_us=IN_DOUBT))
     assert {take(of, each).slug for each in (approval(OF), recall(OF), replacement(OF))} == {"root-expired"}
 
 
-def test_an_approval_counts_until_it_expires_and_a_refusal_for_good() -> None:
+def test_approvals_expire_and_refusals_do_not() -> None:
     of = flight()
     assert of.approvals(STEP, START) == ()
     receipt = take(of, approval(OF))
@@ -159,7 +159,7 @@ def test_refusal_applies_to_equal_replacement_step() -> None:
     assert take(of, approval(OF, granted=0, mission=bytes(32))).slug == "other-mission"
 
 
-def test_after_a_recall_nothing_else_is_accepted() -> None:
+def test_documents_after_a_recall_are_refused() -> None:
     of = flight()
     assert take(of, recall(OF)).accepted
     assert of.recalled
@@ -324,7 +324,7 @@ def test_a_replacement_of_a_released_step_is_refused() -> None:
     assert take(flight(), replacement(OF), released=3).slug == "already-released"
 
 
-def test_a_new_step_with_the_id_of_one_that_stays_is_refused() -> None:
+def test_new_step_with_a_kept_id_is_refused() -> None:
     bound = bind(shorter(OF), OF.bundle.policy_digest, after=b"")
     first, second, last = bound.invocations
     twin = replace(last, invocation_id=OF.bundle.mission.invocations[0].invocation_id)

@@ -103,7 +103,7 @@ def test_day_window_with_constant_offsets_equals_fixed_offset(start: int, end: i
         (6 * DAY, U),
     ],
 )
-def test_an_hour_that_is_skipped_and_one_that_comes_twice(at: int, answer: int) -> None:
+def test_daily_window_handles_skipped_and_repeated_hours(at: int, answer: int) -> None:
     window = daily(2 * H, 3 * H - 1, LOCAL)
     assert window.truth(((ZERO + at,) * 2,), (0, 0)) == answer
     assert window.truth(((ZERO + at,) * 2,), (0, 1)) in (answer, answer | U)

@@ -254,7 +254,7 @@ def test_a_single_situation_says_one_thing_of_each_monitor() -> None:
 # ------------------------------------------------------------------------------------------- how long it holds
 
 
-def test_an_admission_holds_no_longer_than_the_observation_it_rests_on() -> None:
+def test_admission_expires_with_its_observation() -> None:
     """Deadline 2 s; the battery, the wind and the rest are fresh for 10 s and more."""
     signals = tuple(replace(signal, stale_us=10 * S) for signal in P.signals)
     policy = requiring(policy=replace(P, signals=signals))
@@ -295,7 +295,7 @@ def test_no_value_is_offered_for_what_a_monitor_says() -> None:
     assert offered(requiring(clause("", (*asks(0).code, Op.NOT, 0, 0))), (T, T, T)) == []
 
 
-def test_beside_a_monitor_a_value_is_offered_where_it_helps() -> None:
+def test_nearest_change_is_offered_beside_a_monitor() -> None:
     charge = apply(Op.GT, flat.signal(BATTERY), const(9_500))
     either = requiring(clause("", apply(Op.OR, asks(0).code, charge)))
     both = requiring(clause("", apply(Op.AND, asks(0).code, charge)))

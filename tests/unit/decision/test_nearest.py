@@ -86,7 +86,7 @@ def test_degrade_and_energy() -> None:
     assert found(goto(), {BATTERY: 1_600}) == (Reason.ENERGY, [("battery", "ratio", 1_655, ())])
 
 
-def test_more_than_a_full_battery_is_no_answer() -> None:
+def test_nearest_change_never_exceeds_a_full_battery() -> None:
     policy, contract = with_contract(GOTO, energy=9_000)
     assert found(replace(goto(), contract=contract), {BATTERY: 10_000}, policy) == (Reason.ENERGY, [])
 
@@ -111,7 +111,7 @@ def below(value: int) -> Any:
     return clause("altitude <= ...", flat.apply(Op.LE, flat.argument(1), flat.const(value)))
 
 
-def test_of_several_permits_the_one_that_needs_least() -> None:
+def test_nearest_change_is_that_of_the_closest_permit() -> None:
     both = clause("", flat.apply(Op.AND, below(9 * M).code, flat.apply(Op.GE, flat.signal(BATTERY), flat.const(9_500))))
     rules = (
         rule(RuleKind.PERMIT, INSPECT, when=both),
@@ -156,7 +156,7 @@ def bounds(code: tuple[int, ...], goal: bool = True, **given: Any) -> Any:
     ]
 
 
-def test_where_arguments_stay_the_signal_is_changed() -> None:
+def test_signals_only_search_changes_the_signal() -> None:
     code = flat.apply(Op.LE, SIG(WIND), flat.apply(Op.SUB, A(1), N(19_000)))  # altitude is 20 m
     assert bounds(code) == [(True, 1, 23_000, None)]
     assert bounds(code, signals_only=True) == [(False, WIND, None, 1_000)]

@@ -35,7 +35,7 @@ def vehicle(metres: int) -> VehicleLimits:
     ("declared", "height", "reached"),
     [(0, 15, (0, 15)), (30, 15, (0, 30)), (30, 50, (0, 50)), (30, -2, (-2, 30)), (0, -2, (-2, -2))],
 )
-def test_a_return_climbs_to_its_altitude_if_it_is_lower(declared: int, height: int, reached: tuple[int, int]) -> None:
+def test_return_climbs_to_its_altitude_from_below(declared: int, height: int, reached: tuple[int, int]) -> None:
     planner = Planner(MotionKind.HOME, (), flown_at(HOME, 0, vehicle(declared)), 0)
     slots = [point(100_000), point(0), point(height * 1_000), point(0)]
     assert planner.volume(slots, KNOWN).height[:2] == tuple(metres * 1_000 for metres in reached)
@@ -86,7 +86,7 @@ def test_from_a_set_of_places_and_heights_every_way_is_covered() -> None:
     ("declared", "near"),
     [(0, 10 + 50 + 3), (15, 10 + 50 + 3), (30, 10 + 50 + 3), (31, 63.334), (60, 20 + 50 + 3), (120, 40 + 50 + 3)],
 )
-def test_how_far_from_home_a_return_may_be_low(declared: int, near: float) -> None:
+def test_low_return_is_limited_in_distance_from_home(declared: int, near: float) -> None:
     """10 m or a third of the height, and as far as home and the vehicle may be from where they are said to be."""
     there = msgspec.structs.replace(vehicle(declared), home_within=50 * M, position_error=3 * M)
     assert near_home(there) == round(near * M)

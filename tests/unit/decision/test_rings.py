@@ -114,7 +114,7 @@ def test_a_long_zig_zag_is_well_formed() -> None:
 
 @settings(max_examples=settings().max_examples // 2)
 @given(worlds.CHANCES)
-def test_one_crossing_among_many_edges_is_found(of: Random) -> None:
+def test_single_crossing_among_many_edges_is_found(of: Random) -> None:
     ring = list(zig_zag(100))
     at = of.randrange(1, 199)
     ring[at], ring[at - 1] = ring[at - 1], ring[at]

@@ -128,7 +128,7 @@ def test_fallback_stays_in_airspace_on_its_whole_path() -> None:
     assert (decision.outcome, decision.link, decision.target) == (FALLBACK, 1, contract.fallback[1])
 
 
-def test_no_airspace_is_no_limit() -> None:
+def test_missing_airspace_imposes_no_limit() -> None:
     policy = loaded(replace(flat.POLICY, airspace=None))
     assert ask(goto(600 * M, 300 * M), policy=policy).outcome is ALLOW
 

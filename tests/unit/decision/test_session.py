@@ -230,7 +230,7 @@ def test_requests_allowed_before_during_and_after_step(
         (Ref(CONTINGENCY_LINK, -1, 2), {FIX: 2}, LAND),
     ],
 )
-def test_a_link_flies_where_it_may(ref: Ref, values: dict[int, int | None], skill: int | None) -> None:
+def test_links_fly_only_when_admitted(ref: Ref, values: dict[int, int | None], skill: int | None) -> None:
     of = Asked()
     for step in range(3):
         of.step(step)
@@ -335,7 +335,7 @@ def test_a_replacement_keeps_what_was_released_or_asked_for(steps: int, released
         (OnInadmissible.SKIP, {BATTERY: 2_000}, {}, "already-released"),
     ],
 )
-def test_requested_step_is_replaced_only_if_it_awaits_that(
+def test_step_is_replaced_only_while_awaiting_replacement(
     on_inadmissible: int, values: dict[int, int | None], context: dict[str, Any], slug: str
 ) -> None:
     of = with_mission(on_inadmissible)

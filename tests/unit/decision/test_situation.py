@@ -20,7 +20,7 @@ def known(value: int | None) -> Value:
     return value, value, PRESENT, None
 
 
-def test_where_all_is_known_every_slot_is_what_was_reported() -> None:
+def test_known_slots_have_their_reported_values() -> None:
     assert values_of(FRESH) == [known(value) for value in FRESH.values]
 
 

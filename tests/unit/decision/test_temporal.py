@@ -109,7 +109,7 @@ def test_outer_monitor_reads_inner_at_same_observation() -> None:
     assert words == ["FU", "FU", "FF", "TT", "FT", "FT", "FF", "FF", "FF"]
 
 
-def test_a_stale_signal_is_unknown_to_a_monitor_as_it_is_to_a_condition() -> None:
+def test_stale_signal_is_unknown_to_monitors_and_conditions() -> None:
     policy = policy_of(Monitor(FOR, S, CALM))
     memory, said = initial(policy), ()
     for number in range(4):
@@ -146,7 +146,9 @@ TRACES = st.lists(st.tuples(STEPS, st.sampled_from("TTFU")), min_size=1, max_siz
 
 @settings(max_examples=settings().max_examples * 4)
 @given(st.sampled_from([*MonitorKind]), WINDOWS, TRACES)
-def test_one_monitor_says_what_its_whole_history_says(kind: int, window_us: int, steps: list[tuple[int, str]]) -> None:
+def test_monitor_matches_an_evaluation_of_its_whole_history(
+    kind: int, window_us: int, steps: list[tuple[int, str]]
+) -> None:
     monitor = Monitor(kind, 0 if kind in (RISING, FALLING) else window_us, CALM)
     history: History = []
     at_us = 0

@@ -145,7 +145,7 @@ def test_the_same_volume_at_two_times() -> None:
 
 
 @pytest.mark.parametrize(("end", "index"), [(UTC + H, 1), (UTC + MIN, 2)])
-def test_a_link_counts_for_as_long_as_it_may_take(end: int, index: int) -> None:
+def test_zone_times_cover_the_longest_duration_of_a_link(end: int, index: int) -> None:
     """Hovering moves nothing; going home takes up to five minutes, and landing is the last."""
     policy = airspace(flat.POLICY.airspace.inside[0], dates=(0, end))
     choice = choose_fallback(ready(STEP, policy), flat.state(), policy, flat.NOW, after=0)
@@ -184,7 +184,7 @@ def test_no_time_is_offered_at_which_a_zone_blocks() -> None:
         assert len(nearest(decision, ready(STEP, policy), flat.state(), policy, flat.NOW)) == offers
 
 
-def test_how_long_a_flight_may_take() -> None:
+def test_longest_flight_time_is_computed() -> None:
     contract, vehicle = flat.CONTRACTS[flat.HOVER], flat.POLICY.vehicle
     assert longest(contract, vehicle) == contract.duration_us
     assert longest(contract, vehicle, 7 * S) == 7 * S

@@ -28,12 +28,12 @@ def test_an_answer_names_its_clause_and_its_target() -> None:
     assert in_words(decided) == ("fallback", Reason.NO_SLACK.value, 5, clause.text, place, target.text, 1, 9)
 
 
-def test_a_link_that_may_fly_is_no_target_of_its_own_record() -> None:
+def test_admitted_link_is_not_a_target_of_its_record() -> None:
     decided = Decided(Outcome.ALLOW, Reason.ADMITTED, 8, None, None, flat.POLICY.contingency[1], 9)
     assert in_words(decided) == ("allow", "admitted", 8, None, None, None, -1, 9)
 
 
-def test_a_record_says_what_it_is_about(
+def test_records_refer_to_their_subject(
     recorder: Recorder, begin: Callable[[], bytes], decide: Callable[..., bytes], now: Callable[[int], Now]
 ) -> None:
     begin()

@@ -139,7 +139,7 @@ def test_the_anchored_part() -> None:
     assert [each.size for each in found.witnessed] == [4, 2]
 
 
-def test_nothing_is_accepted_under_another_pin() -> None:
+def test_log_under_another_pin_is_untrusted() -> None:
     for pinned in (bytes(32), bytes(16), ROOT_KEY[:16]):
         assert independent_verifier.verify(b"".join(lines_of("closed")), pinned).kind == "untrusted"
 

@@ -187,7 +187,7 @@ def test_cache_of_ranges_is_bounded() -> None:
     assert [tree.root(size) for size in range(1_101)] == [EMPTY, *(root(0, size) for size in range(1, 1_101))]
 
 
-def test_a_store_is_taken_up_again_as_it_was_left(stored: StoredTree) -> None:
+def test_stored_tree_is_restored(stored: StoredTree) -> None:
     half = StoredTree()
     for leaf in LEAVES[:33]:
         half.push(leaf)

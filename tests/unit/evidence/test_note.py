@@ -146,7 +146,7 @@ GOOD = f"{ORIGIN}\n7\n{ZEROS}\nrecord {ZEROS}\nkey {ZEROS}\n"
         GOOD.replace("key", f"after {ZEROS}\nkey"),
     ],
 )
-def test_signed_text_that_is_no_checkpoint(text: str, log_key: SigningKey) -> None:
+def test_signed_text_other_than_a_checkpoint_is_malformed(text: str, log_key: SigningKey) -> None:
     signature = key_id(ORIGIN, log_key.public) + log_key.sign(text.encode(), duty=Duty.LOG)
     note = f"{text}\n\u2014 {ORIGIN} {b64encode(signature).decode()}\n"
     assert slug(note, log_key.public) == "note/malformed"

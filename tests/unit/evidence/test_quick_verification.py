@@ -77,7 +77,7 @@ def anew(lines: list[bytes], **ways: object) -> list[bytes]:
 
 
 @given(epochs=some.lists(some.integers(0, 40), min_size=1, max_size=9))
-def test_it_agrees_on_every_whole_log(epochs: list[int]) -> None:
+def test_quick_verification_agrees_on_complete_logs(epochs: list[int]) -> None:
     lines = logged(*epochs).lines
     careful, found = verify(lines), quickly(lines)
     assert careful.verdict is LogVerdict.VERIFIED
@@ -245,7 +245,7 @@ def test_contradicting_anchor_is_left_to_full_verification() -> None:
     assert quickly(spread.lines) is None
 
 
-def test_a_record_between_that_signs_is_no_segment(log: Log) -> None:
+def test_segment_with_an_inner_signed_record_is_rejected(log: Log) -> None:
     data = b"".join(log.lines[:4])
     assert scan(data) is not None
     assert scan(data + log.lines[4]) is None  # two that sign

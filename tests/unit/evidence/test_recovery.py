@@ -94,14 +94,14 @@ def test_a_hole_in_what_was_not_sealed_is_torn_there(lines: list[bytes]) -> None
     assert found.discarded == sum(map(len, holed[last + 2 :]))
 
 
-def test_damage_before_a_signed_record_is_no_crash(lines: list[bytes]) -> None:
+def test_damage_before_a_signed_record_is_tampering(lines: list[bytes]) -> None:
     for place in range(signed(lines)[-1]):
         holed = lines.copy()
         holed[place] = bytes(60) + holed[place][60:]
         assert examined(holed).state is LogState.TAMPERED
 
 
-def test_a_record_that_does_not_follow_is_no_crash(lines: list[bytes]) -> None:
+def test_record_that_does_not_follow_is_tampering(lines: list[bytes]) -> None:
     last = signed(lines)[-1]
     for changed, slug in (
         (lines[: last + 1] + lines[last + 2 :], "chain/sequence"),
@@ -119,7 +119,7 @@ def test_a_record_that_does_not_follow_is_no_crash(lines: list[bytes]) -> None:
         assert found.reason.slug == slug
 
 
-def test_an_epoch_that_was_never_sealed_is_no_crash() -> None:
+def test_epoch_without_a_seal_is_tampering() -> None:
     log = writes(Random(1), seals=10**9)
     found = examined(next(log)[0] for _ in range(2_060))
     assert (found.state, found.head.seq) == (LogState.TAMPERED, 2_049)
@@ -138,12 +138,12 @@ def test_data_after_close_is_tampering(lines: list[bytes]) -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"x", bytes(4_000), b'{"_prev":"000'])
-def test_a_log_without_a_first_record_has_nothing_to_keep(data: bytes) -> None:
+def test_log_without_a_first_record_has_not_begun(data: bytes) -> None:
     found = examined(split(data))
     assert (found.state, found.kept, found.genesis) == (LogState.UNBEGUN, 0, None)
 
 
-def test_a_damaged_first_record_before_others_is_no_crash(lines: list[bytes]) -> None:
+def test_damaged_first_record_before_others_is_tampering(lines: list[bytes]) -> None:
     assert examined([lines[0][:-1]]).state is LogState.UNBEGUN
     assert examined([b"x" * 9 + lines[0][9:], lines[1]]).state is LogState.TAMPERED
 
@@ -160,7 +160,7 @@ def test_line_without_end_is_bounded(lines: list[bytes], monkeypatch: pytest.Mon
     assert (found.state, found.reason.slug) == (LogState.TORN, "record/too-long")
 
 
-def test_a_clock_that_was_lost_states_an_error_as_great_as_that(lines: list[bytes]) -> None:
+def test_lost_clock_records_the_full_time_error(lines: list[bytes]) -> None:
     found = examined(lines)
     log = lines + recovered(found, Now(7, 0, 5))
     assert verify(log).verdict is LogVerdict.VERIFIED

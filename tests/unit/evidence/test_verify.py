@@ -124,7 +124,7 @@ def test_caller_can_end_verification(log: list[bytes]) -> None:
 # 1 the line
 
 
-def test_nothing_may_follow_the_close(log: list[bytes]) -> None:
+def test_bytes_after_the_close_are_refused(log: list[bytes]) -> None:
     assert failure([*log, b"\n"]) == ("close/junk-after", 9)
     assert failure([*log, b"x"]) == ("close/junk-after", 9)
     for junk, what in (
@@ -188,7 +188,7 @@ def test_an_unknown_field_in_a_known_version(log: list[bytes]) -> None:
     assert failure([edit(log[0], later=1)]) == ("record/malformed", 0)
 
 
-def test_the_log_key_has_the_name_it_is_given(log: list[bytes]) -> None:
+def test_log_kid_must_match_the_log_key(log: list[bytes]) -> None:
     assert failure([edit(log[0], log_kid="00" * 16)]) == ("genesis/log-key", 0)
 
 
@@ -204,7 +204,7 @@ def test_numbers_leave_no_gap(log: list[bytes]) -> None:
     assert failure([edit(log[0], seq=1)]) == ("chain/sequence", 0)
 
 
-def test_a_changed_record_is_named_not_the_one_that_shows_it(log: list[bytes]) -> None:
+def test_failure_names_the_changed_record(log: list[bytes]) -> None:
     for number in (1, 2, 3, 4, 7):
         assert failure(changed(log, number, utc_error_us=2_001)) == ("chain/broken", number)
 

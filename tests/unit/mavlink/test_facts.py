@@ -40,7 +40,7 @@ def test_layouts_are_the_dialects(number: int, layout: Layout) -> None:
 
 
 @rows("layout", LAYOUTS.values(), ids=MESSAGES)
-def test_a_target_is_a_system_and_behind_it_a_component(layout: Layout) -> None:
+def test_target_fields_are_system_then_component(layout: Layout) -> None:
     system, component = layout.at("target_system"), layout.at("target_component")
     assert component == (system + 1 if system >= 0 else -1)
 

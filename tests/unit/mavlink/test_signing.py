@@ -106,7 +106,7 @@ def test_timestamps_follow_the_clock_and_always_rise() -> None:
     assert stamps == [1, 2, 3, 4, 5, 100_000, 100_001]
 
 
-def test_it_starts_at_the_greater_of_clock_and_stored() -> None:
+def test_timestamps_start_after_the_later_of_clock_and_stored() -> None:
     for utc_us, stored in ((UTC, 0), (UTC, timestamp_of(UTC) + 77), (0, timestamp_of(UTC))):
         ours = link(stored=SigningState(stored, {}), utc_us=utc_us)
         assert int.from_bytes(ours.sign(frame(), 0)[-12:-6], "little") == max(timestamp_of(utc_us), stored) + 1

@@ -32,7 +32,7 @@ def naive(times: list[int]) -> int:
 
 
 @given(TIMES)
-def test_the_remaining_latency_is_a_high_quantile_of_the_latest_measurements(times: list[int]) -> None:
+def test_remaining_latency_is_a_high_quantile_of_recent_samples(times: list[int]) -> None:
     remaining = RemainingLatency()
     for each in times:
         remaining.measured(each)

@@ -9,7 +9,7 @@ from rtshcua.model.durability import WRITTEN
 from rtshcua.onboard.ports import Anchored, Append
 
 
-def test_a_cosigned_checkpoint_is_recorded_whole_and_changes_nothing_else() -> None:
+def test_cosigned_checkpoint_is_recorded_without_other_effects() -> None:
     run, other = Run(renewed(low()), ready=False), Run(renewed(low()), ready=False)
     note = "rtshcua/log/quad/00\n0\nAA==\n\n— a b\n"
     actions = run.runtime.step(START, [Anchored(0, note)])

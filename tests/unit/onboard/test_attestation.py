@@ -34,7 +34,7 @@ def said(of: Loaded, *, final: bool = False) -> Statement:
     return open_statement(signed, KEYS)
 
 
-def test_without_a_key_nothing_is_signed_and_everything_is_chained() -> None:
+def test_entries_without_a_key_are_chained_but_unsigned() -> None:
     of = loaded()
     of.attestation.begin(None)
     assert of.attestation.statement(START) is None
@@ -139,7 +139,7 @@ def test_another_gate_counts_in_the_same_chain() -> None:
     assert (said(of).stopped, said(of).frames) == (2, 0)
 
 
-def test_nothing_happens_after_the_end_was_signed() -> None:
+def test_boundary_refuses_commands_after_the_signed_end() -> None:
     """A compromised runtime has the end signed early, to fly on without a record."""
     of = loaded()
     of.attestation.begin(KEY)

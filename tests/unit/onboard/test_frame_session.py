@@ -242,7 +242,7 @@ def test_unlisted_frames_never_pass(autopilot: int) -> None:
 
 @rows("forced", [21_196.0, 2_989.0, 1.0, nan, inf])
 @rows("on", [0, 1])
-def test_nothing_is_armed_or_disarmed_by_force(forced: float, on: int) -> None:
+def test_forced_arming_and_disarming_are_refused(forced: float, on: int) -> None:
     by_int = reposition(command=400, param1=on, param2=forced)
     for message in (long(400, on, forced), by_int):
         for gate in (session(PX4), session(ARDUPILOT, command(K.CLIMB))):
@@ -335,7 +335,7 @@ def test_heights_above_sea_follow_home_as_the_autopilot_tells_it() -> None:
         assert covers(gate, reposition(z=515.0))
 
 
-def test_without_homes_height_nothing_goes_above_sea() -> None:
+def test_amsl_altitudes_are_refused_without_home_altitude() -> None:
     gate = FrameSession()
     gate.observe(pack(heartbeat(PX4), component=1))
     gate.open(command(K.FLY))
@@ -444,7 +444,7 @@ def test_a_path_is_flown_point_after_point(autopilot: int) -> None:
     assert gate.seal(to(a), NOW) == to(a)
 
 
-def test_one_command_at_a_time_and_none_after_the_end() -> None:
+def test_frames_of_a_finished_or_second_command_are_refused() -> None:
     gate = session(ARDUPILOT, command(K.LAND))
     gate.open(command(K.HOLD))
     assert not covers(gate, long(176, 1, 9))
@@ -592,7 +592,7 @@ def prepared(autopilot: int, name: str, value: float) -> FrameSession:
     return gate
 
 
-def test_a_listed_parameter_is_set_to_its_listed_value_and_nothing_else_is() -> None:
+def test_listed_parameter_is_set_only_to_its_listed_value() -> None:
     gate = prepared(ARDUPILOT, "FENCE_RADIUS", 300.0)
     assert covers(gate, setting("FENCE_RADIUS", 300.0))
     assert covers(gate, setting("FENCE_RADIUS", 300.0, 4)), "ArduPilot has the type of its own"

@@ -97,7 +97,7 @@ def test_the_timestamps_ascend_from_copy_to_copy_and_link_to_link() -> None:
     assert found == sorted(set(found))
 
 
-def test_a_frame_leaves_as_often_as_it_may_be_retried_and_no_more() -> None:
+def test_frame_retries_are_limited() -> None:
     of = made()
     of.begin(FALLBACK_LINK, 0)
     taken = [of.take(frame("hover", confirmation)) for confirmation in range(SENDINGS)]
@@ -189,7 +189,7 @@ def test_home_and_time_fields_do_not_distinguish_frames(kind_of_place: str) -> N
     assert isinstance(of.take(again), bytes)
 
 
-def test_it_is_signed_anew_before_it_is_void() -> None:
+def test_frames_are_signed_again_before_they_expire() -> None:
     boundary = Boundary()
     of = made(boundary)
     for now_us in range(0, 10 * EVERY_US, EVERY_US // 7):
@@ -204,7 +204,7 @@ def test_it_is_signed_anew_before_it_is_void() -> None:
     assert EVERY_US * 2 <= LEAD * UNIT_US
 
 
-def test_it_is_signed_anew_where_timestamps_run_faster_than_our_time() -> None:
+def test_frames_are_signed_again_when_timestamps_run_fast() -> None:
     """The timestamps of a recorded ArduCopter do so for a while, and ours follow."""
     boundary = Boundary()
     of = made(boundary)

@@ -29,7 +29,7 @@ def obeys(run: Run, target: tuple[int, int, int] | None = None) -> None:
     run.tick(Obeyed(0, run.vehicle.commands[-1].token, target))
 
 
-def test_a_command_is_in_force_with_those_before_it_until_it_is_obeyed() -> None:
+def test_earlier_commands_stay_in_force_until_the_next_is_obeyed() -> None:
     run = Run().until_flies("takeoff")
     assert in_force(run) == [("takeoff", None)]
     obeys(run, HERE)
@@ -59,7 +59,7 @@ def test_allowed_command_may_have_been_sent() -> None:
     assert in_force(run, run.lines[:at]) == in_force(run) == [("goto", THERE), ("hover", None)]
 
 
-def test_of_a_step_that_came_too_late_nothing_is_in_force() -> None:
+def test_late_step_leaves_no_command_in_force() -> None:
     run = Run().until_flies("goto")
     run.tick(CommandFailed(0, run.vehicle.commands[-1].token, "late"))
     unsent = max(n for n, line in enumerate(run.lines) if b'"permit/unsent"' in line)
@@ -91,7 +91,7 @@ def test_a_takeover_is_remembered() -> None:
     assert found.taken == "Position"
 
 
-def test_a_run_that_went_on_from_another_knows_nothing_before_it_is_obeyed() -> None:
+def test_resumed_run_knows_no_command_before_one_is_obeyed() -> None:
     of = loaded()
     run = Run(renewed(of), FakeVehicle(armed=True, airborne=True), resumed=True, ready=False)
     run.tick(AirState(0, True, True), Ready(0))

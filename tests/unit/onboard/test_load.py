@@ -118,7 +118,7 @@ def test_a_session_key_of_another_length_is_a_fault() -> None:
         refusal(sealed(), session_key=b"short")
 
 
-def test_a_bundle_may_be_loaded_before_it_was_issued() -> None:
+def test_bundle_may_be_loaded_before_its_issue() -> None:
     early = Now(0, 0, 0)
     assert isinstance(
         load(

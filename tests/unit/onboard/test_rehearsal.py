@@ -59,7 +59,7 @@ def test_a_denied_step_is_not_hopeful() -> None:
     assert not any(each.hopeful for each in rehearse(OF, state(), early))
 
 
-def test_a_rehearsal_uses_nothing_up() -> None:
+def test_rehearsal_consumes_no_invocation() -> None:
     of = loaded()
     rehearse(of, state(), START)
     assert allowed(of)
@@ -82,7 +82,7 @@ def test_a_rehearsal_uses_nothing_up() -> None:
         (Plan(MotionKind.LAND, (), 0, 0), 1, 2, 0),
     ],
 )
-def test_a_later_step_is_judged_where_the_one_before_it_ends(plan: Plan, x: int, y: int, height: int) -> None:
+def test_rehearsed_step_starts_where_the_previous_one_ends(plan: Plan, x: int, y: int, height: int) -> None:
     before = state(**{f"s{POSITION_X}": 1, f"s{POSITION_Y}": 2, f"s{HEIGHT}": 3})
     after = flown(before, plan, OF.bundle.policy.vehicle)
     assert [after.values[slot] for slot in (POSITION_X, POSITION_Y, HEIGHT)] == [x, y, height]

@@ -126,7 +126,7 @@ def test_obeying_vehicle_that_never_flew_has_not_landed(way: Event | None) -> No
 
 
 @pytest.mark.parametrize("name", ENDS)
-def test_run_that_ends_in_the_air_warns_that_vehicle_may_fly(name: str) -> None:
+def test_run_ending_in_the_air_warns_of_a_flying_vehicle(name: str) -> None:
     way, ending, words = ENDS[name]
     run = flying()
     way(run)
@@ -160,7 +160,7 @@ def test_obeyed_command_that_failed_on_ground_is_reported() -> None:
     assert MAY_FLY in run.events
 
 
-def test_a_refusal_with_nothing_sent_says_nothing_of_flying() -> None:
+def test_refusal_with_nothing_sent_has_no_flight_warning() -> None:
     run = start(ready=False)
     run.tick(Interrupted(0))
     assert over(run).runtime.may_fly == ""
@@ -192,7 +192,7 @@ def test_unfit_vehicle_ends_the_wait_at_once() -> None:
     assert "RTL_ALT" in record["detail"]
 
 
-def test_a_command_that_was_late_says_that_the_computer_was_busy() -> None:
+def test_late_command_reports_a_busy_computer() -> None:
     run = start(vehicle=FakeVehicle(deaf={"takeoff"})).until_flies("takeoff")
     token = next(each["token"] for each in run.records if each.get("event") == "dispatched")
     run.tick(CommandFailed(0, token, "late"))

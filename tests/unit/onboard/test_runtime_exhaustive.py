@@ -136,7 +136,7 @@ def assert_orderly(run: Run) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("situation", SITUATIONS)
-def test_every_sequence_ends_and_nothing_is_sent_that_should_not_be(situation: str) -> None:
+def test_every_event_sequence_ends_without_a_forbidden_command(situation: str) -> None:
     """Each event first and each second in every situation, every pair in one; the other pairs are for soak."""
     for sequence in islice(product(EVENTS, repeat=DEPTH - 1), [*SITUATIONS].index(situation), None, len(SITUATIONS)):
         explore(situation, sequence)

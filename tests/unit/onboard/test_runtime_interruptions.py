@@ -184,7 +184,7 @@ def test_failure_during_silence_falls_back_when_link_returns() -> None:
     assert run.until_over().ending is Ending.ABORTED
 
 
-def test_interrupted_while_the_link_is_lost_falls_back_once_it_is_back() -> None:
+def test_interrupt_during_link_loss_falls_back_on_reconnection() -> None:
     run = running()
     run.tick(LinkLost(0), Interrupted(0))
     run.tick()
@@ -296,7 +296,7 @@ def test_return_continues_when_boundary_is_lost() -> None:
     assert run.ending is Ending.ABORTED, "nobody was there to say that all was done"
 
 
-def test_a_boundary_that_never_answers_lets_nothing_fly() -> None:
+def test_unanswering_boundary_prevents_flight() -> None:
     of = loaded()
     deaf = Deaf(of.boundary)
     deaf.answer = b""

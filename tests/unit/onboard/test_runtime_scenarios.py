@@ -129,7 +129,7 @@ def test_battery_falling_returns_by_the_degrade_rule() -> None:
     assert run.ending is Ending.ABORTED
 
 
-def test_a_breach_between_two_steps_is_seen_though_it_is_over() -> None:
+def test_brief_breach_between_steps_is_detected() -> None:
     """A backlog brings many states at once: each is watched, not only the last."""
     run = start().until_flies("inspect_area")
     at_us, far = run.clock.now().monotonic_us, run.vehicle.values[OBSTACLE]
@@ -283,7 +283,7 @@ def waiting_to_be_replaced() -> Run:
     return run
 
 
-def test_another_step_is_asked_for_in_place_of_one_that_is_not_admitted() -> None:
+def test_replacement_is_requested_for_a_refused_step() -> None:
     run = waiting_to_be_replaced()
     assert hand(run, replacement(run.loaded, 1)) == "already-released", "what was flown stays"
     assert hand(run, replacement(run.loaded)) == "accepted"
@@ -297,7 +297,7 @@ def test_another_step_is_asked_for_in_place_of_one_that_is_not_admitted() -> Non
     assert decided["context"]["released_us"] >= began_us, "it has its own time from when it came"  # type: ignore[index]
 
 
-def test_without_another_step_it_falls_back_at_the_deadline() -> None:
+def test_run_falls_back_at_the_deadline_without_a_replacement() -> None:
     run = waiting_to_be_replaced().until_over()
     assert run.flown == ["takeoff", "goto", "hover", "hover", "return_home"]
     assert (run.ending, run.events.count("replan")) == (Ending.ABORTED, 1)
@@ -555,7 +555,7 @@ def test_invalid_readings_are_unknown_or_ignored() -> None:
 # --------------------------------------------------------------------------------------------------- mode none
 
 
-def test_mode_none_records_what_it_does_not_enforce() -> None:
+def test_mode_none_records_unenforced_decisions() -> None:
     run = Run(loaded(without_permit(GOTO), mode=EnforcementMode.NONE)).until_over()
     assert (0, 1, -1, "deny", "authority/not-permitted") in run.decisions
     assert run.flown == ["takeoff", "goto", "inspect_area", "return_home"]

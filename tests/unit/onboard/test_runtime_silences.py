@@ -171,7 +171,7 @@ def after_it(run: Run) -> list[str]:
 
 
 @pytest.mark.parametrize(("situation", "seconds", "order"), TRIED)
-def test_a_silence_is_no_violation(situation: Situation, seconds: float, order: int) -> None:
+def test_silence_is_not_a_violation(situation: Situation, seconds: float, order: int) -> None:
     run = situation(AfterSilence.CONTINUE)
     flown, stage = list(run.flown), run.runtime.view(run.clock.now()).stage
     be_silent(run, seconds)
@@ -218,7 +218,7 @@ def test_after_a_long_silence_the_contingency_flies(situation: Situation, order:
 
 
 @pytest.mark.parametrize("seconds", [5, 20, 30.9])
-def test_a_silence_that_is_not_too_long_gives_nothing_up(seconds: float) -> None:
+def test_short_silence_does_not_abort_the_mission(seconds: float) -> None:
     run = running(AfterSilence.CONTINGENCY)
     be_silent(run, seconds)
     come_back(run, 0)
@@ -235,7 +235,7 @@ def test_return_or_landing_under_way_continues(situation: Situation) -> None:
     assert run.flown[-1] == "return_home"
 
 
-def test_the_last_step_is_completed_after_a_long_silence_if_it_comes_home() -> None:
+def test_return_home_completes_after_a_long_silence() -> None:
     run = start(vehicle=FakeVehicle(deaf={"return_home"})).until_flies("return_home")
     be_silent(run, 45)
     run.vehicle.deaf = set()
@@ -352,7 +352,7 @@ def test_a_signal_that_is_stale_a_moment_later_is_waited_for_too() -> None:
 # ------------------------------------------------------------------------------------ a link that comes and goes
 
 
-def test_one_message_and_no_more_is_not_the_end_of_a_silence() -> None:
+def test_single_message_does_not_end_a_silence() -> None:
     run = falling(AfterSilence.CONTINUE)
     flown = list(run.flown)
     be_silent(run, 25)  # the time of its hover is over
@@ -514,7 +514,7 @@ def test_pilot_takeover_during_silence_ends_run(situation: Situation, moment: st
     assert run.flown == flown
 
 
-def test_a_take_off_that_was_lost_waits_for_word_on_whether_it_flies() -> None:
+def test_lost_takeoff_waits_for_the_flight_state() -> None:
     """It was last reported on the ground: it may have risen, and is not told to land for that."""
     run = start(vehicle=FakeVehicle(deaf={"takeoff"}))
     run.tick(AirState(0, True, False))

@@ -93,7 +93,7 @@ def details(run: Run, event: str) -> list[str]:
 
 @rows("for_s", STALLS_S)
 @rows("situation", (running, holding, falling))
-def test_nothing_is_judged_before_the_vehicle_reported_again(situation: object, for_s: int) -> None:
+def test_nothing_is_decided_after_a_stall_before_fresh_reports(situation: object, for_s: int) -> None:
     run = situation()  # type: ignore[operator]
     flown, stage, decided = list(run.flown), run.runtime.view(run.clock.now()).stage, len(run.decisions)
     stand_still(run, for_s * S)

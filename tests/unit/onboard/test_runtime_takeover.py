@@ -134,7 +134,7 @@ def test_a_crash_is_graver_than_a_takeover(order: tuple[Event, ...]) -> None:
     assert_audited(run)
 
 
-def test_a_crash_says_what_showed_it_and_where_it_was_last_seen() -> None:
+def test_crash_record_names_its_evidence_and_last_state() -> None:
     run = running()
     run.step(Crashed(0, "on its side"), StatusText(0, 2, "SIM Hit ground at 5.2 m/s"))
     details = {str(record["event"]): record["detail"] for record in run.records if record["type"] == "effect"}
@@ -187,7 +187,7 @@ def test_a_hold_between_steps_that_fails_flies_the_steps_chain(reason: str) -> N
     assert_audited(run)
 
 
-def test_no_hold_of_the_contingency_is_tried_either_after_one_that_failed() -> None:
+def test_contingency_skips_holds_after_a_failed_hold() -> None:
     run = held(chain=(HOVER,))
     run.vehicle.fails = {"return_home"}
     run.tick(CommandFailed(0, run.vehicle.commands[-1].token, "did-not-stop"))

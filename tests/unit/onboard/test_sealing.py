@@ -38,7 +38,7 @@ def told(journal: Journal, us: int) -> list[tuple[Any, int]]:
     return [(record.get("event", record["type"]), durability) for record, durability in lines]
 
 
-def test_an_epoch_that_is_over_is_sealed_in_a_step_that_sends_nothing(journal: Journal) -> None:
+def test_finished_epoch_is_sealed_in_a_step_without_commands(journal: Journal) -> None:
     assert told(journal, EPOCH_US - 1) == []
     journal.add(COMMAND)
     assert told(journal, EPOCH_US) == []
@@ -70,7 +70,7 @@ def test_full_epoch_is_sealed_even_if_every_step_sends(journal: Journal, in_a_st
     assert all(EPOCH_RECORDS <= number <= EPOCH_RECORDS * 5 // 4 * count for count, number in enumerate(seals, 1))
 
 
-def test_a_command_waits_for_its_decision_and_for_nothing_else(journal: Journal) -> None:
+def test_command_waits_only_for_its_decision_record(journal: Journal) -> None:
     late = at(EPOCH_US * 2)
     journal.effect(late, "succeeded")
     journal.tell(lambda: journal.record(lambda: b"{}", late, SYNCED, awaited=True))
@@ -84,7 +84,7 @@ def test_a_command_waits_for_its_decision_and_for_nothing_else(journal: Journal)
     ("before", "needs_record", "is_reflex"),
     [((), False, True), ((), True, False), ((Release(),), False, False)],
 )
-def test_a_command_that_waits_for_nothing_is_a_reflex(
+def test_only_reflex_commands_wait_for_no_record(
     journal: Journal, before: tuple[Release, ...], needs_record: bool, is_reflex: bool
 ) -> None:
     for action in before:

@@ -30,7 +30,7 @@ def test_a_signal_with_another_source_comes_all_the_same() -> None:
     assert unheard(replace(POLICY, signals=signals), {"RADIO_STATUS"}) == frozenset()
 
 
-def test_a_contract_needs_what_it_reads() -> None:
+def test_contract_needs_the_signals_it_reads() -> None:
     assert of(INSPECT)
     assert not of(TAKEOFF)
 

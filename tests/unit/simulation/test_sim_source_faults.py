@@ -138,7 +138,7 @@ def test_moving_pillar_hits_the_vehicle(flying: Any) -> None:
     assert flying.truth.distance_to_obstacle_mm == 0
 
 
-def test_removed_pillar_is_no_obstacle(flying: Any) -> None:
+def test_removed_pillar_is_not_an_obstacle(flying: Any) -> None:
     assert flying.truth.distance_to_obstacle_mm is None
     inject(flying, faults.Pillar, 0, 30_000, 2_000, 10_000, 2 * S, 1_000, 0)
     flying.wait(1)

@@ -47,7 +47,7 @@ def test_pilot_takeover_is_recorded(
     assert taken(p, kind, *args) == (before_us + 20_000, Taker.PILOT)
 
 
-def test_pilot_action_without_effect_is_no_takeover(pilot: Callable[..., Any], flavour: str) -> None:
+def test_pilot_action_without_effect_is_not_a_takeover(pilot: Callable[..., Any], flavour: str) -> None:
     p = on_its_way(pilot, flavour)
     kind, args = (faults.PilotMode, (FlightMode.LOITER,)) if p.px4 else (faults.PilotSticks, (S,))
     assert taken(p, kind, *args) == (None, None)
@@ -79,7 +79,7 @@ def test_no_takeover_on_the_ground(pilot: Callable[..., Any], flavour: str) -> N
     assert taken(p, faults.PilotMode, FlightMode.ALTITUDE) == (None, None)
 
 
-def test_own_commands_are_no_takeover(pilot: Callable[..., Any], flavour: str) -> None:
+def test_own_commands_are_not_takeovers(pilot: Callable[..., Any], flavour: str) -> None:
     p = on_its_way(pilot, flavour)
     p.mode(FlightMode.LAND)
     p.until(lambda: not p.truth.armed)

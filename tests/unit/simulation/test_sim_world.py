@@ -134,7 +134,7 @@ def test_simulation_is_a_hundred_times_faster_than_real_time(pilot: Callable[...
     assert 60 / (process_time() - start) > 100
 
 
-def test_no_position_before_it_is_ready(pilot: Callable[..., Any]) -> None:
+def test_position_is_missing_before_readiness(pilot: Callable[..., Any]) -> None:
     p = pilot("px4")
     p.wait(0.3)
     assert not {"GLOBAL_POSITION_INT", "HOME_POSITION", "WIND_COV"} & {f.name for f in p.seen}

@@ -287,7 +287,7 @@ def test_faults_that_excuse_a_collision(good: ScenarioFlown, fault: Fault, cause
     assert slugs(found) == ([] if cause else ["collision"])
 
 
-def test_visible_pillar_is_no_excuse(good: ScenarioFlown) -> None:
+def test_visible_pillar_does_not_excuse_a_collision(good: ScenarioFlown) -> None:
     contracts = tuple(with_fields(each, reads=(case.flat.OBSTACLE,)) for each in good.policy.contracts)
     looks_out = with_fields(good.policy, contracts=contracts)
     far = [sample(5, obstacle_mm=60 * M), *crash()[1:]]

@@ -436,7 +436,7 @@ def test_host_and_agent_faults_cause_no_failure_at_any_time(kind: type[Fault], a
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("flavour", "at_s"), [("ardupilot", 25.3), ("px4", 21.75), ("px4", 20.15)])
-def test_motor_stop_during_descent_is_no_landing(flavour: str, at_s: float) -> None:
+def test_motor_stop_during_descent_is_not_a_landing(flavour: str, at_s: float) -> None:
     """A vehicle disarmed in the air reports at once that it is on the ground, also while it lands."""
     found = flown(scenario(incident(at_s, faults.Kill(0))), flavour, bundle=shipped("short"))
     before = next(each for each in found.samples if each.at_us >= round(at_s * S) - 50_000)

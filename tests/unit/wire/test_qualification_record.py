@@ -49,14 +49,14 @@ def test_signed_record_opens() -> None:
     assert open_qualification(signed, root=root(), vehicle="quad-07", now_us=1_000) == RECORD
 
 
-def test_the_log_key_signs_it_and_no_other() -> None:
+def test_qualification_record_needs_the_log_key() -> None:
     with pytest.raises(WrongDuty):
         sign_qualification(RECORD, POLICY)
     other = SigningKey.from_seed(bytes([9]) * 32, duty=Duty.LOG, development=True)
     assert slug(sign_qualification(RECORD, other)) == "unknown-key"
 
 
-def test_it_is_of_one_vehicle_and_its_key_could_speak_for_that() -> None:
+def test_qualification_record_needs_a_key_valid_for_its_vehicle() -> None:
     signed = sign_qualification(RECORD, LOG)
     assert slug(signed, vehicle="quad-08") == "wrong-vehicle"
     assert slug(signed, root(vehicles=("quad-08",))) == "wrong-vehicle"
@@ -83,7 +83,7 @@ def test_other_artefact_of_log_key_is_refused() -> None:
         {"checks": (replace(HELD, outcome=4),)},
     ],
 )
-def test_one_that_contradicts_itself_is_refused(change: dict[str, Any]) -> None:
+def test_contradictory_qualification_record_is_refused(change: dict[str, Any]) -> None:
     assert slug(sign_qualification(replace(RECORD, **change), LOG)) == "malformed"
 
 

@@ -407,7 +407,7 @@ def test_an_archive_of_another_version_is_left_alone(folder: ArchiveFolder) -> N
         ArchiveFolder(folder.path)
 
 
-def test_query_of_an_empty_archive_is_refused(folder: ArchiveFolder) -> None:
+def test_reading_an_empty_archive_is_refused(folder: ArchiveFolder) -> None:
     with pytest.raises(Untrusted, match="no log was added yet"):
         ArchiveReader(folder)
 

@@ -164,7 +164,7 @@ def silenced(**about: Any) -> ObservedSortie:
         ({"for_us": 4 * S}, UNCHECKED),
     ],
 )
-def test_silence_changes_nothing_and_ends_at_once(about: dict[str, Any], outcome: CheckOutcome) -> None:
+def test_silence_check_requires_prompt_recovery(about: dict[str, Any], outcome: CheckOutcome) -> None:
     assert checks(BRAKED, silenced(**about))["silence/3s"].outcome == outcome
 
 
@@ -270,7 +270,7 @@ def returned(from_mm: int, *heights: int) -> ObservedSortie:
         (40 * M, (), UNCHECKED),
     ],
 )
-def test_return_check_measures_the_lowest_cruise(from_mm: int, heights: tuple[int, ...], outcome: CheckOutcome) -> None:
+def test_return_check_judges_the_lowest_height(from_mm: int, heights: tuple[int, ...], outcome: CheckOutcome) -> None:
     assert checks(BRAKED, returned(from_mm, *heights))["return/across"].outcome == outcome
 
 

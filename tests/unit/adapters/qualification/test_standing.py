@@ -100,7 +100,7 @@ def test_identity_is_requested_until_it_is_reported() -> None:
     assert sum(asks) == 6, "one that does not tell its version is not asked for ever"
 
 
-def test_last_record_of_a_vehicle_counts(tmp_path: Path) -> None:
+def test_last_qualification_record_of_a_vehicle_is_kept(tmp_path: Path) -> None:
     assert kept_qualification(tmp_path, "quad/07") is None
     keep_qualification(tmp_path, "quad/07", b"one")
     path = keep_qualification(tmp_path, "quad/07", b"two")

@@ -121,7 +121,7 @@ def test_the_last_room_on_the_disk_is_left_to_the_log(tmp_path: Path, monkeypatc
     assert (file.error.errno, file.lost) == (errno.ENOSPC, 1)
 
 
-def test_unknown_free_space_is_accepted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unknown_free_space_does_not_stop_the_telemetry_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(folder: Path) -> int:
         raise OSError(errno.ENOSYS, "Function not implemented")
 

@@ -103,7 +103,7 @@ def test_an_unsigned_radio_is_heard_at_its_worst() -> None:
         (51, 68, "HEARTBEAT", None, False),
     ],
 )
-def test_radio_frames_keep_their_own_identity(
+def test_radio_status_is_accepted_only_from_a_radio(
     system: int, component: int, name: str, named: int | None, heard: bool
 ) -> None:
     link = VehicleLink(FrameSession(), None, named)

@@ -72,7 +72,7 @@ def test_exception_in_effect_fails_its_skill(with_own: Make) -> None:
     ],
     ids=["forced arming", "another place", "a parameter"],
 )
-def test_frames_of_own_manoeuvres_pass_the_gate(with_own: Make, message: Any) -> None:
+def test_gate_refuses_bad_frames_of_own_manoeuvres(with_own: Make, message: Any) -> None:
     def own(command: Command, seen: ObservedVehicle, system: int) -> list[Stage]:
         return [Stage(message(system), None, lambda seen: seen.airborne, frozenset())]
 

@@ -28,7 +28,7 @@ def test_follows_the_vehicles_time_and_runs_a_little_ahead() -> None:
     assert clock.now().monotonic_us == start + 120_000 + clock.LEAD_US
 
 
-def test_paused_vehicle_does_not_age_signals_but_silence_does() -> None:
+def test_paced_clock_stops_during_a_pause_but_not_a_silence() -> None:
     machine = Machine()
     clock = PacedClock(10, machine_ns=machine)
     clock.heard(0)

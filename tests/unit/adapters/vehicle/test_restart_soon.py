@@ -131,7 +131,7 @@ def test_sender_is_identified_before_its_heartbeat(hurries: bool) -> None:
     assert driver.receive(others, 10 * S).answers == []
 
 
-def test_missing_reports_are_requested_one_at_a_time() -> None:
+def test_missing_reports_are_requested_once_per_interval() -> None:
     rates = {name: Rate(S // 4, S) for name in ("BATTERY_STATUS", "GPS_RAW_INT", "SYS_STATUS")}
     streams = StreamRequests(plan_streams(rates, None, signed=False), [frozenset({name}) for name in rates])
     assert streams.due_once(1, 0) == []  # nothing is awaited yet

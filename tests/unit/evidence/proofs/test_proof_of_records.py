@@ -206,7 +206,7 @@ def test_invalid_log_or_other_key_gives_no_receipt(log: SealedLog) -> None:
     )
 
 
-def test_there_is_no_receipt_without_a_path(log: SealedLog) -> None:
+def test_receipt_requires_an_inclusion_path(log: SealedLog) -> None:
     assert slug(receipt(log, len(log.lines) - 1)) == "proof/number"
     assert slug(receipt(log, 6, 6)) == "proof/number"
     assert slug(receipt(log, 99)) == "proof/number"

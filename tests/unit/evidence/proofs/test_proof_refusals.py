@@ -123,7 +123,7 @@ def test_a_changed_proof_of_inclusion_is_refused(change: Change, slug: str) -> N
     assert parts.slug() == slug
 
 
-def test_a_record_in_part_is_no_proof_any_more() -> None:
+def test_partial_record_proof_is_refused() -> None:
     """Earlier versions made them: a holder of the last epoch's key could state other fields of any record."""
     parts = inclusion(3)
     parts.kind = "rtshcua/disclosure-proof@v1"
@@ -173,7 +173,7 @@ def test_checkpoint_record_is_only_proven_at_its_own_place() -> None:
         (b"c2sp.org/tlog-proof@v1\nextra \nindex 0\n\n", "proof/extra"),
     ],
 )
-def test_a_file_that_is_no_proof_is_refused(data: bytes, slug: str) -> None:
+def test_malformed_proof_file_is_refused(data: bytes, slug: str) -> None:
     found = check_proof(data, PIN)
     assert isinstance(found, Flaw)
     assert found.slug == slug
@@ -210,5 +210,5 @@ def test_a_changed_receipt_is_refused(changed: dict[str, Any], slug: str) -> Non
 
 
 @pytest.mark.parametrize("data", [b"", b"\xd2", b"\xd2\x80", b"junk"])
-def test_bytes_that_are_no_receipt_are_refused(data: bytes) -> None:
+def test_malformed_receipt_is_refused(data: bytes) -> None:
     assert slug_of_receipt(data) == "proof/malformed"

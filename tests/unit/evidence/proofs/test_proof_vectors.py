@@ -37,7 +37,7 @@ MADE: dict[str, Callable[[], bytes | Flaw]] = {
 
 
 @rows("name", MADE)
-def test_a_proof_is_made_as_it_was(name: str) -> None:
+def test_proofs_match_the_stored_vectors(name: str) -> None:
     made = MADE[name]()
     assert isinstance(made, bytes)
     if os.environ.get("UPDATE_GOLDENS") == "1":

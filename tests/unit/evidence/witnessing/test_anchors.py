@@ -49,7 +49,7 @@ def test_without_anchors_all_is_tail(log: Log) -> None:
     assert outcome(log, []) == AnchoredExtent(0, 9, 1, ())
 
 
-def test_a_checkpoint_anchors_all_before_it_and_its_own_record(log: Log) -> None:
+def test_checkpoint_anchors_its_record_and_all_before(log: Log) -> None:
     witness = Judge()
     marks = [witness.blindly(note) for note in log.notes]
     assert [anchored(log, [mark]) for mark in marks] == [(1, 8), (5, 4), (8, 1), (9, 0)]
@@ -133,7 +133,7 @@ def test_a_forged_cosignature_for_this_log(log: Log) -> None:
     assert (found.records, found.rejected) == (5, 2)
 
 
-def test_a_note_with_one_wrong_signature_says_nothing_at_all(log: Log) -> None:
+def test_note_with_a_wrong_signature_is_rejected(log: Log) -> None:
     note = log.notes[1]
     good, other = Judge().blindly(note), Judge(WITNESSES[1]).blindly(log.notes[2]).removeprefix(log.notes[2])
     found = outcome(log, [good + other])

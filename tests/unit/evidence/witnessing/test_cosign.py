@@ -33,7 +33,7 @@ def test_a_cosignature_as_the_page_says_it() -> None:
     assert len(octets) == 76
 
 
-def test_it_is_read_back() -> None:
+def test_cosignature_can_be_read_back() -> None:
     keys = [OTHER.public, KEY.public]
     assert read_cosignature(line_of(), TEXT, keys) == Cosignature(KEY.public, name_of(KEY.public), TIME)
     assert cosignatures(f"{TEXT}\n{line_of()}{line_of(OTHER)}", keys) == (
@@ -64,7 +64,7 @@ def forged(change: int, value: int) -> str:
         (line_of(), TEXT.replace("5", "6")),
     ],
 )
-def test_a_line_in_the_name_of_a_witness_that_it_did_not_make(line: str, text: str) -> None:
+def test_forged_cosignature_line_is_refused(line: str, text: str) -> None:
     found = read_cosignature(line, text, [KEY.public])
     assert isinstance(found, Flaw)
     assert found.slug == "anchor/signature"

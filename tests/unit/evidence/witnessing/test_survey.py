@@ -57,7 +57,7 @@ def test_a_log_that_is_not_its_checkpoints(log: Log) -> None:
 
 
 @pytest.mark.parametrize("more", [b"\n", b"{", b'{"_prev":""}\n'])
-def test_nothing_follows_the_close(more: bytes) -> None:
+def test_survey_refuses_bytes_after_the_close(more: bytes) -> None:
     log = Log()
     log.effects(2)
     log.close()

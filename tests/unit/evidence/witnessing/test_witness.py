@@ -264,7 +264,7 @@ def test_a_chain_of_another_log_gives_no_key() -> None:
     assert refused(Judge(), CosignRequest(0, (), note, (crossed,))).status == FORBIDDEN
 
 
-def test_a_first_note_that_is_no_genesis() -> None:
+def test_first_note_must_cover_the_genesis() -> None:
     """A holder of the log key could begin in the middle, so it is refused."""
     log = Log()
     log.effects(1)

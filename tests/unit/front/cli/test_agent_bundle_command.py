@@ -186,7 +186,7 @@ def test_a_key_of_its_own_is_named_and_not_copied(base: Path, tmp_path: Path) ->
     assert Duty.MISSION not in args
 
 
-def test_where_there_is_no_script_the_module_is_started_from_the_path_of_the_interpreter_alone(
+def test_module_is_started_in_isolation_without_a_script(
     base: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A folder `rtshcua` where a host happens to run is not what is started."""

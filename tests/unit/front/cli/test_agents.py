@@ -92,7 +92,7 @@ def test_first_lines_name_the_mission(run: Followed) -> None:
     assert mission["steps"][2]["id"] == run.loaded.bundle.mission.invocations[2].invocation_id.hex()
 
 
-def test_every_record_goes_out_as_it_stands_in_the_log(run: Followed) -> None:
+def test_records_are_forwarded_unchanged(run: Followed) -> None:
     run.agents.events(run.clock.now())
     run.told()
     run.hand(b"")

@@ -74,7 +74,7 @@ def test_lint_of_files_seen_before_loads_no_evidence(tmp_path: Path, monkeypatch
     assert not {"msgspec", "lark", "typer", "rtshcua.evidence", "rtshcua.ground.language.parse"} & set(loaded)
 
 
-def test_check_loads_nothing_of_lint(tmp_path: Path) -> None:
+def test_check_does_not_import_lint(tmp_path: Path) -> None:
     (tmp_path / "a.rts").write_text("zone pond = circle(47.39840 N, 8.54640 E, 15 m)\n")
     program = "import sys; from rtshcua.front.cli.app import main; main(['check', 'a.rts']); print(*sys.modules)"
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=tmp_path)
@@ -137,7 +137,7 @@ def test_exit_code_of_the_command_is_the_exit_code(monkeypatch: pytest.MonkeyPat
     assert [app.main(["show", str(code.value)]) for code in ExitCode] == list(ExitCode)
 
 
-def test_nothing_returned_is_ok_and_typer_exit_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_none_means_success_and_typer_exit_keeps_its_code(monkeypatch: pytest.MonkeyPatch) -> None:
     def ends(early: bool = False) -> None:
         if early:
             raise typer.Exit(7)
@@ -282,7 +282,7 @@ def test_exception_becomes_one_line_and_an_exit_code(
     assert capsys.readouterr().err.strip() == message
 
 
-def test_an_error_that_ctrl_c_caused_is_no_fault(
+def test_error_caused_by_ctrl_c_is_an_interrupt(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     class Named:
@@ -351,7 +351,7 @@ def test_full_disk_and_closed_pipe_end_without_traceback() -> None:
     assert (run.returncode, run.stderr) == (ExitCode.FULL, "")
 
 
-def test_a_poor_terminal_is_no_fault() -> None:
+def test_ascii_terminal_gets_escaped_text() -> None:
     program = "from rtshcua.front.cli import app; app.overview = lambda bold: 'height 20 m, heading 90°'; app.main([])"
     environment = {**os.environ, "PYTHONIOENCODING": "ascii"}
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=environment, check=True)

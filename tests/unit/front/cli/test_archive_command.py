@@ -248,14 +248,14 @@ def test_file_that_is_not_a_log_is_not_added(tmp_path: Path, capsys: pytest.Capt
     assert not (tmp_path / "archive").exists()
 
 
-def test_without_a_root_nothing_is_added(runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_archive_add_requires_a_root(runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert archive("add", runs) == ExitCode.UNTRUSTED
     assert "name the trust root" in capsys.readouterr().err
     assert not (tmp_path / "archive").exists()
 
 
 @pytest.mark.parametrize("words", [("stats",), ("query", "refused"), ("add",)])
-def test_without_the_extra_it_says_which(
+def test_missing_archive_extra_is_named(
     words: tuple[str, ...], runs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in [*sys.modules]:
@@ -364,7 +364,7 @@ def test_a_link_in_a_folder_is_not_taken_in(runs: Path, capsys: pytest.CaptureFi
     assert archive("add", "flown/a/log.jsonl", *ROOT) == ExitCode.OK
 
 
-def test_a_log_that_becomes_a_link_before_it_is_copied_is_not_taken_in(
+def test_log_replaced_by_a_link_is_not_added(
     runs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     Path("flown/a").mkdir(parents=True)

@@ -85,7 +85,7 @@ def test_sessions_follow_one_another(tmp_path: Path) -> None:
     assert session_of(store, case.BOUNDARY_KEY, aloft=False).key == (case.BOUNDARY_KEY, 2, b"b" * 32)
 
 
-def test_a_state_folder_that_was_put_back_shows_where_the_boundary_counts_itself(tmp_path: Path) -> None:
+def test_restored_state_folder_is_noted_by_the_boundary_count(tmp_path: Path) -> None:
     store = BoundaryStore(tmp_path, "quad-07")
     store.keep(2, b"a" * 32)
     session = session_of(store, case.BOUNDARY_KEY, aloft=False)
@@ -104,14 +104,14 @@ def test_a_key_that_the_boundary_has_is_not_held_here(tmp_path: Path) -> None:
     assert BoundaryStore(tmp_path, "quad-07").kept() == (1, b"a" * 32)
 
 
-def test_nothing_flies_where_a_session_was_to_begin_and_did_not(tmp_path: Path) -> None:
+def test_run_stops_on_the_ground_if_no_session_begins(tmp_path: Path) -> None:
     store = BoundaryStore(tmp_path, "quad-07")
     with pytest.raises(OSError, match="cannot keep that its session begins"):
         session_of(store, case.BOUNDARY_KEY, aloft=False).begun(START, None)
     session_of(store, case.BOUNDARY_KEY, aloft=True).begun(START, None)
 
 
-def test_without_a_key_nothing_is_kept(tmp_path: Path) -> None:
+def test_no_session_is_stored_without_a_key(tmp_path: Path) -> None:
     session = session_of(BoundaryStore(tmp_path, "quad-07"), None, aloft=False)
     session.begun(b"a" * 32, None)
     session.ended(b"b" * 32)

@@ -109,7 +109,7 @@ def fly_one_again(line: dict[str, Any]) -> CampaignResult:
     return field.fly(CampaignFlight(line["number"], made.scenario, made.tries))
 
 
-def test_it_goes_on_where_it_stopped(
+def test_interrupted_campaign_resumes(
     here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
 ) -> None:
     seen: list[int] = []
@@ -132,7 +132,7 @@ def test_it_goes_on_where_it_stopped(
     assert len((folder / "results.jsonl").read_text().splitlines()) == 30
 
 
-def test_it_stops_while_a_failure_is_shrunk_and_shrinks_it_the_next_time(
+def test_interrupted_shrinking_resumes(
     here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
 ) -> None:
     seen: list[int] = []
@@ -159,7 +159,7 @@ def test_it_stops_while_a_failure_is_shrunk_and_shrinks_it_the_next_time(
     assert Path("runs/campaign-short-1/failures/collision.rts").exists()
 
 
-def test_a_failure_is_shrunk_kept_as_a_scenario_and_ends_it_with_13(
+def test_failure_is_shrunk_to_a_scenario_and_exits_with_13(
     here: Path,
     capsys: pytest.CaptureFixture[str],
     flies: Callable[[Any], None],
@@ -229,7 +229,7 @@ def test_torn_result_line_repeats_only_its_flight(
     assert sorted(json.loads(line)["number"] for line in kept) == [0, 1, 2, 3, 4]
 
 
-def test_a_flight_that_fails_in_two_ways_is_one_that_failed(
+def test_flight_with_two_findings_counts_once(
     here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
 ) -> None:
     both = JudgeFinding("collision", "flew into it"), JudgeFinding("late", "came late")
@@ -295,7 +295,7 @@ def test_fewer_flights_than_were_flown_are_reported_with_all_that_were(
     assert "5 flights, 1 failed" in out
 
 
-def test_a_file_is_no_folder_of_a_campaign(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_campaign_output_must_be_a_folder(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("made").write_text("mine")
     code, _, err = run(capsys, "-o", "made")
     assert (code, Path("made").read_text()) == (ExitCode.USAGE, "mine")

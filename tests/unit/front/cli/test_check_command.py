@@ -83,7 +83,7 @@ def test_missions_of_one_name_in_unrelated_files_do_not_clash(here: Path, capsys
     assert lines[-1].endswith("`where fitted` left out, without link.quality, obstacle.distance, wind.speed")
 
 
-def test_a_folder_means_all_sources_below_it_in_order(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_folder_selects_all_sources_in_order(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     put(
         {
             "a/.hidden/x.rts": "?",
@@ -100,7 +100,7 @@ def test_a_folder_means_all_sources_below_it_in_order(here: Path, capsys: pytest
     assert set(answered) == {"format", "version", "diagnostics", "exit", "exit_code", *told}
 
 
-def test_without_a_path_it_is_this_folder(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_default_path_is_the_current_folder(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     answers = []
     for words in (["check"], ["check", "--deny-warnings"], ["check", "."]):
         assert main(words) == ExitCode.OK
@@ -139,7 +139,7 @@ def test_files_that_import_each_other_are_checked_once(here: Path, capsys: pytes
     assert (code, [each for each, _ in found(answered)]) == (ExitCode.OK, ["E0111"])
 
 
-def test_one_that_cannot_be_read_does_not_hide_the_others(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_unreadable_source_does_not_hide_other_findings(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     put({"b/two.rts": "zone ?"})
     code = main(["check", "a", "nowhere.rts", "b"])
     assert code == ExitCode.INPUT
@@ -156,7 +156,7 @@ def test_habits_are_for_lint(here: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert main(["check", ".", "--deny-warnings"]) == ExitCode.OK
 
 
-def test_notes_are_no_warnings(capsys: pytest.CaptureFixture[str]) -> None:
+def test_notes_do_not_count_as_warnings(capsys: pytest.CaptureFixture[str]) -> None:
     for code, denied in ((codes.UNDECIDED, False), (codes.NAMING, True), (codes.SYNTAX, True)):
         assert Findings(json=False, deny_warnings=True).report([Diagnostic(code, "something")], {}) == denied
     assert not Findings(json=False).report([Diagnostic(codes.NAMING, "something")], {})
@@ -246,9 +246,7 @@ def test_compared_versions_are_printed(old: Path, capsys: pytest.CaptureFixture[
 
 
 @pytest.mark.parametrize("earlier", ["old.bundle", ".old"])
-def test_a_gate_does_not_pass_where_nothing_was_compared(
-    old: Path, earlier: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_gate_fails_if_nothing_was_compared(old: Path, earlier: str, capsys: pytest.CaptureFixture[str]) -> None:
     """A policy that was renamed, or another project's bundle: its version was never looked at."""
     put({"policy.rts": POLICY.replace("meadow_flight", "other_flight")})
     assert main(["check", "policy.rts", "--since", earlier]) == ExitCode.INPUT
@@ -335,7 +333,7 @@ mission look under dated@1 on quad {{
         ('active "2025-01-01T00:00Z" .. "2026-02-28T00:00Z"', False, True),
     ],
 )
-def test_a_zone_that_exists_on_dates_counts_for_the_time_that_is_given(
+def test_dated_zone_is_checked_at_the_given_time(
     active: str, now: bool, then: bool, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     put({"dated.rts": DATED.format(active)})

@@ -50,7 +50,7 @@ def stops(page: str) -> list[tuple[float, float]]:
     return [(float(x), float(y)) for x, y in re.findall(r'class="stop" cx="([\d.]+)" cy="([\d.]+)"', page)]
 
 
-def test_a_refused_mission_is_drawn_with_the_place_where_it_fails(at: Path) -> None:
+def test_map_marks_where_a_mission_is_refused(at: Path) -> None:
     code, page = drawn(at, "47.39760 N, 8.54900 E", "20 m")
     assert code == ExitCode.DIAGNOSTICS
     assert page.count('class="failed-leg"') == 1

@@ -237,7 +237,7 @@ mission lift under shift@1 on quad {
 
 
 @pytest.mark.parametrize("named", [".", "..", "made", "made.bundle"])
-def test_a_folder_or_a_bundle_is_no_source(
+def test_folder_or_bundle_as_source_is_refused(
     named: str, checkout: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (here / "made").mkdir()
@@ -275,7 +275,7 @@ def test_a_slip_in_an_option_is_not_blamed_on_the_file(checkout: Path, capsys: p
         assert help in error["help"]
 
 
-def test_a_source_that_cannot_be_read_comes_before_a_policy_that_is_not_there(here: Path, checkout: Path) -> None:
+def test_unreadable_import_is_reported_before_a_missing_policy(here: Path, checkout: Path) -> None:
     text = proposal(checkout).replace("lib:policies/bridge_inspection.rts", "lib:policies/none.rts")
     (here / "spec.json").write_text(text, encoding="utf-8")
     assert main(["compile", "spec.json", "--policy", "bridge_inspection"]) == ExitCode.DIAGNOSTICS

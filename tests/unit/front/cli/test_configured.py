@@ -36,7 +36,7 @@ def test_unsettable_parameter_is_refused_first(command: list[str], capsys: pytes
         assert says in capsys.readouterr().err, words
 
 
-def test_nothing_is_set_of_a_vehicle_that_is_much_faster_than_life(capsys: pytest.CaptureFixture[str]) -> None:
+def test_set_requires_a_limited_speed(capsys: pytest.CaptureFixture[str]) -> None:
     words = ["run", "x.bundle", "--set=FENCE_RADIUS=50"]
     assert app.main([*words, "--speed=6"]) == ExitCode.USAGE
     assert "`--set` requires a `--speed` of at most 5" in capsys.readouterr().err

@@ -65,7 +65,7 @@ def test_a_busy_port(line: tuple[str, int], capsys: pytest.CaptureFixture[str]) 
     assert "ModemManager" in said
 
 
-def test_nobody_at_the_other_end(capsys: pytest.CaptureFixture[str]) -> None:
+def test_unreachable_address_exits_with_link_error(capsys: pytest.CaptureFixture[str]) -> None:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]

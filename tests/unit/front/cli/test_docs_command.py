@@ -44,7 +44,7 @@ def test_page_is_written_and_its_digest_printed(capsys: pytest.CaptureFixture[st
     assert "".join(f"<span>{digest[at : at + 8]}</span> " for at in range(0, 64, 8)) in text
 
 
-def test_the_digest_is_the_one_that_compile_signs(capsys: pytest.CaptureFixture[str], keys: None) -> None:
+def test_digest_equals_that_of_compile(capsys: pytest.CaptureFixture[str], keys: None) -> None:
     del keys
     assert main(["docs", str(MISSION), "--json", *AT]) == ExitCode.OK
     (chapter,) = json.loads(capsys.readouterr().out)["handbook"]["chapters"]
@@ -85,7 +85,7 @@ def test_since_highlights_changes(capsys: pytest.CaptureFixture[str]) -> None:
     assert "<= 12 m" in change["after"][0]
 
 
-def test_the_folder_that_it_runs_in_has_a_name_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_current_folder_is_shown_by_name(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("old.rts").write_text(POLICY.read_text(encoding="utf-8"), encoding="utf-8")
     assert main(["docs", str(POLICY), "--since", ".", "--json", *AT]) == ExitCode.OK
     (chapter,) = json.loads(capsys.readouterr().out)["handbook"]["chapters"]
@@ -150,7 +150,7 @@ def test_the_date_has_no_parts_of_a_second(monkeypatch: pytest.MonkeyPatch, caps
     assert json.loads(capsys.readouterr().out)["handbook"]["made_at"] == "2026-01-31 08:00 UTC"
 
 
-def test_where_nothing_earlier_is_found_it_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+def test_missing_earlier_version_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     other = str(CHECKOUT / "policies" / "bridge_inspection.rts")
     assert main(["docs", str(POLICY), "-o", "page.html", "--since", other, *AT]) == ExitCode.OK
     assert "earlier version" in capsys.readouterr().err
@@ -187,7 +187,7 @@ def test_invalid_arguments_are_refused(
     assert sorted(path.name for path in Path.cwd().iterdir()) == before
 
 
-def test_with_a_test_that_fails_nothing_is_written(capsys: pytest.CaptureFixture[str]) -> None:
+def test_failing_policy_test_prevents_output(capsys: pytest.CaptureFixture[str]) -> None:
     """Not even where another file asked for imports it; where only what is imported fails, that is not asked."""
     source = CHECKOUT / "policies" / "bridge_inspection_test.rts"
     text = source.read_text(encoding="utf-8")
@@ -219,7 +219,7 @@ def test_page_shows_the_scenarios_of_the_named_files(capsys: pytest.CaptureFixtu
         assert chapter["scenarios"][0]["told"][-1] == "it ends `aborted`"
 
 
-def test_as_json_a_refusal_is_an_object(capsys: pytest.CaptureFixture[str]) -> None:
+def test_refusal_as_json_is_an_object(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["docs", "missing.rts", "--json"]) == ExitCode.INPUT
     assert json.loads(capsys.readouterr().out)["exit"] == "input"
 

@@ -247,7 +247,7 @@ def test_a_bundle_that_no_root_ever_trusted_is_not_recalled(
     assert not (here / "home").exists()
 
 
-def test_who_replaced_the_key_that_a_flight_knows_recalls_it_with_that_one(here: Path) -> None:
+def test_recall_accepts_the_replaced_key_of_the_flight(here: Path) -> None:
     """The flight began under a root that knows no other key of theirs."""
     of = in_force(here / "low.bundle")
     assert main(["keys", "replace", "approval-owner-operator"]) == ExitCode.OK
@@ -353,7 +353,7 @@ def test_send_refuses_other_files(
 
 
 @pytest.mark.slow
-def test_an_operator_follows_a_flight_and_calls_it_home(here: Path, listening: Path) -> None:
+def test_operator_follows_and_recalls_a_flight(here: Path, listening: Path) -> None:
     words = [str(Path(sys.executable).with_name("rtshcua")), "operator", "low.bundle", "--to", str(listening), "--json"]
     with subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as console:
         assert console.stdin is not None

@@ -125,7 +125,7 @@ def test_why_begins_with_the_cause_of_the_end(log: Path, capsys: pytest.CaptureF
         (cancellation, MISSION_KEY, "cancels the mission"),
     ],
 )
-def test_a_document_is_shown_and_a_run_says_where_it_goes(
+def test_document_is_shown_with_its_destination(
     make: Callable[[Loaded], bytes], key: SigningKey, words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = tmp_path / "x.document"
@@ -158,9 +158,7 @@ def test_the_summary_counts_every_decision_as_the_log_does() -> None:
     assert counts["allow"] > 2, "both steps, and the links of what flew then"
 
 
-def test_a_fallback_of_which_no_landing_was_seen_is_in_the_summary_of_run_and_audit(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_fallback_without_a_landing_is_in_both_summaries(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run = Run(low()).until_flies("goto")
     assert hand(run, recall(run.loaded, now=run.clock.now())) == "accepted"
     run.until_flies("return_home")
@@ -289,7 +287,7 @@ def test_the_target_of_a_degrade_rule_is_named_as_such() -> None:
     assert any("target of the degrade rule, at step 2" in line for line in told)
 
 
-def test_one_record_of_a_decision_names_who_answered(broken_off: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_decision_record_names_the_approver(broken_off: Path, capsys: pytest.CaptureFixture[str]) -> None:
     records = [json.loads(line) for line in broken_off.read_bytes().splitlines()]
     decided = next(each["seq"] for each in records if each["type"] == "decision" and each["context"]["approvals"])
     main(["verify-log", str(broken_off), "--root", ROOT_KEY.public.hex(), "--explain", str(decided)])

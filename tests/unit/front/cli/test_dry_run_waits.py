@@ -91,13 +91,15 @@ def test_dry_run_lists_pending_conditions(monkeypatch: pytest.MonkeyPatch, capsy
     assert world.said == ["note: the radio", waits]
 
 
-def test_interrupted_it_says_how_it_stands(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_interrupted_dry_run_reports_its_state(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     code, said = rehearsed(World(1e9, wish_s=7), monkeypatch, capsys)
     assert code is ExitCode.INTERRUPTED
     assert (said["interrupted"], said["ready"], len(said["steps"])) == (True, False, 4)
 
 
-def test_its_own_wait_makes_nothing_stale(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_dry_run_wait_does_not_age_signals(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     code, said = rehearsed(World(59, speed=50), monkeypatch, capsys)
     assert {step["reason"] for step in said["steps"]} == {"admitted"}
     assert code is ExitCode.OK

@@ -95,7 +95,7 @@ def test_without_json_the_output_stays_empty(capsys: pytest.CaptureFixture[str])
     assert len(capsys.readouterr().out.splitlines()) == 1
 
 
-def test_a_word_after_the_options_is_no_option(capsys: pytest.CaptureFixture[str]) -> None:
+def test_json_after_double_dash_is_an_argument(capsys: pytest.CaptureFixture[str]) -> None:
     assert app.main(["show", "--", "--json"]) == ExitCode.INPUT
     assert capsys.readouterr().out == ""
 

@@ -72,7 +72,7 @@ def test_unreadable_file_is_bad_input(
     assert f"error[input]: permission denied: `{log}`" in capsys.readouterr().err
 
 
-def test_where_nothing_may_be_written(
+def test_read_only_folder_is_reported(
     log: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     opened = os.open

@@ -66,7 +66,7 @@ def ended(tmp_path: Path) -> Ended:
     return Ended(tmp_path)
 
 
-def test_a_whole_flight_has_nothing_missing(ended: Ended) -> None:
+def test_complete_flight_lists_nothing_missing(ended: Ended) -> None:
     assert ended.close() == ()
     assert ended.notes == []
     assert [record["type"] for record in ended.records()] == ["genesis", "close"]

@@ -60,7 +60,7 @@ def test_check_writes_nothing(here: Path, capsys: pytest.CaptureFixture[str]) ->
     assert main(["fmt", "--check", "b"]) == ExitCode.OK
 
 
-def test_the_diff_is_one_that_patch_takes(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_diff_can_be_applied_by_patch(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("a.rts").write_text(BAD.rstrip("\n"))
     assert main(["fmt", "--diff", "b"]) == ExitCode.OK
     assert said(capsys) == ("", "")
@@ -240,7 +240,7 @@ def test_a_fault_of_ours_changes_nothing(
     assert Path("a.rts").read_text() == BAD
 
 
-def test_nothing_is_counted_where_nothing_could_be_laid_out(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_unparsable_source_is_not_counted(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("a.rts").write_text("skill")
     assert main(["fmt", "a.rts"]) == ExitCode.DIAGNOSTICS
     assert said(capsys)[0] == ""

@@ -111,7 +111,7 @@ def test_unsupported_incident_is_refused_by_name(source: Path) -> None:
     assert "3 scenarios" in refused(source, "")
 
 
-def test_it_goes_wrong_when_the_scenario_says_so_and_no_sooner(source: Path) -> None:
+def test_incident_starts_at_its_scheduled_time(source: Path) -> None:
     made, vehicle = incidents(source, "gusts and a lost fix"), Vehicle()
     made.begin(prepared(source), chosen(f"{source}:killed", ISSUED_US).mission, vehicle)  # type: ignore[arg-type]
     turns: list[int] = []

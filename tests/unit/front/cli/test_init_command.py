@@ -18,7 +18,7 @@ def everything(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-def test_it_makes_the_example_under_the_folders_name(tmp_path: Path, capsys: Said) -> None:
+def test_example_project_is_named_after_its_folder(tmp_path: Path, capsys: Said) -> None:
     folder = tmp_path / "sub/River-Side 2"
     assert app.main(["init", str(folder)]) == 0
     assert everything(folder) == project("river_side_2")
@@ -42,7 +42,7 @@ def test_no_other_name_is_left_in_it() -> None:
     assert project(EXAMPLE) == {file: (root() / "examples" / EXAMPLE / file).read_bytes() for file in FILES}
 
 
-def test_without_a_folder_it_is_made_where_one_is(
+def test_default_project_folder_is_the_current_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Said
 ) -> None:
     (tmp_path / "2 farms").mkdir()
@@ -111,7 +111,7 @@ def test_a_folder_in_the_way_is_not_kept(tmp_path: Path, capsys: Said) -> None:
     assert f"in the way: `{tmp_path}/README.md`" in capsys.readouterr().err
 
 
-def test_where_nothing_can_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Said) -> None:
+def test_unwritable_folder_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Said) -> None:
     make = Path.mkdir
 
     def refused(self: Path, *given: object, **named: object) -> None:

@@ -61,7 +61,7 @@ def test_the_handlers_before_are_put_back() -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_request_to_stop_raises_where_it_is_looked_at_and_nowhere_else(number: signal.Signals) -> None:
+def test_stop_request_raises_only_at_its_checkpoints(number: signal.Signals) -> None:
     before = signal.signal(signal.SIGINT, signal.SIG_DFL)
     try:
         with StopRequest() as stop:

@@ -175,7 +175,7 @@ def test_a_passphrase_may_come_from_a_pipe() -> None:
         os.close(out)
 
 
-def test_a_passphrase_is_no_book(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_oversized_passphrase_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_new(tmp_path / "book", b"a" * 5_000, mode=0o600)
     words = ["keys", "init", "--encrypted", "--policy", "field", "--passphrase-file", str(tmp_path / "book")]
     assert app.main(words) == ExitCode.UNTRUSTED
@@ -190,7 +190,7 @@ def test_mission_keys_in_earnest_are_for_named_policies(tmp_path: Path, capsys: 
     assert not KeyStore(data_folder()).exists()
 
 
-def test_a_short_passphrase_is_none(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_short_passphrase_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_new(tmp_path / "short", b"12345678901\n", mode=0o600)
     words = ["keys", "init", "--encrypted", "--policy", "field", "--passphrase-file", str(tmp_path / "short")]
     assert app.main(words) == ExitCode.USAGE
@@ -259,7 +259,7 @@ def test_an_approver_is_a_person_in_a_role(capsys: pytest.CaptureFixture[str]) -
         (["ada", "--role", "../pilot"], ExitCode.USAGE),
     ],
 )
-def test_who_is_no_approver(words: list[str], code: ExitCode, capsys: pytest.CaptureFixture[str]) -> None:
+def test_invalid_approver_is_refused(words: list[str], code: ExitCode, capsys: pytest.CaptureFixture[str]) -> None:
     app.main(["keys", "init"])
     app.main(["keys", "approver", "ada", "--role", "supervisor"])
     store = KeyStore(data_folder())

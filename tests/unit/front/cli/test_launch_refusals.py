@@ -36,7 +36,7 @@ LATER = 1 << 52  # us
 START_CLOCK: Any = SimpleNamespace(now=lambda: START)
 
 
-def test_an_older_policy_than_the_one_that_was_in_force(tmp_path: Path) -> None:
+def test_older_policy_version_is_refused(tmp_path: Path) -> None:
     FileReplayStore(tmp_path, VEHICLE).open_once(bytes(32), LATER, 0, POLICY.name, POLICY.version + 1)
     refused = refusal_of(replay_check.broke_off(tmp_path, loaded(), cast("Any", None), SystemClock(), []))
     assert "a later version of `bridge_inspection` than 7" in refused.text
@@ -47,7 +47,7 @@ def test_an_older_policy_than_the_one_that_was_in_force(tmp_path: Path) -> None:
     ("armed", "landed_state", "resumes"),
     [(False, 1, False), (True, 1, True), (True, 2, True), (True, 0, True), (False, 0, False)],
 )
-def test_a_bundle_that_was_opened_goes_on_where_the_vehicle_flies_or_may_be_about_to(
+def test_opened_bundle_resumes_while_the_vehicle_may_fly(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, armed: bool, landed_state: int, resumes: bool
 ) -> None:
     """On the ground and armed, it may have been told to take off by a run that was killed."""
@@ -105,7 +105,7 @@ def full(path: Path, *_: object, **__: object) -> None:
     raise OSError(ENOSPC, "no space left on device", str(path))
 
 
-def test_that_a_mark_could_be_written_leaves_nothing_behind(tmp_path: Path) -> None:
+def test_writability_check_leaves_no_file(tmp_path: Path) -> None:
     store = FileReplayStore(tmp_path, VEHICLE)
     store.expect_room()
     assert [*store.folder.iterdir()] == []
@@ -198,7 +198,7 @@ class Over:
         self.used_up = used_up
 
 
-def test_a_bundle_of_which_nothing_was_sent_may_be_handed_in_again(tmp_path: Path) -> None:
+def test_bundle_without_sent_commands_can_run_again(tmp_path: Path) -> None:
     replay_check.mark_opened(tmp_path, loaded(), SystemClock(), cast("Any", Grounded()))
     told = replay_check.give_back(tmp_path, loaded(), cast("Any", Over(used_up=False)), START)
     assert told == "no command was sent: the bundle can be run again"
@@ -260,7 +260,7 @@ def test_expired_bundle_is_reported_and_not_reusable(tmp_path: Path) -> None:
     assert told == f"no command was sent, and {refusal.text}; {refusal.help}"
 
 
-def test_a_bundle_that_may_be_fresh_still_is_no_expired_one() -> None:
+def test_bundle_is_not_expired_while_it_may_be_fresh() -> None:
     assert replay_check.expired(loaded(), late(0)) is None
     unknown = replace(late(1 << 40), utc_error_us=UTC_UNKNOWN_US)
     assert replay_check.expired(loaded(), unknown) is None, "nobody knows the time of day"

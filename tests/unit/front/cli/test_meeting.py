@@ -111,7 +111,7 @@ def met_at(
         (marked(100), "other-speed"),
     ],
 )
-def test_another_speed_than_that_of_life_is_believed_of_no_vehicle_that_does_not_live_so(
+def test_speed_is_refused_for_a_real_vehicle(
     speed: float, custom: Any, slug: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """An autopilot behind a router at 127.0.0.1 was flown with `--speed 10` on a machine whose time nobody knew: as
@@ -123,7 +123,7 @@ def test_another_speed_than_that_of_life_is_believed_of_no_vehicle_that_does_not
 
 
 @pytest.mark.parametrize("speed", [10, 1.01, 0.5, 2])
-def test_a_simulated_vehicle_is_met_at_the_speed_that_it_says(speed: float, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_speed_is_read_from_a_simulated_vehicle(speed: float, monkeypatch: pytest.MonkeyPatch) -> None:
     vehicle, found = met_at(speed, marked(round(speed * 100)), monkeypatch)
     assert found == []
     assert vehicle.asked_before_ready, "nothing begins before it is known"

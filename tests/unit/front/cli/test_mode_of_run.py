@@ -48,7 +48,7 @@ def test_the_mode_that_counts(
 
 
 @pytest.mark.parametrize("unbuilt", [True, False])
-def test_a_run_says_that_there_is_no_program(tmp_path: Path, unbuilt: bool) -> None:
+def test_missing_boundary_program_is_noted(tmp_path: Path, unbuilt: bool) -> None:
     signing = sign_link(context(request(state=tmp_path, unbuilt=unbuilt)), loaded())
     assert isinstance(signing, LinkSigning)
     assert any(UNBUILT in note for note in signing.notes) == unbuilt

@@ -52,7 +52,7 @@ def test_nearest_fix_is_suggested(said: Said, words: str, code: ExitCode, help: 
     assert help in found[1]
 
 
-def test_nothing_is_guessed_where_no_name_is_alike(said: Said) -> None:
+def test_no_name_is_suggested_without_a_similar_one(said: Said) -> None:
     assert "did you mean" not in said("show", "quite-another.bundle")[1]
     assert "did you mean" not in said("show", "nowhere/standard.rts")[1]
 

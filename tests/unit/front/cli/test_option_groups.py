@@ -27,7 +27,7 @@ def options(command: object) -> list[list[str]]:
     return [each.opts for each in command.params if each.opts[0].startswith("-")]  # type: ignore[attr-defined]
 
 
-def test_every_command_with_many_options_has_groups_and_each_option_is_in_one() -> None:
+def test_commands_with_many_options_group_each_option() -> None:
     for name, command in commands():
         found = options(command)
         groups = OPTION_GROUPS.get(name, {})

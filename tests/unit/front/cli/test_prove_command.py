@@ -59,7 +59,7 @@ def test_a_record_in_and_out(capsys: pytest.CaptureFixture[str]) -> None:
     assert "\033" not in out
 
 
-def test_it_verifies_where_no_log_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_proof_verifies_without_the_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert prove(3, "-o", "p") == ExitCode.OK
     away = tmp_path / "away"
     away.mkdir()
@@ -84,7 +84,7 @@ def test_as_json(capsys: pytest.CaptureFixture[str]) -> None:
     }
 
 
-def test_that_nothing_changed_since(capsys: pytest.CaptureFixture[str]) -> None:
+def test_consistency_proof_since_a_signed_record_verifies(capsys: pytest.CaptureFixture[str]) -> None:
     assert prove("--since", SIGNED[1]) == ExitCode.OK
     assert verify(f"since-{SIGNED[1]}.consistency-proof") == ExitCode.OK
     out = capsys.readouterr().out
@@ -205,7 +205,7 @@ def test_the_nearest_checkpoint_that_witnesses_saw_vouches_for_it(
     assert "not anchored: too few witnesses cosigned the checkpoint that covers it" in capsys.readouterr().out
 
 
-def test_nothing_but_a_proof_is_written_over(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_prove_overwrites_only_proofs(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for name in ("log.jsonl", "root.trust", "log.key"):
         before = (folder / name).read_bytes()
         assert prove(3, "-o", name) == ExitCode.USAGE

@@ -82,7 +82,7 @@ def test_a_policy_that_permits_no_leg_is_refused(commands: Forked, own_world: No
         ({"sitl": False, "takeover": True, "keyed": False}, [*SORTIES[:2], BY_PILOT], {"pause", "target"}),
     ],
 )
-def test_nobody_takes_over_a_real_vehicle_but_its_pilot(words: Any, flown: Any, missing: set[str]) -> None:
+def test_real_vehicles_skip_the_simulated_takeover(words: Any, flown: Any, missing: set[str]) -> None:
     sorties, why = plan_sorties(**words)
     assert sorties == flown
     assert why.keys() == missing

@@ -13,7 +13,7 @@ CHECKOUT = Path(__file__).resolve().parents[4]
 POLICY = str(CHECKOUT / "policies" / "bridge_inspection.rts")
 
 
-def test_without_options_it_is_the_general_schema(capsys: pytest.CaptureFixture[str]) -> None:
+def test_default_schema_is_the_general_one(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["schema"]) == ExitCode.OK
     assert json.loads(capsys.readouterr().out) == schema()
 

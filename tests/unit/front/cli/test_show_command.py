@@ -134,7 +134,7 @@ def test_a_log_as_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> No
     assert "bundle" not in whole["records"][0]
 
 
-def test_a_damaged_log_is_shown_as_far_as_it_goes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_damaged_log_is_shown_up_to_the_damage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     lines = list(flight())
     lines[0] = edit(lines[0], bundle=b64encode(b"no bundle").decode(), before="ab" * 32)
     at = 1 + next(number for number, line in enumerate(lines) if b'"type":"decision"' in line)
@@ -319,7 +319,7 @@ def test_text_from_elsewhere() -> None:
     assert utc(1 << 60) == f"{1 << 60} us"
 
 
-def test_a_statement_of_the_boundary_says_how_far_it_got() -> None:
+def test_boundary_statement_is_summarised() -> None:
     said = [detail_of("boundary", read(line)["detail"]) for line in attested() if read(line).get("event") == "boundary"]
     assert said[0] == "session 1 has 1 entry and 0 frames of commands"
     assert said[-1].startswith("session 1 has 11 entries and ")

@@ -63,7 +63,7 @@ def test_a_key_of_a_passphrase_is_the_ground_stations(tmp_path: Path) -> None:
     assert not (tmp_path / "key2").exists()
 
 
-def test_without_a_key_nothing_is_signed(tmp_path: Path) -> None:
+def test_sign_options_without_a_key_sign_nothing(tmp_path: Path) -> None:
     of = loaded()
     signing = LinkSigning(None, of.bundle.policy, of.executor.frames, tmp_path, SystemClock(), unsigned_radio=False)
     of.executor.frames.observe(HEARTBEAT)

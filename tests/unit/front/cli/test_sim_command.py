@@ -48,7 +48,7 @@ def key_file(folder: Path, mode: int = 0o600) -> Path:
     return path
 
 
-def test_it_says_how_to_fly_it(capsys: pytest.CaptureFixture[str]) -> None:
+def test_sim_prints_how_to_connect(capsys: pytest.CaptureFixture[str]) -> None:
     assert command.sim() == ExitCode.OK
     out = capsys.readouterr().out
     assert "a simulated px4 vehicle, system 1, sends to udp port 14550" in out
@@ -142,7 +142,9 @@ def test_links_that_are_not_for_it(words: dict[str, Any], message: str, capsys: 
     assert message in capsys.readouterr().err
 
 
-def test_it_may_not_start(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_simulator_start_failure_is_reported(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     def refuse(_: list[str]) -> None:
         raise SimulatorError("the port is taken")
 
@@ -151,7 +153,7 @@ def test_it_may_not_start(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Captur
     assert "the port is taken" in capsys.readouterr().err
 
 
-def test_it_may_end_by_itself(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_simulator_exit_is_reported(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.setattr(FakeSimulator, "wait", lambda _: 9)
     assert command.sim() == ExitCode.FAULT
     assert "with code 9" in capsys.readouterr().err

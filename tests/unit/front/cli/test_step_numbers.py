@@ -70,7 +70,7 @@ def test_every_command_gives_the_inspection_the_same_number(here: Path, capsys: 
 
 
 @pytest.mark.parametrize("number", ["0", "-1"])
-def test_there_is_no_step_before_the_first(here: Path, number: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_step_numbers_below_one_are_refused(here: Path, number: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert "1 takeoff" in told(capsys, "why", "low.bundle", "--step", number, code=ExitCode.USAGE)
     assert "greater than or equal to 1" in told(
         capsys, "approve", "low.bundle", "--step", number, "-o", "x", *FLIGHT, code=ExitCode.USAGE

@@ -42,7 +42,7 @@ def answer(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, dict[s
     return code, json.loads(out)
 
 
-def test_a_line_a_test_and_one_that_sums_up(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_output_has_a_line_per_test_and_a_summary(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = run(capsys)
     assert (code, err) == (ExitCode.OK, "")
     assert out.splitlines() == [
@@ -89,7 +89,7 @@ def test_only_those_that_are_named(here: Path, capsys: pytest.CaptureFixture[str
         assert out == f"no test was run: no name of 4 contains `{near}`; the nearest is `coming home`\n"
 
 
-def test_no_test_is_no_success(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_without_tests_fails(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, out, _ = run(capsys, "policy.rts")
     assert code == ExitCode.TESTS
     assert out.startswith("no test was found")
@@ -109,7 +109,7 @@ def test_sources_with_errors_are_not_called_sources_without_tests(
         assert run(capsys, name)[:2] == (code, words)
 
 
-def test_one_case_as_json_in_full(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_case_as_json_is_complete(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     code, found = answer(capsys, "-k", "40 %")
     assert code == ExitCode.OK
     assert (found["format"], found["exit"], found["diagnostics"]) == ("rtshcua/diagnostics", "ok", [])

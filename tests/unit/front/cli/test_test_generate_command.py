@@ -54,7 +54,7 @@ def test_generated_tests_on_the_standard_output(here: Path, capsys: pytest.Captu
     assert json.loads(described)["text"] == out
 
 
-def test_which_policy_must_be_clear(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_generate_requires_an_unambiguous_policy(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     put("other.rts", POLICY[: POLICY.index("nominal")].replace("policy yard", "policy idle"))
     code, _, err = run(capsys, "--generate", "policy.rts", "other.rts")
     assert code == ExitCode.USAGE

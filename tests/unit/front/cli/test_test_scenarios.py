@@ -65,7 +65,7 @@ def test_scenarios_are_flown(here: Path, capsys: pytest.CaptureFixture[str]) -> 
 
 
 @pytest.mark.slow
-def test_the_example_of_the_reference_flies_as_it_expects(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_reference_scenario_meets_its_expectations(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     page = (Path(__file__).parents[4] / "docs" / "language.md").read_text(encoding="utf-8")
     example = page.split("## Scenarios\n\n```rts\n")[1].split("```")[0]
     fewer = example.replace("aboard px4, ardupilot", "aboard px4").replace("seeds  1 .. 20", "seeds  3")

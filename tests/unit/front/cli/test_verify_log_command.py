@@ -238,7 +238,7 @@ def test_telemetry_that_was_not_whole_is_not_vouched_for(run: Path, capsys: pyte
     assert "the log does not vouch for `telemetry.tlog`" in capsys.readouterr().out
 
 
-def test_nothing_vouches_for_the_summary(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_summary_file_is_reported_as_unsigned(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert verify(run) == ExitCode.OK
     assert "summary.json" not in capsys.readouterr().out
     (run / "summary.json").write_text("{}")
@@ -294,7 +294,7 @@ def test_a_decision_that_its_own_signers_forged(run: Path, capsys: pytest.Captur
     assert verify(run, "--audit", "--no-derive") == ExitCode.OK
 
 
-def test_fast_says_no_more_than_it_saw(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_fast_claims_only_checked_properties(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert verify(run, "--fast") == ExitCode.OK
     out = capsys.readouterr().out
     assert f"+ the octets of records 0 to {len(flight()) - 2} are the signed ones" in out
@@ -377,7 +377,7 @@ def test_a_hostile_log_does_not_write_to_the_terminal(run: Path, capsys: pytest.
     assert "\r" not in out
 
 
-def test_a_long_log_shows_that_it_goes_on(
+def test_long_log_shows_progress(
     run: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(verify_log, "_LONG", 100)
@@ -385,7 +385,7 @@ def test_a_long_log_shows_that_it_goes_on(
     assert verify(run) == ExitCode.OK
 
 
-def test_in_a_terminal_it_is_coloured(
+def test_terminal_output_is_coloured(
     run: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.delenv("NO_COLOR")

@@ -81,7 +81,7 @@ def test_telemetry_that_nobody_read(fast: bool, log: Path, capsys: pytest.Captur
     assert ("`telemetry.tlog` was not read: without `--fast`" in capsys.readouterr().out) == fast
 
 
-def test_fast_says_nothing_of_telemetry_where_there_is_none(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_fast_omits_missing_telemetry(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert verify(log, "--fast") == ExitCode.OK
     assert "telemetry.tlog" not in capsys.readouterr().out
 
@@ -108,7 +108,7 @@ def test_a_log_that_must_be_anchored_and_too_few_cosigned() -> None:
     assert missing.found == "0 records, the rest cosigned by 1 of 2 required witnesses"
 
 
-def test_how_fast_a_flight_was() -> None:
+def test_flight_speed_is_reported() -> None:
     assert pace_of(1, own=False) is None
     assert pace_of(1, own=True) == "a simulated vehicle, as fast as life"
     assert pace_of(10, own=True) == "a simulated vehicle, 10 times as fast as life"

@@ -195,7 +195,7 @@ def test_ctrl_c_ends_it(begin: Callable[..., World]) -> None:
     assert (refused.code, refused.slug) == (ExitCode.INTERRUPTED, "interrupted")
 
 
-def test_it_does_not_wait_for_ever(begin: Callable[..., World]) -> None:
+def test_wait_for_documents_times_out(begin: Callable[..., World]) -> None:
     refused = cast("Refusal", begin(most_s=0.05).end())
     assert (refused.code, refused.slug) == (ExitCode.REFUSED, "nothing-handed-in")
 

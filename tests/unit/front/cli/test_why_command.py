@@ -30,7 +30,7 @@ def shown(capsys: pytest.CaptureFixture[str], *words: str) -> dict[str, object]:
     return found
 
 
-def test_every_step_of_the_shipped_mission_is_admitted_as_its_contract_wants_the_state(
+def test_steps_of_the_standard_mission_are_admitted(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     for step in range(6):
@@ -221,7 +221,7 @@ def late_until(ends: int) -> list[bytes]:
     return [*run.lines, run.recorder.close(run.clock.now(), ending=str(run.ending), tlog=None)]
 
 
-def test_a_takeoff_that_was_late_until_its_time_was_over_names_the_busy_computer(
+def test_takeoff_late_beyond_its_deadline_names_the_busy_computer(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     log = tmp_path / "log.jsonl"
@@ -231,7 +231,7 @@ def test_a_takeoff_that_was_late_until_its_time_was_over_names_the_busy_computer
     assert "late: nothing was sent: this computer was too busy" in cause["what"]
 
 
-def test_a_takeoff_that_was_late_and_flew_is_no_cause(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_late_takeoff_that_flew_is_not_a_cause(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     log = tmp_path / "log.jsonl"
     log.write_bytes(b"".join(late_until(2)))
     assert shown(capsys, str(log))["cause"] is None

@@ -304,7 +304,7 @@ def test_log_with_unwritten_anchors_is_tried_again(
     assert beside.is_file()
 
 
-def test_another_record_than_the_one_that_was_cosigned(
+def test_altered_cosigned_record_is_detected(
     flown: Flown, store: KeyStore, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The lines before the seal are the same, the seal is not; both logs go on from there with the same key."""

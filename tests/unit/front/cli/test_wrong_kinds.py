@@ -28,7 +28,7 @@ def test_source_that_is_not_a_file_is_reported(
     assert "save the source as a file that ends in `.rts`: its imports are relative to that file" in said
 
 
-def test_the_standard_input_is_no_file_where_it_is_a_pipe(capsys: pytest.CaptureFixture[str]) -> None:
+def test_pipe_as_source_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     reads, writes = os.pipe()
     try:
         assert main(["check", f"/dev/fd/{reads}"]) == ExitCode.INPUT

@@ -82,7 +82,7 @@ def test_failing_prover_is_reported_and_tried_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("hangs", ["time.sleep(99)", "take(); time.sleep(99)"])
-def test_one_that_hangs_is_ended(tmp_path: Path, hangs: str) -> None:
+def test_hanging_prover_is_killed(tmp_path: Path, hangs: str) -> None:
     """Also where it does not even read what it is asked."""
     found, said, starts = asked(tmp_path, f"if not starts:\n  {hangs}{RIGHT}", "a", "b", longest=0.5)
     assert found == [None, FOUND]

@@ -17,7 +17,7 @@ def asked(path: str = "/mcp", more: tuple[tuple[bytes, bytes], ...] = (), **chan
     return refusal(path, [*((name, value) for name, value in headers.items() if value is not None), *more], TOKEN, 8790)
 
 
-def test_who_has_the_token_and_asks_this_machine_is_answered() -> None:
+def test_local_request_with_the_token_is_accepted() -> None:
     assert asked() is None
     assert asked(host=b"localhost:8790", origin=b"http://localhost:8790") is None
     assert asked(authorization=b"bearer   " + TOKEN) is None
@@ -28,7 +28,7 @@ def test_who_has_the_token_and_asks_this_machine_is_answered() -> None:
     [None, b"", b"Bearer", b"Bearer ", b"Basic " + TOKEN, TOKEN, b"Bearer " + TOKEN[1:], b"Bearer " + TOKEN + b"t",
      b"Bearer T" + TOKEN[1:], b"Bearer \xff\xff", b"Bearer " + TOKEN + b"," + TOKEN],
 )  # fmt: skip
-def test_who_has_not_is_refused(authorization: bytes | None) -> None:
+def test_request_without_the_token_is_refused(authorization: bytes | None) -> None:
     assert asked(authorization=authorization) == 401
     assert asked("/other", authorization=authorization) == 401, "nor is it said what there is"
 
@@ -50,7 +50,7 @@ def test_a_name_of_another_machine_is_refused_whoever_asks(host: bytes | None) -
     "origin",
     [b"null", b"https://evil.example", b"http://127.0.0.1", b"https://localhost:8790", b"http://localhost:87900"],
 )
-def test_a_page_of_elsewhere_is_refused_whatever_it_sends(origin: bytes) -> None:
+def test_request_of_a_foreign_origin_is_refused(origin: bytes) -> None:
     assert asked(origin=origin) == 403
     assert asked(origin=b"http://localhost:8790", more=((b"origin", origin),)) == 403
 
@@ -87,6 +87,6 @@ def test_invalid_token_is_refused(tmp_path: Path, text: str) -> None:
         token_of(path)
 
 
-def test_a_token_is_no_folder(tmp_path: Path) -> None:
+def test_folder_as_token_file_is_refused(tmp_path: Path) -> None:
     with pytest.raises((NotRegular, IsADirectoryError)):
         token_of(tmp_path)

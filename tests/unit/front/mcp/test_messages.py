@@ -86,7 +86,7 @@ def test_invalid_message_is_refused_with_its_certain_id() -> None:
     assert not wrong
 
 
-def test_a_line_of_which_only_the_ends_are_left_is_refused_with_the_id_at_either() -> None:
+def test_truncated_message_is_refused_with_its_id() -> None:
     assert read_message(asked(), whole=False) == Wrong(
         NO_REQUEST, "the message is larger than 4 MiB or 65536 values", 1
     )
@@ -105,7 +105,7 @@ def test_a_line_of_which_only_the_ends_are_left_is_refused_with_the_id_at_either
         {"id": "x", "error": {"code": 1}},
     ],
 )
-def test_a_message_is_read_as_it_is(told: dict[str, Any]) -> None:
+def test_valid_message_is_read(told: dict[str, Any]) -> None:
     told = {"jsonrpc": "2.0"} | told
     assert read_message(json.dumps(told).encode()) == told
     assert read_message(json.dumps(told, ensure_ascii=False).encode()) == told
@@ -129,7 +129,7 @@ def test_any_external_text_can_be_serialised() -> None:
     assert writable({"a": 1}) == ({"a": 1}, '{"a": 1}')
 
 
-def test_whatever_is_changed_in_a_message_it_is_read_or_refused() -> None:
+def test_mutated_message_is_read_or_refused() -> None:
     chance = random.Random(1)
     lines = [asked(b'"a":{"b":["c",1.5,null]}'), b'{"jsonrpc":"2.0","id":"x","result":{"a":"\\u00e9"}}']
     parts = [b"\\ud800", b'"', b"{", b"]", b"\xff", b"\0", b"NaN", b",", b'"id":', b"1e999", b"9" * 30]

@@ -97,7 +97,7 @@ def test_invalid_utf_8_does_not_end_the_session() -> None:
     assert [(each["id"], each["result"]) for each in told] == [(1, {"a": "\ufffd"}), (2, {"a": "\ufffd"})]
 
 
-def test_an_id_that_waits_for_its_answer_and_requests_beyond_the_most_are_refused() -> None:
+def test_duplicate_ids_and_excess_requests_are_refused() -> None:
     told = served(request(0) + b"".join(map(request, range(MOST_OPEN + 1))), answers=False)
     assert [each["id"] for each in told] == [None, MOST_OPEN]
     assert f"{MOST_OPEN} requests wait" in told[1]["error"]["message"]

@@ -200,7 +200,7 @@ def test_proposals_are_bounded(desk: Tools, handed: list[bytes], monkeypatch: py
     assert desk.propose_mission(PROPOSAL, "one")["accepted"], "what is known is answered as before"
 
 
-def test_a_cancellation_says_which_flight_and_nothing_of_where_to(desk: Tools, handed: list[bytes]) -> None:
+def test_cancellation_names_only_the_flight(desk: Tools, handed: list[bytes]) -> None:
     with pytest.raises(Misused) as misused:
         desk.cancel()
     assert (misused.value.code, handed) == ("not-flying", [])
@@ -223,9 +223,7 @@ def test_a_cancellation_says_which_flight_and_nothing_of_where_to(desk: Tools, h
     assert 0 < said.expires_at_us - said.issued_at_us <= MAX_LIFE_US
 
 
-def test_a_decision_is_explained_by_the_mission_that_it_is_of_alone(
-    desk: Tools, handed: list[bytes], missions: Missions
-) -> None:
+def test_decision_is_explained_only_by_its_own_mission(desk: Tools, handed: list[bytes], missions: Missions) -> None:
     assert status(desk, desk.propose_mission(PROPOSAL, "one")["ticket"]) == "admitted"
     other = missions.check(PROPOSAL, 1_000_000).mission  # issued at another time
     assert other is not None
@@ -295,6 +293,6 @@ def test_a_line_of_no_type_that_is_read_is_passed_over(line: Any) -> None:
 
 
 @pytest.mark.parametrize("kind", LINES)
-def test_a_line_is_passed_on_as_it_came(kind: str) -> None:
+def test_lines_are_forwarded_unchanged(kind: str) -> None:
     line = LINES[kind] | ({} if kind == "decision" else {"more": [1, {"a": None}]})
     assert understood(line) is line

@@ -96,7 +96,7 @@ def test_rule_for_a_missing_sensor_is_omitted_and_recorded(kind: str) -> None:
     assert not isinstance(prepare(without.policy), Refusal)
 
 
-def test_where_fitted_is_refused_for_a_permit() -> None:
+def test_fitted_argument_is_refused_for_a_permit() -> None:
     """Without the rule the policy would permit less, and without its condition more than it states."""
     made = compiled(NO_EYES, rule="permit goto by role trainee when obstacle.distance > 2 m where fitted")
     assert codes(made) == ["E0101"]
@@ -169,7 +169,7 @@ def test_unread_velocity_may_be_missing() -> None:
     assert codes(compiled("without velocity.down")) == []
 
 
-def test_where_fitted_is_refused_in_a_step() -> None:
+def test_fitted_argument_is_refused_in_a_step() -> None:
     assert codes(compiled(block="{ require height < 90 m where fitted }")) == ["E0101"]
 
 

@@ -386,7 +386,7 @@ def test_wrong_scenario_is_found(body: str, code: str, message: str, help: str |
     assert help in (None, more)
 
 
-def test_expectation_that_nothing_else_flies_is_no_finding() -> None:
+def test_expectation_that_nothing_else_flies_has_no_finding() -> None:
     assert found("expect never dance", OTHERS) == []
 
 

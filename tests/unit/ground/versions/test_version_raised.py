@@ -106,12 +106,12 @@ def changed(changes: Mapping[str, str]) -> str:
         ),
     ],
 )
-def test_change_without_a_new_meaning_is_no_difference(before: LoweredPolicy, old: str, new: str) -> None:
+def test_change_without_a_new_meaning_is_not_a_difference(before: LoweredPolicy, old: str, new: str) -> None:
     words = differences(before.policy, lowered(changed({old: new})).policy)
     assert words == (("the new zone `aside`",) if "aside" in new else ())
 
 
-def test_order_of_declarations_is_no_difference(before: LoweredPolicy) -> None:
+def test_order_of_declarations_is_not_a_difference(before: LoweredPolicy) -> None:
     school, roof = (line for line in SITE.splitlines() if line.startswith(("zone school", "zone roof")))
     text = (
         TEXT.replace(school, "").replace(roof, f"{roof}\n{school}").replace(POLICY, "").replace(SKILLS, POLICY + SKILLS)
@@ -193,7 +193,7 @@ def test_newly_missing_sensor_is_listed_first_and_as_looser(before: LoweredPolic
     assert differences(new, old)[0] == "the vehicle is no longer without the signal `wind.speed`"
 
 
-def test_zone_at_another_index_is_no_difference(before: LoweredPolicy) -> None:
+def test_zone_at_another_index_is_not_a_difference(before: LoweredPolicy) -> None:
     """Sets and tables have more members then, but the same ones for the old zones."""
     inside = "zone shed = circle(47.39780 N, 8.54500 E, 5 m)\nzone field"
     after = lowered(changed({"zone field": inside})).policy

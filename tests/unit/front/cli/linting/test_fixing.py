@@ -77,7 +77,7 @@ def test_suggestions_need_unsafe_fixes(here: Path, lint: Lint) -> None:
     assert Path("one.rts").read_text() == MISSION.replace("Look", "look")
 
 
-def test_diff_is_printed_and_nothing_written(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_diff_is_printed_without_writing(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["lint", ".", "--diff"]) == ExitCode.DIAGNOSTICS
     said = capsys.readouterr().out
     assert f"-{UNUSED}" in said.splitlines()

@@ -26,7 +26,7 @@ def test_a_view_that_does_not_read_holds_nobody_up(
     assert not feed.shown
 
 
-def test_all_that_is_kept_is_shown_in_order(capfd: pytest.CaptureFixture[str]) -> None:
+def test_kept_lines_are_shown_in_order(capfd: pytest.CaptureFixture[str]) -> None:
     with Feed("json") as feed:
         for number in range(500):
             feed.post(event(number))

@@ -70,7 +70,7 @@ def test_a_first_step_that_waits_to_have_observed_enough_would_fly(
     assert (first.hopeful, first.observing) == (hopeful, observing)
 
 
-def test_dry_run_names_the_condition_it_waits_for() -> None:
+def test_dry_run_names_the_awaited_condition() -> None:
     of, values = waiting(), FakeVehicle().values
     state = State(tuple(values[slot] for slot in range(len(values))), (10_000,) * len(values), (UNKNOWN, UNKNOWN))
     page = str(rehearsed._page(FlightRehearsal(of, rehearse(of, state, START), (), None, None, interrupted=False)))

@@ -114,7 +114,7 @@ def test_flight_prints_role_time_and_command_of_a_pending_approval() -> None:
     )
 
 
-def test_the_plain_view_has_the_banner_and_the_command_can_be_copied_from_it() -> None:
+def test_plain_view_shows_a_copyable_command() -> None:
     lines = list(plain(Happened(WAITS)))
     text = "\n".join(lines)
     assert "WAITS FOR A PERSON: supervisor" in text
@@ -132,7 +132,7 @@ def test_pending_approval_is_in_json_too() -> None:
     assert told["asks"]["until_us"] - told["asks"]["asked_us"] == 30 * S
 
 
-def test_who_answers_a_clock_that_runs_ahead_signs_for_longer() -> None:
+def test_approval_for_a_fast_clock_is_valid_longer() -> None:
     run, _, _ = waiting()
     teller = Teller(run.loaded.bundle.policy, run.loaded.bundle.mission, 0, Answering("b", "s", ahead=True))
     asked = next(each for each in map(teller.tell, run.lines[1:]) if each is not None and each.asks)
@@ -144,7 +144,7 @@ def test_who_answers_a_clock_that_runs_ahead_signs_for_longer() -> None:
     assert "--replacement FILE" in " ".join(again.asks.commands[0])
 
 
-def test_without_a_socket_it_says_that_nobody_can_answer() -> None:
+def test_missing_operator_socket_is_reported() -> None:
     run, _, _ = waiting()
     teller = Teller(run.loaded.bundle.policy, run.loaded.bundle.mission, 0)
     asked = next(each for each in map(teller.tell, run.lines[1:]) if each is not None and each.asks)
@@ -274,7 +274,7 @@ def stories() -> Iterator[tuple[Message, ...]]:
 
 
 @pytest.mark.parametrize("size", [(80, 24), (80, 10), (40, 24), (120, 50), (200, 20), (30, 6)])
-def test_at_any_size_nothing_is_wider_or_higher_and_the_newest_line_is_there(size: tuple[int, int]) -> None:
+def test_live_view_fits_any_size_and_shows_the_newest_line(size: tuple[int, int]) -> None:
     width, height = size
     for story in stories():
         if board(*story).banner(width) and height < 10:

@@ -12,7 +12,7 @@ test slow: JOBS ?= 6
 soak mutate wrong: JOBS ?= 4
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test slow clients lint soak fuzz mutate wrong bench size dist clean
+.PHONY: help setup demo test slow clients lint soak fuzz mutate wrong bench size dist trustzone-m clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-6s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -60,8 +60,12 @@ wrong: setup ## fly campaigns against wrong runtimes, and count the flights that
 bench: setup ## run every benchmark, or TARGETS; each against a peer or a limit, with a table of held and missed at the end
 	@$(BIN)/python .make/bench $(TARGETS)
 
-size: setup ## count modules, code lines, shared names and functions that are too long, by package
+size: setup ## count modules, code lines, shared names and long functions by package; the footprint of each home of the boundary
 	@$(BIN)/python .make/size
+	@$(BIN)/python .make/footprint
+
+trustzone-m: setup ## fly a mission by the boundary in the secure world of a Cortex-M33, emulated; as root, install what is missing
+	@.make/trustzone-m fly
 
 dist: setup ## build the wheels into dist, and their bill of materials (CycloneDX); the same bytes each time
 	@.make/dist $(BIN)/python

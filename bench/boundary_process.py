@@ -18,7 +18,7 @@ from msgspec.structs import replace
 
 from reference import flat_case as flat
 from reference.world import ROOT, ROOT_KEY, START, VEHICLE, loaded, renewed, request_for, sealed_again
-from rtshcua.adapters.boundary_process import BoundaryProcess
+from rtshcua.adapters.boundary.process import BoundaryProcess
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.isolated import Caller

@@ -20,7 +20,8 @@ from unittest.mock import patch
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 import rtshcua.virtual.flight as flights
-from rtshcua.adapters.boundary_process import BoundaryProcess, kept_file
+from rtshcua.adapters.boundary.home import kept_file
+from rtshcua.adapters.boundary.process import BoundaryProcess
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.onboard.enforcement.isolated import Caller
 from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load

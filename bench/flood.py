@@ -31,7 +31,7 @@ from hostile.documents import hostile
 from hostile.target import Target, greeting
 from reference.documents import large, low, low_mission, replacement
 from reference.world import MISSION_KEY, ROOT, ROOT_KEY, START, VEHICLE, Run, loaded, sealed_again
-from rtshcua.adapters.boundary_process import BoundaryProcess
+from rtshcua.adapters.boundary.process import BoundaryProcess
 from rtshcua.app.fly.agents import Agents
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.isolated import Caller

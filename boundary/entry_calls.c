@@ -29,7 +29,8 @@ const char *rt_test_boundary_begin(const uint8_t *root, uint32_t root_size, cons
     if (own_key != NULL) memcpy(keys.boundary, own_key, RT_KEY_BYTES);
     if (log_key != NULL) memcpy(keys.log, log_key, RT_KEY_BYTES);
     const rt_setup setup = {&keys, &kept, {kept_root, root_size}, {pin, pin_size}, {kept_vehicle, vehicle_size}, link_key != NULL, own_key != NULL,
-                            log_key != NULL, settings, owed, {now[0], now[1], now[2]}, stated_us};
+                            log_key != NULL, settings, owed, {now[0], now[1], now[2]}, stated_us,
+                            {{(const uint8_t *)"library", 7}, {0}, RT_DEBUG_ENABLED, 0}};
     return rt_boundary_begin(&boundary, &setup);
 }
 

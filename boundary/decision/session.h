@@ -10,7 +10,7 @@
 #include "wire/replacement.h"
 
 /* The greatest number of steps in one flight: those of its bundle, and of its replacements. */
-#define RT_MAX_KNOWN (RT_MAX_INVOCATIONS + RT_MAX_REPLACEMENTS * 2048)
+#define RT_MAX_KNOWN (RT_MAX_INVOCATIONS + RT_MAX_REPLACEMENTS * (RT_MAX_DOCUMENT / 128))
 
 /* Status of wire/response.py: whether `enforce` decided, or why not. */
 typedef enum { RT_DECIDED = 0, RT_MALFORMED = 1, RT_UNKNOWN_STEP = 2, RT_NOT_CURRENT = 3,

@@ -163,6 +163,7 @@ rt_refusal rt_boundary_begin(rt_boundary *boundary, const rt_setup *setup) {
     boundary->vehicle = setup->vehicle;
     boundary->has_key = setup->has_key;
     boundary->has_log_key = setup->has_log_key;
+    boundary->home = setup->home;
     rt_refusal refused = rt_open_root(setup->root, setup->pinned, setup->now.utc_us, &boundary->root);
     if (refused != NULL) return refused;
     rt_clock_begin(&boundary->clock, &setup->now, setup->stated_us);
@@ -309,6 +310,16 @@ bool rt_attest(rt_boundary *boundary, int64_t session, const uint8_t before[RT_D
     boundary->attestation = session;
     keep_session(boundary);
     return true;
+}
+
+uint32_t rt_attest_home(const rt_boundary *boundary, uint8_t *out) {
+    if (!boundary->attests || boundary->home.mode.size == 0) return 0;
+    const rt_attested_state state = {
+        boundary->keys->boundary, boundary->has_log_key ? boundary->keys->log : NULL,
+        boundary->executor.gate.signs ? boundary->keys->link : NULL, boundary->session.in_force.flight, boundary->chain.digest,
+        boundary->kept->restarts,
+    };
+    return rt_sign_attestation(&boundary->home, &state, out);
 }
 
 rt_refusal rt_begin_log(rt_boundary *boundary, rt_bytes checkpoint, uint8_t signature[RT_SIGNATURE_BYTES]) {

@@ -7,6 +7,7 @@
 #include "decision/session.h"
 #include "executor.h"
 #include "kept.h"
+#include "wire/attestation.h"
 #include "wire/request.h"
 #include "wire/response.h"
 
@@ -30,6 +31,7 @@ typedef struct {
     const rt_preparation *settings, *owed; /* the parameters to set, and those owed to the vehicle; NULL if there are none */
     rt_now now;         /* by the machine's clock, with the error reported by the kernel; RT_UTC_UNKNOWN_US if it is not synchronised */
     int64_t stated_us;  /* the error of this clock as stated by an operator, -1 if not stated */
+    rt_home home;       /* the place where it runs */
 } rt_setup;
 
 typedef struct {
@@ -47,6 +49,7 @@ typedef struct {
     uint64_t serial;   /* of the next permit */
     int64_t version;   /* of the policy: fixed, a newer one comes with another bundle, after landing */
     int64_t now_us;    /* of the last request: time must not go back */
+    rt_home home;      /* the place where it runs, as measured at the start */
     rt_clock clock;    /* its own clock, if it has one */
     bool dated;        /* whether the keys of the bundle were valid by that clock */
     uint64_t challenges; /* how many were drawn */
@@ -89,6 +92,9 @@ bool rt_give_back(rt_boundary *boundary);
    octets; 0 if nothing is signed. */
 bool rt_attest(rt_boundary *boundary, int64_t session, const uint8_t before[RT_DIGEST_BYTES]);
 uint32_t rt_attested(rt_boundary *boundary, const rt_now *named, int64_t own_us, bool final, uint8_t *out);
+
+/* Sign the measurement of the home into `out` of RT_MAX_ATTESTATION octets, during a session of the evidence; 0 if nothing is signed. */
+uint32_t rt_attest_home(const rt_boundary *boundary, uint8_t *out);
 
 /* The source of the time of day, and its value: our own, or, if `own_us` is -1, the caller's. */
 int64_t rt_own_now(const rt_boundary *boundary, const rt_now *named, int64_t own_us, rt_now *now);

@@ -291,6 +291,10 @@ uint32_t rt_answer(rt_boundary *boundary, rt_bytes call, int64_t own_us, uint8_t
         refused = size > 0 ? NULL : "no-boundary-key";
         break;
     }
+    case RT_CALL_HOME:
+        size = boundary->loaded ? rt_attest_home(boundary, out + 1) : 0;
+        refused = size > 0 ? NULL : "no-boundary-key";
+        break;
     case RT_CALL_TIME:
         return left.end - left.at == 1 ? answer_time(boundary, take(&left, 1) != 0, own_us, out) : refuse("malformed", out);
     case RT_CALL_FLIGHT:

@@ -31,11 +31,10 @@ enum {
     RT_CALL_LOG = 21,    /* the checkpoint that begins the log of the flight -> its signature by the log's key (64) */
     RT_CALL_TIME = 22,   /* whether to stop waiting for a better source (1) -> the source of the time of day (1), now by it (24), and
                             the number that the vehicle must return in TIMESYNC (8), 0 for none */
-    RT_CALL_WITHDRAW = 23 /* now (8), the permit of a step, of which nothing was sent: it may be decided again */
+    RT_CALL_WITHDRAW = 23, /* now (8), the permit of a step, of which nothing was sent: it may be decided again */
+    RT_CALL_HOME = 24 /* -> an attestation token (RFC 9711) of the home */
 };
 
-#define RT_MAX_PART 60000 /* octets */
-#define RT_MOST_AHEAD 128 /* frames in one call */
 #define RT_MAX_CALL (RT_MAX_PART + 64)
 #define RT_MAX_RESULT (RT_MAX_STATEMENT + 64)
 

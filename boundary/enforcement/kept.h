@@ -1,12 +1,10 @@
 /* The state that a boundary keeps across a restart, in one file of two slots that are written alternately: an interrupted write leaves
-   the other intact. Mirrors adapters/store/replay.py (opened missions, versions of policies) and adapters/store/signing.py. */
+   the other intact. Mirrors adapters/store/opened_missions.py (opened missions, versions of policies) and adapters/store/signing.py. */
 #ifndef RT_ENFORCEMENT_KEPT_H
 #define RT_ENFORCEMENT_KEPT_H
 
 #include "mavlink/signing.h"
-
-#define RT_MOST_OPENED 4094
-#define RT_MOST_POLICIES 256
+#include "model/limits.h"
 
 typedef struct {
     uint8_t digest[RT_DIGEST_BYTES];

@@ -69,7 +69,8 @@ static uint32_t call_with(rt_bytes call, uint8_t *result) {
 static void begin(bool signs) {
     memset(&kept, 0, sizeof kept);
     kept.floor_us = -1;
-    const rt_setup setup = {&keys, &kept, world_root, {NULL, 0}, RT_TEXT("quad-07"), signs, true, true, &settings, &settings, world_now, -1};
+    const rt_setup setup = {&keys, &kept, world_root, {NULL, 0}, RT_TEXT("quad-07"), signs, true, true, &settings, &settings, world_now, -1,
+                            {{(const uint8_t *)"fuzz", 4}, {0}, RT_DEBUG_ENABLED, 0}};
     if (rt_boundary_begin(&boundary, &setup) != NULL) abort();
     memcpy(boundary.bundle, world_bundle.at, world_bundle.size);
     boundary.bundle_size = world_bundle.size;

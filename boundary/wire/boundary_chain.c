@@ -65,7 +65,6 @@ void rt_chain_leave(rt_chain *chain, rt_bytes frame) {
 uint32_t rt_sign_statement(rt_chain *chain, const uint8_t seed[RT_KEY_BYTES], const uint8_t *flight, int64_t session,
                            const uint8_t before[RT_DIGEST_BYTES], int64_t source, const rt_now *now, bool final, uint8_t *out) {
     static uint8_t payload[RT_MAX_STATEMENT]; /* the marks are most of its size */
-    uint8_t protected[64], public[RT_KEY_BYTES], kid[RT_KID_BYTES], signature[RT_SIGNATURE_BYTES];
     uint32_t at = rt_wrap(payload, &RT_STATEMENT);
     at += rt_cbor_head(payload + at, RT_MAJOR_ARRAY, 18);
     at += rt_cbor_string(payload + at, RT_MAJOR_OCTETS, (rt_bytes){flight, RT_FLIGHT_BYTES});
@@ -87,21 +86,5 @@ uint32_t rt_sign_statement(rt_chain *chain, const uint8_t seed[RT_KEY_BYTES], co
     at += rt_cbor_int(payload + at, now->utc_error_us);
     payload[at++] = final ? 0xF5 : 0xF4;
     chain->marked = 0;
-    rt_ed25519_public(seed, public);
-    rt_key_id(RT_DUTY_BOUNDARY, (rt_bytes){public, RT_KEY_BYTES}, kid);
-    /* the protected header: algorithm, content type, name of the key */
-    static const uint8_t algorithm[] = {0xA3, 0x01, 0x32, 0x03};
-    uint32_t header = sizeof algorithm;
-    memcpy(protected, algorithm, sizeof algorithm);
-    header += rt_cbor_string(protected + header, RT_MAJOR_TEXT, RT_STATEMENT.content_type);
-    protected[header++] = 0x04;
-    header += rt_cbor_string(protected + header, RT_MAJOR_OCTETS, (rt_bytes){kid, RT_KID_BYTES});
-    rt_sign_for(RT_DUTY_BOUNDARY, seed, (rt_bytes){protected, header}, (rt_bytes){payload, at}, signature);
-    static const uint8_t outset[] = {0xD2, 0x84};
-    memcpy(out, outset, sizeof outset);
-    uint32_t size = sizeof outset;
-    size += rt_cbor_string(out + size, RT_MAJOR_OCTETS, (rt_bytes){protected, header});
-    out[size++] = 0xA0;
-    size += rt_cbor_string(out + size, RT_MAJOR_OCTETS, (rt_bytes){payload, at});
-    return size + rt_cbor_string(out + size, RT_MAJOR_OCTETS, (rt_bytes){signature, RT_SIGNATURE_BYTES});
+    return rt_sign1(RT_DUTY_BOUNDARY, true, seed, RT_STATEMENT.content_type, (rt_bytes){payload, at}, out);
 }

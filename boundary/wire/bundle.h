@@ -5,8 +5,6 @@
 #include "binding.h"
 #include "trust.h"
 
-#define RT_MAX_BUNDLE (16 << 20)
-
 /* A verified bundle: its parts, the digests that name them, and the keys that signed them, which are in the root. */
 typedef struct {
     rt_policy policy;

@@ -36,16 +36,15 @@ typedef struct {
     rt_bytes parts[8];
 } structure;
 
-static void lay_out(structure *signed_, int64_t duty, rt_bytes protected, rt_bytes payload) {
-    static const uint8_t context[] = "\x84\x6aSignature1", label[] = "rtshcua/duty/";
+static void lay_out(structure *signed_, rt_bytes label, rt_bytes name, rt_bytes protected, rt_bytes payload) {
+    static const uint8_t context[] = "\x84\x6aSignature1";
     uint8_t(*heads)[RT_HEAD_BYTES] = signed_->heads;
-    rt_bytes name = rt_duty_name(duty);
     const rt_bytes parts[] = {
         {context, sizeof context - 1},
         {heads[0], rt_cbor_head(heads[0], RT_MAJOR_OCTETS, protected.size)},
         protected,
-        {heads[1], rt_cbor_head(heads[1], RT_MAJOR_OCTETS, sizeof label - 1 + name.size)},
-        {label, sizeof label - 1},
+        {heads[1], rt_cbor_head(heads[1], RT_MAJOR_OCTETS, label.size + name.size)},
+        label,
         name,
         {heads[2], rt_cbor_head(heads[2], RT_MAJOR_OCTETS, payload.size)},
         payload,
@@ -53,14 +52,32 @@ static void lay_out(structure *signed_, int64_t duty, rt_bytes protected, rt_byt
     memcpy(signed_->parts, parts, sizeof parts);
 }
 
+static const uint8_t LABEL[] = "rtshcua/duty/";
+static const rt_bytes DUTY = {LABEL, sizeof LABEL - 1}, NOTHING = {NULL, 0};
+
 bool rt_signed_by(const rt_envelope *envelope, int64_t duty, rt_bytes public) {
     structure signed_;
-    lay_out(&signed_, duty, envelope->protected, envelope->payload);
+    lay_out(&signed_, DUTY, rt_duty_name(duty), envelope->protected, envelope->payload);
     return rt_ed25519_verify(public.at, envelope->signature.at, signed_.parts, sizeof signed_.parts / sizeof signed_.parts[0]);
 }
 
-void rt_sign_for(int64_t duty, const uint8_t seed[RT_KEY_BYTES], rt_bytes protected, rt_bytes payload, uint8_t signature[RT_SIGNATURE_BYTES]) {
+uint32_t rt_sign1(int64_t duty, bool labelled, const uint8_t seed[RT_KEY_BYTES], rt_bytes content_type, rt_bytes payload, uint8_t *out) {
+    static const uint8_t outset[] = {0xD2, 0x84}, algorithm[] = {0xA3, 0x01, 0x32, 0x03};
+    uint8_t protected[96], public[RT_KEY_BYTES], kid[RT_KID_BYTES], signature[RT_SIGNATURE_BYTES];
     structure signed_;
-    lay_out(&signed_, duty, protected, payload);
+    rt_ed25519_public(seed, public);
+    rt_key_id(duty, (rt_bytes){public, RT_KEY_BYTES}, kid);
+    uint32_t header = sizeof algorithm;
+    memcpy(protected, algorithm, sizeof algorithm);
+    header += rt_cbor_string(protected + header, RT_MAJOR_TEXT, content_type);
+    protected[header++] = KID;
+    header += rt_cbor_string(protected + header, RT_MAJOR_OCTETS, (rt_bytes){kid, RT_KID_BYTES});
+    lay_out(&signed_, labelled ? DUTY : NOTHING, labelled ? rt_duty_name(duty) : NOTHING, (rt_bytes){protected, header}, payload);
     rt_ed25519_sign(seed, signed_.parts, sizeof signed_.parts / sizeof signed_.parts[0], signature);
+    memcpy(out, outset, sizeof outset);
+    uint32_t size = sizeof outset;
+    size += rt_cbor_string(out + size, RT_MAJOR_OCTETS, (rt_bytes){protected, header});
+    out[size++] = 0xA0; /* nothing is unprotected */
+    size += rt_cbor_string(out + size, RT_MAJOR_OCTETS, payload);
+    return size + rt_cbor_string(out + size, RT_MAJOR_OCTETS, (rt_bytes){signature, RT_SIGNATURE_BYTES});
 }

@@ -15,7 +15,8 @@ rt_refusal rt_take_apart(rt_bytes envelope, uint32_t limit, rt_envelope *claimed
 /* Whether a public key signed it for a duty. */
 bool rt_signed_by(const rt_envelope *envelope, int64_t duty, rt_bytes public);
 
-/* The signature over a protected header and a payload for a duty. */
-void rt_sign_for(int64_t duty, const uint8_t seed[RT_KEY_BYTES], rt_bytes protected, rt_bytes payload, uint8_t signature[RT_SIGNATURE_BYTES]);
+/* An envelope around a payload, signed for a duty, into `out`; how many octets there are. `labelled`: the duty's label is signed along, as
+   everything of ours has it; an attestation token has none, so that any reader of COSE verifies it. */
+uint32_t rt_sign1(int64_t duty, bool labelled, const uint8_t seed[RT_KEY_BYTES], rt_bytes content_type, rt_bytes payload, uint8_t *out);
 
 #endif

@@ -4,7 +4,6 @@
 
 #include "bundle.h"
 
-#define RT_MAX_DOCUMENT (1u << 18)
 #define RT_MAX_WITHOUT_MISSION (1u << 11)
 #define RT_MAX_LIFE_US 3600000000LL
 

@@ -4,8 +4,6 @@
 
 #include "document.h"
 
-#define RT_MAX_REPLACEMENTS 64
-
 /* A verified replacement; `digest` is the digest of the new mission. */
 typedef struct {
     rt_bytes supersedes;

@@ -6,8 +6,6 @@
 #include "artefact.h"
 #include "cose.h"
 
-#define RT_MAX_ROOT (1u << 20)
-
 typedef struct {
     int64_t version;
     bool development;

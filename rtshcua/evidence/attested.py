@@ -15,7 +15,7 @@ from typing import Final, NamedTuple
 
 from rtshcua.evidence.finding import Claim, Finding, Flaw
 from rtshcua.evidence.gaps import STALLED, seconds
-from rtshcua.evidence.log_writer import BOUNDARY, BOUNDARY_LOST
+from rtshcua.evidence.log_writer import ATTESTED, BOUNDARY, BOUNDARY_LOST
 from rtshcua.evidence.note import octets
 from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Genesis, Recover, Seal
 from rtshcua.evidence.recovery import RECOVERED
@@ -24,6 +24,7 @@ from rtshcua.model.flat.limits import MAX_MONITORS, MAX_SLOTS
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now, State
 from rtshcua.model.outcome import WIRE_REASONS, Outcome
 from rtshcua.wire import boundary_chain, receipt, request, statement
+from rtshcua.wire.attestation import DebugState, HomeAttestation, open_attestation
 from rtshcua.wire.boundary_chain import MARK_BYTES, MOST_MARKS, Tag
 from rtshcua.wire.clock import APART_US, DRIFT_US, ClockSource, bears_out
 from rtshcua.wire.digest import DIGEST_BYTES
@@ -50,6 +51,10 @@ _WRITE: Final = re.compile(r"([A-Z0-9_]{1,16}) from (\S+) to (\S+)", re.ASCII)
 _NONE: Final = Claim(
     "boundary",
     "what the boundary itself decided and sent: the trust root has no key of duty `boundary` for this vehicle",
+)
+
+_SELF_MEASURED: Final = Claim(
+    "home", "that the boundary measured its own code correctly: nothing below it vouches for that"
 )
 
 _MOVED: Final = (
@@ -109,6 +114,8 @@ class BoundaryEvidence:
         self.asked = bool(self._keys)
         self._flight = bytes.fromhex(genesis.boot)
         self._enforced = genesis.mode != UNENFORCED
+        self._mode = genesis.mode
+        self._home: HomeAttestation | None = None
         self._bundle = sha256(octets(genesis.bundle) or b"").digest()
         #: the boundary's chain, recomputed from the records
         self.digest = boundary_chain.START
@@ -144,6 +151,9 @@ class BoundaryEvidence:
                 found = self._vouched_for(record)
             self._gap = None
             return found.at(record.seq, offset) if isinstance(found, Flaw) else found
+        if isinstance(record, Effect) and record.event == ATTESTED:
+            flaw = self._attested(record)
+            return None if flaw is None else flaw.at(record.seq, offset)
         if isinstance(record, DecisionRecord | Effect):
             if isinstance(record, Effect) and record.event == STALLED:
                 self._gap = record.seq, record.at_us
@@ -189,6 +199,24 @@ class BoundaryEvidence:
         return _DIFFERS.at(record.seq, offset)
 
     # -------------------------------------------------------- the boundary's signatures
+
+    def _attested(self, record: Effect) -> Flaw | None:
+        """Hold what the boundary's home attests of itself against the flight, the mode and the evidence so far."""
+        try:
+            home = open_attestation(octets(record.detail) or b"", self._keys)
+        except Untrusted as error:
+            return Flaw(f"attested/{error.slug}", f"the attestation of the boundary's home is not trusted: {error}")
+        if home.flight != self._flight:
+            text = "the boundary's home attested this in another flight"
+            return Flaw("attested/other-flight", text, home.flight.hex(), self._flight.hex())
+        if home.mode != self._mode:
+            text = "the boundary's home attested another mode than the log states"
+            return Flaw("attested/other-mode", text, home.mode, self._mode)
+        if home.evidence != self.digest:
+            text = "the boundary's home attested this at another point of its evidence"
+            return Flaw("attested/moved", text, home.evidence.hex(), self.digest.hex())
+        self._home = home
+        return None
 
     def _stated_by(self, record: Effect) -> Finding | Flaw | None:
         try:
@@ -326,6 +354,8 @@ class BoundaryEvidence:
         )
         proven, unproven = _of_clock(ClockSource(last.source))
         proven = (Claim("boundary", text), *proven)
+        if self._home is not None:
+            proven, unproven = (*proven, _of_home(self._home)), (_SELF_MEASURED, *unproven)
         ahead = (*_ahead(last.ahead), *unproven)
         if last.final and self._lost is None:
             return proven, ahead
@@ -336,6 +366,15 @@ class BoundaryEvidence:
             )
             return proven, (Claim("boundary", text), *ahead)
         return proven, (Claim("boundary", "what the boundary did after its last statement: the log ends"), *ahead)
+
+
+def _of_home(home: HomeAttestation) -> Claim:
+    debugging = "enabled" if home.debug is DebugState.ENABLED else "disabled"
+    text = (
+        f"the boundary attested that it ran as `{home.mode}`, from the code image {home.code.hex()}, "
+        f"in start {home.boots} with what it keeps, debugging {debugging}"
+    )
+    return Claim("home", text)
 
 
 def _of_clock(source: ClockSource) -> tuple[tuple[Claim, ...], tuple[Claim, ...]]:

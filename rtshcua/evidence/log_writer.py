@@ -34,6 +34,8 @@ from rtshcua.wire.request import NOTHING, Ref
 BOUNDARY: Final = "boundary"
 #: the effect that reports the permanent loss of the boundary: it makes nothing in the log after that
 BOUNDARY_LOST: Final = "boundary-lost"
+#: the event of an effect whose detail is what the boundary's home attests of itself (`wire.attestation`), in base64
+ATTESTED: Final = "attested"
 
 #: The delay after `EPOCH_US` and `EPOCH_RECORDS` at which an epoch is sealed before anything else is recorded; a
 #: fifth.

@@ -55,13 +55,14 @@ class Unverified:
 def sign1(payload: bytes, *, key: SigningKey, duty: Duty, content_type: str) -> bytes:
     """An envelope around `payload`. Raises `WrongDuty` unless `duty` is the key's."""
     protected = cbor.encode({_ALGORITHM: ED25519, _CONTENT_TYPE: content_type, _KID: key.kid})
-    signature = key.sign(_signed(protected, duty, payload), duty=duty)
+    signature = key.sign(_signed(protected, duty.label, payload), duty=duty)
     return _TAG_18 + cbor.encode((protected, {}, payload, signature))
 
 
 def open1(
-    envelope: bytes, *, keys: Mapping[bytes, VerificationKey], duty: Duty, content_type: str, limit: int = cbor.LIMIT
-) -> Opened:
+    envelope: bytes, *, keys: Mapping[bytes, VerificationKey], duty: Duty, content_type: str, limit: int = cbor.LIMIT,
+    labelled: bool = True,
+) -> Opened:  # fmt: skip
     """The payload, if a key among `keys` (by `kid`) with this duty signed it. Raises `EnvelopeError`.
 
     Expiry and authorisation of the key are not checked: see `trust.key_refusal` and `trust.speaker_refusal`.
@@ -76,7 +77,7 @@ def open1(
         raise EnvelopeError("unknown-key", f"key {claimed.kid.hex()} is not in the trust root")
     if key.duty is not duty:
         raise EnvelopeError("wrong-duty", f"key {key.kid.hex()} is trusted for `{key.duty}`, not for `{duty}`")
-    if not key.verify(claimed.signature, _signed(claimed.protected, duty, claimed.payload)):
+    if not key.verify(claimed.signature, _signed(claimed.protected, duty.label if labelled else b"", claimed.payload)):
         raise EnvelopeError("bad-signature", f"key {key.kid.hex()} did not sign these bytes for `{duty}`")
     return Opened(claimed.payload, key)
 
@@ -108,9 +109,9 @@ def _headers(protected: bytes) -> tuple[str, bytes]:
     )
 
 
-def _signed(protected: bytes, duty: Duty, payload: bytes) -> bytes:
+def _signed(protected: bytes, label: bytes, payload: bytes) -> bytes:
     """The Sig_structure (RFC 9052, section 4.4)."""
-    return cbor.encode(("Signature1", protected, duty.label, payload))
+    return cbor.encode(("Signature1", protected, label, payload))
 
 
 def _decode(data: bytes, limit: int, items: int) -> cbor.Value:

@@ -19,7 +19,7 @@ from pymavlink.dialects.v20 import ardupilotmega as m
 
 from reference.attested_flight import attested
 from reference.forgery import edit, expect, read, signed
-from rtshcua.adapters.boundary_process import BoundaryProcess, program
+from rtshcua.adapters.boundary.process import BoundaryProcess, program
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.signing import SignedLink

@@ -20,8 +20,9 @@ from pathlib import Path
 import pytest
 
 from reference.flying import refusal_of
-from rtshcua.adapters import boundary_process
-from rtshcua.adapters.boundary_process import BoundaryError, ListeningBoundary, Measure
+from rtshcua.adapters.boundary import process as boundary_process
+from rtshcua.adapters.boundary.home import BoundaryError
+from rtshcua.adapters.boundary.process import ListeningBoundary, Measure
 from rtshcua.adapters.clock import monotonic_ns
 from rtshcua.app.fly import start_boundary
 from rtshcua.diagnostics.refusal import Refusal

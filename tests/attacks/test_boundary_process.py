@@ -22,22 +22,14 @@ from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from reference.flying import refusal_of, request
-from rtshcua.adapters import boundary_process
-from rtshcua.adapters.boundary_process import (
-    AGAIN_S,
-    ANSWER_S,
-    PATIENCE_S,
-    BoundaryError,
-    BoundaryProcess,
-    Measure,
-    first_kept,
-    kept_file,
-)
+from rtshcua.adapters.boundary import process as boundary_process
+from rtshcua.adapters.boundary.home import ANSWER_S, PATIENCE_S, BoundaryError, kept_file
+from rtshcua.adapters.boundary.process import AGAIN_S, BoundaryProcess, Measure, first_kept
 from rtshcua.adapters.clock import monotonic_ns
 from rtshcua.adapters.store.signing import LinkKeyError, fingerprint, read_link_key
 from rtshcua.adapters.store.writing import lock
 from rtshcua.adapters.vehicle.address import Address, LinkCarrier
-from rtshcua.app.fly.start_boundary import start_process
+from rtshcua.app.fly.start_boundary import start_home
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -419,7 +411,7 @@ def tried(state: Path) -> BoundaryProcess | Refusal:
     """Start it as `run` does."""
     _, signed = case.root(issued_us())
     of = request(state=state, link=Address(LinkCarrier.UDP_IN, "127.0.0.1", 1), mode=EnforcementMode.PROCESS)
-    return start_process(of, VEHICLE, signed, None, case.KEYS[Duty.LOG], {})
+    return start_home(of, VEHICLE, signed, None, case.KEYS[Duty.LOG], {})
 
 
 def begun(state: Path) -> BoundaryProcess:

@@ -22,8 +22,8 @@ from random import Random
 import pytest
 from msgspec.structs import replace
 
-from boundary.c_and_python import PIN, SIGNED_ROOT
 from boundary.kept import HEAD, LAYOUT, MOST_OPENED, OPENED
+from boundary.sessions_in_c_and_python import PIN, SIGNED_ROOT
 from reference import flat_case as flat
 from reference import outlines
 from reference.documents import presented, replacement
@@ -37,7 +37,8 @@ from reference.world import (
     request_for,
     sealed,
 )
-from rtshcua.adapters.boundary_process import PATIENCE_S, BoundaryError, BoundaryProcess, kept_file, program
+from rtshcua.adapters.boundary.home import PATIENCE_S, BoundaryError, kept_file
+from rtshcua.adapters.boundary.process import BoundaryProcess, program
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.mission import Mission

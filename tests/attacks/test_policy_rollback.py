@@ -6,7 +6,7 @@ from msgspec.structs import replace
 
 from reference.flat_case import MISSION, POLICY
 from reference.world import START, VEHICLE, loaded
-from rtshcua.adapters.store.replay import FileReplayStore
+from rtshcua.adapters.store.opened_missions import FileReplayStore
 from rtshcua.onboard.ports import MissionOpening
 
 

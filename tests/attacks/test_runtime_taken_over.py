@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as m
 
-from boundary.c_and_python import PIN, SIGNED_ROOT
+from boundary.sessions_in_c_and_python import PIN, SIGNED_ROOT
 from reference.flat_case import S
 from reference.world import ROOT, START, VEHICLE, answer_to, request_for, sealed
-from rtshcua.adapters.boundary_process import BoundaryProcess, program
+from rtshcua.adapters.boundary.process import BoundaryProcess, program
 from rtshcua.adapters.clock import monotonic_ns
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal

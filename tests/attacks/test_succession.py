@@ -22,7 +22,7 @@ from reference.world import APPROVAL_KEY, LOG_KEY, MISSION_KEY, POLICY_KEY, ROOT
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.store.folders import data_folder, state_folder
 from rtshcua.adapters.store.keystore import KeyStore
-from rtshcua.adapters.store.replay import FileReplayStore, looked_up
+from rtshcua.adapters.store.opened_missions import FileReplayStore, looked_up
 from rtshcua.adapters.store.signing import fingerprint, read_link_key
 from rtshcua.adapters.store.vehicle_records import RootStore, opened_root
 from rtshcua.app.fly import waiting

@@ -7,16 +7,28 @@ from typing import NamedTuple
 
 from rtshcua.mavlink.signing import MOST_STREAMS
 from rtshcua.mavlink.signing import SigningState as LinkState
+from rtshcua.model.flat import home_limits
 
-LAYOUT, MOST_OPENED, MOST_POLICIES = 0x7274736863756103, 4_094, 256
+LAYOUT = 0x7274736863756103
 #: layout, turn, restarts, floor, and how many missions, policies and streams there are
 HEAD, OPENED, VERSION, STREAM = Struct("<QQQqQQQ"), Struct("<32sq"), Struct("<32sq"), Struct("<BBB5xq")
 _SESSION, _TIMESTAMP, _CHECK = Struct("<32sq"), Struct("<q"), 32
-_SESSION_AT = HEAD.size + (MOST_OPENED + 1) * OPENED.size  # behind whose it is, and since when
-_VERSIONS_AT = _SESSION_AT + _SESSION.size
-_LINK_AT = _VERSIONS_AT + MOST_POLICIES * VERSION.size
-_STREAMS_AT = _LINK_AT + _TIMESTAMP.size
-SLOT = _STREAMS_AT + MOST_STREAMS * STREAM.size + _CHECK
+
+
+class Sizes:
+    """Where everything is in one slot, by how many missions and policies are remembered."""
+
+    def __init__(self, opened: int, policies: int) -> None:
+        self.session = HEAD.size + (opened + 1) * OPENED.size  # behind whose it is, and since when
+        self.versions = self.session + _SESSION.size
+        self.link = self.versions + policies * VERSION.size
+        self.streams = self.link + _TIMESTAMP.size
+        self.slot = self.streams + MOST_STREAMS * STREAM.size + _CHECK
+
+
+PROCESS = Sizes(4_094, 256)
+TRUSTZONE_M = Sizes(home_limits.TRUSTZONE_M["MOST_OPENED"], home_limits.TRUSTZONE_M["MOST_POLICIES"])
+SLOT = PROCESS.slot
 
 
 class Kept(NamedTuple):
@@ -37,14 +49,14 @@ def read(path: Path) -> Kept:
     """The content of the newer intact slot."""
     data = path.read_bytes()
     assert len(data) in (SLOT, 2 * SLOT), len(data)
-    return max(_slot(data[at : at + SLOT]) for at in range(0, len(data), SLOT) if _is_whole(data[at : at + SLOT]))
+    return max(slot(data[at : at + SLOT]) for at in range(0, len(data), SLOT) if _is_whole(data[at : at + SLOT]))
 
 
 def spoil_older(path: Path) -> None:
     """Damage the older slot."""
     data = bytearray(path.read_bytes())
     if len(data) == 2 * SLOT:
-        first, second = (_slot(bytes(data[at : at + SLOT])).turn for at in (0, SLOT))
+        first, second = (slot(bytes(data[at : at + SLOT])).turn for at in (0, SLOT))
         data[(SLOT if first > second else 0) + HEAD.size] ^= 1
         path.write_bytes(data)
 
@@ -53,13 +65,14 @@ def _is_whole(slot: bytes) -> bool:
     return sha256(slot[:-_CHECK]).digest() == slot[-_CHECK:]
 
 
-def _slot(slot: bytes) -> Kept:
-    layout, turn, restarts, floor_us, missions, policies, streams = HEAD.unpack_from(slot)
+def slot(data: bytes, sizes: Sizes = PROCESS) -> Kept:
+    """What a slot says."""
+    layout, turn, restarts, floor_us, missions, policies, streams = HEAD.unpack_from(data)
     assert layout == LAYOUT, hex(layout)
-    opened = dict(OPENED.unpack_from(slot, HEAD.size + at * OPENED.size) for at in range(missions))
-    versions = dict(VERSION.unpack_from(slot, _VERSIONS_AT + at * VERSION.size) for at in range(policies))
-    digest, session = _SESSION.unpack_from(slot, _SESSION_AT)
-    heard = [STREAM.unpack_from(slot, _STREAMS_AT + at * STREAM.size) for at in range(streams)]
-    (timestamp,) = _TIMESTAMP.unpack_from(slot, _LINK_AT)
+    opened = dict(OPENED.unpack_from(data, HEAD.size + at * OPENED.size) for at in range(missions))
+    versions = dict(VERSION.unpack_from(data, sizes.versions + at * VERSION.size) for at in range(policies))
+    digest, session = _SESSION.unpack_from(data, sizes.session)
+    heard = [STREAM.unpack_from(data, sizes.streams + at * STREAM.size) for at in range(streams)]
+    (timestamp,) = _TIMESTAMP.unpack_from(data, sizes.link)
     link = LinkState(timestamp, {(system, component, by): last for system, component, by, last in heard})
     return Kept(turn, restarts, floor_us, opened, versions, (session, digest), link)

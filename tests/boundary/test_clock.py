@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from boundary import both_boundaries
-from boundary.c_and_python import PIN, SIGNED_ROOT
+from boundary.sessions_in_c_and_python import PIN, SIGNED_ROOT
 from reference.documents import approval
 from reference.own_clock import ARDUPILOT_US, CHALLENGE_US, VEHICLE_US, OwnClock
 from reference.world import ROOT, SESSION_KEY, START, VEHICLE, request_for, sealed

@@ -9,9 +9,10 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from boundary import kept as keeping
-from boundary.c_and_python import PIN, SIGNED_ROOT
+from boundary.sessions_in_c_and_python import PIN, SIGNED_ROOT
 from reference.world import MISSION, POLICY, START, VEHICLE, sealed
-from rtshcua.adapters.boundary_process import BoundaryProcess, kept_file
+from rtshcua.adapters.boundary.home import kept_file
+from rtshcua.adapters.boundary.process import BoundaryProcess
 from rtshcua.adapters.clock import monotonic_ns
 from rtshcua.codec.frames import Codec
 from rtshcua.diagnostics.refusal import Refusal

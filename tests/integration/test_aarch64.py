@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
-from boundary.c_and_python import ask_both, decided
-from rtshcua.adapters import boundary_process
-from rtshcua.adapters.boundary_process import Measure, measures_here
+from boundary.sessions_in_c_and_python import ask_both, decided
+from rtshcua.adapters.boundary import process as boundary_process
+from rtshcua.adapters.boundary.process import Measure, measures_here
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 MACHINE, EMULATOR = "aarch64", shutil.which("qemu-aarch64-static") or shutil.which("qemu-aarch64")
@@ -66,7 +66,7 @@ def test_missing_hardening_measures_are_named(program: Path, monkeypatch: pytest
 def test_flight_with_the_aarch64_boundary(program: Path, ground: Any) -> None:
     start = (
         "from pathlib import Path\n"
-        "from rtshcua.adapters import boundary_process\n"
+        "from rtshcua.adapters.boundary import process as boundary_process\n"
         f"boundary_process.program = lambda: Path({str(program)!r})\n"
         "from rtshcua.front.cli.app import main\n"
         "main()\n"

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from rtshcua.adapters.boundary_process import program
+from rtshcua.adapters.boundary.process import program
 from rtshcua.adapters.utc import kernel_error_us
 
 pytestmark = [

@@ -9,8 +9,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from rtshcua.adapters import boundary_process
-from rtshcua.adapters.boundary_process import MISSING, Measure, measures_here
+from rtshcua.adapters.boundary import process as boundary_process
+from rtshcua.adapters.boundary.process import MISSING, Measure, measures_here
 from rtshcua.adapters.doctor.diagnosis import MissionVerdict
 from rtshcua.adapters.simulator import Simulator
 from rtshcua.front.cli.commands import doctor as doctor_command

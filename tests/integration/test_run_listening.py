@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from rtshcua.adapters.agent_socket import hand_in
-from rtshcua.adapters.boundary_process import ListeningBoundary
+from rtshcua.adapters.boundary.process import ListeningBoundary
 from rtshcua.front.cli.app import main
 from rtshcua.wire.keys import Duty
 from virtual.listening import Listening, listening

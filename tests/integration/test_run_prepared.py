@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from rtshcua.adapters.boundary_process import program
+from rtshcua.adapters.boundary.process import program
 
 #: so slow that a busy machine's hold-ups stay below what a permit lasts
 SPEED = 3

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from rtshcua.adapters.boundary_process import PATIENCE_S
+from rtshcua.adapters.boundary.home import PATIENCE_S
 from rtshcua.adapters.store.vehicle_records import BoundaryStore
 from rtshcua.adapters.store.writing import lock
 from rtshcua.codec.frames import Codec

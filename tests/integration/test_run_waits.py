@@ -10,7 +10,7 @@ import pytest
 from msgspec.structs import replace
 
 from rtshcua.adapters.agent_socket import hand_in
-from rtshcua.adapters.boundary_process import program
+from rtshcua.adapters.boundary.process import program
 from rtshcua.adapters.store.vehicle_records import opened_root
 from rtshcua.wire.keys import Duty
 from virtual import case

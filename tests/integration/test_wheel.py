@@ -122,7 +122,7 @@ def test_new_project_passes_its_checks(run: Run, tmp_path: Path) -> None:
 
 
 def test_flight_with_the_boundary_of_the_wheel(run: Run, library: Path, place: Path, tmp_path: Path) -> None:
-    asked = "from rtshcua.adapters.boundary_process import program; print(program())"
+    asked = "from rtshcua.adapters.boundary.process import program; print(program())"
     program = Path(run("python", "-c", asked).stdout.strip())
     assert program.is_relative_to(place / "venv")
     assert os.access(program, os.X_OK)

@@ -12,7 +12,8 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Final
 
-from rtshcua.adapters.boundary_process import PATIENCE_S, program
+from rtshcua.adapters.boundary.home import PATIENCE_S
+from rtshcua.adapters.boundary.process import program
 
 VEHICLE: Final = "quad-07"
 #: the users of the boundary and of the run if the test may choose, otherwise the current user

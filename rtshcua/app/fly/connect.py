@@ -6,7 +6,7 @@ from errno import ENOENT
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from rtshcua.adapters.boundary_process import UNBUILT, UNBUILT_HELP
+from rtshcua.adapters.boundary.process import UNBUILT, UNBUILT_HELP
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.doctor.identity import IdentityQuestions, standing
 from rtshcua.adapters.packs import BrokenPack, manoeuvres, packs_of

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from rtshcua.adapters.boundary_process import ListeningBoundary
+from rtshcua.adapters.boundary.process import ListeningBoundary
 from rtshcua.adapters.clock import LinkClock, PacedClock, SystemClock
 from rtshcua.adapters.store.telemetry import TelemetryFile
 from rtshcua.adapters.store.vehicle_records import SIMULATED_FOLDER
@@ -163,7 +163,7 @@ def _utc(request: FlightRequest, clock: LinkClock) -> UtcWatch:
     takes what the boundary of a flight would take.
     """
     if request.link is not None and request.speed == 1:
-        apart = request.dry_run and request.mode is EnforcementMode.PROCESS
+        apart = request.dry_run and request.mode.apart
         counts = vehicle_counts(apart=apart, keyed=request.signing_key is not None)
         return UtcWatch(clock, request.utc_error_us, vehicle=counts)
     return UtcWatch.simulated(clock)

@@ -3,6 +3,7 @@
 import secrets
 import shlex
 import time
+from base64 import b64encode
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -32,7 +33,7 @@ from rtshcua.app.fly.view_ports import LiveView
 from rtshcua.app.fly.witnesses import FlightWitnesses
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.evidence.log_writer import Recorder
+from rtshcua.evidence.log_writer import ATTESTED, Recorder
 from rtshcua.model.durability import SYNC_US, SYNCED, SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Append, Ending, Event, Interrupted, Presented
@@ -156,6 +157,9 @@ class FlightSession:
         self._boundary.begun(loaded.attestation.digest, session)
         self._recorder.attest = loaded.attestation.statement
         append_all(self._sink, self._recorder.attested(now), WRITTEN)
+        home = loaded.attestation.home()
+        if home is not None:
+            self._sink.append(self._recorder.effect(now, ATTESTED, detail=b64encode(home).decode()), WRITTEN)
         simulated = pace_of(request.speed, own=request.link is None)
         known = ((SIMULATED, simulated), (LOG_BEFORE, self._past.note), (CLOCK, self._context.utc.bound.told()))
         for event, detail in known:

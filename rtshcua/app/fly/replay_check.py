@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final, Protocol
 
 from rtshcua.adapters.clock import LinkClock
-from rtshcua.adapters.store.replay import FileReplayStore, looked_up
+from rtshcua.adapters.store.opened_missions import FileReplayStore, looked_up
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.app.wording import utc
 from rtshcua.diagnostics.exits import ExitCode

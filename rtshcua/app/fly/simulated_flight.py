@@ -1,4 +1,4 @@
-"""That a flight was simulated, or faster than life: as its log tells it, before anything is decided."""
+"""That a flight was simulated, or faster than life, or its boundary emulated: as its log tells it."""
 
 from itertools import islice, takewhile
 from pathlib import Path
@@ -8,9 +8,11 @@ from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Claim
 from rtshcua.evidence.reading import read
-from rtshcua.evidence.records import Effect
+from rtshcua.evidence.records import Effect, Genesis
 from rtshcua.evidence.report import LogReport
 
+#: modes in which the boundary's secure world is emulated
+EMULATED: Final = ("trustzone-m",)
 #: the event of the effect
 SIMULATED: Final = "simulated"
 
@@ -28,11 +30,21 @@ def pace_of(speed: float, *, own: bool) -> str | None:
 
 def with_simulated(report: LogReport, log: Path) -> LogReport:
     """The report on a log whose beginning was verified, with what this says of its times."""
-    detail = None if report.failure is not None else simulated(log)
-    if detail is None:
+    if report.failure is not None:
         return report
-    claim = Claim("simulated", f"that anything flew: times are those of {detail}")
-    return report._replace(unproven=(*report.unproven, claim))
+    claims, detail = [], simulated(log)
+    if _mode(log) in EMULATED:
+        claims.append(Claim("emulated", "that hardware kept the boundary out of reach: its secure world was emulated"))
+    if detail is not None:
+        claims.append(Claim("simulated", f"that anything flew: times are those of {detail}"))
+    return report._replace(unproven=(*report.unproven, *claims))
+
+
+def _mode(log: Path) -> str:
+    """Where decisions were made, as the genesis says it."""
+    with open_regular(log) as file:
+        first = next(map(read, islice(lines(file), 1)), None)
+        return first.mode if isinstance(first, Genesis) else ""
 
 
 def simulated(log: Path) -> str | None:

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, NamedTuple
 
-from rtshcua.adapters.boundary_process import ListeningBoundary
+from rtshcua.adapters.boundary.process import ListeningBoundary
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.runs import LOG
 from rtshcua.adapters.store.vehicle_records import OwedParameters

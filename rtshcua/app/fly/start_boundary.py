@@ -3,12 +3,15 @@
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from errno import ENOSPC
+from functools import partial
 from pathlib import Path
 from typing import Final, NamedTuple, TypeAlias
 
 from msgspec.structs import replace
 
-from rtshcua.adapters.boundary_process import BoundaryError, BoundaryProcess, ListeningBoundary
+from rtshcua.adapters.boundary.home import BoundaryError, BoundaryHome
+from rtshcua.adapters.boundary.process import BoundaryProcess, ListeningBoundary
+from rtshcua.adapters.boundary.trustzone_m import SecureWorld
 from rtshcua.adapters.clock import UTC_ERROR_US
 from rtshcua.adapters.store.signing import LinkKeyError
 from rtshcua.adapters.store.vehicle_records import BoundaryStore, DamagedState
@@ -19,8 +22,10 @@ from rtshcua.app.fly.flight_request import FlightContext, FlightRequest
 from rtshcua.app.fly.previous_log import LogBefore
 from rtshcua.app.fly.vehicle_trust import Trusted
 from rtshcua.app.fly.verify_bundle import LogSigner, Verified, load_bundle, local_log_key, may_have_flown
+from rtshcua.decision.checks.home_fit import exceeded
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.model.flat.home_limits import TRUSTZONE_M
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.executor import Commands
 from rtshcua.onboard.enforcement.isolated import Caller, IsolatedExecutor, IsolatedGate, OwnTime
@@ -29,6 +34,7 @@ from rtshcua.onboard.enforcement.preparation import SETTABLE, Owed
 from rtshcua.onboard.ports import BoundaryKey
 from rtshcua.wire import cose
 from rtshcua.wire.boundary_chain import START
+from rtshcua.wire.bundle import open_bundle
 from rtshcua.wire.document import FLIGHT_BYTES
 from rtshcua.wire.keys import Duty, SigningKey, key_id
 from rtshcua.wire.preparation import ParameterWrite, Preparation, encode
@@ -199,16 +205,17 @@ def connect_boundary(path: Path, *, paced: bool) -> ListeningBoundary | Refusal:
     return found
 
 
-def start_process(
+def start_home(
     request: FlightRequest, vehicle: str, signed_root: bytes, own_key: SigningKey | None, log_key: SigningKey,
     owed: Mapping[str, Owed],
-) -> BoundaryProcess | Refusal:  # fmt: skip
+) -> BoundaryHome | Refusal:  # fmt: skip
     """A boundary that is started for one run, until `close`. Raises OSError."""
     pinned = cose.unverified(signed_root, limit=MAX_ROOT).kid
+    process = request.mode is EnforcementMode.PROCESS
+    make = partial(BoundaryProcess, user=request.boundary_user) if process else SecureWorld
     try:
-        return BoundaryProcess(
-            signed_root, pinned, vehicle, request.kept_in,
-            link_key=request.signing_key, user=request.boundary_user, paced=request.speed != 1,
+        return make(
+            signed_root, pinned, vehicle, request.kept_in, link_key=request.signing_key, paced=request.speed != 1,
             own_seed=None if own_key is None else own_key.private.private_bytes_raw(),
             log_seed=log_key.private.private_bytes_raw(),
             settings=_listed({name: Owed(0, value) for name, value in request.settings.items()}), owed=_listed(owed),
@@ -239,11 +246,11 @@ class BoundaryClient:
     """This end of a boundary of its own process, for one run under one trust root."""
 
     def __init__(
-        self, process: BoundaryProcess | ListeningBoundary, vehicle: str, root: TrustRoot, settings: Mapping[str, int]
+        self, home: BoundaryHome, mode: EnforcementMode, vehicle: str, root: TrustRoot, settings: Mapping[str, int]
     ) -> None:
-        self.process = process
+        self.process, self._mode = home, mode
         self._vehicle, self._root, self._settings = vehicle, root, settings
-        self._caller = Caller(process.call, signs=process.link_name is not None)
+        self._caller = Caller(home.call, signs=home.link_name is not None, part=home.part, most_ahead=home.most_ahead)
 
     def flight(self) -> bytes | Refusal:
         """The id of the flight that begins next."""
@@ -267,25 +274,39 @@ class BoundaryClient:
         """What is waited with, in this process: what leaves meanwhile, leaves by the boundary."""
         commands = Commands(base.bundle.policy, base.bundle.mission)
         executor = IsolatedExecutor(self._caller, commands, IsolatedGate(self._caller, commands))
-        return replace(base, executor=executor, mode=EnforcementMode.PROCESS)
+        return replace(base, executor=executor, mode=self._mode)
 
     def load(self, bundle: bytes, now: Now) -> Loaded | Refusal:
         """Have it open a bundle, in place of the one before."""
+        unfit = self._unfit(bundle, now)
+        if unfit:
+            text = f"the bundle does not fit in the secure world: {', '.join(unfit)}"
+            return Refusal("boundary-too-large", text, "`--mode process` has room for it", ExitCode.REFUSED)
         loaded = load(
-            bundle, root=self._root, vehicle=self._vehicle, now=now, mode=EnforcementMode.PROCESS,
+            bundle, root=self._root, vehicle=self._vehicle, now=now, mode=self._mode,
             session_key=bytes(SESSION_KEY_BYTES), flight=bytes(FLIGHT_BYTES), peer_is_own_simulator=False,
             settings=self._settings, caller=self._caller,
         )  # fmt: skip
         if isinstance(loaded, Refusal):
-            text = f"the boundary's process refuses the bundle: {loaded.text} ({loaded.slug})"
+            text = f"the boundary refuses the bundle: {loaded.text} ({loaded.slug})"
             return Refusal(f"boundary-{loaded.slug}", text, loaded.help, _CODES.get(loaded.slug, ExitCode.REFUSED))
         return loaded
+
+    def _unfit(self, bundle: bytes, now: Now) -> tuple[str, ...]:
+        """What of a bundle is too large for its home, in words; nothing of one that is not to be trusted."""
+        if self._mode is not EnforcementMode.TRUSTZONE_M:
+            return ()
+        try:
+            opened = open_bundle(bundle, root=self._root, vehicle=self._vehicle, now_us=now.utc_us)
+        except Untrusted:
+            return ()
+        return exceeded(opened.policy, opened.mission, len(bundle), TRUSTZONE_M)
 
     def admit(self, bundle: bytes, now: Now) -> Loaded | Refusal:
         """Have it open a bundle that nothing flies of yet, in place of the one before."""
         loaded = self.load(bundle, now)
         if not isinstance(loaded, Refusal) and self._caller.reopened:
-            text = f"the boundary's process opened this bundle before on `{self._vehicle}`: a bundle flies once"
+            text = f"the boundary opened this bundle before on `{self._vehicle}`: a bundle flies once"
             return Refusal("boundary-replayed", text, "compile the mission again, which issues it anew")
         return loaded
 
@@ -293,7 +314,7 @@ class BoundaryClient:
         """That it is gone, so that nothing more leaves; None while it is there."""
         if not self._caller.lost:
             return None
-        text = "the boundary's process is gone: nothing more is sent"
+        text = "the boundary is gone: nothing more is sent"
         return Refusal("boundary-lost", text, "", ExitCode.REFUSED)
 
 
@@ -401,12 +422,12 @@ def _open(
     if isinstance(process, Refusal):
         return process
     if process is not None:
-        return BoundaryClient(process, loaded.vehicle, trusted.root, request.settings)
-    if request.mode is not EnforcementMode.PROCESS or request.dry_run or trusted.distrust is not None:
+        return BoundaryClient(process, EnforcementMode.PROCESS, loaded.vehicle, trusted.root, request.settings)
+    if not request.mode.apart or request.dry_run or trusted.distrust is not None:
         return None
     assert not isinstance(own_key, HeldByBoundary)
-    started = start_process(request, loaded.vehicle, trusted.signed, own_key, log_key.key(), owed)
+    started = start_home(request, loaded.vehicle, trusted.signed, own_key, log_key.key(), owed)
     if isinstance(started, Refusal):
         return started
     context.resources.callback(started.close)
-    return BoundaryClient(started, loaded.vehicle, trusted.root, request.settings)
+    return BoundaryClient(started, request.mode, loaded.vehicle, trusted.root, request.settings)

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from rtshcua.adapters.boundary_process import ListeningBoundary
+from rtshcua.adapters.boundary.process import ListeningBoundary
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.app.documents import no_bundle
@@ -35,7 +35,7 @@ HANDED_IN = {
 }
 
 #: the mode of what is decided in this process, of the mode that was asked for
-_HERE = {EnforcementMode.PROCESS: EnforcementMode.SOFTWARE}
+_HERE = {mode: EnforcementMode.SOFTWARE for mode in EnforcementMode if mode.apart}
 _NOT_HERE = ("mode-refused", "wrong-vehicle")
 
 

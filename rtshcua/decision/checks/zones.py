@@ -147,7 +147,7 @@ def zones(policy: Policy) -> Iterator[str]:
     yield from at("projection", _projection(policy.projection))
     yield from within("number of zones", len(policy.zones), 0, MAX_ZONES)
     yield from within("number of declared zones", policy.declared, 0, len(policy.zones))
-    yield from within("number of vertices", sum(map(_vertices, policy.zones)), 0, MAX_TOTAL_VERTICES)
+    yield from within("number of vertices", sum(map(vertices, policy.zones)), 0, MAX_TOTAL_VERTICES)
     for number, zone in enumerate(policy.zones):
         yield from at(f"zone {number}", _zone(zone))
     yield from within("number of tables", len(policy.tables), 0, MAX_TABLES)
@@ -180,7 +180,7 @@ def _on_earth(latitude: int, longitude: int) -> Iterator[str]:
     yield from within("longitude", longitude, -flat.HALF_TURN, flat.HALF_TURN)
 
 
-def _vertices(zone: flat.Zone) -> int:
+def vertices(zone: flat.Zone) -> int:
     """A lower bound of the number of vertices, computed before anything else about a zone is known."""
     counts = 1 + min(max(zone.data[0], 0), flat.MAX_RINGS) if zone.shape == flat.AREA and zone.data else 0
     return max(len(zone.data) - counts, 0) // 2

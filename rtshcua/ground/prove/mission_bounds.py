@@ -24,8 +24,8 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.prove.proof_context import ProofContext
-from rtshcua.ground.prove.step_bounds import StepBound
 from rtshcua.ground.prove.step_starts import StartPlace, may_be_skipped, planned
+from rtshcua.ground.prove.step_time_and_energy import StepBound
 from rtshcua.ground.prove.step_times import START_WINDOW_US, MissionStep, approval
 from rtshcua.model.flat.contract import Contract, Link, MotionKind
 from rtshcua.model.flat.limits import FULL

@@ -22,9 +22,8 @@ from rtshcua.ground.prove.observability import prove_observability, prove_step_o
 from rtshcua.ground.prove.parameter_ranges import prove_between, unmoved_lines
 from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.rule_checks import prove_delegations, prove_rules
-from rtshcua.ground.prove.step_authority import prove_authority
-from rtshcua.ground.prove.step_bounds import StepBound, prove_step_bounds
 from rtshcua.ground.prove.step_paths import prove_home, prove_path
+from rtshcua.ground.prove.step_permissions import prove_authority
 from rtshcua.ground.prove.step_starts import (
     AT_HOME,
     MOST_PLACES,
@@ -35,6 +34,7 @@ from rtshcua.ground.prove.step_starts import (
     prove_start,
     warn_not_landed,
 )
+from rtshcua.ground.prove.step_time_and_energy import StepBound, prove_step_bounds
 from rtshcua.ground.prove.step_times import MissionStep, mission_steps, prove_validity
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy

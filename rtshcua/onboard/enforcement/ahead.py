@@ -73,7 +73,9 @@ class FramesAhead:
     there, `begin`, `take` and `close` after its loss. They only go forward.
     """
 
-    def __init__(self, commands: Commands, sign: Sign) -> None:
+    def __init__(self, commands: Commands, sign: Sign, most: int = MOST) -> None:
+        """`most`: how many frames are signed in one call at most."""
+        self._most = most
         self._commands = commands
         self._sign = sign
         self._standing: tuple[bytes, int] | None = None  # the permit of the step, and its number
@@ -137,11 +139,11 @@ class FramesAhead:
             if not frames:
                 notes.append(f"cannot sign `{command.skill}` ahead: its manoeuvre is unknown")
                 continue
-            if len(frames) > MOST:
-                notes.append(f"cannot sign `{command.skill}` ahead: {len(frames)} frames; the limit is {MOST}")
+            if len(frames) > self._most:
+                notes.append(f"cannot sign `{command.skill}` ahead: {len(frames)} frames; the limit is {self._most}")
                 continue
             if (kind, number) == of_step[-1]:
-                frames = [*frames] * min(LAST, MOST // len(frames))
+                frames = [*frames] * min(LAST, self._most // len(frames))
             answer = self._sign(sealed, kind, number, frames, now_us)
             if not isinstance(answer, Refusal):
                 copies = tuple(map(_copied, frames, answer.signatures))

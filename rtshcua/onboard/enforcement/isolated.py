@@ -18,7 +18,7 @@ from rtshcua.mavlink.framing import FLAG_SIGNED, FLAGS, SIGNATURE
 from rtshcua.mavlink.signing import MINUTE, UNIT_US, Counts, Stream, stream_of, timestamp_in
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement import executor, frames, preparation
-from rtshcua.onboard.enforcement.ahead import NOT_AHEAD, Encode, FramesAhead
+from rtshcua.onboard.enforcement.ahead import MOST, NOT_AHEAD, Encode, FramesAhead
 from rtshcua.onboard.enforcement.allow_list import is_housekeeping, read_frame
 from rtshcua.onboard.enforcement.executor import Commands, Made, SignedAhead
 from rtshcua.onboard.ports import BoundaryKey, Command
@@ -38,8 +38,8 @@ Call = Callable[[bytes], bytes]
 
 (
     PART, LOAD, ENFORCE, PRESENT, DISPATCH, STAND_IN, ENDED, LANDED, RELEASE, OBSERVE, SEAL, BEGIN, STATEMENT, DIGEST,
-    PERMIT, PREPARE, PREPARED, STANDS, AHEAD, FLIGHT, LOG, TIME, WITHDRAW,
-) = range(1, 24)  # fmt: skip
+    PERMIT, PREPARE, PREPARED, STANDS, AHEAD, FLIGHT, LOG, TIME, WITHDRAW, HOME,
+) = range(1, 25)  # fmt: skip
 #: octets of a bundle or a document in one call
 MAX_PART: Final = 60_000
 
@@ -78,9 +78,13 @@ _REFUSALS: Final[Mapping[str, Refusal]] = MappingProxyType(_known(executor, fram
 class Caller:
     """Calls a boundary. A missing or malformed answer gives `LOST`, as does every later call."""
 
-    def __init__(self, call: Call, *, signs: bool = False) -> None:
-        """`signs`: the boundary has the link's key."""
+    def __init__(self, call: Call, *, signs: bool = False, part: int = MAX_PART, most_ahead: int = MOST) -> None:
+        """`signs`: it has the link's key. `part`: octets of a bundle or a document that go in one call at most;
+        `most_ahead`: frames that one call has signed ahead at most.
+        """
         self._call = call
+        self._part = part
+        self.most_ahead = most_ahead
         self.signs = signs
         #: whether the boundary is lost
         self.lost = False
@@ -109,8 +113,8 @@ class Caller:
 
     def put(self, what: int, octets: bytes) -> Refusal | None:
         """Transfer the data of the next call of a kind, in parts."""
-        for at in range(0, len(octets) or 1, MAX_PART):
-            answer = self(PART, _AT.pack(what, at), octets[at : at + MAX_PART])
+        for at in range(0, len(octets) or 1, self._part):
+            answer = self(PART, _AT.pack(what, at), octets[at : at + self._part])
             if isinstance(answer, Refusal):
                 return answer
         return None
@@ -236,7 +240,7 @@ class IsolatedGate:
     def __init__(self, caller: Caller, commands: Commands) -> None:
         self._caller = caller
         #: the frames that are sent after the loss
-        self.ahead = FramesAhead(commands, caller.ahead)
+        self.ahead = FramesAhead(commands, caller.ahead, caller.most_ahead)
         self._counts = Counts()
         self._heard: dict[Stream, tuple[int, int]] = {}  # the last timestamp of a verified frame, and its time
 
@@ -425,4 +429,9 @@ class IsolatedAttestation:
     def statement(self, now: Now, *, final: bool = False) -> bytes | None:
         """A signed statement, None without a key or after the final one. `now` counts if it has no clock of its own."""
         answer = self._caller(STATEMENT, bytes([final]), _NOW.pack(*_times(now))) if self._begun else LOST
+        return None if isinstance(answer, Refusal) else answer
+
+    def home(self) -> bytes | None:
+        """What the boundary's home attests of itself (`wire.attestation`), None without a key."""
+        answer = self._caller(HOME) if self._begun else LOST
         return None if isinstance(answer, Refusal) else answer

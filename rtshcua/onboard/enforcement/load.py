@@ -86,6 +86,10 @@ class Attestation:
         )  # fmt: skip
         return sign(said, self._signs)
 
+    def home(self) -> bytes | None:
+        """Nothing: this boundary runs in the process of the runtime, and has no home of its own."""
+        return None
+
 
 #: length of a session key in bytes
 SESSION_KEY_BYTES: Final = 32
@@ -97,6 +101,12 @@ class EnforcementMode(StrEnum):
     NONE = "none"
     SOFTWARE = "software"
     PROCESS = "process"
+    TRUSTZONE_M = "trustzone-m"
+
+    @property
+    def apart(self) -> bool:
+        """Whether the boundary is outside of the runtime, and called."""
+        return self in (EnforcementMode.PROCESS, EnforcementMode.TRUSTZONE_M)
 
 
 class Loaded(msgspec.Struct, frozen=True):

@@ -15,9 +15,11 @@ from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Genesis, Recover, Seal
 from rtshcua.evidence.rooted import rooted
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
-from rtshcua.wire import boundary_chain, statement
+from rtshcua.wire import boundary_chain, cbor, cose, statement
+from rtshcua.wire.attestation import CONTENT_TYPE, PROFILE, SOFTWARE
 from rtshcua.wire.boundary_chain import MOST_MARKS, START, BoundaryChain, Tag
 from rtshcua.wire.clock import ClockSource
+from rtshcua.wire.keys import Duty
 from rtshcua.wire.preparation import ParameterWrite
 from rtshcua.wire.statement import Statement
 from rtshcua.wire.trust import TrustRoot
@@ -88,6 +90,20 @@ def stated(said: Statement) -> Effect:
     return effect("boundary", b64encode(statement.sign(said, case.BOUNDARY_KEY)).decode())
 
 
+def at_home(log: Log, claims: dict[int, object]) -> Effect:
+    """What the boundary's home attests at this point, but for these claims."""
+    said = {
+        10: bytes.fromhex(GENESIS.boot), 256: b"\1" + bytes(16), 263: 0, 265: PROFILE, 267: 4, 270: SOFTWARE,
+        273: ((60, cbor.encode({1: -16, 2: bytes([9]) * 32})),), -70001: GENESIS.mode, -70002: log.chain.digest,
+        -70003: 0, -70004: (b"", b""),
+    } | claims  # fmt: skip
+    protected = cbor.encode({1: cose.ED25519, 3: CONTENT_TYPE, 4: case.BOUNDARY_KEY.kid})
+    payload = cbor.encode(said)
+    signature = case.BOUNDARY_KEY.sign(cbor.encode(("Signature1", protected, b"", payload)), duty=Duty.BOUNDARY)
+    token = b"\xd2" + cbor.encode((protected, {}, payload, signature))
+    return effect("attested", b64encode(token).decode())
+
+
 @pytest.fixture
 def log() -> Log:
     """A log with its first statement."""
@@ -101,6 +117,24 @@ def test_genuine_flight_has_no_flaw() -> None:
     assert [evidence.check(record, 0) for record in RECORDS[1:]] == [None] * (len(RECORDS) - 1)
     (proven,), (clock,) = evidence.claims()
     assert (proven.slug, clock.slug) == ("boundary", "clock")
+
+
+@pytest.mark.parametrize(("debug", "told"), [(0, "enabled"), (1, "disabled")])
+def test_attested_home_is_proven(log: Log, debug: int, told: str) -> None:
+    assert log.take(at_home(log, {263: debug})) is None
+    assert [log.refuse(), log.state(final=True), log.take(CLOSE)] == [None] * 3
+    proven, unproven = log.evidence.claims()
+    (home,) = [claim.text for claim in proven if claim.slug == "home"]
+    assert f"`{GENESIS.mode}`" in home
+    assert f"in start 4 with what it keeps, debugging {told}" in home
+    assert "measured its own code" in next(claim.text for claim in unproven if claim.slug == "home")
+
+
+def test_home_that_does_not_fit_the_log_is_a_flaw(log: Log) -> None:
+    assert log.take(at_home(log, {10: bytes([1]) * 16})) == ("attested/other-flight", 2)
+    assert log.take(at_home(log, {-70001: "optee"})) == ("attested/other-mode", 3)
+    assert log.take(at_home(log, {-70002: bytes(32)})) == ("attested/moved", 4)
+    assert log.take(effect("attested", "no token")) == ("attested/malformed", 5)
 
 
 def test_root_without_boundary_key_requires_no_evidence() -> None:

@@ -14,15 +14,9 @@ import msgspec
 import typer
 
 from rtshcua import library
-from rtshcua.adapters.boundary_process import (
-    MISSING,
-    UNBUILT,
-    UNBUILT_HELP,
-    BoundaryError,
-    ListeningBoundary,
-    measures_here,
-    program,
-)
+from rtshcua.adapters.boundary.home import BoundaryError
+from rtshcua.adapters.boundary.process import MISSING, UNBUILT, UNBUILT_HELP, ListeningBoundary, measures_here, program
+from rtshcua.adapters.boundary.trustzone_m import EMULATED, missing_packages
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose, settled, settling, told_apart
 from rtshcua.adapters.doctor.examination import ExaminingDriver
@@ -192,9 +186,7 @@ def _examine(
             silent = unmet(f"a vehicle at `{how.link}`", _HEARTBEAT_S, how.system, signing.rejected, socket.silence)
             return silent._replace(code=ExitCode.LINK)
         keyed = how.signing_key is not None
-        time_of_day = _time_of_day(
-            how.boundary_socket, how.utc_error_us, keyed=keyed, apart=how.decides is EnforcementMode.PROCESS
-        )
+        time_of_day = _time_of_day(how.boundary_socket, how.utc_error_us, keyed=keyed, apart=how.decides.apart)
         findings = _boundary(how.decides, how.boundary_socket) + agents + _settle(socket, vehicle, clock)
         findings += list(
             diagnose(
@@ -222,6 +214,15 @@ def _boundary(mode: EnforcementMode, socket: Path | None = None) -> list[Vehicle
         built = program() is not None
         text, help = (_SOFTWARE, "leave out `--mode`") if built else (UNBUILT, UNBUILT_HELP)
         return [VehicleFinding(slug, MissionVerdict.WARN, text, "a separate process", help)]
+    if mode is EnforcementMode.TRUSTZONE_M:
+        lacking = missing_packages()
+        if lacking is not None:
+            return [VehicleFinding(slug, MissionVerdict.STOP, str(lacking), "its emulator and programs", lacking.help)]
+        where = "a run decides in the secure world of an emulated Cortex-M33 (`run --mode trustzone-m`)"
+        return [
+            VehicleFinding(slug, MissionVerdict.OK, where),
+            VehicleFinding("boundary/hardware", MissionVerdict.WARN, f"the boundary would run without {EMULATED}"),
+        ]
     try:
         if socket is None:
             here, where = measures_here(None), "a run decides in a separate process (`run --mode process`)"

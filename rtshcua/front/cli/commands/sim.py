@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from rtshcua.adapters.boundary_process import program
+from rtshcua.adapters.boundary.process import program
 from rtshcua.adapters.simulator import Simulator, SimulatorError
 from rtshcua.adapters.store.signing import LinkKeyError, read_link_key
 from rtshcua.adapters.utc import kernel_error_us, vehicle_counts

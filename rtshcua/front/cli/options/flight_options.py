@@ -8,7 +8,7 @@ from typing import Annotated, Final
 
 import typer
 
-from rtshcua.adapters.boundary_process import program
+from rtshcua.adapters.boundary.process import program
 from rtshcua.mavlink.parameters import bits_of
 from rtshcua.model.faults import WindStep
 from rtshcua.onboard.enforcement.load import EnforcementMode
@@ -52,7 +52,7 @@ DecidesIn = Annotated[
     EnforcementMode | None,
     typer.Option(
         help="where decisions are made: in a separate process (default with --connect if its program is built) or in "
-        "this one; `none` enforces nothing, simulation only",
+        "this one; `trustzone-m`: in an emulated secure world; `none` enforces nothing, simulation only",
     ),
 ]
 UtcError = Annotated[

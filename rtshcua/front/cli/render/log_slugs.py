@@ -28,6 +28,9 @@ _FOUND: Final = {
     "anchor/signature": "a note of a witness is damaged or forged, so it is ignored",
     "archive/changed": "the file in the archive differs from the one that was added",
     "archive/missing": "the file is missing in the archive",
+    "attested/moved": "the attestation of the boundary's home belongs to another point of its evidence",
+    "attested/other-flight": "the attestation of the boundary's home belongs to another flight",
+    "attested/other-mode": "the attestation of the boundary's home names another mode than the log",
     "boundary/after-loss": "a record after the loss of the boundary contains something that only a boundary makes",
     "boundary/beginning": "the boundary's session began with another flight, bundle or mode",
     "boundary/gap": "the boundary signed before the end of a gap that the log records earlier",
@@ -184,6 +187,7 @@ _REFUSED: Final = {
     "wrong-vehicle": "{} is for another vehicle",
 }
 _SIGNED: Final = {
+    "attested": "the attestation of the boundary's home",
     "boundary": "a statement of the boundary",
     "document": "an approval, recall, replacement or cancellation",
     "trust/root": "the trust root",

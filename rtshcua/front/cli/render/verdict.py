@@ -30,6 +30,7 @@ MEANINGS = {
     "preparation": "Autopilot parameters were set differently from their record, or at a forbidden time.",
     "frames": "The raw frames contain a command that is not in the log: it was sent without an earlier record.",
     "anchor": "A witness saw a different log: this one was rewritten or cut by a holder of its keys.",
+    "attested": "The attestation of the boundary's home does not fit the log, or is not trusted.",
     "boundary": "The log contradicts what the enforcement boundary decided, accepted or sent, or lacks its signature.",
     "telemetry": "The raw frames file belongs to another flight. The log itself is valid.",
     "tail": "The log was cut, or the program stopped while it was writing. Later events are unknown.",

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from rtshcua.adapters.store.replay import FileReplayStore
+from rtshcua.adapters.store.opened_missions import FileReplayStore
 from rtshcua.onboard.ports import MissionOpening
 
 ONE, TWO = bytes(32), b"\x01" * 32

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from rtshcua.adapters.store.replay import FileReplayStore, looked_up
+from rtshcua.adapters.store.opened_missions import FileReplayStore, looked_up
 from rtshcua.onboard.ports import MissionOpening
 
 DIGEST, LATER = bytes(32), 1 << 52

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.adapters.store import replay
-from rtshcua.adapters.store.replay import FileReplayStore
+from rtshcua.adapters.store import opened_missions as replay
+from rtshcua.adapters.store.opened_missions import FileReplayStore
 from rtshcua.onboard.ports import MissionOpening
 
 ONE, TWO, THREE = bytes(32), b"\x01" * 32, b"\x02" * 32
@@ -134,7 +134,7 @@ def test_marker_and_folder_are_synced_before_a_mission_opens(tmp_path: Path, mon
 
 def test_of_many_processes_one_opens_it(tmp_path: Path) -> None:
     program = (
-        "import sys; from pathlib import Path; from rtshcua.adapters.store.replay import FileReplayStore\n"
+        "import sys; from pathlib import Path; from rtshcua.adapters.store.opened_missions import FileReplayStore\n"
         "sys.stdin.read(1); print(FileReplayStore(Path(sys.argv[1]), 'quad-07').open_once(bytes(32), 9, 1, 'p', 1))"
     )
     command = [sys.executable, "-c", program, str(tmp_path)]

@@ -9,7 +9,7 @@ import pytest
 
 from reference.flat_case import MISSION, POLICY
 from reference.world import START
-from rtshcua.adapters.boundary_process import BoundaryError
+from rtshcua.adapters.boundary.home import BoundaryError
 from rtshcua.adapters.utc import TimeSources
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.app import main

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.adapters import boundary_process
+from rtshcua.adapters.boundary import process as boundary_process
 from rtshcua.adapters.store import reading
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import PROPOSERS, KeyStore

@@ -14,8 +14,8 @@ from reference.flat_case import MISSION, POLICY
 from reference.flying import context, refusal_of, request
 from reference.world import START, VEHICLE, loaded
 from rtshcua.adapters.clock import SystemClock
-from rtshcua.adapters.store import replay
-from rtshcua.adapters.store.replay import FileReplayStore
+from rtshcua.adapters.store import opened_missions as replay
+from rtshcua.adapters.store.opened_missions import FileReplayStore
 from rtshcua.adapters.store.signing import LinkStore, write_link_key
 from rtshcua.adapters.store.vehicle_records import OwedParameters
 from rtshcua.adapters.vehicle.observed import ObservedVehicle

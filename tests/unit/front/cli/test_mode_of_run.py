@@ -6,7 +6,7 @@ import pytest
 
 from reference.flying import context, request
 from reference.world import loaded
-from rtshcua.adapters.boundary_process import UNBUILT, Measure
+from rtshcua.adapters.boundary.process import UNBUILT, Measure
 from rtshcua.adapters.doctor.diagnosis import MissionVerdict
 from rtshcua.app.fly.connect import sign_link
 from rtshcua.app.fly.link_signing import LinkSigning
@@ -69,7 +69,7 @@ def test_requested_process_mode_is_required(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("rtshcua.adapters.boundary_process.program", lambda: None)
+    monkeypatch.setattr("rtshcua.adapters.boundary.process.program", lambda: None)
     assert main(["keys", "init"]) == ExitCode.OK
     assert main(["compile", str(library() / "missions" / "short.rts"), "-o", "short.bundle"]) == ExitCode.OK
     words = ["run", "short.bundle", "--mode", "process", "--connect", "udpin:127.0.0.1:14550", "--vehicle", "quad-07"]

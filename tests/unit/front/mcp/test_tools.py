@@ -142,16 +142,17 @@ def test_an_admitted_proposal_is_judged_by_its_own_flight(
     following.await_first()
     following.close = close
     with socket.socket(socket.AF_UNIX) as listener:
+        listens = threading.Event()
 
         def hand_in(_: Path, document: bytes) -> tuple[str, str]:
             listener.bind(str(path))
             listener.listen()
+            listens.set()
             return "accepted", "admitted"
 
         monkeypatch.setattr(desks, "hand_in", hand_in)
         ticket = desk.propose_mission(PROPOSAL, "one")["ticket"]
-        while not path.exists():
-            time.sleep(0.001)
+        assert listens.wait(60)
         listener.settimeout(60)
         link, _ = listener.accept()
         with link:

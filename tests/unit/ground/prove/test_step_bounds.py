@@ -10,7 +10,7 @@ from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.language.load import load
 from rtshcua.ground.pipeline.program import Compiled, compile_program
-from rtshcua.ground.prove.step_bounds import StepBound
+from rtshcua.ground.prove.step_time_and_energy import StepBound
 from rtshcua.mavlink import dialect
 from rtshcua.wire.binding import bind
 from virtual.rows import rows

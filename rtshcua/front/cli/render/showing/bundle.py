@@ -3,8 +3,10 @@
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.app.documents import claimed
+from rtshcua.decision.checks.home_fit import exceeded
 from rtshcua.front.cli.render.showing.page import TextPage, named
 from rtshcua.front.cli.render.showing.policy import show_mission, show_policy
+from rtshcua.model.flat.home_limits import TRUSTZONE_M
 from rtshcua.wire.bundle import open_bundle
 from rtshcua.wire.trust import open_root
 from rtshcua.wire.untrusted import Untrusted
@@ -19,6 +21,8 @@ def show_bundle(page: TextPage, data: bytes, now_us: int) -> dict[str, object]:
     page.row("policy", f"digest {what.policy_digest.hex()}, key {what.policy_kid.hex()}")
     page.row("mission", f"key {what.mission_kid.hex()}")
     page.row("signatures", verdict)
+    unfit = exceeded(what.policy, what.mission, len(data), TRUSTZONE_M)
+    page.row("memory", f"too large for `--mode trustzone-m`: {', '.join(unfit)}" if unfit else "fits every mode")
     show_mission(page, what.mission, what.policy)
     show_policy(page, what.policy)
     return {
@@ -29,6 +33,7 @@ def show_bundle(page: TextPage, data: bytes, now_us: int) -> dict[str, object]:
         "mission_key": what.mission_kid.hex(),
         "trusted": trusted,
         "verdict": verdict,
+        "too_large_for": {"trustzone-m": unfit} if unfit else {},
         "mission": named(what.mission),
         "policy": named(what.policy),
     }

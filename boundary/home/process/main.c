@@ -29,6 +29,7 @@
 #define _GNU_SOURCE
 #include "isolation.h"
 
+#include "../common.h"
 #include "enforcement/calls.h"
 #include "crypto/crypto.h"
 
@@ -49,10 +50,7 @@
 #include <unistd.h>
 
 enum { FINE = 0, USAGE = 64, UNTRUSTED = 65, NO_KEY = 66, MISSING = 72, IO = 74, IN_USE = 75, DAMAGED = 78 };
-/* how far ahead of its use the link's timestamp is stored, in its units of 10 us, and how often: signing.py */
-#define RESERVE 300000LL
-#define EVERY_US 1000000LL
-/* how long a call may take, and the beginning or loading a bundle, in s: the runtime waits for 1.2 s and 20 s (boundary_process.py),
+/* how long a call may take, and the beginning or loading a bundle, in s: the runtime waits for 1.2 s and 20 s (rtshcua/adapters/boundary/process.py),
    and a machine that stands still for a moment ends nothing; and how often one wakes that waits for a call */
 #define CALL_S 3
 #define BEGINNING_S 20
@@ -306,16 +304,6 @@ static rt_now machine_now(void) {
     return now;
 }
 
-/* The link's timestamps: our own are ahead of their use, each peer's is the last received one (signing.py says why). */
-static void gather(rt_kept *kept, int64_t ahead) {
-    rt_signed_link *link = &boundary.executor.gate.signer;
-    if (!boundary.executor.gate.signs) return; /* the stored state of the link stays, for a start with its key */
-    kept->link_timestamp = rt_signed_up_to(link) + ahead;
-    kept->stream_count = link->stream_count;
-    memcpy(kept->streams, link->streams, sizeof kept->streams);
-    link->news = false;
-}
-
 static int digit(uint8_t sign) {
     if (sign >= '0' && sign <= '9') return sign - '0';
     sign |= 0x20;
@@ -356,34 +344,30 @@ static int read_writes(int file, rt_preparation *into, const rt_preparation **li
     return rt_read_preparation((rt_bytes){data, (uint32_t)read_all(file, data, sizeof data)}, into);
 }
 
-#define LINK_NAME 8
-
-/* A name for a key that discloses nothing of it: `fingerprint` of adapters/store/signing.py. */
-static void name_link(const uint8_t key[RT_KEY_BYTES], uint8_t *name) {
-    static const uint8_t domain[] = "rtshcua/link-key";
-    uint8_t digest[RT_DIGEST_BYTES];
-    rt_sha256 hash;
-    rt_sha256_begin(&hash);
-    rt_sha256_add(&hash, (rt_bytes){domain, sizeof domain});
-    rt_sha256_add(&hash, (rt_bytes){key, RT_KEY_BYTES});
-    rt_sha256_end(&hash, digest);
-    memcpy(name, digest, LINK_NAME);
-}
-
-/* The first message: the measures in force, the name of the link's key, the public halves of the two signing keys, and whose clock is
-   used. */
-static int greet(const options *given, uint32_t measures, const rt_keys *keys) {
-    uint8_t greeting[4 + LINK_NAME + 2 * RT_KEY_BYTES + 1] = {0};
-    for (int octet = 0; octet < 4; octet++) greeting[octet] = (uint8_t)(measures >> 8 * octet & 0xFF);
-    if (given->link_key >= 0) name_link(keys->link, greeting + 4);
-    if (given->log_key >= 0) rt_ed25519_public(keys->log, greeting + 4 + LINK_NAME);
-    if (given->boundary_key >= 0) rt_ed25519_public(keys->boundary, greeting + 4 + LINK_NAME + RT_KEY_BYTES);
-    greeting[sizeof greeting - 1] = !given->paced;
+static int greet(const options *given, uint32_t measures, const rt_setup *setup) {
+    uint8_t greeting[RT_GREETING_BYTES];
+    rt_greet(setup, measures, !given->paced, greeting);
     return send(given->socket, greeting, sizeof greeting, MSG_NOSIGNAL) == sizeof greeting;
 }
 
+static const char MODE[] = "process";
+
+/* What of this program can be measured from inside: its file, as it was started. */
+static int measure_code(uint8_t digest[RT_DIGEST_BYTES]) {
+    uint8_t block[4096];
+    rt_sha256 hash;
+    ssize_t got;
+    int file = open("/proc/self/exe", O_RDONLY | O_CLOEXEC);
+    if (file < 0) return 0;
+    rt_sha256_begin(&hash);
+    while ((got = read(file, block, sizeof block)) > 0) rt_sha256_add(&hash, (rt_bytes){block, (uint32_t)got});
+    close(file);
+    rt_sha256_end(&hash, digest);
+    return got == 0;
+}
+
 /* Everything before the first message. */
-static int begin(options *given, rt_keys *keys, uint32_t *measures) {
+static int begin(options *given, rt_keys *keys, uint32_t *measures, rt_setup *setup) {
     static uint8_t root[1 << 20];
     if (given->folder != NULL) {
         int code = start_timer(given->socket) ? open_folder(given) : IO;
@@ -408,6 +392,9 @@ static int begin(options *given, rt_keys *keys, uint32_t *measures) {
     uint8_t own[RT_KEY_BYTES];
     if (given->boundary_key >= 0) rt_ed25519_public(keys->boundary, own);
     if (!rt_kept_is_of(kept, given->boundary_key >= 0 ? own : NULL)) return DAMAGED;
+    uint8_t code[RT_DIGEST_BYTES];
+    if (!measure_code(code))
+        return IO;
     kept->restarts++;
     if (!write_kept(given->kept, kept))
         return IO;
@@ -421,15 +408,18 @@ static int begin(options *given, rt_keys *keys, uint32_t *measures) {
         given->pin == NULL ? 0 : from_hex((const uint8_t *)given->pin, strlen(given->pin), pin, sizeof pin);
     if (given->folder != NULL && pinned == 0)
         return UNTRUSTED; /* without a pin any development root would be accepted */
-    const rt_setup setup = {
+    *setup = (rt_setup){
         keys, kept, root_bytes, {pin, pinned},
         {(const uint8_t *)given->vehicle, (uint32_t)strlen(given->vehicle)}, given->link_key >= 0, given->boundary_key >= 0,
-        given->log_key >= 0, meant, left, machine_now(), given->utc_error};
-    return rt_boundary_begin(&boundary, &setup) == NULL ? FINE : UNTRUSTED;
+        given->log_key >= 0, meant, left, machine_now(), given->utc_error,
+        {{(const uint8_t *)MODE, sizeof MODE - 1}, {0}, *measures & RT_NOT_DUMPABLE ? RT_DEBUG_DISABLED : RT_DEBUG_ENABLED, *measures}};
+    memcpy(setup->home.code, code, sizeof code);
+    return rt_boundary_begin(&boundary, setup) == NULL ? FINE : UNTRUSTED;
 }
 
 int main(int count, char **words) {
     options given;
+    rt_setup setup = {0};
     uint32_t measures = 0;
     const int runtime = getppid();
     if (!read_options(count, words, &given))
@@ -437,15 +427,15 @@ int main(int count, char **words) {
     rt_keys *keys = rt_key_memory(sizeof *keys, &measures);
     if (given.measures) {
         measures |= rt_isolate(given.user, given.group);
-        return greet(&given, measures, keys) ? FINE : IO;
+        return greet(&given, measures, &setup) ? FINE : IO;
     }
-    int code = begin(&given, keys, &measures);
+    int code = begin(&given, keys, &measures, &setup);
     if (code != FINE) {
         const uint8_t why = (uint8_t)code;
         (void)!send(given.socket, &why, sizeof why, MSG_NOSIGNAL);
         return code;
     }
-    if (!give_time(CALL_S) || !greet(&given, measures, keys))
+    if (!give_time(CALL_S) || !greet(&given, measures, &setup))
         return IO;
     rt_kept *kept = boundary.kept;
     int64_t kept_us = own_time_us(CLOCK_MONOTONIC);
@@ -457,7 +447,7 @@ int main(int count, char **words) {
         if (size < 0 && (errno == EINTR || errno == EAGAIN))
             continue;
         if (size <= 0) {
-            gather(kept, 0); /* an orderly end keeps the exact figures */
+            rt_gather_link(&boundary, 0); /* an orderly end keeps the exact figures */
             (void)rt_give_back(&boundary);
             return give(kept, 1) && size == 0 ? FINE : IO;
         }
@@ -468,10 +458,9 @@ int main(int count, char **words) {
         }
         uint32_t answered = rt_answer(&boundary, (rt_bytes){call, (uint32_t)size}, given.paced ? -1 : now_us, result);
         /* state that must survive this process is on the disk before the answer is sent */
-        const rt_gate *gate = &boundary.executor.gate;
-        if (boundary.to_keep || (gate->signs && (now_us - kept_us > EVERY_US || gate->signer.news))) {
+        if (rt_is_to_be_kept(&boundary, now_us, kept_us)) {
             bool must = boundary.to_keep;
-            gather(kept, RESERVE);
+            rt_gather_link(&boundary, RT_RESERVE);
             if (!give(kept, must))
                 answered = rt_take_back(&boundary, result);
             boundary.to_keep = false;

@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from boundary import c_and_python
+from boundary import sessions_in_c_and_python as c_and_python
 from boundary.both_boundaries import Differs
-from boundary.c_and_python import ask_both, decided
-from rtshcua.adapters.boundary_process import program
+from boundary.sessions_in_c_and_python import ask_both, decided
+from rtshcua.adapters.boundary.process import program
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 CHUNKS, CHUNK = 100, 10_000
@@ -49,7 +49,7 @@ def test_both_stop_signing_ahead_at_the_same_frame(tmp_path: Path, monkeypatch: 
         ("onboard.enforcement.preparation.VALID_US", 1),
         ("mavlink.signing.LEAD", 3_000_001),
         ("wire.boundary_chain.START", bytes(31) + b"\1"),
-        ("adapters.store.replay.FileReplayStore.give_back", lambda *_: None),
+        ("adapters.store.opened_missions.FileReplayStore.give_back", lambda *_: None),
     ],
 )
 def test_an_answer_that_differs_is_noticed(

@@ -18,34 +18,27 @@ from hashlib import sha256
 from pathlib import Path
 from struct import Struct
 from typing import Final
-from urllib.parse import quote
 
+from rtshcua.adapters.boundary.home import ANSWER_S, GREETING_BYTES, PATIENCE_S, BoundaryError, BoundaryHome, kept_file
 from rtshcua.adapters.store.signing import no_link_key, open_link_key
 from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, create_whole, lock, make_folder
 from rtshcua.onboard.enforcement.isolated import LOAD, MAX_PART
 from rtshcua.wire.keys import PUBLIC_BYTES
 
-#: the time to start, and to load a bundle with its whole mission, in s;
-PATIENCE_S: Final = 20.0
-#: the time for any other answer: a boundary that does not answer counts as lost, while the vehicle flies
-ANSWER_S: Final = 1.0
-#: and an extra time: if the whole machine stood still, both times are over, and one process resumes first
+#: an extra time: if the whole machine stood still, both times are over, and one process resumes first
 AGAIN_S: Final = 0.2
 #: the time for the boundary of a killed run to write its state and end
 ENDING_S: Final = 2.0
 #: the same for a listening one: if it hangs, the kernel ends it 3 s after its last activity, and nobody else may
 LISTENING_ENDING_S: Final = 5.0
-_PACKAGED: Final = Path(__file__).resolve().parents[1] / "boundary" / "rtshcua-boundary"
-_BUILT: Final = Path(__file__).resolve().parents[2] / "build" / "boundary" / "rtshcua-boundary"
+_PACKAGED: Final = Path(__file__).resolve().parents[2] / "boundary" / "rtshcua-boundary"
+_BUILT: Final = Path(__file__).resolve().parents[3] / "build" / "boundary" / "rtshcua-boundary"
 #: the interval of attempts with a listening one, in s: each writes a line to systemd's journal
 _ASKING_S: Final = 0.1
 #: octets of the largest call and answer
 _CALL, _ANSWER = MAX_PART + 64, 2_112
-#: after the measures, as in `process.c`: the name of the link's key, two public keys, whether its clock counts
-_SAID: Final = Struct(f"8s{PUBLIC_BYTES}s{PUBLIC_BYTES}s?")
 _FIRST: Final = Struct(f"<Qq{PUBLIC_BYTES}s")
 _FIRST_LAYOUT: Final = 0x7274736863756100
-_GREETING: Final = 4 + _SAID.size
 
 #: the message without a program, if none was requested
 UNBUILT: Final = "the boundary's program was not built, so the run decides in its own process, without isolation"
@@ -96,23 +89,9 @@ _DAMAGED_HELP: Final = (
 )
 
 
-class BoundaryError(Exception):
-    """The boundary's process did not start: `missing`, `in-use`, `damaged`, `not-kept`, `untrusted`, `not-begun`."""
-
-    def __init__(self, slug: str, text: str, help: str = "") -> None:
-        super().__init__(text)
-        self.slug = slug
-        self.help = help
-
-
 def program() -> Path | None:
     """The program, in a checkout or in the package; None where it was not built."""
     return next((each for each in (_BUILT, _PACKAGED) if each.is_file()), None)
-
-
-def kept_file(state: Path, vehicle: str) -> Path:
-    """The file of a boundary's state for a vehicle, in a state folder."""
-    return state / "boundary" / f"vehicle-{quote(vehicle, safe='')}.kept"
 
 
 def first_kept(since_us: int = 0, public: bytes = bytes(PUBLIC_BYTES)) -> bytes:
@@ -146,18 +125,12 @@ def measures_here(user: tuple[int, int] | None) -> Measure:
     return Measure(int.from_bytes(greeting[:4], "little"))
 
 
-class _Connected:
-    """The socket of a boundary, and the content of its first message."""
+class _Connected(BoundaryHome):
+    """A boundary at the other end of a socket."""
 
     _socket: socket.socket
     #: the measures in force
     measures: Measure
-    #: the name of the link's key, and the public keys of the log and of the boundary, None for missing ones
-    link_name: bytes | None
-    log_public: bytes | None
-    own_public: bytes | None
-    #: whether it decides by its own clock; otherwise the caller's time counts, as for a vehicle that runs faster
-    own_clock: bool
 
     @property
     def missing(self) -> Sequence[str]:
@@ -195,9 +168,7 @@ class _Connected:
         raise NotImplementedError
 
     def _take_in(self, greeting: bytes) -> None:
-        self.measures = Measure(int.from_bytes(greeting[:4], "little"))
-        link, log, own, self.own_clock = _SAID.unpack(greeting[4:])
-        self.link_name, self.log_public, self.own_public = (each if any(each) else None for each in (link, log, own))
+        self.measures = Measure(self._read_greeting(greeting))
         self._socket.settimeout(ANSWER_S)
 
 
@@ -247,7 +218,7 @@ class ListeningBoundary(_Connected):
             raise BoundaryError("not-begun", f"the boundary at `{path}` did not start") from None
         except OSError:
             greeting = b""
-        if len(greeting) == _GREETING:
+        if len(greeting) == GREETING_BYTES:
             return greeting
         self._socket.close()
         if greeting in (b"", bytes([_IN_USE])):
@@ -368,7 +339,7 @@ class BoundaryProcess(_Connected):
             greeting = self._socket.recv(_ANSWER)
         except TimeoutError:
             greeting = b""
-        if len(greeting) == _GREETING:
+        if len(greeting) == GREETING_BYTES:
             return greeting
         self._socket.close()
         self._process.kill()

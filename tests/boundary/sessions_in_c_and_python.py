@@ -17,7 +17,7 @@ from hashlib import sha256
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, ClassVar
 from unittest.mock import patch
 
 from msgspec.structs import replace
@@ -33,10 +33,11 @@ from reference import worlds
 from reference.documents import approval, cancellation, low_mission, recall, replacement
 from reference.flat_case import MIN, MISSION, POLICY, S, state
 from reference.world import MISSION_KEY, ROOT, ROOT_KEY, START, VEHICLE, read_answer, request_for, sealed
-from rtshcua.adapters import boundary_process
-from rtshcua.adapters.boundary_process import BoundaryProcess, kept_file
+from rtshcua.adapters.boundary import process as boundary_process
+from rtshcua.adapters.boundary.home import kept_file
+from rtshcua.adapters.boundary.process import BoundaryProcess
 from rtshcua.adapters.clock import monotonic_ns
-from rtshcua.adapters.store.replay import FileReplayStore
+from rtshcua.adapters.store.opened_missions import FileReplayStore
 from rtshcua.adapters.vehicle import messages
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.framing import unsigned
@@ -104,6 +105,9 @@ class Together:
     of it.
     """
 
+    #: where the boundary in C is
+    home: ClassVar[Callable[..., Any]] = BoundaryProcess
+
     def __init__(self, random: Random, folder: Path) -> None:
         self.random, self.counts, self._folder = random, Counter[str](), folder
         self._link_keys: list[Path | None] = [None]
@@ -169,13 +173,15 @@ class Together:
             self._owed = {name: Owed(fitting(random, name), drawn_bits(random)) for name in left}
         key = random.choice(self._link_keys)
         self._attests, self._logs = random.random() < 0.8, random.random() < 0.8
-        self.process = BoundaryProcess(
+        self.process = type(self).home(
             SIGNED_ROOT, PIN, VEHICLE, self._folder, link_key=key, paced=True,
             own_seed=OWN_KEY if self._attests else None, log_seed=LOG_KEY if self._logs else None,
             settings=listed({name: Owed(0, value) for name, value in self.settings.items()}), owed=listed(self._owed),
         )  # fmt: skip
         self._restarts += 1
-        self.caller = Caller(self.process.call, signs=key is not None)
+        self.caller = Caller(
+            self.process.call, signs=key is not None, part=self.process.part, most_ahead=self.process.most_ahead
+        )
         self.us, self._link = START.monotonic_us, None
         if key is not None:
             self.us = monotonic_ns() // 10_000 * 10 + 10_000
@@ -213,8 +219,7 @@ class Together:
         self.process.close()
         if self._issuer is not None:
             self._owed = dict(self._issuer._owed)
-        path = kept_file(self._folder, VEHICLE)
-        found = keeping.read(path)
+        found = self._kept()
         markers = {each.name: each.read_text() for each in self._replay.folder.iterdir()}
         floor_us, versions = int(markers.pop("floor", "-1")), json.loads(markers.pop("floor-policies", "{}"))
         same("missions", {bytes.fromhex(name): int(text) for name, text in markers.items()}, found.opened)
@@ -228,10 +233,18 @@ class Together:
             same("the link", self._link.state, found.link)
         self._kept_link = found.link  # of one that was killed, what it had kept last and the reserve
         if random.random() < 0.1:
-            keeping.spoil_older(path)
+            self._spoil()
         self._utc_us = self.now.utc_us + random.choice((0, 0, 60 * S, 20 * MIN, 40 * MIN, 180 * MIN, -20 * MIN))
         self.here = self.there = None
         self.counts["killed" if killed else "ended"] += 1
+
+    def _kept(self) -> keeping.Kept:
+        """What the boundary in C keeps of the vehicle."""
+        return keeping.read(kept_file(self._folder, VEHICLE))
+
+    def _spoil(self) -> None:
+        """Damage what does not count of it."""
+        keeping.spoil_older(kept_file(self._folder, VEHICLE))
 
     # ------------------------------------------------------------ bundles, evidence
 
@@ -679,7 +692,7 @@ def some_mission(random: Random, mission: Mission, kept: int) -> Mission:
     return replace(mission, issued_at_us=mission.issued_at_us + 1, invocations=(*steps, last))
 
 
-def ask_both(first: int, requests: int, folder: Path) -> Counter[str]:
+def ask_both(first: int, requests: int, folder: Path, make: type[Together] = Together) -> Counter[str]:
     """What both were asked, vehicle after vehicle, and answered alike: so many requests to decide, and all else.
 
     What is drawn of a vehicle comes from its number alone, but for the times of a signed link.
@@ -688,7 +701,7 @@ def ask_both(first: int, requests: int, folder: Path) -> Counter[str]:
     with patch.object(boundary_process, "ANSWER_S", boundary_process.PATIENCE_S):  # nothing flies that waits
         while decided(counts) < requests:
             with TemporaryDirectory(dir=folder) as place:
-                both = Together(Random(number), Path(place))
+                both = make(Random(number), Path(place))
                 try:
                     both.run()
                 except AssertionError as error:

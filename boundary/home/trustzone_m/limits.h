@@ -1,0 +1,20 @@
+/* Made by .make/limits from rtshcua/model/flat/home_limits.py: what fits in the secure world. */
+#define RT_MAX_BUNDLE 65536
+#define RT_MAX_DOCUMENT 16384
+#define RT_MAX_REPLACEMENTS 2
+#define RT_MAX_ROOT 16384
+#define RT_MAX_PART 18000
+#define RT_MOST_AHEAD 60
+#define RT_MOST_OPENED 128
+#define RT_MOST_POLICIES 16
+#define RT_MAX_ROLES 16
+#define RT_MAX_ZONES 64
+#define RT_MAX_TOTAL_VERTICES 1024
+#define RT_MAX_TABLES 32
+#define RT_MAX_SETS 128
+#define RT_MAX_CONTRACTS 32
+#define RT_MAX_RULES 128
+#define RT_MAX_INVOCATIONS 64
+#define RT_MAX_KEYS 32
+#define RT_MAX_ANSWERS 32
+#define RT_MAX_DISPATCHED 1024

@@ -1,4 +1,4 @@
-"""The agent socket: who may use it, what goes out and comes in, and what never holds a flight up."""
+"""The agent socket: access, messages in both directions, and clients that must not delay a flight."""
 
 import json
 import os
@@ -36,7 +36,7 @@ HELLO = b'{"type":"hello"}\n'
 
 @pytest.fixture
 def folder() -> Iterator[Path]:
-    """A short path: a socket's has at most 107 bytes."""
+    """A short path, because the path of a socket has at most 107 bytes."""
     import tempfile
 
     with tempfile.TemporaryDirectory(dir="/tmp") as name:
@@ -58,7 +58,7 @@ def reader(agents: AgentSocket) -> socket.socket:
 
 
 def heard(link: socket.socket) -> list[bytes]:
-    """What has come in; every line is whole."""
+    """The lines received so far, all complete."""
     data = link.recv(1 << 20)
     assert data.endswith(b"\n")
     return data.splitlines()
@@ -194,7 +194,7 @@ def test_disconnected_reader_and_its_pending_answer_are_dropped(agents: AgentSoc
 
 @pytest.fixture
 def strangers(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Every connection is of another process."""
+    """Make each connection appear to come from another process."""
     processes = count(1)
     monkeypatch.setattr(agent_socket, "peer_of", lambda _: Peer(next(processes), os.geteuid()))
 
@@ -229,7 +229,7 @@ def test_connections_of_one_process_are_limited(agents: AgentSocket) -> None:
 def test_reader_with_pending_document_keeps_its_place(
     agents: AgentSocket, monkeypatch: pytest.MonkeyPatch, alike: bool
 ) -> None:
-    """What came in, and waits for its turn, is not thrown away for whoever comes later."""
+    """A document that waits for its turn is not dropped for a later client."""
     processes = repeat(7) if alike else count(1)
     monkeypatch.setattr(agent_socket, "peer_of", lambda _: Peer(next(processes), None))
     most = MOST_OF_A_PEER if alike else MOST_READERS
@@ -281,7 +281,7 @@ def test_peer_is_unknown_without_peer_credentials(monkeypatch: pytest.MonkeyPatc
 
 
 def test_a_client_that_finds_no_place_tries_again(folder: Path) -> None:
-    """First the queue is full, then it is hung up on; then there is room."""
+    """First the queue is full, then the connection is closed, then there is room."""
     path = folder / "s"
     with socket.socket(socket.AF_UNIX) as listener:
         listener.bind(str(path))
@@ -373,7 +373,7 @@ def test_a_client_hands_in_and_waits_for_its_answer(agents: AgentSocket) -> None
     ],
 )
 def test_client_refuses_other_program(folder: Path, monkeypatch: pytest.MonkeyPatch, says: bytes, found: str) -> None:
-    """Whoever listens at a path may say anything; who recalls a flight there is told so."""
+    """Another program may listen at the path, so a recall there must be reported as failed."""
     monkeypatch.setattr(agent_socket, "LONGEST_TOLD", 200_000)
     with socket.socket(socket.AF_UNIX) as listener:
         listener.bind(str(folder / "s"))
@@ -394,7 +394,7 @@ def test_client_refuses_other_program(folder: Path, monkeypatch: pytest.MonkeyPa
 
 @contextmanager
 def listener(folder: Path, *says: bytes, every_s: float = 0.0) -> Iterator[Path]:
-    """Somebody who listens and says these, one after the other, until who connected hangs up."""
+    """A listener that sends these texts in turn until the client disconnects."""
     over = threading.Event()
 
     def serve() -> None:
@@ -419,7 +419,7 @@ def listener(folder: Path, *says: bytes, every_s: float = 0.0) -> Iterator[Path]
 
 
 def test_follower_waits_a_limited_time_for_identity(folder: Path) -> None:
-    """However often something comes."""
+    """This includes a listener that keeps sending."""
     with listener(folder, *[b" "] * 1_000, every_s=0.01) as path, pytest.raises(TimeoutError):
         FlightFollower(path, patience_s=0.1)
 

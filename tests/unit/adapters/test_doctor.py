@@ -1,4 +1,4 @@
-"""The doctor, beside the simulated vehicle in explicit time: what is well, and each thing that would stop a mission."""
+"""The doctor with the simulated vehicle in explicit time: a healthy vehicle, and each fault that stops a mission."""
 
 import dataclasses
 import itertools
@@ -54,7 +54,7 @@ def examine(
     vehicle_counts: bool = True,
     stated_us: int | None = None,
 ) -> dict[str, VehicleFinding]:
-    """The findings after so many seconds, by slug; of several with one slug, the worst. An ArduCopter acts on a low
+    """The findings after so many seconds, by slug; the worst of several with one slug. An ArduCopter acts on a low
     battery, as its owner set it, unless `config` says otherwise.
     """
     if config.flavour is AutopilotKind.ARDUPILOT and "BATT_FS_LOW_ACT" not in dict(config.parameters):
@@ -101,7 +101,7 @@ def test_healthy_vehicle_has_no_findings(flavour: str) -> None:
     names = [each.message for frame in sent for each in Codec(0, 0).parse(frame)]
     assert {each.get_type() for each in names} == {"HEARTBEAT", "COMMAND_LONG", "PARAM_REQUEST_READ", "TIMESYNC"}
     asked = {each.command for each in names if each.get_type() == "COMMAND_LONG"}
-    own_checks = {mavlink.MAV_CMD_RUN_PREARM_CHECKS}  # it looks again, and says why not
+    own_checks = {mavlink.MAV_CMD_RUN_PREARM_CHECKS}  # the second check reports the reason
     assert asked - own_checks == {mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE}
 
 
@@ -138,7 +138,7 @@ SPEEDS = Speeds(
     cruise=5_000, climb=1_500, descent=1_000, landing=500, landing_below=10_000, homeward=6_000, acceleration=1_000,
     air=12_000, wind=5_000, flight_us=1_000 * SECOND,
 )  # fmt: skip
-#: what is too slow, in the units of the parameter, and what it is to be
+#: a value that is too slow, in the units of the parameter, and the required value
 SLOW = {
     "px4": {
         "MPC_XY_CRUISE": (5.5, 6), "MPC_Z_VEL_MAX_UP": (1, 1.5), "MPC_Z_VEL_MAX_DN": (0.5, 1),
@@ -285,7 +285,7 @@ def test_signing_key_is_advised_only_if_the_release_supports_it(
 
 @FLAVOURS
 def test_unnoticed_low_battery_stops_mission(flavour: str) -> None:
-    """Where the autopilot does nothing about it, and the policy goes by the charge alone."""
+    """The autopilot does not react, and the policy only uses the charge."""
     name = "COM_LOW_BAT_ACT" if flavour == "px4" else "BATT_FS_LOW_ACT"
     config = case.simulated(flavour, parameters=((name, 0.0),))
     slug, by_charge = f"settings/{name.lower()}", case.policy()
@@ -345,7 +345,7 @@ def test_doctor_names_what_is_still_settling() -> None:
 
 @rows(("seconds", "needed"), [(60.0, "at least 1080 s"), (1_079.0, "at least 1080 s"), (1_080.0, ""), (0.0, "")])
 def test_fast_simulated_battery_drain_of_px4_warns(seconds: float, needed: str) -> None:
-    """As it is delivered in a minute (`SIM_BAT_DRAIN`): each flight there would turn home soon."""
+    """With the default `SIM_BAT_DRAIN` of one minute, each simulated flight would soon return home."""
     (found,) = settings_told("px4", {"SIM_BAT_DRAIN": seconds}, case.policy(), FlightReach())
     assert (found.slug, found.needed) == ("settings/sim_bat_drain", needed)
     assert found.verdict is (MissionVerdict.WARN if needed else MissionVerdict.OK)
@@ -453,7 +453,7 @@ def test_second_mediator_and_ground_station_are_reported() -> None:
 
 
 def signs(flavour: str, utc_us: int) -> SimulationConfig:
-    """A vehicle with the key, of which an ArduCopter acts on a low battery."""
+    """A vehicle with the key; an ArduCopter acts on a low battery."""
     acts = (("BATT_FS_LOW_ACT", 2.0),) if flavour == "ardupilot" else ()
     return case.simulated(flavour, signing_key=KEY, utc_us=utc_us, parameters=acts)
 

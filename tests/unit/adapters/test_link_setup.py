@@ -1,4 +1,4 @@
-"""A link key put on the simulated vehicle, in explicit time: what is sent, what is refused, and what is seen of it."""
+"""Setting a link key on the simulated vehicle, in explicit time: frames, refusals and effects."""
 
 from collections.abc import Callable
 from typing import Any
@@ -20,7 +20,7 @@ MOST_US = 40_000_000
 
 
 class Bench:
-    """A vehicle on the bench, and a set-up that talks to it. `lose` drops what is sent to the vehicle."""
+    """A vehicle on the bench, and a set-up connected to it. `lose` drops frames to the vehicle."""
 
     def __init__(self, flavour: str, **config: Any) -> None:
         self.simulation = Simulation(
@@ -111,7 +111,7 @@ def test_an_armed_vehicle_gets_no_key(flavour: str, config: dict[str, Any]) -> N
 
 
 def told_wrongly(setup: LinkSetup, state: int | None, autopilot: Codec) -> Refusal:
-    """What a set-up makes of a disarmed vehicle that tells this landed state, or none."""
+    """The result of a set-up for a disarmed vehicle that reports this landed state, or none."""
     for tick in range(MOST_US // TICK_US):
         now_us = tick * TICK_US
         if tick % 50 == 0:
@@ -154,7 +154,7 @@ def test_several_vehicles_silence_and_deafness_are_refused() -> None:
 
 
 class TwoSenders:
-    """A transport at which a vehicle speaks, and then somebody else, under an id of their own; `sent` is to whom."""
+    """A transport with frames of a vehicle, and then of another sender; `sent` lists the recipients."""
 
     begins = False
 

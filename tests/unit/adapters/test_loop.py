@@ -1,4 +1,4 @@
-"""The thin loop: actions in their order, nothing late, nothing unrecorded that had to be recorded."""
+"""The loop executes actions in order, none too late, and none before its required record."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -28,7 +28,7 @@ def command(token: int, not_after_us: int, *, needs_record: bool) -> Command:
 
 
 class World:
-    """All ports in one, and a runtime that says what it is told to."""
+    """All ports in one object, with a scripted runtime."""
 
     def __init__(self, *script: Sequence[Any]) -> None:
         self.now_us = 1_000
@@ -108,7 +108,7 @@ def test_late_command_is_not_sent_and_is_reported() -> None:
     assert world.did == []
     world.loop.turn()
     assert world.events == [CommandFailed(1_000, 7, "late")]
-    assert world.polled == [WAIT_US, 0]  # and told at once
+    assert world.polled == [WAIT_US, 0]  # and reported at once
 
 
 def test_unrecorded_command_is_withheld() -> None:
@@ -156,7 +156,7 @@ STEP = [Append(b"allowed", WRITTEN), command(7, 5_000, needs_record=True), Appen
 
 
 def held(*script: Sequence[Any]) -> World:
-    """A world whose disk is slow, after a step that was admitted."""
+    """A world with a slow disk, after an admitted step."""
     world = World(STEP, *script)
     world.slow = True
     world.loop.turn()
@@ -169,7 +169,7 @@ def test_a_step_waits_for_its_own_record_alone_and_the_loop_goes_on() -> None:
     world = held()
     world.loop.turn()
     assert (world.did, world.polled) == ([], [WAIT_US, HELD_WAIT_US])
-    world.kept = 1  # the decision; what follows it may take longer
+    world.kept = 1  # the decision; later lines may take longer
     world.loop.turn()
     assert world.did == [("begin", 7)]
     world.loop.turn()

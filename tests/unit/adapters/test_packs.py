@@ -1,4 +1,4 @@
-"""Packs of skills: found by entry points, imported by name, flown by their own code where the policy names them."""
+"""Packs of skills: found by entry points, imported by name, and flown by their own code."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -16,7 +16,7 @@ Install = Callable[[str, str, str], None]
 
 @pytest.fixture
 def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install]:
-    """Installs a package of a name, with entry points and the source of its one module, for this test."""
+    """Install a package with entry points and the source of one module, for this test."""
     site = tmp_path / "site"
     site.mkdir()
     monkeypatch.syspath_prepend(str(site))
@@ -38,7 +38,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install
 
 
 def forget() -> None:
-    """What a process keeps of the packs that it found."""
+    """Clear the cache of packs that were found."""
     packs.folder.cache_clear()
     packs.manoeuvres.cache_clear()
 

@@ -1,4 +1,4 @@
-"""Setting parameters and putting them back: what happens where the vehicle, its owner or the disk do otherwise."""
+"""Setting and restoring parameters, also when the vehicle, its owner or the disk interferes."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -35,7 +35,7 @@ def has(of: Flight, name: str = "FENCE_ALT_MAX") -> float:
 
 
 def writes(of: Flight) -> list[Any]:
-    """What is set of the vehicle from now on, the switches of its fence apart."""
+    """The parameters set from now on, except the switches of the fence."""
     found: list[Any] = []
 
     def watch(frame: bytes) -> bool:

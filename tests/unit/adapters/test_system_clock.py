@@ -37,7 +37,7 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
 
 
 def test_both_times_go_on_while_the_machine_is_suspended(machine: Machine) -> None:
-    """Else a bundle that expired meanwhile flies, and an approval, a zone's hours, an age count for what they were."""
+    """Otherwise an expired bundle could fly, and approvals, hours of zones and ages would be wrong."""
     clock = SystemClock(1_000)
     before = clock.now()
     machine.wait(3_600 * S, suspended=True)

@@ -1,4 +1,4 @@
-"""How far UTC may be off: who vouches for it, in which order, and what becomes of it where nobody does."""
+"""The error of UTC: its sources, their order, and the result without any source."""
 
 from collections.abc import Callable
 
@@ -22,7 +22,7 @@ NOW_US = 1_800_000_000_000_000
 
 
 class Vehicle:
-    """Tells that UTC is so far ahead of our monotonic time, or nothing."""
+    """Reports that UTC is so far ahead of our monotonic time, or reports nothing."""
 
     def __init__(self, ahead_us: int | None = None) -> None:
         self._ahead_us = ahead_us
@@ -113,7 +113,7 @@ def test_the_vehicles_time_is_known_as_well_as_its_clock() -> None:
     assert ts1_ns is not None
     for message, at_us in (
         (mavlink.MAVLink_timesync_message(5_000_000_000, ts1_ns), 100_002_000),
-        (mavlink.MAVLink_system_time_message(0, 5_010), 100_012_000),  # before its receiver told it
+        (mavlink.MAVLink_system_time_message(0, 5_010), 100_012_000),  # before its receiver reported the time
     ):
         source.of(ReceivedFrame(message, message.get_type(), 1, 1, 0, False, b""), at_us)
     assert source.utc(100_012_000) is None
@@ -127,7 +127,7 @@ def test_the_vehicles_time_is_known_as_well_as_its_clock() -> None:
 
 
 def test_unknown_utc_makes_dependent_conditions_unknown() -> None:
-    """Freshness and the hours of a permit: the step waits, and is not permitted."""
+    """Freshness and permitted hours are unknown: the step waits and is not permitted."""
     policy = prepare(flat.POLICY)
     assert not isinstance(policy, Refusal)
     invocations = prepare_mission(flat.MISSION, policy)
@@ -148,7 +148,7 @@ def test_unknown_utc_makes_dependent_conditions_unknown() -> None:
         (NOW_US - 6_000_000, 6_000_000, 0),
         (NOW_US - 2_000_000, 6_000_000, 4_000_000 + 2_001 + 1),
         (NOW_US + 5_000_000, 6_000_000, 11_000_000 + 5_502 + 1),  # its clock may be ahead of ours
-        (NOW_US + 6_000_001, 6_000_000, 0),  # certainly of the time to come: that is refused, and not waited for
+        (NOW_US + 6_000_001, 6_000_000, 0),  # certainly in the future, so it is refused without waiting
         (NOW_US, UTC_UNKNOWN_US, 0),
     ],
 )
@@ -212,11 +212,11 @@ def test_stated_utc_error_holds_once_waiting_ends() -> None:
 
 
 def test_time_taken_by_the_boundary_meanwhile_is_followed() -> None:
-    """Else the vehicle counts as ready before anybody here knows the time of day, and its first step is deferred."""
+    """Otherwise the vehicle counts as ready before the time of day is known, and its first step is deferred."""
     own = Own(number=77)
     watch = UtcWatch(SystemClock(), None, kernel_us=lambda: None)
     watch.follow(own)
-    own.source = ClockSource.VEHICLE  # its answer came between two looks
+    own.source = ClockSource.VEHICLE  # its answer came between two checks
     assert (watch.waits, watch.question(), watch.vehicle_may_tell) == (True, 0, True)
     assert watch.look(SourceTime(), "px4", 0)
     assert not watch.vehicle_may_tell

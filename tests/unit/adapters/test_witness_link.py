@@ -1,4 +1,4 @@
-"""A log and its witnesses over real UDP: with losses, strangers, restarts, and witnesses that saw something else."""
+"""A log and its witnesses over real UDP: losses, strangers, restarts, and witnesses with another view."""
 
 import socket
 import threading
@@ -57,7 +57,7 @@ class Served:
 
 
 class Lossy:
-    """A relay between one client and a witness that loses, repeats and delays what it carries."""
+    """A relay between a client and a witness that loses, repeats and delays messages."""
 
     def __init__(self, to: tuple[str, int], loses: float) -> None:
         self.to, self.loses, self.chance = to, loses, Random(7)
@@ -221,7 +221,7 @@ def test_two_witnesses_over_a_bad_link(serve: Callable[..., Served], writer: Wri
 
 
 def test_a_witness_that_is_not_there_yet(serve: Callable[..., Served], writer: Writer, port: int) -> None:
-    """It is asked for the genesis alone until it answers, and then led along all keys."""
+    """It gets only the genesis until it answers, and then the checkpoints of all keys."""
     client = writer.client((HOST, port))
     for _ in range(70):
         writer.epoch(1)
@@ -284,7 +284,7 @@ def test_a_witness_that_saw_another_future(serve: Callable[..., Served], writer:
     found = until(client, lambda found: any(isinstance(each, WitnessTrouble) for each in found))
     (trouble,) = [each for each in found if isinstance(each, WitnessTrouble)]
     assert "saw another log" in trouble.text
-    assert client.finish(PATIENCE_S) == []  # nothing more is expected of it
+    assert client.finish(PATIENCE_S) == []  # no more answers are expected
     assert not seen(3)(found)
 
 
@@ -330,7 +330,7 @@ def test_only_what_is_on_the_disk_is_shown(serve: Callable[..., Served], writer:
 
 
 def test_half_a_line_is_left_alone(serve: Callable[..., Served], writer: Writer) -> None:
-    """A line that the disk took in part is cut off and written again."""
+    """A line that was partly written is cut off and written again."""
     client = writer.client(serve().address)
     whole = writer.path.read_bytes()
     with writer.path.open("ab") as file:
@@ -343,7 +343,7 @@ def test_half_a_line_is_left_alone(serve: Callable[..., Served], writer: Writer)
 
 
 def test_strangers_are_not_heard(serve: Callable[..., Served], writer: Writer) -> None:
-    """Junk, requests that are none, answers that nobody asked for: none of it is answered, and none of it disturbs."""
+    """Junk, malformed requests and unrequested answers are ignored."""
     served = serve()
     codec = Codec(9, 9)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger:
@@ -365,7 +365,7 @@ def test_strangers_are_not_heard(serve: Callable[..., Served], writer: Writer) -
 
 
 def test_malformed_witness_answers_are_ignored(writer: Writer) -> None:
-    """Whoever sits on the link may answer anything: it is only ever asked again."""
+    """An attacker on the link may answer anything; the client only repeats its request."""
     codec = Codec(255, 155)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as liar:
         liar.bind((HOST, 0))

@@ -1,4 +1,4 @@
-"""A small fleet's logs, an archive of them, and one with nothing in it."""
+"""The logs of a small fleet, an archive of them, and an empty archive."""
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -24,7 +24,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def empty(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of an archive that has its tables, with nothing in them: the engine takes its time to make them."""
+    """The folder of an archive with empty tables, made once because the engine is slow to create them."""
     folder = ArchiveFolder(tmp_path_factory.mktemp("empty") / "archive", make=True)
     lay_out(folder)
     return folder.path
@@ -32,13 +32,13 @@ def empty(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def folder(empty: Path, tmp_path: Path) -> ArchiveFolder:
-    """An archive with nothing in it."""
+    """An empty archive."""
     return ArchiveFolder(Path(copytree(empty, tmp_path / "archive")), make=True)
 
 
 @pytest.fixture
 def take(folder: ArchiveFolder) -> Add:
-    """Adds logs to that archive."""
+    """A function that adds logs to that archive."""
 
     def take(logs: Iterable[Path], check: VerificationOptions = CHECK) -> list[Done]:
         return list(add(folder, map(LogSource, logs), check))
@@ -48,7 +48,7 @@ def take(folder: ArchiveFolder) -> Add:
 
 @pytest.fixture(scope="session")
 def filled(fleet: Path, tmp_path_factory: pytest.TempPathFactory) -> ArchiveFolder:
-    """The archive of the whole fleet, for tests that only ask."""
+    """The archive of the whole fleet, for read-only tests."""
     folder = ArchiveFolder(tmp_path_factory.mktemp("filled") / "archive", make=True)
     list(add(folder, map(LogSource, sorted(fleet.glob("*.jsonl"))), CHECK))
     return folder

@@ -1,4 +1,4 @@
-"""Logs are taken in octet for octet, verified before anything of them is indexed, and never indexed twice."""
+"""Logs are copied byte for byte, verified before they are indexed, and never indexed twice."""
 
 import json
 from collections.abc import Callable
@@ -67,7 +67,7 @@ def test_archive_entry_describes_its_log(take: Add, fleet: Path, folder: Archive
 def test_copies_of_a_log_are_added_once_and_each_is_reported(
     take: Add, fleet: Path, folder: ArchiveFolder, tmp_path: Path
 ) -> None:
-    """A sound one is never called failed: what came of the first came of each."""
+    """A valid log is never reported as failed: each copy has the result of the first."""
     sound, broken = fleet / "quad-08-0.jsonl", tmp_path / "broken.jsonl"
     broken.write_bytes(sound.read_bytes()[:-1] + b"#\n")
     paths = []
@@ -251,7 +251,7 @@ def test_a_copy_that_was_damaged_is_replaced_by_the_log_taken_in_again(
 
 @pytest.mark.slow
 def test_an_index_that_was_changed_is_made_anew(take: Add, fleet: Path, folder: ArchiveFolder) -> None:
-    """Who can write in the folder can let the index say anything; the logs still say what they said."""
+    """Whoever can write to the folder can forge the index, but not the logs."""
     done = take(sorted(fleet.glob("*.jsonl")))
     rows, known = question(folder, "refused"), entries(folder)
     for path in [folder.catalogue, *folder.parts()]:
@@ -354,7 +354,7 @@ def test_an_anchor_for_another_log_of_the_same_boot_fails_it(take: Add, fleet: P
     assert (done.entry.status, done.entry.finding) == ("failed", "anchor/beyond")
 
 
-#: what a vehicle may say
+#: texts that a vehicle may report
 SAID = (
     "", "plain", 'a "quote" and \\', "two\nlines\ttab", "\0 nothing", "\x7f\u2028", "ünï ✓ 🚁", "x" * 3_000, "'; DROP",
 )  # fmt: skip

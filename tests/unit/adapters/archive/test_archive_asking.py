@@ -1,4 +1,4 @@
-"""Questions to an archive: what ships answers as the lines do, conditions narrow it, and only reading is done."""
+"""Queries of an archive: shipped queries match the log lines, conditions narrow them, and all are read-only."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -28,7 +28,7 @@ def asker(filled: ArchiveFolder) -> Iterator[ArchiveReader]:
 
 @pytest.fixture(scope="session")
 def wanted(fleet: Path) -> list[tuple[object, ...]]:
-    """Every refusal of the fleet, by hand."""
+    """Every refusal of the fleet, collected without the archive."""
     return refused(fleet.glob("*.jsonl"))
 
 

@@ -1,4 +1,4 @@
-"""`rtshcua archive add`, killed at random moments and begun again, ends with every log in it once."""
+"""`rtshcua archive add`, killed at random moments and repeated, adds every log exactly once."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""The questions that ship run on other engines, over the same Parquet files, with the same answers.
+"""The shipped queries give the same answers on other engines over the same Parquet files.
 
 SQLite is always there, fed with the rows. DataFusion (the engine under Ballista, which spreads queries over machines)
 and ClickHouse (`chdb`) read the files themselves; they are tried where they are installed (group `engines`).
@@ -75,7 +75,7 @@ def test_every_question_has_the_same_answer(engine: Callable[[ArchiveFolder], En
 
 
 def test_no_question_needs_more_than_standard_sql() -> None:
-    """Nothing that only some engines have, as far as words tell."""
+    """The queries contain no keyword that only some engines support."""
     own = ("QUALIFY", "LIMIT", "::", "GROUP BY ALL", "EXCLUDE", "FILTER (", "UNNEST", "ILIKE", "//", "STRFTIME")
     for question in canned().values():
         assert not [word for word in own if word in question.sql.upper()]

@@ -1,4 +1,4 @@
-"""Who verifies makes no difference: this process, several, or a cluster."""
+"""The result does not depend on the workers: this process, several processes, or a cluster."""
 
 import subprocess
 import sys
@@ -60,7 +60,7 @@ if __name__ == "__main__":
 
 @pytest.mark.clients
 def test_a_cluster_comes_to_the_same(take: Add, fleet: Path, tmp_path: Path, checkout: Path) -> None:
-    """A scheduler and two workers, each a process of its own, on this machine."""
+    """A scheduler and two workers run as separate processes on this machine."""
     script = tmp_path / "on_cluster.py"
     script.write_text(CLUSTER)
     run = subprocess.run(

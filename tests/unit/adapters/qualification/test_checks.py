@@ -1,4 +1,4 @@
-"""The checks as functions of what was observed: made by hand, at the edge of each limit."""
+"""The qualification checks of hand-made observations, at the edge of each limit."""
 
 from typing import Any
 
@@ -41,7 +41,7 @@ def checks(policy: Any = BRAKED, *sorties: ObservedSortie, **about: Any) -> dict
 
 
 def leg(way_mm: int, took_us: int, **about: Any) -> ObservedSortie:
-    """A leg at 4 m/s that is told to stop at 10 s, stands after so long, so far on, and stays."""
+    """A leg at 4 m/s with a stop command at 10 s; the vehicle stands after a time and a distance, and stays."""
     samples = [MotionSample(at, 0, 0, 10 * M, 4 * M, 0) for at in (9_900_000, 10 * S)]
     samples = [each._replace(latitude=place(0)) for each in samples]
     samples += [MotionSample(10 * S + took_us // 2, place(way_mm // 2), 0, 10 * M, 3 * M, 0)]
@@ -119,7 +119,7 @@ def taken(kind: TakeoverKind, shown_us: int | None, how: str = "another target",
         (taken(TakeoverKind.MODE, None), FAILED),
         (taken(TakeoverKind.TARGET, 320_000, moved_us=S + 320_000), HELD),
         (taken(TakeoverKind.TARGET, 320_000, moved_us=S + 400_000), FAILED),
-        (taken(TakeoverKind.PAUSE, 6 * S, "paused"), HELD),  # ArduCopter's: that it stands is all that shows
+        (taken(TakeoverKind.PAUSE, 6 * S, "paused"), HELD),  # ArduCopter shows only that it stands
         (taken(TakeoverKind.TARGET, 6 * S, "paused"), FAILED),
         (taken(TakeoverKind.PAUSE, 11 * S, "paused"), FAILED),
         (taken(TakeoverKind.PAUSE, 6 * S, "stopped-short"), FAILED),

@@ -1,4 +1,4 @@
-"""How a vehicle stands to its record, in words; what is asked of it; and where the record is kept."""
+"""The comparison of a vehicle with its qualification record, the requests for its identity, and the record's file."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -37,7 +37,7 @@ def test_partly_flown_vehicle_is_partly_qualified() -> None:
 
 
 def test_a_simulation_qualifies_no_vehicle() -> None:
-    """Whoever calls both by one identity would fly the real one with a record of the other."""
+    """With one identity for both, the real vehicle would fly with the simulated vehicle's record."""
     stands = standing(replace(RECORD, pilot=""), VERSION, dict(PARAMETERS))
     assert stands == (False, "this vehicle was qualified in simulation only, on 2026-01-01")
 

@@ -1,4 +1,4 @@
-"""Files of anchors: what is put behind, what is read, and what cannot be."""
+"""Anchor files: appending, reading, and refusals."""
 
 import os
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a boundary keeps from session to session."""
+"""The state that a boundary keeps between sessions."""
 
 from pathlib import Path
 

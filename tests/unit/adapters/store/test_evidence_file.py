@@ -1,4 +1,4 @@
-"""The evidence file under a disk that refuses, takes half, or fails to sync: no line is lost, no chain broken."""
+"""The evidence file on a disk that refuses, writes partly, or fails to sync: no line is lost."""
 
 import errno
 from pathlib import Path

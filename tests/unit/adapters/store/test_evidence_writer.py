@@ -1,4 +1,4 @@
-"""The evidence writer: nobody waits for the disk, no line is lost or out of order, and what is kept is told truly."""
+"""The evidence writer: the flight never waits for the disk, no line is lost, and stored lines are counted correctly."""
 
 import errno
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""The key store: private, whole or not there, and never a key for another duty."""
+"""The key store: private, written atomically, and each key used for its own duty only."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -19,7 +19,7 @@ LATER = NOW + 1_000_000
 
 @pytest.fixture(autouse=True)
 def _cheap_guesses(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Encrypted keys are many here."""
+    """Make passphrases cheap to check, because these tests encrypt many keys."""
     monkeypatch.setattr(key_file, "COST", key_file.COSTS[0])
 
 

@@ -1,4 +1,4 @@
-"""Which log a vehicle wrote last, and what is told of it."""
+"""The last log of a vehicle, and the notes about it."""
 
 import json
 from pathlib import Path

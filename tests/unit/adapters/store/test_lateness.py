@@ -1,4 +1,4 @@
-"""When a disk is told to be late, and to hang: not for the time in which the whole process stood still."""
+"""When a disk is reported as late or hanging: time in which the whole process was stopped does not count."""
 
 import pytest
 
@@ -8,7 +8,7 @@ from rtshcua.model.durability import SYNCED
 
 @pytest.fixture
 def lateness() -> Lateness:
-    """One that watches a line which is not on the disk yet, from second 100 on."""
+    """Watches a line that is not on the disk yet, from second 100 on."""
     made = Lateness()
     made.given(1, SYNCED)
     assert made.late(0, 100.0) is None
@@ -16,7 +16,7 @@ def lateness() -> Lateness:
 
 
 def looked(lateness: Lateness, from_s: float, to_s: float) -> str | None:
-    """What is told in that time by who looks ten times a second."""
+    """The reports of that time when the disk is checked ten times a second."""
     told = None
     for tenths in range(int(from_s * 10), int(to_s * 10)):
         told = told or lateness.stuck(0, tenths / 10)
@@ -29,7 +29,7 @@ def test_a_disk_that_does_not_answer_hangs(lateness: Lateness) -> None:
 
 
 def test_stopped_process_does_not_count_as_a_slow_disk(lateness: Lateness) -> None:
-    """Both threads were stopped, and the one that looks may go on first."""
+    """Both threads were stopped, and the watching thread may continue first."""
     assert looked(lateness, 100, 101) is None
     assert lateness.stuck(0, 131.0) is None
     assert lateness.late(0, 131.0) is None

@@ -1,4 +1,4 @@
-"""A set of files is laid whole or not at all, whatever is there and wherever the disk gives up."""
+"""A set of files is written completely or not at all, whatever exists and wherever the disk fails."""
 
 import errno
 import os
@@ -15,7 +15,7 @@ FILES = {"a.rts": b"new a", "sub/b.rts": b"new b", "sub/deep/.c": b"new c"}
 
 
 def tree(folder: Path) -> dict[str, bytes | None]:
-    """Everything below a folder: what is in files, None for folders."""
+    """Everything below a folder: the contents of files, and None for folders."""
     return {str(path.relative_to(folder)): path.read_bytes() if path.is_file() else None for path in folder.rglob("*")}
 
 
@@ -59,7 +59,7 @@ def test_a_file_or_folder_in_the_way_is_never_replaced(tmp_path: Path, in_the_wa
 
 
 def failing_at(number: int, real: Callable[..., Any], left: list[int]) -> Callable[..., Any]:
-    """A system call that fails once, the `number`th time that it is asked for."""
+    """A system call that fails once, on its `number`th call."""
     left.append(number)
 
     def call(*arguments: Any, **more: Any) -> Any:
@@ -84,7 +84,7 @@ def test_disk_failure_at_any_point_changes_nothing(tmp_path: Path, name: str, mo
                 with suppress(OSError):
                     assert lay(FILES, tmp_path / folder, replace=True) is None
             if left[0] > 0:
-                assert number > 1 or (name, folder) == ("rename", "new/x")  # nothing is put aside there
+                assert number > 1 or (name, folder) == ("rename", "new/x")  # no file is moved aside there
                 break
             assert tree(tmp_path) == before
         else:

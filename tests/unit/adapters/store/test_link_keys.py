@@ -1,4 +1,4 @@
-"""The link's key and its timestamps on the disk: who may read them, what survives a crash, what stops a run."""
+"""The link key and its timestamps on the disk: permissions, crashes, and errors that stop a run."""
 
 import os
 import stat
@@ -117,7 +117,7 @@ def test_second_run_on_a_link_key_is_refused(tmp_path: Path) -> None:
              b'{"timestamp": 1, "streams": [[1, 1]]}', b'{"timestamp": 1, "streams": 3}', b"\xff"],
 )  # fmt: skip
 def test_a_damaged_state_stops_the_run(tmp_path: Path, data: bytes) -> None:
-    """Not knowing which timestamps were used must not look like having used none."""
+    """Unknown timestamps must not be treated as unused."""
     store = LinkStore(tmp_path, "quad-07", KEY)
     put(store.path, data)
     assert slug(store.load) == "damaged"
@@ -125,14 +125,14 @@ def test_a_damaged_state_stops_the_run(tmp_path: Path, data: bytes) -> None:
 
 
 def test_timestamps_stay_monotonic_after_a_crash(tmp_path: Path) -> None:
-    """The clock is set back besides; what is on the disk is all that is left."""
+    """The clock is also set back, and only the state on the disk remains."""
     store = LinkStore(tmp_path, "quad-07", KEY)
     link = SignedLink(KEY, store.load(), UTC, 0)
     heard = SignedLink(KEY, SigningState(0, {}), UTC, 0).sign(a_frame(), 0)
     assert link.accept(heard, 0)
     keeper = LinkKeeper(store, link, us_in)
     last = [link.sign(a_frame(), now_us) for now_us in range(0, 2_900_000, 100_000)][-1]
-    left = store.load()  # here it dies: nothing more is written
+    left = store.load()  # the process dies here, and writes nothing more
     after = SignedLink(KEY, left, UTC - 10**12, 0)
     assert after.sign(a_frame(), 0)[-12:-6][::-1] > last[-12:-6][::-1]
     assert not after.accept(heard, 0)
@@ -149,7 +149,7 @@ def test_next_frame_of_ardupilot_is_accepted_after_a_kill(tmp_path: Path, moment
     keeper = LinkKeeper(store, link, us_in)
     heard = [vehicle.sign(a_vehicles_frame(), 0) for _ in range(moment)]
     assert all(link.accept(frame, 10_000 * at) for at, frame in enumerate(heard))
-    left = store.load()  # here it is killed: what lies in memory and on the disk is all that is left
+    left = store.load()  # the process is killed here: shared memory and the disk remain
     after = SignedLink(KEY, left, UTC + 10_000 * moment, 0)
     assert not any(after.accept(frame, 0) for frame in heard)
     assert after.accept(vehicle.sign(a_vehicles_frame(), 0), 0)
@@ -204,7 +204,7 @@ def test_memory_keeps_the_newest_streams_until_an_orderly_exit(tmp_path: Path, m
     again = signing.HeardStamps("name")
     assert again.load() == {(1, each, 0): 100 + each for each in range(5, 19)} | {(1, 200, 0): 500, (1, 19, 0): 501}
     again.close(forget=True)
-    again.remember((1, 1, 1), 7)  # too late: nothing happens
+    again.remember((1, 1, 1), 7)  # too late: no effect
     assert list(tmp_path.iterdir()) == []
 
 

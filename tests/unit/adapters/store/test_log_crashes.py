@@ -1,4 +1,4 @@
-"""Processes and power that fail while a log is written and while it is recovered: what was acknowledged is kept."""
+"""Process crashes and power cuts while a log is written or recovered lose no acknowledged line."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -19,7 +19,7 @@ KINDS = ("died", "torn", "late", "failed", "short", "refused")
 
 
 class Crashed(NamedTuple):
-    """A log that was written until the process or the power failed: its lines, how many were written, and synced."""
+    """A log written until a crash or power cut: its lines, and the numbers written and synced."""
 
     path: Path
     lines: list[bytes]
@@ -44,10 +44,10 @@ def crashed(folder: Path, chance: Random, disk: PowerDisk, *, most: int = 80) ->
 
 
 def campaign(folder: Path, seed: int) -> str:
-    """One crash and its recovery, which may crash too; what is wrong with the outcome, or nothing."""
+    """Run one crash and its recovery, which may crash too; return the fault of the outcome, if any."""
     chance = Random(seed)
     when, kind = chance.randint(2, 260), chance.choice(KINDS)
-    more = chance.random() < 0.3  # it does not stay at one
+    more = chance.random() < 0.3  # several crashes may follow
 
     def fault(number: int, name: str) -> str:
         return kind if number == when or (more and number > when and number % 7 == 0) else ""
@@ -69,9 +69,9 @@ def campaign(folder: Path, seed: int) -> str:
 
 
 def outcome(log: Crashed, chance: Random, *, cut: bool, doubtful: bool) -> str:
-    """What is wrong with a log once it was recovered, or nothing. After a power cut only what was synced must be there.
+    """Return the fault of a recovered log, if any. After a power cut only synced lines must remain.
 
-    `doubtful`: a sync had failed; if the power then goes, what is lost may stand before a signed record.
+    `doubtful`: a sync had failed, so a power cut may lose lines before a signed record.
     """
     if not log.path.exists() or examine(log.path, LOG_KEY.public).state is LogState.UNBEGUN:
         return "" if log.synced == 0 and (cut or log.written == 0) else "the beginning is lost"
@@ -92,7 +92,7 @@ def campaigns(seeds: range) -> list[str]:
 
 
 def each_operation(kinds: Sequence[str], step: int) -> list[str]:
-    """Every fault at every operation (or each so many) of a writer, with and without a power cut; what is wrong."""
+    """Return the faults found after a failure at each (or each nth) operation, with and without a power cut."""
     wrong, number = [], 0
     over = False
     while not over:

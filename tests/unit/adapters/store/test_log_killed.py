@@ -1,4 +1,4 @@
-"""Writers that are killed at random moments: nothing that was acknowledged is lost, and the log is recovered."""
+"""Writers killed at random moments lose no acknowledged line, and the log is recovered."""
 
 import subprocess
 import sys
@@ -12,7 +12,7 @@ TESTS = Path(killed.__file__).parents[1]
 
 
 def kill(count: int, seed: int) -> None:
-    """In a process of its own, which has no threads and can fork."""
+    """Run in a separate process without threads, which can fork."""
     command = [sys.executable, killed.__file__, str(count), str(seed)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, env={"PYTHONPATH": str(TESTS)})
     assert (done.returncode, done.stderr) == (0, ""), done.stdout

@@ -1,4 +1,4 @@
-"""Logs of flights that broke off, ended on the disk; and what if that is broken off too."""
+"""Recovery of interrupted logs on the disk, also when the recovery is interrupted."""
 
 import json
 import os
@@ -109,7 +109,7 @@ def test_a_link_to_elsewhere_is_not_written_to(tmp_path: Path) -> None:
 
 
 def test_a_file_with_another_name_elsewhere_is_not_written_to(tmp_path: Path) -> None:
-    """Whoever may put a name into the folder, but not write the file, must not have it written by a recovery."""
+    """A user who can create links in the folder must not make a recovery write to a foreign file."""
     path, lines = torn(tmp_path)
     elsewhere = tmp_path / "elsewhere"
     elsewhere.touch()

@@ -1,4 +1,4 @@
-"""What is kept of parameters that are to be put back."""
+"""The stored values of parameters that must be restored."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What others may have put there is opened as a regular file, or refused at once."""
+"""Paths under the control of others are opened as regular files or refused at once."""
 
 import os
 import socket
@@ -49,7 +49,7 @@ def test_links_are_followed_but_not_below_a_root(root: Path) -> None:
     for path in (root / "folder/secret", root / "../secret"):
         with pytest.raises(OSError, match=f"{path}'$"):
             read_regular(path, 9, root)
-    (root.parent / "here").symlink_to(root)  # how somebody calls the root is theirs to say
+    (root.parent / "here").symlink_to(root)  # the root itself may be reached through a link
     assert read_regular(root.parent / "here/sub/a", 9, root.parent / "here") == b"inside"
 
 

@@ -1,4 +1,4 @@
-"""The replay store through a crash at every single thing that it does to the disk: what was opened stays opened."""
+"""The replay store with a crash at each disk operation: an opened mission stays opened."""
 
 import os
 from collections.abc import Callable
@@ -15,11 +15,11 @@ MOST = 60
 
 
 class Crash(BaseException):
-    """The machine stops here; nothing of the program runs any more."""
+    """The machine stops here."""
 
 
 class Disk:
-    """Lets so many changes through, and crashes before, or half way through, the next."""
+    """Allows a number of changes, and crashes before or during the next one."""
 
     def __init__(self, patch: pytest.MonkeyPatch, changes: int, *, half: bool) -> None:
         self._left, self._half = changes, half
@@ -42,7 +42,7 @@ class Disk:
 
 
 def survived(tmp_path: Path, changes: int, *, half: bool) -> tuple[bool, bool]:
-    """Whether the second opening got through, and whether it counts as opened afterwards."""
+    """Whether the second opening succeeded, and whether it counts as opened after the crash."""
     store = FileReplayStore(tmp_path, "quad-07")
     assert store.open_once(ONE, 1000, 10, "bridge", 7) is MissionOpening.OPENED
     through = True

@@ -1,4 +1,4 @@
-"""Looking into the replay store as a rehearsal does: the same answer, and nothing is made or used up."""
+"""The read-only lookup of the replay store by a rehearsal: the same answer, without an effect."""
 
 from pathlib import Path
 

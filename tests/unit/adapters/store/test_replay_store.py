@@ -1,4 +1,4 @@
-"""A bundle opens once: also after a crash, in two processes at once, and with the clock set back."""
+"""A bundle opens only once, also after a crash, with two processes, and with the clock set back."""
 
 import os
 import subprocess
@@ -57,7 +57,7 @@ def test_vehicles_have_separate_replay_stores(tmp_path: Path) -> None:
 def test_expired_markers_are_pruned(tmp_path: Path) -> None:
     store = FileReplayStore(tmp_path, "quad-07")
     assert store.open_once(ONE, 1000, 10, *POLICY) is OPENED
-    assert store.open_once(TWO, 2000, 1000, *POLICY) is OPENED  # not yet: it expires with this very microsecond
+    assert store.open_once(TWO, 2000, 1000, *POLICY) is OPENED  # it expires at the end of this microsecond
     assert (store.folder / ONE.hex()).exists()
     assert store.open_once(THREE, 3000, 1001, *POLICY) is OPENED
     assert sorted(path.name for path in store.folder.iterdir()) == sorted(
@@ -88,7 +88,7 @@ def test_a_marker_that_a_crash_left_empty_still_counts(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("beside", ["a marker", "a floor"])
 def test_versions_that_are_gone_are_damage(tmp_path: Path, beside: str) -> None:
-    """Else a policy that was taken back flies again."""
+    """Otherwise a withdrawn policy could fly again."""
     store = FileReplayStore(tmp_path, "quad-07")
     assert store.open_once(ONE, 1000, 10, *POLICY) is OPENED
     if beside == "a floor":

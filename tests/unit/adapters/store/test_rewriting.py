@@ -1,4 +1,4 @@
-"""A file is rewritten whole or not at all, and stays what it was besides."""
+"""A file is rewritten atomically and keeps its attributes."""
 
 import errno
 import os

@@ -1,4 +1,4 @@
-"""A log file, verified quickly, by several processes, by its octets alone, and line by line: they come to the same."""
+"""Quick, parallel, byte-based and line-by-line verification of a log file agree."""
 
 from pathlib import Path
 

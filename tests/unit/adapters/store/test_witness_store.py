@@ -1,4 +1,4 @@
-"""What a witness remembers survives it, comes before every cosignature, and is believed only when it is whole."""
+"""A witness's state survives crashes, is stored before each cosignature, and is used only if intact."""
 
 import os
 from pathlib import Path
@@ -85,7 +85,7 @@ def test_damaged_witness_memory_prevents_cosigning(tmp_path: Path, log: Log, con
 
 
 def test_killed_witness_never_contradicts_itself(tmp_path: Path, log: Log, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever step of keeping fails, no cosignature left; and the witness knows the old checkpoint, or the new one."""
+    """Whichever write fails, no cosignature is sent, and the witness knows the old or the new checkpoint."""
     steps = [("write", 1), ("fsync", 1), ("replace", 1), ("fsync", 2)]  # the file is synced, then its folder
     for number, (step, turn) in enumerate(steps):
         folder = tmp_path / str(number)

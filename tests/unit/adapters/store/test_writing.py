@@ -1,4 +1,4 @@
-"""Files that are whole or not there, and never written through a link."""
+"""Files are written atomically, and never through a link."""
 
 import errno
 import os
@@ -123,7 +123,7 @@ def test_append_refuses_special_files(tmp_path: Path) -> None:
     append(tmp_path / "a", b"two")
     assert (tmp_path / "a").read_bytes() == b"onetwo"
     os.mkfifo(tmp_path / "pipe")
-    with pytest.raises(OSError, match="pipe"):  # nobody reads it
+    with pytest.raises(OSError, match="pipe"):  # the pipe has no reader
         append(tmp_path / "pipe", b"one")
     reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
     with pytest.raises(NotRegular):

@@ -21,5 +21,5 @@ def flyer(flavour: str) -> Callable[..., Flyer]:
 
 @pytest.fixture
 def aloft(flavour: str) -> Callable[..., Flyer]:
-    """One that has climbed: to 20 m, or to an altitude in mm."""
+    """A function that makes a flying vehicle at 20 m, or at an altitude in mm."""
     return lambda altitude=20_000: copied(climbed(flavour, altitude))

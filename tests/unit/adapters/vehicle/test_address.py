@@ -1,4 +1,4 @@
-"""Link addresses: what is accepted, and what is said of each that is not."""
+"""Link addresses: accepted forms, and the error for each bad one."""
 
 import pytest
 

@@ -19,7 +19,7 @@ FLAVOURS = ("px4", "ardupilot")
 
 @cache
 def in_a_leg(flavour: str) -> Flyer:
-    """Five seconds of a leg are flown."""
+    """A vehicle five seconds into a leg."""
     one: Flyer = copied(climbed(flavour, 20_000))
     one.begin(MotionKind.FLY, (200_000, 0), altitude=20_000, speed=5_000)
     one.wait(5)
@@ -28,7 +28,7 @@ def in_a_leg(flavour: str) -> Flyer:
 
 @pytest.mark.parametrize("flavour", FLAVOURS)
 def test_stopping_point_reached_during_a_stall_is_ours(flavour: str) -> None:
-    """It was told to stop just before, and to come home just after: it names its place between the two."""
+    """A stop was sent just before the stall and a return just after; the stopping point is reported in between."""
     one = copied(in_a_leg(flavour))
     one.begin(MotionKind.HOLD)
     one.wait(0.2)
@@ -43,7 +43,7 @@ def test_stopping_point_reached_during_a_stall_is_ours(flavour: str) -> None:
     each_once((100 * MS, 3 * S, 5_300 * MS), (MotionKind.HOME, MotionKind.LAND, MotionKind.HOLD), FLAVOURS),
 )
 def test_a_pilot_who_took_over_meanwhile_is_not_flown_over(taken_us: int, kind: MotionKind, flavour: str) -> None:
-    """Reports of the mode before that waited are no answer to who flies."""
+    """Queued reports of the earlier mode do not show who flies now."""
     one = copied(in_a_leg(flavour))
     one.vehicle.simulation.inject(PilotMode(one.vehicle.simulation.now_us + taken_us, FlightMode.POSITION))
     one.vehicle.stand_still(6 * S)

@@ -1,4 +1,4 @@
-"""How far a mission and an airspace go, and which of the autopilot's own bounds are narrower."""
+"""The reach of a mission and an airspace, and the autopilot's own bounds that are narrower."""
 
 import pytest
 from msgspec.structs import replace

@@ -1,4 +1,4 @@
-"""Acknowledgements: retried, extended, doubted, never taken for the effect; streams: asked for and measured."""
+"""Acknowledgements are retried and extended, and never count as the effect; streams are requested and measured."""
 
 from typing import Any
 
@@ -87,7 +87,7 @@ def test_answers_to_other_commands_are_set_aside() -> None:
 
 
 class Link:
-    """Streams that come as they are asked for, unless `every` says otherwise."""
+    """Streams that are delivered as requested, or at `every`."""
 
     def __init__(self, wanted: dict[str, int]) -> None:
         self.streams = StreamRequests(StreamPlan(wanted, 0, 0, None), ())
@@ -96,7 +96,7 @@ class Link:
         self.now_us = 0
 
     def run(self, seconds: float) -> list[str]:
-        """Let time pass; what was asked for."""
+        """Let time pass; return the requests."""
         before = len(self.asked)
         for _ in range(round(seconds * 100)):
             self.now_us += S // 100
@@ -114,7 +114,7 @@ class Link:
 
 
 def told(one: Link) -> list[str]:
-    """What was noted, but for what was delivered at first."""
+    """The notes, except those on the first delivery."""
     first, *others = one.streams.notes
     assert first.startswith("streams: ")
     return others

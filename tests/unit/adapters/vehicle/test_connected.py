@@ -1,4 +1,4 @@
-"""The UDP link: one peer, the first that proves to be a vehicle; nothing that comes raises."""
+"""The UDP link has one peer, the first identified vehicle; no input raises an exception."""
 
 import select
 import socket
@@ -24,7 +24,7 @@ HERE = "127.0.0.1"
 
 
 class Peer:
-    """Somebody who sends."""
+    """A sender on the link."""
 
     def __init__(self, to: int, system: int = 1) -> None:
         self.codec = Codec(system, 1)
@@ -43,7 +43,7 @@ class Peer:
         return frame.name
 
     def answers_time(self, link: ConnectedVehicle) -> None:
-        """Answer the first TIMESYNC that comes."""
+        """Answer the first TIMESYNC received."""
         while True:
             (frame,) = self.codec.parse(self.socket.recv(65_535))
             if frame.name == "TIMESYNC":
@@ -121,7 +121,7 @@ def test_the_first_vehicle_is_answered_and_nobody_else_is_heard(
 
 @pytest.mark.parametrize("key", ["the link's", "another"])
 def test_vehicle_with_late_signing_clock_is_accepted_after_a_greeting(key: str) -> None:
-    """ArduPilot that heard nobody for over a minute: it counts frames, and takes a later timestamp."""
+    """ArduPilot received nothing for over a minute: it counts frames, and accepts a later timestamp."""
     now, frames = SystemClock().now(), FrameSession()
     ours = SignedLink(bytes(range(32)), SigningState(0, {}), now.utc_us, now.monotonic_us)
     theirs = SignedLink(
@@ -169,7 +169,7 @@ def test_a_busy_port_is_an_os_error(link: ConnectedVehicle) -> None:
 
 
 def crowd(link: ConnectedVehicle) -> str | None:
-    """Another vehicle, after what was sent could come."""
+    """The notice of another vehicle, once all frames have arrived."""
     for _ in range(3):
         link.poll(SystemClock().now().monotonic_us, 20_000)
     return link.driver.link.crowd
@@ -251,19 +251,19 @@ def test_awaited_datagrams_are_handled_one_by_one(
     def taken() -> list[int | None]:
         return [value for event in poll(link) if isinstance(event, Readings) for _, value in event.values]
 
-    for message in both:  # what waits already is taken in together
+    for message in both:  # queued frames are read together
         vehicle.send(message)
     assert taken() == [5_700, 5_600]
     look = select.select
     nothing: tuple[list[Any], ...] = ([], [], [])
-    monkeypatch.setattr(select, "select", lambda *asked: look(*asked) if asked[-1] else nothing)  # all comes later
+    monkeypatch.setattr(select, "select", lambda *asked: look(*asked) if asked[-1] else nothing)  # later frames
     for message in both:
         vehicle.send(message)
     assert [taken(), taken()] == [[5_700], [5_600]]
 
 
 class Moment:
-    """A clock that stands where it was set."""
+    """A clock that only changes when it is set."""
 
     def __init__(self) -> None:
         self.us = 10_000_000
@@ -283,7 +283,7 @@ class Moment:
 
 @pytest.mark.parametrize("waits", [True, False])
 def test_unread_datagrams_are_not_a_silence(waits: bool) -> None:
-    """This process was held up: what the vehicle said meanwhile lies in the socket."""
+    """This process was delayed, and the vehicle's frames wait in the socket."""
     clock = Moment()
     link = ConnectedVehicle(
         UdpTransport(HERE, 0, begins=False), Driver(POLICY, FrameSession()), clock, lambda utc_us, frame: None

@@ -1,4 +1,4 @@
-"""A crash is told from what is of one moment, by the vehicle's own clock, whenever that is read."""
+"""A crash is detected from reports of one moment by the vehicle's clock, whenever they are read."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -23,7 +23,7 @@ KNOWN = ATTITUDE | POSITION | VELOCITY_HORIZONTAL | HEIGHT | VELOCITY_VERTICAL
 
 
 class Watched:
-    """A vehicle whose messages come at `now_us`; without one, as they are made. `told` is what showed a crash."""
+    """A vehicle whose messages arrive at `now_us`, or as they are sent. `told` lists the signs of a crash."""
 
     def __init__(self) -> None:
         self.seen = ObservedVehicle(estimator=Estimator("ESTIMATOR_STATUS"))
@@ -99,7 +99,7 @@ def test_motors_off_after_a_gap_are_not_a_crash() -> None:
 
 
 def test_first_report_after_a_gap_is_not_dated_by_queued_frames() -> None:
-    """A heartbeat has no stamp: its earliest time is that of the last stamp before."""
+    """A heartbeat has no timestamp: its earliest time is that of the last stamp before it."""
     one = Watched()
     one.now_us = 70 * S
     one.flew()

@@ -1,4 +1,4 @@
-"""A link that holds frames back: what arrives late is old, whoever sent it, and an old state is an unknown one."""
+"""A link that delays frames: a late report is old, and a stale state is unknown."""
 
 from functools import cache
 
@@ -23,7 +23,7 @@ REPORTED = ("battery", "height", "gps.fix", "position", "link.quality")
 
 
 class Watched:
-    """The simulated vehicle through its driver, and what the state monitor makes of it."""
+    """The simulated vehicle with its driver and the state monitor."""
 
     def __init__(self, flavour: str) -> None:
         prepared = prepare(LATE)
@@ -65,7 +65,7 @@ def watched(flavour: str) -> Watched:
 
 
 def ready(flavour: str) -> Watched:
-    """One that has been heard for 20 s."""
+    """A vehicle that was received for 20 s."""
     return copied(watched(flavour))
 
 
@@ -97,14 +97,14 @@ def test_slightly_delayed_position_stays_known_with_its_age(flavour: str) -> Non
         ages = one.monitor.state(one.now_us).ages
         assert set(REPORTED) <= one.known()
         reported = [ages[signal.slot] for signal in LATE.signals if signal.name in REPORTED]
-        # the way down, as much again that the way up may have taken of the round trip, and until the next report
+        # the way down, the same again for the way up, and the time to the next report
         assert 500_000 <= min(reported) <= max(reported) < 500_000 + 500_000 + 600_000
     assert one.vehicle.driver.source.clock.round_trip_us == 1_000_000
 
 
 @pytest.mark.parametrize("flavour", ["px4", pytest.param("ardupilot", marks=pytest.mark.soak)])
 def test_a_link_that_was_slow_from_the_beginning_counts_the_way_up_as_well(flavour: str) -> None:
-    """Nothing tells how a round trip is divided: all of it may have been the way down."""
+    """The division of a round trip is unknown: all of it may have been the way down."""
     one = Watched(flavour)
     one.delay(700_000)
     one.wait(25)

@@ -1,4 +1,4 @@
-"""What a minute takes of the charge, as measured from reports in whole percent."""
+"""The drain of the charge per minute, measured from reports in whole percent."""
 
 from random import Random
 from typing import Any
@@ -32,7 +32,7 @@ S = 1_000_000
 def measured(
     rate: int, seconds: int, *, start: int = 10_000, every_us: int = S, meter: DrainMeter | None = None
 ) -> int | None:
-    """What is measured at the end of so many seconds in which a minute takes `rate`, 1/10000, reported in percent."""
+    """The drain measured after so many seconds at `rate` (1/10000 per minute), reported in percent."""
     meter, found = meter or DrainMeter(), None
     for at_us in range(0, seconds * S + 1, S):
         left = max(0, start - rate * at_us // MINUTE)
@@ -66,7 +66,7 @@ def test_a_drain_that_ends_is_believed_to_have_ended() -> None:
 
 @given(st.integers(20, 190), st.integers(0, 99), st.sampled_from([100, 200, 500]))
 def test_a_slow_drain_is_measured_once_the_charge_changed_often_enough(rate: int, start: int, step: int) -> None:
-    """From 0.2 % a minute on, in whatever steps it is told: within a tenth of it at the end, and known from then on."""
+    """From 0.2 % a minute on, reported in any steps: accurate to a tenth at the end, and known from then on."""
     meter, known = DrainMeter(), 0
     each_s = step * 60 // rate + 1
     for second in range(0, 8 * each_s, max(1, each_s // 40)):
@@ -108,7 +108,7 @@ def test_a_fall_at_once_is_a_finding_and_no_drain() -> None:
 
 @pytest.mark.parametrize(("every", "rise"), [(5, 200), (5, 300), (10, 100), (20, 100)])
 def test_a_charge_that_rises_now_and_then_is_drained_all_the_same(every: int, rise: int) -> None:
-    """As an estimate by voltage does; such a drain was never known, or seldom."""
+    """An estimate from voltage does this; the drain was never or seldom known."""
     meter, known = DrainMeter(), list[int]()
     for second in range(300):
         left = (10_000 - 1_760 * second // 60) // 100 * 100
@@ -129,9 +129,9 @@ def test_drain_accepts_steps_of_at_most_ten_percent() -> None:
 
 
 def naive(reports: list[tuple[int, int | None]]) -> int | None:
-    """What the last of these reports (when, charge) makes known, by all of them."""
+    """The drain known after the last of these reports (time, charge), computed from all of them."""
     known = [(at_us, charge) for at_us, charge in reports if charge is not None]
-    since = last = 0  # where the charge jumped last, or stood; what it came to be least
+    since = last = 0  # the last jump or pause of the charge, and its minimum
     rate, often = None, 0
     for now, (at_us, charge) in enumerate(known):
         least = min(each for _, each in known[last:now]) if now > last else charge
@@ -181,7 +181,7 @@ def test_the_drain_is_what_the_least_charges_tell(steps: list[tuple[int, int | N
 
 @given(st.integers(400, 3_000), st.lists(st.integers(0, 300), min_size=1, max_size=40))
 def test_no_rise_of_up_to_three_percent_hides_a_drain(rate: int, rises: list[int]) -> None:
-    """In any pattern, if one report in four is as low as it is."""
+    """In any pattern, if one report in four has the true value."""
     meter, known = DrainMeter(), False
     for second in range(100):
         left = 10_000 - rate * second // 60
@@ -216,7 +216,7 @@ def test_reports_that_come_late_or_together_make_no_number_too_great() -> None:
 
 
 def legs(meter: PaceMeter, *speeds: int, seconds: int = 60, climb: int = 0) -> tuple[int, int]:
-    """What is known of flight at these speeds over ground (mm/s), one after the other, told ten times a second."""
+    """The measured pace of flight at these speeds over ground (mm/s), reported ten times a second."""
     x = at_us = 0
     for speed in speeds:
         for _ in range(seconds * 10):
@@ -244,14 +244,14 @@ def test_a_place_that_is_not_known_or_too_old_begins_anew() -> None:
         meter.move(lost, lost, lost, 40 * S)
         meter.move(900_000, 0, 0, 41 * S)
         meter.move(905_000, 0, 0, 42 * S)
-        meter.move(0, 0, 0, 30 * S)  # came late
+        meter.move(0, 0, 0, 30 * S)  # arrived late
         assert meter.flown(0) == flown
 
 
 def flown_with(
     policy: Any, speed: int, rate: int, *, seconds: int = 120, asked: int = 0
 ) -> tuple[Consumption, int | None]:
-    """After a leg at a speed over ground of which a minute takes `rate`; the charge is told in whole percent."""
+    """The state after a leg at a speed over ground and a drain of `rate` a minute, reported in whole percent."""
     of, found = Consumption(policy.vehicle), None
     of.fly(asked)
     for second in range(seconds):
@@ -268,7 +268,7 @@ SPEEDS = Speeds(
 
 @pytest.mark.parametrize(("asked", "counted_at"), [(0, 5_000), (3_000, 3_000), (6_000, 5_000)])
 def test_slow_progress_raises_the_drain_of_the_return(asked: int, counted_at: int) -> None:
-    """Against more wind than declared. What a minute takes is as declared; what a metre takes is not."""
+    """With more wind than declared, the drain per minute is as declared, but the drain per metre is higher."""
     policy = replace(POLICY, vehicle=replace(POLICY.vehicle, speeds=SPEEDS))
     assert over_ground(SPEEDS, asked or SPEEDS.homeward) == counted_at
     declared = drained(policy.vehicle)

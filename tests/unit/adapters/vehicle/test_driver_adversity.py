@@ -1,4 +1,4 @@
-"""What goes wrong on real links and vehicles: refusals, losses, take-overs, garbage, silence."""
+"""Faults of real links and vehicles: refusals, losses, takeovers, garbage, silence."""
 
 from collections.abc import Callable
 from random import Random
@@ -30,13 +30,13 @@ from virtual.policy import BATTERY, FIX, HEIGHT, POLICY, POSITION_X
 from virtual.sampling import each_once
 
 Make = Callable[..., Any]
-#: where nothing depends on the autopilot, `make test` tries one of them
+#: `make test` uses one autopilot where the result does not depend on it
 ONE_FLAVOUR = pytest.mark.parametrize("flavour", ["px4", pytest.param("ardupilot", marks=pytest.mark.soak)])
 OTHER_FLAVOUR = pytest.mark.parametrize("flavour", ["ardupilot", pytest.param("px4", marks=pytest.mark.soak)])
 COMMANDS = ("COMMAND_LONG", "COMMAND_INT")
 
 
-#: commands of ours, each sent at the latest on the leg, or on the way home
+#: our commands, all sent by the end of the leg or of the way home
 OURS = (
     mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_CMD_NAV_TAKEOFF,
     mavlink.MAV_CMD_DO_REPOSITION, mavlink.MAV_CMD_DO_CHANGE_SPEED,
@@ -49,7 +49,7 @@ def of_command(frame: bytes, number: int) -> bool:
 
 
 def asks(frame: bytes) -> bool:
-    """Whether it only asks for a message."""
+    """Whether the frame only requests a message."""
     return of_command(frame, mavlink.MAV_CMD_REQUEST_MESSAGE)
 
 
@@ -61,7 +61,7 @@ def test_pilot_takes_over_while_it_flies(aloft: Make, flavour: str) -> None:
     begun = one.now_us
     taken = one.until(TakenOver, 5)
     assert taken.how == {"px4": "Position", "ardupilot": "POSHOLD"}[flavour]
-    assert taken.at_us - begun < 500_000  # the heartbeat was asked for at 5 Hz
+    assert taken.at_us - begun < 500_000  # the heartbeat was requested at 5 Hz
     assert not any(isinstance(event, (TakenOver, CommandFailed, Succeeded)) for event in one.wait(10))
 
 
@@ -118,7 +118,7 @@ def test_disarmed_vehicle_fails_a_leg(flyer: Make, kind: MotionKind) -> None:
 
 
 def goes_on(one: Any, command: int) -> None:
-    """Whatever was lost, it flies a leg; and home, where the way home may be the first that needs the command."""
+    """Whatever was lost, the vehicle flies a leg and returns home."""
     assert isinstance(one.fly(MotionKind.FLY, (40_000, 0), altitude=20_000, speed=5_000), Succeeded)
     if command == mavlink.MAV_CMD_DO_SET_MODE:
         assert isinstance(one.fly(MotionKind.HOME), Succeeded)
@@ -127,7 +127,7 @@ def goes_on(one: Any, command: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("command", "flavour"), each_once(OURS, ["px4", "ardupilot"]))
 def test_lost_acknowledgements_change_nothing(flyer: Make, command: int) -> None:
-    """What was obeyed and not acknowledged is seen by its effect; the retry's refusal is not taken for the first's."""
+    """An obeyed command without acknowledgement is detected by its effect; a refused retry does not count."""
 
     def drop(datagram: bytes) -> list[bytes]:
         found = Codec(1, 1).parse(datagram)
@@ -172,7 +172,7 @@ def test_flies_on_a_poor_and_slow_link(flyer: Make) -> None:
 
 @OTHER_FLAVOUR
 def test_unanswered_command_neither_succeeds_nor_fails(flyer: Make) -> None:
-    """It hears nothing of ours, though we hear it: nothing is known of the command but that it did not arrive."""
+    """Reports arrive, but our frames do not reach the vehicle, so the command's state stays unknown."""
     one = flyer()
     one.until(Ready)
     one.vehicle.lose = lambda frame: True
@@ -187,7 +187,7 @@ def test_unanswered_command_neither_succeeds_nor_fails(flyer: Make) -> None:
 
 
 def test_airborne_vehicle_is_ready_once_it_answers(aloft: Make) -> None:
-    """What brings it home is chosen by what is known of it; while it answers nothing, nothing would arrive anyway."""
+    """The fallback depends on the known state; while the vehicle does not answer, no command would arrive."""
     one = aloft()
     one.vehicle.lose = lambda frame: True
     one.vehicle.driver = Driver(POLICY, one.vehicle.frames, fence=False)
@@ -206,7 +206,7 @@ def test_airborne_vehicle_is_ready_once_it_answers(aloft: Make) -> None:
 
 
 def test_airborne_vehicle_without_time_is_ready(aloft: Make) -> None:
-    """It answers, so that it can be brought down: but what it says has no age."""
+    """The vehicle answers and can be landed, but its reports have no age."""
     one = aloft()
     one.vehicle.lose = lambda frame: Codec(1, 1).parse(frame)[0].name == "TIMESYNC"
     one.vehicle.driver = Driver(POLICY, one.vehicle.frames, fence=False)
@@ -215,7 +215,7 @@ def test_airborne_vehicle_without_time_is_ready(aloft: Make) -> None:
 
 
 def test_overtaken_heartbeat_is_not_a_takeover(aloft: Make) -> None:
-    """Both were sent between the same two stamps: only the numbers of their frames tell which was first."""
+    """Both were sent between the same two stamps; only their sequence numbers show the order."""
     one = aloft()
     one.begin(MotionKind.FLY, (100_000, 0), altitude=20_000, speed=5_000)
     one.wait(3)
@@ -242,7 +242,7 @@ def test_overtaken_heartbeat_is_not_a_takeover(aloft: Make) -> None:
 
 @ONE_FLAVOUR
 def test_a_link_that_fails_upward_first_and_then_downward_is_lost(aloft: Make) -> None:
-    """As a radio fails at the end of its range: first it does not hear us, then we do not hear it."""
+    """A radio at the end of its range first loses the uplink, then the downlink."""
     one = aloft()
     one.begin(MotionKind.HOLD)
     one.wait(1)
@@ -287,7 +287,7 @@ def test_a_hurried_vehicle_is_given_more_time(flyer: Make) -> None:
 
 @ONE_FLAVOUR
 def test_stopping_short_is_a_failure(aloft: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It stands, and goes on saying that it flies to our target."""
+    """The vehicle stands but still reports our target."""
     one = aloft()
     one.begin(MotionKind.FLY, (200_000, 0), altitude=20_000, speed=5_000)
     one.wait(6)

@@ -1,4 +1,4 @@
-"""Each kind of motion, on both flavours, ended by what is seen and by nothing else."""
+"""Each kind of motion, on both autopilots, ends only by its observed effect."""
 
 from collections.abc import Callable
 from typing import Any
@@ -73,7 +73,7 @@ def test_holds_on_without_a_time(aloft: Make) -> None:
 
 
 def rests(one: Any) -> bool:
-    """It has landed, and that was no crash."""
+    """Whether the vehicle landed without a crash."""
     one.wait(10)
     return not one.truth.armed and not any(isinstance(event, Crashed) for event in one.events)
 
@@ -105,7 +105,7 @@ def test_landing_what_stands_already_is_done_at_once(flyer: Make) -> None:
 
 @pytest.mark.slow
 def test_one_command_replaces_another_without_a_false_take_over(aloft: Make) -> None:
-    """Modes show in the heartbeat with a delay, so the mode of a command just replaced may still come."""
+    """The heartbeat reports modes with a delay, so the mode of a replaced command may still arrive."""
     one = aloft()
     one.begin(MotionKind.FLY, (100_000, 0), altitude=20_000, speed=5_000)
     one.wait(4)

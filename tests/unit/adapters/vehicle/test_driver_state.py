@@ -1,4 +1,4 @@
-"""What a driver makes of single frames: readiness and its reasons, modes taken over, texts, altitudes."""
+"""A driver's reaction to single frames: readiness, mode takeovers, texts, altitudes."""
 
 from typing import Any
 
@@ -26,7 +26,7 @@ def link() -> SignedLink:
 
 
 class Bench:
-    """A driver, and an autopilot that says what it is told to say."""
+    """A driver, and a scripted autopilot."""
 
     def __init__(self, autopilot: int = PX4, *, signs: bool = False, keyed: bool = False) -> None:
         self.autopilot = autopilot
@@ -36,7 +36,7 @@ class Bench:
         self.codec = Codec(1, 1)
         self.now_us = S
         self.answers = True  # TIMESYNC; it was started when our clock was
-        self.deaf = False  # it answers nothing at all
+        self.deaf = False  # no answers at all
         self.events: list[Event] = []
         self.sent: list[Any] = []
         self.beat(0)
@@ -60,7 +60,7 @@ class Bench:
                 self.answer()
 
     def answer(self) -> None:
-        """What is asked for: the mode, as it was told last."""
+        """Answer a request with the last reported mode."""
         self.hear(mavlink.MAVLink_command_ack_message(512, 0, 0, 0, 1, 191))
         self.beat(*self.told)
 
@@ -94,7 +94,7 @@ class Bench:
         self.hear(mavlink.MAVLink_statustext_message(severity, text.encode()))
 
     def well(self) -> None:
-        """On the ground, with everything that is needed."""
+        """Report a vehicle on the ground with all required data."""
         self.tick()
         self.landed(1)
         self.hear(mavlink.MAVLink_gps_raw_int_message(1, 3, 0, 0, 0, 0, 0, 0, 0, 0))

@@ -1,4 +1,4 @@
-"""The estimator gates position and height: by its flags, their age, and whether there ever was a home."""
+"""Estimator flags, their age, and a known home decide whether position and height are valid."""
 
 from rtshcua.adapters.vehicle.observed import STALE_US, Estimator
 from virtual.rows import rows
@@ -24,7 +24,7 @@ def known(estimator: Estimator, now_us: int = S) -> set[str]:
     (0x73F, {"relative_alt", "vz", "hdg"}),  # PX4: GPS glitch
     (0x833F, {"relative_alt", "vz", "hdg"}),  # ArduPilot: GPS glitching
     (0x025, {"relative_alt", "vz", "hdg"}),  # GPS lost
-    (0x024, set()),  # no attitude: nothing else is worth anything
+    (0x024, set()),  # no attitude, so no other flag counts
 ])  # fmt: skip
 def test_flags_as_recorded_and_as_documented(flags: int, fields: set[str]) -> None:
     estimator = Estimator("EKF_STATUS_REPORT")

@@ -1,4 +1,4 @@
-"""The airspace as a fence: never narrower than the airspace, and what it does not say is told."""
+"""The airspace as a fence: never narrower than the airspace, with a note for each omitted part."""
 
 from typing import Any
 
@@ -137,7 +137,7 @@ def acknowledged(result: int) -> Any:
 
 
 def test_an_item_that_came_twice_ends_no_upload() -> None:
-    """A vehicle that waits for long asks again, and gets two answers: to the second it says `invalid sequence`."""
+    """A slow vehicle repeats its request, gets two answers, and reports `invalid sequence` for the second."""
     items = fence(ARDUPILOT, [zone()]).items
     upload = Upload(items, ARDUPILOT.fence.frame)
     upload.due(1, 0)

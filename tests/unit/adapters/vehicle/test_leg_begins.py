@@ -1,4 +1,4 @@
-"""When ArduCopter flies a leg, which it acknowledges with nothing: its speed goes out then, and the leg no more."""
+"""The start of a leg on ArduCopter, which does not acknowledge legs: the speed is sent, the leg not repeated."""
 
 from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 from rtshcua.adapters.vehicle.flavour import Stage
@@ -17,14 +17,14 @@ def vehicle(latitude: int, height: int, speed: int, target: tuple[int, int, int]
 
 
 def leg(begins: ObservedVehicle) -> Stage:
-    """The frame of the leg itself, with what ends the wait for it."""
+    """The frame of the leg, with the condition that ends the wait for its start."""
     command = Command(1, "goto", MotionKind.FLY, (0, 0), PLACE, 20_000, 6_000, 0)
     (found,) = [each for each in ARDUPILOT.stages(command, begins, 1) if each.message is not None and each.repeat_us]
     return found
 
 
 def test_residual_takeoff_motion_does_not_start_a_leg() -> None:
-    """It names no target before the first leg. The frame of that was lost, and was never sent again."""
+    """No target is reported before the first leg. Its frame was lost, and was never sent again."""
     begun = leg(vehicle(473_977_398, 19_600, 300)).done
     assert begun is not None
     assert not begun(vehicle(473_977_398, 19_900, 300)), "it rises on"

@@ -1,4 +1,4 @@
-"""Our end of the link: what the boundary does not let out fails the manoeuvre; what comes in is proved first."""
+"""Our end of the link: a frame refused by the boundary fails the manoeuvre; received frames are verified first."""
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -25,7 +25,7 @@ def test_frame_refused_by_boundary_fails_the_command() -> None:
     assert not [event for event in target.driver.tick(10_000_000)[0] if isinstance(event, CommandFailed)], "told once"
     target.frames.open(LAND)
     target.now_us = 11_000_000
-    target.receive(target.says(mavlink.MAVLink_attitude_message(11_900, 0, 0, 0, 0, 0, 0)))  # what follows is of now:
+    target.receive(target.says(mavlink.MAVLink_attitude_message(11_900, 0, 0, 0, 0, 0, 0)))  # later frames are current:
     target.receive(target.says(greeting("px4")[0]))  # its mode is known
     assert target.driver.begin(LAND, 11_000_000)[0] == []
     events, _ = target.driver.tick(11_050_000)
@@ -48,7 +48,7 @@ def test_a_retry_after_the_session_was_closed_does_not_leave() -> None:
     target.frames.close()
     target.now_us = 1_500_000
     target.sent.clear()
-    target.receive(target.says(mavlink.MAVLink_attitude_message(2_400, 0, 0, 0, 0, 0, 0)))  # what follows is of now
+    target.receive(target.says(mavlink.MAVLink_attitude_message(2_400, 0, 0, 0, 0, 0, 0)))  # later frames are current
     target.receive(target.says(mavlink.MAVLink_heartbeat_message(2, 3, 129, 4, 4, 3)))
     events, due = target.driver.tick(1_600_000)
     failed = [event for event in (*target.events, *events) if isinstance(event, CommandFailed)]
@@ -95,9 +95,9 @@ def test_an_unsigned_radio_is_heard_at_its_worst() -> None:
 @pytest.mark.parametrize(
     ("system", "component", "name", "named", "heard"),
     [
-        (51, 68, "RADIO_STATUS", None, True),  # a SiK radio: it is nobody's part
+        (51, 68, "RADIO_STATUS", None, True),  # a SiK radio belongs to no vehicle
         (1, 68, "RADIO_STATUS", None, True),
-        (51, 68, "RADIO_STATUS", 1, False),  # several speak here: whose link is it about?
+        (51, 68, "RADIO_STATUS", 1, False),  # several vehicles: the link is ambiguous
         (51, 1, "RADIO_STATUS", None, False),
         (52, 68, "RADIO_STATUS", None, False),
         (51, 68, "HEARTBEAT", None, False),

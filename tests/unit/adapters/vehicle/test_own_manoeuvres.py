@@ -1,4 +1,4 @@
-"""A skill that a pack flies in a way of its own: through the same gate, and never instead of what ships."""
+"""A manoeuvre of a pack: it passes the same gate, and never replaces a shipped one."""
 
 from collections.abc import Callable
 from typing import Any
@@ -18,7 +18,7 @@ Make = Callable[[Stages], Any]
 
 @pytest.fixture
 def with_own(flyer: Callable[..., Any], flavour: str) -> Make:
-    """A flyer whose `climb` is flown in this way."""
+    """A flyer whose `climb` is flown by this manoeuvre."""
 
     def make(own: Stages) -> Any:
         made = flyer()

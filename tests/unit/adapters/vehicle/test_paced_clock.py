@@ -1,4 +1,4 @@
-"""The clock of a simulated vehicle that lives faster than life."""
+"""The clock of a simulated vehicle that runs faster than real time."""
 
 from rtshcua.adapters.clock import PacedClock, SystemClock
 
@@ -24,7 +24,7 @@ def test_follows_the_vehicles_time_and_runs_a_little_ahead() -> None:
     assert clock.now().monotonic_us == start + 100_000
     clock.heard(5_120_000)
     assert clock.now().monotonic_us == start + 120_000
-    machine.ns += 100 * MS  # a second of the vehicle's life, in which nothing was heard
+    machine.ns += 100 * MS  # one second of vehicle time without a frame
     assert clock.now().monotonic_us == start + 120_000 + clock.LEAD_US
 
 

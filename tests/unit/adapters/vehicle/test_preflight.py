@@ -31,7 +31,7 @@ CITY = replace(
 FLAVOURS = pytest.mark.parametrize("flavour", [PX4, ARDUPILOT], ids=lambda flavour: flavour.name)
 
 
-#: what limits the way home, of both flavours
+#: the parameters that limit the way home, of both autopilots
 AS_IT_COMES = {
     "RTL_MIN_DIST": 10.0, "NAV_MC_ALT_RAD": 0.8, "RTL_CONE_SLOPE": 3.0, "RTL_CLIMB_MIN": 0.0, "WPNAV_RADIUS": 200.0,
     "RTL_TYPE": 0.0, "RTL_ALT_TYPE": 0.0, "RALLY_TOTAL": 0.0,
@@ -39,7 +39,7 @@ AS_IT_COMES = {
 
 
 class Port:
-    """A vehicle that takes parameters and a fence, as the flavour asks and answers. `lose` decides on each frame."""
+    """A vehicle that accepts parameters and a fence, as its autopilot does. `lose` decides on each frame."""
 
     def __init__(self, flavour: Flavour, parameters: dict[str, float] | None = None) -> None:
         self.flavour = flavour
@@ -87,7 +87,7 @@ class Port:
         return []
 
     def settle(self, preflight: Preflight, seconds: int = 60) -> None:
-        """Let both talk until nothing is outstanding, or for so long."""
+        """Exchange frames until nothing is outstanding, or for a limited time."""
         ours, theirs = Codec(1, 191), Codec(1, 1)
         for tick in range(seconds * 10):
             now_us = tick * S // 10
@@ -115,7 +115,7 @@ def at_home() -> ObservedVehicle:
 
 
 def done(flavour: Flavour) -> str:
-    """What is told of a fence that was set: on ArduCopter parameters are changed for it."""
+    """The notes about a fence that was set; ArduCopter needs parameters for it."""
     text = "its fence was set to the policy's airspace (4 items), and read back"
     switched = "; switched on with `FENCE_TYPE` from 3 to 7 and `FENCE_ENABLE` from 0 to 1, which stays so"
     return text + (switched if flavour is ARDUPILOT else "")
@@ -236,7 +236,7 @@ def test_a_limit_of_the_way_home_that_stays_silent_is_told_once(flavour: Flavour
 
 @pytest.mark.parametrize(("count", "told"), [(1, "1 rally point"), (7, "7 rally points")])
 def test_rally_points_of_px4_prevent_readiness(count: int, told: str) -> None:
-    """A return leads to the one that is nearest, with RTL_TYPE 0 too; no parameter tells of them."""
+    """A return leads to the nearest rally point, also with RTL_TYPE 0; no parameter reports them."""
     one, port = preflight(PX4), Port(PX4)
     port.rally = lambda: [mavlink.MAVLink_mission_count_message(1, 191, count, 2)]
     port.settle(one, 10)

@@ -1,4 +1,4 @@
-"""Frames in which a manoeuvre sees nothing new are not shown to it: nothing comes of it, whatever goes wrong."""
+"""Frames without news for a manoeuvre are not passed to it, which changes no outcome."""
 
 from collections.abc import Callable, Sequence
 from itertools import product
@@ -19,7 +19,7 @@ from virtual.shipped import shipped, simulated
 FAULTS = ("link-loss,at=5s,loss=40%", "link-delay,at=0s,delay=400ms")
 
 
-#: one of them flies a whole mission twice; the others are for soak
+#: one case flies a whole mission twice; the others are for soak
 CASES = [
     pytest.param("px4", FAULTS[0]),
     *(pytest.param(*each, marks=pytest.mark.soak) for each in [("px4", FAULTS[1]), *product(["ardupilot"], FAULTS)]),
@@ -45,7 +45,7 @@ def test_a_flight_is_the_same_when_every_frame_is_shown(
 def test_a_leg_is_not_looked_at_whenever_time_goes_by(
     aloft: Callable[[], Flyer], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Also one whose target would be repeated, were it not flown to."""
+    """This includes a leg whose target would otherwise be repeated."""
     advance = Manoeuvre.advance
     moments: set[int] = set()
 

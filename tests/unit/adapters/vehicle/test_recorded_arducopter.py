@@ -1,4 +1,4 @@
-"""The recorded flight of ArduCopter 4.7 through driver and state monitor: what its page says, second by second."""
+"""The recorded flight of ArduCopter 4.7, replayed through driver and state monitor second by second."""
 
 import pytest
 
@@ -15,13 +15,13 @@ USING_GPS, ARMED, GPS_OFF, GPS_ON, TAKEN, RETURN, LANDED = 41.6, 42.3, 77.9, 85.
 
 @pytest.fixture(scope="module")
 def watched() -> Recorded:
-    """Nothing is commanded: the flight is somebody else's."""
+    """The replay without commands of ours: a foreign flight."""
     return Recorded("arducopter", 1_000_000, at_home(*HOME), {"RTL_ALT": 3_000.0})
 
 
 @pytest.fixture(scope="module")
 def flown() -> Recorded:
-    """As if the recorded commands had been ours."""
+    """The replay with the recorded commands as ours."""
     return Recorded("arducopter", 1_000_000, at_home(*HOME), {"RTL_ALT": 3_000.0}, (
         (ARMED, command(1, MotionKind.CLIMB, altitude=15_000)),
         (53.8, command(2, MotionKind.FLY, *NORTH_40, altitude=15_000)),
@@ -63,7 +63,7 @@ def test_arducopter_signal_without_report_is_unknown(watched: Recorded) -> None:
 
 
 def test_missing_wind_estimate_is_unknown(watched: Recorded) -> None:
-    """8 m/s blew from 65.9 on, and WIND said 0 all the while, for a copter does not estimate it unless it is tuned."""
+    """From 65.9 on the wind was 8 m/s, but WIND reported 0: an untuned copter does not estimate it."""
     assert watched.known("wind.speed") == []
 
 
@@ -117,14 +117,14 @@ def test_after_our_last_command_the_failsafe_takes_over(flown: Recorded) -> None
 
 
 def test_unanswered_stream_requests_are_noted(watched: Recorded) -> None:
-    """The recorded client had asked for 1 Hz of some; a 4 Hz stream was what it got of most."""
+    """The recorded client had requested 1 Hz for some streams; most came at 4 Hz."""
     notes = [event.text for _, event in watched.of(Noted)]
     assert "the vehicle's own fence was left unchanged" in notes
     assert not any("GLOBAL_POSITION_INT" in note for note in notes)
 
 
 def test_a_critical_state_is_told_though_the_mode_stays(watched: Recorded) -> None:
-    """The battery's failsafe came at 111.1, on a return that was under way."""
+    """The battery failsafe triggered at 111.1, during a return."""
     told = [(at, event.text) for at, event in watched.of(Noted) if "critical" in event.text]
     assert [text for _, text in told][:3] == [
         "the vehicle reports a critical state", "the vehicle's state is no longer critical",

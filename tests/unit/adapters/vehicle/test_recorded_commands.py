@@ -1,4 +1,4 @@
-"""Recorded answers of real autopilots to right and wrong commands, as our side of the protocols takes them."""
+"""Recorded answers of real autopilots to valid and invalid commands, and our reaction to them."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ ARM, TAKEOFF, MODE, REPOSITION, RETURN, LAND = 400, 22, 176, 192, 20, 21
 
 @dataclass
 class Judged:
-    """A command of the recording, and what a commander made of its answers until the next question."""
+    """A recorded command, and the commander's reaction to its answers until the next one."""
 
     number: int
     message: Any

@@ -1,4 +1,4 @@
-"""Ten recorded flights of ours in which something went wrong, through the driver: what it makes of them now.
+"""Ten recorded flights with a failure, replayed through the present driver.
 
 Times are seconds from the first frame of the recording (`tests/traces/README.md`).
 """
@@ -36,7 +36,7 @@ def flown(name: str, *commands: tuple[float, Any], until_s: float) -> Recorded:
 
 
 def legs_sent(of: Recorded) -> list[float]:
-    """When the vehicle was sent somewhere."""
+    """The times at which legs were sent."""
     return [
         at
         for at, frame in of.sent
@@ -46,7 +46,7 @@ def legs_sent(of: Recorded) -> list[float]:
 
 
 def test_a_hover_that_does_not_stop_is_seen_within_seconds() -> None:
-    """It flew on at 4.5 to 5.6 m/s for the 10 s of the hover, about 46 m, and the hover counted as flown."""
+    """It continued at 4.5 to 5.6 m/s for the 10 s of the hover, about 46 m, and the hover counted as successful."""
     seen = flown("px4-hover-does-not-stop", (21.27, leg()), (25.71, hover()), until_s=31)
     (at, failed), *_ = seen.of(CommandFailed)
     assert (failed.token, failed.reason) == (2, "did-not-stop")
@@ -54,7 +54,7 @@ def test_a_hover_that_does_not_stop_is_seen_within_seconds() -> None:
 
 
 def test_landing_between_heartbeats_prevents_the_next_leg() -> None:
-    """No HEARTBEAT shows the pilot's Land: the landed state does from 17.38 s on, the target before it."""
+    """No HEARTBEAT shows the pilot's Land: the target shows it first, and the landed state from 17.38 s on."""
     seen = flown("px4-takeover-race", (12.0, hover()), (18.15, leg(3)), until_s=40)
     (at, taken), *_ = seen.of(TakenOver)
     assert 17.25 < at < 17.5
@@ -66,7 +66,7 @@ def test_landing_between_heartbeats_prevents_the_next_leg() -> None:
     ("name", "begun", "taken_at"), [("px4-pilot-pause", 19.86, 25.07), ("px4-pilot-goto", 19.69, 24.73)]
 )
 def test_a_pause_and_a_go_to_without_a_change_of_mode_are_seen(name: str, begun: float, taken_at: float) -> None:
-    """The pause was told as `stopped-short` after 12 s; the other way was flown for 41 s, unnoticed."""
+    """The pause was reported as `stopped-short` after 12 s; the go-to was not detected for 41 s."""
     seen = flown(name, (begun, leg()), until_s=60)
     (at, taken), *_ = seen.of(TakenOver)
     assert taken_at - 0.1 < at < taken_at + 0.3
@@ -75,15 +75,15 @@ def test_a_pause_and_a_go_to_without_a_change_of_mode_are_seen(name: str, begun:
 
 
 def test_a_guided_target_is_not_overwritten() -> None:
-    """Ours was repeated every 2 s, and took the vehicle back. Now it goes out once it is obeyed no more.
+    """Our target was repeated every 2 s and overrode the pilot's. Now it is not repeated after a leg began.
 
-    That autopilot was not asked for its target, so the recording cannot show whose it flew to.
+    That autopilot's target was not requested, so the recording does not contain it.
     """
     seen = flown("arducopter-pilot-goto", (18.6, leg()), until_s=61)
     assert len([at for at in legs_sent(seen) if at < 60]) <= 2
 
 
-#: when the first frame of a recording that was cut came, in seconds of what it was cut from
+#: the start of a cut recording, in seconds of the original
 FIRST_S = {"arducopter-velocity-takeover": 0.26, "arducopter-pause-takeover": 0.25}
 FAR = (473_996_000, 85_455_900)
 
@@ -115,7 +115,7 @@ def test_a_velocity_and_a_pause_in_guided_are_seen_and_not_fought(
 
 
 def test_leg_after_an_undone_land_changes_no_mode() -> None:
-    """Nothing in the recording shows it: what leaves must not be able to undo it."""
+    """The recording does not show the Land, so the next command must not be able to undo it."""
     seen = flown("px4-land-undone", (30.86, hover()), (33.45, leg(3)), until_s=38)
     sent = [frame.message for _, frame in seen.sent if frame.name == "COMMAND_INT"]
     assert sent
@@ -123,7 +123,7 @@ def test_leg_after_an_undone_land_changes_no_mode() -> None:
 
 
 def test_after_a_dropout_all_is_known_again_before_a_second_is_over() -> None:
-    """On the first frames after 5 s of silence every other signal was stale: what is judged there lands the vehicle."""
+    """At the first frames after 5 s of silence every other signal was stale: a decision then would land the vehicle."""
     seen = flown("arducopter-dropout", (14.5, leg()), until_s=60)
     (lost, why), *_ = seen.of(LinkLost)
     (back, _), *_ = seen.of(LinkBack)
@@ -144,7 +144,7 @@ def test_after_a_dropout_all_is_known_again_before_a_second_is_over() -> None:
 def test_sagging_cells_and_fast_drain_are_both_detected() -> None:
     """10.2 V of three cells from 21.79 s on: flown on for 245 s, and landed with 7 % of a charge that was to be 15 %.
 
-    ArduCopter's own failsafe said so 10 s later. The rule that ships, read by three cells, takes hold at the next look.
+    ArduCopter's own failsafe triggered 10 s later. The shipped rule, for three cells, triggers at the next report.
     """
     policy, mission = stock()
     index, cell = next((number, each) for number, each in enumerate(policy.signals) if each.name == CELL)

@@ -1,4 +1,4 @@
-"""The recorded flight of PX4 1.16 through driver and state monitor: what its page says, second by second."""
+"""The recorded flight of PX4 1.16, replayed through driver and state monitor second by second."""
 
 import pytest
 
@@ -16,13 +16,13 @@ READY, ARMED, RETURN, DISARMED = 5.6, 10.6, 87.1, 147.0
 
 @pytest.fixture(scope="module")
 def watched() -> Recorded:
-    """Nothing is commanded: the flight is somebody else's."""
+    """The replay without commands of ours: a foreign flight."""
     return Recorded("px4", 370_000, shipped_policy(), {"RTL_RETURN_ALT": 30.0})
 
 
 @pytest.fixture(scope="module")
 def flown() -> Recorded:
-    """As if the recorded commands had been ours; and one, at 56 s, that nobody sent, so that nothing answers it."""
+    """The replay with the recorded commands as ours, and an unanswered command at 56 s."""
     return Recorded("px4", 370_000, shipped_policy(), {"RTL_RETURN_ALT": 30.0}, (
         (ARMED, command(1, MotionKind.CLIMB, altitude=15_000)),
         (26.9, command(2, MotionKind.FLY, *NORTH_40, altitude=15_000)),

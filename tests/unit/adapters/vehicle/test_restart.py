@@ -1,4 +1,4 @@
-"""Whose flight a run finds in the air: the table of docs/flying/supervision.md by hand, and what targets tell."""
+"""Who flies when a run starts in the air: the table of docs/flying/supervision.md, and reported targets."""
 
 import pytest
 
@@ -12,7 +12,7 @@ from rtshcua.model.flat.contract import MotionKind
 from rtshcua.onboard.left import CommandInForce, Left
 from rtshcua.onboard.ports import Command
 
-#: in which modes it may be that obeyed this and was touched by nobody
+#: the possible modes of a vehicle that obeyed this command without intervention
 OURS = {
     ("px4", MotionKind.CLIMB): "Takeoff, Hold",
     ("px4", MotionKind.FLY): "Hold",
@@ -51,7 +51,7 @@ def test_flight_mode_shows_who_flies(flavour: AutopilotFlavour) -> None:
 
 
 def test_each_command_that_may_be_in_force_counts() -> None:
-    """The last one may never have got there."""
+    """The last command may not have arrived."""
     left = Left((told(MotionKind.FLY, HERE), told(MotionKind.HOME)))
     assert [flown_by(left, ARDUPILOT, seen(mode)) for mode in (CopterMode.GUIDED, CopterMode.RTL)] == ["", ""]
     assert flown_by(left, ARDUPILOT, seen(CopterMode.BRAKE)) == "BRAKE"
@@ -71,7 +71,7 @@ def near(place: tuple[int, int, int], north: int = 0, up: int = 0) -> tuple[int,
 @pytest.mark.parametrize(
     ("in_force", "target", "ours"),
     [
-        # nothing was named yet: where it was sent, as far as rounding goes
+        # no target was reported yet: its commanded target, up to rounding
         (told(MotionKind.FLY, NORTH), NORTH, True),
         (told(MotionKind.FLY, NORTH), near(NORTH, 2_500), True),
         (told(MotionKind.FLY, NORTH), HERE, False),
@@ -80,7 +80,7 @@ def near(place: tuple[int, int, int], north: int = 0, up: int = 0) -> tuple[int,
         (told(MotionKind.CLIMB), near(HERE, up=-4_000), False),
         (told(MotionKind.HOLD), near(HERE, 9_000, 20_000), True),
         (told(MotionKind.HOLD), FAR, False),
-        # it was named: just that, or the next place
+        # reported: exactly that target, or the next one
         (told(MotionKind.FLY, NORTH, named=NORTH), near(NORTH, 90), True),
         (told(MotionKind.FLY, NORTH, named=NORTH), near(NORTH, 150), False),
         (told(MotionKind.COVER, HERE, NORTH, FAR, named=HERE), NORTH, True),
@@ -99,7 +99,7 @@ def test_in_the_same_mode_the_target_tells(
 
 
 def test_superseded_command_stays_in_force_only_at_exact_place() -> None:
-    """A return that is paused as it begins holds where the hold before it was."""
+    """A return that is paused at its beginning holds at the place of the hold before it."""
     left = Left((told(MotionKind.HOLD, named=HERE), told(MotionKind.HOME)))
     assert flown_by(left, PX4, seen(Px4Mode.HOLD, HERE)) == ""
     assert flown_by(left, PX4, seen(Px4Mode.HOLD, near(HERE, 50))) == "another target"

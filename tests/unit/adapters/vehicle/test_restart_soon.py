@@ -1,4 +1,4 @@
-"""A run that is begun again in the air waits for no report that it could ask for: the vehicle flies on meanwhile."""
+"""A run restarted in the air requests missing reports instead of waiting, because the vehicle flies on."""
 
 from functools import cache
 from typing import Any
@@ -29,7 +29,7 @@ MS, S = 1_000, 1_000_000
 
 @cache
 def left_climbing(flavour: str) -> Flyer:
-    """Its run ended while it climbs."""
+    """A vehicle whose run ended during a climb."""
     one = Flyer(flavour)
     one.until(Ready)
     one.begin(MotionKind.CLIMB, altitude=20_000)
@@ -56,7 +56,7 @@ def begun_again(one: Flyer, policy: Policy = POLICY) -> Flyer:
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 @pytest.mark.parametrize("phase_ms", [0, 250, 500, 750])
 def test_a_restart_in_the_air_is_soon_ready(flavour: str, phase_ms: int) -> None:
-    """PX4's next heartbeat is up to a second away, a report of each kind as well, and ArduCopter names no target here:
+    """The next heartbeat or report of PX4 may take a second, and ArduCopter reports no target here:
     that took up to 3 s, at 6 m/s. A radio cannot be asked for its status, which counts here: 0.5 s.
     """
     one = copied(left_climbing(flavour))
@@ -70,7 +70,7 @@ def test_a_restart_in_the_air_is_soon_ready(flavour: str, phase_ms: int) -> None
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
 @pytest.mark.parametrize("phase_ms", [0, 250, 610])
 def test_link_without_radio_is_ready_at_once(flavour: str, phase_ms: int) -> None:
-    """A link home is chosen by it: where it came before its estimator vouched for it, it landed where it was."""
+    """The fallback depends on the position: before the estimator confirmed it, the vehicle landed on the spot."""
     one = copied(left_climbing(flavour))
     one.wait(phase_ms / 1_000)
     begun_us = begun_again(one, replace(POLICY, signals=SIGNALS[:-1])).now_us
@@ -97,7 +97,7 @@ def test_lossy_link_waits_for_a_target_report() -> None:
 
 @pytest.mark.parametrize(("armed", "taken"), [(False, []), (True, ["Return"])])
 def test_landing_during_a_silence_is_not_a_takeover(armed: bool, taken: list[str]) -> None:
-    """The last word that it flies is old, and the first that is new says that its motors are off, in another mode."""
+    """The last report of flight is old, and the first new one reports stopped motors in another mode."""
     one = begun_again(copied(left_climbing("px4")))
     one.until(Ready, 1)
     one.vehicle.hurt = lambda datagram: ()
@@ -110,7 +110,7 @@ def test_landing_during_a_silence_is_not_a_takeover(armed: bool, taken: list[str
 
 
 def questions(frames: Any) -> list[tuple[int, int]]:
-    """The system that is asked, and for which message."""
+    """The requested messages, with the systems that they are requested from."""
     received = [each for frame in frames for each in Codec(1, 1).parse(frame)]
     return [
         (each.message.target_system, int(each.message.param1))
@@ -134,7 +134,7 @@ def test_sender_is_identified_before_its_heartbeat(hurries: bool) -> None:
 def test_missing_reports_are_requested_once_per_interval() -> None:
     rates = {name: Rate(S // 4, S) for name in ("BATTERY_STATUS", "GPS_RAW_INT", "SYS_STATUS")}
     streams = StreamRequests(plan_streams(rates, None, signed=False), [frozenset({name}) for name in rates])
-    assert streams.due_once(1, 0) == []  # nothing is awaited yet
+    assert streams.due_once(1, 0) == []  # no report is awaited yet
     streams.renew(S)
     streams.heard("GPS_RAW_INT", S)
     missing = ["ATTITUDE", "BATTERY_STATUS", "EXTENDED_SYS_STATE", "GLOBAL_POSITION_INT", "HEARTBEAT", "SYS_STATUS"]

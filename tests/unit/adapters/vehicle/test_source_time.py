@@ -1,4 +1,4 @@
-"""When the vehicle measured what a frame says: never later than it did, and never later than the frame came."""
+"""The measurement time of a frame: never later than the true time or the frame's arrival."""
 
 from typing import Any
 
@@ -32,7 +32,7 @@ class Ear:
             self.hear(mavlink.MAVLink_timesync_message((now_us - self.offset_us) * 1_000, ts1), now_us)
 
     def hear(self, message: Any, now_us: int, *, component: int = 1, number: int | None = None) -> int | None:
-        """Without a `number` it is the next one."""
+        """Receive a frame; `number` is its sequence number, by default the next one."""
         if number is None:
             number = self.number = (self.number + 1) % 256 if component == 1 else 0
         return self.source.of(ReceivedFrame(message, message.get_type(), 1, component, number, False, b""), now_us)
@@ -93,12 +93,12 @@ def test_a_message_without_a_stamp_is_as_old_as_the_stamp_before_it() -> None:
     assert ear.place(11 * S, 11 * S + 40_000) == 11 * S - 5 * DRIFT_US
     for message in (HEARTBEAT, mavlink.MAVLink_extended_sys_state_message(0, 1)):
         assert ear.hear(message, 11 * S + 90_000) == 11 * S - 5 * DRIFT_US
-    ear.place(11 * S - 500_000, 11 * S + 95_000)  # an older stamp says nothing of when the next was sent
+    ear.place(11 * S - 500_000, 11 * S + 95_000)  # an older stamp does not date the next frame
     assert ear.hear(HEARTBEAT, 11 * S + 99_000) == 11 * S - 5 * DRIFT_US
 
 
 def test_an_estimate_of_the_wind_that_does_not_change_grows_old() -> None:
-    """ArduCopter sends the last one of a flight for ever: it must not count as fresh."""
+    """ArduCopter repeats the last estimate of a flight indefinitely: it must not count as fresh."""
     ear = Ear()
 
     def wind(speed: float, made_us: int) -> int | None:
@@ -151,7 +151,7 @@ def test_link_delay_is_that_of_the_last_seconds() -> None:
     ear = Ear()
 
     def age_us(now_us: int) -> int:
-        """How old a frame of another component counts."""
+        """The age given to a frame of another component."""
         at_us = ear.hear(radio(), now_us, component=68)
         assert at_us is not None
         return now_us - at_us
@@ -162,7 +162,7 @@ def test_link_delay_is_that_of_the_last_seconds() -> None:
         ear.place(now_us - (700_000 if step == 20 else 30_000), now_us)
         if step == 21:
             assert age_us(now_us) < 100_000, "what came late was numbered late: it was measured late"
-    ear.place(20_900_000 - 200_000, 20_950_000, number=ear.number - 2)  # one that was overtaken
+    ear.place(20_900_000 - 200_000, 20_950_000, number=ear.number - 2)  # an overtaken frame
     assert age_us(20_950_000) > 200_000
     for step in range(1, 40):
         now_us = 21 * S + 100_000 * step
@@ -186,7 +186,7 @@ def test_after_a_silence_the_order_begins_anew() -> None:
 
 @rows("lost", [80, 127, 128, 200, 255, 256, 900])
 def test_frame_after_a_gap_comes_after_the_backlog(lost: int) -> None:
-    """A computer that stood still reads what waited, all at once, and then what comes: what was in between is lost."""
+    """After a stall the queued frames are read at once, then new ones; frames in between are lost."""
     ear = Ear()
     for step in range(5):
         ear.place(10_100_000 + 100_000 * step, 40 * S)
@@ -203,7 +203,7 @@ def test_a_stamp_that_does_not_advance_is_the_same_measurement() -> None:
     first = ear.hear(gps(3_900_000), 10 * S)
     for second in range(11, 40):
         ear.synchronise(second * S)
-        ear.offset_us += 30_000  # the vehicle's clock is slow, so that every answer moves its stamps to later
+        ear.offset_us += 30_000  # the vehicle's clock is slow, so each answer moves its stamps later
         assert ear.hear(gps(3_900_000), second * S) == first
     assert (ear.hear(gps(33_000_000), 40 * S) or 0) > 39 * S
 
@@ -263,7 +263,7 @@ def test_excess_clock_drift_only_raises_ages() -> None:
 
 
 def test_a_small_correction_costs_no_good_frame() -> None:
-    """The clock ran 300 ms fast within a second: what is measured later is never given an earlier time."""
+    """The clock ran 300 ms fast within a second: a later measurement never gets an earlier time."""
     ear = Ear()
     for step in range(6):
         ear.synchronise(10 * S + step * 100_000)
@@ -324,7 +324,7 @@ def test_stamps_of_addressed_messages_are_ignored() -> None:
 
 
 def test_equal_stamps_and_growing_ones_never_go_back_on_a_steady_link() -> None:
-    """The state monitor sets aside what is older than what it holds: a better estimate must not cost good frames."""
+    """The state monitor ignores older values: a better time estimate must not make it drop good frames."""
     vehicle = StampedVehicle(3, LinkKind(up_us=20_000, down_us=20_000, jitter_us=15_000, ordered=True), ppm=-20_000)
     source, last_us, dropped, count = SourceTime(), 0, 0, 0
     for arrival in vehicle.run(source, 60):
@@ -354,7 +354,7 @@ links = st.builds(
     st.sampled_from([0, 1, 3 * S, (1 << 32) * 1_000 - 5 * S]),
 )
 def test_age_is_never_underestimated(link: LinkKind, seed: int, ppm: int, uptime_us: int) -> None:
-    """Whatever the link does to frames, within what the order of numbers can tell (127 frames, half a second)."""
+    """For any reordering and delay within the range of the sequence numbers (127 frames, half a second)."""
     vehicle, source = StampedVehicle(seed, link, ppm, uptime_us=uptime_us), SourceTime()
     known = 0
     for arrival in vehicle.run(source, 12):
@@ -369,8 +369,8 @@ def test_age_is_never_underestimated(link: LinkKind, seed: int, ppm: int, uptime
 
 @given(st.integers(0, 1 << 30), st.integers(-1_000, 1_000))
 def test_on_a_good_link_ages_are_right_to_some_ms(seed: int, ppm: int) -> None:
-    """The error is the way up, what drift is allowed for between two round trips, and for what has no stamp of its own
-    the time since the last one that has.
+    """The error is the uplink delay, the allowed drift between two round trips, and for frames without a stamp
+    the time since the last stamp.
     """
     vehicle, source = StampedVehicle(seed, LinkKind(loss=2), ppm), SourceTime()
     for arrival in vehicle.run(source, 12):

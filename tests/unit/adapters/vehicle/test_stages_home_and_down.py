@@ -1,4 +1,4 @@
-"""The stages home and down are made once for a vehicle, ahead of being needed: none serves another vehicle or kind."""
+"""The stages of a return and a landing are prepared once per vehicle, and never used for another one."""
 
 from collections.abc import Callable
 

@@ -1,7 +1,7 @@
-"""A stop stops from every state in which it may be commanded, and one that does not is told.
+"""A stop works from every state in which it may be commanded; a failed stop is reported.
 
-What stops each autopilot, from which speed and over which distance, is measured (vehicles.md 5); `did-not-stop` is told
-by the ground speed alone, never by an acknowledgement or a mode.
+The command, speed and distance of a stop are measured for each autopilot (vehicles.md 5); `did-not-stop` is reported
+by ground speed only, not by an acknowledgement or a mode.
 """
 
 from collections.abc import Callable
@@ -35,7 +35,7 @@ FAR = (300_000, 0)
 
 
 def stops(one: Any, seconds: float = 9) -> None:
-    """It comes to stand, by what is really so."""
+    """Whether the vehicle really comes to a standstill."""
     begun = one.now_us
     one.begin(MotionKind.HOLD, hold_us=2 * S)
     end = one.until((Succeeded, CommandFailed, TakenOver), seconds)
@@ -75,7 +75,7 @@ def test_a_return_and_a_landing_are_stopped(aloft: Make, kind: MotionKind) -> No
 
 @pytest.mark.parametrize(("after_s", "flavour"), each_once([0.6, 1.2, 1.8], ["px4", "ardupilot"]))
 def test_a_vehicle_that_still_gathers_speed_is_stopped_over_a_slow_link(aloft: Make, after_s: float) -> None:
-    """The speed that is known when the stop is sent is not the one that it has when it obeys."""
+    """The speed when the stop is sent differs from the speed when it is obeyed."""
     one = aloft()
     one.vehicle.simulation.inject(LinkDelay(0, 300_000))
     one.wait(1)
@@ -97,7 +97,7 @@ def test_own_stopping_point_is_not_a_foreign_target(aloft: Make, delay_us: int) 
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", ["px4", pytest.param("ardupilot", marks=pytest.mark.soak)])
 def test_a_return_from_far_gets_somewhere_wherever_home_is(aloft: Make) -> None:
-    """A program that began in the air never saw the vehicle stand at home."""
+    """A program started in the air has never observed the vehicle at home."""
     one = aloft()
     assert isinstance(one.fly(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=12_000), Succeeded)
     again = Driver(POLICY, one.vehicle.frames, fence=False)
@@ -107,7 +107,7 @@ def test_a_return_from_far_gets_somewhere_wherever_home_is(aloft: Make) -> None:
 
 
 def test_a_hold_that_does_not_stop_has_failed(aloft: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is acknowledged, the mode is right, and the vehicle flies on."""
+    """The command is acknowledged and the mode is right, but the vehicle flies on."""
     one = aloft()
     one.begin(MotionKind.FLY, FAR, altitude=20_000, speed=8_000)
     one.wait(8)
@@ -120,14 +120,14 @@ def test_a_hold_that_does_not_stop_has_failed(aloft: Make, monkeypatch: pytest.M
 
 
 def _drift(vehicle: Multirotor, dt: float, *_: object) -> None:
-    """A step in which it goes on as it goes, whatever it was told."""
+    """A simulation step without any reaction to commands."""
     body = vehicle.body
     body.north += body.v_north * dt
     body.east += body.v_east * dt
 
 
 def test_drifting_hold_does_not_succeed(aloft: Make, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A campaign found it: a gust that it could not stand against began while it held, and it had held all the same."""
+    """Regression: a gust stronger than the vehicle began during a hold, which counted as successful."""
     one = aloft()
     one.begin(MotionKind.HOLD, hold_us=3 * S)
     one.wait(2.5)
@@ -167,7 +167,7 @@ def test_fastest_allowed_speed_while_braking(passed_s: float, fastest: int) -> N
 def speeds(
     stop: BrakingWatch, of: Callable[[float], int | None], until_s: float = 20, obeyed_s: float = 0
 ) -> float | None:
-    """When a stop from 10 m/s fails, where the speed is `of` the seconds since; None: it does not."""
+    """The time at which a stop from 10 m/s fails with speed `of` (seconds); None if it succeeds."""
     known_us = 0
     for tick in range(round(until_s * 10)):
         speed = of(tick / 10)
@@ -187,7 +187,7 @@ def test_a_vehicle_that_brakes_as_declared_does_not_fail() -> None:
 
 
 def test_measured_stops_do_not_fail() -> None:
-    """PX4 from 4.5 m/s and ArduCopter from 10.1 m/s, evenly to the time at which they were below 0.4 m/s."""
+    """PX4 from 4.5 m/s and ArduCopter from 10.1 m/s, with even braking to the measured time below 0.4 m/s."""
     assert speeds(stop_from(4_500), lambda s: max(300, round(4_500 - 4_100 * s / 4.6))) is None
     assert speeds(stop_from(10_100), lambda s: max(300, round(10_100 - 9_700 * s / 4.6))) is None
 
@@ -222,7 +222,7 @@ def test_a_speed_that_nobody_knows_has_not_fallen() -> None:
 
 
 def test_a_speed_that_is_not_known_for_a_moment_is_not_held_against_it() -> None:
-    """After a hold-up what waited is too old, and what is fresh has not come yet."""
+    """After a stall queued reports are too old, and fresh ones have not arrived yet."""
     stands_s = BRAKES.stands_us(10_000) / S
     braking = speeds(
         stop_from(10_000), lambda s: None if abs(s - stands_s) < 0.8 else round(max(0.0, 9_000 - 2_000 * s))
@@ -230,13 +230,13 @@ def test_a_speed_that_is_not_known_for_a_moment_is_not_held_against_it() -> None
     assert braking is None
 
 
-#: how it brakes at the least that a flight without a hold-up still passes, in mm/s^2
+#: the weakest braking with which a flight without a stall passes, in mm/s^2
 TIGHT = {"px4": 4_000, "ardupilot": 6_000}
 
 
 @cache
 def stopping_tightly(flavour: str) -> Flyer:
-    """From 10 m/s, with brakes declared as good as they are."""
+    """A stop from 10 m/s, with braking as declared."""
     one = Flyer(flavour)
     policy = msgspec.structs.replace(
         POLICY, vehicle=msgspec.structs.replace(POLICY.vehicle, braking=TIGHT[flavour], reaction_us=100_000)
@@ -250,7 +250,7 @@ def stopping_tightly(flavour: str) -> Flyer:
 
 
 def stalled(flavour: str, after_ms: int, for_ms: int) -> list[Event]:
-    """What ends a stop in which our computer stands still for a while."""
+    """The end of a stop during which our computer stalls."""
     one = copied(stopping_tightly(flavour))
     one.wait(after_ms / 1_000)
     one.vehicle.stand_still(for_ms * 1_000)
@@ -260,7 +260,7 @@ def stalled(flavour: str, after_ms: int, for_ms: int) -> list[Event]:
 @pytest.mark.slow
 @pytest.mark.parametrize(("after_ms", "flavour"), each_once([2_200, 2_900, 3_400], ["px4", "ardupilot"]))
 def test_delayed_reports_are_judged_by_their_own_time(after_ms: int, flavour: str) -> None:
-    """A speed of before was held against what it may be a second later: `did-not-stop`, and it was flown home."""
+    """Regression: an old speed was compared with the limit of a second later, which reported `did-not-stop`."""
     for for_ms in (300, 1_000, 6_000):
         assert stalled(flavour, after_ms, for_ms) == []
 
@@ -304,7 +304,7 @@ PILLAR = Pillar(0, 0, 100_000, 3_000, 60_000)
 
 
 def test_a_vehicle_that_flies_into_a_pillar_has_crashed(flyer: Make) -> None:
-    """And has not landed: PX4 stays armed and in its mode, ArduCopter disarms; both lie tilted."""
+    """It did not land: PX4 stays armed and in its mode, ArduCopter disarms; both lie tilted."""
     one = flyer(faults=(PILLAR,)).up()
     one.begin(MotionKind.FLY, FAR, altitude=20_000, speed=8_000)
     crashed = one.until((Crashed, Succeeded), 60)

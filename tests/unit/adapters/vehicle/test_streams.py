@@ -1,4 +1,4 @@
-"""Streams are planned against what a link carries, and what is delivered is measured."""
+"""Streams are planned for the capacity of a link, and their delivery is measured."""
 
 from typing import Any
 
@@ -53,7 +53,7 @@ def test_overloaded_link_names_sufficient_baud_rate() -> None:
 
 
 class Line:
-    """A line that carries so much: what does not fit is not sent. Streams come as asked, and some unasked."""
+    """A line of limited capacity: excess frames are dropped. It delivers requested and unrequested streams."""
 
     def __init__(self, capacity: int | None, unasked: dict[str, int]) -> None:
         self.plan = plan_streams(RATES, capacity, signed=False)
@@ -121,7 +121,7 @@ def test_unrequested_streams_are_turned_off_for_lack_of_room() -> None:
 
 @pytest.mark.parametrize(("capacity", "unasked"), [(None, 20_000), (92_160, 20_000), (5_760, 1_000_000)])
 def test_unrequested_streams_with_room_are_left_on(capacity: int | None, unasked: int) -> None:
-    """A ground station may look at the same streams."""
+    """A ground station may use the same streams."""
     line = Line(capacity, {"HIGHRES_IMU": unasked})
     line.run(4 * MEASURE_US / S)
     assert all(interval >= 0 for _, interval in line.asked)

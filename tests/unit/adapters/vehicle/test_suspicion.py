@@ -1,4 +1,4 @@
-"""One report ends nothing where anybody can put in a frame; reports that go back and forth are of two."""
+"""A single report is not trusted on a link that anybody can write to; alternating reports show two senders."""
 
 import pytest
 
@@ -65,7 +65,7 @@ def test_values_that_only_go_on_are_of_one() -> None:
 
 
 def test_forged_sequence_number_makes_few_frames_late() -> None:
-    """All that the vehicle said after it counted as overtaken, up to 127 frames."""
+    """Regression: up to 127 later frames of the vehicle counted as overtaken."""
     source = SourceTime()
     for number in range(20):
         source._follow(number, None, number * 1_000)

@@ -1,4 +1,4 @@
-"""Whoever else flies the vehicle is seen, whether or not the mode changes, and is never fought.
+"""Foreign control of the vehicle is detected, with or without a mode change, and never overridden.
 
 The required property, over the moments at which a pilot may act, the phases of the reports and the delays of the link:
 no frame that moves the vehicle leaves later than W after the takeover took effect, where W is how old a mode report may
@@ -51,17 +51,17 @@ Make = Callable[..., Any]
 ASKS = (mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAV_CMD_REQUEST_MESSAGE)
 MS, S = 1_000, 1_000_000
 WITHIN_US = {"px4": PX4.mode_within_us, "ardupilot": ARDUPILOT.mode_within_us}
-#: how long it may take until the driver looks again
+#: the longest time until the driver's next check
 TICK_US = 40 * MS
-#: how often landed state and target are reported
+#: the report interval of landed state and target
 REPORTED_US = 100 * MS
 DELAYS_US = (0, 20 * MS, 150 * MS)
-#: where our own next command leads, in mm
+#: the target of our next command, in mm
 NEXT = (200_000, 90_000)
 
 
 def moves(frame: bytes) -> bool:
-    """Whether an autopilot that obeys the frame does something."""
+    """Whether the frame has an effect on an autopilot."""
     for received in Codec(1, 1).parse(frame):
         if received.name.startswith("COMMAND_"):
             return received.message.command not in (
@@ -74,13 +74,13 @@ def moves(frame: bytes) -> bool:
 
 
 def steers(frame: bytes) -> bool:
-    """Whether it tells the autopilot where to fly, or how: a speed alone takes the vehicle from nobody."""
+    """Whether the frame commands a target or a mode: a speed alone is not a takeover."""
     (received,) = Codec(1, 1).parse(frame)
     return getattr(received.message, "command", None) != mavlink.MAV_CMD_DO_CHANGE_SPEED
 
 
 class Sent:
-    """When frames left that move the vehicle, and which of them steer it."""
+    """The times of frames that move the vehicle, and those that steer it."""
 
     def __init__(self, one: Any) -> None:
         self.at_us: list[int] = []
@@ -108,7 +108,7 @@ TAKEOVERS: dict[str, Callable[[int], Fault]] = {
 
 @cache
 def in_a_leg(flavour: str) -> Flyer:
-    """Five seconds of a leg are flown."""
+    """A vehicle five seconds into a leg."""
     one = copied(climbed(flavour, 20_000))
     one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
     one.wait(5)
@@ -117,7 +117,7 @@ def in_a_leg(flavour: str) -> Flyer:
 
 @cache
 def held(flavour: str) -> Flyer:
-    """It stopped in the leg, and stands."""
+    """A vehicle that stopped during a leg, and stands."""
     one = copied(in_a_leg(flavour))
     one.begin(MotionKind.HOLD)
     one.wait(8)
@@ -126,7 +126,7 @@ def held(flavour: str) -> Flyer:
 
 @cache
 def climbing(flavour: str, height: int) -> Flyer:
-    """On its way to 20 m it is at a height, in mm."""
+    """A vehicle at a height, in mm, on its climb to 20 m."""
     one = copied(ready(flavour))
     one.begin(MotionKind.CLIMB, altitude=20_000)
     while one.truth.up_mm < height:
@@ -148,7 +148,7 @@ def test_a_takeover_in_a_leg_is_seen_and_not_fought(flavour: str, name: str) -> 
     one = copied(in_a_leg(flavour))
     sent = Sent(one)
     one.vehicle.simulation.inject(TAKEOVERS[name](0))
-    # ArduCopter that is paused goes on reporting our target, so that only its motion tells
+    # a paused ArduCopter still reports our target, so only its motion shows it
     taken = one.until((TakenOver, CommandFailed), 5.5 if (name, flavour) == ("pause", "ardupilot") else 3)
     assert isinstance(taken, TakenOver), taken
     one.wait(10)
@@ -156,7 +156,7 @@ def test_a_takeover_in_a_leg_is_seen_and_not_fought(flavour: str, name: str) -> 
 
 
 def test_a_velocity_in_guided_is_a_takeover_at_once() -> None:
-    """Recorded: no target is named any more, and the mode stays. It was fought 10 s later."""
+    """Recorded: no target is reported any more, and the mode stays. Our command overrode it 10 s later."""
     one = copied(in_a_leg("ardupilot"))
     sent = Sent(one)
     one.vehicle.simulation.inject(PilotVelocity(0, -3_000, 0))
@@ -191,7 +191,7 @@ def test_lost_reports_are_not_a_takeover(loss: int) -> None:
 
 
 def test_a_way_home_waits_no_longer_than_its_permit_lasts() -> None:
-    """It waited a second for a target, and then came too late: the vehicle was landed where it was."""
+    """Regression: it waited a second for a target, was then too late, and the vehicle landed on the spot."""
     for flavour in (PX4, ARDUPILOT):
         assert UNNAMED_MOST_US + ANSWER_MOST_US + flavour.mode_within_us < LINK_VALID_US - TICK_US
 
@@ -223,7 +223,7 @@ def test_vehicle_standing_for_a_reason_is_not_paused(name: str) -> None:
 
 
 def test_end_of_a_leg_is_not_a_takeover(aloft: Make) -> None:
-    """It stands there, names its target, and nothing of ours follows for a while."""
+    """The vehicle stands at its target, and no command follows for a while."""
     one = aloft()
     assert isinstance(one.fly(MotionKind.FLY, (60_000, 0), altitude=20_000, speed=8_000), Succeeded)
     assert not any(isinstance(event, TakenOver) for event in one.wait(30))
@@ -241,7 +241,7 @@ def test_a_leg_that_somebody_slows_down_says_so_once(flavour: str) -> None:
 
 @pytest.mark.parametrize("result", [0, 4])
 def test_command_accepted_from_another_invalidates_older_reports(result: int) -> None:
-    """Its Land shows in no report yet: the next command of ours waits for one that is of after that."""
+    """No report shows the Land yet: our next command waits for a report of a later time."""
     one = copied(held("px4"))
     one.vehicle._tick_us = MS
     sent = Sent(one)
@@ -266,7 +266,7 @@ def test_command_accepted_from_another_after_ours_is_noted() -> None:
     assert "255/190 was granted a mode" in told
 
 
-#: what ArduCopter answers a ground station that pauses it
+#: ArduCopter's answer to a ground station that pauses it
 PAUSED = mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 0, 0, 0, 255, 190)
 
 CLIMBING = {
@@ -281,7 +281,7 @@ CLIMBING = {
 @pytest.mark.parametrize("height", [3_000, 17_800])
 def test_a_takeover_in_a_climb_is_seen_and_not_fought(flavour: str, name: str, height: int) -> None:
     """ArduCopter has no target to report in a takeoff (recorded), PX4 the same one from its first to its last moment.
-    ArduCopter's pause shows in its motion, and that it is a pause by the answer to who gave it.
+    ArduCopter's pause shows in its motion, and in the answer to its sender.
     """
     one = copied(climbing(flavour, height))
     sent = Sent(one)
@@ -307,8 +307,8 @@ SLOWLY_UP: dict[str, tuple[Fault, ...]] = {
 @pytest.mark.parametrize("name", SLOWLY_UP)
 @pytest.mark.parametrize(("height", "within_s"), [(500, 13), (5_000, 5), (15_000, 13)])
 def test_climb_held_down_by_others_is_a_takeover(name: str, height: int, within_s: float) -> None:
-    """ArduCopter names no target in a takeoff, so that it flies to the side tells, or that somebody was told that it
-    obeys.
+    """ArduCopter reports no target in a takeoff: sideways motion shows the takeover, or an answer to another sender that
+    it obeys.
     """
     one = copied(climbing("ardupilot", height))
     sent = Sent(one)
@@ -323,7 +323,7 @@ def test_climb_held_down_by_others_is_a_takeover(name: str, height: int, within_
 
 @pytest.mark.parametrize("ceiling_mm", [7_000, 17_000])
 def test_stalled_climb_without_intervention_is_not_a_takeover(ceiling_mm: int) -> None:
-    """Its weight, weak motors or a fence end it: that was called a pause, and it was left in the air."""
+    """Weight, weak motors or a fence stop the climb. Regression: it counted as a pause, and the run stood down."""
     one = Flyer("ardupilot", ceiling_mm=ceiling_mm)
     one.until(Ready)
     one.begin(MotionKind.CLIMB, altitude=20_000)
@@ -347,7 +347,7 @@ def test_the_first_leg_waits_for_no_target_that_arducopter_never_tells(aloft: Ma
 
 @pytest.mark.parametrize(("up_mm", "foreign"), [(20_000, False), (10_000, True)])
 def test_the_end_of_the_takeoff_is_ours_where_arducopter_tells_it(up_mm: int, foreign: bool) -> None:
-    """In older versions, to 4.1, its guided takeoff ends in a target at the height that it was told."""
+    """Up to version 4.1, its guided takeoff ends with a target at the commanded height."""
     seen = ObservedVehicle(latitude=473977418, longitude=85455939, home_amsl=488_000, up_us=S)
     command = Command(1, "takeoff", MotionKind.CLIMB, (), (), 20_000, 0, 0)
     targets = TargetWatch()
@@ -360,7 +360,7 @@ def test_the_end_of_the_takeoff_is_ours_where_arducopter_tells_it(up_mm: int, fo
 
 @pytest.mark.parametrize(("off_mm", "foreign"), [(400, False), (600, True)])
 def test_reported_target_becomes_foreign_only_if_it_changes(off_mm: int, foreign: bool) -> None:
-    """However far from what we asked for it was: PX4 rounds, and says itself where it stops."""
+    """At any distance from the commanded one: PX4 rounds, and reports its own stopping point."""
     seen = ObservedVehicle(up_us=S)
     targets = TargetWatch()
     targets.expect(ExpectedTarget(0, 0, 500_000), seen)
@@ -381,21 +381,21 @@ def test_takeover_is_detected_without_a_running_command(aloft: Make, name: str) 
 
 @pytest.mark.parametrize("name", ["pause", "go-to", "land", "position"])
 def test_takeover_is_detected_during_a_hold(flavour: str, name: str) -> None:
-    """ArduCopter obeys no pause in BRAKE: there is nothing to see."""
+    """ArduCopter ignores a pause in BRAKE, so there is nothing to detect."""
     one = copied(held(flavour))
     sent = Sent(one)
     one.vehicle.simulation.inject(TAKEOVERS[name](0))
     if (name, flavour) == ("pause", "ardupilot"):
         assert not any(isinstance(event, (TakenOver, CommandFailed)) for event in one.wait(10))
     elif (name, flavour) == ("pause", "px4"):
-        one.wait(10)  # it stands where it stood: nothing is taken from us, and nothing of ours follows
+        one.wait(10)  # it stands at the same place: no takeover, and no command follows
     else:
         one.until(TakenOver, 3)
     assert sent.at_us == []
 
 
 def streams(one: Any, name: str, interval_us: int) -> None:
-    """Somebody on the link has a message streamed so often; -1: not at all."""
+    """Another sender sets the interval of a message; -1 stops it."""
     number = getattr(mavlink, f"MAVLINK_MSG_ID_{name}")
     asks = mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
     made = mavlink.MAVLink_command_long_message(1, 1, asks, 0, number, interval_us, 0, 0, 0, 0, 0)
@@ -403,7 +403,7 @@ def streams(one: Any, name: str, interval_us: int) -> None:
 
 
 def unstreamed(one: Any) -> None:
-    """Nothing but asking shows a target."""
+    """Stop the stream of targets, so that only a request shows one."""
     streams(one, "POSITION_TARGET_GLOBAL_INT", -1)
 
 
@@ -416,7 +416,7 @@ def test_foreign_target_is_requested_before_the_next_command(flavour: str) -> No
     one.vehicle.simulation.inject(TAKEOVERS["go-to"](0))
     one.wait(1)
     taken = [event for event in one.events if isinstance(event, TakenOver)]
-    assert len(taken) == (flavour == "ardupilot")  # which goes on naming it, and is asked as soon as it does not
+    assert len(taken) == (flavour == "ardupilot")  # which keeps reporting it, and is requested when it stops
     if not taken:
         one.begin(MotionKind.FLY, (200_000, 90_000), altitude=25_000, speed=5_000)
         taken = [one.until(TakenOver, 1)]
@@ -426,7 +426,7 @@ def test_foreign_target_is_requested_before_the_next_command(flavour: str) -> No
 
 
 def test_an_arducopter_that_tells_its_target_no_more_is_taken_over() -> None:
-    """A velocity of somebody else looks the same."""
+    """A foreign velocity command looks the same."""
     one = copied(in_a_leg("ardupilot"))
     one.vehicle.simulation.inject(MessageSilence(0, "POSITION_TARGET_GLOBAL_INT"))
     assert one.until(TakenOver, 1).how == "no target"
@@ -446,7 +446,7 @@ def test_missing_target_report_delays_a_command_briefly(aloft: Make, delay_us: i
 
 
 def test_sticks_end_what_px4_does_by_itself(flavour: str) -> None:
-    """ArduCopter does not mind them in GUIDED."""
+    """ArduCopter ignores them in GUIDED."""
     one = copied(in_a_leg(flavour))
     one.vehicle.simulation.inject(PilotSticks(0))
     if flavour == "px4":
@@ -487,7 +487,7 @@ OLD = {"px4": FlightMode.LOITER, "ardupilot": FlightMode.GUIDED}
 
 
 def test_no_command_begins_after_a_takeover(aloft: Make) -> None:
-    """Neither what waited for its record while the takeover showed, nor anything after it."""
+    """Neither the command that waited for its record, nor any later one."""
     one = aloft()
     one.vehicle.simulation.inject(PilotMode(0, FlightMode.POSITION))
     one.until(TakenOver, 3)
@@ -536,7 +536,7 @@ def under_way(aloft: Make, delay_us: int) -> Any:
 
 
 def holds(one: Any, flavour: str, name: str, acts_us: int, phase_us: int, delay_us: int) -> None:
-    """One pilot, one next command of ours, close together."""
+    """Check one pilot action and our next command, close together."""
     one.wait((phase_us - one.now_us % S) % S / S)
     sent = Sent(one)
     begins_us = one.now_us + 500 * MS
@@ -551,7 +551,7 @@ def holds(one: Any, flavour: str, name: str, acts_us: int, phase_us: int, delay_
     if any(isinstance(event, TakenOver) for event in one.events):
         one.wait(3)
         assert max(sent.at_us, default=0) == latest_us, "nothing is sent once it shows"
-    else:  # ours was on its way, and came before any report showed the pilot's; a speed follows once ours shows
+    else:  # our command arrived before any report of the pilot's; a speed follows once ours is reported
         assert takes_us - TICK_US <= sent.steering_us[-1] + delay_us <= takes_us + REPORTED_US
         assert one.vehicle.driver.seen.target[:2] == pytest.approx(geo(NEXT), abs=10)
     assert latest_us <= late_us, f"{(latest_us - takes_us) / MS} ms after it took effect"
@@ -573,7 +573,7 @@ def test_no_frame_leaves_later_than_w(aloft: Make, flavour: str, name: str) -> N
 
 @pytest.mark.parametrize("flavour", ["ardupilot"])
 def test_a_go_to_that_comes_before_our_question_is_not_flown_over(aloft: Make) -> None:
-    """It took effect 20 ms before our next target left, and none was streamed between: one that is asked for shows."""
+    """The go-to took effect 20 ms before our next target was sent; only a requested target report shows it."""
     one = under_way(aloft, DELAYS_US[1])
     holds(one, "ardupilot", "go-to", 20 * MS, 0, DELAYS_US[1])
     assert [event.how for event in one.events if isinstance(event, TakenOver)] == ["another target"]
@@ -589,7 +589,7 @@ def test_no_frame_leaves_later_than_w_at_any_moment(aloft: Make, flavour: str, n
 
 
 def test_target_change_before_an_untargeted_command_shows_is_a_takeover() -> None:
-    """Two heartbeats later, for what our own command changes shows in the mode by then."""
+    """Two heartbeats later, because by then the mode shows the effect of our own command."""
     ours, theirs = (470_000_000, 80_000_000, 500_000), (470_001_000, 80_000_000, 500_000)
     targets, seen = TargetWatch(), ObservedVehicle()
     targets.expect(ExpectedTarget(*ours), seen)
@@ -606,7 +606,7 @@ def test_target_change_before_an_untargeted_command_shows_is_a_takeover() -> Non
 
 
 def test_a_leg_that_gets_there_after_the_stop_left_is_not_a_takeover() -> None:
-    """Its place was taken for that of the stop, or for somebody else's: the run stood down, and it was left there."""
+    """Regression: its target was taken for that of the stop or for a foreign one, and the run stood down."""
     here, leg, other = ((latitude, 80_000_000, 500_000) for latitude in (470_000_000, 470_000_500, 470_000_200))
     for stop in (ExpectedTarget(here[0], here[1], None, within=10_000), None):
         targets, seen = TargetWatch(), ObservedVehicle()

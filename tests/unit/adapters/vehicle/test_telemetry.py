@@ -1,4 +1,4 @@
-"""Telemetry becomes integers in canonical units, or "not known", never anything else."""
+"""Telemetry becomes integers in canonical units, or "not known"."""
 
 from itertools import pairwise
 from math import inf, nan
@@ -82,7 +82,7 @@ def test_position_is_continuous_across_longitude_180() -> None:
 
 def test_asks_often_enough_for_what_grows_stale_and_no_oftener_than_useful() -> None:
     rates = Telemetry(POLICY).rates
-    assert rates["GLOBAL_POSITION_INT"].asked == 100_000  # stale after 500 ms, and effects are seen by it
+    assert rates["GLOBAL_POSITION_INT"].asked == 100_000  # stale after 500 ms, and used to observe effects
     assert rates["BATTERY_STATUS"].asked == 1_000_000  # stale after 5 s
     assert frozenset({"WIND_COV", "WIND"}) in Telemetry(POLICY).sources
 
@@ -122,7 +122,7 @@ def one_of(number: int, percent: int, function: int = 0) -> Any:
 
 
 def charge(telemetry: Telemetry, number: int, percent: int, function: int = 0, at_us: int = 0) -> Any:
-    """What one report of a battery makes of the charge; () where it says nothing of it."""
+    """The charge after one battery report; () if the report does not change it."""
     return telemetry.read("BATTERY_STATUS", one_of(number, percent, function), now_us=at_us)
 
 
@@ -170,7 +170,7 @@ def test_a_flight_battery_that_falls_silent_makes_the_charge_unknown() -> None:
 
 @pytest.mark.parametrize("function", [mavlink.MAV_BATTERY_FUNCTION_ALL, mavlink.MAV_BATTERY_FUNCTION_PAYLOAD])
 def test_single_report_of_a_new_battery_is_ignored(function: int) -> None:
-    """Somebody else's frame on a link without a key, or an odd one of the vehicle's; also of one that says that the
+    """A foreign frame on a link without a key, or an odd one of the vehicle; also one that reports that the
     battery feeds no motor. Such a frame every other minute is no battery either.
     """
     telemetry = Telemetry(POLICY)
@@ -224,7 +224,7 @@ def silent(reports: Reports, battery: int, heard: int, until: int, most_us: int)
 
 
 def usual(reports: Reports, battery: int) -> int | None:
-    """How long it is between two reports of a battery as a rule; None: it does not count."""
+    """The usual interval between reports of a battery; None if the battery does not count."""
     own = [index for index, each in enumerate(reports) if each[1] == battery]
     apart = [
         (reports[after][0] - reports[before][0], silent(reports, battery, before, after, STALE_US))
@@ -238,7 +238,7 @@ def usual(reports: Reports, battery: int) -> int | None:
 
 
 def naive(reports: Reports, armed: list[bool], *, begun: bool) -> Any:
-    """What the last of these reports (when, battery, charge) says, by all of them: () where it says nothing. `begun`:
+    """The charge after the last of these reports (time, battery, charge), from all of them; () if unchanged. `begun`:
     one before said something.
     """
     last = {battery: index for index, (_, battery, _) in enumerate(reports)}
@@ -295,7 +295,7 @@ def test_a_signal_may_name_one_battery() -> None:
 
 
 def test_range_finder_is_chosen_by_orientation() -> None:
-    """Also where the one that looks down has the lower number, and each counts on its own."""
+    """Also if the downward one has the lower number; each has its own values."""
 
     def sees(instance: int, orientation: int, cm: int) -> Any:
         return mavlink.MAVLink_distance_sensor_message(0, 20, 4_000, cm, 0, instance, orientation, 0)
@@ -336,7 +336,7 @@ def gps(fix: int, at_us: int) -> Any:
 
 
 class Held:
-    """What the state monitor holds of frames that come in order; the vehicle was started when our clock was."""
+    """The state monitor's values after frames in order; the vehicle started with our clock."""
 
     def __init__(self, policy: Policy) -> None:
         prepared = prepare(policy)
@@ -361,7 +361,7 @@ class Held:
 
 
 def test_repeated_measurement_keeps_its_age() -> None:
-    """A receiver that hangs: the autopilot goes on reporting its last measurement, and its fix, for ever."""
+    """A hanging receiver: the autopilot repeats its last measurement and fix."""
     held = Held(POLICY)
     assert held.hear(gps(3, S), S)[0] == 3
     for now_us in range(S, 60 * S, S // 5):
@@ -378,7 +378,7 @@ def test_stamp_of_zero_is_unknown() -> None:
 
 
 def test_repeated_no_fix_report_is_fresh() -> None:
-    """ArduPilot's time of a lost fix is that of the last one."""
+    """ArduPilot reports a lost fix with the time of the last fix."""
     assert Held(POLICY).hear(gps(1, S), S)[0] == 1
     unknown = replace(POLICY.signals[2], sources=(SignalSource("GPS_RAW_INT", ("fix_type",), 1, 1, (0, 1, 2)),))
     for policy, none in (

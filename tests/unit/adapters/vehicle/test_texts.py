@@ -1,4 +1,4 @@
-"""STATUSTEXT: whole, quoted, bounded and not too many; and what we announce ourselves."""
+"""STATUSTEXT: reassembled, quoted, bounded and rate-limited; and our own announcements."""
 
 from typing import Any
 

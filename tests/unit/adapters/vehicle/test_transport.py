@@ -1,4 +1,4 @@
-"""Serial lines and TCP connections: found, lost and found again; what is wrong with them is said."""
+"""Serial lines and TCP connections: connect, loss, reconnection, and error messages."""
 
 import errno
 import os
@@ -35,7 +35,7 @@ def lined(terminal: Terminal, baud: int = 57_600, config: SimulationConfig = CON
 
 
 def live(vehicle: LinedVehicle, seconds: float, until: Callable[[], bool] = lambda: False) -> list[Event]:
-    """Let time pass; what happened."""
+    """Let time pass; return the events."""
     events: list[Event] = []
     end_us = vehicle.clock.elapsed_us + round(seconds * S)
     while vehicle.clock.elapsed_us < end_us and not until():
@@ -205,7 +205,7 @@ def test_tcp_listener_refuses_a_second_connection() -> None:
     stranger.send(b"nothing that is a frame")
     live(vehicle, 1)
     with pytest.raises(BlockingIOError):
-        stranger.recv(100)  # what is said is said to the vehicle alone
+        stranger.recv(100)  # frames are sent only to the vehicle
     assert vehicle.driver.link.crowd is None
     stranger.close()
     far.close()

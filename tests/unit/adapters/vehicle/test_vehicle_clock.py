@@ -30,7 +30,7 @@ def trip(clock: VehicleClock, sent_us: int, boot_us: int, came_us: int) -> bool:
 
 @pytest.mark.parametrize(("boot_ns", "least_us"), [
     (4_000_000_000, 6 * S),
-    (4_000_000_001, 6 * S - 1),  # what is not a whole us counts against us
+    (4_000_000_001, 6 * S - 1),  # fractions of a us are rounded against us
     (4_000_999_999, 6 * S - 1_000),
     (16_000_000_000, -6 * S),  # a vehicle that has been up for longer than we
 ])  # fmt: skip

@@ -1,4 +1,4 @@
-"""What comes under the vehicle's ids and is not of it says nothing of it; an answer to somebody else is none to us."""
+"""Foreign frames under the vehicle's ids are ignored, and so are answers to other senders."""
 
 from collections.abc import Callable
 from typing import Any
@@ -44,7 +44,7 @@ def beat(kind: int, autopilot: int, armed: bool = False, mode: int = 0) -> Any:
 
 
 def says(one: Flyer, message: Any, system: int = 1, component: int = 1) -> list[Any]:
-    """One frame more comes from the link."""
+    """Receive one more frame from the link."""
     events, _, _ = one.vehicle.driver.receive(Codec(system, component).pack(message), one.now_us)
     one.events += events
     return list(events)
@@ -77,7 +77,7 @@ def test_sender_other_than_a_vehicle_is_never_chosen(name: str, kind: int, autop
 
 
 def test_every_type_of_the_dialect_is_a_vehicle_or_is_not() -> None:
-    """A type that the dialect gets anew is to be looked at."""
+    """A new type in the dialect must be classified."""
     others = {
         "ANTENNA_TRACKER", "GCS", "ONBOARD_CONTROLLER", "GIMBAL", "ADSB", "CAMERA", "CHARGING_STATION", "FLARM",
         "SERVO", "ODID", "BATTERY", "PARACHUTE", "LOG", "OSD", "IMU", "GPS", "WINCH", "ILLUMINATOR", "GRIPPER",
@@ -237,7 +237,7 @@ def test_forged_frame_does_not_end_a_leg(aloft: Make, name: str, after_s: float)
 
 
 def test_answers_that_are_held_back_make_no_forged_frame_count_for_longer(aloft: Make) -> None:
-    """Whoever delays answers to TIMESYNC widened the time in which one frame counts as a takeover."""
+    """Regression: delayed TIMESYNC answers widened the time in which one frame counts as a takeover."""
     one = aloft()
     one.begin(MotionKind.FLY, (60_000, 0), altitude=20_000, speed=5_000)
     one.wait(2)
@@ -313,7 +313,7 @@ def test_a_vehicle_that_only_needs_time_is_not_given_up(flavour: str) -> None:
 
 @pytest.mark.parametrize("next_", [None, MotionKind.HOME, MotionKind.LAND, MotionKind.FLY])
 def test_takeover_is_detected_despite_forged_reports_of_our_mode(aloft: Make, next_: MotionKind | None) -> None:
-    """Each true report was refuted by a forged one: the vehicle was the pilot's for 10 s, and none of ours knew it."""
+    """Regression: a forged report refuted each true one, so the takeover was not detected for 10 s."""
     one = aloft()
     one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
     one.wait(4)
@@ -335,7 +335,7 @@ def test_takeover_is_detected_despite_forged_reports_of_our_mode(aloft: Make, ne
 def test_command_begun_after_one_report_of_a_left_mode_yields(
     kind: MotionKind,
 ) -> None:
-    """Nothing of ours flies, as after a restart: the mode that is left counts as the one before."""
+    """No command of ours is running, as after a restart: the mode that is left counts as the earlier one."""
     one = copied(climbed("px4", 20_000))
     one.vehicle.driver._manoeuvre = None
     one.vehicle.simulation.inject(PilotMode(0, FlightMode.POSITION))

@@ -307,8 +307,8 @@ SLOWLY_UP: dict[str, tuple[Fault, ...]] = {
 @pytest.mark.parametrize("name", SLOWLY_UP)
 @pytest.mark.parametrize(("height", "within_s"), [(500, 13), (5_000, 5), (15_000, 13)])
 def test_climb_held_down_by_others_is_a_takeover(name: str, height: int, within_s: float) -> None:
-    """ArduCopter reports no target in a takeoff: sideways motion shows the takeover, or an answer to another sender that
-    it obeys.
+    """ArduCopter reports no target in a takeoff: sideways motion shows the takeover, or an answer to another sender
+    that it obeys.
     """
     one = copied(climbing("ardupilot", height))
     sent = Sent(one)

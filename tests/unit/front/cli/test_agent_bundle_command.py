@@ -1,4 +1,4 @@
-"""`rtshcua agent-bundle`: what hosts ask of a plug-in, that it holds no secret, and what its hook refuses.
+"""`rtshcua agent-bundle`: the plug-in fits its hosts, contains no secret, and its hook refuses calls.
 
 What hosts ask: Claude Code's published schema of manifests, hooks and servers (SchemaStore, of 2026-04-23:
 `claude-code-plugin-manifest.json`), and the specification of Agent Skills. Whoever has Claude Code names the program in
@@ -189,7 +189,7 @@ def test_a_key_of_its_own_is_named_and_not_copied(base: Path, tmp_path: Path) ->
 def test_module_is_started_in_isolation_without_a_script(
     base: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A folder `rtshcua` where a host happens to run is not what is started."""
+    """A folder `rtshcua` in the host's working folder must not be imported."""
     monkeypatch.setattr(sys, "executable", str(tmp_path / "python3"))
     assert made(base, tmp_path / "plug") == 0
     server = read(tmp_path / "plug/.mcp.json")["mcpServers"][NAME]

@@ -1,4 +1,4 @@
-"""A whole run over the agent socket: an agent follows it, is refused, replans, and a person calls it home."""
+"""A whole run over the agent socket: an agent follows it, is refused, and replans; a person recalls it."""
 
 import json
 import os
@@ -176,7 +176,7 @@ def test_operators_have_a_socket_of_their_own_and_are_looked_at_first(tmp_path: 
 
 
 def test_agent_documents_do_not_delay_operators(tmp_path: Path) -> None:
-    """Replacements are looked at ahead, by a thread for each socket, and no more of them than that."""
+    """Replacements are prepared ahead, by at most one thread for each socket."""
     of, over = low(), threading.Event()
     seeds = (number.to_bytes(32) for number in range(1, 14))
     keys = [SigningKey.from_seed(seed, duty=Duty.MISSION, development=True) for seed in seeds]

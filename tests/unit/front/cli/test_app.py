@@ -1,4 +1,4 @@
-"""The front door: what it prints, how fast it opens, and how it fails."""
+"""The entry point: output, start time and failures."""
 
 import errno
 import os
@@ -25,7 +25,7 @@ def run_module(*words: str, **options: object) -> subprocess.CompletedProcess[st
 
 
 def install(monkeypatch: pytest.MonkeyPatch, body: Callable[..., object]) -> None:
-    """Puts a command in the place of `rtshcua show`."""
+    """Replace the command `rtshcua show`."""
     door = typer.Typer(add_completion=False)
     door.command()(body)
     monkeypatch.setattr(app, "import_module", lambda name: SimpleNamespace(app=door))
@@ -85,7 +85,7 @@ def test_check_does_not_import_lint(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_shipped_sources_are_checked_without_float_geometry(checkout: Path) -> None:
-    """What a check needs not takes long to import, and the floats of geometry differ between machines."""
+    """Unneeded imports are slow, and floating-point geometry differs between machines."""
     files = [str(path) for folder in ("skills", "policies", "missions") for path in (checkout / folder).glob("*.rts")]
     program = (
         f"import sys; from rtshcua.front.cli.app import main; code = main(['check', *{files}])\n"
@@ -220,7 +220,7 @@ def test_misused_verb_names_the_verb(monkeypatch: pytest.MonkeyPatch, capsys: py
 
 
 def abort_at_the_end() -> typer.Abort:
-    """What a question raises at the end of the input."""
+    """The exception of a prompt at the end of the input."""
     try:
         try:
             raise EOFError

@@ -1,4 +1,4 @@
-"""`rtshcua archive`: what it says, and its exit codes."""
+"""`rtshcua archive`: output and exit codes."""
 
 import csv
 import errno
@@ -233,7 +233,7 @@ def test_invalid_options_are_refused(
 
 @pytest.mark.slow
 def test_unreachable_cluster_is_reported(runs: Path) -> None:
-    """In a process of its own: a client of a cluster leaves a thread behind."""
+    """Run in a separate process, because a cluster client leaves a thread behind."""
     words = ["archive", "add", str(runs / "quad-07-0"), *ROOT, "--cluster", "nonsense"]
     run = subprocess.run(
         [sys.executable, "-m", "rtshcua", *words], capture_output=True, text=True, check=False, timeout=120
@@ -354,7 +354,7 @@ def test_two_stories_of_one_boot_are_named(tmp_path: Path, capsys: pytest.Captur
 
 
 def test_a_link_in_a_folder_is_not_taken_in(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Whoever sends a folder must not have another file of ours copied; one that is named may be a link."""
+    """A received folder must not make us copy another file of ours; a log named on the command line may be a link."""
     for name in ("a", "b"):
         Path("flown", name).mkdir(parents=True)
     Path("flown/a/log.jsonl").symlink_to(runs / "quad-07-0" / "log.jsonl")

@@ -1,4 +1,4 @@
-"""The boundary's key and its sessions, as a run has them."""
+"""The boundary's key and its sessions in a run."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -33,7 +33,7 @@ def root(store: KeyStore) -> TrustRoot:
 
 
 def opened(store: KeyStore) -> Callable[[Duty, Path | None], SigningKey]:
-    """What opens its keys."""
+    """The passphrase source of its keys."""
     return lambda duty, path: unlock(store, duty, path=path)
 
 

@@ -1,4 +1,4 @@
-"""`rtshcua campaign`: what it asks for, how it goes on, what it keeps, and how it ends."""
+"""`rtshcua campaign`: options, resumption, stored files and exit codes."""
 
 import json
 import signal
@@ -35,7 +35,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def flies(
     monkeypatch: pytest.MonkeyPatch,
 ) -> Callable[[Callable[[FlownMission, CampaignFlight], CampaignResult]], None]:
-    """Lets flights be flown in another way."""
+    """A function that replaces how flights are flown."""
 
     def put(fly: Callable[[FlownMission, CampaignFlight], CampaignResult]) -> None:
         monkeypatch.setattr(FlownMission, "fly", fly)
@@ -70,7 +70,7 @@ def run(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str, str]
 
 @pytest.mark.slow
 def test_flights_that_are_flown_and_judged(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The one that flies: a few real flights, from the source to the report."""
+    """A few real flights, from the source to the report."""
     code, out, err = run(capsys, "--flights", "2", "--json", "--fault", "link-silence", "--fault", "wind", "-o", "made")
     assert (code, err) == (ExitCode.OK, "")
     found = json.loads(out)["campaign"]
@@ -90,7 +90,7 @@ def test_flights_that_are_flown_and_judged(here: Path, capsys: pytest.CaptureFix
 
 
 def fly_one_again(line: dict[str, Any]) -> CampaignResult:
-    """Flight 0 once more, in this process, from what the folder says alone."""
+    """Fly flight 0 again, in this process, from the contents of the folder only."""
     from rtshcua.app.campaigns import _kinds, _space
     from rtshcua.app.programs import compile_sources
     from rtshcua.campaign.drawing import FLAVOURS
@@ -116,7 +116,7 @@ def test_interrupted_campaign_resumes(
 
     def interrupted(field: FlownMission, flight: CampaignFlight) -> CampaignResult:
         seen.append(flight.number)
-        if len(seen) == 12:  # the flight that is under way is flown to its end
+        if len(seen) == 12:  # the present flight is completed
             signal.raise_signal(signal.SIGTERM)
         return good(field, flight)
 
@@ -184,7 +184,7 @@ def test_failure_is_shrunk_to_a_scenario_and_exits_with_13(
 
 
 def _failing(_: ScenarioTrial, flight: Try) -> FlightResult:
-    """What a kept failure says can be read: it is the flight that failed."""
+    """Check that a stored failure is the flight that failed."""
     assert [type(each.fault) for each in flight.scenario.incidents] == [GpsLoss]
     assert flight.scenario.start.utc_us == 1_780_300_800_000_000 + 60 * S
     wrong = (FlightFailure(-1, "collision", "flew into it"),)
@@ -262,7 +262,7 @@ def test_a_mission_that_fails_without_faults_is_refused(
 def test_approve_grants_each_requested_approval(
     here: Path, capsys: pytest.CaptureFixture[str], flies: Callable[[Any], None]
 ) -> None:
-    """Two roles are asked before each of two orbits: without them the mission cannot be flown."""
+    """Each of two orbits needs the approval of two roles."""
     asked = [f"1 s .. 5 s after goto {step} approve(role = {role})" for step in (2, 3) for role in ("chief", "safety")]
     refused: list[CampaignFlight] = []
 

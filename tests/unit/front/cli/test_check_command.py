@@ -1,4 +1,4 @@
-"""`rtshcua check`: which files it looks at together, what it says of them, and how it ends."""
+"""`rtshcua check`: selected files, findings and exit codes."""
 
 import io
 import json
@@ -78,7 +78,7 @@ def test_missions_of_one_name_in_unrelated_files_do_not_clash(here: Path, capsys
     lines = said.out.splitlines()
     assert lines[0] == "no errors in 9 files"
     missions = ["look (a/one.rts)", "look (b/two.rts)"]
-    told = [line for line in lines[1:] if not line.startswith("  ")]  # what the steps take is indented
+    told = [line for line in lines[1:] if not line.startswith("  ")]  # the costs of the steps are indented
     assert [line.split(":")[0] for line in told] == [*missions, "meadow_flight on quad"]
     assert lines[-1].endswith("`where fitted` left out, without link.quality, obstacle.distance, wind.speed")
 
@@ -247,7 +247,7 @@ def test_compared_versions_are_printed(old: Path, capsys: pytest.CaptureFixture[
 
 @pytest.mark.parametrize("earlier", ["old.bundle", ".old"])
 def test_gate_fails_if_nothing_was_compared(old: Path, earlier: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """A policy that was renamed, or another project's bundle: its version was never looked at."""
+    """The policy was renamed, or the bundle is of another project: no version was compared."""
     put({"policy.rts": POLICY.replace("meadow_flight", "other_flight")})
     assert main(["check", "policy.rts", "--since", earlier]) == ExitCode.INPUT
     said = capsys.readouterr().err

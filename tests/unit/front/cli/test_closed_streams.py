@@ -1,4 +1,4 @@
-"""Commands whose standard output is closed: the documented exit code, and not a word more than they have to say."""
+"""Commands with a closed standard output end with the documented exit code and no further output."""
 
 import os
 import subprocess

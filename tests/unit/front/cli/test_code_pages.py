@@ -22,7 +22,7 @@ from virtual.sampling import parts
 CHECKOUT = Path(__file__).resolve().parents[4]
 PAGES = CHECKOUT / "docs" / "codes"
 
-#: what a source alone cannot show: bytes that are no text, size, depth, other files, other formats, command lines
+#: codes that one source cannot show: invalid text, size, depth, other files and formats, command lines
 TOLD = {
     codes.NOT_TEXT,
     codes.HIDDEN_CHARACTER,
@@ -55,9 +55,9 @@ SHOWN = [code for code in REGISTRY.values() if code not in TOLD]
 
 
 def findings(text: str, code: Code) -> tuple[tuple[Diagnostic, ...], Program]:
-    """What checking the example finds, as its only file; a mission that it has is compiled.
+    """The findings of an example as a single file; its mission is also compiled.
 
-    Habits are looked for in their own examples only.
+    Lint findings are only computed for examples of lint codes.
     """
 
     def read(path: str) -> bytes:

@@ -1,4 +1,4 @@
-"""`rtshcua compile`, `check` and `schema`, as a person, a script and an agent call them."""
+"""`rtshcua compile`, `check` and `schema`, called by a person, a script and an agent."""
 
 import json
 import os
@@ -83,7 +83,7 @@ def test_a_refusal_names_clause_argument_and_nearest_value(
 def test_an_agent_repairs_its_proposal_from_the_answer_alone(
     checkout: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The loop that the JSON answer is for: follow each pointer, put in what is said to be accepted, propose again."""
+    """The intended use of the JSON answer: follow each pointer, insert an accepted value, and propose again."""
     wrong = json.loads(proposal(checkout))
     wrong["phases"][1]["steps"][1]["arguments"]["altitude"] = "35 m"
     (here / "p.json").write_text(json.dumps(wrong), encoding="utf-8")
@@ -209,7 +209,7 @@ def test_check_needs_no_keys_and_writes_nothing(
 def test_the_key_of_the_store_that_may_sign_a_mission_signs_it(
     checkout: Path, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Those of `keys init` speak for the operator alone; of none that may, it is said what makes one."""
+    """Keys of `keys init` are for operators only; if no key may sign, the error names the command that makes one."""
     text = """import "lib:policies/site.rts"
 import "lib:skills/takeoff.rts"
 import "lib:skills/return_home.rts"
@@ -284,7 +284,7 @@ def test_unreadable_import_is_reported_before_a_missing_policy(here: Path, check
 def test_a_key_of_another_root_is_warned_of(
     checkout: Path, here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """It signs, for the vehicle may have that root; whoever mistook the key learns it before `run` refuses."""
+    """The bundle is signed, because the vehicle may have that root; the warning comes before `run` refuses it."""
     own = data_folder()
     monkeypatch.setenv("RTSHCUA_DATA_DIR", str(here / "other"))
     assert main(["keys", "init"]) == ExitCode.OK

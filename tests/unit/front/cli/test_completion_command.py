@@ -1,4 +1,4 @@
-"""`rtshcua completion`: real shells complete commands, verbs, options, values, codes and files by the script."""
+"""`rtshcua completion`: real shells complete commands, options, values, codes and files."""
 
 import shutil
 import subprocess
@@ -41,7 +41,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def tab(place: Path, capsys: pytest.CaptureFixture[str]) -> Complete:
-    """What bash offers for the last of some words."""
+    """The completions of bash for the last word."""
     script = place / ".script"
     script.write_text(asked(capsys, "bash"))
 

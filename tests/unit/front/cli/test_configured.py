@@ -1,4 +1,4 @@
-"""`--set`: which parameters an operator may name on a command line, and what is said of others."""
+"""`--set`: accepted parameters, and errors for others."""
 
 from pathlib import Path
 

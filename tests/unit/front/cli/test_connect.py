@@ -1,4 +1,4 @@
-"""`--connect` of the commands: what is said of a link that cannot be opened, or over which no vehicle is heard."""
+"""`--connect`: errors for a link that cannot be opened, or without a vehicle."""
 
 import os
 import pty
@@ -42,7 +42,7 @@ def test_garbage_is_distinguished_from_no_heartbeat(line: tuple[str, int], capsy
     over, chance = threading.Event(), Random(3)
 
     def babble() -> None:
-        while not over.wait(0.05):  # what waits when the device is opened is thrown away
+        while not over.wait(0.05):  # bytes received before the device was opened are dropped
             with suppress(BlockingIOError):
                 os.write(far, chance.randbytes(40))
 

@@ -1,4 +1,4 @@
-"""`rtshcua docs`: where the page goes, what it refuses, and that it names what `compile` signs."""
+"""`rtshcua docs`: output, refusals, and the same digest as `compile`."""
 
 import io
 import json
@@ -28,7 +28,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 class Terminal(io.StringIO):
-    """A standard output that somebody looks at."""
+    """A standard output that is a terminal."""
 
     def isatty(self) -> bool:
         return True
@@ -93,7 +93,7 @@ def test_current_folder_is_shown_by_name(tmp_path: Path, capsys: pytest.CaptureF
 
 
 def newer(old: str, new: str, *, raised: bool = True) -> str:
-    """The shipped policy with other words, and perhaps a higher version."""
+    """The shipped policy with changed text, and optionally a higher version."""
     text = POLICY.read_text(encoding="utf-8")
     assert old in text
     text = text.replace(old, new, 1)
@@ -114,7 +114,7 @@ def test_since_refuses_like_check(machine: list[str], capsys: pytest.CaptureFixt
 
 
 def test_no_path_of_this_machine_is_in_the_page(tmp_path: Path) -> None:
-    """Not of an earlier file, nor of a source that lies elsewhere."""
+    """Neither of an earlier file nor of a source in another folder."""
     elsewhere, here = tmp_path / "elsewhere", tmp_path / "here"
     elsewhere.mkdir()
     here.mkdir()
@@ -130,7 +130,7 @@ def test_no_path_of_this_machine_is_in_the_page(tmp_path: Path) -> None:
 
 
 def test_rules_and_files_are_called_alike(capsys: pytest.CaptureFixture[str]) -> None:
-    """As seen from the folder that the command ran in, whichever file was asked for; the library by its own name."""
+    """Paths are relative to the working folder, whichever file was selected; the library has its own name."""
     for folder in ("rules", "tests"):
         Path(folder).mkdir()
     Path("rules/own.rts").write_text(POLICY.read_text(encoding="utf-8"), encoding="utf-8")
@@ -188,7 +188,7 @@ def test_invalid_arguments_are_refused(
 
 
 def test_failing_policy_test_prevents_output(capsys: pytest.CaptureFixture[str]) -> None:
-    """Not even where another file asked for imports it; where only what is imported fails, that is not asked."""
+    """Also if another selected file imports it; tests in files that are only imported do not count."""
     source = CHECKOUT / "policies" / "bridge_inspection_test.rts"
     text = source.read_text(encoding="utf-8")
     assert text.count("expect allow") > 1

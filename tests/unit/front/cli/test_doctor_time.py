@@ -1,4 +1,4 @@
-"""By which time of day `doctor` judges: the one that a run would take, whoever decides."""
+"""`doctor` uses the same time of day as a run would."""
 
 from pathlib import Path
 from struct import Struct
@@ -43,7 +43,7 @@ def test_of_a_run_on_this_machine(monkeypatch: pytest.MonkeyPatch, apart: bool, 
 def test_of_a_boundary_that_listens(
     monkeypatch: pytest.MonkeyPatch, source: ClockSource, linked: bool, found: TimeSources
 ) -> None:
-    """It is asked as a run asks that waits for no more, and let go."""
+    """The boundary is queried like by a run that no longer waits, and then released."""
     asked: list[bytes] = []
 
     def call(octets: bytes) -> bytes:

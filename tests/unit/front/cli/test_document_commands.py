@@ -1,4 +1,4 @@
-"""`approve`, `recall`, `replace` and `compile --replaces`, from the command line to what a boundary says to them."""
+"""`approve`, `recall`, `replace` and `compile --replaces`, from the command line to the boundary's answer."""
 
 import json
 import re
@@ -123,7 +123,7 @@ def test_from_the_command_line_to_the_boundary(here: Path, capsys: pytest.Captur
 
 
 def test_a_replacement_that_drops_a_phase_is_followed_in_a_log(here: Path) -> None:
-    """A step that stays may have meant something in that phase too: it flies, and a log of it is explained."""
+    """A kept step may also refer to that phase: it flies, and its log can be explained."""
     two = LOW.replace("  }\n  phase recovery {", "   ").replace(
         "inspect_area(bridge_a, altitude = 9 m, pattern = perimeter)", ""
     )
@@ -216,7 +216,7 @@ def test_unsignable_documents_are_refused(here: Path, capsys: pytest.CaptureFixt
 
 @pytest.mark.parametrize("whose", ["mission-agent", "policy"])
 def test_flight_can_be_stopped_after_its_keys_are_revoked(here: Path, whose: str) -> None:
-    """It flies on under the root that it began with: an operator must not have to choose what to do first."""
+    """The flight continues under its first root, so that an operator may recall and replace in any order."""
     flies, again = in_force(here / "low.bundle"), in_force(here / "low.bundle")
     first = here / "first.trust"
     first.write_bytes(KeyStore(data_folder()).root())
@@ -248,7 +248,7 @@ def test_a_bundle_that_no_root_ever_trusted_is_not_recalled(
 
 
 def test_recall_accepts_the_replaced_key_of_the_flight(here: Path) -> None:
-    """The flight began under a root that knows no other key of theirs."""
+    """The flight began under a root with only the old key."""
     of = in_force(here / "low.bundle")
     assert main(["keys", "replace", "approval-owner-operator"]) == ExitCode.OK
     (old,) = (data_folder() / "keys").glob("revoked-*.key")
@@ -282,7 +282,7 @@ def test_a_bundle_that_was_cut_is_malformed_for_everybody(
 
 @pytest.fixture
 def listening() -> Iterator[Path]:
-    """A flight's socket that accepts the first document and refuses the others, the next as for another mission."""
+    """A flight's socket that accepts the first document and refuses later ones, the second as of another mission."""
     with tempfile.TemporaryDirectory(dir="/tmp") as name:
         agents = AgentSocket(Path(name) / "s", lambda: b'{"type":"hello","flight":"' + b"00" * 16 + b'"}\n')
         over = threading.Event()

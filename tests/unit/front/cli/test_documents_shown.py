@@ -81,7 +81,7 @@ def test_audit_lists_signed_documents(log: Path, capsys: pytest.CaptureFixture[s
 
 
 def test_the_person_who_signed_is_named_from_the_trust_root(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A key's name says nothing to whoever reads the log: the root in it has the person's."""
+    """A key id is not readable, so the person's name is taken from the root in the log."""
     assert main(["show", str(log)]) == ExitCode.OK
     told = [line for line in capsys.readouterr().out.splitlines() if f"by ada, key {APPROVAL_KEY.kid.hex()}" in line]
     assert [line.split("·")[1].split()[0] for line in told] == ["approval", "recall"]
@@ -102,7 +102,7 @@ def test_a_trust_root_that_makes_no_sense_names_nobody(log: Path, capsys: pytest
 
 
 def test_why_begins_with_the_cause_of_the_end(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """An admitted step says nothing of that: the recall does."""
+    """The cause is the recall, not an admitted step."""
     assert main(["why", str(log)]) == ExitCode.OK
     out = capsys.readouterr().out
     assert out.startswith("Cause of the early end\n")

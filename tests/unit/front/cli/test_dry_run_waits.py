@@ -1,4 +1,4 @@
-"""`run --dry-run` while it waits: it says what for, ends when asked to, and its own wait ages nothing."""
+"""`run --dry-run` while it waits: it names the reason, can be interrupted, and does not age signals."""
 
 import json
 from collections.abc import Sequence
@@ -22,12 +22,12 @@ SECOND = 1_000_000
 
 
 class Told:
-    """The parameters of a vehicle that has one only."""
+    """The parameters of a vehicle with a single parameter."""
 
     values = {"RTL_RETURN_ALT": 30.0}  # noqa: RUF012
 
     def read(self, name: str) -> None:
-        """It is asked for."""
+        """Request the parameter."""
 
     def is_known(self, name: str) -> bool:
         return name in self.values

@@ -1,4 +1,4 @@
-"""`--json`: whatever goes wrong, a program finds one JSON object on the standard output that says what."""
+"""`--json`: every error is one JSON object on the standard output."""
 
 import json
 from collections.abc import Callable
@@ -43,7 +43,7 @@ def test_every_error_is_one_object(words: str, code: ExitCode, slug: str, capsys
     assert said.err.splitlines()[0] == f"error[{slug}]: {found['error']['text']}", "a person still reads it"
 
 
-#: what each command is given so that all that is wrong is that a file is missing; None where it takes no file
+#: arguments of each command with a missing file as the only error; None if it takes no file
 MISSING: dict[str, str | None] = {
     "check": "none.rts", "lint": "none.rts", "fmt": "none.rts", "test": "none.rts", "campaign": "none.rts",
     "compile": "none.rts", "docs": "none.rts", "explain": None, "schema": None, "init": None, "lsp": None,

@@ -1,4 +1,4 @@
-"""`rtshcua verify-log --explain N`: one record in words, after an audit of its log."""
+"""`rtshcua verify-log --explain N`: one record explained, after an audit of its log."""
 
 import json
 import re

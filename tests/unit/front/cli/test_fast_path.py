@@ -1,4 +1,4 @@
-"""Plain command lines are read without typer, and to the same effect."""
+"""Simple command lines are parsed without typer, with the same result."""
 
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from rtshcua.front.cli.commands import check, lint, recall
 from rtshcua.front.cli.table import COMMANDS
 
 COMMAND = {"lint": (lint, fast_path.LINT), "check": (check, fast_path.CHECK), "recall": (recall, fast_path.RECALL)}
-#: what the fast path leaves to typer
+#: command lines that the fast path leaves to typer
 LEFT = {"recall": {"--for"}}
 
 

@@ -1,4 +1,4 @@
-"""Files and folders that commands are given: whichever command reads one, it says the same of it."""
+"""Files and folders as arguments: every command reports the same errors for them."""
 
 import json
 import os
@@ -50,7 +50,7 @@ def test_a_log_that_is_cut_inside_its_first_record(words: tuple[str, ...], log: 
 def test_unreadable_file_is_bad_input(
     words: tuple[str, ...], log: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """And no wrong command line, as it would be for an argument parser that looks first."""
+    """It is not a usage error, which an argument parser with a file check would report."""
     opened = os.open
 
     def denied(path: Any, *rest: Any, **more: Any) -> int:
@@ -119,7 +119,7 @@ def test_seal_is_explained(log: Path, capsys: pytest.CaptureFixture[str]) -> Non
 def test_a_folder_that_cannot_be_read_is_not_passed_over(
     words: tuple[str, ...], log: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Else "no errors" would be said of what nobody looked at."""
+    """Otherwise unread files would be reported as free of errors."""
     Path("runs/fine.rts").write_text("role watch\n", encoding="utf-8")
     locked, scanned = Path("runs/locked"), os.scandir
     locked.mkdir()

@@ -1,4 +1,4 @@
-"""The end of a flight on a disk that refuses: nothing is vouched for that is not there, and what is missing is said."""
+"""The end of a flight on a failing disk: only stored files are listed, and missing ones are reported."""
 
 import errno
 import json

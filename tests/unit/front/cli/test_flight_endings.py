@@ -1,4 +1,4 @@
-"""Each way in which a flight may end has its exit code, and only a mission that was completed has 0."""
+"""Each way to end a flight has its exit code; only a completed mission has 0."""
 
 from rtshcua.app.fly.flight_session import EXIT_CODES
 from rtshcua.diagnostics.exits import ExitCode

@@ -1,4 +1,4 @@
-"""A program that fails in the air says that the vehicle may be flying, and what brings it down."""
+"""A program that fails in the air warns that the vehicle may be flying, and names the command that lands it."""
 
 from types import SimpleNamespace
 from typing import Any

@@ -1,4 +1,4 @@
-"""`rtshcua fmt`: which files it lays out, what it says, how it ends, and that it loses nothing."""
+"""`rtshcua fmt`: selected files, output, exit codes, and no loss of text."""
 
 import io
 import json
@@ -197,7 +197,7 @@ def test_a_closed_pipe_is_quiet(here: Path) -> None:
 
 
 def test_a_file_that_may_not_be_written(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """It is told, and the others are done all the same."""
+    """The error is reported, and the other files are formatted."""
     Path("a.rts").chmod(0o444)
     Path("b/c.rts").write_text(BAD)
     assert main(["fmt", "."]) == ExitCode.FULL
@@ -212,7 +212,7 @@ def test_a_file_that_may_not_be_written(here: Path, capsys: pytest.CaptureFixtur
 
 @pytest.fixture
 def interruptible() -> Iterator[None]:
-    """A shell starts a background job with SIGINT ignored, and its tests inherit that: here it interrupts."""
+    """Restore SIGINT, which a shell ignores for background jobs."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)

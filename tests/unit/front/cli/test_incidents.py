@@ -1,4 +1,4 @@
-"""What goes wrong in one run by a scenario: which runs may have it, when it happens, and what is told of it."""
+"""Incidents of a scenario in one run: allowed runs, times and reports."""
 
 from pathlib import Path
 from typing import Any
@@ -43,7 +43,7 @@ scenario "at its own time" {
 
 
 class Vehicle:
-    """Remembers what it is told; `gone`: nothing listens any more."""
+    """A vehicle that records its commands; `gone`: it no longer listens."""
 
     def __init__(self, *, gone: bool = False) -> None:
         self.told: list[str] = []

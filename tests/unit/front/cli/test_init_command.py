@@ -1,4 +1,4 @@
-"""`rtshcua init`: what it makes is sound under any name, and it never takes anything away."""
+"""`rtshcua init`: its project is valid under any name, and it never removes files."""
 
 import json
 import re

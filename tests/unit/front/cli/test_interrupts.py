@@ -1,4 +1,4 @@
-"""What each Ctrl-C asks for."""
+"""The effect of each Ctrl-C."""
 
 import os
 import signal
@@ -77,7 +77,7 @@ def test_stop_request_raises_only_at_its_checkpoints(number: signal.Signals) -> 
 
 
 def test_ignored_sigint_stays_ignored() -> None:
-    """As a shell starts what runs in the background."""
+    """A shell starts background jobs this way."""
     before = signal.signal(signal.SIGINT, signal.SIG_IGN)
     try:
         with StopRequest() as stop:

@@ -1,4 +1,4 @@
-"""`rtshcua keys`: made once, private, never shown."""
+"""`rtshcua keys`: keys are made once, kept private, and never printed."""
 
 import json
 import os
@@ -28,7 +28,7 @@ PASSPHRASE = "correct horse battery"
 
 @pytest.fixture(autouse=True)
 def _cheap_guesses(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Encrypted keys are many here."""
+    """Make passphrases cheap to check, because these tests encrypt many keys."""
     monkeypatch.setattr(key_file, "COST", key_file.COSTS[0])
 
 
@@ -165,7 +165,7 @@ def test_a_passphrase_file_that_others_may_read_is_refused(
 
 
 def test_a_passphrase_may_come_from_a_pipe() -> None:
-    """As a shell gives it: `--passphrase-file <(pass show drone)`."""
+    """As in a shell: `--passphrase-file <(pass show drone)`."""
     out, into = os.pipe()
     os.write(into, PASSPHRASE.encode() + b"\n")
     os.close(into)
@@ -210,7 +210,7 @@ def test_no_prompt_without_a_terminal(monkeypatch: pytest.MonkeyPatch, tmp_path:
 
 
 class Terminal:
-    """A standard input that someone sits at."""
+    """A standard input that is a terminal."""
 
     def isatty(self) -> bool:
         return True
@@ -328,7 +328,7 @@ def test_approval_key_is_selected_by_person(capsys: pytest.CaptureFixture[str]) 
 
 
 def listed(capsys: pytest.CaptureFixture[str]) -> dict[str, list[str]]:
-    """The ids of the keys by duty, and what is revoked."""
+    """The ids of the keys by duty, and the revoked ones."""
     capsys.readouterr()
     assert app.main(["keys", "list", "--json"]) == ExitCode.OK
     told = json.loads(capsys.readouterr().out)
@@ -465,7 +465,7 @@ def test_list_shows_files_and_version_and_revoking_twice_fails(
 
 
 def provisioned(capsys: pytest.CaptureFixture[str], folder: Path, *words: str) -> tuple[int, str]:
-    """The exit code, and the slug where it is refused."""
+    """The exit code, and the slug of a refusal."""
     capsys.readouterr()
     code = app.main(["keys", "provision", str(folder), "--vehicle", "quad-07", "--json", *words])
     told = capsys.readouterr()
@@ -473,7 +473,7 @@ def provisioned(capsys: pytest.CaptureFixture[str], folder: Path, *words: str) -
 
 
 def first_of(folder: Path) -> tuple[int, bytes]:
-    """Since when missions are opened by a folder, and whose boundary's it is."""
+    """The time from which a folder opens missions, and its boundary."""
     data = (folder / "quad-07" / "kept").read_bytes()
     since_us, public = struct.unpack_from("<q32s", data, 8)
     assert data == boundary_process.first_kept(since_us, public)
@@ -481,7 +481,7 @@ def first_of(folder: Path) -> tuple[int, bytes]:
 
 
 def test_a_folder_is_provisioned_once(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A second one knows of no bundle that the first opened: it takes a word more, and a key that logs tell apart."""
+    """A second folder does not know the opened bundles of the first, so it needs an extra option and another key."""
     app.main(["keys", "init"])
     store, begun_us = KeyStore(data_folder()), time.time_ns() // 1_000
     key = store.signing_key(Duty.BOUNDARY)

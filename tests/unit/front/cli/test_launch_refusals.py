@@ -1,4 +1,4 @@
-"""What `run` refuses between loading a bundle and flying it."""
+"""Refusals of `run` between loading a bundle and flying it."""
 
 import os
 import shutil
@@ -50,7 +50,7 @@ def test_older_policy_version_is_refused(tmp_path: Path) -> None:
 def test_opened_bundle_resumes_while_the_vehicle_may_fly(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, armed: bool, landed_state: int, resumes: bool
 ) -> None:
-    """On the ground and armed, it may have been told to take off by a run that was killed."""
+    """An armed vehicle on the ground may have a takeoff command from a killed run."""
     monkeypatch.setattr(replay_check, "AIR_S", 0.01)
     of = loaded()
     replay_check.mark_opened(tmp_path, of, SystemClock(), cast("Any", Grounded()))
@@ -139,7 +139,7 @@ def test_unknown_link_timestamps_bring_an_airborne_vehicle_home(tmp_path: Path, 
 
 
 class Grounded:
-    """A flight that is told not to be."""
+    """A flight that is reported as not flying."""
 
     refused = False
 
@@ -160,7 +160,7 @@ def test_a_bundle_is_marked_once_and_of_two_runs_at_a_time_one_flies(tmp_path: P
 
 @pytest.mark.parametrize("own", [True, False])
 def test_a_simulated_flight_and_a_real_one_use_up_no_bundle_of_each_other(tmp_path: Path, own: bool) -> None:
-    """Nor does the policy that flew on the one forbid an older one on the other."""
+    """A policy flown on one does not forbid an older policy on the other."""
     orders = [request(state=tmp_path, link=link) for link in (None, "udpin:127.0.0.1:1")]
     flew, other = orders if own else reversed(orders)
     of = loaded()
@@ -208,7 +208,7 @@ def test_bundle_without_sent_commands_can_run_again(tmp_path: Path) -> None:
 
 
 def test_missing_log_is_not_reported_as_interrupted(tmp_path: Path) -> None:
-    """Whoever clears `runs/` away is not told to bring a vehicle down by a file that is not there."""
+    """After `runs/` was deleted, the message must not refer to a missing file."""
     log = tmp_path / "runs" / "1" / "log.jsonl"
     log.parent.mkdir(parents=True)
     log.touch()
@@ -224,7 +224,7 @@ def test_missing_log_is_not_reported_as_interrupted(tmp_path: Path) -> None:
 
 
 def test_simulated_flight_does_not_affect_the_connected_vehicle(tmp_path: Path) -> None:
-    """Its log, and the parameters that it set: neither is brought down or put back on the real one."""
+    """Its log and its parameters have no effect on a real vehicle."""
     simulated, real = (request(state=tmp_path, link=link).kept_in for link in (None, 1))
     log = tmp_path / "log.jsonl"
     log.touch()
@@ -244,7 +244,7 @@ def test_simulated_flight_does_not_affect_the_connected_vehicle(tmp_path: Path) 
 
 
 def late(us: int) -> Now:
-    """So long after the first moment at which a step of the mission may not begin any more."""
+    """A time so long after the last moment at which a step of the mission may begin."""
     end_us = min(each.invocation.issued_at_us + each.invocation.contract.validity_us for each in loaded().invocations)
     return Now(START.monotonic_us, end_us + START.utc_error_us + us, START.utc_error_us)
 

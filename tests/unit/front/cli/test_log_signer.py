@@ -1,4 +1,4 @@
-"""The log's key is in the hands of one: this process, or the boundary that it was handed over to."""
+"""Only one process holds the log key: this one, or the boundary."""
 
 import gc
 

@@ -1,4 +1,4 @@
-"""`rtshcua explain` knows whatever `verify-log` may print as a finding."""
+"""`rtshcua explain` knows every finding that `verify-log` may print."""
 
 import ast
 import json
@@ -20,11 +20,11 @@ from rtshcua.front.cli.render.verdict import MEANINGS
 from rtshcua.wire.untrusted import Untrusted
 
 PACKAGE = Path(rtshcua.__file__).parent
-#: where findings about logs are made
+#: the modules that make findings about logs
 MAKERS = ("evidence", "ground/audit", "adapters/archive", "app", "front/cli")
-#: those of `verify-proof`, and of notes before they are told as a part of what has them
+#: slugs of `verify-proof`, and of notes within other artefacts
 OTHERS = ("proof/", "note/")
-#: and the rest of these slugs is that of a refusal of `wire`, or of a session: whatever these raise
+#: prefixes whose remainder is the slug of a refusal by `wire` or by a session
 REFUSE = ("wire", "decision/session.py")
 SLUG = re.compile("[a-z]+(-[a-z]+)*")
 #: of keys on the disk, of streams, and of the archive
@@ -51,14 +51,14 @@ def literal_slugs() -> set[str]:
 
 
 def refused_slugs() -> set[str]:
-    """What something signed may be refused for."""
+    """The slugs with which a signed artefact may be refused."""
     named = ("Error", "Untrusted")
     found = {first_text(call) for call in calls(REFUSE) if call.func.id.endswith(named)}  # type: ignore[attr-defined]
     return {slug for slug in found if slug is not None and SLUG.fullmatch(slug)}
 
 
 def documented_slugs() -> set[str]:
-    """What the errors of `wire` say that they are raised with."""
+    """The slugs that the docstrings of `wire` errors list."""
     found: set[str] = set()
     for error in Untrusted.__subclasses__():
         if error.__module__.startswith("rtshcua.wire."):
@@ -84,7 +84,7 @@ def test_every_refusal_of_something_signed_is_explained() -> None:
 
 @pytest.mark.slow
 def test_explained_slugs_exist() -> None:
-    """A slug that nothing prints any more would mislead."""
+    """An explanation of a removed slug would mislead."""
     written = literal_slugs() | {f"seal/{part}" for part in _PARTS.values()} | {"boundary/frames", "boundary/clock"}
     written |= {f"decision/{field.replace('_', '-')}" for field in DECIDED} | {"trust/revoked-key"}
     assert {slug for slug in log_slugs._FOUND if slug not in written} == set()
@@ -122,7 +122,7 @@ def test_unknown_slug_suggests_the_nearest(capsys: pytest.CaptureFixture[str]) -
 
 
 def test_zeros_after_a_closed_log_are_recognised(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """As a file system pads it after a power cut: nothing says that it was forged, and it tells how to go on."""
+    """A file system may pad the file after a power cut; the finding does not suggest forgery, and says what to do."""
     whole = b"".join(flight())
     path = tmp_path / "log.jsonl"
     path.write_bytes(whole + bytes(4096))

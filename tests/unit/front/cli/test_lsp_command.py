@@ -1,4 +1,4 @@
-"""The door to the language server: what is wrong with the command line is said, and nothing is started."""
+"""`rtshcua lsp`: usage errors are reported before a server is started."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""The door to the MCP server: what is wrong with the command line is said, and nothing is served."""
+"""`rtshcua mcp`: usage errors are reported before anything is served."""
 
 import sys
 from pathlib import Path

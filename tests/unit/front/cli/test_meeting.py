@@ -1,4 +1,4 @@
-"""Before a flight the vehicle's time of day is waited for, and not before what hangs in the air is brought down."""
+"""A flight waits for the vehicle's time of day, except when it lands an airborne vehicle."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -17,7 +17,7 @@ from rtshcua.simulation.simulated_mark import marked
 
 
 class Silent:
-    """A vehicle that tells no time of day."""
+    """A vehicle that does not report the time of day."""
 
     def __init__(self, *, armed: bool) -> None:
         link = SimpleNamespace(crowd=None)
@@ -26,7 +26,7 @@ class Silent:
             source=SourceTime(),
         )  # fmt: skip
         self.polls = 0
-        #: from when on it could have been ready, at each look
+        #: the earliest readiness, at each check
         self.ready_from_us: list[int] = []
 
     def poll(self, now_us: int, timeout_us: int) -> list[Any]:
@@ -40,7 +40,7 @@ class Silent:
 def test_airborne_vehicle_does_not_wait_for_the_time_of_day(
     hurried: bool, armed: bool, waits: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """3 s of each restart on a machine whose clock nobody sets, where the operator said how far it is off."""
+    """Otherwise each restart takes 3 s on a machine without clock synchronisation and with a stated error."""
     monkeypatch.setattr(connect, "UTC_S", 0.05)
     clock, vehicle = SystemClock(), Silent(armed=armed)
     utc = UtcWatch(clock, 500_000, kernel_us=lambda: None)
@@ -50,8 +50,8 @@ def test_airborne_vehicle_does_not_wait_for_the_time_of_day(
 
 
 def test_vehicle_is_not_ready_before_its_first_answers(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On a busy machine it had all else while a second vehicle was waited for: its first step was deferred as
-    uncertain, until the deadline of that was over.
+    """Regression: on a busy machine the time came last, while the run waited for a second vehicle. The first step was
+    deferred as uncertain until its deadline.
     """
     monkeypatch.setattr(connect, "UTC_S", 0.05)
     monkeypatch.setattr(connect, "ANOTHER_S", 0.05)
@@ -68,12 +68,12 @@ def test_vehicle_is_not_ready_before_its_first_answers(monkeypatch: pytest.Monke
     assert 0 <= wait_us <= 600_000, "issued now, by a clock that is true to 0.5 s"
 
 
-#: what PX4 1.16 has there: a hash of its sources, and one of its operating system
+#: the values of PX4 1.16: hashes of its sources and of its operating system
 PX4_HASHES = [0x6A, 0x0F, 0xC1, 0x33, 0x91, 0, 0, 0], [0x12, 0xFE, 0x44, 0x09, 0x5B, 0, 0, 0]
 
 
 class Telling(Silent):
-    """A vehicle that answers what it is asked first with these custom versions; None: not at all."""
+    """A vehicle that answers the first request with these custom versions; None: it does not answer."""
 
     def __init__(self, custom: tuple[list[int], list[int]] | None) -> None:
         super().__init__(armed=False)
@@ -114,8 +114,8 @@ def met_at(
 def test_speed_is_refused_for_a_real_vehicle(
     speed: float, custom: Any, slug: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """An autopilot behind a router at 127.0.0.1 was flown with `--speed 10` on a machine whose time nobody knew: as
-    simulated, with a time of day that was true to 0.1 s.
+    """Regression: a real autopilot behind a router at 127.0.0.1 was accepted as simulated, with `--speed 10`, on an
+    unsynchronised machine, with a time of day exact to 0.1 s.
     """
     _, found = met_at(speed, custom, monkeypatch)
     assert isinstance(found, Refusal)

@@ -1,4 +1,4 @@
-"""`--set` gives a mission its values; `check` and `compile` say what it takes at most."""
+"""`--set` gives a mission its values; `check` and `compile` print its upper bounds."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Where `run` decides: in a process of its own before a vehicle of others, where there is a program for it."""
+"""The place of decisions in `run`: a separate boundary process for real vehicles, if its program exists."""
 
 from pathlib import Path
 
@@ -27,7 +27,7 @@ BUILT = Path("/usr/lib/rtshcua-boundary")
         (None, True, False, False, (EnforcementMode.SOFTWARE, False)),
         (None, False, False, True, (EnforcementMode.PROCESS, False)),
         (None, False, False, False, (EnforcementMode.SOFTWARE, True)),
-        (None, False, True, False, (EnforcementMode.PROCESS, False)),  # and it is refused: its user was asked for
+        (None, False, True, False, (EnforcementMode.PROCESS, False)),  # refused, because a boundary user was requested
         (None, True, True, True, (EnforcementMode.PROCESS, False)),
         (EnforcementMode.SOFTWARE, False, False, True, (EnforcementMode.SOFTWARE, False)),
         (EnforcementMode.SOFTWARE, False, False, False, (EnforcementMode.SOFTWARE, False)),

@@ -1,4 +1,4 @@
-"""What was probably meant is named, whatever was mistyped: a file, an option, a word, a code."""
+"""Suggestions for mistyped files, options, commands and codes."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -15,7 +15,7 @@ Said = Callable[..., tuple[int, str]]
 
 @pytest.fixture
 def said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Said:
-    """Runs a command where `standard.rts`, an empty file and an empty folder are: how it ends, and what it says."""
+    """Run a command in a folder with `standard.rts`, an empty file and an empty folder; return its result."""
     monkeypatch.chdir(tmp_path)
     Path("standard.rts").write_text("")
     Path("empty.bundle").touch()

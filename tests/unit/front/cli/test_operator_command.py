@@ -1,4 +1,4 @@
-"""`rtshcua operator` over real sockets: a flight that hangs up, comes again, does not read, or says that it is over."""
+"""`rtshcua operator` over real sockets: a flight that disconnects, reconnects, does not read, or ends."""
 
 import dataclasses
 import json
@@ -39,7 +39,7 @@ from rtshcua.wire.request import Ref
 MISSION = Path(__file__).resolve().parents[4] / "missions/short.rts"
 SIGNER = SigningKey.from_seed(bytes(32), duty=Duty.LOG, development=True)
 CONFIRM = "confirm takeoff by role supervisor within 30 s, whatever the state of the vehicle and of the weather may be"
-#: what a test waits for it shortens; the rest never comes, however busy the machine is
+#: time limits: tests shorten those that they wait for, and the others are never reached
 CALM = Patience(again_s=0.3, lost_s=60, answer_s=60, silent_s=60, drain_s=0.3)
 
 
@@ -58,7 +58,7 @@ def flying(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Bundle, S
 
 
 class Flight:
-    """What listens where a flight does, and does with each connection what a test says: the next one of `turns`."""
+    """A listener in place of a flight that handles each connection by the next entry of `turns`."""
 
     def __init__(self, path: Path, *turns: Callable[[socket.socket], None]) -> None:
         self.path = path
@@ -85,7 +85,7 @@ class Flight:
 
 
 class Seat:
-    """A person at the console: what they type, and the events that they see once it ended."""
+    """A person at the console: the typed input, and the events shown."""
 
     def __init__(self, flying: tuple[Bundle, SigningKey]) -> None:
         self._flying = flying
@@ -94,12 +94,12 @@ class Seat:
         self._heard = b""
 
     def until(self, event: str) -> None:
-        """Read what is told until there was such an event."""
+        """Read the output until an event of this kind."""
         while f'"event": "{event}"'.encode() not in self._heard:
             self._heard += os.read(self.reads, 1 << 16)
 
     def until_said(self, words: str) -> None:
-        """Read what is told until these words were in it."""
+        """Read the output until it contains this text."""
         while words.encode() not in self._heard:
             self._heard += os.read(self.reads, 1 << 16)
 
@@ -164,7 +164,7 @@ def effect(number: int) -> bytes:
 
 
 def asks(flying: Bundle, utc_us: int) -> bytes:
-    """That the first step of the bundle waits for a supervisor: 30 s, of which 5 are over."""
+    """The event that the first step waits for a supervisor: 30 s, of which 5 are over."""
     recorder = Recorder(lambda _: b"", SIGNER.public, lambda: bytes(32))
     now = Now(105_000_000, utc_us, 0)
     recorder.genesis(now, bundle=b"", root=b"", boot=bytes(16), vehicle="quad", mission="short", mode="software")
@@ -227,7 +227,7 @@ def test_unanswered_recall_is_reported_and_repeated(seat: Seat, place: Path) -> 
 
 def test_a_recall_that_is_typed_while_the_flight_is_lost_is_kept(seat: Seat, place: Path) -> None:
     def hangs_up_and_is_recalled(link: socket.socket) -> None:
-        place.rename(place.with_name("gone"))  # who connects finds nobody
+        place.rename(place.with_name("gone"))  # connections are refused
         link.close()
         seat.until("lost")
         seat.type("p\n")
@@ -304,7 +304,7 @@ def test_the_newest_lines_are_kept(seat: Seat) -> None:
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_leaves_the_flight_as_quit_does(seat: Seat, place: Path, number: signal.Signals) -> None:
-    """It comes while the console waits, and ends that wait."""
+    """The signal arrives while the console waits, and ends the wait."""
 
     def turn(link: socket.socket) -> None:
         seat.until("ready")
@@ -334,7 +334,7 @@ def test_unknown_command_suggests_the_nearest(seat: Seat, place: Path) -> None:
 
 @pytest.fixture
 def asked(flying: tuple[Bundle, SigningKey]) -> tuple[Bundle, SigningKey]:
-    """The same, under a policy that asks a supervisor."""
+    """The same, under a policy that requires a supervisor."""
     bundle, key = flying
     rule = Rule(RuleKind.CONFIRM, (), (), (), None, 0, 30_000_000, None, CONFIRM, 0, 0, 0)
     policy = msgspec.structs.replace(bundle.policy, roles=("supervisor",), rules=(rule,))

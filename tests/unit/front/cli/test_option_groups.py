@@ -11,7 +11,7 @@ from rtshcua.front.cli.app import main
 from rtshcua.front.cli.options.option_groups import MANY, OPTION_GROUPS, grouped
 from rtshcua.front.cli.table import COMMANDS
 
-#: what every command may have under `Options`
+#: options that every command may list under `Options`
 COMMON = {"--json", "--plain", "--help", "--deny-warnings", "--archive", "-a"}
 
 

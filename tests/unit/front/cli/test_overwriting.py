@@ -1,4 +1,4 @@
-"""No report, page or file of tests is written over a source that the same run reads, under whatever name."""
+"""No output overwrites a source that the same run reads, under any name."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ from reference.tested import POLICY, TESTS
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
 
-#: each with a place for the file that it writes
+#: commands, each with a placeholder for its output file
 COMMANDS = [
     ("test", "tests.rts", "--junit"),
     ("test", "policy.rts", "--generate", "--force", "-o"),

@@ -1,4 +1,4 @@
-"""What was before a flight, told to the next one."""
+"""The state that a flight leaves for the next one."""
 
 import json
 from pathlib import Path
@@ -44,7 +44,7 @@ def test_a_log_that_was_closed_is_named_by_the_next(tmp_path: Path, log: Path) -
     first.end("ab" * 32)
     second = past(tmp_path)
     assert (second.hash, second.note) == ("ab" * 32, "")
-    assert recover(log, signer(Random(1))).done  # nobody holds it
+    assert recover(log, signer(Random(1))).done  # not locked
 
 
 def test_airborne_vehicle_does_not_wait_for_the_state_folder(tmp_path: Path, log: Path) -> None:
@@ -71,7 +71,7 @@ def test_unrecorded_end_is_read_from_the_log(tmp_path: Path, log: Path) -> None:
 
 
 def recover_unheld(log: Path) -> str:
-    """Ends a log that is held: as its flight would."""
+    """Recover a locked log, as its flight would."""
     copy = log.with_name("copy.jsonl")
     copy.write_bytes(log.read_bytes())
     last = recover(copy, signer(Random(1))).last

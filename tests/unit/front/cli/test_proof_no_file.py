@@ -1,4 +1,4 @@
-"""`rtshcua verify-proof` refuses what is no file at once: a pipe would be waited for."""
+"""`rtshcua verify-proof` refuses special files at once, because reading a pipe could block."""
 
 import os
 from pathlib import Path

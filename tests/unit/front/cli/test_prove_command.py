@@ -1,4 +1,4 @@
-"""`rtshcua prove` and `rtshcua verify-proof`: files, what is said of them, and exit codes."""
+"""`rtshcua prove` and `rtshcua verify-proof`: files, output and exit codes."""
 
 import json
 from pathlib import Path
@@ -177,7 +177,7 @@ def test_proof_includes_cosignatures(folder: Path, capsys: pytest.CaptureFixture
     object = told(capsys)
     assert object["anchored"] is True
     assert [witness["time_s"] for witness in object["witnesses"]] == [1_750_000_100]  # type: ignore[attr-defined]
-    assert verify("q") == ExitCode.OK  # nobody saw the log after it
+    assert verify("q") == ExitCode.OK  # not witnessed after it
     assert "unanchored" in capsys.readouterr().out
 
 

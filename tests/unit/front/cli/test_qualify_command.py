@@ -1,4 +1,4 @@
-"""`rtshcua qualify`, up to where something would fly: who consents, to what, and under which policy."""
+"""`rtshcua qualify` before any flight: consent, its scope, and the policy."""
 
 import json
 from pathlib import Path
@@ -60,7 +60,7 @@ def test_invalid_qualification_does_not_fly(
 
 
 def test_a_policy_that_permits_no_leg_is_refused(commands: Forked, own_world: None, tmp_path: Path) -> None:
-    """The sorties are proved like any mission: nobody flies past the user's own policy to test it."""
+    """The sorties are proved like any mission, under the user's own policy."""
     policy = (library.root() / "policies/training_field.rts").read_text(encoding="utf-8")
     (tmp_path / "tight.rts").write_text(policy.replace("permit  goto", "forbid  goto"), encoding="utf-8")
     mission = (library.root() / "missions/short.rts").read_text(encoding="utf-8")

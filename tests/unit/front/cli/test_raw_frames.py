@@ -1,4 +1,4 @@
-"""`rtshcua verify-log --audit` holds the raw frames beside a log against it."""
+"""`rtshcua verify-log --audit` compares a log with the raw frames beside it."""
 
 import hashlib
 import json
@@ -30,7 +30,7 @@ def flown() -> tuple[list[bytes], Entries]:
 
 
 def folder(at: Path, lines: list[bytes], data: bytes) -> Path:
-    """A run whose log vouches for this telemetry."""
+    """A run whose log has the digest of this telemetry."""
     of = edit(lines[-1], tlog=hashlib.sha256(data).hexdigest())
     (at / "log.jsonl").write_bytes(b"".join(signed([*lines[:-1], of])))
     (at / "telemetry.tlog").write_bytes(data)
@@ -101,7 +101,7 @@ def test_frames_that_were_changed_after_the_flight_prove_nothing(
 def test_commands_that_were_sent_and_are_not_there_are_not_spoken_for(
     flown: tuple[list[bytes], Entries], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """But where the boundary signs how many passed its gate, they are missed."""
+    """With the boundary's signed count of passed frames, the missing ones are detected."""
     lines, entries = flown
     without = [(at_us, frame) for at_us, frame in entries if frame[6] != OURS]
     code, said = verify(folder(tmp_path, lines, encoded(without)), capsys, "--audit")

@@ -1,4 +1,4 @@
-"""`rtshcua recover`: what it says, and its exit codes."""
+"""`rtshcua recover`: output and exit codes."""
 
 import json
 from hashlib import sha256
@@ -153,7 +153,7 @@ def test_a_log_that_was_closed_is_not_ended_anew_where_its_end_was_cut_off(
     said = json.loads(capsys.readouterr().out)
     assert (said["state"], said["recovered"], said["reason"]["slug"]) == ("tampered", False, "close/missing")
     if kept > 1:
-        assert recover("--state-dir", run, run) == ExitCode.OK  # nobody remembers it there
+        assert recover("--state-dir", run, run) == ExitCode.OK  # no last log is stored there
 
 
 def flown(run: Path) -> tuple[tuple[bytes, ...], list[int]]:
@@ -168,7 +168,7 @@ def flown(run: Path) -> tuple[tuple[bytes, ...], list[int]]:
 def test_log_shorter_than_its_anchors_is_not_closed(
     words: list[str], end: bytes, run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A log that was cut behind a signed record looks as after a crash; its witness saw a later one."""
+    """A log that was cut after a signed record looks like a crash, but its witness saw a later record."""
     whole, signed = flown(run)
     cut = signed[-2] + 1
     (run / "log.jsonl").write_bytes(b"".join(whole[:cut]) + end)

@@ -1,4 +1,4 @@
-"""`rtshcua schema`: the general schema, one under a policy, and the tools that are made of them."""
+"""`rtshcua schema`: the general schema, the schema of a policy, and the tool definitions."""
 
 import json
 from pathlib import Path

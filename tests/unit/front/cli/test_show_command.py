@@ -1,4 +1,4 @@
-"""`rtshcua show`: everything that a file says, for a person and for a program."""
+"""`rtshcua show`: the contents of a file, for a person and for a program."""
 
 import json
 import time

@@ -1,4 +1,4 @@
-"""`keys link` and `run --signing-key`: the key is made and read with care, and put to use or the run is refused."""
+"""`keys link` and `run --signing-key`: the key is stored privately, and used or the run is refused."""
 
 import hashlib
 from pathlib import Path
@@ -116,7 +116,7 @@ def test_invalid_link_key_prevents_the_run(tmp_path: Path, key_file: Path, what:
     if what == "in-use":
         store.close()
     if what == "damaged":
-        LinkStore(tmp_path, VEHICLE, KEY).close()  # it was given back
+        LinkStore(tmp_path, VEHICLE, KEY).close()  # it was released
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""`rtshcua sim`: what it starts, and what it tells a person to type."""
+"""`rtshcua sim`: the started simulator, and the printed commands."""
 
 import json
 import shlex
@@ -18,7 +18,7 @@ KEY = b"shared/traces test key, 32 bytes"
 
 
 class FakeSimulator:
-    """Takes the words that the process would get, and is told to end at once."""
+    """A simulator that records its arguments and ends at once."""
 
     words: tuple[str, ...] = ()
 
@@ -62,7 +62,7 @@ AS_QUAD = ["rtshcua", "run", "BUNDLE", "--connect", "udpin:127.0.0.1:14550", "--
 
 
 def typed(out: str) -> list[str]:
-    """The words that a shell makes of what is to be copied."""
+    """The arguments of the printed command, as split by a shell."""
     return shlex.split(out[out.index("rtshcua run") : out.index("  QGroundControl")].replace("\\\n", " "))
 
 
@@ -80,7 +80,7 @@ def test_printed_run_command_works_when_copied(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
     apart: bool, kernel_us: int | None, keyed: bool, speed: float, needs: list[str],
 ) -> None:  # fmt: skip
-    """The boundary apart takes no time from a link without a key, and this machine's may be nobody's."""
+    """A separate boundary does not take the time from a link without a key, and this machine may be unsynchronised."""
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr(command, "program", lambda: Path("rtshcua-boundary") if apart else None)
     monkeypatch.setattr(command, "kernel_error_us", lambda: kernel_us)

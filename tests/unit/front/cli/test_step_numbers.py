@@ -24,7 +24,7 @@ from rtshcua.wire.request import CONTINGENCY_LINK, DEGRADE, FALLBACK_LINK, STEP,
 PACKAGE = Path(__file__).resolve().parents[4] / "rtshcua"
 FLIGHT = ("--flight", bytes(16).hex())
 LOW = low_source()
-#: the third step is the only one that is asked about, and the only inspection
+#: the third step is the only one that needs approval, and the only inspection
 ASKED = 3
 
 
@@ -154,7 +154,7 @@ def test_number_and_index_are_one_apart() -> None:
 
 
 def test_no_text_is_made_of_an_index() -> None:
-    """Text that says `step` before a value takes it from `step_number`: an index there would be off by one."""
+    """Text with `step` before a value must use `step_number`: an index would be off by one."""
     wrong = []
     for path in PACKAGE.rglob("*.py"):
         text = path.read_text("utf-8")

@@ -1,4 +1,4 @@
-"""`rtshcua test`: which tests run, what is told of them, how it ends, and what it writes."""
+"""`rtshcua test`: selected tests, output, exit codes and written files."""
 
 import json
 import os
@@ -143,7 +143,7 @@ def test_coverage_lists_undecided_clauses(here: Path, capsys: pytest.CaptureFixt
     assert "coverage of yard@1 on quad: " in out
     lines = out.splitlines()
     forbid = lines.index("  policy.rts:9  forbid hover by any when battery > 90 %")
-    assert lines[forbid + 1] == "      never true, never decided"  # unknown it was, and the permit decided
+    assert lines[forbid + 1] == "      never true, never decided"  # it was unknown, and the permit decided
     assert not any("permit hover" in line for line in lines)
     assert any(line.endswith("never decided: no test would detect a change of them") for line in lines)
 

@@ -1,4 +1,4 @@
-"""`rtshcua test --generate`: what it writes, where, and that it passes there."""
+"""`rtshcua test --generate`: the written file, its place, and that it passes."""
 
 import json
 from pathlib import Path

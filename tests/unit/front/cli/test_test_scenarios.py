@@ -1,4 +1,4 @@
-"""`rtshcua test` with scenarios: each flight of each is flown, judged, held against what is expected, and told."""
+"""`rtshcua test` with scenarios: each flight is flown, judged, compared with its expectations, and reported."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""docs/testing.md: its examples are sources, and its commands end as it says."""
+"""docs/testing.md: its examples compile, and its commands end as documented."""
 
 import re
 import shlex

@@ -1,4 +1,4 @@
-"""`rtshcua verify-log`: what it says, and its exit codes."""
+"""`rtshcua verify-log`: output and exit codes."""
 
 import hashlib
 import json
@@ -74,7 +74,7 @@ def test_file_and_folder_are_the_same(run: Path, capsys: pytest.CaptureFixture[s
 def test_of_a_folder_no_log_is_passed_over_for_its_name(
     place: str, run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A forged `flight-0412.jsonl` beside a good `log.jsonl`: the folder was VERIFIED, without a word of it."""
+    """Regression: a folder with a forged `flight-0412.jsonl` beside a good `log.jsonl` was VERIFIED."""
     folder = tmp_path / "given"
     (folder / "y/deeper").mkdir(parents=True)
     shutil.copy(run / "log.jsonl", folder / "y/log.jsonl")
@@ -403,7 +403,7 @@ def test_every_kind_of_failure_has_its_meaning() -> None:
     for folder in ("evidence", "ground/audit", "front/cli"):
         for file in (Path(verdict.__file__).parents[3] / folder).rglob("*.py"):
             slugs |= set(re.findall(r'\b(?:Flaw|Finding)\(\s*f?"([a-z]+)/', file.read_text()))
-    of_others = {"note", "proof"}  # a note's are told as those of a `seal`, a proof's by who reads proofs
+    of_others = {"note", "proof"}  # reported as slugs of a `seal`, and by `verify-proof`
     assert slugs - of_others <= set(verdict.MEANINGS)
     assert "chain" in slugs
 

@@ -1,4 +1,4 @@
-"""What `verify-log` says of witnesses that are too few, of notes that are none, and of files that nobody read."""
+"""`verify-log` on too few witnesses, malformed notes, and unread files."""
 
 import json
 from base64 import b64decode, b64encode
@@ -44,7 +44,7 @@ def spoilt(note: str) -> str:
 
 @pytest.mark.parametrize("how", HOWS)
 def test_a_damaged_note_says_nothing(how: list[str], log: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Nobody signs a file of anchors: what is written into it must not make a sound log fail."""
+    """An anchor file is unsigned, so its content must not make a valid log fail."""
     note = mark(note_of(flight(), len(flight()) - 1))
     log.with_suffix(".anchors").write_text(spoilt(note) + "\n" + spoilt(note) + "\n")
     assert verify(log, *how) == ExitCode.OK

@@ -1,4 +1,4 @@
-"""A run that waits: what is handed in is admitted or refused, a recall and Ctrl-C end it, and who follows is told."""
+"""A waiting run: documents are admitted or refused, a recall or Ctrl-C ends it, and followers are notified."""
 
 import json
 import socket
@@ -31,7 +31,7 @@ BUNDLE = b"the bundle of a test"
 
 
 class Clock(SystemClock):
-    """The machine's, but for the day, which is that of the documents."""
+    """The machine's clock, except for the day, which is that of the documents."""
 
     def now(self) -> Now:
         return Now(super().now().monotonic_us, START.utc_us, 0)
@@ -120,7 +120,7 @@ def begin(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., World]]:
 
 
 def lines_of(world: World, count: int) -> list[dict[str, Any]]:
-    """The first lines that a reader is told."""
+    """The first lines sent to a reader."""
     with socket.socket(socket.AF_UNIX) as link:
         link.connect(str(world.path))
         file = link.makefile("rb")
@@ -144,7 +144,7 @@ def test_admitted_bundle_flies_under_the_announced_id(
 def test_documents_after_the_bundle_go_to_the_flight(
     begin: Callable[..., World], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It was dropped, a recall too, and never answered."""
+    """Regression: such a document, even a recall, was dropped without an answer."""
     world = begin()
     beside: list[Event] = [Presented(0, BUNDLE, 1), Presented(0, recall(world.base), 2)]
     monkeypatch.setattr(world.agents, "events", lambda now: [beside.pop(0) for _ in beside[:]])

@@ -1,4 +1,4 @@
-"""`compile --with` a file that declares what the mission imports already: which one is meant is said."""
+"""`compile --with` a file that declares a policy which the mission imports: the message names the one used."""
 
 import json
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""`rtshcua why`: by hand and from a log, for a person and for a program, and wrong input."""
+"""`rtshcua why`: for a given state and from a log, as text and JSON, and wrong input."""
 
 import json
 from pathlib import Path
@@ -211,7 +211,7 @@ def test_decision_after_an_approval_is_explained(tmp_path: Path, capsys: pytest.
 
 
 def late_until(ends: int) -> list[bytes]:
-    """The log of a run whose take-off came too late so often; then it flies, or its time is over."""
+    """The log of a run whose take-off was late a number of times; then it flies, or its deadline passes."""
     run = Run().until_flies("takeoff")
     for _ in range(ends):
         run.tick(CommandFailed(0, run.vehicle.commands[-1].token, "late"))
@@ -242,7 +242,7 @@ def logged(run: Run) -> bytes:
 
 
 def stalled(run: Run, slot: int | None) -> bytes:
-    """The log of a run that stood still for 14 s in its third step; then `slot` is not known any more."""
+    """The log of a run that stalled for 14 s in its third step; afterwards `slot` is unknown."""
     run.until_flies("inspect_area")
     if slot is not None:
         run.vehicle.values[slot] = None

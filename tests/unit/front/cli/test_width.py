@@ -1,4 +1,4 @@
-"""What commands print for a person fits 80 columns, on a terminal or in a pipe; longer words stand alone."""
+"""Output for a person fits 80 columns, on a terminal or in a pipe; longer words stand alone."""
 
 import re
 from collections.abc import Callable
@@ -32,7 +32,7 @@ def pipe(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def too_wide(text: str) -> list[str]:
-    """The lines of more than 80 columns, but for those of one word."""
+    """The lines of more than 80 columns, except those of one word."""
     return [line for line in text.splitlines() if len(line) > 80 and " " in re.sub(r"^[ `]+|[`,.]+$", "", line)]
 
 

@@ -156,7 +156,7 @@ def test_a_log_that_was_cut(flown: Flown, capsys: pytest.CaptureFixture[str]) ->
 def test_a_log_that_was_written_anew(
     flown: Flown, store: KeyStore, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """By who holds the log key: the witness keeps the note that shows it."""
+    """A holder of the log key rewrote it: the witness keeps the note that shows it."""
     app.main(["witness", str(flown.path)])
     other = Flown(tmp_path / "other" / "log.jsonl", store.signing_key(Duty.LOG))
     other.epoch("landed")
@@ -263,7 +263,7 @@ def test_a_survey_needs_a_log(tmp_path: Path, store: KeyStore) -> None:
 def test_unreadable_log_does_not_delay_the_others(
     flown: Flown, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """Whoever may put a file into the folder that is watched must not end the watch."""
+    """A user who may add files to the watched folder must not be able to end the watch."""
     (tmp_path / "a.jsonl").mkdir()
     (tmp_path / "b.jsonl").symlink_to("b.jsonl")
     os.mkfifo(tmp_path / "c.jsonl")
@@ -353,7 +353,7 @@ def test_data_after_the_close_is_not_cosigned(flown: Flown, capsys: pytest.Captu
 def test_links_that_others_put_into_the_folder_are_not_followed(
     flown: Flown, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """They must not have the anchors of a log put behind a file of ours, nor have us read one."""
+    """Such links must not make us append anchors to our own files, or read them."""
     (tmp_path / "victim").write_text("mine")
     flown.path.with_suffix(".anchors").symlink_to(tmp_path / "victim")
     assert app.main(["witness", str(flown.path.parent)]) != ExitCode.OK

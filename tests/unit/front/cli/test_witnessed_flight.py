@@ -1,4 +1,4 @@
-"""What `run --witness` does around a flight: refusals before it, and nothing at all without witnesses."""
+"""`run --witness` around a flight: refusals before it, and no effect without witnesses."""
 
 import socket
 from pathlib import Path
@@ -18,7 +18,7 @@ KEYS = frozenset({bytes(32)})
 
 
 class Client:
-    """What the thread would say."""
+    """A client with scripted reports of its thread."""
 
     waited: list[tuple[object, ...]]
 

@@ -10,7 +10,7 @@ from rtshcua.front.lsp.server import GRACE, LARGEST, LONGEST, Watched
 
 
 class Forced:
-    """What would end the process."""
+    """Replace the call that ends the process."""
 
     started: list[float]
 
@@ -44,14 +44,14 @@ def test_stream_that_ends_before_or_within_a_line_ends_the_process(left: bytes, 
 
 @pytest.mark.parametrize("left", [b"", b'{"jsonrpc'])
 def test_stream_that_ends_before_or_within_a_body_ends_the_process(left: bytes, started: list[float]) -> None:
-    """A body that is cut off cannot be answered where nobody listens: then nothing is read after it."""
+    """A truncated message cannot be answered after the stream's end, so nothing more is read."""
     assert Watched(BytesIO(left)).read(999) == left
     assert started == [GRACE]
 
 
 @pytest.mark.parametrize("size", [LARGEST + 1, 10**30])
 def test_a_message_of_more_bytes_than_any_has_ends_the_process(size: int, started: list[float]) -> None:
-    """`Content-Length` says so much: nobody waits for it, nor makes room."""
+    """A huge `Content-Length` is refused without waiting or allocating."""
     stream = BytesIO(b"{}")
     assert Watched(stream).read(size) == b""
     assert stream.tell() == 0

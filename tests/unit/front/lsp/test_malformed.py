@@ -1,4 +1,4 @@
-"""What an editor may send that is no message of the protocol: a request is answered, whatever it holds."""
+"""Malformed messages of an editor: every request is answered."""
 
 import json
 import logging
@@ -29,7 +29,7 @@ class _Sent:
 
 
 def _said(message: dict[str, Any]) -> list[Any]:
-    """What the server answers to a message that comes as pygls reads them."""
+    """The server's answer to a message as read by pygls."""
     server, session = make(str(root()))
     sent = _Sent()
     server.protocol.set_writer(sent)  # type: ignore[arg-type]  # it has what is used of one

@@ -1,5 +1,5 @@
-"""The process that proves, replaced by ones that die, hang, or say what is no answer: it is restarted, or that it could
-not be had is said; nobody waits for it in vain.
+"""The proving process, replaced by ones that die, hang, or give malformed answers: it is restarted, or the failure is
+reported, without an endless wait.
 """
 
 import asyncio
@@ -30,7 +30,7 @@ RIGHT = "\nwhile True:\n  take(); answer(RIGHT)"
 
 
 def asked(tmp_path: Path, does: str, *names: str, longest: float = 30) -> tuple[list[Found], list[str], int]:
-    """What comes of asking about `names` one after the other, what is said, and how often the process was started."""
+    """The results for `names` in turn, the messages, and the number of started processes."""
     said: list[str] = []
 
     async def asking() -> list[Found]:
@@ -43,7 +43,7 @@ def asked(tmp_path: Path, does: str, *names: str, longest: float = 30) -> tuple[
                 done: Callable[[Found], None] = one.set_result
                 proving.ask(name, {name: "x" * 300_000}, done)  # more than a pipe holds
                 found.append(await asyncio.wait_for(one, 60))
-                proving._patience = proving._longest = 60  # that a slow machine takes none for one that hangs
+                proving._patience = proving._longest = 60  # long enough for a slow machine
         finally:
             proving.end()
             await proving.ended()
@@ -83,7 +83,7 @@ def test_failing_prover_is_reported_and_tried_again(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("hangs", ["time.sleep(99)", "take(); time.sleep(99)"])
 def test_hanging_prover_is_killed(tmp_path: Path, hangs: str) -> None:
-    """Also where it does not even read what it is asked."""
+    """This includes one that does not read its request."""
     found, said, starts = asked(tmp_path, f"if not starts:\n  {hangs}{RIGHT}", "a", "b", longest=0.5)
     assert found == [None, FOUND]
     assert [each[: each.index(":")] for each in said] == ["the proofs of a took too long and were given up"]

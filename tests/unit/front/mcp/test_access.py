@@ -1,4 +1,4 @@
-"""Who may speak to the MCP server over HTTP: the token's file, and what is refused before anything else counts."""
+"""Access to the MCP server over HTTP: the token file, and requests that are refused first."""
 
 import stat
 from pathlib import Path
@@ -41,7 +41,7 @@ def test_two_tokens_are_none() -> None:
     "host", [None, b"", b"127.0.0.1", b"127.0.0.1:80", b"evil.example:8790", b"localhost:8790.evil.example"]
 )
 def test_a_name_of_another_machine_is_refused_whoever_asks(host: bytes | None) -> None:
-    """A page whose name was made to mean this machine (DNS rebinding)."""
+    """A page whose host name resolves to this machine (DNS rebinding)."""
     assert asked(host=host) == 421
     assert asked(more=((b"host", b"evil.example"),)) == 421
 

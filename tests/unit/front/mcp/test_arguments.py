@@ -1,4 +1,4 @@
-"""Tools are called with what their schema asks, or are told what to write."""
+"""Arguments of tools are checked against their schema, with an error that names the correct form."""
 
 import json
 from typing import Any

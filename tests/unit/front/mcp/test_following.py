@@ -1,4 +1,4 @@
-"""What is known of a vehicle that is followed."""
+"""The state of a followed vehicle."""
 
 import socket
 import threading
@@ -15,7 +15,7 @@ HELLO = b'{"type":"hello","vehicle":"quad-07","flight":"ab"}\n'
 
 
 def test_the_first_word_is_waited_for(tmp_path: Path) -> None:
-    """Who asks at once was told that it cannot be reached."""
+    """Regression: an early request reported that the vehicle cannot be reached."""
     place = tmp_path / "quad.sock"
     with socket.socket(socket.AF_UNIX) as door:
         door.bind(str(place))

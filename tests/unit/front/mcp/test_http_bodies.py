@@ -1,4 +1,4 @@
-"""What comes over HTTP and is no message, too large, too slow or asked twice never reaches the SDK."""
+"""HTTP requests that are malformed, too large, too slow or repeated do not reach the SDK."""
 
 import asyncio
 import json
@@ -16,7 +16,7 @@ BIG = PING[:-1] % b"9" + b',"params":{"a":"' + b"x" * LARGE + b'"}}'
 
 
 class Host:
-    """A host that sends requests; what reaches the SDK is kept, and answered once `let` is set."""
+    """A host that sends requests; those that reach the SDK are recorded, and answered once `let` is set."""
 
     def __init__(self) -> None:
         self.served: list[bytes] = []

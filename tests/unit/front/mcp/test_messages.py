@@ -1,4 +1,4 @@
-"""Messages of a host: each is read as JSON-RPC has it, or refused with the id that it certainly has."""
+"""Messages of a host: each is read as JSON-RPC, or refused with its id if that is certain."""
 
 import json
 import random

@@ -1,4 +1,4 @@
-"""A method that the protocol does not have is answered as JSON-RPC says."""
+"""An unknown method is answered as JSON-RPC specifies."""
 
 from typing import get_args
 

@@ -1,4 +1,4 @@
-"""The streams of a host: lines of any length, what is answered to those that are no messages, and how it ends."""
+"""The streams of a host: lines of any length, answers to malformed ones, and the end."""
 
 import json
 import os
@@ -58,7 +58,7 @@ def pipes() -> Iterator[tuple[int, int, int, int]]:
 
 
 def served(said: bytes, *, answers: bool = True, reads: bool = True, more: Any = None) -> list[dict[str, Any]]:
-    """What a host is answered that says this and ends; requests are answered with nothing, or not at all."""
+    """The answers to a host that sends these lines and ends; requests get an empty answer, or none."""
 
     async def serve(ours_in: int, ours_out: int) -> None:
         async with streams(ours_in, ours_out) as (incoming, outgoing):

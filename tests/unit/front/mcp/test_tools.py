@@ -34,7 +34,7 @@ POLICY = SigningKey.from_seed(bytes([2]) * 32, duty=Duty.POLICY, development=Tru
 AGENT = SigningKey.from_seed(bytes([3]) * 32, duty=Duty.MISSION, development=True)
 
 
-#: what a decision on a step says beside the step; of the state, that everything reads 0
+#: the fields of a decision beside its step; all values of the state are 0
 RECORDED = {
     "_prev": "00" * 32, "at_us": 1_000_000, "utc_us": 2_000_000, "utc_error_us": 0, "valid_until_us": 0,
     "clause": "told", "clause_at": None, "rule_step": 8, "reason": "a rule", "target": None, "target_link": -1,
@@ -53,7 +53,7 @@ def missions() -> Missions:
 
 @pytest.fixture
 def handed(monkeypatch: pytest.MonkeyPatch) -> list[bytes]:
-    """What was handed to the vehicle, which takes all of it."""
+    """The documents sent to the vehicle, which accepts all."""
     found: list[bytes] = []
 
     def hand_in(socket: Path, document: bytes) -> tuple[str, str]:
@@ -75,7 +75,7 @@ def desk(missions: Missions, tmp_path: Path) -> Tools:
 
 
 def status(desk: Tools, ticket: str) -> str:
-    """How a proposal stands once the vehicle answered."""
+    """The status of a proposal after the vehicle's answer."""
     until_s = time.monotonic() + 60
     while desk.mission_status(ticket)["state"] == "submitted" and time.monotonic() < until_s:
         time.sleep(0.001)
@@ -85,7 +85,7 @@ def status(desk: Tools, ticket: str) -> str:
 def test_each_of_two_checks_at_a_time_is_of_its_own_mission(
     missions: Missions, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The second was read in the place of the first, which was then signed for it."""
+    """Regression: the second proposal was read in place of the first, and signed."""
     others: list[ProposalAnswer | None] = []
 
     def load_late(*about: Any) -> Any:
@@ -136,7 +136,7 @@ def test_a_submitted_proposal_is_not_over_while_the_vehicle_is_unreachable(
 def test_an_admitted_proposal_is_judged_by_its_own_flight(
     desk: Tools, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, close: dict[str, Any]
 ) -> None:
-    """Neither the last failed attempt to connect nor the end of an earlier flight makes it over."""
+    """Neither a failed connection nor the end of an earlier flight ends the proposal."""
     path = tmp_path / "flight.sock"
     desk.following = following = Following(path)
     following.await_first()
@@ -263,7 +263,7 @@ HOSTILE: tuple[Any, ...] = ("x", "\ud800", None, [], {}, True, -5, 1.5, 1 << 70)
 
 
 def ask_everything(desk: Tools) -> None:
-    """Each tool that reads what the vehicle told; it may say no."""
+    """Call each tool that reads the vehicle's state; it may refuse."""
     for ask in (desk.describe_vehicle, desk.flight, desk.explain_decision, desk.cancel, desk._in_force,
                 lambda: desk.explain_decision(7), lambda: desk.read_evidence(3, 2)):  # fmt: skip
         try:
@@ -274,7 +274,7 @@ def ask_everything(desk: Tools) -> None:
 
 @rows("kind", tuple(LINES))
 def test_no_line_of_whoever_listens_at_the_socket_fails_a_tool(kind: str, desk: Tools, handed: list[bytes]) -> None:
-    """Its fields were taken to be numbers, and texts in hexadecimal."""
+    """Regression: its fields were assumed to be numbers and hexadecimal texts."""
     desk.following.hello, desk.following.mission = {}, {}
     desk.following.connected = True
     assert status(desk, desk.propose_mission(PROPOSAL, "one")["ticket"]) == "admitted"
@@ -283,7 +283,7 @@ def test_no_line_of_whoever_listens_at_the_socket_fails_a_tool(kind: str, desk: 
             desk.following.records.clear()
             for line in LINES.values():
                 told = line | {key: value} if line is LINES[kind] else line
-                with suppress(ValueError):  # the connection is given up
+                with suppress(ValueError):  # the connection is closed
                     desk.following._take(understood(told), 1)
             ask_everything(desk)
 

@@ -1,4 +1,4 @@
-"""What is told to a person: lines, the screen, and the map."""
+"""The live view for a person: lines, the screen, and the map."""
 
 import json
 

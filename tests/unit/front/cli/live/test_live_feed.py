@@ -1,4 +1,4 @@
-"""The feed never waits for the view, whatever the view does."""
+"""The feed never waits for the view."""
 
 import time
 
@@ -16,7 +16,7 @@ def event(number: int) -> Happened:
 def test_a_view_that_does_not_read_holds_nobody_up(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(feed_module, "_MODULE", "timeit")  # reads nothing of its input, and ends by itself
+    monkeypatch.setattr(feed_module, "_MODULE", "timeit")  # does not read its input, and exits by itself
     with Feed("-n1") as feed:
         started = time.monotonic()
         for number in range(2_000):  # far more than a pipe holds

@@ -1,4 +1,4 @@
-"""A condition over time is unknown as the run begins: `run` says so, and a rehearsal does not count it as refused."""
+"""A temporal condition is unknown when a run begins: `run` reports it, and a rehearsal does not count it as refused."""
 
 from msgspec.structs import replace
 
@@ -25,7 +25,7 @@ LATER = clause("wind.speed < 8 m/s for the last 3 s for the last 2 s", (Op.MONIT
 
 
 def waiting(skill: int = TAKEOFF) -> Loaded:
-    """A mission of which a skill requires calm air for 3 s, seen for 2 s, and waits for it."""
+    """A mission with a skill that requires calm air for 3 s; calm was observed for 2 s."""
     contract = replace(CONTRACTS[skill], deadline_us=30 * S, require=(LATER,))
     read = slots_read((*contract.require, *contract.assume, *contract.maintain), POLICY.vehicle, (CALM, STILL))
     contract = replace(contract, reads=read)

@@ -1,5 +1,5 @@
-"""A step that waits for a person is shown as that: whom, how long, and what to type; so is a recall. With it, how the
-view fits a small terminal, and what its map shows.
+"""A step that waits for a person is shown with the role, the time left and the command; so is a recall. The view fits a
+small terminal, and has a map.
 """
 
 import io
@@ -87,7 +87,7 @@ def shown(found: Board, width: int = 80, height: int = 24) -> list[str]:
 
 
 def waiting() -> tuple[Run, Teller, list[Happening]]:
-    """A flight that waits for its supervisor, and what was told of it."""
+    """A flight that waits for its supervisor, and the events shown of it."""
     run = Run(low())
     teller = Teller(run.loaded.bundle.policy, run.loaded.bundle.mission, START.monotonic_us,
                     Answering("low.bundle", SOCKET))  # fmt: skip
@@ -278,7 +278,7 @@ def test_live_view_fits_any_size_and_shows_the_newest_line(size: tuple[int, int]
     width, height = size
     for story in stories():
         if board(*story).banner(width) and height < 10:
-            continue  # what a person must do comes before what happened
+            continue  # a required action is shown before past events
         lines = shown(board(*story), width, height)
         assert len(lines) <= height
         assert max(map(len, lines)) <= width

@@ -1,4 +1,4 @@
-"""Frames: round trips, and good frames found among whatever else arrives."""
+"""Frames: round trips, and good frames among garbage."""
 
 import random
 from pathlib import Path
@@ -116,7 +116,7 @@ def test_random_bytes_never_raise_and_never_hide_the_next_datagram() -> None:
     receiver, sender = Codec(1, 1), Codec(1, 1)
     for number in range(2_000):
         noise = bytearray(chance.randbytes(chance.randrange(600)))
-        for _ in range(chance.randrange(4)):  # markers make the parser try
+        for _ in range(chance.randrange(4)):  # start markers make the parser try
             if noise:
                 noise[chance.randrange(len(noise))] = 0xFD
         receiver.parse(bytes(noise))

@@ -1,4 +1,4 @@
-"""Frames out of a stream of octets: cut where they lie, whatever stands between them."""
+"""Frames from a byte stream, with any bytes between them."""
 
 from random import Random
 
@@ -65,6 +65,6 @@ def test_garbage_is_counted_without_delaying_frames() -> None:
     assert stream.feed(chance.randbytes(5_000)) == []
     assert stream.counts.frames == 0
     assert stream.counts.garbage > 4_000
-    for _ in range(30):  # whatever looked like a beginning, it is longer than this
+    for _ in range(30):  # longer than any apparent frame in the garbage
         found = stream.feed(BEAT)
     assert found == [BEAT]

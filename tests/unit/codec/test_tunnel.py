@@ -1,4 +1,4 @@
-"""Messages over TUNNEL frames: in any order, with losses and repetitions, and what hostile frames cannot do."""
+"""Messages over TUNNEL frames: in any order, with losses and repetitions, and with hostile frames."""
 
 from random import Random
 
@@ -26,7 +26,7 @@ NAME = b"12345678"
 
 
 def frames(data: bytes, kind: int = 1, name: bytes = NAME) -> list[ReceivedFrame]:
-    """Over the wire and back."""
+    """Encode and decode frames."""
     codec = Codec(1, 191)
     found = [codec.parse(codec.pack(message)) for message in messages(kind, name, data)]
     assert all(len(each) == 1 for each in found)
@@ -68,7 +68,7 @@ def test_message_of_invalid_length_is_refused(length: int) -> None:
 
 @given(st.binary(min_size=1, max_size=2_000), st.integers(0, 2**32))
 def test_lost_repeated_and_out_of_order(data: bytes, seed: int) -> None:
-    """Every round loses half of what is left to chance; what is sent again fills what is missing."""
+    """Each round loses half of the frames at random; repetitions fill the gaps."""
     chance, assembler, whole, rounds = Random(seed), Assembler(), None, 0
     while whole is None:
         sent = frames(data) * 2

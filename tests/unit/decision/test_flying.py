@@ -31,7 +31,7 @@ VEHICLE = replace(flat.POLICY.vehicle, speeds=SPEEDS, home_within=0, return_alti
 
 @given(distance=st.integers(0, 10_000 * M), speed=st.integers(100, 20 * M), acceleration=st.integers(100, 10 * M))
 def test_a_leg_is_sped_up_flown_and_slowed_down(distance: int, speed: int, acceleration: int) -> None:
-    """By the textbook, in floats: a trapezoid of speed over time, or a triangle."""
+    """The textbook formula in floats: speed over time is a trapezoid or a triangle."""
     v, a, d = float(speed), float(acceleration), float(distance)
     seconds = d / v + v / a if d >= v * v / a else 2 * sqrt(d / a)
     found = leg_us(replace(SPEEDS, acceleration=acceleration), distance, speed)
@@ -80,7 +80,7 @@ LEVEL = interval(0, 20 * M)
     ("battery", "planned", "truth"),
     [
         (point(MOST), volume(100 * M, 100 * M, LEVEL), TRUE),
-        (point(MOST - 1), volume(100 * M, 100 * M, LEVEL), TRUE | FALSE),  # it may be as high as all that
+        (point(MOST - 1), volume(100 * M, 100 * M, LEVEL), TRUE | FALSE),  # the largest height
         (point(MOST - 1), volume(100 * M, 100 * M, point(0)), FALSE),
         (point(0), volume(100 * M, 100 * M, LEVEL), FALSE),
         (point(0), volume(0, 100 * M, LEVEL), FALSE),

@@ -49,7 +49,7 @@ def later(us: int) -> Now:
 
 
 def as_replacement(mission: Mission, kept: int = 2, supersedes: bytes = OF.bundle.mission_digest) -> Mission:
-    """The mission, bound as what replaces another one."""
+    """The mission, bound as a replacement."""
     return bind(mission, OF.bundle.policy_digest, after=cbor.encode([FLIGHT, supersedes, kept]))
 
 
@@ -65,7 +65,7 @@ def as_content(content_type: str) -> bytes:
     return cose.sign1(payload, key=APPROVAL_KEY, duty=Duty.APPROVAL, content_type=content_type)
 
 
-#: bytes that are nearly laid out as an envelope
+#: malformed envelopes
 OUTLINES = (
     b"", b"\xd2", b"\xd2\x84", b"\xd2\x84\x00", b"\xd2\x84\x40", b"\xd2\x84\x40\xa1", b"\xd2\x84\x40\xa0",
     b"\xd2\x84\x40\xa0\x40\x40\x00",

@@ -24,7 +24,7 @@ from virtual.rows import rows
 T, F, U = TRUE, FALSE, UNKNOWN
 LETTERS = {"T": T, "F": F, "U": U}
 ZERO = 1_767_571_200_000_000  # Monday, 2026-01-05 00:00 UTC
-#: from Monday on an hour ahead, from Wednesday 01:00 UTC on two, from Friday 01:00 on one again, known until Sunday
+#: one hour ahead from Monday, two from Wednesday 01:00 UTC, one again from Friday 01:00; known until Sunday
 OFFSETS = (ZERO, H, ZERO + 2 * DAY + H, 2 * H, ZERO + 4 * DAY + H, H, ZERO + 6 * DAY)
 LOCAL = LocalTime(0, OFFSETS)
 VEHICLE = replace(flat.POLICY.vehicle, utc_offset_us=0, time_zone="A/B", time_zone_data="1", offsets=OFFSETS)

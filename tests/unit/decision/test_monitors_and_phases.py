@@ -183,7 +183,7 @@ def asked(policy: PreparedPolicy, said: tuple[int, ...] = (T, T, T), **state: An
         ((T, F, U), Outcome.ALLOW, Reason.ADMITTED),
         ((F, T, T), Outcome.FALLBACK, Reason.STATE_VIOLATED),
         ((U, T, T), Outcome.DEFER, Reason.STATE_UNKNOWN),
-        # too few, too many, or what is no truth: nothing of it is believed
+        # too few, too many, or invalid truths are all ignored
         ((), Outcome.DEFER, Reason.STATE_UNKNOWN),
         ((T, T), Outcome.DEFER, Reason.STATE_UNKNOWN),
         ((T, T, T, T), Outcome.DEFER, Reason.STATE_UNKNOWN),
@@ -267,7 +267,7 @@ def test_admission_expires_with_its_observation() -> None:
 
 
 def test_an_admission_ends_when_what_a_monitor_looked_at_is_stale() -> None:
-    """Only monitor 2 reads the obstacle."""
+    """Only monitor 2 reads the obstacle's distance."""
     near = clause("obstacle", apply(Op.GT, flat.signal(flat.OBSTACLE), const(0)))
     monitors = (CALM_FOR_3_S, Monitor(WITHIN, S, near), Monitor(RISING, 0, asks(1)))
     contract = replace(P.contracts[INSPECT], assume=(), maintain=())
@@ -356,7 +356,7 @@ def test_the_target_of_a_degrade_rule_is_judged_in_the_phase_of_the_step() -> No
 
 
 def test_the_phase_does_not_depend_on_what_a_request_says() -> None:
-    """It is the invocation's own; the mission's current one only says whether the step is due."""
+    """The invocation's own phase counts; the mission's current phase only decides whether the step is due."""
     invocation = step(requiring(in_phases(2)))
     state = replace(flat.state(), monitors=(T, T, T))
     context = flat.context(phase=flat.DEPARTURE)

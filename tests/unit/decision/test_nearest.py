@@ -191,7 +191,7 @@ def test_signals_only_search_changes_the_signal() -> None:
         (flat.apply(Op.AND, flat.apply(Op.LE, A(1), N(9)), flat.apply(Op.LE, A(1), N(5))), True, [(True, 1, None, 5)]),
         (flat.apply(Op.AND, flat.apply(Op.LE, A(1), N(9)), flat.apply(Op.EQ, A(1), N(11))), True, None),
         (flat.apply(Op.AND, TIME, (Op.TIME_IN, 3 * flat.H, 4 * flat.H)), True, None),
-        # not (a and b): either will do
+        # not (a and b): one of the two changes suffices
         (
             (*flat.apply(Op.AND, flat.apply(Op.GE, A(1), N(9)), flat.apply(Op.GE, SIG(WIND), N(0))), Op.NOT, 0, 0),
             True,

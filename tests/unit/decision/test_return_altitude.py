@@ -58,8 +58,8 @@ START, LEG, END = (60, 80), (60, 80, 0, 0), (0, 0)
         (30, 0, 29, [(LEG, 29, 30), (END, 0, 30)]),
         (30, 0, 50, [(LEG, 50, 50), (END, 0, 50)]),  # higher, it flies as high as it is
         (30, 99, 15, [(START, 15, 30), (LEG, 28, 30), (END, 0, 30)]),
-        (30, 100, 15, [(LEG, 15, 30), (END, 0, 30)]),  # so near it may not climb
-        (0, 0, 15, [(LEG, 15, 15), (END, 0, 15)]),  # it is not known how high it climbs
+        (30, 100, 15, [(LEG, 15, 30), (END, 0, 30)]),  # so near to home it may not climb
+        (0, 0, 15, [(LEG, 15, 15), (END, 0, 15)]),  # the climb's height is unknown
         (1, 0, -2, [(START, -2, 1), (LEG, -1, 1), (END, -2, 1)]),
     ],
 )
@@ -87,7 +87,7 @@ def test_from_a_set_of_places_and_heights_every_way_is_covered() -> None:
     [(0, 10 + 50 + 3), (15, 10 + 50 + 3), (30, 10 + 50 + 3), (31, 63.334), (60, 20 + 50 + 3), (120, 40 + 50 + 3)],
 )
 def test_low_return_is_limited_in_distance_from_home(declared: int, near: float) -> None:
-    """10 m or a third of the height, and as far as home and the vehicle may be from where they are said to be."""
+    """10 m or a third of the height, plus the position errors of home and the vehicle."""
     there = msgspec.structs.replace(vehicle(declared), home_within=50 * M, position_error=3 * M)
     assert near_home(there) == round(near * M)
 

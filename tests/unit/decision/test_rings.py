@@ -36,7 +36,7 @@ def test_well_formed_rings_are_accepted(of: Random) -> None:
 @settings(max_examples=settings().max_examples * 4)
 @given(worlds.CHANCES)
 def test_one_thing_changed(of: Random) -> None:
-    """A corner moved, a ring turned round, left out or moved: mostly wrong, sometimes still right."""
+    """A moved corner, or a reversed, removed or moved ring: mostly invalid, sometimes still valid."""
     made = [list(ring) for ring in rings(of)]
     ring = of.choice(made)
     match of.randrange(5):

@@ -122,7 +122,7 @@ def test_airspace_between_the_present_height_and_the_planned_one() -> None:
 
 
 def test_fallback_stays_in_airspace_on_its_whole_path() -> None:
-    """The school lies between here and home: the way there begins and ends well, and is not flown."""
+    """The school lies between here and home: both ends of the way are clear, but it is not flown."""
     policy, contract = with_contract(INSPECT, fallback=(flat.link(HOME), flat.link(LAND)))
     decision = ask(replace(STEP, contract=contract), values={POSITION_X: 0, POSITION_Y: 450 * M}, policy=policy)
     assert (decision.outcome, decision.link, decision.target) == (FALLBACK, 1, contract.fallback[1])
@@ -155,7 +155,7 @@ def test_maintain_over_the_planned_volume(values: dict[int, int | None], reason:
 
 
 def test_a_zone_without_a_band_needs_no_height() -> None:
-    """Neither where a rule forbids it, nor for the airspace, nor to know the way home."""
+    """Neither in a rule, nor for the airspace, nor for the way home."""
     zones = tuple(replace(zone, floor=LOWEST, ceiling=HIGHEST) for zone in flat.ZONES)
     forbid = flat.rule(RuleKind.FORBID, when=clause("position inside bridge_a", (Op.POSITION_IN, flat.BRIDGE, 0)))
     step, away = goto(150 * M, 0), {HEIGHT: None, POSITION_X: 0}

@@ -28,7 +28,7 @@ AT_US = NOW.monotonic_us
 
 
 class Asked:
-    """A session, asked by hand. Each step is released when it is asked for, at the bridge."""
+    """A session with requests by hand. Each step is released when it is requested, at the bridge."""
 
     def __init__(self, of: Loaded = LOADED, *, enforced: bool = True) -> None:
         self.in_force = InForce(of.bundle, of.policy, of.invocations, world.ROOT, world.VEHICLE, world.FLIGHT, 0)
@@ -54,7 +54,7 @@ class Asked:
         return self.session.decide_link(ref, binding, flat.state(values), NOW)
 
     def turns(self) -> list[int]:
-        """The steps that may be asked for."""
+        """The steps that may be requested."""
         steps = range(-2, len(self.in_force.invocations) + 2)
         return [step for step in steps if self.session.refusal(Ref(STEP, step, -1)) is None]
 
@@ -64,18 +64,18 @@ class Asked:
 
 
 def at(step: int, values: dict[int, int | None] | None) -> State:
-    """Where an honest runtime asks for a step: on the ground for the first, else at the bridge."""
+    """The state in which an honest runtime requests a step: on the ground for the first, else at the bridge."""
     ground: dict[int, int | None] = {flat.HEIGHT: 0, flat.POSITION_X: 0, flat.POSITION_Y: 0} if step == 0 else {}
     return flat.state(ground | (values or {}))
 
 
 def with_mission(on_inadmissible: int) -> Loaded:
-    """The mission, each step of which does this when it is not admitted."""
+    """The mission with this reaction of each step that is not admitted."""
     steps = tuple(replace(each, on_inadmissible=on_inadmissible) for each in flat.INVOCATIONS)
     return world.loaded(mission=replace(flat.MISSION, invocations=steps))
 
 
-# ------------------------------------------------------------------------------------------- whose turn it is
+# ------------------------------------------------------------------------------------------- turns
 
 
 @pytest.mark.parametrize(
@@ -105,7 +105,7 @@ LATE = {"released_us": AT_US - flat.INVOCATIONS[0].contract.deadline_us - S}
     ("on_inadmissible", "values", "context", "outcome", "turns", "used"),
     [
         (OnInadmissible.ABORT, {}, {}, ALLOW, [0, 1], [0]),
-        (OnInadmissible.ABORT, {}, BINDING, DENY, [0], []),  # a forger uses no id up
+        (OnInadmissible.ABORT, {}, BINDING, DENY, [0], []),  # a forged request uses no id
         (OnInadmissible.ABORT, EMPTY, {}, DEFER, [0, 1], []),
         (OnInadmissible.ABORT, {BATTERY: 2_000}, {}, FALLBACK, [0, 1], [0]),
         (OnInadmissible.SKIP, {BATTERY: 2_000}, {}, FALLBACK, [0, 1], [0]),
@@ -274,7 +274,7 @@ def test_the_binding_of_a_link_is_that_of_its_own_chain() -> None:
 
 
 def confirmed(steps: int) -> tuple[Asked, Loaded]:
-    """A session in which so many steps of the low mission were asked for."""
+    """A session in which so many steps of the low mission were requested."""
     of = documents.low()
     asked = Asked(of)
     for step in range(steps):
@@ -330,7 +330,7 @@ def test_a_replacement_keeps_what_was_released_or_asked_for(steps: int, released
         (OnInadmissible.REPLAN, EMPTY, {}, "accepted"),  # deferred
         (OnInadmissible.REPLAN, {}, {}, "already-released"),  # it was permitted
         (OnInadmissible.REPLAN, {}, LATE, "already-released"),  # its fallback flies
-        (OnInadmissible.REPLAN, {}, BINDING, "accepted"),  # a forger asked
+        (OnInadmissible.REPLAN, {}, BINDING, "accepted"),  # a forged request
         (OnInadmissible.HOLD, {BATTERY: 2_000}, {}, "already-released"),
         (OnInadmissible.SKIP, {BATTERY: 2_000}, {}, "already-released"),
     ],

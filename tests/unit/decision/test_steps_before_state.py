@@ -359,7 +359,7 @@ def test_phase(phases: int, current: int, outcome: Outcome, reason: Reason) -> N
         (S, S + 1, FALLBACK),
         (2 * S, 0, ALLOW),
         (-S, 2 * S, ALLOW),
-        (-S, 2 * S + 1, FALLBACK),  # a release that is still to come gains nothing
+        (-S, 2 * S + 1, FALLBACK),  # a future release has no advantage
     ],
 )
 def test_timing(elapsed: int, remaining: int, outcome: Outcome) -> None:

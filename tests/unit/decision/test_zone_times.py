@@ -146,7 +146,7 @@ def test_the_same_volume_at_two_times() -> None:
 
 @pytest.mark.parametrize(("end", "index"), [(UTC + H, 1), (UTC + MIN, 2)])
 def test_zone_times_cover_the_longest_duration_of_a_link(end: int, index: int) -> None:
-    """Hovering moves nothing; going home takes up to five minutes, and landing is the last."""
+    """Hovering covers no way; the return takes up to five minutes; landing is the last link."""
     policy = airspace(flat.POLICY.airspace.inside[0], dates=(0, end))
     choice = choose_fallback(ready(STEP, policy), flat.state(), policy, flat.NOW, after=0)
     assert choice is not None
@@ -171,7 +171,7 @@ def test_an_argument_is_asked_about_at_the_moment() -> None:
 
 
 def test_no_time_is_offered_at_which_a_zone_blocks() -> None:
-    """A rule asks for the morning and to be out of a zone that exists from tomorrow on."""
+    """A rule requires the morning and a place outside a zone that exists from tomorrow on."""
     hours = (Op.TIME_IN, 8 * H, 12 * H)
     outside = (Op.POSITION_IN, flat.CITY, 0, Op.NOT, 0, 0)
     when = flat.clause("in the morning, outside of the city", flat.apply(Op.AND, hours, outside))

@@ -45,7 +45,7 @@ STARS = st.lists(st.integers(3, 30), min_size=17, max_size=40).map(
     )
 )
 CIRCLES = st.builds(lambda c, r: Zone("c", CIRCLE, LOWEST, HIGHEST, (*c, r)), POINTS, st.integers(1, 200))
-#: so large that a few mm of rounding hide nothing
+#: so large that a few mm of rounding do not matter
 WIDE = st.integers(-9_000, 9_000)
 WIDE_POINTS = st.tuples(WIDE, WIDE)
 WIDE_CIRCLES = st.builds(
@@ -84,7 +84,7 @@ METRE = 1_000
 
 
 def field(chance: Random) -> Zone:
-    """A zone as wide as what is flown in."""
+    """A zone as wide as the flown area."""
     floor, ceiling = chance.choice([(LOWEST, HIGHEST), (LOWEST, 20 * METRE), (5 * METRE, 40 * METRE)])
     if chance.random() < 0.4:
         radius = chance.randint(METRE, 70 * METRE)
@@ -121,7 +121,7 @@ def test_zone_cache_changes_no_answer(seed: int) -> None:
     ],
 )
 def test_a_short_leg_past_a_circle_stays_in_doubt(north: int, box: tuple[int, int, int, int]) -> None:
-    """Its length of 2 mm counts as 3, and its box as if it reached to all sides."""
+    """Its length of 2 mm counts as 3 mm, and its box as extended to all sides."""
     zone = PreparedZone(0, Zone("c", CIRCLE, LOWEST, HIGHEST, (0, 0, (60 * METRE) ** 2)))
     for _ in range(3):
         assert PlaceSet(((Sweep((-1, north, 1, north), box), 0, 0),)).inside(zone) == T | F
@@ -195,7 +195,7 @@ def test_a_box_that_reaches_to_one_side(turn: int, east: int, reach: tuple[int, 
 
 
 def check_circle(zone: Zone, a: tuple[int, int], b: tuple[int, int], box: tuple[int, int, int, int]) -> None:
-    """Exact inside; outside it may say both when the leg comes nearer than 3 mm and the difference of box and disc."""
+    """Exact inside; outside, both truths are allowed nearer than 3 mm and the difference of box and disc."""
     answer = PreparedZone(0, zone).along((*a, *b), box)
     outline = widened(a, b, box)
     if circle_far(outline, zone) < zone.data[2]:

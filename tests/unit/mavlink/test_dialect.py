@@ -1,4 +1,4 @@
-"""The dialect table: what it says, and that it says what pymavlink says."""
+"""The dialect table: its contents, and agreement with pymavlink."""
 
 import json
 import subprocess

@@ -1,4 +1,4 @@
-"""Every layout, number and mode that is shared says what pymavlink's dialect says."""
+"""Every shared layout, number and mode agrees with pymavlink's dialect."""
 
 from random import Random
 from types import ModuleType
@@ -34,7 +34,7 @@ def test_layouts_are_the_dialects(number: int, layout: Layout) -> None:
     assert layout.extra == kind.crc_extra
     assert layout.fields.size == kind.unpacker.size
     octets = Random(number).randbytes(layout.fields.size)
-    for at in range(layout.fields.size):  # a turned octet shows in the same field: types and offsets are the same
+    for at in range(layout.fields.size):  # a changed octet changes the same field: types and offsets are the same
         turned = octets[:at] + bytes([octets[at] ^ 0xFF]) + octets[at + 1 :]
         assert repr(layout.fields.unpack(turned)) == repr(kind.unpacker.unpack(turned))
 
@@ -71,7 +71,7 @@ def test_arducopters_modes_are_the_dialects() -> None:
     assert all(mode.parameters == (mode, 0) for mode in CopterMode)
 
 
-#: pymavlink's name of a mode and, where it is another, PX4's own; it has none of ORBIT and PRECISION_LAND
+#: pymavlink's name of a mode, and PX4's own if it differs; pymavlink lacks ORBIT and PRECISION_LAND
 PX4_NAMED = {"ALTCTL": "ALTITUDE", "POSCTL": "POSITION", "LOITER": "HOLD", "RTL": "RETURN", "FOLLOWME": "FOLLOW"}
 NOT_OURS = {"RATTITUDE", "RTGS"}
 

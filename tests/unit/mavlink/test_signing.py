@@ -1,4 +1,4 @@
-"""Signing: against pymavlink's own, against a recorded ArduCopter, and rule by rule of the specification."""
+"""Signing: compared with pymavlink, with a recorded ArduCopter, and with each rule of the specification."""
 
 from pathlib import Path
 from typing import Any
@@ -46,7 +46,7 @@ def theirs(key: bytes = KEY, timestamp: int = 0, number: int = 0) -> Any:
 
 
 def at(timestamp: int, other: SignedLink | None = None, of: bytes | None = None) -> bytes:
-    """A frame that is rightly signed at a timestamp."""
+    """A correctly signed frame with a timestamp."""
     sender = other or link(stored=SigningState(timestamp - 1, {}), utc_us=0)
     return sender.sign(of or frame(), 0)
 
@@ -133,7 +133,7 @@ def test_unsigned_or_foreign_frame_is_refused() -> None:
 
 
 def test_forged_future_timestamp_locks_nobody_out() -> None:
-    """pymavlink believes the timestamp before it looks at the signature; here it is the other way round."""
+    """pymavlink stores the timestamp before it checks the signature; here the check comes first."""
     ours, end = link(), theirs(timestamp=timestamp_of(UTC))
     forged = bytearray(at(timestamp_of(UTC) + 1_000_000))
     forged[-1] ^= 1
@@ -173,7 +173,7 @@ def test_own_signed_frame_is_refused() -> None:
 
 
 def test_frame_of_another_link_is_refused() -> None:
-    """An autopilot signs on each of its channels; here only one of them is heard, also after a restart."""
+    """An autopilot signs on each of its channels; we only accept one of them, also after a restart."""
     now = timestamp_of(UTC)
     here = [at(now + 10 * n, SignedLink(KEY, SigningState(now + 10 * n, {}), 0, 0, link=1)) for n in range(3)]
     there = at(0, SignedLink(KEY, SigningState(now + 5, {}), 0, 0, link=2))
@@ -271,7 +271,7 @@ def test_a_key_has_32_octets(length: int) -> None:
 
 @given(st.lists(st.tuples(st.integers(0, 2), st.integers(-80, 80), st.integers(0, 70)), max_size=30))
 def test_no_frame_comes_in_twice_and_none_over_a_minute_late(arrivals: list[tuple[int, int, int]]) -> None:
-    """(stream, timestamp in s from the start, s that pass before it arrives), against the rules written down anew."""
+    """(stream, timestamp in s from the start, delay in s), compared with an independent form of the rules."""
     ours, begin, now_s = link(), timestamp_of(UTC), 0
     last: dict[int, int] = {}
     local = begin
@@ -311,7 +311,7 @@ def test_frames_signed_ahead_have_later_timestamps() -> None:
 
 
 def test_frame_signed_ahead_is_accepted_late() -> None:
-    """The last frame that was signed, then what was signed ahead, minutes later, in its order; none of it twice."""
+    """The last signed frame, then the frames signed ahead, minutes later and in order; each only once."""
     ours, autopilot = link(), vehicle()
     ahead = [signed_ahead(ours, frame(mode), 0) for mode in range(3)]
     assert autopilot.accept(ours.sign(frame(), 20_000_000), 20_000_000)
@@ -322,7 +322,7 @@ def test_frame_signed_ahead_is_accepted_late() -> None:
 
 
 def test_later_signature_voids_frames_signed_ahead() -> None:
-    """Who holds it back while the flight goes on holds nothing soon: not for the next step, nor for the next flight."""
+    """A held-back frame soon becomes void as the flight continues, also for the next step and flight."""
     ours, autopilot = link(), vehicle()
     held_back = signed_ahead(ours, frame(1), 0)
     again = signed_ahead(ours, frame(2), 20_000_000)
@@ -342,7 +342,7 @@ def test_no_timestamp_is_promised_twice() -> None:
 
 
 def test_repeated_signing_ahead_cannot_exhaust_timestamps() -> None:
-    """Whoever has it signed, sends it, and shows the vehicle's answer, as fast as can be."""
+    """An attacker requests signatures, sends the frames, and shows the vehicle's answers, as fast as possible."""
     ours, autopilot = link(), vehicle()
     for now_us in range(0, 10_000_000, 10_000):
         assert autopilot.accept(signed_ahead(ours, frame(), now_us), now_us)
@@ -351,7 +351,7 @@ def test_repeated_signing_ahead_cannot_exhaust_timestamps() -> None:
 
 
 def test_a_flood_of_frames_to_sign_ahead_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Each raises the timestamp by one: without a limit, a flood is good for hours."""
+    """Each raises the timestamp by one: without a limit, a flood would advance it by hours."""
     ours = link()
     monkeypatch.setattr(signing, "MOST_AHEAD", 50)
     signed = [ours.sign_ahead(frame(), 0) for _ in range(52)]
@@ -383,7 +383,7 @@ def test_frames_signed_ahead_change_stored_state() -> None:
 
 
 def test_library_keeps_streams_and_refuses_more() -> None:
-    """`mavlink_signature_check`: a table of 16, each sender on each link a stream of its own, none given up."""
+    """`mavlink_signature_check`: a table of 16 streams, one per sender and link, without eviction."""
     autopilot = vehicle()
     for number in range(MOST_STREAMS):
         assert autopilot.accept(link(number=number).sign(frame(), 0), 0)

@@ -1,4 +1,4 @@
-"""The tlog format: what is written reads back, and a cut file says where it was cut."""
+"""The tlog format: round trips, and truncated files with the place of the cut."""
 
 import itertools
 from io import BytesIO

@@ -72,11 +72,11 @@ BEFORE, AFTER = 1, 10 * S
 @rows(
     ("reason", "outcome", "step", "before", "after"),
     [
-        (Reason.AWAITING_APPROVAL, Outcome.DEFER, 3, True, True),  # it has a time of its own
+        (Reason.AWAITING_APPROVAL, Outcome.DEFER, 3, True, True),  # the approval has its own time limit
         (Reason.FORBID_UNKNOWN, Outcome.DEFER, 3, True, False),
         (Reason.CLOCK_UNCERTAIN, Outcome.DEFER, 2, True, False),
         (Reason.PHASE_NOT_REACHED, Outcome.DEFER, 4, True, False),
-        (Reason.STATE_UNKNOWN, Outcome.DEFER, 6, True, True),  # it passed the deadline's own step
+        (Reason.STATE_UNKNOWN, Outcome.DEFER, 6, True, True),  # the deadline check has passed
         (Reason.SAFETY_UNKNOWN, Outcome.DEFER, 7, True, True),
         (Reason.NO_SLACK, Outcome.FALLBACK, 5, False, False),
         (Reason.STATE_VIOLATED, Outcome.FALLBACK, 6, False, False),

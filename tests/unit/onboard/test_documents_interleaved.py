@@ -32,7 +32,7 @@ def other(of: Loaded, work: int) -> Mission:
 
 
 class Hands:
-    """Presents documents and keeps them for replays."""
+    """Presents documents, and keeps them to replay them."""
 
     def __init__(self, run: Run) -> None:
         self.run = run

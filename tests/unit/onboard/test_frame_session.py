@@ -139,7 +139,7 @@ ALWAYS: list[Any] = [
     m.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3),
     long(511, 33, 100_000),
     long(512, 148),
-    long(401),  # the checks before arming: says why not
+    long(401),  # requests the results of the pre-arm checks
     m.MAVLink_param_request_read_message(SYSTEM, 1, b"RTL_ALT", -1),
     m.MAVLink_param_request_list_message(SYSTEM, 1),
     m.MAVLink_statustext_message(6, b"going home"),
@@ -171,7 +171,7 @@ NEVER: list[Any] = [
     m.MAVLink_mission_set_current_message(SYSTEM, 1, 0),
     m.MAVLink_param_set_message(SYSTEM, 1, b"FENCE_ENABLE", 0, 2),
     m.MAVLink_param_set_message(SYSTEM, 1, b"FENCE_TYPE", 3, 2),
-    m.MAVLink_param_set_message(SYSTEM, 1, b"FENCE_TYPE", 4, 2),  # its own circle and ceiling are not taken away
+    m.MAVLink_param_set_message(SYSTEM, 1, b"FENCE_TYPE", 4, 2),  # its own circle and ceiling stay enabled
     m.MAVLink_param_set_message(SYSTEM, 1, b"FENCE_TYPE", 15, 2),
     m.MAVLink_param_set_message(SYSTEM, 1, b"FENCE_RADIUS", 300, 9),
     m.MAVLink_param_set_message(SYSTEM, 1, b"FENCE_TYPE", nan, 2),
@@ -366,7 +366,7 @@ def test_the_first_autopilot_that_is_known_is_the_vehicle() -> None:
 
 @pytest.mark.parametrize("message", BEFORE_FLIGHT, ids=named)
 def test_a_fence_is_not_handed_to_a_vehicle_that_is_armed(message: Any) -> None:
-    """Whoever armed it, because a run may begin while it flies."""
+    """This does not depend on who armed it, because a run may begin in flight."""
     gate = FrameSession()
     gate.observe(pack(heartbeat(PX4), component=1))
     gate.observe(pack(parameter("FENCE_TYPE", 7), component=1))
@@ -522,7 +522,7 @@ def test_no_message_that_we_do_not_know_leaves() -> None:
         payload = chance.randbytes(kind.unpacker.size)
         frame = bytes([0xFD, len(payload), 0, 0, 0, SYSTEM, OURS]) + number.to_bytes(3, "little") + payload + b"\0\0"
         passed = any(isinstance(gate.seal(frame, NOW), bytes) for gate in gates)
-        assert not passed or number in (111, 253), kind.msgname  # TIMESYNC and STATUSTEXT may hold anything
+        assert not passed or number in (111, 253), kind.msgname  # TIMESYNC and STATUSTEXT may have any content
 
 
 class FakeSigner:
@@ -552,7 +552,7 @@ def test_only_passing_frames_are_signed() -> None:
 
 
 def test_a_frame_that_is_not_signed_ahead_does_not_count_as_refused() -> None:
-    """Nobody tried to send it."""
+    """No attempt to send it was recorded."""
     gate, of = session(PX4), command(K.LAND)
     assert gate.sign_ahead(b"no frame", of, NOW) is NOT_ONE_FRAME
     assert gate.sign_ahead(pack(m.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)), of, NOW) is NOT_COVERED

@@ -13,7 +13,7 @@ from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.view import RunStage
 from virtual.rows import rows
 
-#: as the loop says it, and as the gate does of a first frame
+#: the loop's reason, and the gate's reason for a first frame
 REASONS = ("late", "frame/late")
 RUNS: list[Run] = []
 

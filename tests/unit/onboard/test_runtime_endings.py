@@ -82,7 +82,7 @@ ENDS: dict[str, tuple[Way, Ending, str]] = {
 }
 
 
-#: what gives a mission up before no link is left
+#: causes that abort a mission before the last link
 GIVEN_UP: dict[str, Callable[[Run], object]] = {
     "interrupted": lambda run: run.tick(Interrupted(0)),
     "no records": lambda run: run.tick(EvidenceFailed(0, "the disk is full")),
@@ -117,7 +117,7 @@ def test_obeying_vehicle_that_never_flew_has_not_landed(way: Event | None) -> No
     run.tick(AirState(0, armed=False, airborne=False))
     if way is not None:
         run.tick(way)
-    else:  # it takes the climb for done, and then waits for its next step
+    else:  # the climb counts as done, and the next step is awaited
         run.vehicle.values[OBSTACLE] = None
         run.tick(Succeeded(0, token), AirState(0, armed=False, airborne=False))
     over(run)

@@ -1,7 +1,7 @@
 """Every sequence of events up to a depth, from several situations: what must never, and what must always happen.
 
-Never: a command that no checked permit stands behind; a step while another flies; a step after a return or a landing of
-a fallback; anything after the end or after standing down. Always: an end, once the vehicle does what it is told.
+Never: a command without a checked permit; a step while another flies; a step after a return or a landing of
+a fallback; anything after the end or after standing down. Always: an end, once the vehicle obeys.
 """
 
 from collections.abc import Callable
@@ -106,7 +106,7 @@ def explore(situation: str, sequence: tuple[str, ...]) -> None:
     SITUATIONS[situation](run)
     for event in sequence:
         EVENTS[event](run)
-    # From here on the link holds, and the vehicle does what it was told last.
+    # From here on the link holds, and the vehicle obeys the last command.
     run.step(LinkBack(0))
     run.until_over(400)
     sent = [action for action in run.actions if isinstance(action, Command)]

@@ -28,7 +28,7 @@ from rtshcua.onboard.runtime.view import RunStage
 from rtshcua.wire.response import Status, encode_refusal
 from virtual.rows import rows
 
-#: it is waited for as long as it can fly: less than that of others, so that this is soon over
+#: the vehicle's endurance, which limits the wait for it: short, to keep the tests fast
 SHORT = replace(POLICY.vehicle, endurance_us=4 * MIN)
 OF = loaded(replace(POLICY, vehicle=SHORT))
 

@@ -114,7 +114,7 @@ def test_a_gust_begins_the_three_seconds_again() -> None:
 
 
 def test_a_gap_of_telemetry_is_not_calm() -> None:
-    """The wind is silent for a second, and stale after half of one: it is unknown then."""
+    """The wind is not reported for a second and stale after half a second, so it is unknown."""
     run = start(world(TAKEOFF, require=(FOR_3_S,)))
     run.until(lambda run: seconds(run) >= 2.0)
     run.vehicle.silent.add(WIND)
@@ -145,7 +145,7 @@ def test_a_gust_of_one_observation_ends_a_skill_that_assumes_calm() -> None:
 
 
 def test_an_edge_is_seen_by_the_decisions_of_its_own_step_and_by_no_other() -> None:
-    """Going on needs the vehicle to have risen above 10 m at this very observation."""
+    """To continue, the vehicle must rise above 10 m at this observation."""
     run = start(world(GOTO, OnInadmissible.HOLD, require=(ROSE_NOW,))).until_flies("goto")
     edges = [monitors[1] for monitors in recorded(run)]
     assert [decision[1] for decision in run.decisions][-2:] == [-1, 1], "it held until then"

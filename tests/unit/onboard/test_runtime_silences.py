@@ -48,11 +48,11 @@ EACH_US = 50_000  # the first messages after a silence come so far apart
 SILENCES = [0.5, 1, 2.5, 3.5, 5, 8, 20, 45]
 ORDERS = range(3)
 
-#: as what ships: most signals are stale after 2 s, and a step may wait for a minute
+#: as in the shipped policy: most signals are stale after 2 s, and a step may wait for a minute
 STALE = {BATTERY: 5 * S, WIND: 10 * S, LINK: 5 * S}
 SIGNALS = tuple(replace(one, stale_us=STALE.get(one.slot, 2 * S)) for one in POLICY.signals)
 PATIENT = tuple(replace(one, deadline_us=10 * MIN) for one in CONTRACTS)
-#: it is waited for as long as it can fly: less than that of others, so that this is soon over
+#: the vehicle's endurance, which limits the wait for it: short, to keep the tests fast
 SHORT = replace(POLICY.vehicle, endurance_us=4 * MIN)
 GRACE_US = CONTRACTS[INSPECT].grace_us
 
@@ -386,7 +386,7 @@ def test_grace_counts_only_the_time_in_which_the_link_is_up() -> None:
     run.vehicle.values[OBSTACLE] = None
     for _ in range(3):
         run.tick()
-    for _ in range(2):  # some of its grace is over, and what there is of it is left
+    for _ in range(2):  # part of its grace period is used, and the rest remains
         run.step(LinkLost(0))
         pass_time(run, 4 * S)
         run.step(LinkBack(0))
@@ -515,7 +515,7 @@ def test_pilot_takeover_during_silence_ends_run(situation: Situation, moment: st
 
 
 def test_lost_takeoff_waits_for_the_flight_state() -> None:
-    """It was last reported on the ground: it may have risen, and is not told to land for that."""
+    """The last report was on the ground: the vehicle may have risen, so no landing is commanded."""
     run = start(vehicle=FakeVehicle(deaf={"takeoff"}))
     run.tick(AirState(0, True, False))
     be_silent(run, 45)

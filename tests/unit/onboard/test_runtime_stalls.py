@@ -27,7 +27,7 @@ from rtshcua.onboard.runtime.link import STOOD_STILL
 from rtshcua.onboard.runtime.view import RunStage
 from virtual.rows import rows
 
-#: as what ships: most signals are stale after 2 s, and a step may wait for minutes
+#: as in the shipped policy: most signals are stale after 2 s, and a step may wait for minutes
 STALE = {BATTERY: 5 * S, WIND: 10 * S, QUALITY: 5 * S}
 SIGNALS = tuple(replace(one, stale_us=STALE.get(one.slot, 2 * S)) for one in POLICY.signals)
 PATIENT = tuple(replace(one, deadline_us=10 * MIN) for one in CONTRACTS)
@@ -52,7 +52,7 @@ def running() -> Run:
 
 
 def holding() -> Run:
-    """It waits for a step, under a hold."""
+    """A run that waits for a step in a hold."""
     run = start().until_flies("goto")
     run.vehicle.values[OBSTACLE] = None
     run.until_flies("hover")

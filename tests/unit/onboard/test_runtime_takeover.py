@@ -84,7 +84,7 @@ def silent() -> Run:
 
 STAGES = (waiting, deferred_on_the_ground, taking_off, running, holding, falling, landing, coming_home, silent)
 
-#: what may come with it; each could turn the run, or end it, by itself
+#: events of the same moment; each alone could change or end the run
 WITH: dict[str, Callable[[int], tuple[Event, ...]]] = {
     "succeeded": lambda token: (Succeeded(0, token),),
     "failed": lambda token: (CommandFailed(0, token, "no-effect"),),
@@ -97,7 +97,7 @@ WITH: dict[str, Callable[[int], tuple[Event, ...]]] = {
 }
 
 
-#: whatever may come with it in every stage, once with a pilot or with a crash; the other of the two is for soak
+#: every such event in every stage, once with a takeover or a crash; the other of the two is for soak
 TRIED = [
     pytest.param(stage, along, last, marks=() if (at + row + crash) % 2 else pytest.mark.soak)
     for at, stage in enumerate(STAGES)
@@ -161,7 +161,7 @@ def test_takeover_seen_after_command_is_respected() -> None:
 
 
 def held(*, chain: tuple[int, ...] = ()) -> Run:
-    """A run that holds for its third step, which waits for an obstacle's distance for as long as it likes."""
+    """A run that holds for its third step, which waits without limit for an obstacle's distance."""
     fallback = tuple(each for each in CONTRACTS[INSPECT].fallback if each.skill in chain or not chain)
     patient = replace(CONTRACTS[INSPECT], deadline_us=10 * MIN, fallback=fallback)
     contracts = tuple(patient if each is CONTRACTS[INSPECT] else each for each in CONTRACTS)

@@ -104,7 +104,7 @@ def arming(*, armed: bool) -> Run:
 @pytest.mark.parametrize("armed", [False, True])
 @pytest.mark.parametrize(("event", "ending"), CAUSES)
 def test_aborted_takeoff_on_ground_gets_land_command(event: Event, ending: Ending, armed: bool) -> None:
-    """Also when it is not seen armed: the order to arm may be on its way, in the mode that takes off by itself."""
+    """Also if it is not reported as armed: the arming command may be on its way, in an automatic takeoff mode."""
     run = arming(armed=armed)
     run.tick(event)
     assert run.flown == ["takeoff", "emergency_land"]

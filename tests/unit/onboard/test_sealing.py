@@ -32,7 +32,7 @@ def journal() -> Journal:
 
 
 def told(journal: Journal, us: int) -> list[tuple[Any, int]]:
-    """Type or event of each line that is taken at a time, and its class."""
+    """The type or event of each line at a time, with its durability."""
     taken = journal.take(at(us), ended=False)
     lines = [(json.loads(each.line), each.durability) for each in taken if isinstance(each, Append)]
     return [(record.get("event", record["type"]), durability) for record, durability in lines]

@@ -1,4 +1,4 @@
-"""A runtime that stands still between any two steps: whatever it records then, and whatever became of its boundary
+"""A runtime that stalls between any two steps: whatever it records then, and whatever happened to its boundary
 meanwhile, its log verifies, at its end and at each place where it may break off.
 """
 
@@ -26,7 +26,7 @@ from rtshcua.wire.keys import Duty, SigningKey
 S = 1_000_000
 KEY = SigningKey.from_seed(bytes(32), duty=Duty.LOG, development=True)
 COMMAND = Command(7, "hover", 0, (), (), 0, 0, needs_record=True)
-#: us since the step before, what it records, whether it sends something, whether the boundary is lost in it
+#: us since the previous step, the records, whether a command is sent, and whether the boundary is lost
 STEPS = some.lists(
     some.tuples(
         some.one_of(some.integers(0, 300_000), some.integers(0, 70 * S)), some.integers(0, 4), some.booleans(),
@@ -55,7 +55,7 @@ class Signs:
 
 
 def lines_of(steps: list[tuple[int, int, bool, bool]], end_us: int, *, signs: bool) -> Iterator[tuple[bytes, int]]:
-    """The lines of a run, each with the class that it is given to the disk with."""
+    """The lines of a run, each with its durability."""
     recorder, boundary = (
         Recorder(lambda text: KEY.sign(text, duty=Duty.LOG), KEY.public, epoch_seeds()),
         Signs(signs=signs),

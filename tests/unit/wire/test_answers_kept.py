@@ -1,4 +1,4 @@
-"""The answers of people that one flight keeps: no more than it has room for, and what is there stays."""
+"""The approvals that a flight stores: their number is limited, and stored ones stay."""
 
 import pytest
 from msgspec.structs import replace

@@ -1,4 +1,4 @@
-"""The boundary's digest: an entry's octets are those that docs/log-format.md, section 7, has of it."""
+"""The boundary's digest: the octets of entries are those of docs/log-format.md, section 7."""
 
 from collections.abc import Callable
 from hashlib import sha256

@@ -1,4 +1,4 @@
-"""wire/bundle.py: what is sealed opens under the right root, for the right vehicle; everything else has its slug."""
+"""Bundles open under the right root and for the right vehicle; every other case has its slug."""
 
 import msgspec
 import pytest
@@ -110,7 +110,7 @@ def test_a_payload_of_the_wrong_shape() -> None:
 
 
 def test_a_payload_that_leaves_a_default_out() -> None:
-    """Structs with defaults decode from shorter arrays too: only the bytes that we would have made are read."""
+    """Structs with defaults also decode from shorter arrays, so only canonical bytes are accepted."""
     payload = bundle.mission_payload(bind(THE_MISSION, b"\0" * 32))
     body = list(artefact.unwrap(names.MISSION, payload))  # type: ignore[arg-type]
     step = list(body[9][0])  # type: ignore[index]
@@ -132,7 +132,7 @@ def test_a_bundle_that_is_too_large_is_not_read() -> None:
 
 
 def test_the_same_mission_in_another_envelope_is_the_same_mission() -> None:
-    """Else a second signature of the policy would let a mission fly twice."""
+    """Otherwise a second signature of the policy would let a mission fly twice."""
     other = SigningKey.from_seed(b"q" * 32, duty=Duty.POLICY)
     plain = root()
     trust = msgspec.structs.replace(plain, keys=(*plain.keys, other.verification(vehicles=("quad-07",))))

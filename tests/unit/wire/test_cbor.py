@@ -1,4 +1,4 @@
-"""Canonical CBOR: against RFC 8949's own examples, an encoder written apart, and bytes that nobody should accept."""
+"""Canonical CBOR: the examples of RFC 8949, an independent encoder, and bytes that must be refused."""
 
 import tracemalloc
 from enum import IntEnum
@@ -23,7 +23,7 @@ VALUES = st.recursive(
 
 
 def naive(value):
-    """An encoder as the RFC words it, written apart from ours."""
+    """An independent encoder by the text of the RFC."""
 
     def head(major, argument):
         for info, width in ((24, 1), (25, 2), (26, 4), (27, 8)):

@@ -1,4 +1,4 @@
-"""What of a named time of day a boundary bears out."""
+"""The check of a claimed time of day against a boundary's clock."""
 
 import pytest
 

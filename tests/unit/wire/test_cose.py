@@ -1,4 +1,4 @@
-"""Envelopes: what COSE says they are, and every way not to be one."""
+"""Envelopes: COSE_Sign1 as specified, and malformed ones."""
 
 import cbor2
 import pytest
@@ -47,7 +47,7 @@ def test_signed_envelope_opens():
 
 
 def test_another_implementation_reads_it():
-    """Taken apart by cbor2, and verified as RFC 9052, section 4.4, says."""
+    """Decoded by cbor2, and verified by RFC 9052, section 4.4."""
     message = cbor2.loads(ENVELOPE)
     assert message.tag == 18
     protected, unprotected, payload, signature = message.value

@@ -1,4 +1,4 @@
-"""Digests of one domain are not those of another."""
+"""Digests of different domains differ."""
 
 import hashlib
 

@@ -1,4 +1,4 @@
-"""Artefacts of each version that there was, in tests/vectors/artefacts: the present one is read, others are refused
+"""Artefacts of each version, in tests/vectors/artefacts: the present version is read, others are refused
 by name. `KIND-VERSION` was written by the revision that had that version (docs/compatibility.md), with the keys of
 `reference.world`; `policy-N` is a whole bundle, signed rightly (those of versions 1 to 3 anew, with these keys).
 """
@@ -24,7 +24,7 @@ KINDS = {"approval": names.APPROVAL, "recall": names.RECALL, "replacement": name
 
 
 def read(kind: str, data: bytes) -> tuple[str, str]:
-    """What becomes of an artefact: a slug and a text, both empty if it is read and trusted."""
+    """The refusal of an artefact: a slug and a text, both empty if it is accepted."""
     if kind == "root":
         try:
             assert open_root(data, pinned=ROOT_KEY.public, now_us=START.utc_us) == ROOT

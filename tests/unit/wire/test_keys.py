@@ -171,7 +171,7 @@ def refusal(data, *, duty=Duty.POLICY, passphrase=None):
 
 
 PLAIN = dump_signing_key(signing_key(development=True), passphrase=None)
-#: as version 0.1.0 wrote it before it had scrypt
+#: as version 0.1.0 wrote it without scrypt
 EARLIER = b"duty: policy\ndevelopment: no\n" + signing_key().private.private_bytes(
     serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8, serialization.BestAvailableEncryption(PASSPHRASE)
 )
@@ -202,7 +202,7 @@ COST = key_file.COST
 
 
 def test_passphrase_guess_has_documented_cost(monkeypatch):
-    """N is 2**17 in what is written: 128 MiB a guess. Salts are drawn."""
+    """N is 2**17 in the file: 128 MiB per guess. Salts are random."""
     first = dump_signing_key(signing_key(), passphrase=PASSPHRASE)
     monkeypatch.setattr(key_file, "COST", COST)
     second = dump_signing_key(signing_key(), passphrase=PASSPHRASE)
@@ -213,7 +213,7 @@ def test_passphrase_guess_has_documented_cost(monkeypatch):
 @rows(
     ("old", "new", "slug"),
     [
-        (b"scrypt: 14 8 1", b"scrypt: 13 8 1", "malformed"),  # too cheap to be ours
+        (b"scrypt: 14 8 1", b"scrypt: 13 8 1", "malformed"),  # cheaper than our own files
         (b"scrypt: 14 8 1", b"scrypt: 19 8 1", "malformed"),  # would take half a gigabyte
         (b"scrypt: 14 8 1", b"scrypt: 15 8 1", "wrong-passphrase"),
         (b"scrypt: 14 8 1", b"scrypt: 14 8 2", "malformed"),

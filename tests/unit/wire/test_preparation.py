@@ -1,4 +1,4 @@
-"""The preparation permit: bytes there and back, and what is none."""
+"""The preparation permit: encoding, decoding, and malformed ones."""
 
 import pytest
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""Qualification records: signed by the log key, about one vehicle, and compared with how it is now."""
+"""Qualification records: signed by the log key, for one vehicle, and compared with its present state."""
 
 from typing import Any
 

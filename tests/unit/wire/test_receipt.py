@@ -1,4 +1,4 @@
-"""Receipts: one encoding, and nothing else is one."""
+"""Receipts have exactly one encoding."""
 
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,4 +1,4 @@
-"""Replacements, opened and fitted by hand: for which flight they are, and whose steps a key may set aside."""
+"""Replacements, opened by hand: their flight, and the steps that a key may replace."""
 
 from dataclasses import replace as with_fields
 
@@ -27,7 +27,7 @@ def through(mission: Mission, source: int) -> Mission:
 
 
 def trusting(*sources: str) -> TrustRoot:
-    """The root, whose mission key speaks through these sources alone."""
+    """The root with a mission key for these sources only."""
     key = MISSION_KEY.verification(roles=("operator",), sources=sources, vehicles=(VEHICLE,), policies=(ANY,))
     return replace(ROOT, keys=tuple(key if each.duty is Duty.MISSION else each for each in ROOT.keys))
 
@@ -56,7 +56,7 @@ def test_replacement_is_for_named_flight_unless_any_is_accepted(flight: bytes | 
         (("agent",), OPERATOR, AGENT, "wrong-source"),
         (("operator",), AGENT, OPERATOR, 3),
         (("operator",), OPERATOR, OPERATOR, 3),
-        (("operator",), AGENT, AGENT, "wrong-source"),  # in the agent's place it proposes nothing
+        (("operator",), AGENT, AGENT, "wrong-source"),  # it may not propose in the agent's place
         (("agent", "operator"), OPERATOR, AGENT, 3),
     ],
 )

@@ -71,7 +71,7 @@ def test_any_bytes_are_an_answer_and_never_an_exception(data: bytes) -> None:
 
 
 GOOD = request.encode(plain())
-HEAD = GOOD[: -(79 + 12 * 3 + 2)]  # what comes before kind
+HEAD = GOOD[: -(79 + 12 * 3 + 2)]  # the fields before `kind`
 
 
 def changed(at: int, octets: bytes) -> bytes:

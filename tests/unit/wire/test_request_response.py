@@ -53,7 +53,7 @@ def test_the_target_of_a_degrade_rule_is_read_back() -> None:
         (CLAUSE, NO_TARGET, None),  # a link of the contingency has no contract of its own
         (NO_CLAUSE, len(CONTRACT.fallback), CONTRACT),
         (NO_CLAUSE, 0, None),
-        (NO_CLAUSE, -1, CONTRACT),  # the first rule is none that degrades
+        (NO_CLAUSE, -1, CONTRACT),  # the first rule is not a `degrade` rule
         (NO_CLAUSE, -1 - len(POLICY.rules), CONTRACT),
         (NO_CLAUSE, NO_TARGET - 1, CONTRACT),
     ],

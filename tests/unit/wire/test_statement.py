@@ -1,4 +1,4 @@
-"""Statements of a boundary: one encoding, one duty, and nothing out of range."""
+"""Statements of a boundary: one encoding, one duty, and range checks."""
 
 import pytest
 from msgspec.structs import replace

@@ -87,7 +87,7 @@ def test_keys_are_found_by_duty():
 def test_another_pin_is_refused():
     assert opening(SIGNED, pinned=NEXT.public) == "unknown-key"
     assert opening(SIGNED, pinned=NEXT.kid) == "unknown-key"
-    assert opening(SIGNED, pinned=bytes(32)) == "unknown-key"  # a pin that anybody could sign for
+    assert opening(SIGNED, pinned=bytes(32)) == "unknown-key"  # a pin of small order, for which anybody could sign
     with pytest.raises(ValueError, match="a pin is 32 or 16 bytes, not 3"):
         open_root(SIGNED, pinned=b"pin", now_us=200)
 
@@ -146,7 +146,7 @@ def test_a_root_that_contradicts_itself_is_neither_signed_nor_opened(fields, slu
 
 
 def approving(number=6, **fields):
-    """An approval key, of Ada as supervisor if nothing else is said."""
+    """An approval key, by default of Ada as supervisor."""
     usual = {"roles": ("supervisor",), "sources": ("operator",), "vehicles": ("quad-07",), "person": "ada"}
     return signing_key(number, Duty.APPROVAL).verification(**(usual | fields))
 
@@ -202,7 +202,7 @@ def test_witnesses_may_have_a_threshold(threshold):
 
 
 def test_without_a_threshold_one_witness_is_enough():
-    """As in a root that is older than the field, which is not in its bytes."""
+    """As in an older root without this field."""
     assert b"witness" not in TRUST.encode()
     assert TRUST.witness_threshold == 1
     assert TRUST.witnesses("quad-07", 200) == set()
@@ -234,7 +234,7 @@ def key_body(**changes):
         body(development=0),
         body(surplus=1),
         body(version=...),
-        body(thresholds=...),  # the default would do, but then the bytes would not be those of the root
+        body(thresholds=...),  # the default would have the same meaning, but other bytes
         body(keys=None),
         key_body(public=ROOT.public[1:]),
         key_body(public="Hm1KxwV0OhW9nULkYcfkvaoQdbzKcsQyCVzcLpsbNDM="),  # as text
@@ -307,7 +307,7 @@ def test_revoked_key_stays_revoked():
 def test_revoked_root_key_signs_no_new_root():
     second = revoking(ROOT.kid, keys=(NEXT.verification(),))
     assert refusal(second.sign, ROOT) == "not-self-signed"
-    both = revoking(ROOT.kid, version=3)  # names it again
+    both = revoking(ROOT.kid, version=3)  # names it twice
     assert succession(envelope(both.encode(), NEXT), current=second) == "revoked-key"
     assert succession(changed(version=3).sign(ROOT), current=second) == "revoked-key"
 

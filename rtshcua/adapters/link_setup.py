@@ -197,7 +197,7 @@ class LinkSetup:
         """The procedure, from the first heartbeat to the result."""
         if not (yield from self._until(lambda: self.met, _HEARTBEAT_US)):
             self.result = Refusal(
-                "no-vehicle", "no heartbeat of a vehicle within 10 s", "check that it is on and sends to this address"
+                "no-vehicle", "no heartbeat from a vehicle within 10 s", "check that it is on and sends to this address"
             )
             return
         yield from self._until(lambda: self._other is not None, _ANOTHER_US)

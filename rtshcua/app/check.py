@@ -1,4 +1,4 @@
-"""The service `check`: everything that is wrong with sources, what missions take at most, and how policies differ."""
+"""The service `check`: the diagnostics of sources, the bounds of missions, and the differences between policies."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
@@ -20,13 +20,13 @@ from rtshcua.model.flat.policy import Policy
 from rtshcua.wire.bundle import MAX_BUNDLE
 from rtshcua.wire.untrusted import Untrusted
 
-#: passes programs on one by one, and may show meanwhile which one is in hand
+#: yields programs one by one, and may show the current one
 Progress = Callable[[Sequence[RootProgram]], Iterator[RootProgram]]
 
 
 class CheckRequest(NamedTuple):
-    """What is checked: sources and folders of them, what further sources bring, an earlier version to compare with, and
-    where a map is to go. `issued_at_us` is 0 where the dates of zones do not count.
+    """The paths to check, further sources, an earlier version to compare with, and the path of a map. With an
+    `issued_at_us` of 0 the dates of zones are ignored.
     """
 
     paths: Sequence[Path]
@@ -38,7 +38,7 @@ class CheckRequest(NamedTuple):
 
 
 class CheckedMission(NamedTuple):
-    """What a mission takes at most, and the file that it stands in."""
+    """The bounds of a mission, and the file that declares it."""
 
     name: str
     file: str
@@ -46,7 +46,7 @@ class CheckedMission(NamedTuple):
 
 
 class LeftOutCounts(NamedTuple):
-    """What does not count of a policy for a vehicle: how many clauses and rules; and the signals that it lacks."""
+    """The numbers of clauses and rules of a policy that are left out for a vehicle, and the signals that it lacks."""
 
     policy: str
     vehicle: str
@@ -55,7 +55,7 @@ class LeftOutCounts(NamedTuple):
     rules: int
 
     def told(self) -> str:
-        """In words."""
+        """The numbers as text."""
         counted = ((self.clauses, "clause"), (self.rules, "rule"))
         counts = [many(count, what) for count, what in counted if count]
         without = ", ".join(self.without)
@@ -63,7 +63,7 @@ class LeftOutCounts(NamedTuple):
 
 
 class ComparedPolicy(NamedTuple):
-    """A policy that an earlier one was found for: both versions, and what differs, on any vehicle."""
+    """A policy with an earlier version: both version numbers, and the differences."""
 
     name: str
     version: int
@@ -72,10 +72,10 @@ class ComparedPolicy(NamedTuple):
 
 
 class CheckResult(NamedTuple):
-    """Everything that was found, each thing once; of what has no errors its bounds, its versions, what is left out.
+    """The diagnostics, each once; and for programs without errors the bounds, version comparisons and left-out clauses.
 
-    `now` are the errors that missions without any would have if they were issued now, where a zone exists on dates;
-    `not_here` the names of earlier policies that no policy here was compared with.
+    `now` are the errors that a mission without errors would have if issued now, because of zones with dates. `not_here`
+    are the names of earlier policies without a counterpart in the sources.
     """
 
     diagnostics: tuple[Diagnostic, ...]
@@ -89,14 +89,14 @@ class CheckResult(NamedTuple):
 
 
 class EarlierPolicies(NamedTuple):
-    """Policies, and where they are from."""
+    """Earlier policies, and the name of their origin."""
 
     name: str
     policies: tuple[Policy, ...]
 
 
 def check(request: CheckRequest, progress: Progress = iter) -> CheckResult | Refusal:
-    """Check sources; what cannot be begun with is refused. Raises OSError for a folder that cannot be read."""
+    """Check sources; an unusable request is refused. Raises OSError for a folder that cannot be read."""
     files = source_files(request.paths)
     if isinstance(files, Refusal):
         return files
@@ -114,7 +114,7 @@ def check(request: CheckRequest, progress: Progress = iter) -> CheckResult | Ref
 
 
 def draw_map(found: CheckResult, request: CheckRequest) -> int | Refusal:
-    """Write the page that was asked for; gives how many missions are drawn. Raises OSError."""
+    """Write the requested map; return the number of drawn missions. Raises OSError."""
     from rtshcua.adapters.store.writing import replace
     from rtshcua.ground.report.mission_maps import CheckedProgram, mission_map_page
 
@@ -129,26 +129,29 @@ def draw_map(found: CheckResult, request: CheckRequest) -> int | Refusal:
 
 
 def nothing_compared(found: CheckResult, since: Path) -> Refusal | None:
-    """That no policy here has an earlier version in `since`, where one was asked for: who asks relies on it."""
+    """The refusal if no policy has an earlier version in `since`, because the user relies on the comparison."""
     if found.versions:
         return None
     there = f"there: {', '.join(f'`{name}`' for name in found.not_here)}"
-    there = there if found.not_here else "there is no policy for a vehicle in it"
-    help = f"{there}; one of another name or for another vehicle is another policy: name a bundle of this one"
+    there = there if found.not_here else "it has no policy for a vehicle"
+    help = (
+        f"{there}; a policy with another name or for another vehicle is a different policy: name a bundle of "
+        f"this policy"
+    )
     return Refusal("since", f"nothing in `{since}` is an earlier version of a policy here", help)
 
 
 def _no_place(target: Path, files: Sequence[Path]) -> Refusal | None:
-    """Why no page can be written to a file."""
+    """The refusal if no page can be written to `target`."""
     if not target.parent.is_dir():
         return Refusal("output", f"there is no folder `{target.parent}` to write to")
     if target.exists() and not target.is_file():
-        return Refusal("output", f"`{target}` is not a regular file, and is not replaced by a page")
+        return Refusal("output", f"`{target}` is not a regular file, and is not overwritten by a page")
     return overwriting_a_source(target, files, "a page")
 
 
 def earlier_policies(path: Path) -> EarlierPolicies | Refusal:
-    """The policies of a bundle, whoever signed it, or of sources, which must be free of errors."""
+    """Read the policies of a bundle, without a check of its signatures, or of sources without errors."""
     if not path.is_dir() and path.suffix.lower() not in (SOURCE, SPECIFICATION):
         return _bundled(path)
     files = source_files([path])
@@ -158,7 +161,7 @@ def earlier_policies(path: Path) -> EarlierPolicies | Refusal:
     for each in programs(files):
         checked = examine(each.reading)
         if has_errors(checked.diagnostics):
-            message = f"`{each.name}` has errors, so nothing can be held against it"
+            message = f"`{each.name}` has errors, so it cannot be compared"
             return Refusal("since", message, f"run `rtshcua check {path}`")
         policies += [lowered.policy for lowered in checked.policies]
     return EarlierPolicies(str(path), tuple(policies))
@@ -179,12 +182,12 @@ def _bundled(path: Path) -> EarlierPolicies | Refusal:
 
 
 def check_all(
-    asked: Iterable[RootProgram], earlier: EarlierPolicies, issued_at_us: int = 0, now_us: int = 0
+    roots: Iterable[RootProgram], earlier: EarlierPolicies, issued_at_us: int = 0, now_us: int = 0
 ) -> CheckResult:
-    """Check programs, one after the other, and hold their policies against earlier ones.
+    """Check programs, and compare their policies with earlier ones.
 
-    Without a time of issue the dates of zones are not looked at; where one of them is in force, it is told what would
-    be found now.
+    Without a time of issue the dates of zones are ignored. If one of these zones exists now, also report the errors of
+    missions issued now.
     """
     now: dict[tuple[object, ...], Diagnostic] = {}
     found: dict[tuple[object, ...], Diagnostic] = {}
@@ -192,7 +195,7 @@ def check_all(
     missions: dict[tuple[str, str], CheckedMission] = {}
     versions: dict[tuple[str, int, int], dict[ChangeView, None]] = {}
     left_out: dict[LeftOutCounts, None] = {}
-    for each in asked:
+    for each in roots:
         program = each.reading.program
         checked = examine(each.reading, issued_at_us)
         sources |= program.sources
@@ -219,7 +222,7 @@ def check_all(
 
 
 def _dated(policy: Policy, now_us: int) -> bool:
-    """Whether a zone exists now, on its dates."""
+    """Whether a zone with dates exists now."""
     return any(zone.dates and zone.dates[0] <= now_us <= zone.dates[1] for zone in policy.zones)
 
 

@@ -1,4 +1,4 @@
-"""The service `compile`: a mission checked, with what it may claim, and signed into a bundle."""
+"""The service `compile`: check a mission and its claims, and sign it into a bundle."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -20,8 +20,8 @@ from rtshcua.wire.keys import SigningKey
 
 
 class CompileRequest(NamedTuple):
-    """A source and what further sources bring, which mission of it, with which parameters, what it may claim, and where
-    the bundle is to go: else beside the source, with a `suffix` of its own.
+    """A source, further sources, the mission with its parameter values, its allowed claims (`pins`), and the path of
+    the bundle; by default beside the source, with the `suffix`.
     """
 
     source: Path
@@ -35,9 +35,7 @@ class CompileRequest(NamedTuple):
 
 
 class CompileResult(NamedTuple):
-    """What came of compiling, its findings as whoever wrote the sources should read them, the sources, and where the
-    bundle goes.
-    """
+    """The compiled mission, the diagnostics for the author of the sources, the sources, and the path of the bundle."""
 
     compiled: Compiled
     diagnostics: tuple[Diagnostic, ...]
@@ -46,7 +44,7 @@ class CompileResult(NamedTuple):
 
 
 class SignedBundle(NamedTuple):
-    """A bundle, who signed its policy and its mission, and which of these keys the key store's root does not name."""
+    """A bundle, the keys that signed its policy and mission, and warnings about keys that the trust root rejects."""
 
     data: bytes
     signers: tuple[SigningKey, SigningKey]
@@ -54,18 +52,18 @@ class SignedBundle(NamedTuple):
 
 
 def claimed_pins(proposer: str | None, role: str | None, policy: str | None) -> Pins | Refusal:
-    """What a mission may claim: its source, its role, and its policy as `NAME` or `NAME@VERSION`."""
+    """The claims that a mission may make: its source, its role, and its policy as `NAME` or `NAME@VERSION`."""
     name, at, version = (policy or "").partition("@")
     numbered = version.isascii() and version.isdigit()
     if proposer not in (None, *PROPOSERS):
-        return Refusal("usage", f"`--source {proposer}` is none", f"accepted: {' or '.join(PROPOSERS)}")
+        return Refusal("usage", f"unknown source `{proposer}` in `--source`", f"accepted: {' or '.join(PROPOSERS)}")
     if (policy is not None and not name) or (at and not numbered):
-        return Refusal("usage", f"`--policy {policy}` is none", "accepted: a name, or as in `rules@7`")
+        return Refusal("usage", f"`{policy}` in `--policy` is not a policy", "accepted: a name, or as in `rules@7`")
     return Pins(proposer, role, frozenset({name}) if name else None, int(version) if numbered else None)
 
 
 def compile_mission(request: CompileRequest) -> CompileResult | Refusal:
-    """Compile a mission; what cannot be begun with, or claims what nothing declares, is refused."""
+    """Compile a mission; an unusable request, or a claim that no source declares, is refused."""
     given = [request.source, *request.further]
     refused = no_source(request.source)
     if refused is not None:
@@ -91,10 +89,10 @@ def sign_bundle(
 
 
 def _no_target(target: Path, given: Sequence[Path]) -> Refusal | None:
-    """Why no bundle can be written to a file."""
+    """The refusal if no bundle can be written to `target`."""
     if not target.parent.is_dir():
         return Refusal("output", f"there is no folder `{target.parent}` to write to", code=ExitCode.INPUT)
     if not target.exists() or (target.is_file() and not any(each.exists() and target.samefile(each) for each in given)):
         return None
     what = "one of the sources" if target.is_file() else "not a regular file"
-    return Refusal("output", f"`{target}` is {what}, and is not replaced by a bundle")
+    return Refusal("output", f"`{target}` is {what}, and is not overwritten by a bundle")

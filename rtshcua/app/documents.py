@@ -1,4 +1,4 @@
-"""What a file is, and what a bundle claims: files are recognised by their content, and opened as what was asked for."""
+"""Recognise files by their content, and read bundles and recorded documents without verification."""
 
 from base64 import b64decode
 from pathlib import Path
@@ -21,7 +21,7 @@ from rtshcua.wire.untrusted import Untrusted
 
 
 class Claimed(NamedTuple):
-    """What a bundle says, and which keys it says signed it: read for showing, and not to be trusted."""
+    """The contents of an unverified bundle, and the ids of the keys that it names; for display only."""
 
     policy: Policy
     mission: Mission
@@ -32,43 +32,43 @@ class Claimed(NamedTuple):
 
 
 def claimed(data: bytes, *, trusted: bool = False) -> Claimed:
-    """Takes a bundle apart without trusting it, and a very large one only if it is `trusted`. Raises `Untrusted`."""
+    """Parse a bundle without verifying it; a very large one only if it is `trusted`. Raises `Untrusted`."""
     first, second = (cose.unverified(envelope) for envelope in envelopes(data))
     read = parse if trusted else parse_unverified
     policy, mission = read(names.POLICY, first.payload, Policy), read(names.MISSION, second.payload, Mission)
     prepared = prepare(policy)
     checked = prepared if isinstance(prepared, Refusal) else prepare_mission(mission, prepared)
     if isinstance(checked, Refusal):
-        raise Untrusted("malformed", f"the bundle makes no sense: {checked.text}")
+        raise Untrusted("malformed", f"the bundle is inconsistent: {checked.text}")
     return Claimed(policy, mission, digest(BUNDLE_DIGEST, data), policy_digest(first.payload), first.kid, second.kid)
 
 
 def recorded_replacement(detail: str) -> ReplacementDocument:
-    """A replacement that a record holds, which is not verified here. Raises `Untrusted`."""
+    """Parse the replacement in a record without verifying it. Raises `Untrusted`."""
     try:
-        document = b64decode(detail, validate=True)
+        data = b64decode(detail, validate=True)
     except ValueError:
         raise Untrusted("malformed", "a recorded document is not base64") from None
-    said = parse_unverified(names.REPLACEMENT, cose.unverified(document).payload, ReplacementDocument)
-    return replace(said, kept=max(said.kept, 0))
+    document = parse_unverified(names.REPLACEMENT, cose.unverified(data).payload, ReplacementDocument)
+    return replace(document, kept=max(document.kept, 0))
 
 
 def replaced(detail: str, mission: Mission) -> Mission:
-    """The mission after a recorded replacement, which is not verified here. Raises `Untrusted`."""
+    """The mission after a recorded replacement, which is not verified. Raises `Untrusted`."""
     return over(recorded_replacement(detail), mission)
 
 
-def over(said: ReplacementDocument, mission: Mission) -> Mission:
-    """The mission after a replacement: the steps that stay, then the new ones."""
-    steps = (*mission.invocations[: said.kept], *said.mission.invocations[said.kept :])
-    return replace(said.mission, invocations=steps)
+def over(document: ReplacementDocument, mission: Mission) -> Mission:
+    """The mission after a replacement: the kept steps, then the new ones."""
+    steps = (*mission.invocations[: document.kept], *document.mission.invocations[document.kept :])
+    return replace(document.mission, invocations=steps)
 
 
 _BUNDLES: Final = "accepted: a bundle, as `rtshcua compile` makes it"
 
 
 class Mistaken(Untrusted):
-    """A file of another kind than was asked for; `help` is what is done with one."""
+    """A file of the wrong kind; `help` says how to use such a file."""
 
     def __init__(self, text: str, help: str) -> None:
         super().__init__("wrong-kind", text)
@@ -76,7 +76,7 @@ class Mistaken(Untrusted):
 
 
 def kind_of(path: Path) -> FileKind | None:
-    """What a file is; None where nothing tells, also where it cannot be read."""
+    """The kind of a file; None if it is unknown, or the file cannot be read."""
     try:
         with open_regular(path) as file:
             data = file.read(LOOKED_AT)
@@ -86,23 +86,23 @@ def kind_of(path: Path) -> FileKind | None:
 
 
 def no_log(path: Path, name: Path, help: str) -> tuple[str, str]:
-    """What to say of a file that is no log, which was given by a name: in words, and what would help."""
+    """The text and the help for a file that is not a log. `name` is its name on the command line."""
     kind = kind_of(path)
     if kind is None or kind is LOG:
         return f"`{name}` is not a log of this program", help
-    return f"`{name}` is {kind.name}, and no log", f"{kind.help}; {help}" if kind.help else help
+    return f"`{name}` is {kind.name}, not a log", f"{kind.help}; {help}" if kind.help else help
 
 
 def no_bundle(path: Path) -> Mistaken | None:
-    """Why a file is surely no bundle; None where it may be one."""
+    """The error if a file is clearly not a bundle; None if it may be one."""
     kind = kind_of(path)
     if kind is None or kind in (BUNDLE, DOCUMENT):
         return None
-    return Mistaken(f"`{path}` is {kind.name}, and no bundle", kind.help or _BUNDLES)
+    return Mistaken(f"`{path}` is {kind.name}, not a bundle", kind.help or _BUNDLES)
 
 
 def read_bundle(path: Path) -> bytes:
-    """A bundle's octets. Raises `Mistaken` for what is of another kind, and OSError."""
+    """Read a bundle. Raises `Mistaken` for a file of another kind, and OSError."""
     data = read_regular(path, MAX_BUNDLE)
     mistaken = no_bundle(path)
     if mistaken is not None:

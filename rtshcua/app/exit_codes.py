@@ -21,13 +21,13 @@ _INPUT = {
     errno.ENOTEMPTY, errno.ENXIO, errno.EPERM,
 }  # fmt: skip
 
-#: what to do about what is not to be trusted, by slug
+#: the help for untrusted input, by slug
 _REMEDIES = {
     "no-keys": "run `rtshcua keys init` to create a development root",
-    "malformed": "it was cut off or damaged, or is another kind of file: make it again, or copy it again",
-    "exposed": "`chmod 600` it; replace what others may have read: `rtshcua keys replace`, or another passphrase",
+    "malformed": "the file was cut off or damaged, or is of another kind: create or copy it again",
+    "exposed": "`chmod 600` it; then replace the exposed key with `rtshcua keys replace`, or change the passphrase",
 }
-#: of what is refused for another reason than that it is not to be trusted, by slug
+#: the exit codes of other refusals, by slug
 _CODES = dict.fromkeys(("usage", "output", "no-approver", "several-approvers"), ExitCode.USAGE)
 _CODES |= dict.fromkeys(
     ("changed", "configuration", "input", "malformed", "no-policy", "no-source", "outside", "since", "wrong-kind"),
@@ -37,22 +37,22 @@ _CODES |= {"not-flown": ExitCode.TESTS, "not-generated": ExitCode.DIAGNOSTICS}
 
 
 def untrusted(error: Untrusted) -> Refusal:
-    """What is not to be trusted, with what to do about it where that is known."""
+    """The refusal for untrusted input."""
     return Refusal(error.slug, str(error), remedy(error))
 
 
 def remedy(error: Untrusted) -> str:
-    """What to do about what is not to be trusted; empty where nothing is known."""
+    """The help for untrusted input; empty if there is none."""
     return str(getattr(error, "help", "")) or _REMEDIES.get(error.slug, "")
 
 
 def code_of(slug: str) -> ExitCode:
-    """The exit code for a refusal or an `Untrusted`: what cannot be read at all is bad input, whoever signed it."""
+    """The exit code for the slug of a refusal or an `Untrusted`; unparsable input is bad input even if it is signed."""
     return _CODES.get(slug, ExitCode.UNTRUSTED)
 
 
 def exit_code_of(error: OSError) -> ExitCode:
-    """The exit code for an error of the operating system: the link, the input, or else the output."""
+    """The exit code for an OSError: of the link, the input, or else the output."""
     if error.errno in _LINK or (isinstance(error, (ConnectionError, TimeoutError)) and error.errno not in _FULL):
         return ExitCode.LINK
     if isinstance(error, PermissionError):
@@ -63,18 +63,18 @@ def exit_code_of(error: OSError) -> ExitCode:
 
 
 def words_of(error: OSError) -> str:
-    """What the system says, as our messages are written."""
-    words = error.strerror or str(error) or "the system gave no reason"
-    return words[:1].lower() + words[1:]
+    """The system's error text, in lower case as in other messages."""
+    text = error.strerror or str(error) or "the system gave no reason"
+    return text[:1].lower() + text[1:]
 
 
 def is_unreadable(found: "Diagnostic") -> bool:
-    """Whether a file that was asked for itself cannot be read: such a finding has no span."""
-    from rtshcua.diagnostics.codes import NO_SUCH_FILE, TOO_LARGE  # the front door opens without these
+    """Whether a file named by the user cannot be read; such a finding has no span."""
+    from rtshcua.diagnostics.codes import NO_SUCH_FILE, TOO_LARGE  # imported late, to start fast
 
     return found.code in (NO_SUCH_FILE, TOO_LARGE) and found.span is None
 
 
 def exit_code(found: "Iterable[Diagnostic]") -> ExitCode:
-    """How a command ends that cannot go on: INPUT where a file that was asked for is none that can be read."""
+    """The exit code of a command that stops on errors: INPUT if a named file cannot be read."""
     return ExitCode.INPUT if any(is_unreadable(each) for each in found) else ExitCode.DIAGNOSTICS

@@ -1,5 +1,5 @@
-"""Which files the paths on a command line mean, which of them make programs, which are never written over, and what a
-missing name probably meant. It imports no parser.
+"""Find the sources and programs for the paths on a command line, protect sources from being overwritten, and suggest
+names for missing files. Imports no parser, to start fast.
 """
 
 import os
@@ -18,8 +18,8 @@ SOURCE, SPECIFICATION = ".rts", ".json"
 
 
 def source_files(paths: Sequence[Path]) -> tuple[Path, ...] | Refusal:
-    """The files that are meant, once each: of a folder all sources below it, but for hidden ones, in order. Raises
-    OSError for a folder that cannot be read, lest it is taken to hold none.
+    """The files for the paths, each once. A folder stands for all sources below it except hidden ones, in order. Raises
+    OSError for a folder that cannot be read.
     """
     files: dict[str, Path] = {}
     for path in paths:
@@ -27,9 +27,9 @@ def source_files(paths: Sequence[Path]) -> tuple[Path, ...] | Refusal:
         outside = next((each for each in below if each != path and each.is_symlink() and not _inside(each, path)), None)
         if outside is not None:
             message = f"`{outside}` is a symbolic link that leads out of `{path}` and its checkout"
-            return Refusal("outside", message, "name what it leads to, if you know what that is")
+            return Refusal("outside", message, "name the target of the link if you trust it")
         if not below:
-            return Refusal("no-source", f"there is no source ({SOURCE}) in `{path}`, nor below it")
+            return Refusal("no-source", f"there is no source ({SOURCE}) in or below `{path}`")
         for each in below:
             files.setdefault(shown(str(each)), each)
     specifications = [path for path in files.values() if path.suffix.lower() == SPECIFICATION]
@@ -45,8 +45,8 @@ def _inside(link: Path, folder: Path) -> bool:
 
 
 def root_programs(names: Sequence[str], members: Sequence[Collection[str]]) -> tuple[int, ...]:
-    """The numbers of the files that make programs of their own: those that no other's program has among its members; of
-    those that import each other the first.
+    """The indexes of the files that are roots of programs: those that are not a member of another file's program. Of
+    files that import each other only the first is a root.
     """
     holders: dict[str, list[int]] = {}
     for number, member in enumerate(members):
@@ -67,29 +67,29 @@ def _below(folder: Path) -> Iterable[Path]:
 
 
 def overwriting_a_source(target: Path, read: Iterable[str | Path], what: str) -> Refusal | None:
-    """Why `what` (a page, a report) cannot be written to a file: it is one of those that are read, by this name or, as
-    links are, by another; None where it is not.
+    """The refusal if `target` is one of the files in `read`, also under another name through a link; else None. `what`
+    is a page or a report.
     """
     if not target.is_file() or not any(_same(target, Path(each)) for each in read):
         return None
-    help = "name a file that nothing is read from"
-    return Refusal("output", f"`{target}` is one of the sources, and is not replaced by {what}", help)
+    help = "name a file that is not a source"
+    return Refusal("output", f"`{target}` is one of the sources, and is not overwritten by {what}", help)
 
 
 def _same(target: Path, other: Path) -> bool:
     try:
         return target.samefile(other)
-    except (OSError, ValueError):  # a name that is no path, such as that of a text in memory
+    except (OSError, ValueError):  # not a path, such as the name of a text in memory
         return False
 
 
-#: so many names of a folder are looked at
+#: the most names of a folder that are compared
 MOST_NAMES: Final = 5_000
 
 
 def missing(path: Path) -> tuple[str, str] | None:
-    """A text and a help for a file that is missing: where a folder was given for a log, which lacks one, and where a
-    file beside it is called almost alike. None where there is nothing to add.
+    """The text and the help for a missing file: a run folder without a log, or a similar name in the same folder. None
+    if there is no suggestion.
     """
     from rtshcua.adapters.store.runs import LOG  # its writers take longer to load than files to lint
 

@@ -1,4 +1,4 @@
-"""What a document that is signed for a flight is about: the bundle that flies, verified, and the flight's id."""
+"""The subject of a document signed for a flight: the verified bundle that flies, and the flight's id."""
 
 import re
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ from rtshcua.wire.replacement import fit_replacement, open_replacement
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
 
-#: the longest that a document may be good for, in s
+#: the longest validity of a document, in seconds
 MOST_S = MAX_LIFE_US // 1_000_000
 #: help for a missing flight
 WHOSE = "add `--flight ID` (32 hexadecimal digits, or a socket of the flight)"
@@ -36,10 +36,10 @@ _FLIGHT = re.compile(r"[0-9a-f]{32}")
 def bundle_in_flight(
     bundle: Path, replacements: Sequence[Path], root: Path | None, now_us: int, *, stops: bool = False
 ) -> Bundle:
-    """The bundle that flies, verified, with the replacements that were put into force since.
+    """Verify the bundle that flies, with the replacements that came into force since.
 
-    Whoever signs must know what it is about. What only `stops` a flight is signed also where a key of the bundle was
-    revoked, or has expired, since it began: it flies on under the root of before. Raises `Untrusted` and OSError.
+    A document that only `stops` a flight can be signed also if a key of the bundle was revoked or has expired since the
+    flight began, because it flies on under the earlier root. Raises `Untrusted` and OSError.
     """
     trusted = _root(root, now_us)
     data = read_bundle(bundle)
@@ -62,10 +62,8 @@ def bundle_in_flight(
 
 
 def prepare_missions(policy: Policy, missions: Sequence[Mission]) -> list[tuple[PreparedInvocation, ...]]:
-    """The steps of missions as they are decided on. What a vehicle would not take is not signed for it: whoever signed
-    a mission may say there what does not fly.
-
-    Raises `BundleError`.
+    """Prepare the steps of missions for decisions. Raises `BundleError` for a mission that the vehicle would refuse:
+    its texts may describe something that does not fly, so nothing is signed for it.
     """
     ready, found = prepare(policy), []
     for mission in missions:
@@ -77,9 +75,8 @@ def prepare_missions(policy: Policy, missions: Sequence[Mission]) -> list[tuple[
 
 
 def _of_before(data: bytes, named: TrustRoot | None, refused: Untrusted) -> Bundle:
-    """The bundle as it was trusted when it began to fly, by the root that was named, or else by those of the key store.
-
-    Raises `Untrusted`: `refused` where none of them ever trusted it.
+    """The bundle under the named root, or an earlier root of the key store, regardless of expiry. Raises `refused` if
+    none of them trusts it.
     """
     roots = [named] if named is not None else [opened_root(each) for each in reversed(KeyStore(data_folder()).chain())]
     for root in roots:
@@ -89,10 +86,10 @@ def _of_before(data: bytes, named: TrustRoot | None, refused: Untrusted) -> Bund
 
 
 def flight_id(flight: str | None, to: Path | None) -> bytes | None:
-    """The id of the flight that is meant: given as 32 hexadecimal digits, or told by the flight itself at its agent
-    socket. None where neither was given. Raises OSError for a socket that tells none.
+    """The id of the flight: parsed from 32 hexadecimal digits, or read from the flight's agent socket. None without
+    either. Raises OSError for a socket that reports none.
 
-    A flight that tells another's id gains nothing: what is signed for that one names its mission too.
+    A flight that reports the id of another one gains nothing, because signed documents also name the mission.
     """
     if flight is not None and _FLIGHT.fullmatch(flight):
         return bytes.fromhex(flight)
@@ -101,13 +98,13 @@ def flight_id(flight: str | None, to: Path | None) -> bytes | None:
 
 
 def _root(path: Path | None, now_us: int) -> TrustRoot:
-    """The key store's root, or the one that was named, which is trusted for being named."""
+    """The key store's root, or the named one, which the user trusts by naming it."""
     signed = KeyStore(data_folder()).root() if path is None else read_root(path)
     return open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=now_us)
 
 
 def send_document(document: bytes, to: Path | None, output: Path | None) -> FlightReply | None:
-    """Write a document, and send it to a flight: what that answers, or None where it is not sent. Raises OSError."""
+    """Write a document, and send it to a flight; return its answer, or None if it was not sent. Raises OSError."""
     if output is not None:
         write_out(output, document, mode=PRIVATE_FILE)
     return None if to is None else hand_in(to, document)

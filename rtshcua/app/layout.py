@@ -1,4 +1,4 @@
-"""One file at a time: read, laid out, replaced where it changed."""
+"""Format one file, and write it if it changed."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,8 +16,8 @@ from rtshcua.ground.language.size_limits import MAX_SIZE
 
 @dataclass(frozen=True, slots=True)
 class Laid:
-    """What a file called `name` held before, and holds after; `after` is None where that was refused, and the
-    diagnostics say why. `unreadable` where it could not be had at all, `error` where it could not be written.
+    """The octets of a file before and after formatting. `after` is None if the file was not formatted, by the
+    diagnostics. `unreadable`: it could not be read. `error`: it could not be written.
     """
 
     name: str
@@ -29,22 +29,22 @@ class Laid:
 
     @property
     def changed(self) -> bool:
-        """Whether it was not in the one style."""
+        """Whether formatting changed the file."""
         return self.after is not None and self.after != self.before
 
     @property
     def source(self) -> Source:
-        """What it held, as text."""
+        """The text before formatting."""
         return Source(self.name, self.before.decode("utf-8", errors="replace"))
 
 
 def of_file(path: Path, width: int, *, write: bool) -> Laid:
-    """Lays a file out, and replaces it if that is asked for and it changes."""
+    """Format a file, and with `write` replace it if it changed."""
     try:
         data = ReadableSources(str(library.root()), [path]).read(str(path))
     except OSError as error:
         from rtshcua.ground.language.file_findings import (
-            unreadable,  # with the model, for which the usual case has no need
+            unreadable,  # imported late, because it loads the model
         )
 
         return Laid(shown(str(path)), b"", None, (unreadable(shown(str(path)), None, error, None),), unreadable=True)
@@ -58,7 +58,7 @@ def of_file(path: Path, width: int, *, write: bool) -> Laid:
 
 
 def of_text(path: Path, data: bytes, width: int) -> Laid:
-    """Lays out what a file holds."""
+    """Format the octets of a file."""
     name = shown(str(path))
     if len(data) > MAX_SIZE:
         from rtshcua.ground.language.file_findings import too_large
@@ -74,7 +74,7 @@ def of_text(path: Path, data: bytes, width: int) -> Laid:
     made = format_text(text, width)
     if isinstance(made, str):
         return Laid(name, data, made.encode())
-    from rtshcua.ground.format.format import formatted  # with the parser, which says why
+    from rtshcua.ground.format.format import formatted  # imported late, because it loads the parser
 
-    told = formatted(Source(name, text), width).diagnostics
-    return Laid(name, data, None, told, unreadable=any(each.code is TOO_LARGE for each in told))
+    diagnostics = formatted(Source(name, text), width).diagnostics
+    return Laid(name, data, None, diagnostics, unreadable=any(each.code is TOO_LARGE for each in diagnostics))

@@ -1,4 +1,4 @@
-"""Which files are logs, how the verification of one ends for the shell, and how long a flight lasted."""
+"""Find logs, the exit codes of their verification, and the duration of their flights."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -14,10 +14,10 @@ from rtshcua.evidence.report import LogReport, LogVerdict
 _MARK = b'"format":"rtshcua/log"'
 _HEAD = 1 << 26
 
-#: of a log whose first record is not whole, in every command
+#: the text for a log with an incomplete first record
 CUT_AT_FIRST = "the log is cut inside its first record, or that record is damaged"
 
-#: where a file is no log
+#: the help for a file that is not a log
 NO_LOG_HELP = "accepted: a log, the folder of a run, or a folder of these"
 
 _EXITS = {
@@ -33,18 +33,18 @@ _EXITS = {
 
 
 def log_of(given: Path) -> Path:
-    """The log that is meant: itself, or that in the folder of a run."""
+    """The log at a path: the file itself, or the log in a run folder."""
     return given / LOG if given.is_dir() else given
 
 
 def logs_meant(given: Iterable[Path]) -> list[Path]:
-    """The logs that are meant by files, folders of runs and folders of these; where there is none, the missing one."""
+    """The logs at paths of files, run folders and folders of these; for a folder without a log, the missing path."""
     return [log for path in given for log in logs_of(path) or [path / LOG]]
 
 
 def logs_and_others(given: Iterable[Path]) -> tuple[list[Path], list[Path]]:
-    """The logs that are meant, of folders all that lie there or below, whatever they are called; and what lies there
-    that has a log's suffix, and is none. What cannot be read is taken for a log: whoever opens it says why.
+    """All logs at the paths and below folders, by content, and the other files with a log's suffix. An unreadable file
+    counts as a log, so that opening it reports the error.
     """
     logs, others = list[Path](), list[Path]()
     for path in given:
@@ -63,7 +63,7 @@ def _may_be_log(path: Path) -> bool:
 
 
 def is_log(path: Path) -> bool:
-    """Whether a file looks like a log, or is empty, as one is of which all was cut off; its first line may be cut."""
+    """Whether a file looks like a log. An empty file or a cut first line counts too: the log may be cut."""
     with open_regular(path) as file:
         line = file.readline(_HEAD)
     return not line or line.startswith(START) or _MARK in line
@@ -77,7 +77,7 @@ def report_code(report: LogReport) -> ExitCode:
 
 
 def finding_code(slug: str) -> ExitCode:
-    """The exit code for what makes a log fail."""
+    """The exit code for the slug of a finding."""
     if slug == "genesis/format":
         return ExitCode.UNTRUSTED
     return _EXITS.get(slug.partition("/")[0], ExitCode.EVIDENCE)
@@ -87,7 +87,7 @@ _RECOVER = b',"type":"recover"'
 
 
 def lasted_us(report: LogReport, log: Path) -> int:
-    """From the first record of a verified log to the last one that the flight wrote, in us."""
+    """The time from the first record of a verified log to the last one of the flight, in us."""
     assert report.genesis is not None
     last_us = report.last_us
     if report.failure is None and report.counts.get("recover"):

@@ -19,9 +19,7 @@ _TEXT = 200  # bytes of a file that may hold a key as text
 
 
 class Pin(NamedTuple):
-    """A root's public key or its `kid`, and where it comes from, for a person. `roots` are the signed trust roots that
-    were given with it.
-    """
+    """The public key of a root or its `kid`, and its origin as text. `roots` are signed trust roots found with it."""
 
     key: bytes
     source: str
@@ -38,7 +36,7 @@ def pin(given: str | None) -> Pin:
         root = open_root(store.root(), pinned=store.pin(), now_us=0)
         return Pin(store.pin(), f"{_kind(root)} of your key store, {store.root_path}", tuple(store.chain()))
     if _KEY.fullmatch(given):
-        return Pin(bytes.fromhex(given), "the key that you gave")
+        return Pin(bytes.fromhex(given), "the key on the command line")
     path = Path(given)
     data = read_root(path)
     text = data[:_TEXT].decode("ascii", "replace").strip()
@@ -55,9 +53,8 @@ def pin(given: str | None) -> Pin:
 
 
 def trusted(given: str | None, revocations: Iterable[Path] = ()) -> Pin | Refusal:
-    """The pin for `--root GIVEN`, with the trust roots that revoke keys since; a refusal where there is none to trust.
-
-    Raises OSError.
+    """The pin for `--root GIVEN`, with the trust roots in `revocations`; a refusal if there is no usable root. Raises
+    OSError.
     """
     try:
         found = pin(given)

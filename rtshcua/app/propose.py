@@ -1,4 +1,4 @@
-"""Missions that an agent proposes: checked against the policy's sources, as they were when the server began."""
+"""Check missions that an agent proposes against the policy's sources, as read when the server began."""
 
 import json
 from collections.abc import Sequence
@@ -15,17 +15,17 @@ from rtshcua.ground.pipeline.pins import Pins
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 
-#: what a proposal is called in findings; no file of it is ever read
+#: the name of a proposal in diagnostics; no file of this name is read
 PROPOSAL: Final = "proposal.json"
 
 
 class NoPolicy(Exception):
-    """The sources make no policy that an agent can be held to."""
+    """The sources do not declare exactly one policy without errors."""
 
 
 @dataclass(frozen=True, slots=True)
 class ProposalAnswer:
-    """What the compiler says of a proposal: a mission and its policy, or why not."""
+    """The compiler's result for a proposal: a mission and its policy, or the rejections."""
 
     policy: Policy | None
     mission: Mission | None
@@ -41,9 +41,8 @@ class ProposalAnswer:
 
 
 class Missions:
-    """Checks proposals against the one policy of `sources`. Each file is read once: what changes later does not count.
-
-    Raises `NoPolicy`.
+    """Checks proposals against the policy of `sources`. Each file is read once; later changes are ignored. Raises
+    `NoPolicy`.
     """
 
     def __init__(self, sources: Sequence[Path]) -> None:
@@ -56,7 +55,7 @@ class Missions:
         own = [each.name.text for unit in program.units[: len(sources)] for each in unit.policies]
         lowered = [each for each in checked.policies if each.policy.name in own]
         if len(lowered) != 1:
-            raise NoPolicy(f"the sources declare {len(own)} policies, and one is asked for")
+            raise NoPolicy(f"the sources declare {len(own)} policies; exactly one is required")
         self.lowered = lowered[0]
         path = program.stable.get(program.units[0].file, "")
         self.schema = narrowed(self.lowered, program.units, path if path.startswith("lib:") else None)
@@ -70,7 +69,7 @@ class Missions:
         return self.lowered.policy
 
     def check(self, specification: Any, issued_at_us: int) -> ProposalAnswer:
-        """What the compiler says of a specification; the same as `rtshcua compile --policy` does."""
+        """Compile a specification as `rtshcua compile --policy` does."""
         proposal = json.dumps(specification, ensure_ascii=False).encode("utf-8", "surrogatepass")
         reading = self._reader.program([PROPOSAL, *self._names], {PROPOSAL: proposal}, self._pins)
         compiled = compile_reading(reading, mission=None, issued_at_us=issued_at_us, pins=self._pins)

@@ -1,4 +1,4 @@
-"""The service `recall`: a signed document that ends a flight. Loads little: it hurries."""
+"""The service `recall`: a signed document that ends a flight. Imports little, to start fast."""
 
 import time
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""The service `recover`: the log of a flight that broke off gets an end, if it was no tampering that cut it."""
+"""The service `recover`: end the log of a flight that broke off, unless it was tampered with."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ _CODES = {
 
 
 def recover_log(path: Path, signer: LogEnder | None, state: Path) -> Recovered:
-    """End a log; without a signer only look at it. `state` is where it is kept which logs were closed. Raises `InUse`,
+    """End a log; without a signer only examine it. The `state` folder has the ends of closed logs. Raises `InUse`,
     OSError.
     """
     cut = _cut(path, state)
@@ -32,14 +32,14 @@ def recover_log(path: Path, signer: LogEnder | None, state: Path) -> Recovered:
 
 
 def _cut(path: Path, state: Path) -> Recovered | None:
-    """What is told of a log of which this machine knows that it was closed, and not as it ends now."""
+    """The result for a log that was closed with another last record, by this machine's state folder; else None."""
     end = known_end(state, path)
     if end is None:
         return None
     found = examine(path, None)
     if found.head.prev == end:
         return None
-    text = "it was closed once, and what stands at its end now is not that: its end was cut off or written anew"
+    text = "the log was closed before with another last record: its end was cut off or rewritten"
     reason = Finding("close/missing", found.records, text, found.head.prev, end, found.kept)
     return Recovered(found._replace(state=LogState.TAMPERED, reason=reason), False, None, found.head.prev)
 
@@ -52,5 +52,5 @@ def recovery_code(found: FoundLog) -> ExitCode:
     if slug.startswith("anchor/"):
         return ExitCode.ANCHOR
     if found.state is LogState.UNBEGUN and slug.startswith("record/"):
-        return ExitCode.INPUT  # a whole line, and none of ours
+        return ExitCode.INPUT  # a complete line, but not a record of this program
     return _CODES[found.state]

@@ -113,7 +113,7 @@ def _refusal(target: Path | None, files: Sequence[Path]) -> Refusal | None:
         help = "name the policy that it is under, or a source with the mission"
         return Refusal("usage", "a specification has no page of its own", help)
     if target is not None and target.exists() and not target.is_file():
-        return Refusal("output", f"`{target}` is not a regular file, and is not replaced by a page")
+        return Refusal("output", f"`{target}` is not a regular file, and is not overwritten by a page")
     if target is not None and not target.parent.is_dir():
         return Refusal("output", f"there is no folder `{target.parent}` to write to", code=ExitCode.INPUT)
     return None if target is None else overwriting_a_source(target, files, "a page")

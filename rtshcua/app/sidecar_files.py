@@ -1,4 +1,4 @@
-"""What lies beside a log and is held against it: the bundle, the raw frames, the summary, the notes of witnesses."""
+"""The files beside a log that are compared with it: bundle, raw frames, summary, and notes of witnesses."""
 
 from collections.abc import Iterable, Iterator
 from hashlib import file_digest
@@ -15,12 +15,12 @@ from rtshcua.wire.bundle import MAX_BUNDLE
 
 
 def run_folder(log: Path) -> Path | None:
-    """The folder of the run that a log is of, if it still lies in one."""
+    """The run folder of a log; None if the log is not in one."""
     return log.parent if log.name == LOG else None
 
 
 def bundle_beside(log: Path) -> bytes | None:
-    """The bundle in a run's folder: the log should be of it."""
+    """The bundle in the run folder, which the log should belong to."""
     folder = run_folder(log)
     if folder is None or not (folder / BUNDLE).exists():
         return None
@@ -28,8 +28,8 @@ def bundle_beside(log: Path) -> bytes | None:
 
 
 def anchors_beside(log: Path, more: Iterable[Path]) -> tuple[str, ...]:
-    """The notes in the files of anchors beside a log, and in those that were named. Raises OSError where one of these
-    cannot be read to its end: who names it relies on it.
+    """The notes of witnesses beside a log, and in the named files `more`. Raises OSError if a named file cannot be
+    read.
     """
     found = read_anchors(log)
     for path in more:
@@ -38,25 +38,25 @@ def anchors_beside(log: Path, more: Iterable[Path]) -> tuple[str, ...]:
 
 
 def with_unread(report: LogReport, log: Path) -> LogReport:
-    """The report, with the files of anchors beside the log that hold none."""
+    """Add to the report the anchor files beside the log that have no readable notes."""
     names = [] if report.failure is not None else [f"`{path.name}`" for path in unreadable(log)]
     if not names:
         return report
-    text = f"what witnesses would say in {', '.join(names)}: nothing there can be read as their notes"
+    text = f"the notes of witnesses in {', '.join(names)}: these files contain no readable notes"
     return report._replace(unproven=(*report.unproven, Claim("anchor/unreadable", text)))
 
 
 def with_summary(report: LogReport, log: Path) -> LogReport:
-    """The report, with what it says of the summary in a run's folder."""
+    """Add to the report that the summary in the run folder proves nothing."""
     folder = run_folder(log)
     if folder is None or report.failure is not None or not (folder / SUMMARY).exists():
         return report
-    claim = Claim("summary", f"`{SUMMARY}`: nothing signs it, and it was not read; what counts stands in the log")
+    claim = Claim("summary", f"`{SUMMARY}`: it is not signed and was not read; the log is the evidence")
     return report._replace(unproven=(*report.unproven, claim))
 
 
 class RawFrames:
-    """The file at `path`, if there is one. `frames` is for the auditor to follow; without it only the digest counts."""
+    """The raw frames file at `path`, which may be missing. `frames` is for the auditor."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -74,26 +74,26 @@ class RawFrames:
                 self._damaged = damaged.offset
 
     def unread(self, report: LogReport) -> LogReport:
-        """The report, where nobody looked at these frames."""
+        """Add to the report that the frames were not read."""
         if report.failure is not None or not self._path.exists():
             return report
         return _unproven(report, f"the raw frames: `{self._path.name}` was not read: without `--fast`")
 
     def judged(self, report: LogReport, *, followed: bool) -> LogReport:
-        """The report, with what it says of these frames; `followed` says that an audit has followed them."""
+        """Add the result for the frames to the report. `followed`: the auditor has checked each frame."""
         close = report.close
         if close is None or report.failure is not None:
             return report
         name, there = self._path.name, self._path.exists()
         if close.tlog is None:
-            text = f"the raw frames: the log does not vouch for `{name}`, which is not whole"
+            text = f"the raw frames: the log has no digest of `{name}`, which is incomplete"
             return report if not there else _unproven(report, text)
         if not there:
-            return _unproven(report, f"the raw frames: `{name}` does not lie beside the log")
+            return _unproven(report, f"the raw frames: `{name}` is missing beside the log")
         with open_regular(self._path, self._path.parent) as file:
             digest = file_digest(file, "sha256").hexdigest()
         if digest != close.tlog:
-            text = f"`{name}` was changed: it is not the telemetry whose digest the close signs"
+            text = f"`{name}` was changed: its digest differs from the signed one in the close record"
             return report._replace(failure=Finding("telemetry/changed", close.seq, text, digest, close.tlog))
         report = report._replace(proven=(*report.proven, Claim("telemetry", f"`{name}` is the one that was signed")))
         return self._followed(report) if followed else report
@@ -105,10 +105,10 @@ class RawFrames:
         if self._damaged is not None:
             return _unproven(report, f"the raw frames from byte {self._damaged} on, where no frame can be read")
         if self.frames.begun and not count:
-            return _unproven(report, "the raw frames: the log has commands that were sent, and none of them is there")
+            return _unproven(report, "the raw frames: the log has sent commands, but none of them is in the telemetry")
         many = "frame that commands" if count == 1 else "frames that command"
         claim = Claim("frames", f"{count} {many} the vehicle, each sent after the record that permits it")
-        text = "what others commanded: only what came and went by us is in the telemetry"
+        text = "commands of others: the telemetry has only frames that this program sent or received"
         return _unproven(report._replace(proven=(*report.proven, claim)), text)
 
 
@@ -117,6 +117,6 @@ def _unproven(report: LogReport, text: str) -> LogReport:
 
 
 def raw_frames(log: Path) -> RawFrames | None:
-    """The raw frames in a run's folder."""
+    """The raw frames in the run folder of a log; None if it is not in one."""
     folder = run_folder(log)
     return None if folder is None else RawFrames(folder / TELEMETRY)

@@ -1,4 +1,4 @@
-"""Which keys of the key store may sign a mission, a bundle or a person's answer, without opening one."""
+"""Select the keys of the key store that may sign a mission, a bundle or an approval, without decrypting them."""
 
 from collections.abc import Iterable
 from contextlib import suppress
@@ -17,7 +17,7 @@ from rtshcua.wire.untrusted import Untrusted
 
 
 def fitting_key(store: KeyStore, policy: Policy, mission: Mission) -> Path | None:
-    """The first key of the store that may sign a mission under a policy, if one may."""
+    """The file of the first key that may sign a mission under a policy; None if there is none."""
     if not store.exists():
         return None
     root = open_root(store.root(), pinned=store.pin(), now_us=0)
@@ -31,9 +31,8 @@ def fitting_key(store: KeyStore, policy: Policy, mission: Mission) -> Path | Non
 
 
 def person_key(store: KeyStore, person: str | None, role: str | None) -> VerificationKey:
-    """Which approval key of the store that is, without opening it: whoever is asked to sign should know it before.
-
-    Raises `Untrusted` (`no-approver`, `several-approvers`, ...) and OSError.
+    """The approval key of a person in a role, without decrypting it, so that it can be shown before the prompt. Raises
+    `Untrusted` (`no-approver`, `several-approvers`, ...) and OSError.
     """
     root = open_root(store.root(), pinned=store.pin(), now_us=0)
     keys = [
@@ -46,23 +45,22 @@ def person_key(store: KeyStore, person: str | None, role: str | None) -> Verific
         raise KeyStoreError("no-approver", _no_approver(root, person, role, who))
     if len({key.person for key in keys}) > 1:
         names = ", ".join(f"`{each}`" for each in sorted({key.person for key in keys}))
-        raise KeyStoreError("several-approvers", f"there are approval keys of {names}: `--as NAME` says whose to use")
+        raise KeyStoreError("several-approvers", f"there are approval keys of {names}: select one with `--as NAME`")
     return keys[0]
 
 
 def _no_approver(root: TrustRoot, person: str | None, role: str | None, who: str) -> str:
-    """That there is no such approval key, or that the person's may sign for other roles, in words."""
+    """The text if there is no such approval key, or the person's key is for other roles."""
     own = {one for key in root.keys_for(Duty.APPROVAL).values() if person == key.person for one in key.roles}
     if person is None or not own:
         return f"there is no approval key of {who}: `rtshcua keys approver` makes one"
     may = ", ".join(f"`{one}`" for one in sorted(own))
-    return f"the key of {person} may not sign as {role}, but as {may}: `rtshcua keys approver` makes another"
+    return f"the key of {person} may sign as {may}, but not as {role}: `rtshcua keys approver` makes another key"
 
 
 def check_trusted(store: KeyStore, key: SigningKey, policy: Policy, mission: Mission) -> None:
-    """Whether the store's trust root, if it names the key, lets it sign this mission: who flies it would ask.
-
-    Raises `BundleError`.
+    """Check that the trust root, if it names the key, allows it to sign this mission, as a run does. Raises
+    `BundleError`.
     """
     if not store.exists():
         return
@@ -73,36 +71,37 @@ def check_trusted(store: KeyStore, key: SigningKey, policy: Policy, mission: Mis
 
 
 def strangers(store: KeyStore, keys: Iterable[SigningKey], vehicle: str, now_us: int) -> list[str]:
-    """Which keys the store's trust root, if there is one, does not let speak for the vehicle, in words: with this root
-    no run takes what they sign. The vehicle may have another one.
+    """A warning for each key that the store's trust root does not accept for the vehicle. A run with this root refuses
+    what they sign, but the vehicle may have another root.
     """
     if not store.exists():
         return []
     root = open_root(store.root(), pinned=store.pin(), now_us=0)
-    told = []
+    warnings = []
     for key in keys:
         named = root.keys_for(key.duty).get(key.kid)
         refusal = None if named is None else key_refusal(named, vehicle=vehicle, now_us=now_us)
         if key.kid in root.revocations:
             why = "revokes it"
         elif named is None:
-            why = f"names no {key.duty} key of this name"
+            why = f"does not name this {key.duty} key"
         elif refusal is not None:
-            why = f"does not let it speak for `{vehicle}` now ({refusal})"
+            why = f"does not accept it for `{vehicle}` now ({refusal})"
         else:
             continue
-        told.append(
-            f"the trust root of this key store {why}: {key.kid.hex()}; `run` with this root refuses the bundle, and "
-            "takes it with one that names the key (`--root`)"
+        warnings.append(
+            f"the trust root of this key store {why}: {key.kid.hex()}; `run` with this root refuses the bundle; "
+            f"use one "
+            "that names the key (`--root`)"
         )
-    return told
+    return warnings
 
 
 def another_key(error: Untrusted, policy: Policy, mission: Mission) -> Refusal:
-    """Why a mission key may not sign a mission, with what makes one that may."""
+    """The refusal of a mission key for a mission, with the command that makes a suitable key."""
     if error.slug not in ("wrong-source", "wrong-role", "key-other-policy") or not mission.invocations:
         return untrusted(error)
     first = mission.invocations[0]
     source, role = SourceKind(first.source).name.lower(), policy.roles[first.role]
-    make = f"`rtshcua keys mission {source} --role {role} --policy {policy.name}` makes one that may"
+    make = f"`rtshcua keys mission {source} --role {role} --policy {policy.name}` makes a key that may"
     return Refusal(error.slug, str(error), make)

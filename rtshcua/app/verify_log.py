@@ -1,4 +1,4 @@
-"""The service `verify-log`: one log with what lies beside it, held against a pinned root key."""
+"""The service `verify-log`: verify a log and the files beside it under a pinned root key."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -19,8 +19,8 @@ _MOST = 5
 
 
 class VerifyRequest(NamedTuple):
-    """How a log is verified: by which pinned key, by which trust roots keys may have been revoked since, with which
-    further notes of witnesses, how deep, by how many processes, and whether it must be anchored to its end.
+    """The pinned root key, the trust roots with later revocations, further notes of witnesses, the depth of the
+    verification, the number of processes, and whether the log must be anchored to its end.
     """
 
     key: bytes
@@ -34,7 +34,7 @@ class VerifyRequest(NamedTuple):
 
 
 def verify_log(path: Path, request: VerifyRequest, progress: Progress) -> Audit:
-    """Verify a log, and what lies beside it. Raises OSError."""
+    """Verify a log and the files beside it. Raises OSError."""
     raw = raw_frames(path)
     unconfirmed = UnconfirmedFallbacks()
     audit = audited(path, request, progress, unconfirmed.take, raw)
@@ -54,8 +54,8 @@ def audited(
     each: Callable[[AnyRecord], None] = lambda _: None,
     raw: RawFrames | None = None,
 ) -> Audit:
-    """Verify a log alone; an audit hands each sound record to `each`. Raises OSError."""
-    asked = VerificationInputs(request.key, bundle_beside(path), anchors_beside(path, request.anchors))
+    """Verify a log without its other files; an audit passes each valid record to `each`. Raises OSError."""
+    inputs = VerificationInputs(request.key, bundle_beside(path), anchors_beside(path, request.anchors))
     revoked = RevokedKeys(request.roots)
 
     def take(record: AnyRecord) -> None:
@@ -63,35 +63,35 @@ def audited(
         revoked.take(record)
 
     if not request.audit:
-        return revoked.judged(verify_quickly(path, asked, fast=request.fast, jobs=request.jobs, progress=progress))
+        return revoked.judged(verify_quickly(path, inputs, fast=request.fast, jobs=request.jobs, progress=progress))
     frames = raw.frames if raw is not None and request.derive else None
-    found = verify_carefully(path, asked, derive=request.derive, frames=frames, each=take, progress=progress)
+    found = verify_carefully(path, inputs, derive=request.derive, frames=frames, each=take, progress=progress)
     return revoked.judged(found)
 
 
 def _required(report: LogReport) -> LogReport:
-    """The report of a log that must be anchored to its end."""
+    """Add a shortfall to the report if the log is not anchored to its end."""
     if report.verdict is not LogVerdict.VERIFIED or report.anchored == report.records:
         return report
-    text = "witnesses did not see the log to its end, as was asked for"
+    text = "witnesses did not cosign the log to its end, as `--anchored` requires"
     few = "" if report.outside is None else cosigned(report.outside)
     found, expected = f"{report.anchored} records{few and f', the rest {few}'}", f"{report.records} records"
     return report._replace(shortfall=Finding("anchor/missing", report.anchored, text, found, expected))
 
 
 class UnconfirmedFallbacks:
-    """Takes the records of a log that is audited, and adds to the report which fallbacks were not confirmed."""
+    """Collects the unconfirmed fallbacks of an audited log, and adds them to the report."""
 
     def __init__(self) -> None:
         self._records: list[int] = []
 
     def take(self, record: AnyRecord) -> None:
-        """One sound record."""
+        """Take a valid record."""
         if isinstance(record, Effect) and record.kind > STEP and record.detail == UNCONFIRMED:
             self._records.append(record.seq)
 
     def told(self, report: LogReport) -> LogReport:
-        """The report of a log without failure, with what is not shown."""
+        """Add the unconfirmed fallbacks to the report of a log without failure."""
         if not self._records or report.failure is not None:
             return report
         many = len(self._records)

@@ -84,7 +84,7 @@ def subject_of(path: Path, mission: str | None, at_us: int | None) -> CompiledSu
 def _in_bundle(path: Path) -> Subject | Refusal:
     mistaken = no_bundle(path)
     if mistaken is not None:
-        text = f"{str(mistaken).removesuffix(', and no bundle')}, and neither a source, a bundle nor a log"
+        text = f"{str(mistaken).removesuffix(', not a bundle')}, not a source, a bundle or a log"
         return Refusal(mistaken.slug, text, mistaken.help, code=ExitCode.INPUT)
     return unpacked(read_regular(path, MAX_BUNDLE), f"`{path}`")
 

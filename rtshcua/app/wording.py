@@ -1,4 +1,4 @@
-"""How commands read times, and show times and counts to a person."""
+"""Parse times, and format times and counts for people."""
 
 from datetime import UTC, datetime
 
@@ -7,7 +7,7 @@ from rtshcua.model.quantity import Dimension, display
 
 
 def moment(text: str) -> int | None:
-    """UTC in us since the epoch, of an ISO 8601 text with an offset; None for a text that is no such time."""
+    """Parse an ISO 8601 time with an offset to UTC in us since the epoch; None if it is malformed."""
     try:
         found = datetime.fromisoformat(text)
     except ValueError:
@@ -22,24 +22,24 @@ _LAST_US = 253_402_300_799_999_999  # the end of the year 9999
 
 
 def utc(us: int) -> str:
-    """A UTC time in us since the Unix epoch, to the second."""
+    """Format a UTC time in us since the Unix epoch, to the second."""
     if not 0 <= us <= _LAST_US:
         return f"{us} us"
     return datetime.fromtimestamp(us // 1_000_000, UTC).strftime("%Y-%m-%d %H:%M:%SZ")
 
 
 def true_to(error_us: int) -> str:
-    """How far a UTC time may be off, or that nobody knows."""
+    """The bound on the error of a UTC time, as text."""
     if error_us >= UTC_UNKNOWN_US:
-        return "and nothing tells how far that is off"
+        return "with an unknown error"
     return f"true to {display(error_us, Dimension.DURATION)}"
 
 
 def many(count: int, what: str) -> str:
-    """So many of something."""
+    """Format a count with its noun."""
     return f"{count} {what}{'' if count == 1 else 's'}"
 
 
 def shorten(text: str, width: int) -> str:
-    """At most `width` characters of a text, with an ellipsis where it was longer."""
+    """Cut a text to `width` characters, with an ellipsis if it was longer."""
     return text if len(text) <= width else text[: width - 1] + "…"

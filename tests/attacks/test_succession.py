@@ -139,7 +139,7 @@ def test_vehicle_accepts_all_missed_roots(fleet: KeyStore, capsys: pytest.Captur
     assert refused(capsys, *accept, chain[0], chain[-1]) == "root-version-gap"
     assert version() == 1
     assert main([*accept, *chain]) == ExitCode.OK
-    assert "version 4 is accepted in the place of version 1; it revokes 2 keys more" in capsys.readouterr().out
+    assert "version 4 replaces version 1; it revokes 2 more keys" in capsys.readouterr().out
     assert version() == 4
     for older in ("first.trust", *chain[:2]):  # and the key that signed them is revoked since
         assert refused(capsys, *accept, older) == "root-revoked-key"
@@ -156,7 +156,7 @@ def test_older_bundle_is_refused_after_revocation(fleet: KeyStore, capsys: pytes
     assert main(["compile", str(PATROL), "-o", "new.bundle"]) == ExitCode.OK, "the new key has the old one's place"
     _, loaded, trusted, _ = verified(order(), "new.bundle")
     assert (trusted.distrust, trusted.root.version, loaded.vehicle) == (None, 2, QUAD)
-    assert accepts(trusted.settle(resumed=False), "version 2 is accepted in the place of version 1")
+    assert accepts(trusted.settle(resumed=False), "version 2 replaces version 1")
     assert version() == 2
     fleet.root_path.write_bytes(Path("first.trust").read_bytes())  # the key store is set back
     assert refused(capsys, "run", "old.bundle") == "revoked-key"
@@ -232,7 +232,7 @@ def test_the_key_of_a_link_is_revoked_by_its_fingerprint(
     signing = LinkSigning(Path("link.key"), POLICY, FrameSession(), Path("state"), SystemClock(), unsigned_radio=True)
     if resumed:
         assert revoked_link_key(signing, root, resumed=True) is None
-        assert "brought down all the same" in signing.notes[-1]
+        assert "brought down anyway" in signing.notes[-1]
     else:
         found = refusal_of(revoked_link_key(signing, root, resumed=False))
         assert name in found.text
@@ -263,7 +263,7 @@ def test_vehicle_in_flight_lands_after_revocation(fleet: KeyStore, what: str) ->
         again = order(log_key=Path("old.key"))
     _, loaded, trusted, _ = verified(again, "old.bundle")
     assert loaded.bundle.mission_digest == of.bundle.mission_digest
-    assert accepts(trusted.settle(resumed=True), "brought down all the same")
+    assert accepts(trusted.settle(resumed=True), "brought down anyway")
     grounded = refusal_of(trusted.settle(resumed=False))
     assert grounded.slug in ("revoked-key", "root-damaged", "root-rollback")
     unverified(altered(again, dry_run=True), "old.bundle")
@@ -280,7 +280,7 @@ def test_vehicle_in_flight_lands_without_state_folder(fleet: KeyStore) -> None:
         looked_up(state_folder(), QUAD, of.bundle.mission_digest, of.expires_us, "bridge_inspection", 7)
     _, loaded, trusted, _ = verified(order(), "old.bundle")
     assert loaded.bundle.mission_digest == of.bundle.mission_digest
-    assert accepts(trusted.settle(resumed=True), "it is brought down all the same")
+    assert accepts(trusted.settle(resumed=True), "the vehicle is brought down anyway")
     assert refusal_of(trusted.settle(resumed=False)).code == ExitCode.INPUT
 
 
@@ -339,7 +339,7 @@ def test_vehicle_in_flight_lands_after_expiry(fleet: KeyStore, duty: Duty, accep
     assert loaded.bundle.mission_digest == of.bundle.mission_digest
     assert trusted.distrust is not None
     assert trusted.distrust.slug == fresh.slug
-    assert accepts(trusted.settle(resumed=True), "brought down all the same")
+    assert accepts(trusted.settle(resumed=True), "brought down anyway")
     refusal_of(trusted.settle(resumed=False))
     unverified(order(dry_run=True), "old.bundle", Late())
 

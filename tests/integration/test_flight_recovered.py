@@ -83,4 +83,4 @@ def test_killed_flight_with_an_expired_root_lands(ground: Any, port: int) -> Non
     second = ground.run(bundle, *words, speed=SPEED).end()
     assert second.code == 6, second.stderr
     assert [event for event in second.events if event["event"] == "resumed"]
-    assert "it is brought down all the same" in str(second.events)
+    assert "the vehicle is brought down anyway" in str(second.events)

@@ -187,7 +187,7 @@ def test_bundle_flies_once(watched: Flown) -> None:
     assert "a bundle flies once" in again.stderr
     (said,) = again.events
     assert (said["event"], said["slug"], said["exit_code"]) == ("refused", "replayed", 5)
-    assert said["help"] == "compile the mission again, which issues it anew"
+    assert said["help"] == "compile the mission again to issue a new bundle"
     assert len(list((watched.ground.folder / "runs").iterdir())) == 1
     state = watched.ground.store.folder.parent / "state"
     assert (state / "simulated" / "replay").is_dir()

@@ -54,7 +54,7 @@ def test_expired_bundle_is_refused(
 def test_missing_vehicle_is_refused(ground: Any, capfd: Any, port: int) -> None:
     code, err = refused(capfd, ground.bundle(), "--connect", f"udpin:127.0.0.1:{port}", *IDENTITY)
     assert code == 8
-    assert "no heartbeat of a vehicle" in err
+    assert "no heartbeat from a vehicle" in err
     assert "rtshcua sim" in err
     assert not (ground.folder / "runs").exists()
 
@@ -124,7 +124,7 @@ def test_source_is_refused_with_the_compile_command(ground: Any, capfd: Any) -> 
     Path("m.rts").write_text("mission m {}\n")
     code, err = refused(capfd, "m.rts")
     assert code == 3
-    assert "`m.rts` is a source, and no bundle" in err
+    assert "`m.rts` is a source, not a bundle" in err
     assert "`rtshcua compile m.rts -o m.bundle`" in err
 
 

@@ -19,7 +19,7 @@ def test_root_without_witnesses_is_refused(commands: Forked, ground: Any) -> Non
     )  # fmt: skip
     done = commands.run(["run", ground.bundle(), "--witness", "udpout:127.0.0.1:15000"], ground.folder, 60)
     assert done.code == ExitCode.UNTRUSTED
-    assert "names no witness of this vehicle" in done.err
+    assert "names no witness for this vehicle" in done.err
 
 
 def test_malformed_addresses_are_refused(commands: Forked, ground: Any) -> None:

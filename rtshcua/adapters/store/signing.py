@@ -191,7 +191,9 @@ class LinkStore:
             return SigningState(int(kept["timestamp"]), streams)
         except (ValueError, TypeError, KeyError):
             text = f"`{self.path}` is damaged, so the timestamps that the link has used are not known"
-            raise LinkKeyError("damaged", text, "use a new key on both ends; `rtshcua keys link` makes one") from None
+            raise LinkKeyError(
+                "damaged", text, "use put a new key on both ends with `rtshcua keys link` makes one"
+            ) from None
 
     def save(self, state: SigningState, ahead: int = 0) -> None:
         """Store a state, with our timestamp so far ahead. Raises OSError."""

@@ -407,7 +407,7 @@ class ObservedVehicle:
     def unready(self) -> str | None:
         """What prevents arming, in words; None if nothing is reported."""
         if self.heartbeat_us is None:
-            return "no heartbeat of an autopilot"
+            return "no heartbeat from an autopilot"
         if self.landed_state == 0:
             return "the vehicle does not report whether it is on the ground"
         if self.fix < _FIX_3D:

@@ -1,4 +1,4 @@
-"""The stage before a flight: that the bundle may fly, or what of it hangs in the air, and where the evidence lies."""
+"""The stage before a flight: check that the bundle may fly or must be brought down, and create the run folder."""
 
 import secrets
 from pathlib import Path
@@ -25,12 +25,12 @@ from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Event
 from rtshcua.wire.trust import TrustRoot
 
-_UNVERIFIABLE = ", which has the log's key: nobody can verify this log, its key is drawn for it alone"
+_UNVERIFIABLE = ", which has the log's key: the log is signed with a key drawn for it alone, so nobody can verify it"
 
 
 class Cleared(NamedTuple):
-    """A flight that may begin, or one that goes on: `resumed`, an earlier run of the bundle broke off in the air, and
-    it is brought down. `refusal`: nothing flies, but what is owed to the vehicle is put back first. `notes` are told.
+    """A flight that may begin. `resumed`: an earlier run of the bundle broke off in the air, and the vehicle is only
+    brought down. `refusal`: nothing flies, but owed parameters are restored first. `notes` are for the user.
     """
 
     resumed: bool
@@ -41,8 +41,8 @@ class Cleared(NamedTuple):
 
 
 def check_vehicle(context: FlightContext, begun: Begun, connected: Connected) -> Refusal | None:
-    """Why nothing of this begins, by the vehicle's time and by what it says it is; a note where it is not qualified.
-    What happened meanwhile is added to its events.
+    """The refusal if the bundle has expired by the vehicle's time, or a qualification may not begin. Adds a note if the
+    vehicle is not qualified, and the events meanwhile.
     """
     request = context.request
     late = bundle_lapsed(context, begun)
@@ -64,8 +64,8 @@ def check_vehicle(context: FlightContext, begun: Begun, connected: Connected) ->
 def clear_for_flight(
     context: FlightContext, begun: Begun, connected: Connected, previous: LogBefore, debts: OwedParameters
 ) -> Cleared | Refusal:
-    """Whether it may fly, and where its evidence lies; what is in the air comes down without most of that. Raises
-    OSError.
+    """Check that the flight may begin, and create its run folder. Most checks are skipped for a vehicle that must come
+    down. Raises OSError.
     """
     request, loaded, vehicle, signing = context.request, begun.loaded, connected.vehicle, connected.signing
     opened = _opened(context, loaded, vehicle, connected.events)
@@ -87,7 +87,7 @@ def clear_for_flight(
     if isinstance(settled, Refusal):
         return settled
     run, moved = run_folder(context, loaded, begun.bundle, resumed=resumed)
-    alone = "" if begun.absent is None else f"{begun.why_absent}; it is brought down without a boundary of its own"
+    alone = "" if begun.absent is None else f"{begun.why_absent}; the vehicle is brought down without its boundary"
     alone += _UNVERIFIABLE if alone and request.boundary_socket is not None else ""
     return Cleared(
         resumed, refusal, session, run, [alone, "" if resumed else hanging(previous, loaded), settled, moved]
@@ -97,7 +97,7 @@ def clear_for_flight(
 def notes_before(
     context: FlightContext, begun: Begun, connected: Connected, cleared: Cleared, previous: LogBefore
 ) -> list[str]:
-    """What there is to tell of a flight once its log has begun."""
+    """The notes for the user at the beginning of a flight."""
     unsigned = begun.own_key.text if isinstance(begun.own_key, Refusal) else UNNAMED if begun.own_key is None else ""
     once = filter(None, dict.fromkeys([*cleared.notes, previous.note, unsigned, cleared.session.note]))
     listens = context.request.boundary_socket is not None
@@ -105,30 +105,30 @@ def notes_before(
 
 
 def bundle_lapsed(context: FlightContext, begun: Begun) -> Refusal | None:
-    """Why the bundle that flies is not to be trusted by the time that the clock has now."""
+    """The refusal if the bundle is no longer valid at the clock's present time."""
     return lapsed(begun.bundle, begun.trusted.signed, begun.log_key.kid, begun.loaded, context.clock)
 
 
 def hanging(previous: LogBefore | None, loaded: Loaded) -> str:
-    """What brings down what the flight before may have left in the air; nothing where it ended."""
+    """The note how to bring the vehicle down if the previous flight broke off; empty if that flight ended."""
     if previous is None or previous.broken_off is None:
         return ""
     if previous.gone:
         return previous.note
-    way = f"`rtshcua run {previous.broken_off / BUNDLE}` brings down what hangs in the air"
-    return f"the flight of `{loaded.vehicle}` before broke off: {way}"
+    way = f"`rtshcua run {previous.broken_off / BUNDLE}` brings the vehicle down if it is still in the air"
+    return f"the previous flight of `{loaded.vehicle}` broke off: {way}"
 
 
 def timestamps_lost(signing: LinkSigning, *, resumed: bool) -> Refusal | None:
-    """What keeps the link's timestamps from being known or kept keeps a vehicle on the ground, and none in the air.
-    Raises OSError.
+    """The refusal if the link's timestamps cannot be read or stored; only a note for a vehicle in the air. Raises
+    OSError.
     """
     error = signing.damage
     if error is None:
         return None
     if resumed:
         reason = str(error) if isinstance(error, LinkKeyError) else words_of(error)
-        signing.notes.append(f"{reason}; it is brought down all the same. The link needs a new key then")
+        signing.notes.append(f"{reason}; the vehicle is brought down anyway. Then the link needs a new key")
         return None
     if isinstance(error, LinkKeyError):
         return of_link_key(error)
@@ -136,20 +136,20 @@ def timestamps_lost(signing: LinkSigning, *, resumed: bool) -> Refusal | None:
 
 
 def revoked_link_key(signing: LinkSigning, root: TrustRoot, *, resumed: bool) -> Refusal | None:
-    """That the trust root revokes the link's key, which keeps a vehicle on the ground, and none in the air."""
+    """The refusal if the trust root revokes the link's key; only a note for a vehicle in the air."""
     if signing.name is None or signing.name not in root.revocations:
         return None
     text = f"the trust root revokes the link's key {signing.name.hex()}"
     if not resumed:
-        help = "a new key on both ends; `rtshcua keys link`"
+        help = "put a new key on both ends with `rtshcua keys link`"
         return Refusal("link-key-revoked", text, help, ExitCode.UNTRUSTED)
-    signing.notes.append(f"{text}; it is brought down all the same")
+    signing.notes.append(f"{text}; the vehicle is brought down anyway")
     return None
 
 
 def run_folder(context: FlightContext, loaded: Loaded, bundle: bytes, *, resumed: bool) -> tuple[RunFolder, str]:
-    """Where the evidence of this run lies, and what there is to tell of it. What comes down keeps it in a temporary
-    folder where it cannot lie among the others. Raises OSError.
+    """Create the run folder; return it with a note for the user. If that fails for a vehicle in the air, use a
+    temporary folder. Raises OSError.
     """
     request, utc_us = context.request, context.clock.now().utc_us
     name = _name(request, loaded)
@@ -161,28 +161,28 @@ def run_folder(context: FlightContext, loaded: Loaded, bundle: bytes, *, resumed
         fresh = Path(gettempdir(), f"rtshcua-runs-{secrets.token_hex(8)}")
         make_folder(fresh, mode=PRIVATE_FOLDER)
         other = RunFolder(fresh, name=name, bundle=bundle, utc_us=utc_us)
-        return other, f"`{request.runs}` takes no run ({error.strerror or error}): the log is in `{other.path}`"
+        return other, f"cannot write to `{request.runs}` ({error.strerror or error}): the log is in `{other.path}`"
 
 
 def _name(request: FlightRequest, loaded: Loaded) -> str:
-    """What is handed in has no name of a file."""
+    """The run's name: the name of the bundle's file, or of the mission if the bundle was handed in."""
     return request.bundle.stem if request.wait_s is None else loaded.bundle.mission.name
 
 
 def _opened(context: FlightContext, loaded: Loaded, vehicle: ConnectedVehicle, events: list[Event]) -> bool | Refusal:
-    """Whether an earlier run of the bundle broke off in the air; why it does not open. Raises OSError."""
+    """Whether an earlier run of the bundle broke off in the air; a refusal if the bundle cannot fly. Raises OSError."""
     resumed = broke_off(context.request.kept_in, loaded, vehicle, context.clock, events)
     return resumed or expired(loaded, context.clock.now()) or False
 
 
 def _not_obeyed(context: FlightContext, begun: Begun, vehicle: ConnectedVehicle, events: list[Event]) -> Refusal | None:
-    """A vehicle in the air that obeys nothing unsigned is not waited for where a boundary listens that has the key, and
-    does not serve: waiting would not begin it.
+    """The refusal if the vehicle in the air accepts signed messages only, and the listening boundary that has the key
+    does not serve this run. Waiting would not help.
     """
     listens, loaded = context.request.boundary_socket, begun.loaded
     if listens is None or isinstance(loaded.executor, IsolatedExecutor) or obeys(vehicle, context.clock, events):
         return None
     why = begun.why_absent or "it does not serve this run"
-    text = f"`{loaded.vehicle}` is in the air and answers nothing that is not signed; the boundary at `{listens}` has "
-    help = "begin this run again once the boundary serves, as systemd does; until then the pilot brings it down, or its"
+    text = f"`{loaded.vehicle}` is in the air and answers signed messages only; the boundary at `{listens}` has "
+    help = "run the command again once the boundary serves, as systemd does; until then the pilot lands it, or its"
     return Refusal("not-obeyed", f"{text}the key: {why}", f"{help} own failsafe for a lost link", ExitCode.REFUSED)

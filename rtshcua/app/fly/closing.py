@@ -1,4 +1,4 @@
-"""The stage that closes: the log signed and read back, the frames finished, and what the disk did not take named."""
+"""The stage that closes: sign and read back the log, close the frame log, and list missing evidence."""
 
 from collections.abc import Callable
 from contextlib import suppress
@@ -21,22 +21,22 @@ from rtshcua.model.durability import SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.ports import Ending
 
-#: the effect that says in the signed log how many frames its telemetry lacks; the close then has no digest of it
+#: the event of the effect for missing telemetry frames; the close record then has no digest of the telemetry
 FRAMES_LOST = "frames-lost"
 
 
 def close_log(
     recorder: Recorder, sink: EvidenceWriter, frames: TelemetryFile, now: Callable[[], Now], ending: Ending | None,
-    note: Callable[[str], None], heard: Callable[[bytes], None],
+    note: Callable[[str], None], publish: Callable[[bytes], None],
 ) -> tuple[str, ...]:  # fmt: skip
-    """Sign and close the log, and give what of the evidence is missing: nothing, if it is whole.
+    """Sign and close the log; return descriptions of missing evidence.
 
-    Without an ending (a fault) the log stays unsigned. `note` tells a person, `heard` gets the lines of its end.
+    Without an ending (a fault) the log stays unsigned. `note` shows a text, `publish` receives the last lines.
     """
     missing: list[str] = []
     tlog, lack = _finish(frames)
     if lack is not None:
-        note(f"the frame log is not whole: {lack}")
+        note(f"the frame log is incomplete: {lack}")
         missing.append(f"{lack} ({TELEMETRY})")
         at = now()
         with suppress(OSError):
@@ -48,7 +48,7 @@ def close_log(
         with suppress(OSError):
             append_all(sink, lines, SYNCED_FIRST)
             for line in lines:
-                heard(line)
+                publish(line)
     trouble: OSError | None = None
     try:
         sink.close()
@@ -63,7 +63,7 @@ def close_log(
 
 
 def _finish(frames: TelemetryFile) -> tuple[bytes | None, str | None]:
-    """The digest of the frame log, if it holds every frame, else what it lacks and why."""
+    """The digest of the frame log if it is complete, else None and a description of what is missing."""
     try:
         digest = frames.finish()
     except OSError as error:
@@ -77,7 +77,7 @@ def _finish(frames: TelemetryFile) -> tuple[bytes | None, str | None]:
 
 
 def keep_summary(run: RunFolder, summary: Summary) -> Summary:
-    """Write the summary; what comes back says so if that failed."""
+    """Write the summary; return it, changed if the write failed."""
     try:
         run.write_summary(msgspec.structs.asdict(summary))
     except OSError as error:
@@ -92,16 +92,15 @@ def _reason(error: OSError) -> str:
 
 
 class ReadBack(NamedTuple):
-    """Why the log is refused, in words, None where it verifies; and for how long it has nothing, in us."""
+    """The reason why the log does not verify, or None; and the total time without records, in us."""
 
     refused: str | None
     gaps_us: int = 0
 
 
 def read_back(log: Path) -> ReadBack:
-    """What a verifier makes of a closed log: chain, order, seals and signatures. That the trust root names the key that
-    signed it was found before the flight; what the boundary stated, and each decision, `verify-log --audit` holds
-    against it.
+    """Verify chain, order, seals and signatures of a closed log. The signing key was checked before the flight; the
+    boundary's statements and the decisions are checked by `verify-log --audit`.
     """
     try:
         with open_regular(log) as file:

@@ -1,4 +1,4 @@
-"""The stage that connects: the link is opened and signed, the first heartbeat heard, and the time of day taken."""
+"""The stage that connects: open and sign the link, await the first heartbeat, and take the time of day."""
 
 import time
 from collections.abc import Sequence
@@ -41,76 +41,76 @@ from rtshcua.wire.qualification import Qualification, open_qualification
 from rtshcua.wire.trust import TrustRoot
 from rtshcua.wire.untrusted import Untrusted
 
-#: How long a heartbeat is waited for, in seconds,
+#: the longest wait for the first heartbeat, in seconds
 HEARTBEAT_S = 10.0
-#: and another vehicle's, which comes each second; from then on it only keeps this one from being ready
+#: the wait for a second vehicle's heartbeat, sent once a second; later ones only make this vehicle not ready
 ANOTHER_S = 1.5
-#: and so long that it says that it is simulated, where it is held to be
+#: the longest wait for the report that the vehicle is simulated, in seconds
 SPEED_S = 10.0
 
-#: what to do where a link cannot be opened, by what carries it
+#: the help for a link that cannot be opened, by its carrier
 PORT_HELP: Final = {
     LinkCarrier.UDP_IN: "another program may listen there; a vehicle can be told to send to another port",
-    LinkCarrier.UDP_OUT: "is it the address of a machine that this one reaches?",
-    LinkCarrier.TCP: "is it the address of a machine that this one reaches?",
+    LinkCarrier.UDP_OUT: "check that this machine reaches that address",
+    LinkCarrier.TCP: "check that this machine reaches that address",
     LinkCarrier.TCP_IN: "another program may listen there; a vehicle can be told to connect to another port",
     LinkCarrier.SERIAL: "end the program that has it open (ModemManager, a ground station, a shell on the console); "
     "the group `dialout` may open serial devices; `ls /dev/serial/by-id` shows which there are",
 }
 
-_NO_DEVICE: Final = "is it plugged in? `ls /dev/serial/by-id` shows which there are"
+_NO_DEVICE: Final = "check that the device is plugged in; `ls /dev/serial/by-id` lists the devices"
 
 
 def unopened(link: Address, error: OSError) -> Refusal:
-    """That a link cannot be opened, and what to do."""
+    """The refusal for a link that cannot be opened."""
     verb = "listen at" if link.way in (LinkCarrier.UDP_IN, LinkCarrier.TCP_IN) else "open"
     missing = link.way is LinkCarrier.SERIAL and error.errno == ENOENT
     help = _NO_DEVICE if missing else PORT_HELP[link.way]
     return Refusal("port", f"cannot {verb} `{link}`: {(error.strerror or str(error)).lower()}", help)
 
 
-#: How long the vehicle's time is waited for where the operator stated how far ours is off, in seconds
+#: the longest wait for the vehicle's time if the operator stated the error of this machine's clock, in seconds
 UTC_S = 3.0
-#: and so long before a flight, once nothing else keeps the vehicle from being ready
+#: the longest wait before a flight once the vehicle is ready otherwise, in seconds
 READY_UTC_S: Final = 10.0
-#: when a mission may begin, in us, while that is not known: never
+#: the earliest begin of a mission while the time is unknown, in us: never
 _UNDATED_US: Final = 2**62
 UTC_NOTE: Final = (
-    "nothing tells how far this machine's time of day is off: until the vehicle does, steps are deferred "
-    "(`--utc-error 500ms` states it)"
+    "the error of this machine's clock is unknown: steps are deferred until the vehicle reports the time "
+    "(`--utc-error 500ms` states the error)"
 )
-#: the same where the boundary is a process of its own, and the link has no key
+#: the same for a boundary process and a link without a key
 APART_UTC_NOTE: Final = (
-    "this machine's clock is not synchronised, and the boundary takes the vehicle's time over a link with a key alone: "
-    "steps are deferred (`--signing-key`, or `--utc-error 500ms` states how far it is off)"
+    "this machine's clock is not synchronised, and the boundary takes the vehicle's time only over a link with a key: "
+    "steps are deferred (`--signing-key`, or `--utc-error 500ms` states the error)"
 )
-#: the same where the boundary is one that listens
+#: the same for a listening boundary
 LISTENING_UTC_NOTE: Final = (
     "the boundary does not know the time of day: this machine's clock is not synchronised, and the vehicle has not "
-    "told its own over a link with a key; steps are deferred (`--utc-error US` in the boundary's own command line "
-    "states it)"
+    "reported its time over a link with a key; steps are deferred (`--utc-error US` on the boundary's command line "
+    "states the error)"
 )
 
-#: that somebody asked for the end before anything flew
+#: the refusal after Ctrl-C before the flight
 INTERRUPTED: Final = Refusal("interrupted", "interrupted before anything flew", "", ExitCode.INTERRUPTED)
 
-#: s that the version and parameters of a vehicle that may be qualified are waited for
-_TOLD_S: Final = 4.0
+#: the longest wait for the version and parameters of a qualified vehicle, in seconds
+_IDENTITY_S: Final = 4.0
 _QUALIFY_HELP: Final = "`rtshcua qualify` flies a short test of it"
 _LOOPBACK: Final = "127.0.0.1"
 _POLL_S = 0.05
 _HELP: Final = "check that it is on and sends to this address (PX4 or ArduPilot); `rtshcua sim` simulates one"
-_KEY_HELP: Final = "has the vehicle the key of `--signing-key`, and are both clocks right?"
-_SILENCE_HELP: Final = "look at the address, the cable and the vehicle's own port settings"
-_SYSTEM_HELP: Final = "`--system` names another id, or leave it out"
+_KEY_HELP: Final = "check that the vehicle has the key of `--signing-key`, and that both clocks are right"
+_SILENCE_HELP: Final = "check the address, the cable and the vehicle's port settings"
+_SYSTEM_HELP: Final = "name another id with `--system`, or leave it out"
 
 
 def unmet(where: str, seconds: float, system: int | None, rejected: str | None, silence: str | None) -> Refusal:
-    """That no heartbeat came within so many seconds, and what to do. `rejected` is what came and was not believed,
-    `silence` what else is known of why nothing is heard.
+    """The refusal if no heartbeat came within so many seconds. `rejected` describes frames that were not accepted,
+    `silence` another known cause.
     """
     of = where if system is None else f"system {system} of {where}"
-    text = f"no heartbeat of {of} within {seconds:.0f} s"
+    text = f"no heartbeat from {of} within {seconds:.0f} s"
     if rejected is not None:
         return Refusal("no-vehicle", f"{text}: {rejected}", _KEY_HELP)
     if silence is not None:
@@ -119,61 +119,57 @@ def unmet(where: str, seconds: float, system: int | None, rejected: str | None, 
 
 
 class SpeedQuestion:
-    """Asks a vehicle whether it is one that this program simulates, and how fast that lives, until it is answered."""
+    """Asks a vehicle, until it answers, whether this program simulates it, and at what speed."""
 
-    #: s of the machine's time between two requests: how fast the vehicle lives is what is asked
+    #: the interval between two requests, in seconds of the machine's time: the vehicle's speed is not known yet
     EACH_S: Final = 0.25
 
     def __init__(self) -> None:
         self._asked_s: float | None = None
-        #: whether it was answered,
-        self.told = False
-        #: and its pace, times 100; None where it is not simulated by this program
+        #: whether the vehicle answered
+        self.answered = False
+        #: its speed in hundredths; None if this program does not simulate it
         self.speed: int | None = None
 
     def due(self, system: int, now_us: int) -> Sequence[Message]:
-        """The request, where it is due."""
+        """The request, if it is due."""
         now_s = time.monotonic()
-        if self.told or (self._asked_s is not None and now_s - self._asked_s < self.EACH_S):
+        if self.answered or (self._asked_s is not None and now_s - self._asked_s < self.EACH_S):
             return ()
         self._asked_s = now_s
         return (messages.request(system, "AUTOPILOT_VERSION"),)
 
     def take(self, name: str, message: Any) -> None:
-        """A message of the autopilot."""
+        """Process a message of the autopilot."""
         if name == "AUTOPILOT_VERSION":
-            self.told, self.speed = True, marked_speed(message)
+            self.answered, self.speed = True, marked_speed(message)
 
 
 def unlike(question: SpeedQuestion, speed: float) -> Refusal | None:
-    """Why a vehicle that answered so, or not at all, is not flown at `speed` seconds of flight in a second; None where
-    it lives so fast. What it said is enough: no pace is measured, for on a busy machine a simulated vehicle waits for
-    its run, and lives slower than it says.
+    """The refusal if the vehicle does not run at `speed` times real time by its own report; None if it does. The speed
+    is not measured, because on a busy machine a simulated vehicle waits for its run and is slower than it reports.
     """
     if question.speed is None:
-        said = "says that it is something else" if question.told else f"did not say what it is within {SPEED_S:.0f} s"
-        text = (
-            f"`--speed {speed:g}` is for a vehicle that this program simulates, and this one {said}: at a real "
-            "vehicle a second is a second"
-        )
+        answer = "reports another one" if question.answered else f"did not report it within {SPEED_S:.0f} s"
+        text = f"`--speed {speed:g}` requires a vehicle that this program simulates; this one {answer}"
         return Refusal(
             "not-simulated",
             text,
-            "without `--speed`; `rtshcua sim --speed N` starts a simulated vehicle",
+            "leave `--speed` out; `rtshcua sim --speed N` starts a simulated vehicle",
             ExitCode.REFUSED,
         )
     if question.speed != hundredths(speed):
-        text = f"the simulated vehicle flies {question.speed / 100:g} seconds in a second, and not {speed:g}"
-        return Refusal("other-speed", text, f"`--speed {question.speed / 100:g}`", ExitCode.REFUSED)
+        text = f"the simulated vehicle runs at {question.speed / 100:g} times real time, not at {speed:g}"
+        return Refusal("other-speed", text, f"use `--speed {question.speed / 100:g}`", ExitCode.REFUSED)
     return None
 
 
 def await_heartbeat(
     context: FlightContext, vehicle: ConnectedVehicle, signing: LinkSigning, *, hurried: bool
 ) -> list[Event] | Refusal:
-    """Wait for the first heartbeat of an autopilot, and on a link of others for that of a second one, with which
-    nothing begins; what happened meanwhile. The vehicle is ready only afterwards. `hurried`: a flight may have broken
-    off in the air; then a second vehicle is not waited for, so that the first is told to come down.
+    """Wait for the first heartbeat of an autopilot; return the events meanwhile. On a real link also wait for a second
+    vehicle, and refuse if there is one. The vehicle is ready only afterwards. `hurried`: a flight may have broken off
+    in the air; then there is no wait for a second vehicle, so that the first is brought down at once.
     """
     link, events = context.request.link, list[Event]()
     vehicle.driver.issued_from_us = _UNDATED_US
@@ -183,8 +179,8 @@ def await_heartbeat(
             return INTERRUPTED
         if time.monotonic() > until_s:
             where = "the simulated vehicle" if link is None else f"a vehicle at `{link}`"
-            unheard = unmet(where, HEARTBEAT_S, context.request.system, signing.rejected, vehicle.silence)
-            return unheard._replace(code=ExitCode.LINK)
+            no_heartbeat = unmet(where, HEARTBEAT_S, context.request.system, signing.rejected, vehicle.silence)
+            return no_heartbeat._replace(code=ExitCode.LINK)
         events += _poll(context, vehicle)
     if link is not None and context.request.speed != 1:
         refusal = _not_simulated(context, vehicle, events)
@@ -201,13 +197,13 @@ def await_heartbeat(
 
 
 def _not_simulated(context: FlightContext, vehicle: ConnectedVehicle, events: list[Event]) -> Refusal | None:
-    """Why a vehicle is not flown faster than life: it has to say itself that it is simulated, else its times would not
-    be checked, nor true in the log. `events` get what came meanwhile.
+    """The refusal if the vehicle does not report that it is simulated at the requested speed: its times could not be
+    checked, and would be wrong in the log. Appends the received events to `events`.
     """
     question = SpeedQuestion()
     vehicle.driver.asks_first = question
     until_s = time.monotonic() + SPEED_S
-    while not question.told and time.monotonic() < until_s:
+    while not question.answered and time.monotonic() < until_s:
         if context.interrupts.wish() is not None:
             return INTERRUPTED
         events += _poll(context, vehicle)
@@ -223,11 +219,13 @@ def await_utc(
     utc: UtcWatch, vehicle: ConnectedVehicle, clock: LinkClock, issued_us: int, *, patient: bool,
     listens: bool = False, hurried: bool = False,
 ) -> list[Event]:  # fmt: skip
-    """Take the vehicle's time of day where the kernel vouches for none; what happened meanwhile. The vehicle is ready
-    only afterwards, and once it is certain that the mission was issued, at `issued_us` (UTC). `patient`: it is waited
-    for, and then what the operator stated holds; else the vehicle is not ready before it told it. `listens`: the
-    boundary listens, and an operator may have stated it there, so it is waited for as long, and where nobody did the
-    vehicle is not ready either. `hurried`: a flight may have broken off, and what is armed then is brought down first.
+    """Take the vehicle's time of day if the kernel's clock is not synchronised; return the events meanwhile. The
+    vehicle is ready only afterwards, and once the mission was certainly issued, at `issued_us` (UTC).
+
+    `patient`: wait `UTC_S`, then use the operator's statement; else the vehicle is not ready before it reports its
+    time. `listens`: wait as long for a listening boundary, whose operator may have stated the error there; without
+    either the vehicle is not ready. `hurried`: a flight may have broken off, and an armed vehicle is brought down
+    first.
     """
     events: list[Event] = []
     vehicle.driver.issued_from_us = _UNDATED_US
@@ -249,7 +247,7 @@ def await_utc(
 
 
 def record_of(vehicle: str, root: TrustRoot, now_us: int, data: Path | None = None) -> Qualification | str | None:
-    """The record of the vehicle of this identity; None where it has none, a text where it is not to be trusted."""
+    """The qualification record of a vehicle; None if it has none, a text if the record is not trusted."""
     try:
         signed = kept_qualification(data_folder() if data is None else data, vehicle)
         return None if signed is None else open_qualification(signed, root=root, vehicle=vehicle, now_us=now_us)
@@ -262,8 +260,8 @@ def record_of(vehicle: str, root: TrustRoot, now_us: int, data: Path | None = No
 def unqualified(
     record: Qualification | str | None, vehicle: ConnectedVehicle, clock: LinkClock
 ) -> tuple[str | None, list[Event]]:
-    """A note for a vehicle that is not qualified as it is now, None where it is; and what happened meanwhile. It is
-    asked only where there is a record that could hold, and only on the ground.
+    """A note if the vehicle in its present state is not qualified, else None; and the events meanwhile. The vehicle is
+    asked for its identity only if there is a valid record, and only on the ground.
     """
     driver, events = vehicle.driver, list[Event]()
     flavour = driver.flavour
@@ -271,7 +269,7 @@ def unqualified(
         return f"{standing(record, None, {}).text} ({_QUALIFY_HELP})", events
     questions = IdentityQuestions(flavour, names=[name for name, _ in record.parameters])
     driver.asks = questions
-    until_s = time.monotonic() + _TOLD_S
+    until_s = time.monotonic() + _IDENTITY_S
     while not questions.told and time.monotonic() < until_s and not (driver.seen.airborne or driver.seen.armed):
         events += vehicle.poll(clock.now().monotonic_us, clock.us_in(_POLL_S))
     driver.asks = None
@@ -285,9 +283,7 @@ def unqualified(
 
 
 class Connected(NamedTuple):
-    """A vehicle that is connected, what signs its link, what happened since it was first heard, and who may follow the
-    flight.
-    """
+    """A connected vehicle, the signing of its link, the events since its first heartbeat, and the agents' sockets."""
 
     vehicle: ConnectedVehicle
     signing: LinkSigning
@@ -298,15 +294,15 @@ class Connected(NamedTuple):
 def connect(
     context: FlightContext, begun: Begun, previous: LogBefore | None, debts: OwedParameters
 ) -> Connected | Refusal:
-    """Open the link, until the flight is over, and wait for the vehicle and the time of day. Raises OSError."""
+    """Open the link for the flight, and wait for the vehicle and the time of day. Raises OSError."""
     request, loaded, driven = context.request, begun.loaded, context.request.dry_run
     signing = sign_link(context, loaded, begun.apart)
     if isinstance(signing, Refusal):
         return signing
     context.resources.callback(signing.close)
-    deaf = stranded_signal(request, loaded, signing)
-    if deaf is not None:
-        return deaf
+    refusal = stranded_signal(request, loaded, signing)
+    if refusal is not None:
+        return refusal
     driver = make_driver(context, loaded, signing, fence=request.fence)
     if isinstance(driver, Refusal):
         return driver
@@ -335,8 +331,8 @@ def connect(
 
 
 def sign_link(context: FlightContext, loaded: Loaded, apart: BoundaryClient | None = None) -> LinkSigning | Refusal:
-    """What signs the link; where the boundary that decides runs apart, that one, and its key is not read here. Raises
-    OSError.
+    """Set up the signing of the link. A boundary process that decides signs itself, and its key is not read here.
+    Raises OSError.
     """
     request, gate = context.request, loaded.executor.frames
     process = apart.process if apart is not None and isinstance(gate, IsolatedGate) else None
@@ -348,7 +344,7 @@ def sign_link(context: FlightContext, loaded: Loaded, apart: BoundaryClient | No
         if process is not None and isinstance(gate, IsolatedGate):
             if request.boundary_socket is not None:
                 where = request.boundary_socket
-                signing.notes.append(f"the boundary at `{where}` decides, by keys and a root of its own")
+                signing.notes.append(f"the boundary at `{where}` decides, with its own keys and trust root")
             if process.missing:
                 signing.notes.append(f"the boundary runs without {'; without '.join(process.missing)}")
             if process.link_name is not None:
@@ -360,26 +356,28 @@ def sign_link(context: FlightContext, loaded: Loaded, apart: BoundaryClient | No
         signing.notes.append(f"{UNBUILT}: {UNBUILT_HELP}")
     if signing.name is None and request.link is not None and not request.link.is_loopback:
         signing.notes.append(
-            f"`{request.link}` has no key: whoever reaches it can speak as the vehicle (`--signing-key`)"
+            f"`{request.link}` has no key: anyone who reaches it can impersonate the vehicle (`--signing-key`)"
         )
     return signing
 
 
 def stranded_signal(request: FlightRequest, loaded: Loaded, signing: LinkSigning) -> Refusal | None:
-    """Why a mission does not begin that would break off in the air for a signal that cannot come; a rehearsal tells."""
+    """The refusal if a step needs a signal that cannot arrive, so that the mission would break off in the air. A
+    rehearsal reports it for each step.
+    """
     steps = stranded(loaded.bundle.policy, loaded.bundle.mission, signing.unheard)
     if not steps or request.dry_run:
         return None
     first = call(loaded.bundle.policy, steps[0])
     return Refusal(
         "signal-unsigned",
-        f"`{first}` needs a signal of RADIO_STATUS, which radios do not sign: it would wait for it in vain",
-        "`--unsigned-radio` takes it unsigned, and the worst of the last seconds counts", ExitCode.REFUSED,
+        f"`{first}` needs a signal of RADIO_STATUS, which radios do not sign: the step would wait in vain",
+        "`--unsigned-radio` accepts it unsigned; the worst value of the last seconds counts", ExitCode.REFUSED,
     )  # fmt: skip
 
 
 def make_driver(context: FlightContext, loaded: Loaded, signing: LinkSigning, *, fence: bool) -> Driver | Refusal:
-    """What drives a vehicle under the policy of a bundle. `fence`: the vehicle's own becomes the airspace."""
+    """The driver of a vehicle under the policy of a bundle. `fence`: upload the airspace as the vehicle's fence."""
     request, policy = context.request, loaded.bundle.policy
     try:
         own = manoeuvres(packs_of(policy.sources))
@@ -403,7 +401,7 @@ def make_driver(context: FlightContext, loaded: Loaded, signing: LinkSigning, *,
 
 
 def too_slow(driver: Driver) -> Refusal | None:
-    """Why a link carries too little for a policy; None where it carries enough."""
+    """The refusal if the link's capacity is too small for the policy; None if it is sufficient."""
     if driver.shortfall is None:
         return None
     help = "use a faster link, or longer deadlines and `stale after` times in the policy; see docs/flying/link.md"
@@ -411,7 +409,7 @@ def too_slow(driver: Driver) -> Refusal | None:
 
 
 def open_link(context: FlightContext) -> Transport | Refusal:
-    """The way to the vehicle; to our own simulated one, a port that the system chooses."""
+    """Open the transport to the vehicle; for the simulated vehicle, a port that the system chooses."""
     if context.transport is not None:
         return context.transport
     link = context.request.link or Address(LinkCarrier.UDP_IN, _LOOPBACK, 0)
@@ -422,21 +420,21 @@ def open_link(context: FlightContext) -> Transport | Refusal:
 
 
 def start_simulator(context: FlightContext, loaded: Loaded, port: int) -> Simulator | Refusal:
-    """The simulated vehicle of a policy, until the flight is over."""
+    """Start the simulated vehicle of a policy for the flight."""
     request = context.request
-    words = [*options_of_policy(loaded.bundle.policy), *request.simulator]
+    options = [*options_of_policy(loaded.bundle.policy), *request.simulator]
     if request.signing_key is not None:
-        words += ["--signing-key", str(request.signing_key)]
+        options += ["--signing-key", str(request.signing_key)]
     try:
-        simulator = Simulator(["--port", str(port), "--speed", f"{request.speed:g}", *words])
+        simulator = Simulator(["--port", str(port), "--speed", f"{request.speed:g}", *options])
     except SimulatorError as error:
         return Refusal("simulator", str(error), "", ExitCode.LINK)
     return context.resources.enter_context(simulator)
 
 
 def options_of_policy(policy: Policy) -> list[str]:
-    """Options that make it the vehicle of a policy: its home, its endurance, its return, no faster, what it reads."""
-    from rtshcua.virtual.fitting import fitting  # the simulation's parameters, which a flight of another vehicle lacks
+    """The simulator's options for the vehicle of a policy: home, endurance, return height, speed and sensors."""
+    from rtshcua.virtual.fitting import fitting  # not imported for a real vehicle
 
     fits = fitting(policy)
     home = fits.home
@@ -450,7 +448,7 @@ def options_of_policy(policy: Policy) -> list[str]:
 
 
 def open_agents(context: FlightContext, loaded: Loaded, *, waits: bool = False) -> Agents | None:
-    """Who may follow the flight and hand in, until it is over. Raises OSError."""
+    """Open the sockets for agents and operators for the flight; None if there are none. Raises OSError."""
     request = context.request
     if request.agent_socket is None and request.operator_socket is None:
         return None
@@ -460,7 +458,7 @@ def open_agents(context: FlightContext, loaded: Loaded, *, waits: bool = False) 
 
 
 def utc_notes(context: FlightContext, apart: BoundaryClient | None, *, listens: bool) -> list[str]:
-    """That the time of day is not known, and what helps."""
+    """The note if the time of day is unknown."""
     if not context.utc.waits:
         return []
     if listens:
@@ -470,7 +468,7 @@ def utc_notes(context: FlightContext, apart: BoundaryClient | None, *, listens: 
 
 
 def _simulate(context: FlightContext, loaded: Loaded, transport: Transport) -> Refusal | None:
-    """Start the simulated vehicle of a flight without a link, and its incidents. One that waits has it already."""
+    """Start the simulated vehicle of a flight without a link, and its incidents. After `--wait` it already runs."""
     request = context.request
     if not isinstance(transport, UdpTransport) or request.link is not None or request.wait_s is not None:
         return None

@@ -1,4 +1,4 @@
-"""`run --dry-run`: listen to the vehicle, decide the whole mission against the present, and send no motion."""
+"""`run --dry-run`: decide all steps of the mission in the vehicle's present state, and send no motion command."""
 
 import time
 from collections.abc import Sequence
@@ -19,21 +19,21 @@ from rtshcua.onboard.ports import Event, Readings, Ready
 from rtshcua.onboard.rehearsal import Rehearsed, rehearse
 from rtshcua.onboard.runtime.monitor import StateMonitor
 
-#: how long the vehicle may take to be ready, in seconds of the machine,
+#: the longest wait until the vehicle is ready, in seconds of the machine's time
 READY_S = 60.0
-#: and then for a signal that it has not told yet
-TOLD_S = 3.0
-#: within which a parameter that it has was told, or was asked for often enough
+#: the longest wait after that for signals without a value, in seconds
+SIGNALS_S = 3.0
+#: the longest wait for the values of parameters, in seconds
 SETTINGS_S = 8.0
-#: how often it is said what is waited for
-SAID_S = 5.0
+#: the interval between two notes about the wait, in seconds
+NOTE_S = 5.0
 
 _POLL_S = 0.05
 
 
 class FlightRehearsal(NamedTuple):
-    """What each step of a mission would come to. `refusal` is why a flight would not begin at all, `unready` what keeps
-    the vehicle from being ready; `notes` are what it would tell first.
+    """The predicted decision of each step. `refusal` is the reason why a flight would not begin, `unready` why the
+    vehicle is not ready; `notes` are those of a flight.
     """
 
     loaded: Loaded
@@ -45,7 +45,7 @@ class FlightRehearsal(NamedTuple):
 
     @property
     def exit_code(self) -> ExitCode:
-        """OK where every step may fly."""
+        """OK if every step may fly."""
         if self.interrupted:
             return ExitCode.INTERRUPTED
         would = self.unready is None and self.refusal is None and all(each.hopeful for each in self.steps)
@@ -53,8 +53,8 @@ class FlightRehearsal(NamedTuple):
 
 
 def rehearse_flight(context: FlightContext, begun: Begun, connected: Connected) -> FlightRehearsal:
-    """Rehearse the mission on the vehicle as it stands. It is judged by the UTC time at which it was asked for, or
-    would begin: the wait here is not the flight's.
+    """Rehearse the mission in the vehicle's present state. It is judged at the UTC time of the request, without the
+    wait here, or at the earliest time at which the flight would begin.
     """
     request, loaded, vehicle, clock = context.request, begun.loaded, connected.vehicle, context.clock
     sets = tuple(request.settings)
@@ -64,17 +64,17 @@ def rehearse_flight(context: FlightContext, begun: Begun, connected: Connected) 
         *utc_notes(context, begun.apart, listens=False),
     )
     refusal = not_begun(request, loaded, clock)
-    asked_us = clock.now().utc_us
+    requested_us = clock.now().utc_us
     for note in notes:
         context.console.say(f"note: {note}")
     for name in sets:
         vehicle.driver.settings.read(name)
     monitor = StateMonitor(loaded.policy)
     ready, interrupted = _await_state(context, monitor, vehicle, connected.events, sets)
-    now = structs.replace(clock.now(), utc_us=asked_us)
-    now = structs.replace(now, utc_us=asked_us + certain_from_us(loaded.issued_us, now) - now.monotonic_us)
+    now = structs.replace(clock.now(), utc_us=requested_us)
+    now = structs.replace(now, utc_us=requested_us + certain_from_us(loaded.issued_us, now) - now.monotonic_us)
     found = rehearse(loaded, monitor.state(now.monotonic_us), now, connected.signing.unheard)
-    unready = None if ready else (vehicle.driver.unready or "it did not say that it is")
+    unready = None if ready else (vehicle.driver.unready or "it did not report that it is ready")
     flavour = vehicle.driver.flavour if sets and not interrupted else None
     if refusal is None and flavour is not None:
         refusal = untold(sets, vehicle.driver.settings.values, flavour.name)
@@ -85,17 +85,17 @@ def _await_state(
     context: FlightContext, monitor: StateMonitor, vehicle: ConnectedVehicle, events: Sequence[Event],
     sets: Sequence[str],
 ) -> tuple[bool, bool]:  # fmt: skip
-    """Listen until every signal was told, and every parameter that a flight would set, or time is over; whether the
-    vehicle is ready, and whether somebody asked for the end.
+    """Wait until all signals, and all parameters that a flight would set, have values, or time is over. Return whether
+    the vehicle is ready, and whether the user interrupted.
     """
     clock, driver = context.clock, vehicle.driver
     ready, begun_s = False, time.monotonic()
-    until_s, said_s, waited = begun_s + READY_S, begun_s, ""
+    until_s, noted_s, waited = begun_s + READY_S, begun_s, ""
     while time.monotonic() < until_s:
         if context.interrupts.wish() is not None:
             return ready, True
-        if not ready and time.monotonic() - said_s >= SAID_S:
-            said_s, waits = time.monotonic(), driver.unready or "its telemetry"
+        if not ready and time.monotonic() - noted_s >= NOTE_S:
+            noted_s, waits = time.monotonic(), driver.unready or "its telemetry"
             if waits != waited:
                 waited = waits
                 context.console.say(f"waiting for the vehicle: {waits}; until {READY_S:.0f} s")
@@ -103,11 +103,11 @@ def _await_state(
             if isinstance(event, Readings):
                 monitor.update(event)
             elif isinstance(event, Ready):
-                ready, until_s = True, max(time.monotonic() + TOLD_S, begun_s + SETTINGS_S if sets else 0)
+                ready, until_s = True, max(time.monotonic() + SIGNALS_S, begun_s + SETTINGS_S if sets else 0)
         now = clock.now()
         monitor.observe(now)
-        told = all(map(driver.settings.is_known, sets))
-        if ready and told and None not in monitor.state(now.monotonic_us).values:
+        known = all(map(driver.settings.is_known, sets))
+        if ready and known and None not in monitor.state(now.monotonic_us).values:
             break
         events = vehicle.poll(now.monotonic_us, clock.us_in(_POLL_S))
     return ready, False

@@ -33,35 +33,35 @@ _MOST_FRAMES = 100_000
 
 
 class SortieHooks(Protocol):
-    """A flight of a qualification: a driver of its own, and what is done before the link is closed."""
+    """The hooks of a qualification's sortie: its driver, and actions before and after the flight."""
 
     def driver(self, policy: Policy, frames: Gate, slack: int, **more: Any) -> Driver:
         """The driver that flies it."""
         ...
 
     def before(self, vehicle: ConnectedVehicle, clock: LinkClock) -> list[Event] | Refusal:
-        """The vehicle is connected, and nothing sent; what happened meanwhile, or why it is not to be flown."""
+        """Called when the vehicle is connected and nothing was sent. Return the events meanwhile, or a refusal."""
         ...
 
     def after(
         self, vehicle: ConnectedVehicle, clock: LinkClock, interrupts: Interrupts, ending: Ending, final_hash: str
     ) -> None:
-        """The flight ended so, and its log ends in the line of this hash."""
+        """Called after the flight with its ending and the hash of its log's last line."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class FlightRequest:
-    """What is to fly, on which vehicle, by which keys. `link` None: the simulated vehicle is started with the options
-    in `simulator`.
+    """A request for a flight: bundle, vehicle and keys. Without a `link`, the simulated vehicle is started with the
+    options in `simulator`.
 
-    `roots`: the trust root, and before it those that lead to it from the one that the vehicle accepted last; none for
-    the key store's. `fence` False: the vehicle's own fence is left as it is. `system`: its MAVLink id, if it was named.
-    `utc_error_us`: what the operator says that UTC is off by at most. `sortie`: it is one of a qualification.
-    `settings`: parameters that are set before the flight, by name, and put back after it. `wait_s`: the bundle says the
-    policy alone, and for so many seconds at most it waits for the one that flies. `boundary_user`: the user and group
-    that a boundary of its own process runs as; `unbuilt`, that there is none only because its program is missing.
-    `boundary_socket`: where a boundary listens that has the keys, of the log, of its own and of the link.
+    `roots`: the trust root, after its predecessors since the last accepted one; empty for the key store's. `fence`
+    False: do not change the vehicle's fence. `system`: the vehicle's MAVLink id. `utc_error_us`: the greatest error of
+    UTC by the operator's statement. `sortie`: the hooks of a qualification. `settings`: parameters that are set before
+    the flight and restored after it. `wait_s`: wait so long at most for the bundle that flies; `bundle` only gives the
+    policy. `boundary_user`: the user and group of the boundary process. `unbuilt`: there is no boundary process only
+    because its program is missing. `boundary_socket`: the socket of a listening boundary, which has the keys of the
+    log, the link and itself.
     """
 
     bundle: Path
@@ -96,28 +96,28 @@ class FlightRequest:
 
     @property
     def kept_in(self) -> Path:
-        """Where it is kept what flew, and what the flight before left, of this vehicle or of the simulated one that is
-        started: neither uses up a bundle of the other.
+        """The state folder of this vehicle. The simulated vehicle has a folder of its own, so that its flights do not
+        use up bundles of the real one.
         """
         return self.state / SIMULATED_FOLDER if self.link is None else self.state
 
 
 class FrameBuffer:
-    """Takes the raw frames of a link, from the first that was heard, and hands them to a file once it is attached."""
+    """Keeps the raw frames of a link, from the first one, until a file is attached."""
 
     def __init__(self) -> None:
         self._early: list[tuple[int, bytes]] = []
         self._file: TelemetryFile | None = None
 
     def keep(self, utc_us: int, frame: bytes) -> None:
-        """One good frame, and when it came or went, UTC in us."""
+        """Keep a valid frame with the UTC time of its reception or sending, in us."""
         if self._file is not None:
             self._file.write(utc_us, frame)
         elif len(self._early) < _MOST_FRAMES:
             self._early.append((utc_us, frame))
 
     def attach(self, file: TelemetryFile) -> None:
-        """Write what was kept, and everything from now on."""
+        """Write the kept frames to `file`, and all frames from now on."""
         self._file = file
         for utc_us, frame in self._early:
             file.write(utc_us, frame)
@@ -125,9 +125,8 @@ class FrameBuffer:
 
 
 class FlightContext(NamedTuple):
-    """What the stages of one flight share. `listening`: the boundary that listens once it is connected, or why it is
-    not; None where none was asked for. `transport`: the link, where it is open already. `resources` closes what the
-    stages opened.
+    """What the stages of one flight share. `listening`: the connected listening boundary, or why it cannot be reached;
+    None if none was requested. `transport`: a link that is already open. `resources` closes what the stages opened.
     """
 
     request: FlightRequest
@@ -142,7 +141,7 @@ class FlightContext(NamedTuple):
 
     @property
     def slack(self) -> int:
-        """How many times longer than life the time limits of the vehicle's are, in the flight's time."""
+        """The factor for the vehicle's time limits in the flight's time, at a high `--speed`."""
         return max(1, round(self.request.speed / _UNHURRIED))
 
 
@@ -151,7 +150,7 @@ def open_context(
     listening: ListeningBoundary | Refusal | None = None, transport: Transport | None = None,
     clock: LinkClock | None = None,
 ) -> FlightContext:  # fmt: skip
-    """The context of a flight that begins; nothing of it is opened yet."""
+    """The context of a new flight, with nothing opened yet."""
     clock = clock or (SystemClock() if request.speed == 1 else PacedClock(request.speed))
     return FlightContext(
         request, console, clock, _utc(request, clock), listening, transport, Interrupts(), FrameBuffer(), ExitStack()
@@ -159,8 +158,8 @@ def open_context(
 
 
 def _utc(request: FlightRequest, clock: LinkClock) -> UtcWatch:
-    """Who vouches for UTC; a simulation has that of the machine that it runs on. A rehearsal, which is decided here,
-    takes what the boundary of a flight would take.
+    """The source of UTC. A simulation uses the machine's time. A rehearsal is decided in this process, but uses the
+    sources that the boundary of a flight would use.
     """
     if request.link is not None and request.speed == 1:
         apart = request.dry_run and request.mode.apart

@@ -1,4 +1,4 @@
-"""One flight of a verified bundle, put together: link, runtime, evidence, raw frames, view, and the summary."""
+"""One flight of a cleared bundle: connects link, runtime, evidence, raw frames and view, and makes the summary."""
 
 import secrets
 import shlex
@@ -62,31 +62,28 @@ _BACKLOG_S = 1.0
 _WAIT_US = 50_000
 _FASTEST_WAIT_S = 0.002
 _WAIT_S = 0.02
-#: how many documents are taken up before the loop begins; more of them wait in their sockets
+#: the most documents that are read before the loop begins; others wait in their sockets
 _MOST_EARLY = 32
 
-_LANDING = "interrupted: it falls back and lands first, and the log is closed then"
+_LANDING = "interrupted: the vehicle falls back and lands, then the log is closed"
 _SILENT = (
     "interrupted: the vehicle is silent; it falls back as soon as it is heard again, and is given up if it stays "
     "silent. Ctrl-C twice more within 3 s leaves it"
 )
-_CRASHED = (
-    "CRASHED: the vehicle came down as no landing does; nothing more is sent. Keep away from its rotors and battery"
-)
+_CRASHED = "CRASHED: nothing more is sent to the vehicle. Keep away from its rotors and battery"
 _FAILED = (
     "this program failed, and the vehicle may be flying: nothing more is sent, and nothing watches it. The same "
     "`rtshcua run` again brings it down"
 )
 _ON_GROUND = "interrupted on the ground: nothing is sent, and the log is closed"
 _KNOWING = (
-    "it is brought down; Ctrl-C once more within 3 s tells it to land where it is, stops watching, and closes the log"
+    "the vehicle is being brought down; Ctrl-C once more within 3 s tells it to land where it is, stops "
+    "watching, and closes the log"
 )
 
 
 class FlightSession:
-    """Flies once, what was cleared. `events` happened before the runtime began. Until it is begun, nothing of it is on
-    the disk, and nothing is sent.
-    """
+    """One cleared flight. Until `begin`, nothing is written to the disk or sent."""
 
     def __init__(
         self, context: FlightContext, begun: Begun, connected: Connected, cleared: Cleared, previous: LogBefore,
@@ -97,11 +94,11 @@ class FlightSession:
         self._context, self._connected, self._cleared = context, connected, cleared
         self._vehicle, self._agents, self._early = connected.vehicle, connected.agents, list(connected.events)
         self._feed = view
-        self._past, self._debts, self._witnesses = previous, debts, witnesses
+        self._previous, self._debts, self._witnesses = previous, debts, witnesses
         self._run, self._boundary = cleared.run, cleared.session
         self._steps = StepWatch()
-        self._preparing, self._told = True, ""
-        self._left = ""  # that the operator stopped watching what may be flying
+        self._preparing, self._last_detail = True, ""
+        self._left = ""  # set once the operator stops watching a vehicle that may fly
         self._recorder = Recorder(begun.log_key.sign, begun.log_key.public, draw)
         self._start_us = clock.now().monotonic_us
         policy, mission = loaded.bundle.policy, loaded.bundle.mission
@@ -109,12 +106,12 @@ class FlightSession:
         self._teller = Teller(policy, mission, self._start_us, answering, context.console.detail_of)
 
     def begin(self) -> Refusal | None:
-        """Put the first record on the disk, and show the plan; what is resumed waits for no disk. A refusal where the
-        boundary does not sign the log. Raises OSError where the disk does not take it.
+        """Write the first records to the disk, and show the plan. A resumed flight does not wait for the disk. A
+        refusal if the boundary does not sign the log. Raises OSError if the disk does not accept them.
         """
         run, resumed, loaded, now = self._run, self._cleared.resumed, self._loaded, self._clock.now()
         log = run.log()
-        self._past.begin(log.path, aloft=resumed)
+        self._previous.begin(log.path, aloft=resumed)
         self._frames = run.telemetry()
         self._context.frames.attach(self._frames)
         self._sink = EvidenceWriter(log)
@@ -123,8 +120,8 @@ class FlightSession:
         except LogNotSigned as error:
             return error.refusal
         finally:
-            self._begun.log_key.hand_over(_signs_no_more)  # nothing in flight needs it, so nothing in flight holds it
-        if not resumed:  # what hangs in the air comes down whatever the disk does
+            self._begun.log_key.hand_over(_signs_no_more)  # the key is not needed in flight, so it is dropped
+        if not resumed:  # a vehicle in the air comes down even without a disk
             self._sink.settle()
         self._witnesses.begin(log.path, lambda: self._sink.synced)
         debts = self._debts
@@ -145,11 +142,11 @@ class FlightSession:
         return None
 
     def _record_beginning(self, now: Now) -> None:
-        """The genesis, the boundary's first statement, and what is known of the flight before anything is decided."""
+        """Record the genesis, the boundary's first statement, and the facts known before the first decision."""
         loaded, request = self._loaded, self._context.request
         genesis = self._recorder.genesis(
             now, bundle=self._begun.bundle, root=self._begun.trusted.signed, boot=loaded.in_force.flight,
-            vehicle=loaded.vehicle, mission=loaded.bundle.mission.name, mode=loaded.mode, before=self._past.hash,
+            vehicle=loaded.vehicle, mission=loaded.bundle.mission.name, mode=loaded.mode, before=self._previous.hash,
             received_us=loaded.in_force.received_us(0), sync_us=self._clock.us_in(SYNC_US / 1e6),
         )  # fmt: skip
         self._sink.append(genesis, SYNCED_FIRST)
@@ -161,13 +158,13 @@ class FlightSession:
         if home is not None:
             self._sink.append(self._recorder.effect(now, ATTESTED, detail=b64encode(home).decode()), WRITTEN)
         simulated = pace_of(request.speed, own=request.link is None)
-        known = ((SIMULATED, simulated), (LOG_BEFORE, self._past.note), (CLOCK, self._context.utc.bound.told()))
+        known = ((SIMULATED, simulated), (LOG_BEFORE, self._previous.note), (CLOCK, self._context.utc.bound.told()))
         for event, detail in known:
             if detail:
                 self._sink.append(self._recorder.effect(now, event, detail=detail), WRITTEN)
 
     def fly(self) -> tuple[ExitCode, Summary]:
-        """Fly to the end, whatever it is, and close the log."""
+        """Fly until an ending, and close the log."""
         try:
             ending = self._follow()
             if ending is not Ending.CRASHED:
@@ -190,7 +187,7 @@ class FlightSession:
             missing, lacks = (found.refused,), ExitCode.EVIDENCE
         self._witnesses.finish(lambda text: self._feed.post(Note(text)), closed=not missing)
         if not missing:
-            self._past.end(self._recorder.final_hash)
+            self._previous.end(self._recorder.final_hash)
         code = EXIT_CODES[ending]
         if missing and code is ExitCode.OK:
             code = lacks
@@ -198,12 +195,12 @@ class FlightSession:
         return (code if summary.whole or code is not ExitCode.OK else ExitCode.FULL), summary
 
     def settle(self) -> None:
-        """Put back what an earlier run left, and close the log of a flight that is not to be."""
+        """Restore owed parameters, and close the log of a flight that does not take place."""
         self._put_back()
         self._close(Ending.REFUSED)
 
     def refuse(self) -> None:
-        """Close the log of a flight that is not to be."""
+        """Close the log of a flight that does not take place."""
         self._close(Ending.REFUSED)
 
     @property
@@ -212,12 +209,12 @@ class FlightSession:
 
     @property
     def used_up(self) -> bool:
-        """Whether the bundle may not fly any more, after the flight."""
+        """Whether the bundle cannot fly again after this flight."""
         return self._runtime.used_up
 
     @property
     def final_hash(self) -> str:
-        """The hash of the last line of its log."""
+        """The hash of the last line of the log."""
         return self._recorder.final_hash
 
     def _plan(self) -> FlightPlanView:
@@ -225,7 +222,7 @@ class FlightSession:
         return plan_of(bundle.policy, bundle.mission, mode=self._loaded.mode, speed=self._context.request.speed)
 
     def _replan(self) -> FlightPlanView:
-        """The mission was replaced: this is the plan from now on."""
+        """The plan after a replacement of the mission."""
         self._teller.replace(self._loaded.bundle.mission)
         return self._plan()
 
@@ -236,9 +233,9 @@ class FlightSession:
         incidents = self._context.request.incidents
         if incidents is not None:
             watch = incidents.around(watch, self._start_us)
-        problem = self._preparations.begin(self._pass)
+        problem = self._preparations.begin(self._wait_before)
         if problem is not None:
-            self._tell_once(problem)
+            self._show_once(problem)
             flavour = self._vehicle.driver.flavour
             for text in () if flavour is None else foreign(self._loaded.preparation.settings, flavour.name):
                 self._feed.post(Note(text))
@@ -249,7 +246,7 @@ class FlightSession:
         while True:
             match self._context.interrupts.wish():
                 case Wish.LAND:
-                    self._feed.post(Note(self._what_follows()))
+                    self._feed.post(Note(self._stop_note()))
                     also.append(Interrupted(self._clock.now().monotonic_us))
                 case Wish.KNOW:
                     self._feed.post(Note(_KNOWING))
@@ -258,7 +255,7 @@ class FlightSession:
                     return loop.turn(also) or self._leave()
                 case None:
                     pass
-            also += self._handed_in()
+            also += self._read_sockets()
             also += self._witnesses.events(self._clock.now().monotonic_us)
             also += self._steps.events(self._clock.now())
             if self._context.utc.waits:
@@ -268,12 +265,12 @@ class FlightSession:
                 return ending
             also = []
 
-    def _pass(self) -> bool:
-        """Let time pass before the loop, which is told then what happened; False once somebody asked to stop."""
+    def _wait_before(self) -> bool:
+        """Wait a little before the loop, and keep the events for it; False after a request to stop."""
         self._early += self._poll()
         self._seal_when_due()
         if sum(isinstance(each, Presented) for each in self._early) < _MOST_EARLY:
-            self._early += self._handed_in()
+            self._early += self._read_sockets()
         if self._context.interrupts.wish() is None:
             return True
         self._feed.post(Note(_ON_GROUND))
@@ -281,29 +278,29 @@ class FlightSession:
         return False
 
     def _waits_for(self) -> str | None:
-        """What the vehicle is waited for, in words; until parameters are set, nothing is known of that."""
+        """Why the vehicle is not ready, as text; None while parameters are being set."""
         return None if self._preparing else self._vehicle.driver.unready
 
     def _put_back(self) -> None:
-        problem = self._preparations.end(self._linger)
+        problem = self._preparations.end(self._wait_after)
         if problem is not None:
-            self._tell_once(problem)
+            self._show_once(problem)
 
-    def _tell_once(self, text: str) -> None:
-        """Tell a person, who is told of each record besides."""
-        if text != self._told:
+    def _show_once(self, text: str) -> None:
+        """Show a text, unless it was just shown with its record."""
+        if text != self._last_detail:
             self._feed.post(Note(text))
 
-    def _linger(self) -> bool:
-        """Let time pass after the loop; False once somebody would not wait."""
+    def _wait_after(self) -> bool:
+        """Wait a little after the loop; False once the user wants to leave."""
         self._poll()
         self._seal_when_due()
         if self._agents is not None:
             self._agents.turn_away(self._clock.now())
         return self._context.interrupts.wish() is not Wish.LEAVE
 
-    def _handed_in(self) -> Sequence[Event]:
-        """What agents and operators handed in; whoever came to their sockets is heard and told from now on."""
+    def _read_sockets(self) -> Sequence[Event]:
+        """Serve the sockets, and return the documents that agents and operators handed in."""
         if self._agents is None:
             return ()
         found = self._agents.events(self._clock.now())
@@ -315,33 +312,33 @@ class FlightSession:
         return self._vehicle.poll(self._clock.now().monotonic_us, self._clock.us_in(_WAIT_S))
 
     def _record(self, event: str, detail: str) -> None:
-        """Put an effect of before or after the loop into the log; it is on the disk then. Raises OSError."""
+        """Record an effect outside of the loop, and wait until it is on the disk. Raises OSError."""
         self._note(event, detail)
         self._sink.settle()
 
     def _note(self, event: str, detail: str) -> None:
-        """Put one there, and do not wait for the disk: the loop sees what becomes of it. Raises OSError."""
+        """Record an effect without waiting for the disk; the loop notices a failure. Raises OSError."""
         now = self._clock.now()
         self._catch_up(now)
         line = self._recorder.effect(now, event, detail=detail, durability=SYNCED_FIRST)
         self._sink.append(line, SYNCED_FIRST)
-        self._told = detail
+        self._last_detail = detail
         self._watch(now, (), (Append(line, SYNCED_FIRST),))
 
     def _catch_up(self, now: Now) -> None:
-        """End an epoch that is over, before anything else is recorded. Raises OSError."""
+        """Seal a finished epoch before another record is written. Raises OSError."""
         append_all(self._sink, self._recorder.caught_up(now), SYNCED_FIRST)
 
     def _seal_when_due(self) -> None:
-        """End an epoch that is over, outside of the loop; the loop sees what becomes of it."""
+        """Seal a finished epoch outside of the loop; the loop notices a failure."""
         now = self._clock.now()
         if self._recorder.due(now):
             with suppress(OSError):
                 append_all(self._sink, self._recorder.sealing(now), SYNCED_FIRST)
 
     def _look_at_utc(self) -> list[Event]:
-        """The vehicle may tell the time of day after the log began: from then on it is known. By it something may have
-        expired that this machine's clock took for good; then nothing flies.
+        """Take the vehicle's time of day if it is reported after the log began. If the bundle has expired by that time,
+        return an interruption, and nothing flies.
         """
         now, flavour = self._clock.now(), self._vehicle.driver.flavour
         if flavour is None or not self._context.utc.look(self._vehicle.driver.source, flavour.name, now.monotonic_us):
@@ -357,22 +354,22 @@ class FlightSession:
         self._feed.post(Note(f"by the vehicle's time: {late.text}"))
         return [Interrupted(now.monotonic_us)]
 
-    def _what_follows(self) -> str:
-        """What comes of the first request to stop."""
+    def _stop_note(self) -> str:
+        """The note for the first request to stop."""
         if not self._runtime.aloft:
             return _ON_GROUND
         return _LANDING if self._runtime.linked else _SILENT
 
     def _backlog(self) -> list[Event]:
-        """What the vehicle said while this was put together, so that the runtime begins with the present."""
+        """The events received during preparation, so that the runtime begins with the present state."""
         events: list[Event] = []
         until_s = time.monotonic() + _BACKLOG_S
-        while time.monotonic() < until_s and (said := self._vehicle.poll(self._clock.now().monotonic_us, 0)):
-            events += said
+        while time.monotonic() < until_s and (received := self._vehicle.poll(self._clock.now().monotonic_us, 0)):
+            events += received
         return events
 
     def _leave(self) -> Ending:
-        """Stop watching, after the vehicle was told to come down, if it could be told; say so in the log."""
+        """Stop watching, after the command to come down if it could be sent; record that in the log."""
         now = self._clock.now()
         told = "it was told to come down" if self._runtime.homeward else "it could not be told to come down"
         self._vehicle.release()
@@ -386,7 +383,7 @@ class FlightSession:
         return Ending.INTERRUPTED
 
     def _close(self, ending: Ending | None) -> tuple[str, ...]:
-        """Sign and close the log; what of the evidence is missing. Without an ending (a fault) it stays unsigned."""
+        """Sign and close the log; return missing evidence. Without an ending (a fault) the log stays unsigned."""
         missing = close_log(
             self._recorder, self._sink, self._frames, self._clock.now, ending,
             lambda text: self._feed.post(Note(text)),
@@ -432,11 +429,11 @@ class FlightSession:
 
 
 def answered_by(request: FlightRequest, run: RunFolder) -> Answering | None:
-    """How a person answers a step of this flight; None where it has no socket."""
+    """What approvals of this flight need; None without a socket."""
     socket = request.operator_socket or request.agent_socket
     if socket is None:
         return None
-    handed_in = request.wait_s is not None  # a file of the run, not of whoever handed it in
+    handed_in = request.wait_s is not None  # the sender's file is unknown, the run folder has a copy
     return Answering(str(run.path / BUNDLE if handed_in else request.bundle), str(socket), ahead=request.speed != 1)
 
 
@@ -445,12 +442,12 @@ def _signs_no_more(_checkpoint: bytes) -> Refusal:
 
 
 def draw() -> bytes:
-    """The secret of an epoch's key."""
+    """Draw the secret of an epoch's key."""
     return secrets.token_bytes(_SEED_BYTES)
 
 
 def _short(path: Path) -> str:
-    """A path as seen from here, where that is shorter."""
+    """The path relative to the working folder, if it lies in it."""
     try:
         return str(path.resolve().relative_to(Path.cwd()))
     except (ValueError, OSError):

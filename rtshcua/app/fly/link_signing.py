@@ -1,4 +1,4 @@
-"""`--signing-key`: one link's key, taken from its file, put to use, and its timestamps kept while it is used."""
+"""`--signing-key`: read the key of a link, sign and verify with it, and store its timestamps meanwhile."""
 
 from pathlib import Path
 
@@ -11,27 +11,28 @@ from rtshcua.onboard.enforcement.frames import FrameSession
 from rtshcua.onboard.enforcement.isolated import IsolatedGate
 from rtshcua.onboard.rehearsal import unheard
 
-_RADIO = "the policy reads RADIO_STATUS, which radios do not sign: it is not known without `--unsigned-radio`"
+_RADIO = "the policy reads RADIO_STATUS, which radios do not sign: its signals stay unknown without `--unsigned-radio`"
 _OUTDATED = (
-    "Either they are repeated, or the vehicle's signing clock is behind; our heartbeat goes out and sets it. If the "
+    "Either the frames are replayed, or the vehicle's signing clock is behind; our heartbeat goes out and sets "
+    "it. If the "
     "vehicle does not hear us here, connect over a cable for a moment: "
     "`rtshcua doctor --connect serial:DEVICE:BAUD --signing-key FILE`"
 )
 _STRANGE = (
-    "`{}` is not this user's own file, so no memory is used: after a kill, frames of the last second could be heard "
+    "`{}` is not this user's own file, so it is not used: after a kill, frames of the last second could be accepted "
     "again; remove it before the flight"
 )
-#: messages that nobody signs
+#: messages that are never signed
 _UNSIGNED = frozenset({"RADIO_STATUS"})
 
 
 class LinkSigning:
-    """Signs what `frames` lets out to a vehicle, and verifies what comes in. Without a key it does neither.
+    """Signs the frames that `frames` sends to a vehicle, and verifies received ones. Without a key it does neither.
 
-    `state` is the folder where timestamps are kept, by the vehicle's identity. Raises LinkKeyError, and OSError where
-    they cannot be; `even_damaged`, that waits in `damage` until it is known whether the vehicle flies, for what flies
-    must come down: it signs by this machine's time meanwhile, and hears nothing older than a minute. `unheard` holds
-    the slots of the signals that cannot come, for nobody signs what carries them.
+    `state` is the folder of the timestamps, by the vehicle's identity. Raises LinkKeyError, and OSError if they cannot
+    be read or stored. With `even_damaged` the error is kept in `damage` until it is known whether the vehicle flies,
+    because a vehicle in the air must come down; meanwhile frames are signed by this machine's time, and frames older
+    than a minute are rejected. `unheard` has the slots of signals whose messages are never signed.
     """
 
     def __init__(
@@ -55,9 +56,9 @@ class LinkSigning:
             store = LinkStore(state, policy.vehicle.identity, key)
             link = SignedLink(key, store.load(), now.utc_us, now.monotonic_us)
             self._keeper = LinkKeeper(store, link, clock.us_in)
-            strange = store.heard.refused
-            if strange is not None:
-                self.notes.append(_STRANGE.format(strange))
+            foreign_file = store.heard.refused
+            if foreign_file is not None:
+                self.notes.append(_STRANGE.format(foreign_file))
         except (LinkKeyError, OSError) as error:
             if store is not None:
                 store.close()
@@ -69,14 +70,14 @@ class LinkSigning:
         assert isinstance(frames, FrameSession)
         frames.sign_with(link)
         self._counts = link.counts
-        self._hear(link, policy, unsigned_radio=unsigned_radio)
+        self._set_verifier(link, policy, unsigned_radio=unsigned_radio)
 
     def elsewhere(self, name: bytes, gate: IsolatedGate, policy: Policy, *, unsigned_radio: bool) -> None:
-        """A boundary elsewhere has the key of this name: it signs and verifies, and keeps the timestamps."""
+        """Let a boundary process with the key of this name sign and verify. It stores the timestamps itself."""
         self.name, self._counts = name, gate.counts
-        self._hear(gate, policy, unsigned_radio=unsigned_radio)
+        self._set_verifier(gate, policy, unsigned_radio=unsigned_radio)
 
-    def _hear(self, link: FrameVerifier, policy: Policy, *, unsigned_radio: bool) -> None:
+    def _set_verifier(self, link: FrameVerifier, policy: Policy, *, unsigned_radio: bool) -> None:
         self.verifier = UnsignedRadio(link) if unsigned_radio else link
         read = {source.message for signal in policy.signals for source in signal.sources}
         if not unsigned_radio:
@@ -86,23 +87,23 @@ class LinkSigning:
 
     @property
     def rejected(self) -> str | None:
-        """What came and was not believed, in words, while nothing else came; None if nothing did."""
+        """A description of the rejected frames; None if there were none, or a frame was accepted."""
         counts = self._counts
         if counts is None or counts.accepted:
             return None
         why = (
             (counts.forged, "signed with another key"),
             (counts.unsigned, "not signed"),
-            (counts.stale, "older than what was heard before, or than a minute"),
+            (counts.stale, "older than an accepted frame, or than a minute"),
             (counts.strayed + counts.crowded, "of another link"),
         )
-        told = ", ".join(f"{count} {what}" for count, what in why if count)
+        text = ", ".join(f"{count} {what}" for count, what in why if count)
         if counts.stale:
-            told += f". {_OUTDATED}"
-        return f"frames come, and none is believed: {told}" if told else None
+            text += f". {_OUTDATED}"
+        return f"frames arrive, but none is accepted: {text}" if text else None
 
     def close(self) -> None:
-        """Keep the last timestamps. What went wrong with keeping them is in `trouble`, for a person."""
+        """Store the last timestamps; an error is described in `trouble`."""
         if self._keeper is None:
             return
         self._keeper.close()
@@ -110,5 +111,5 @@ class LinkSigning:
         if error is not None:
             reason = (error.strerror or str(error)).lower()
             self.trouble = (
-                f"the link's timestamps could not be kept: {reason}; it needs a new key before the next flight"
+                f"the link's timestamps could not be stored: {reason}; the link needs a new key before the next flight"
             )

@@ -1,6 +1,4 @@
-"""From evidence lines and the loaded bundle to what the view is told, after each step, and to the counts of the
-summary. It never waits.
-"""
+"""Translate evidence lines into messages for the live view, and count decisions for the summary. Never waits."""
 
 import time
 from base64 import b64decode
@@ -47,27 +45,27 @@ from rtshcua.wire.document import kind_of
 from rtshcua.wire.request import CONTINGENCY_LINK, STEP
 from rtshcua.wire.untrusted import Untrusted
 
-#: the effect that puts another mission into force
+#: the event of an effect that puts another mission into force
 REPLACED = "replacement"
-#: what flies instead of a step that is not admitted before anything flew
+#: shown in place of the fallback of a step that is refused before take-off
 NOTHING_FLIES = "no command is sent, because the vehicle is on the ground"
-#: what the boundary makes of what was told anyway
-_UNTOLD = frozenset({BOUNDARY, PERMITTED})
+#: effects of the boundary that repeat other records
+_NOT_SHOWN = frozenset({BOUNDARY, PERMITTED})
 _SNAPSHOT_S = 0.1
 _WAITING_NOTE_S = 5.0
 _OUTCOMES = ("allow", "deny", "defer", "fallback")
 
 
-#: corners of a circle on the map, and of a zone at most
+#: the corners of a drawn circle, and the most corners of a drawn zone
 _CORNERS: Final = 48
 _MOST_CORNERS: Final = 400
-#: how long an answer is good that a clock ahead of ours is to take, s
+#: the validity of an answer for a flight whose clock runs ahead, in seconds
 _AHEAD_S: Final = 3_600
 
 
 class Answering(NamedTuple):
-    """How a person answers a step of this flight: the bundle, a socket of the flight, and whether the flight's clock
-    runs ahead of ours.
+    """What an approval of a step of this flight needs: the bundle, a socket, and whether the flight's clock runs
+    `ahead` of this machine's.
     """
 
     bundle: str
@@ -76,13 +74,13 @@ class Answering(NamedTuple):
 
 
 class _Released(msgspec.Struct):
-    """When what was decided on was released."""
+    """The release time in the context of a decision."""
 
     released_us: int = 0
 
 
 class _Line(msgspec.Struct):
-    """What is read of an evidence line; the rest of it is not looked at."""
+    """The fields of an evidence line that are read; others are ignored."""
 
     type: str
     at_us: int
@@ -102,7 +100,7 @@ _read = msgspec.json.Decoder(_Line).decode
 
 
 def plan_of(policy: Policy, mission: Mission, *, mode: str, speed: float) -> FlightPlanView:
-    """The plan of a loaded bundle."""
+    """The plan of a loaded bundle, for the view."""
     paths = [invocation.plan.path for invocation in mission.invocations if invocation.plan.kind != MotionKind.HOME]
     return FlightPlanView(
         mission=mission.name,
@@ -121,7 +119,7 @@ def plan_of(policy: Policy, mission: Mission, *, mode: str, speed: float) -> Fli
 
 
 def _areas(policy: Policy) -> Iterator[Area]:
-    """The zones as they are drawn."""
+    """The zones to draw."""
     airspace = policy.airspace
     inside, outside = ((), ()) if airspace is None else (airspace.inside, airspace.outside)
     for number, zone in enumerate(policy.zones):
@@ -141,11 +139,11 @@ def _outline(zone: Zone) -> Iterator[tuple[int, ...]]:
 
 
 class Teller:
-    """Reads each evidence line once, counts, and says what happened.
+    """Translates each evidence line into a `Happening`, and counts.
 
-    `outcomes` counts every decision of the log, on steps and on links alike: as `rtshcua verify-log` does.
-    `unconfirmed` names the fallbacks of which no landing was seen. `answering`: how a person answers, where one can.
-    `detail_of` gives an effect's detail in words, by its event.
+    `outcomes` counts all decisions of the log, as `rtshcua verify-log` does. `unconfirmed` are the fallbacks whose
+    landing was not observed. `answering` is given if people can answer. `detail_of` formats the detail of an effect by
+    its event.
     """
 
     def __init__(
@@ -158,18 +156,18 @@ class Teller:
         self._start_us = start_us
         self._answering = answering
         self._replaced = 0
-        self._flown = False  # something was sent that may have lifted it off
+        self._flown = False  # a command was sent that may have lifted the vehicle off
         self.outcomes = dict.fromkeys(_OUTCOMES, 0)
         self.done: set[int] = set()
         self.unconfirmed: list[str] = []
 
     def replace(self, mission: Mission) -> None:
-        """From now on this is the mission."""
+        """Use `mission` from now on."""
         self._mission = mission
         self._replaced += 1
 
     def tell(self, line: bytes) -> Happening | None:
-        """What a line says, if it is a decision or an effect."""
+        """The happening in an evidence line; None if the line is not shown."""
         record = _read(line)
         t_us = record.at_us - self._start_us
         subject = self._subject(record)
@@ -184,7 +182,7 @@ class Teller:
                 "decision", t_us, record.step, subject, record.outcome, record.reason, clause, target, record.detail,
                 waits, asks=self._asks(record),
             )  # fmt: skip
-        if record.type != "effect" or record.event in _UNTOLD:
+        if record.type != "effect" or record.event in _NOT_SHOWN:
             return None
         self._flown = (self._flown or record.event == "dispatched") and record.event != "landed"
         if record.event == "succeeded" and record.kind == STEP:
@@ -198,7 +196,7 @@ class Teller:
         return Happening(record.event, t_us, record.step, subject, detail=detail, role=role)
 
     def _asks(self, record: _Line) -> Asks | None:
-        """Whom a step waits for, where it waits for people."""
+        """The people for whom a step waits; None if it waits for none."""
         if record.reason != Reason.AWAITING_APPROVAL.value or record.context is None:
             return None
         released_us = record.context.released_us
@@ -207,32 +205,32 @@ class Teller:
         )
 
     def _waits(self, text: str, t_us: int) -> str:
-        """What is said of a clause over time, by its text, that was not observed for as long as it looks back."""
+        """A note if the clause with this text looks back further than the run has observed; else empty."""
         window_us = max((self._looks_back(code) for code in self._codes(text)), default=0)
         if window_us <= t_us:
             return ""
-        return f"it looks back {display(window_us, Dimension.DURATION)}, and observation began with the run"
+        return f"the clause looks back {display(window_us, Dimension.DURATION)}, but observation began with the run"
 
     def _codes(self, text: str) -> Iterator[tuple[int, ...]]:
-        """The codes of the rules and clauses of the policy and the mission that are written so."""
+        """The codes of all rules and clauses of policy and mission with this text."""
         contracts = (*self._policy.contracts, *(each.contract for each in self._mission.invocations))
         clauses = (each for one in contracts for each in (*one.require, *one.assume, *one.maintain))
         yield from (each.code for each in clauses if each.text == text)
         yield from (each.when.code for each in self._policy.rules if each.when is not None and each.text == text)
 
     def _looks_back(self, code: tuple[int, ...]) -> int:
-        """How far, in us, with what it looks at in turn."""
+        """How far a code looks back, in us, including nested monitors."""
         monitors = [self._policy.monitors[a] for op, a in zip(code[::3], code[1::3], strict=True) if op == Op.MONITOR]
         return max((each.window_us + self._looks_back(each.when.code) for each in monitors), default=0)
 
     def _subject(self, record: _Line) -> str:
-        """The step or link that a record is about, as it was written."""
+        """The source text of the step or fallback of a record."""
         if record.kind == CONTINGENCY_LINK:
             return f"contingency: {self._policy.contingency[record.link].text}"
         if record.kind < 0 or record.step < 0:
             return ""
         if record.step >= len(self._mission.invocations):
-            return ""  # of a mission that is only just put into force
+            return ""  # a step of a mission that has just come into force
         invocation = self._mission.invocations[record.step]
         if record.kind == STEP:
             return call(self._policy, invocation)
@@ -246,9 +244,8 @@ def asks(
     policy: Policy, clause: str | None, step: int, at_us: int, released_us: int, answering: Answering | None,
     replaced: int = 0,
 ) -> Asks | None:  # fmt: skip
-    """Whom a step waits for that was released then, by the `confirm` of this text; None where the policy has none such.
-
-    `replaced` is how many replacements came before.
+    """The people for whom a step released at `released_us` waits, by the `confirm` rule with the text `clause`; None if
+    there is no such rule. `replaced` is the number of earlier replacements.
     """
     rule = next((each for each in policy.rules if each.kind == RuleKind.CONFIRM and each.text == clause), None)
     if rule is None:
@@ -259,7 +256,7 @@ def asks(
 
 
 def _commands(answering: Answering, step: int, roles: tuple[str, ...], replaced: int) -> Iterator[tuple[str, ...]]:
-    """What to type as each of these roles."""
+    """The command for an approval in each of the roles."""
     bundle, socket, ahead = answering
     for role in dict.fromkeys(roles):
         yield (
@@ -270,7 +267,7 @@ def _commands(answering: Answering, step: int, roles: tuple[str, ...], replaced:
 
 
 def _agreed(detail: str) -> str:
-    """The role of whoever agreed by the document that a log holds; empty where it is no yes."""
+    """The role in a logged approval; empty if the document is not an approval or was denied."""
     try:
         document = b64decode(detail, validate=True)
         if kind_of(document) is not names.APPROVAL:
@@ -282,9 +279,9 @@ def _agreed(detail: str) -> str:
 
 
 class Watching:
-    """The loop's `watch`. `view` makes a snapshot, `unready` says what it waits for; `live`: one that is drawn.
-
-    `replan` is asked for the plan after the mission was replaced; `agents` are told of everything too.
+    """The loop's `watch`: posts happenings and snapshots to the view, and all actions to `agents`. `view` makes a
+    snapshot, `unready` returns why the vehicle is not ready, `replan` the plan after a replacement. `live`: snapshots
+    are drawn.
     """
 
     def __init__(
@@ -302,7 +299,7 @@ class Watching:
         self._shown_s = self._waited_s = time.monotonic()
 
     def __call__(self, now: Now, events: Sequence[Event], actions: Sequence[Action]) -> None:
-        """One step was made."""
+        """Report one turn of the loop."""
         for action in actions:
             if isinstance(action, Append):
                 what = self._teller.tell(action.line)

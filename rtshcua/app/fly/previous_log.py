@@ -1,4 +1,4 @@
-"""What was before a flight: the vehicle's last log, ended if it was not, and named by the next one."""
+"""The vehicle's previous log: it is recovered if it has no end, and the next log names its hash."""
 
 import secrets
 from contextlib import ExitStack, suppress
@@ -15,14 +15,14 @@ from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.left import Left, left_by
 from rtshcua.wire.keys import SEED_BYTES, Duty, SigningKey
 
-#: the effect that says, in the signed log, what there was to tell of the one before
+#: the event of the effect with the note about the previous log
 LOG_BEFORE = "log-before"
 
-_UNKEPT = "the next log will not know of this one, for that cannot be kept"
+_UNKEPT = "the next log cannot name this one, because its name could not be stored"
 
 
 class LogBefore:
-    """The last log of a vehicle; `hash` and `note` are for the next one."""
+    """The previous log of a vehicle; `hash` and `note` go into the next log."""
 
     def __init__(self, last: LastLog, earlier: PreviousLog) -> None:
         self._last = last
@@ -32,34 +32,34 @@ class LogBefore:
 
     @classmethod
     def settle(cls, state: Path, vehicle: str, log_key: SigningKey | None) -> Self:
-        """Ends it, where it must be ended; without the log's key it stays without an end."""
+        """Recover the previous log if it has no end; without the log's key it is only read."""
         last = LastLog(state, vehicle)
         signer = None if log_key is None else signer_of(log_key)
         return cls(last, last.settle(look if signer is None else lambda path: recover(path, signer)))
 
     @property
     def hash(self) -> str | None:
-        """The hash of the last line of the log before, None where there is none, or it is not known."""
+        """The hash of the last line of the previous log; None if there is none, or it is unknown."""
         return self._earlier.last
 
     @property
     def note(self) -> str:
-        """What there is to tell of it; empty where all is as it should be."""
+        """A note about a problem with the previous log; empty if there is none."""
         return self._earlier.note
 
     @property
     def broken_off(self) -> Path | None:
-        """The run folder of the flight before, if that is not known to have ended its log."""
+        """The run folder of the previous flight, if its log is not known to have ended."""
         log = self._earlier.broken_off
         return None if log is None else log.parent
 
     @property
     def gone(self) -> bool:
-        """Whether the log before is not there any more: nobody knows how its flight ended."""
+        """Whether the previous log is missing, so that the end of its flight is unknown."""
         return self._earlier.gone
 
     def left(self, bundle: bytes, loaded: Loaded) -> Left | None:
-        """What a run of this bundle left the vehicle doing, if the log before is of one; None: nobody knows."""
+        """What a run of this bundle left the vehicle doing, by the previous log; None if unknown."""
         log = self._earlier.log
         if log is None:
             return None
@@ -70,8 +70,8 @@ class LogBefore:
             return None
 
     def begin(self, log: Path, *, aloft: bool = False) -> None:
-        """The next log was made, and nothing is in it yet; nobody recovers it before `end`. Raises OSError where that
-        cannot be kept; not for a vehicle that is `aloft`, which comes down whatever the state folder says.
+        """Store the path of the new, empty log, and lock it against recovery until `end`. Raises OSError if that fails,
+        but not for a vehicle that is `aloft`, which must come down.
         """
         self._held.enter_context(alone(log))
         try:
@@ -83,7 +83,7 @@ class LogBefore:
         self._log = log
 
     def end(self, last: str) -> None:
-        """It is closed; `last` is the hash of its last line. Where that cannot be kept, the log is asked again."""
+        """Store the hash of the last line of the closed log. If that fails, the next run reads the log again."""
         assert self._log is not None
         with suppress(OSError):
             self._last.end(self._log, self.hash, last)
@@ -91,11 +91,11 @@ class LogBefore:
 
 
 def signer_of(log_key: SigningKey) -> LogEnder:
-    """Who ends logs with this key, by this machine's clock, in no more time than a flight can wait."""
+    """A `LogEnder` that ends logs with this key, by this machine's clock."""
 
     def certify(text: bytes) -> bytes:
         return log_key.sign(text, duty=Duty.LOG)
 
     clock = SystemClock()
-    UtcWatch(clock)  # the kernel may vouch for it; nobody else is there
+    UtcWatch(clock)  # takes the kernel's bound, if the clock is synchronised
     return LogEnder(log_key.public, certify, lambda: secrets.token_bytes(SEED_BYTES), clock.now)

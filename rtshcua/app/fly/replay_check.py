@@ -1,5 +1,5 @@
-"""That a bundle flies once: looked up before anything is written, and marked before anything is sent. The mark is taken
-back after a run that sent nothing.
+"""A bundle flies once. The replay store is read before anything is written, and the bundle is marked as opened before
+anything is sent. After a run that sent nothing the mark is removed.
 """
 
 import time
@@ -21,35 +21,35 @@ from rtshcua.onboard.calls import call
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Event, MissionOpening
 
-#: How long word of whether the vehicle is in the air is waited for, in seconds.
+#: how long a report whether the vehicle is in the air is awaited, in seconds
 AIR_S: Final = 5.0
-#: and an answer to what is not signed.
+#: how long an answer to an unsigned message is awaited, in seconds
 ANSWER_S: Final = 3.0
 _POLL_S: Final = 0.05
-_MEND: Final = "put `replay/` of the state folder right; without it, each bundle that has not expired opens again"
+_MEND: Final = "restore `replay/` in the state folder; without it, each bundle that has not expired can fly again"
 
 
 class Grounded(Protocol):
-    """A flight whose log has begun."""
+    """A flight that does not take off, although its log has begun."""
 
     @property
     def used_up(self) -> bool:
-        """Whether the bundle may not fly any more, after it."""
+        """Whether the bundle cannot fly again after this flight."""
         ...
 
     def refuse(self) -> None:
-        """Close the log: it is not to be."""
+        """Close the log of a flight that does not take place."""
         ...
 
 
 def flown_before(state: Path, loaded: Loaded) -> str | None:
-    """Why the bundle would not be opened, in words; nothing of it is used up."""
+    """The reason why the bundle cannot be opened, as text; None if it can. The store is not changed."""
     refusal = not_opened(state, loaded)
     return None if refusal is None else refusal.text
 
 
 def not_opened(state: Path, loaded: Loaded) -> Refusal | None:
-    """Why the bundle would not be opened, if it would not be; nothing of it is used up."""
+    """The refusal if the bundle cannot be opened; None if it can. The store is not changed."""
     opening = _looked_up(state, loaded)
     return None if opening is MissionOpening.OPENED else _not_opened(loaded, opening)
 
@@ -62,43 +62,43 @@ def _looked_up(state: Path, loaded: Loaded) -> MissionOpening:
 def _not_opened(loaded: Loaded, opening: MissionOpening) -> Refusal:
     policy, vehicle = loaded.bundle.policy, loaded.vehicle
     if opening is MissionOpening.DAMAGED:
-        text = f"what is kept about the bundles that `{vehicle}` opened is damaged: this one may have flown"
+        text = f"the record of the bundles that `{vehicle}` opened is damaged: this bundle may have flown before"
         return Refusal(opening, text, _MEND, ExitCode.REFUSED)
     if opening is MissionOpening.OLD_POLICY:
-        text = f"a later version of `{policy.name}` than {policy.version} was in force on `{vehicle}`"
-        help = "compile the mission again under the policy in force; `--fresh-state` forgets it, in simulation"
+        text = f"`{vehicle}` has already flown under a later version of `{policy.name}` than {policy.version}"
+        help = "compile the mission again under the later policy; in simulation, `--fresh-state` clears the record"
         return Refusal(opening, text, help, ExitCode.REFUSED)
     text = f"this bundle was opened before on `{vehicle}`: a bundle flies once"
-    return Refusal(opening, text, "compile the mission again, which issues it anew", ExitCode.REFUSED)
+    return Refusal(opening, text, "compile the mission again to issue a new bundle", ExitCode.REFUSED)
 
 
 def expired(loaded: Loaded, now: Now) -> Refusal | None:
-    """Why the mission in force could not fly to its end any more (`too_old`)."""
+    """The refusal if the mission in force is too old to fly to its end (`too_old`)."""
     return too_old(loaded.bundle.policy, [prepared.invocation for prepared in loaded.invocations], now)
 
 
 def too_old(policy: Policy, steps: Iterable[Invocation], now: Now) -> Refusal | None:
-    """Why a mission of these steps could not fly to its end any more, whatever the vehicle says: one of them has
-    certainly expired. None where none has, or the time of day is not known.
+    """The refusal if one of these steps has certainly expired, so that the mission cannot fly to its end. None if none
+    has, or if UTC is unknown.
     """
     for step in steps:
         end_us = step.issued_at_us + step.contract.validity_us
         if now.utc_us - now.utc_error_us > end_us:
             which = f"step {number_of(step.step)}, `{call(policy, step)}`"
-            text = f"the bundle expired at {utc(end_us)}: later {which}, may not begin"
-            return Refusal("bundle-expired", text, "compile the mission again, which issues it anew", ExitCode.REFUSED)
+            text = f"the bundle expired at {utc(end_us)}: after that time {which}, may not begin"
+            return Refusal("bundle-expired", text, "compile the mission again to issue a new bundle", ExitCode.REFUSED)
     return None
 
 
 def broke_off(
     state: Path, loaded: Loaded, vehicle: ConnectedVehicle, clock: LinkClock, events: list[Event]
 ) -> bool | Refusal:
-    """True for a bundle that was opened before while the vehicle is in the air, or armed; one that can be opened is not
-    yet. A refusal for one that was opened, and nothing of it flies. Raises OSError.
+    """True if an earlier run of the bundle broke off: the bundle was opened before, and the vehicle is armed or in the
+    air. False if the bundle can be opened. A refusal if it was opened before and the vehicle is on the ground.
+    Raises OSError.
 
-    Then a run of it broke off up there, or had just told it to take off: nothing of the mission is flown again, but it
-    is brought down. So it is where nobody can tell, for the state folder is damaged, or cannot be read or written: what
-    flies must come down whatever that says.
+    After an earlier run broke off, no step of the mission is flown again; the vehicle is brought down. The same holds
+    if the state folder is damaged or cannot be read or written, because a vehicle in the air must come down.
     """
     unread: OSError | None = None
     try:
@@ -119,7 +119,9 @@ def broke_off(
 
 
 def still_flies(vehicle: ConnectedVehicle, clock: LinkClock, events: list[Event]) -> bool:
-    """Whether the vehicle says, within `AIR_S`, that it is in the air, or armed. `events` get what came meanwhile."""
+    """Whether the vehicle reports within `AIR_S` that it is armed or in the air. Appends the received events to
+    `events`.
+    """
     seen = vehicle.driver.seen
     until_s = time.monotonic() + AIR_S
     while not seen.landed_state and time.monotonic() < until_s:
@@ -128,8 +130,8 @@ def still_flies(vehicle: ConnectedVehicle, clock: LinkClock, events: list[Event]
 
 
 def obeys(vehicle: ConnectedVehicle, clock: LinkClock, events: list[Event]) -> bool:
-    """Whether the vehicle takes what is not signed, or answers, within `ANSWER_S`, what it is asked so. `events` get
-    what came meanwhile.
+    """Whether the vehicle accepts unsigned messages, or answers one within `ANSWER_S`. Appends the received events to
+    `events`.
     """
     until_s = time.monotonic() + ANSWER_S
     while vehicle.driver.keyless and time.monotonic() < until_s:
@@ -138,11 +140,11 @@ def obeys(vehicle: ConnectedVehicle, clock: LinkClock, events: list[Event]) -> b
 
 
 def mark_opened(state: Path, loaded: Loaded, clock: LinkClock, flight: Grounded) -> Refusal | None:
-    """Open the bundle, which works once: after the first record is on the disk, so that a disk that is full uses up no
-    bundle, and before anything is sent. Another run may have been faster; then this one does not fly.
+    """Mark the bundle as opened, which works once. Called after the first record is on the disk, so that a full disk
+    does not use up a bundle, and before anything is sent. A refusal if another run opened the bundle first.
     """
     policy, now = loaded.bundle.policy, clock.now()
-    earliest_us = now.utc_us - now.utc_error_us  # nothing is forgotten that may not have expired yet
+    earliest_us = now.utc_us - now.utc_error_us  # entries that may not have expired yet are kept
     try:
         opening = FileReplayStore(state, loaded.vehicle).open_once(
             loaded.bundle.mission_digest, loaded.expires_us, earliest_us, policy.name, policy.version
@@ -157,10 +159,10 @@ def mark_opened(state: Path, loaded: Loaded, clock: LinkClock, flight: Grounded)
 
 
 def give_back(state: Path, loaded: Loaded, flight: Grounded, now: Now) -> str | None:
-    """After a run that ended with nothing sent: its bundle may be handed in again, unless it expired meanwhile; that,
-    in words. None if it was used.
+    """After a run that sent nothing, remove the mark, so that the bundle can fly. Return a note for the user; None if
+    the bundle is used up.
 
-    A run that was killed, or ended by a fault, gives nothing back: what it sent is not known.
+    After a run that was killed or failed the mark stays, because it is unknown what the run sent.
     """
     if flight.used_up:
         return None

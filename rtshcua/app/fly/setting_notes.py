@@ -1,4 +1,4 @@
-"""What is told of the parameters of the autopilot that a flight sets."""
+"""Notes about autopilot parameters that a flight sets."""
 
 from collections.abc import Container, Iterable, Mapping
 from typing import Final
@@ -6,27 +6,27 @@ from typing import Final
 from rtshcua.mavlink.parameters import shown
 
 _CALLED: Final = {"px4": "PX4", "ardupilot": "ArduPilot"}
-#: of those that may be set; the others are ArduPilot's
+#: the settable parameters of PX4; the others are ArduPilot's
 _OF_PX4: Final = ("GF_ACTION", "GF_MAX_HOR_DIST", "GF_MAX_VER_DIST", "RTL_RETURN_ALT")
 
 
 def would_set(settings: Mapping[str, int]) -> list[str]:
-    """What a rehearsal tells of what a flight would set."""
+    """The note of a rehearsal about parameters that a flight would set."""
     listed = ", ".join(f"{name} to {shown(bits)}" for name, bits in settings.items())
-    return [f"a flight would set {listed}, and is judged so; nothing is set here"] if listed else []
+    return [f"a flight would set {listed}; this rehearsal assumes those values and sets nothing"] if listed else []
 
 
-def untold(names: Iterable[str], told: Container[str], flavour: str) -> str | None:
-    """That a vehicle of this flavour does not tell some of the parameters that are to be set; None where it does."""
-    missing = [name for name in names if name not in told]
+def untold(names: Iterable[str], reported: Container[str], flavour: str) -> str | None:
+    """A text if the vehicle does not report some of the parameters to set; None if it reports all."""
+    missing = [name for name in names if name not in reported]
     if not missing:
         return None
-    said = f"the vehicle does not report `{'`, `'.join(missing)}`, which is to be set"
-    return "; ".join([said, *foreign(missing, flavour)])
+    text = f"the vehicle does not report `{'`, `'.join(missing)}`, which is to be set"
+    return "; ".join([text, *foreign(missing, flavour)])
 
 
 def foreign(names: Iterable[str], flavour: str) -> list[str]:
-    """Of which of these parameters it is known that another autopilot has them, in words."""
+    """A text for each parameter that belongs to another autopilot."""
     return [
         f"`{name}` is a parameter of {_CALLED[kind]}, and this is {_CALLED[flavour]}"
         for name in names

@@ -1,4 +1,4 @@
-"""That a flight was simulated, or faster than life, or its boundary emulated: as its log tells it."""
+"""The claims of a log that its flight was simulated, and at what speed, or its boundary emulated."""
 
 from itertools import islice, takewhile
 from pathlib import Path
@@ -18,9 +18,8 @@ SIMULATED: Final = "simulated"
 
 
 def pace_of(speed: float, *, own: bool) -> str | None:
-    """What a log says of a flight at `speed` seconds of flight in a second; None where it is a flight as any other.
-
-    `own`: of the simulated vehicle that we start ourselves; another one may be simulated too, which we cannot know.
+    """The detail of the effect for a flight at `speed` times real time; None for a flight that is not known to be
+    simulated. `own`: the run started the simulated vehicle itself.
     """
     if not own and speed == 1:
         return None
@@ -29,7 +28,7 @@ def pace_of(speed: float, *, own: bool) -> str | None:
 
 
 def with_simulated(report: LogReport, log: Path) -> LogReport:
-    """The report on a log whose beginning was verified, with what this says of its times."""
+    """Add to the report on a verified log that its flight was simulated, or its boundary emulated."""
     if report.failure is not None:
         return report
     claims, detail = [], simulated(log)
@@ -41,14 +40,14 @@ def with_simulated(report: LogReport, log: Path) -> LogReport:
 
 
 def _mode(log: Path) -> str:
-    """Where decisions were made, as the genesis says it."""
+    """The enforcement mode in the genesis of a log."""
     with open_regular(log) as file:
         first = next(map(read, islice(lines(file), 1)), None)
         return first.mode if isinstance(first, Genesis) else ""
 
 
 def simulated(log: Path) -> str | None:
-    """What the log says of it, among the effects that follow the genesis: the boundary's own statement comes first."""
+    """The detail of the effect among the first effects of a log; None if there is none."""
     with open_regular(log) as file:
         effects = takewhile(lambda record: isinstance(record, Effect), map(read, islice(lines(file), 1, None)))
         return next((each.detail for each in effects if isinstance(each, Effect) and each.event == SIMULATED), None)

@@ -1,4 +1,4 @@
-"""The sorties of a qualification: planned, flown one after the other, judged, and recorded."""
+"""Plan, fly, judge and record the sorties of a qualification."""
 
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -50,11 +50,11 @@ from rtshcua.wire.qualification import (
 )
 from rtshcua.wire.untrusted import Untrusted
 
-#: s that a vehicle which somebody else flies is watched until it is down
+#: the longest wait for the landing of a vehicle that another pilot flies, in seconds
 _LANDS_S: Final = 180.0
 _POLL_S: Final = 0.05
 _DOWN_HELP: Final = "land and disarm it first; `rtshcua doctor` shows what it reports"
-#: nothing is recorded of a qualification that ends so: it says nothing of the autopilot
+#: endings without a record, because they say nothing about the autopilot
 _BROKEN_OFF: Final = (
     Ending.INTERRUPTED, Ending.REFUSED, Ending.LINK_LOST, Ending.EVIDENCE_LOST, Ending.RECALLED, Ending.STOOD_DOWN,
 )  # fmt: skip
@@ -64,7 +64,7 @@ _KEYED: Final = "not possible on a signed link: the second ground station has no
 
 
 def plan_sorties(*, sitl: bool, takeover: bool, keyed: bool) -> tuple[list[Sortie], dict[str, str]]:
-    """The sorties, and why others are not flown."""
+    """The sorties to fly, and the reasons why others are left out."""
     alone = [each for each in SORTIES if each.takeover is None]
     if sitl and not keyed:
         return list(SORTIES), {}
@@ -76,7 +76,7 @@ def plan_sorties(*, sitl: bool, takeover: bool, keyed: bool) -> tuple[list[Sorti
 
 @dataclass
 class FlownSortie:
-    """One sortie, as it is flown and observed. `ask` tells the pilot what to do, `announce` who watches what begins."""
+    """One sortie, as flown and observed. `ask` shows a request to the pilot, `announce` shows which sortie begins."""
 
     sortie: Sortie
     sends: bool
@@ -87,10 +87,10 @@ class FlownSortie:
     final_hash: str = ""
     slack: int = 1
     left: bool = False
-    """Whoever waited for the landing was told to leave."""
+    """Whether the user left before the landing."""
 
     def driver(self, policy: Policy, frames: Gate, slack: int, **more: Any) -> Driver:
-        """Its driver, which observes it."""
+        """The driver, which observes the sortie."""
         self.slack = slack
         self.driven = QualifyingDriver(
             policy, frames, slack, sortie=self.sortie, sends=self.sends, ask=self.ask, **more
@@ -98,7 +98,7 @@ class FlownSortie:
         return self.driven
 
     def before(self, vehicle: ConnectedVehicle, clock: LinkClock) -> list[Event] | Refusal:
-        """It stands, with its motors off: nobody else flies it."""
+        """Check that the vehicle is on the ground and disarmed."""
         seen, events = vehicle.driver.seen, list[Event]()
         until_s = time.monotonic() + AIR_S
         while not seen.down and not (seen.landed_state and seen.armed) and time.monotonic() < until_s:
@@ -117,7 +117,7 @@ class FlownSortie:
     def after(
         self, vehicle: ConnectedVehicle, clock: LinkClock, interrupts: Interrupts, ending: Ending, final_hash: str
     ) -> None:
-        """Whoever took it over lands it: watch until it is down."""
+        """After a take-over, wait until the pilot has landed the vehicle."""
         assert self.driven is not None
         if ending is Ending.STOOD_DOWN and not self.sends:
             self.ask("PILOT: the vehicle is yours; land it")
@@ -131,8 +131,8 @@ class FlownSortie:
 
 
 class QualificationResult(NamedTuple):
-    """What a qualification came to: the record, the ending that broke it off, if one did, where the record is kept, if
-    it is, and how the command ends.
+    """The result of a qualification: the record, the ending that broke it off or None, the path of the stored record or
+    None, and the exit code.
     """
 
     record: Qualification
@@ -156,8 +156,9 @@ class Qualifying:
     flown: list[FlownSortie] = field(default_factory=list)
 
     def choose_leg(self) -> Compiled | Refusal | None:
-        """Choose a leg that the policy permits; where it permits none, what was found on the first one, and a
-        refusal where it lacks a skill."""
+        """Choose a leg that the policy permits. Return None, or the diagnostics of the first leg if none is permitted,
+        or a refusal if a skill is missing.
+        """
         first: Compiled | None = None
         for trial in trials():
             refused = self._refused(trial)
@@ -174,7 +175,9 @@ class Qualifying:
         self, request: FlightRequest, console: Console, keys: Mapping[Duty, SigningKey],
         announce: Callable[[Sortie], None],
     ) -> Refusal | None:  # fmt: skip
-        """Fly one after the other, until one does not go as planned. `request`: the bundles are made in its folder."""
+        """Fly the sorties in order, until one does not go as planned. The bundles are written to the folder of
+        `request`.
+        """
         for sortie in self.sorties:
             flown = FlownSortie(sortie, not self.pilot, lambda text: console.say(f">>> {text}"), announce)
             bundle = request.bundle / f"{NAME}-{sortie.name}.bundle"
@@ -192,7 +195,7 @@ class Qualifying:
         return None
 
     def judge(self, log_key: SigningKey) -> QualificationResult:
-        """Judge what was observed, and keep the record, unless it was broken off."""
+        """Judge the observations, and store the record unless the qualification was broken off."""
         last = self.flown[-1]
         ended = Ending.INTERRUPTED if last.left or last.observed is None else Ending(last.observed.ending)
         observed = self._observed()
@@ -211,7 +214,7 @@ class Qualifying:
         return QualificationResult(record, ended if broken else None, path, code)
 
     def _was_whole(self) -> bool:
-        """Whether the record that there is is one of a whole qualification, which no partial one replaces."""
+        """Whether the stored record is of a complete qualification, which a partial one does not replace."""
         try:
             signed = kept_qualification(self.data, self.policy.vehicle.identity)
             return signed is not None and not unflown(
@@ -221,7 +224,7 @@ class Qualifying:
             return False
 
     def _refused(self, trial: SortiePlan) -> Compiled | Refusal | None:
-        """The first of the missions that does not compile; those with a leg are tried before the others."""
+        """The result of the first mission that does not compile; those with a leg are compiled first."""
         for sortie in sorted(self.sorties, key=lambda each: MotionKind.FLY not in each.steps):
             compiled = self._compiled(sortie, trial)
             if isinstance(compiled, Refusal) or compiled.mission is None:

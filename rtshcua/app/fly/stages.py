@@ -1,7 +1,7 @@
 """A flight from its request to its end: verify, start the boundary, connect, check before flight, fly, close.
 
-Each stage takes the result of the one before, and gives its own, or a refusal: then the flight does not begin. What a
-stage opened is closed when the flight is over, in whatever way.
+Each stage takes the result of the previous stage and returns its own. After a refusal the flight does not begin.
+Resources that a stage opened are closed at the end of the flight in every case.
 """
 
 import gc
@@ -38,9 +38,7 @@ if TYPE_CHECKING:
 
 
 class FinishedFlight(NamedTuple):
-    """A flight that is over: how it ends for the shell, its summary, its view, and what went wrong with the link's key
-    since.
-    """
+    """A finished flight: its exit code, summary, view and connection."""
 
     code: ExitCode
     summary: Summary
@@ -51,13 +49,13 @@ class FinishedFlight(NamedTuple):
 def fly(
     request: FlightRequest, console: Console, transport: Transport | None = None
 ) -> ExitCode | FlightRehearsal | Refusal:
-    """Fly, and show how it ended; a rehearsal gives what it found. `transport`: the link, where it is open already.
-    Raises OSError for files that cannot be read or written.
+    """Fly, and show the end; return the exit code, or the result of a rehearsal. `transport`: a link that is already
+    open. Raises OSError for files that cannot be read or written.
     """
     if request.boundary_socket is None:
         return _fly(open_context(request, console, transport=transport))
     listening = connect_boundary(request.boundary_socket, paced=request.speed != 1)
-    try:  # where none listens, what hangs in the air comes down without
+    try:  # without it, a vehicle in the air is still brought down
         return _fly(open_context(request, console, listening, transport))
     finally:
         if isinstance(listening, ListeningBoundary):
@@ -80,11 +78,11 @@ def _fly(context: FlightContext) -> ExitCode | FlightRehearsal | Refusal:
         log_key = verified.log_key.key() if request.boundary_socket is None else None
         previous = LogBefore.settle(request.kept_in, verified.loaded.vehicle, log_key)
         del log_key
-    with ExitStack() as view:  # it may still be shown when everything else is over
+    with ExitStack() as view:  # the view may outlast all other resources
         view.enter_context(breakable())
         with context.resources:
             ended = _stages(context, verified, previous, witnesses, view)
-        if isinstance(ended, Refusal):  # whoever learns that nothing begins learns what may be in the air meanwhile
+        if isinstance(ended, Refusal):  # the refusal also says what may still be in the air
             help = "; ".join(filter(None, (ended.help, hanging(previous, verified.loaded))))
             return ended._replace(help=help)
         if isinstance(ended, FlightRehearsal):
@@ -113,9 +111,9 @@ def _stages(
         begun = await_mission(context, begun, previous)
     if isinstance(begun, Refusal):
         return begun
-    if isinstance(begun.loaded.preparation, PreparationIssuer):  # the one elsewhere was told when it began
+    if isinstance(begun.loaded.preparation, PreparationIssuer):  # a boundary process received them at its start
         begun.loaded.preparation.owes(debts.left)
-    if begun.apart is not None:  # what it takes for the time of day counts here too
+    if begun.apart is not None:  # use the boundary's time of day here too
         context.utc.follow(begun.apart.time)
     connected = connect(context, begun, previous, debts)
     if isinstance(connected, Refusal):
@@ -129,12 +127,12 @@ def _stages(
 
 
 def _too_old(context: FlightContext, verified: Verified, *, owes: bool) -> Refusal | None:
-    """Where it is known already, a mission that is too old begins nothing; but what may hang in the air is looked for,
-    and what is owed to the vehicle is put back. One that is waited with says the policy alone.
+    """The refusal if the mission is already too old, before anything starts. Not if the vehicle may be in the air or is
+    owed parameters. With `--wait` the mission does not count.
     """
     request, loaded = context.request, verified.loaded
-    vain = request.wait_s is None and (request.link is None or not (owes or may_have_flown(request, loaded)))
-    return expired(loaded, context.clock.now()) if vain else None
+    decides = request.wait_s is None and (request.link is None or not (owes or may_have_flown(request, loaded)))
+    return expired(loaded, context.clock.now()) if decides else None
 
 
 def _flown(
@@ -160,7 +158,7 @@ def _flown(
             return refusal
     for note in notes_before(context, begun, connected, cleared, previous):
         view.post(Note(note))
-    _keep_what_is_loaded(hurried=cleared.resumed)
+    _freeze_loaded_objects(hurried=cleared.resumed)
     code, summary = session.fly()
     if request.sortie is not None:
         ending = Ending(summary.ending)
@@ -170,21 +168,23 @@ def _flown(
         view.post(Note(kept))
     if request.incidents is not None:
         with open_regular(cleared.run.path / LOG) as log:
-            code = _hold(request.incidents, Ending(summary.ending), code, log, view)
+            code = _report_scenario(request.incidents, Ending(summary.ending), code, log, view)
     return FinishedFlight(code, summary, view, connected)
 
 
-def _keep_what_is_loaded(*, hurried: bool) -> None:
-    """What was loaded stays; the collector need not look at it while flying. `hurried`: what is garbage may stay too,
-    for to collect it takes 30 ms.
+def _freeze_loaded_objects(*, hurried: bool) -> None:
+    """Freeze loaded objects, so that the garbage collector skips them during the flight. `hurried`: do not collect
+    first, which takes 30 ms.
     """
     if not hurried:
         gc.collect()
     gc.freeze()
 
 
-def _hold(incidents: "Incidents", ending: Ending, code: ExitCode, lines: Iterable[bytes], view: LiveView) -> ExitCode:
-    """Tell what came of the scenario; the exit code that follows."""
+def _report_scenario(
+    incidents: "Incidents", ending: Ending, code: ExitCode, lines: Iterable[bytes], view: LiveView
+) -> ExitCode:
+    """Report the results of the scenario; return the exit code."""
     for text in incidents.happened:
         view.post(Note(f"the scenario: {text}"))
     met = incidents.met(ending, list(lines))
@@ -192,6 +192,8 @@ def _hold(incidents: "Incidents", ending: Ending, code: ExitCode, lines: Iterabl
         view.post(Note(f"{'met' if each.met else 'NOT MET'}: {each.expectation.text}: {each.found}"))
     left = len(incidents.scenario.expectations) - len(met)
     if left:
-        text = f"{left} more of what is expected is for `rtshcua test`, which knows where the vehicle really was"
+        text = (
+            f"{left} more expectations can be checked only by `rtshcua test`, which knows the vehicle's true position"
+        )
         view.post(Note(text))
     return code if all(each.met for each in met) else ExitCode.TESTS

@@ -1,4 +1,4 @@
-"""The stage that starts the boundary: in this process, in one of its own, or one that listens and has the keys."""
+"""The stage that starts the boundary: in this process, in its own process, or as a listening boundary."""
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -41,24 +41,28 @@ from rtshcua.wire.preparation import ParameterWrite, Preparation, encode
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, key_refusal
 from rtshcua.wire.untrusted import Untrusted
 
-#: why nothing begins where another run has the boundary of the vehicle
+#: the slug if another run uses the boundary of the vehicle
 IN_USE: Final = "boundary-in-use"
-#: what is said of a flight that nothing inside signs
+#: the note of a flight whose boundary does not sign
 UNNAMED: Final = (
-    "the trust root names no boundary key for it: what is decided is not signed inside (`rtshcua keys boundary`)"
+    "the trust root names no boundary key for this vehicle: the boundary does not sign its decisions (`rtshcua "
+    "keys boundary`)"
 )
 
-#: how a run ends, by why its boundary does not begin or take the bundle; REFUSED where none is named
+#: the exit code by the slug of the boundary's refusal; REFUSED for any other slug
 _CODES: Final = {
     "in-use": ExitCode.REFUSED,
     "damaged": ExitCode.INPUT,
     "not-kept": ExitCode.FULL,
     "untrusted": ExitCode.UNTRUSTED,
 }
-_KEY_HELP: Final = "`--boundary-key` gives one that it names; `rtshcua keys boundary` makes it"
-#: why nothing is signed inside, where the boundary that listens does not decide
+_KEY_HELP: Final = "select a key that the root names with `--boundary-key`; `rtshcua keys boundary` makes one"
+#: the refusal if the listening boundary has the key but does not decide
 KEYLESS: Final = Refusal(
-    "no-boundary-key", "what is decided is not signed inside: the boundary has the key", "", ExitCode.INPUT
+    "no-boundary-key",
+    "the boundary does not sign its decisions: the listening boundary has the key",
+    "",
+    ExitCode.INPUT,
 )
 
 
@@ -66,49 +70,49 @@ KEYLESS: Final = Refusal(
 
 
 class HeldByBoundary:
-    """In place of the boundary's key: the boundary's process has it, and nobody here."""
+    """A placeholder for the boundary's key: only the boundary's process has the key."""
 
 
-#: the key that the boundary signs with; None where the trust root asks for none
+#: the key with which the boundary signs; None if the trust root requires none
 OwnKey: TypeAlias = SigningKey | HeldByBoundary | None
 
 
 def boundary_key(
     root: TrustRoot, vehicle: str, now_us: int, unlock: Callable[[Duty, Path | None], SigningKey], path: Path | None
 ) -> SigningKey | Refusal | None:
-    """The key that the boundary signs with, from a file or else the key store; None where the root asks for none."""
-    good = _named(root, vehicle, now_us)
-    if not good:
+    """The boundary's signing key, from a file or else the key store; None if the root requires none."""
+    valid = _valid_ids(root, vehicle, now_us)
+    if not valid:
         return None
     try:
         key = unlock(Duty.BOUNDARY, path)
     except Untrusted as error:
         return untrusted(error)
     except FileNotFoundError as error:
-        text = f"the trust root asks for what the boundary signs, and its key is not here: `{error.filename}`"
+        text = f"the trust root requires the boundary's signature, but its key is missing: `{error.filename}`"
         return Refusal("no-boundary-key", text, _KEY_HELP, ExitCode.INPUT)
-    return _unnamed(key.kid, good, vehicle) or key
+    return _not_valid(key.kid, valid, vehicle) or key
 
 
 def held_by_boundary(
     root: TrustRoot, vehicle: str, now_us: int, public: bytes | None
 ) -> HeldByBoundary | Refusal | None:
-    """What stands for the key of a boundary that listens, of which it said the public half, None where it has none;
-    None where the root asks for none.
+    """The placeholder for the key of a listening boundary. `public` is the public half that the boundary reported, or
+    None if it has no key. Return None if the root requires no key.
     """
-    good = _named(root, vehicle, now_us)
-    if not good:
+    valid = _valid_ids(root, vehicle, now_us)
+    if not valid:
         return None
     if public is None:
-        text = "the trust root asks for what the boundary signs, and the boundary has no key"
+        text = "the trust root requires the boundary's signature, but the boundary has no key"
         return Refusal(
-            "no-boundary-key", text, "`boundary.seed` of its folder; `rtshcua keys provision`", ExitCode.INPUT
+            "no-boundary-key", text, "put `boundary.seed` into its folder with `rtshcua keys provision`", ExitCode.INPUT
         )
-    return _unnamed(key_id(Duty.BOUNDARY, public), good, vehicle) or HeldByBoundary()
+    return _not_valid(key_id(Duty.BOUNDARY, public), valid, vehicle) or HeldByBoundary()
 
 
 def own_key_of(context: FlightContext, root: TrustRoot, loaded: Loaded) -> OwnKey | Refusal:
-    """The key that the boundary of a flight signs with, or why there is none."""
+    """The signing key of the flight's boundary, its placeholder, or the refusal if it is missing."""
     now_us, listening = context.clock.now().utc_us, context.listening
     if isinstance(listening, Refusal):
         return KEYLESS
@@ -117,22 +121,22 @@ def own_key_of(context: FlightContext, root: TrustRoot, loaded: Loaded) -> OwnKe
     return boundary_key(root, loaded.vehicle, now_us, context.console.unlock, context.request.boundary_key)
 
 
-def _named(root: TrustRoot, vehicle: str, now_us: int) -> set[bytes]:
-    """The boundary keys that the root trusts for a vehicle now."""
+def _valid_ids(root: TrustRoot, vehicle: str, now_us: int) -> set[bytes]:
+    """The ids of the boundary keys that are valid for a vehicle now."""
     named = root.keys_for(Duty.BOUNDARY)
     return {kid for kid, key in named.items() if key_refusal(key, vehicle=vehicle, now_us=now_us) is None}
 
 
-def _unnamed(kid: bytes, good: set[bytes], vehicle: str) -> Refusal | None:
-    if kid in good:
+def _not_valid(kid: bytes, valid: set[bytes], vehicle: str) -> Refusal | None:
+    if kid in valid:
         return None
     text = f"the trust root names no boundary key {kid.hex()} for `{vehicle}`: nobody could verify the log"
     return Refusal("unknown-key", text, _KEY_HELP, ExitCode.UNTRUSTED)
 
 
 class StartedBoundary:
-    """One flight's session of a boundary, with or without a key. `note` is what there is to tell of it. `aloft`: the
-    vehicle comes down whatever the state folder says.
+    """One session of a boundary, with or without a key. `note` is for the user. `aloft`: the vehicle is in the air and
+    must come down, so errors of the state folder are tolerated.
     """
 
     def __init__(self, store: BoundaryStore, key: BoundaryKey | None, note: str, *, aloft: bool) -> None:
@@ -144,7 +148,9 @@ class StartedBoundary:
 
     @classmethod
     def open(cls, store: BoundaryStore, key: OwnKey, *, aloft: bool) -> "StartedBoundary | Refusal":
-        """The session after the last one, where nobody knows of one for a vehicle that is `aloft`. Raises OSError."""
+        """Open the session after the last stored one. If it cannot be read and the vehicle is `aloft`, the session has
+        no number. Raises OSError.
+        """
         if key is None:
             return cls(store, None, "", aloft=aloft)
         number, digest, note = 0, START, ""
@@ -155,22 +161,25 @@ class StartedBoundary:
             if not aloft and isinstance(error, OSError):
                 raise
             if not aloft:
-                help = "without that file the boundary begins to count anew, and no log shows that it did not before"
+                help = (
+                    "restore that file; without it the boundary counts its sessions from 1 again, and no log "
+                    "shows the earlier ones"
+                )
                 return Refusal("damaged", str(error), help, ExitCode.INPUT)
-            note = f"{error}; it is brought down all the same"
+            note = f"{error}; the vehicle is brought down anyway"
         held = key if isinstance(key, SigningKey) else None
         return cls(store, BoundaryKey(held, number, digest), note, aloft=aloft)
 
     def begun(self, digest: bytes, session: int | None) -> None:
-        """The session began, under this number: a boundary of its own process counts itself. Raises OSError where none
-        began, or that cannot be kept; not for a vehicle that is `aloft`.
+        """Store that the session began. `session` is the number counted by the boundary. Unless `aloft`, raises OSError
+        if it did not begin or cannot be stored.
         """
         if self.key is not None and session is None and not self._aloft:
-            raise OSError(ENOSPC, "the boundary's process cannot keep that its session begins")
+            raise OSError(ENOSPC, "the boundary's process cannot store the start of its session")
         if self.key is not None and session is not None and session != self._session:
             self.note = (
-                f"the state folder counts {max(0, self._session - 1)} sessions of the boundary, its own process "
-                f"{session - 1}: the folder was put back to what it was, or lost"
+                f"the state folder counts {max(0, self._session - 1)} sessions of the boundary, and its process "
+                f"{session - 1}: the folder was restored from an old copy, or lost"
             )
             self._session = session
         try:
@@ -180,12 +189,12 @@ class StartedBoundary:
                 raise
 
     def ended(self, digest: bytes) -> None:
-        """It ended in order. Where that cannot be kept, the next one takes it for broken off."""
+        """Store the regular end of the session. If that fails, the next session treats this one as broken off."""
         with suppress(OSError):
             self._keep(digest)
 
     def _keep(self, digest: bytes) -> None:
-        if self.key is not None and self.key.session:  # what is damaged stays so, for a person to see
+        if self.key is not None and self.key.session:  # a damaged file is left for the operator to see
             self._store.keep(self._session, digest)
 
 
@@ -193,14 +202,14 @@ class StartedBoundary:
 
 
 def connect_boundary(path: Path, *, paced: bool) -> ListeningBoundary | Refusal:
-    """A boundary that listens, until `close`. `paced`: the run's time is not the machine's."""
+    """Connect to a listening boundary. The caller closes it. `paced`: the run does not use the machine's time."""
     try:
         found = ListeningBoundary(path)
     except BoundaryError as error:
         return _not_begun(error)
     if paced and found.own_clock:
         found.close()
-        text = f"the boundary at `{path}` decides by its own clock, and `--speed` is another"
+        text = f"the boundary at `{path}` uses its own clock, which `--speed` does not change"
         return Refusal("boundary-not-begun", text, "without `--speed`", ExitCode.REFUSED)
     return found
 
@@ -209,7 +218,7 @@ def start_home(
     request: FlightRequest, vehicle: str, signed_root: bytes, own_key: SigningKey | None, log_key: SigningKey,
     owed: Mapping[str, Owed],
 ) -> BoundaryHome | Refusal:  # fmt: skip
-    """A boundary that is started for one run, until `close`. Raises OSError."""
+    """Start a boundary for one run. The caller closes it. Raises OSError."""
     pinned = cose.unverified(signed_root, limit=MAX_ROOT).kid
     process = request.mode is EnforcementMode.PROCESS
     make = partial(BoundaryProcess, user=request.boundary_user) if process else SecureWorld
@@ -228,7 +237,7 @@ def start_home(
 
 
 def of_link_key(error: LinkKeyError) -> Refusal:
-    """That a link's key cannot be used."""
+    """The refusal for a link key that cannot be used."""
     return Refusal(f"link-key-{error.slug}", str(error), error.help or "", code_of(error.slug))
 
 
@@ -237,13 +246,13 @@ def _not_begun(error: BoundaryError) -> Refusal:
 
 
 def _listed(parameters: Mapping[str, Owed]) -> bytes | None:
-    """Parameters as a boundary is given them when it begins; None where there are none that may be set."""
+    """Encode the settable parameters for the start of a boundary; None if there are none."""
     writes = tuple(ParameterWrite(name, *each) for name, each in parameters.items() if name in SETTABLE)
     return encode(Preparation(0, False, 0, writes)) if writes else None
 
 
 class BoundaryClient:
-    """This end of a boundary of its own process, for one run under one trust root."""
+    """The client of a boundary process, for one run under one trust root."""
 
     def __init__(
         self, home: BoundaryHome, mode: EnforcementMode, vehicle: str, root: TrustRoot, settings: Mapping[str, int]
@@ -253,7 +262,7 @@ class BoundaryClient:
         self._caller = Caller(home.call, signs=home.link_name is not None, part=home.part, most_ahead=home.most_ahead)
 
     def flight(self) -> bytes | Refusal:
-        """The id of the flight that begins next."""
+        """The id that the boundary has drawn for the next flight."""
         answer = self._caller.flight()
         lost = self.lost()
         if lost is not None:
@@ -262,22 +271,22 @@ class BoundaryClient:
         return answer
 
     def time(self, settle: bool) -> OwnTime | None:
-        """What its own clock says; None of one that is gone. `settle`: no more is waited for."""
+        """The time of the boundary's clock; None if the process has ended. `settle`: await no better source."""
         answer = self._caller.time(settle=settle)
         return None if isinstance(answer, Refusal) else answer
 
     def sign_log(self, checkpoint: bytes) -> bytes | Refusal:
-        """The signature of the log's key under the checkpoint that begins the log of the flight, once."""
+        """The signature of the checkpoint that begins the flight's log. The boundary signs it once."""
         return self._caller.sign_log(checkpoint)
 
     def waiting(self, base: Loaded) -> Loaded:
-        """What is waited with, in this process: what leaves meanwhile, leaves by the boundary."""
+        """`base` with an executor that sends all frames through the boundary, for the wait."""
         commands = Commands(base.bundle.policy, base.bundle.mission)
         executor = IsolatedExecutor(self._caller, commands, IsolatedGate(self._caller, commands))
         return replace(base, executor=executor, mode=self._mode)
 
     def load(self, bundle: bytes, now: Now) -> Loaded | Refusal:
-        """Have it open a bundle, in place of the one before."""
+        """Let the boundary open a bundle in place of the previous one."""
         unfit = self._unfit(bundle, now)
         if unfit:
             text = f"the bundle does not fit in the secure world: {', '.join(unfit)}"
@@ -293,7 +302,7 @@ class BoundaryClient:
         return loaded
 
     def _unfit(self, bundle: bytes, now: Now) -> tuple[str, ...]:
-        """What of a bundle is too large for its home, in words; nothing of one that is not to be trusted."""
+        """Descriptions of what is too large in a bundle for the secure world; empty for an untrusted bundle."""
         if self._mode is not EnforcementMode.TRUSTZONE_M:
             return ()
         try:
@@ -303,18 +312,18 @@ class BoundaryClient:
         return exceeded(opened.policy, opened.mission, len(bundle), TRUSTZONE_M)
 
     def admit(self, bundle: bytes, now: Now) -> Loaded | Refusal:
-        """Have it open a bundle that nothing flies of yet, in place of the one before."""
+        """Let the boundary open a bundle that was not opened before, in place of the previous one."""
         loaded = self.load(bundle, now)
         if not isinstance(loaded, Refusal) and self._caller.reopened:
             text = f"the boundary opened this bundle before on `{self._vehicle}`: a bundle flies once"
-            return Refusal("boundary-replayed", text, "compile the mission again, which issues it anew")
+            return Refusal("boundary-replayed", text, "compile the mission again to issue a new bundle")
         return loaded
 
     def lost(self) -> Refusal | None:
-        """That it is gone, so that nothing more leaves; None while it is there."""
+        """The refusal once the boundary's process has ended; None while it runs."""
         if not self._caller.lost:
             return None
-        text = "the boundary is gone: nothing more is sent"
+        text = "the boundary has ended: nothing more is sent"
         return Refusal("boundary-lost", text, "", ExitCode.REFUSED)
 
 
@@ -322,9 +331,9 @@ class BoundaryClient:
 
 
 class Begun(NamedTuple):
-    """What flies: its bundle, in force; under what it is trusted; who signs its log; the key that the boundary signs
-    with, or why there is none; the boundary, where it runs apart, or why it is `absent`. A run that waited has its link
-    and its sockets already.
+    """A flight whose boundary has begun: the bundle and its loaded form, its trust root, the signer of its log, and the
+    boundary's key or why it is missing. `apart` is the client of a boundary process, `absent` why there is none. After
+    `--wait` the transport and the sockets are already open.
     """
 
     bundle: bytes
@@ -338,14 +347,14 @@ class Begun(NamedTuple):
     agents: Agents | None = None
 
     def boundary_refusal(self) -> Refusal | None:
-        """Why the boundary is absent, with which nothing new flies. Raises OSError where that is why."""
+        """Why the boundary is absent, which prevents a new flight. Raises the OSError if it is one."""
         if isinstance(self.absent, OSError):
             raise self.absent
         return self.absent
 
     @property
     def why_absent(self) -> str:
-        """Why the boundary is absent, in words; empty where it is not."""
+        """Why the boundary is absent, as text; empty if it is present."""
         if self.absent is None:
             return ""
         return words_of(self.absent) if isinstance(self.absent, OSError) else self.absent.text
@@ -354,9 +363,9 @@ class Begun(NamedTuple):
 def start_boundary(
     context: FlightContext, verified: Verified, previous: LogBefore | None, owed: Mapping[str, Owed]
 ) -> Begun | Refusal:
-    """The boundary begins, until the flight is over, and takes the bundle, unless another one is waited for. Where it
-    does not, and a vehicle may hang in the air, it is the one in this process; also where the boundary of a run that is
-    gone still holds the vehicle. Raises OSError.
+    """Start the boundary for the flight, and let it load the bundle, unless another one is awaited. If it does not
+    start and the vehicle may be in the air, the boundary in this process is used instead, also if the boundary of a
+    dead run still holds the vehicle. Raises OSError.
     """
     request, (bundle, loaded, trusted, log_key) = context.request, verified
     own_key = own_key_of(context, trusted.root, loaded)
@@ -371,9 +380,9 @@ def start_boundary(
     if isinstance(started, Refusal | OSError):
         absent = started
         broke_off = previous is not None and previous.broken_off is not None
-        hangs = broke_off if request.wait_s is not None else may_have_flown(request, loaded)
+        may_fly = broke_off if request.wait_s is not None else may_have_flown(request, loaded)
         in_use = isinstance(absent, Refusal) and absent.slug == IN_USE
-        if not hangs or (in_use and not broke_off):
+        if not may_fly or (in_use and not broke_off):
             if isinstance(absent, OSError):
                 raise absent
             return absent
@@ -385,14 +394,14 @@ def start_boundary(
     if apart is not None:
         log_key.hand_over(apart.sign_log)
         if isinstance(own_key, SigningKey):
-            own_key = HeldByBoundary()  # it is not held here
+            own_key = HeldByBoundary()  # this process drops it
     return Begun(bundle, loaded, trusted, log_key, own_key, apart, None)
 
 
 def _start(
     context: FlightContext, verified: Verified, own_key: OwnKey, owed: Mapping[str, Owed]
 ) -> tuple[BoundaryClient | None, Loaded] | Refusal:
-    """A boundary that runs apart, where that is asked for, and the bundle in force where decisions are made. Raises
+    """The boundary process, if one was requested, and the bundle as loaded by the boundary that decides. Raises
     OSError.
     """
     request, (bundle, loaded, trusted, _) = context.request, verified
@@ -402,7 +411,7 @@ def _start(
     taken: Loaded | Refusal = loaded
     if request.wait_s is None:
         taken = loaded if apart is None else apart.load(bundle, context.clock.now())
-    elif apart is not None:  # it draws the id of the flight that the sockets tell of
+    elif apart is not None:  # the boundary draws the flight id that the sockets announce
         flight = apart.flight()
         if isinstance(flight, Refusal):
             return flight
@@ -414,9 +423,8 @@ def _start(
 def _open(
     context: FlightContext, verified: Verified, own_key: OwnKey, owed: Mapping[str, Owed]
 ) -> BoundaryClient | Refusal | None:  # fmt: skip
-    """A boundary that runs apart, where that is asked for, until the flight is over. What may have expired is brought
-    down by the one in this process, which does not ask, but where one listens: that has a trust root of its own. Raises
-    OSError.
+    """Start or connect to the boundary process, if one was requested. Under a distrusted root the boundary in this
+    process brings the vehicle down; a listening boundary has its own trust root. Raises OSError.
     """
     request, process, (_, loaded, trusted, log_key) = context.request, context.listening, verified
     if isinstance(process, Refusal):

@@ -1,4 +1,4 @@
-"""Ctrl-C and other requests to stop a flight, taken as wishes instead of obeyed at once: it falls back first."""
+"""Ctrl-C and other requests to stop a flight. They do not end the program: the vehicle falls back and lands first."""
 
 import signal
 import time
@@ -10,7 +10,7 @@ from threading import current_thread, main_thread
 from types import FrameType, TracebackType
 from typing import Self
 
-#: Two more requests within this time, in seconds, mean it.
+#: two more requests within this time, in seconds, end the watch at once
 LEAVE_S = 3.0
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -18,8 +18,8 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 @contextmanager
 def breakable() -> Iterator[None]:
-    """Within this, in the main thread, Ctrl-C raises KeyboardInterrupt, as Python has it: what is under way is put in
-    order. Elsewhere it ends a command by the signal itself (`entry_point`).
+    """Let Ctrl-C raise KeyboardInterrupt in the main thread, so that open resources are closed. Outside of this context
+    the signal ends the command (`entry_point`).
     """
     if current_thread() is not main_thread() or signal.getsignal(signal.SIGINT) is not signal.SIG_DFL:
         yield
@@ -32,20 +32,20 @@ def breakable() -> Iterator[None]:
 
 
 class Wish(Enum):
-    """What a request to stop asks for."""
+    """The meaning of a request to stop."""
 
     LAND = auto()  # the first: fall back, come down, close the log
-    KNOW = auto()  # another: how it stands
+    KNOW = auto()  # another: show the state
     LEAVE = auto()  # one more soon after: do not wait for the landing
 
 
 class Interrupts:
-    """While entered, SIGINT, SIGTERM and SIGHUP are kept until `wish` asks for them."""
+    """Collects SIGINT, SIGTERM and SIGHUP as requests for `wish`, while entered."""
 
     def __init__(self) -> None:
         self._times: deque[float] = deque()
         self._landing = False
-        self._asked_s: float | None = None
+        self._requested_s: float | None = None
 
     def __enter__(self) -> Self:
         self._before = {number: signal.signal(number, self._note) for number in _SIGNALS}
@@ -58,16 +58,16 @@ class Interrupts:
             signal.signal(number, handler)
 
     def wish(self) -> Wish | None:
-        """What the next request asks for, each once; None when there is none."""
+        """The next request; None if there is none."""
         if not self._times:
             return None
         at_s = self._times.popleft()
         if not self._landing:
             self._landing = True
             return Wish.LAND
-        if self._asked_s is not None and at_s - self._asked_s <= LEAVE_S:
+        if self._requested_s is not None and at_s - self._requested_s <= LEAVE_S:
             return Wish.LEAVE
-        self._asked_s = at_s
+        self._requested_s = at_s
         return Wish.KNOW
 
     def _note(self, number: int, frame: FrameType | None) -> None:

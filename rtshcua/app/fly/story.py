@@ -1,4 +1,4 @@
-"""What the flying process tells the drawing one: JSON lines, each one of these."""
+"""The messages from the flying process to the drawing process, sent as JSON lines."""
 
 import msgspec
 
@@ -6,7 +6,7 @@ from rtshcua.onboard.runtime.view import RuntimeView
 
 
 class LiveStep(msgspec.Struct, frozen=True):
-    """A mission step as it was written, and the index of its phase."""
+    """The source text of a mission step, and the index of its phase."""
 
     text: str
     phase: int
@@ -21,8 +21,8 @@ class SignalFormat(msgspec.Struct, frozen=True):
 
 
 class Area(msgspec.Struct, frozen=True):
-    """A zone on the map: rings of corners, x0, y0, x1, y1, ... in mm east and north of home. `kind` says what it is to
-    the airspace: `inside` it must be stayed, `outside` it must be stayed, or neither (empty).
+    """A zone on the map: rings of corners, x0, y0, x1, y1, ... in mm east and north of home. `kind` is `inside` or
+    `outside` if the vehicle must stay there, else empty.
     """
 
     name: str
@@ -31,9 +31,8 @@ class Area(msgspec.Struct, frozen=True):
 
 
 class Asks(msgspec.Struct, frozen=True):
-    """Whom a step waits for: a person of each of these roles, each with the command that answers as one, in words.
-
-    It is awaited from the monotonic time `asked_us` until `until_us`. Without a socket nobody can answer: no commands.
+    """A step waits for one person of each role, from `asked_us` until `until_us` (monotonic). `commands` has the
+    arguments of the command that answers in each role; it is empty without a socket.
     """
 
     roles: tuple[str, ...]
@@ -43,7 +42,7 @@ class Asks(msgspec.Struct, frozen=True):
 
 
 class FlightPlanView(msgspec.Struct, frozen=True, tag="plan", tag_field="event"):
-    """What is going to fly. `position` names the signal that is one, `path` holds x, y in mm of every place gone to."""
+    """The plan of a flight. `position` names the position signal, `path` has x, y in mm of every target."""
 
     mission: str
     intent: str
@@ -60,16 +59,16 @@ class FlightPlanView(msgspec.Struct, frozen=True, tag="plan", tag_field="event")
 
 
 class Snapshot(msgspec.Struct, frozen=True, tag="view", tag_field="event"):
-    """How things stand now; one that cannot be sent at once is not sent."""
+    """The present state; dropped if it cannot be sent at once."""
 
     view: RuntimeView
 
 
 class Happening(msgspec.Struct, frozen=True, omit_defaults=True):
-    """One record of the log, in brief: a decision (`event` is `decision`) or an effect. `t_us` is since the start.
+    """One record of the log, shortened: a decision (`event` is `decision`) or an effect. `t_us` counts from the start.
 
-    `waits` says of a deferral what it waits for, where that is to have been observed for long enough; `asks` which
-    people. `role` is that of somebody who agreed.
+    For a deferral, `waits` says if a clause has not been observed for long enough, `asks` which people are awaited.
+    `role` is the role of a person who agreed.
     """
 
     event: str
@@ -93,19 +92,19 @@ class Happened(msgspec.Struct, frozen=True, tag="happened", tag_field="event"):
 
 
 class Note(msgspec.Struct, frozen=True, tag="note", tag_field="event"):
-    """A word about the run itself, not about the flight."""
+    """A note about the run itself."""
 
     text: str
 
 
 class Summary(msgspec.Struct, frozen=True, tag="summary", tag_field="event"):
-    """How the run ended; also `summary.json` of the run folder. The log proves it, this only says it.
+    """The end of the run; also `summary.json` of the run folder. It is not signed; the log is the evidence.
 
-    `whole`: all evidence is on the disk, and the log was read back and verifies; else `missing` says what does not.
-    `gaps_us`: for how long the log has nothing, for the computer stood still. `unconfirmed`: the fallbacks that were
-    sent, and ended without a landing being seen. `may_fly`: that the vehicle may be flying, and why nothing watches it.
-    `drain_declared`, `drain_measured`: what a minute takes of the charge at the worst, 1/10000, and `km_declared`,
-    `km_measured` what a km over ground takes; 0 measured: it was not. `battery` says it in words.
+    `whole`: all evidence is on the disk, and the log was read back and verified; else `missing` lists the defects.
+    `gaps_us`: the time without records because the computer stood still. `unconfirmed`: the fallbacks that ended
+    without an observed landing. `may_fly`: why the vehicle may still fly unwatched. `drain_*` is the charge used in the
+    worst minute, `km_*` per km over ground, both in 1/10000; a measured 0 means not measured. `battery` is that as
+    text.
     """
 
     mission: str
@@ -139,12 +138,12 @@ Message = FlightPlanView | Snapshot | Happened | Note | Summary
 
 
 def tenths(thousandths: int) -> str:
-    """Thousandths as units with one decimal, never `-0.0`."""
+    """Format thousandths with one decimal, never as `-0.0`."""
     rounded = (abs(thousandths) + 50) // 100
     return f"{'-' if thousandths < 0 and rounded else ''}{rounded // 10}.{rounded % 10}"
 
 
 def duration(us: int) -> str:
-    """A time as a person reads it: `4 min 12 s`."""
+    """Format a duration as `4 min 12 s`."""
     minutes, seconds = divmod(us // 1_000_000, 60)
     return f"{minutes} min {seconds} s" if minutes else f"{seconds} s"

@@ -1,4 +1,4 @@
-"""Under which trust root a vehicle flies: the one that it accepted last, or one that follows from it."""
+"""The trust root under which a vehicle flies: the last accepted one, or a successor of it."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
@@ -15,26 +15,26 @@ from rtshcua.wire.trust import MAX_ROOT, TrustRoot, open_root
 from rtshcua.wire.untrusted import Untrusted
 
 REVOKED: Final = "revoked-key"
-#: why what was good once is not any more: what began to fly under it comes down all the same
+#: slugs of expiry: a flight that began before may still be brought down
 LAPSED: Final = ("expired", "key-expired")
-#: what to do where a root is refused, by slug
+#: the help for a refused root, by slug
 HELPS = {
-    "version-gap": "give the roots between too, from the oldest to the newest: `root-N.trust` of the key store",
-    "rollback": "the vehicle accepted a newer root: leave `--root` out, or give that one",
-    "fork": "whoever has the root key signed two roots of one version: find out who, and change it",
-    "unknown-key": "a root follows from the one before; another fleet's root takes another `--state-dir`",
-    REVOKED: "sign it again, with the key that took its place; `rtshcua keys list` shows what is trusted",
-    "superseded": "begin again: the run goes by the root that the vehicle has now",
-    "damaged": "put `trust/` of the state folder right; without it, whatever root is named is trusted",
+    "version-gap": "also pass the roots in between, the oldest first: `root-N.trust` of the key store",
+    "rollback": "the vehicle accepted a newer root: leave `--root` out, or pass the newer one",
+    "fork": "a holder of the root key signed two roots of one version: find out who, and replace the key",
+    "unknown-key": "a root key of the previous root must sign it; for another fleet's root, use another `--state-dir`",
+    REVOKED: "sign it again with the replacement key; `rtshcua keys list` shows the trusted keys",
+    "superseded": "run the command again: it uses the root that the vehicle has now",
+    "damaged": "restore `trust/` in the state folder; without it, any root that is named is trusted",
 }
 
 
 class Trusted(NamedTuple):
-    """The root to fly under, with its signed bytes, and the `others` that lead to it or were accepted before it, newest
-    first. `store` is where the vehicle keeps what it accepted, `accepted` what lay there, and `keeps` says that this
-    one is to be kept there from this flight on; `news` is what there is to tell then.
+    """The trust root of a flight and its signed octets. `others` are its predecessors, newest first. `store` keeps the
+    vehicle's accepted root, which was `accepted`; `keeps`: this root is stored from this flight on, and `news` is the
+    note about that.
 
-    `distrust` says why nothing may fly under it that is not in the air already.
+    `distrust` is the reason why no new flight may begin under it; a vehicle in the air is brought down.
     """
 
     root: TrustRoot
@@ -47,14 +47,14 @@ class Trusted(NamedTuple):
     distrust: Refusal | None = None
 
     def before(self, refused: Refusal) -> Iterator["Trusted"]:
-        """The roots under which the bundle may have begun to fly, where something was revoked or has expired since."""
+        """The roots under which the flight may have begun, if the bundle was `refused` for a revocation or expiry."""
         if refused.slug in (REVOKED, *LAPSED):
             for signed in (self.signed, *self.others):
                 with suppress(Untrusted):
                     yield Trusted(opened_root(signed), signed, distrust=self.distrust or refused)
 
     def superseded(self) -> Refusal | None:
-        """Why nothing new flies under it: the vehicle accepted another root since, which may revoke keys."""
+        """The refusal if the vehicle has accepted another root since, which may revoke keys."""
         if self.store is None:
             return None
         try:
@@ -67,11 +67,11 @@ class Trusted(NamedTuple):
         return None
 
     def settle(self, *, resumed: bool) -> str | Refusal:
-        """What there is to tell. The vehicle accepts the root, unless it is in the air and comes down as it began.
-        Raises OSError where that cannot be kept.
+        """Store the root as accepted, unless the flight is `resumed`; return a note for the user. Raises OSError if it
+        cannot be stored.
         """
         if resumed:
-            return f"{self.distrust.text}; it is brought down all the same" if self.distrust is not None else ""
+            return f"{self.distrust.text}; the vehicle is brought down anyway" if self.distrust is not None else ""
         refusal = self.distrust or self.superseded()
         if refusal is not None:
             return refusal
@@ -81,10 +81,10 @@ class Trusted(NamedTuple):
 
 
 def trust(roots: Sequence[Path], data: Path, state: Path, vehicle: str | None, now_us: int) -> Trusted:
-    """The trust root for a vehicle, of those that were named, else of the key store's.
+    """Select the trust root for a vehicle, from the named roots or else the key store.
 
-    Raises `Untrusted` and OSError; but what is the matter with the root that was accepted last, what does not follow
-    from it, and what has expired, is `distrust`.
+    A damaged accepted root, a root that does not follow from it, and an expired root are reported as `distrust`. Raises
+    `Untrusted` and OSError for other errors.
     """
     store = None if vehicle is None else RootStore(state, vehicle)
     kept, distrust = None, None
@@ -92,7 +92,7 @@ def trust(roots: Sequence[Path], data: Path, state: Path, vehicle: str | None, n
         kept = None if store is None else store.kept()
     except (Untrusted, OSError) as error:
         distrust = _refusal(error)
-    chain = _given(roots, data, needed=kept is None)
+    chain = _read_roots(roots, data, needed=kept is None)
     try:
         signed = root_in_force(kept, chain, named=bool(roots), now_us=now_us)
         _open(signed, now_us)
@@ -107,20 +107,20 @@ def trust(roots: Sequence[Path], data: Path, state: Path, vehicle: str | None, n
     root = opened_root(signed)
     others = tuple(each for each in (*reversed(chain), kept) if each not in (None, signed))
     keeps = store is not None and signed != kept and not (kept is None and root.development)
-    news = told(opened_root(kept), root) if distrust is None and keeps and kept is not None else ""
+    news = succession_note(opened_root(kept), root) if distrust is None and keeps and kept is not None else ""
     return Trusted(root, signed, others, store, kept, keeps, news, distrust)
 
 
-def _given(roots: Sequence[Path], data: Path, *, needed: bool) -> list[bytes]:
-    """The roots that were named, else those of the key store, if it is there or needed."""
+def _read_roots(roots: Sequence[Path], data: Path, *, needed: bool) -> list[bytes]:
+    """Read the named roots, else those of the key store if it exists or is needed."""
     if roots:
-        return [_named(path) for path in roots]
+        return [_read_root_file(path) for path in roots]
     store = KeyStore(data)
     return store.chain() if needed or store.exists() else []
 
 
-def _named(path: Path) -> bytes:
-    """The root in a file, of which only the form is looked at. Raises `Untrusted`, naming the file, and OSError."""
+def _read_root_file(path: Path) -> bytes:
+    """Read a root from a file and check its form only. Raises `Untrusted` with the file's name, and OSError."""
     signed = read_root(path)
     try:
         cose.unverified(signed, limit=MAX_ROOT)
@@ -140,8 +140,8 @@ def _open(signed: bytes, now_us: int) -> TrustRoot:
     return open_root(signed, pinned=cose.unverified(signed, limit=MAX_ROOT).kid, now_us=now_us)
 
 
-def told(before: TrustRoot, root: TrustRoot) -> str:
-    """What a vehicle accepted, in a line."""
+def succession_note(before: TrustRoot, root: TrustRoot) -> str:
+    """The note that a vehicle accepted `root` in place of `before`."""
     gone = len(root.revocations - before.revocations)
-    revoked = f"; it revokes {gone} key{'s' * (gone > 1)} more" if gone else ""
-    return f"trust root version {root.version} is accepted in the place of version {before.version}{revoked}"
+    revoked = f"; it revokes {gone} more key{'s' * (gone > 1)}" if gone else ""
+    return f"trust root version {root.version} replaces version {before.version}{revoked}"

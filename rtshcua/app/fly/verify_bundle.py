@@ -1,4 +1,4 @@
-"""The stage that verifies: the bundle in force under a trust root, and the key that signs the log of its flight."""
+"""The stage that verifies the bundle under a trust root and selects the key that signs the log."""
 
 import secrets
 from collections.abc import Callable
@@ -24,9 +24,9 @@ from rtshcua.wire.keys import SEED_BYTES, Duty, SigningKey, VerificationKey
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, key_refusal, open_root
 from rtshcua.wire.untrusted import Untrusted
 
-#: where it stands which vehicle a bundle is for
-IDENTITY_HELP = "`identity` of the policy's `vehicle` says which one it is for, `--vehicle` which one this is"
-#: how each kind of document is handed to a flight
+#: the help for a bundle of another vehicle
+IDENTITY_HELP = "the bundle is for the `identity` of its policy's `vehicle`; `--vehicle` names this vehicle"
+#: the command that hands each kind of document to a flight
 HANDED_IN = {
     names.APPROVAL: "`rtshcua approve --to` hands one to a flight",
     names.RECALL: "`rtshcua recall --to` hands one to a flight",
@@ -34,7 +34,7 @@ HANDED_IN = {
     names.CANCELLATION: "`cancel` of `rtshcua mcp` hands one to a flight",
 }
 
-#: the mode of what is decided in this process, of the mode that was asked for
+#: the mode of an executor in this process, by the requested mode
 _HERE = {mode: EnforcementMode.SOFTWARE for mode in EnforcementMode if mode.apart}
 _NOT_HERE = ("mode-refused", "wrong-vehicle")
 
@@ -48,8 +48,8 @@ class LogNotSigned(Exception):
 
 
 class LogSigner:
-    """The log's key, until it is handed over: this process signs, or a boundary, which then has the key alone. `kid`
-    names it, and `public` is its public half; there may be no more of it here.
+    """Signs the log: with the key in this process, or after `hand_over` through the boundary, which then holds the only
+    copy of the key. `kid` is the key's id, `public` its public half.
     """
 
     def __init__(self, key: SigningKey | VerificationKey) -> None:
@@ -58,22 +58,22 @@ class LogSigner:
         self.use(key)
 
     def use(self, key: SigningKey | VerificationKey) -> None:
-        """This process signs, with this key, if it has it."""
+        """Sign in this process with `key`. With a verification key there is nothing to sign with yet."""
         self.kid, self.public = key.kid, key.public
         self._key, self._elsewhere = (key if isinstance(key, SigningKey) else None), None
 
     def hand_over(self, elsewhere: Callable[[bytes], bytes | Refusal]) -> None:
-        """Who has the key too signs from now on; it is let go here."""
+        """Sign by calling `elsewhere` from now on, and drop the key."""
         self._key, self._elsewhere = None, elsewhere
 
     def key(self) -> SigningKey:
-        """The key. Raises LookupError once it was handed over, and where it never was here."""
+        """The key. Raises LookupError if this process does not hold it."""
         if self._key is None:
-            raise LookupError("the log's key is not here")
+            raise LookupError("this process does not hold the log's key")
         return self._key
 
     def sign(self, checkpoint: bytes) -> bytes:
-        """The signature under a checkpoint. Raises LogNotSigned where the boundary does not sign it."""
+        """The signature of a checkpoint. Raises LogNotSigned if the boundary refuses to sign."""
         if self._elsewhere is None:
             return self.key().sign(checkpoint, duty=Duty.LOG)
         signed = self._elsewhere(checkpoint)
@@ -84,7 +84,7 @@ class LogSigner:
 
 
 class Verified(NamedTuple):
-    """A bundle, as it was given and in force; under what it is trusted; and who signs the log."""
+    """A verified bundle: its octets, its loaded form, its trust root, and the signer of the log."""
 
     bundle: bytes
     loaded: Loaded
@@ -93,11 +93,12 @@ class Verified(NamedTuple):
 
 
 def verify(context: FlightContext, bundle: bytes, flight: bytes | None = None) -> Verified | Refusal:
-    """The bundle under the trust root that counts, as a flight of this id, or else of a new one. Raises OSError.
+    """Verify and load the bundle under the vehicle's trust root, with the flight id `flight` or a new one. Raises
+    OSError.
 
-    Where the root does not follow from the one that was accepted last, or has expired, or a key of the bundle or the
-    log has, or is revoked, a run of this bundle may still have broken off in the air: then it is brought down under the
-    root that was given.
+    If the root does not follow from the last accepted one, or the root or a key has expired or is revoked, a run of
+    this bundle may still have broken off in the air. Then the bundle is loaded under the given root, to bring the
+    vehicle down.
     """
     request = context.request
     try:
@@ -121,25 +122,27 @@ def verify(context: FlightContext, bundle: bytes, flight: bytes | None = None) -
 
 
 def read_bundle(path: Path) -> bytes | Refusal:
-    """A bundle's octets. Raises OSError."""
+    """Read a bundle, and refuse a file that is clearly something else. Raises OSError."""
     data = read_regular(path, MAX_BUNDLE)
     refusal = other_kind(path)
     if refusal is not None:
         return refusal
     if len(data) > MAX_BUNDLE:
-        return Refusal("too-large", f"`{path}` is larger than a bundle may be", "", ExitCode.INPUT)
+        return Refusal(
+            "too-large", f"`{path}` is larger than {MAX_BUNDLE} bytes, the limit for a bundle", "", ExitCode.INPUT
+        )
     try:
         kind = kind_of(data)
     except Untrusted:
         return data
-    return Refusal("wrong-kind", f"`{path}` is no bundle, but `{kind.name}`", HANDED_IN[kind], ExitCode.INPUT)
+    return Refusal("wrong-kind", f"`{path}` is not a bundle: it is `{kind.name}`", HANDED_IN[kind], ExitCode.INPUT)
 
 
 def other_kind(path: Path) -> Refusal | None:
-    """Why a file is surely no bundle; None where it may be one."""
-    if path.suffix == ".rts":  # what names it elsewhere is of the ground
+    """The refusal if the file is clearly not a bundle; None if it may be one."""
+    if path.suffix == ".rts":  # the general check is in `ground`, which the onboard side does not import
         advice = f"`rtshcua compile {path} -o {path.stem}.bundle` makes one of it"
-        return Refusal("wrong-kind", f"`{path}` is a source, and no bundle", advice, ExitCode.INPUT)
+        return Refusal("wrong-kind", f"`{path}` is a source, not a bundle", advice, ExitCode.INPUT)
     mistaken = no_bundle(path)
     return None if mistaken is None else Refusal(mistaken.slug, str(mistaken), mistaken.help, ExitCode.INPUT)
 
@@ -147,7 +150,7 @@ def other_kind(path: Path) -> Refusal | None:
 def load_bundle(
     request: FlightRequest, bundle: bytes, root: TrustRoot, now: Now, flight: bytes | None = None
 ) -> Loaded | Refusal:
-    """The bundle in force in this process, as a flight of this id, or else of a new one."""
+    """Verify and load the bundle in this process, with the flight id `flight` or a new one."""
     identity = request.vehicle
     if identity is None:
         try:
@@ -167,8 +170,8 @@ def load_bundle(
 
 
 def local_log_key(context: FlightContext) -> SigningKey:
-    """The key by which this process signs the log; one that is drawn, and nobody knows, for what comes down without the
-    boundary that has it.
+    """The key with which this process signs the log. With a listening boundary, which has the real key, it is a random
+    key for a vehicle that is brought down without that boundary.
     """
     if context.request.boundary_socket is not None:
         return SigningKey.from_seed(secrets.token_bytes(SEED_BYTES), duty=Duty.LOG, development=True)
@@ -176,8 +179,8 @@ def local_log_key(context: FlightContext) -> SigningKey:
 
 
 def lapsed(bundle: bytes, signed_root: bytes, log_key: bytes, loaded: Loaded, clock: LinkClock) -> Refusal | None:
-    """Why what was verified by this machine's time of day, or before a wait, does not hold by the vehicle's now; None
-    where it does. `log_key` names the one that signs the log.
+    """Verify root, bundle and log key again at the clock's present time, which may come from the vehicle. The refusal
+    if one has expired; None if all are valid. `log_key` is the id of the log key.
     """
     now_us = clock.now().utc_us
     try:
@@ -189,7 +192,7 @@ def lapsed(bundle: bytes, signed_root: bytes, log_key: bytes, loaded: Loaded, cl
 
 
 def may_have_flown(request: FlightRequest, loaded: Loaded) -> bool:
-    """Whether a run of this bundle may be in the air; with one that waits, of whatever bundle was handed in."""
+    """Whether a run of this bundle may be in the air; with `--wait`, a run of any bundle."""
     if request.wait_s is not None:
         return True
     try:
@@ -199,13 +202,13 @@ def may_have_flown(request: FlightRequest, loaded: Loaded) -> bool:
 
 
 def not_begun(request: FlightRequest, loaded: Loaded, clock: LinkClock) -> str | None:
-    """Why a flight of the bundle would not begin, in words."""
+    """The reason why a flight of the bundle would not begin, as text; None if it would."""
     late = expired(loaded, clock.now())
     return flown_before(request.kept_in, loaded) or (None if late is None else f"{late.text}; {late.help}")
 
 
 def _identity(request: FlightRequest, bundle: bytes) -> str | None:
-    """Who the vehicle is, also by a bundle that nobody verified yet; None where it does not say."""
+    """The vehicle's identity: the requested one, or the claim of the unverified bundle; None if it has no claim."""
     try:
         return request.vehicle or claimed_vehicle(bundle)
     except Untrusted:
@@ -222,7 +225,7 @@ def _log_key(context: FlightContext) -> SigningKey | VerificationKey:
 def _under(
     context: FlightContext, bundle: bytes, trusted: Trusted, key: SigningKey | VerificationKey, flight: bytes | None
 ) -> Loaded | Refusal:
-    """The bundle under a root; under one that is not to be trusted any more, whatever has expired since."""
+    """Load the bundle under a root. Under a distrusted root, expiry is ignored."""
     now = context.clock.now()
     if trusted.distrust is not None:
         now = Now(now.monotonic_us, 0, now.utc_error_us)
@@ -238,7 +241,7 @@ def _under(
 def _untrusted_log_key(key: SigningKey | VerificationKey, root: TrustRoot) -> Refusal | None:
     if key.kid in root.revocations:
         text = f"the trust root revokes the log key {key.kid.hex()}"
-        return Refusal(REVOKED, text, "`--log-key` gives the one that took its place", ExitCode.UNTRUSTED)
+        return Refusal(REVOKED, text, "select its replacement with `--log-key`", ExitCode.UNTRUSTED)
     if key.kid not in root.keys_for(Duty.LOG):
         text = f"the trust root names no log key {key.kid.hex()}: nobody could verify the log"
         return Refusal("unknown-key", text, "choose a key that the root names with `--log-key`", ExitCode.UNTRUSTED)
@@ -246,10 +249,12 @@ def _untrusted_log_key(key: SigningKey | VerificationKey, root: TrustRoot) -> Re
 
 
 def _unverifiable(root: TrustRoot, log_key: bytes, vehicle: str, now_us: int) -> Refusal | None:
-    """Why nobody could verify a log that the key of this name signs now; None where they could."""
-    named = root.keys_for(Duty.LOG).get(log_key)  # none: `local_log_key`
+    """The refusal if the log key is not valid now, so that nobody could verify the log; None if it is valid."""
+    named = root.keys_for(Duty.LOG).get(log_key)  # None for a random key of `local_log_key`
     refusal = None if named is None else key_refusal(named, vehicle=vehicle, now_us=now_us)
     if refusal is None:
         return None
-    text = f"the log key {log_key.hex()} may not speak for `{vehicle}` now: nobody could verify the log"
-    return Refusal(refusal, text, "`--log-key` gives one that may; `rtshcua keys replace` makes it", code_of(refusal))
+    text = f"the log key {log_key.hex()} is not valid for `{vehicle}` now: nobody could verify the log"
+    return Refusal(
+        refusal, text, "select a valid key with `--log-key`; `rtshcua keys replace` makes one", code_of(refusal)
+    )

@@ -1,4 +1,4 @@
-"""How whoever started a flight is told of it and asked: the ports that a front end fills in."""
+"""The ports through which a flight shows its progress and unlocks keys; a front end implements them."""
 
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
@@ -10,53 +10,53 @@ from rtshcua.wire.keys import Duty, SigningKey
 
 
 class LiveView(Protocol):
-    """The view of one flight. It never makes the flight wait."""
+    """The view of one flight. It never blocks the flight."""
 
     @property
     def shown(self) -> bool:
-        """Whether all of it was shown, once the view has ended."""
+        """Whether all messages were shown, once the view has ended."""
         ...
 
     def post(self, message: Message, *, keep: bool = True) -> None:
-        """Tell it something; unless `keep`, only if it can be told now."""
+        """Send a message to the view; without `keep`, drop it if it cannot be sent at once."""
         ...
 
     def flush(self) -> None:
-        """Tell it what waits, as far as it takes that now."""
+        """Send waiting messages, as far as the view accepts them now."""
         ...
 
 
 class Console(Protocol):
-    """Where a flight was started."""
+    """The console from which a flight was started."""
 
     @property
     def as_json(self) -> bool:
-        """A program reads what is told."""
+        """Whether output is JSON for a program."""
         ...
 
     @property
     def live(self) -> bool:
-        """The view is drawn anew all the time."""
+        """Whether the view is redrawn continuously."""
         ...
 
     def say(self, text: str) -> None:
-        """Tell a person, beside the view."""
+        """Show a text outside of the view."""
         ...
 
     def emit(self, event: Mapping[str, object]) -> None:
-        """Tell a program, beside the view."""
+        """Write a JSON event outside of the view."""
         ...
 
     def view(self) -> AbstractContextManager[LiveView]:
-        """The view of a flight, until it is left: then all of it is shown, or whoever looked has gone."""
+        """Open the view of a flight. It closes after all messages are shown, or its reader has gone."""
         ...
 
     def detail_of(self, event: str, detail: str) -> str:
-        """An effect's detail in words, by its event."""
+        """The detail of an effect as text, by its event."""
         ...
 
     def unlock(self, duty: Duty, path: Path | None) -> SigningKey:
-        """The key of a duty, from a file or else the key store; a person may be asked for its passphrase. Raises
-        `Untrusted` and OSError.
+        """The key of a duty, from a file or else the key store; may ask the user for the passphrase. Raises `Untrusted`
+        and OSError.
         """
         ...

@@ -1,8 +1,8 @@
-"""`rtshcua run --wait`: a vehicle that is connected under a policy, and flies nothing until a bundle is handed in.
+"""`rtshcua run --wait`: connect to the vehicle and wait until a bundle is handed in.
 
-The bundle that the run was given says under which policy, on which vehicle; its mission does not fly. What is handed in
-at the sockets is a bundle, which is admitted or refused by what `run` asks of one, or a recall, which ends the wait.
-Nothing that moves the vehicle is sent meanwhile, and its geofence stays as it is.
+The bundle on the command line names the policy and the vehicle; its mission does not fly. A bundle that is handed in at
+a socket is admitted if `run` would accept it. A recall ends the wait. During the wait no motion command is sent, and
+the geofence is not changed.
 """
 
 import time
@@ -52,31 +52,31 @@ from rtshcua.wire.document import kind_of
 from rtshcua.wire.receipt import Receipt, decode
 from rtshcua.wire.untrusted import Untrusted
 
-#: how often who follows is told how the vehicle is, in seconds
-TOLD_S: Final = 1.0
-#: the least time between two refusals that a person is told of, in seconds: whoever hands in may do so by the hundred
-SAID_S: Final = 1.0
-#: what ground stations on the link are told
+#: the interval between two reports of the vehicle's state to the sockets, in seconds
+REPORT_S: Final = 1.0
+#: the least time between two refusals that are shown, in seconds: a client may hand in hundreds of documents
+REFUSAL_S: Final = 1.0
+#: the text that ground stations on the link show
 ANNOUNCED: Final = "waits for a mission"
 
 _INFO: Final = 6  # MAV_SEVERITY_INFO
 _POLL_S: Final = 0.05
 _ADMITTED: Final = "admitted: the flight begins, and each step is decided before it is sent"
-_NOTHING_FLIES: Final = "nothing flies yet: a bundle is handed in first"
+_NOTHING_FLIES: Final = "no mission is in force yet: hand in a bundle first"
 
 _encode = msgspec.json.Encoder().encode
 
 
 class Admitted(NamedTuple):
-    """The bundle that flies, as it was handed in and as it was loaded."""
+    """The bundle that flies: its octets and its loaded form."""
 
     data: bytes
     loaded: Loaded
 
 
 class MissionWait:
-    """One wait. `admit` says whether a bundle may fly, `superseded` and `lost` why none may any more.
-    `most_s`: how long it waits at most, in seconds. `notes`: what there is to tell first.
+    """One wait. `admit` loads a bundle or refuses it. `superseded` and `lost` return a refusal once no bundle can fly.
+    `most_s` is the longest wait, in seconds; `notes` are shown first.
     """
 
     def __init__(
@@ -97,21 +97,24 @@ class MissionWait:
         self._notes = notes
         self._monitor = StateMonitor(base.policy)
         self._refused = 0
-        self._said_s = -SAID_S
+        self._refused_s = -REFUSAL_S
 
     def follow(self, events: Sequence[Event]) -> Admitted | Refusal:
-        """Wait until a bundle is admitted. `events` came while the vehicle was connected."""
+        """Wait until a bundle is admitted. `events` are those received while connecting."""
         policy = self._base.bundle.policy
         begun_s = time.monotonic()
-        told_s, unready = begun_s - TOLD_S, ""
-        text = f"{self._base.vehicle} waits under {policy.name}@{policy.version}: nothing flies until a bundle comes in"
+        reported_s, unready = begun_s - REPORT_S, ""
+        text = (
+            f"{self._base.vehicle} waits under {policy.name}@{policy.version}: nothing flies until a bundle is "
+            f"handed in"
+        )
         for note in self._notes:
-            self._tell("note", f"note: {note}")
-        self._tell("waiting", f"{text}; Ctrl-C or a recall ends it", vehicle=self._base.vehicle)
+            self._report("note", f"note: {note}")
+        self._report("waiting", f"{text}; Ctrl-C or a recall ends the wait", vehicle=self._base.vehicle)
         self._vehicle.announce(_INFO, ANNOUNCED)
         while True:
             if self._interrupts.wish() is not None:
-                return _ended("interrupted", "interrupted while it waited: nothing was flown", ExitCode.INTERRUPTED)
+                return _ended("interrupted", "interrupted while waiting: nothing was flown", ExitCode.INTERRUPTED)
             now_s = time.monotonic()
             if now_s - begun_s >= self._most_s:
                 text = f"no bundle was admitted within {self._most_s:g} s: nothing was flown"
@@ -119,13 +122,13 @@ class MissionWait:
             for event in events:
                 if isinstance(event, Readings):
                     self._monitor.update(event)
-            if now_s - told_s >= TOLD_S:
+            if now_s - reported_s >= REPORT_S:
                 over = self._superseded() or self._lost()
                 if over is not None:
                     return over
-                told_s, before, unready = now_s, unready, self._vehicle.driver.unready or ""
+                reported_s, before, unready = now_s, unready, self._vehicle.driver.unready or ""
                 if unready != before:
-                    self._tell("vehicle", f"not ready yet: {unready}" if unready else "the vehicle is ready")
+                    self._report("vehicle", f"not ready yet: {unready}" if unready else "the vehicle is ready")
                 self._agents.tell(self._state(unready))
             admitted = self._handed_in()
             if admitted is not None:
@@ -152,7 +155,7 @@ class MissionWait:
             assert isinstance(receipt, Receipt)
             self._agents.answer(event.sender, receipt.slug, receipt.text)
             if receipt.accepted:
-                return _ended("recalled", "recalled while it waited: nothing was flown", ExitCode.ABORTED)
+                return _ended("recalled", "recalled while waiting: nothing was flown", ExitCode.ABORTED)
             self._refusal(receipt.slug, receipt.text)
             return None
         over = None if kind is not None else self._superseded()
@@ -165,19 +168,19 @@ class MissionWait:
             return None
         self._agents.answer(event.sender, "accepted", _ADMITTED)
         mission = outcome.bundle.mission.name
-        self._tell("admitted", f"`{mission}` was handed in and admitted", mission=mission)
+        self._report("admitted", f"`{mission}` was handed in and admitted", mission=mission)
         return Admitted(event.document, outcome)
 
     def _refusal(self, slug: str, text: str) -> None:
-        """Tell a person of a refusal, at most once in `SAID_S`."""
+        """Show a refusal, at most once in `REFUSAL_S`."""
         self._refused += 1
         now_s = time.monotonic()
-        if now_s - self._said_s >= SAID_S:
-            self._said_s = now_s
-            self._tell("not-admitted", f"refused what was handed in: {text} ({slug})", slug=slug, refused=self._refused)
+        if now_s - self._refused_s >= REFUSAL_S:
+            self._refused_s = now_s
+            self._report("not-admitted", f"refused the document: {text} ({slug})", slug=slug, refused=self._refused)
 
     def _state(self, unready: str) -> bytes:
-        """How the vehicle is, for who follows: what keeps it from being ready, and every signal with its age."""
+        """The JSON line for the sockets: why the vehicle is not ready, and every signal with its age."""
         seen, now_us = self._vehicle.driver.seen, self._clock.now().monotonic_us
         state, current = self._monitor.state(now_us), self._monitor.current(now_us)
         signals = [
@@ -189,7 +192,7 @@ class MissionWait:
             }
             for signal in self._base.bundle.policy.signals
         ]
-        told = {
+        report = {
             "type": "vehicle",
             "ready": not unready,
             "unready": unready or None,
@@ -197,10 +200,10 @@ class MissionWait:
             "airborne": bool(seen.airborne),
             "signals": signals,
         }
-        return _encode(told) + b"\n"
+        return _encode(report) + b"\n"
 
-    def _tell(self, event: str, text: str, **more: object) -> None:
-        """Say how it stands: a line for a person, an object for a program."""
+    def _report(self, event: str, text: str, **more: object) -> None:
+        """Report an event: as a line of text, or as a JSON object."""
         if self._console.as_json:
             self._console.emit({"event": event, "text": text} | more)
         else:
@@ -212,7 +215,7 @@ def _ended(slug: str, text: str, code: ExitCode) -> Refusal:
 
 
 def _kind_of(data: bytes) -> names.Artefact | None:
-    """Which kind of document these bytes are, if they are one."""
+    """The kind of document in `data`; None if it is not a document."""
     try:
         return kind_of(data)
     except Untrusted:
@@ -223,8 +226,8 @@ def _kind_of(data: bytes) -> names.Artefact | None:
 
 
 def await_mission(context: FlightContext, begun: Begun, previous: LogBefore | None) -> Begun | Refusal:
-    """Wait, connected, for the bundle that flies; the one of a flight that broke off in the air is not waited for.
-    Raises OSError.
+    """Connect and wait for the bundle that flies. If the previous flight broke off in the air, return its bundle
+    without a wait. Raises OSError.
     """
     transport = open_link(context)
     if isinstance(transport, Refusal):
@@ -268,12 +271,12 @@ def _wait(
     events = await_heartbeat(context, vehicle, signing, hurried=hurried)
     if isinstance(events, Refusal):
         return events
-    aloft = None if previous is None else broken_off(context, previous, base, vehicle, events)
-    if isinstance(aloft, Refusal):
-        return aloft
-    if aloft is not None:
-        return _bring_down(context, begun, aloft, agents)
-    refusal = trusted.distrust or begun.boundary_refusal()  # what that is not enough for is to fly anything new
+    unfinished = None if previous is None else broken_off(context, previous, base, vehicle, events)
+    if isinstance(unfinished, Refusal):
+        return unfinished
+    if unfinished is not None:
+        return _bring_down(context, begun, unfinished, agents)
+    refusal = trusted.distrust or begun.boundary_refusal()  # enough to bring a vehicle down, not for a new flight
     if refusal is not None:
         return refusal
     notes = list(signing.notes)
@@ -299,28 +302,28 @@ def _wait(
     return begun._replace(bundle=admitted.data, loaded=admitted.loaded)
 
 
-def _bring_down(context: FlightContext, begun: Begun, aloft: Verified, agents: Agents) -> Begun:
-    """The bundle of a flight that broke off in the air, in force where decisions are made, or in this process."""
-    same_root = aloft.trusted.root == begun.trusted.root and aloft.trusted.distrust is None
-    apart = begun.apart if same_root or context.listening is not None else None  # it has the one root, or its own
-    loaded = aloft.loaded if apart is None else apart.load(aloft.bundle, context.clock.now())
+def _bring_down(context: FlightContext, begun: Begun, unfinished: Verified, agents: Agents) -> Begun:
+    """The bundle of a flight that broke off in the air, loaded by the boundary, or in this process if it refuses."""
+    same_root = unfinished.trusted.root == begun.trusted.root and unfinished.trusted.distrust is None
+    apart = begun.apart if same_root or context.listening is not None else None
+    loaded = unfinished.loaded if apart is None else apart.load(unfinished.bundle, context.clock.now())
     if isinstance(loaded, Refusal):
-        context.console.say(f"note: {loaded.text}; it is brought down all the same")
-        loaded = aloft.loaded
+        context.console.say(f"note: {loaded.text}; the vehicle is brought down anyway")
+        loaded = unfinished.loaded
     if not isinstance(loaded.executor, IsolatedExecutor):
         begun.log_key.use(local_log_key(context))
     agents.fly(loaded)
-    return begun._replace(bundle=aloft.bundle, loaded=loaded, trusted=aloft.trusted)
+    return begun._replace(bundle=unfinished.bundle, loaded=loaded, trusted=unfinished.trusted)
 
 
 def broken_off(
     context: FlightContext, previous: LogBefore, base: Loaded, vehicle: ConnectedVehicle, events: list[Event]
 ) -> Verified | Refusal | None:
-    """The bundle of the flight before this run, and under what it is trusted, if that did not end, and the vehicle is
-    in the air still: a restart brings it down, as `run` does that is given the same bundle again. No charge lasts
-    longer than `endurance_us` after the last moment at which it could take off: what flies then is somebody else's.
+    """The verified bundle of the previous flight, if that flight did not end and the vehicle is still in the air. It
+    is then brought down, as by `run` with the same bundle. None if the bundle expired more than `endurance_us` ago: no
+    charge lasts that long, so another operator flies the vehicle.
 
-    Raises OSError for a bundle that cannot be read.
+    Raises OSError if the bundle cannot be read.
     """
     if previous.broken_off is None or not still_flies(vehicle, context.clock, events):
         return None
@@ -338,19 +341,26 @@ def admit_bundle(
     context: FlightContext, data: bytes, base: Loaded, trusted: Trusted, log_key: bytes, signing: LinkSigning,
     apart: BoundaryClient | None = None,
 ) -> Loaded | Refusal:  # fmt: skip
-    """What `run` asks of a bundle before it connects, of one that was handed in; and that its policy is the one that is
-    waited under; and that the boundary takes it. It flies as the flight that the sockets tell of.
+    """Load a bundle that was handed in. It must pass the checks of `run`, have the policy of `base`, and be accepted by
+    the boundary. It flies under the flight id of `base`, which the sockets have announced.
     """
     loaded = load_bundle(context.request, data, trusted.root, context.clock.now(), base.in_force.flight)
     if isinstance(loaded, Refusal):
         return loaded
     if loaded.bundle.policy_digest != base.bundle.policy_digest:
         theirs, ours = loaded.bundle.policy, base.bundle.policy
-        text = f"it is under {theirs.name}@{theirs.version}, and this vehicle waits under {ours.name}@{ours.version}"
-        return Refusal("other-policy", text, "the policy's envelope is that of the bundle that is waited with")
-    if loaded.bundle.mission_digest == base.bundle.mission_digest:  # an agent has it; a person may have signed
-        text = "it is the bundle that is waited with: that says the policy, and its own mission does not fly"
-        return Refusal("waited-with", text, "sign a mission of your own under its policy")
+        text = (
+            f"the bundle is under {theirs.name}@{theirs.version}, but the vehicle waits under "
+            f"{ours.name}@{ours.version}"
+        )
+        return Refusal("other-policy", text, "use the signed policy of the bundle that `run --wait` was started with")
+    if (
+        loaded.bundle.mission_digest == base.bundle.mission_digest
+    ):  # agents know this bundle, and a person may have approved its steps
+        text = (
+            "this is the bundle that `run --wait` was started with: it names the policy, and its mission does not fly"
+        )
+        return Refusal("waited-with", text, "compile and sign another mission under its policy")
     refusal = (
         lapsed(data, trusted.signed, log_key, loaded, context.clock)
         or stranded_signal(context.request, loaded, signing)

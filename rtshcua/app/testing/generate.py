@@ -107,11 +107,9 @@ def _chosen(found: list[_Candidate], asked: set[str], request: GenerateRequest) 
             return few[0]
     if not names:
         return Refusal(
-            "usage", "there is no policy to write tests of", "name a source that declares one, or imports it"
+            "usage", "there is no policy to generate tests for", "name a source that declares or imports a policy"
         )
-    return Refusal(
-        "usage", f"there are {len(names)} policies", f"`--policy` says which one is meant{_listed(names, ': ')}"
-    )
+    return Refusal("usage", f"there are {len(names)} policies", f"select one with `--policy`{_listed(names, ': ')}")
 
 
 def _listed(names: Sequence[str], before: str = "") -> str:

@@ -88,7 +88,7 @@ def run(
             return say_refused(incidents, as_json=as_json)
         request = FlightRequest(
             bundle=bundle, link=address_, mode=decides_in, data=data_folder(), state=state, runs=runs,
-            simulator=words if incidents is None else incidents.words, speed=speed, vehicle=vehicle,
+            simulator=words if incidents is None else incidents.options, speed=speed, vehicle=vehicle,
             roots=tuple(root or ()), log_key=log_key, fence=not no_fence and not rehearsal, signing_key=signing_key,
             unsigned_radio=unsigned_radio, agent_socket=agent_socket, operator_socket=operator_socket,
             agent_group=group if isinstance(group, int) else None, dry_run=rehearsal, system=system,

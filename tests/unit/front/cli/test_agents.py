@@ -17,7 +17,7 @@ import pytest
 from reference.documents import approval, low, recall, replacement
 from reference.world import Run
 from rtshcua.adapters.agent_socket import GAP_US
-from rtshcua.app.fly.agents import ALIKE, Agents
+from rtshcua.app.fly.agents import SAME_USER, Agents
 from rtshcua.app.fly.narrator import Teller
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.app import main
@@ -165,7 +165,7 @@ def test_operators_have_a_socket_of_their_own_and_are_looked_at_first(tmp_path: 
         assert isinstance(second, Presented)
         assert (first.document[-1], second.document[-1]) == (2, 1), "the operator's comes first"
         assert first.sender != second.sender
-        assert agents.notes() == [ALIKE], "both run as one user"
+        assert agents.notes() == [SAME_USER], "both run as one user"
         agents.events(Now(GAP_US * 2, 1, 0))
         assert agents.notes() == [], "which is told once"
         agents.watch([Reply(second.sender, "accepted", "to the agent"), Reply(first.sender, "expired", "to the other")])

@@ -90,7 +90,7 @@ def test_restored_state_folder_is_noted_by_the_boundary_count(tmp_path: Path) ->
     store.keep(2, b"a" * 32)
     session = session_of(store, case.BOUNDARY_KEY, aloft=False)
     session.begun(b"b" * 32, 8)
-    assert "counts 2 sessions of the boundary, its own process 7" in session.note
+    assert "counts 2 sessions of the boundary, and its process 7" in session.note
     assert store.kept() == (8, b"b" * 32), "and goes on from there"
     same = session_of(store, case.BOUNDARY_KEY, aloft=False)
     same.begun(b"c" * 32, 9)
@@ -106,7 +106,7 @@ def test_a_key_that_the_boundary_has_is_not_held_here(tmp_path: Path) -> None:
 
 def test_run_stops_on_the_ground_if_no_session_begins(tmp_path: Path) -> None:
     store = BoundaryStore(tmp_path, "quad-07")
-    with pytest.raises(OSError, match="cannot keep that its session begins"):
+    with pytest.raises(OSError, match="cannot store the start of its session"):
         session_of(store, case.BOUNDARY_KEY, aloft=False).begun(START, None)
     session_of(store, case.BOUNDARY_KEY, aloft=True).begun(START, None)
 
@@ -126,7 +126,7 @@ def test_unreadable_state_does_not_block_an_airborne_vehicle(tmp_path: Path) -> 
     assert (refused.slug, refused.code) == ("damaged", ExitCode.INPUT)
     session = session_of(store, case.BOUNDARY_KEY, aloft=True)
     assert session.key == (case.BOUNDARY_KEY, 0, START)
-    assert "brought down all the same" in session.note
+    assert "brought down anyway" in session.note
     session.begun(b"a" * 32, 0)
     session.ended(b"b" * 32)
     assert store.path.read_bytes() == b"x"

@@ -229,7 +229,9 @@ mission lift under shift@1 on quad {
 """
     (here / "lift.rts").write_text(text, encoding="utf-8")
     assert main(["compile", "lift.rts", *AT]) == ExitCode.UNTRUSTED
-    assert "`rtshcua keys mission agent --role technician --policy shift` makes one that may" in capsys.readouterr().err
+    assert (
+        "`rtshcua keys mission agent --role technician --policy shift` makes a key that may" in capsys.readouterr().err
+    )
     assert main(["keys", "mission", "agent", "--role", "technician", "--policy", "shift"]) == ExitCode.OK
     assert main(["compile", "lift.rts", *AT]) == ExitCode.OK
     source = str(checkout / "missions" / "short.rts")
@@ -299,6 +301,6 @@ def test_a_key_of_another_root_is_warned_of(
     assert main(["compile", *source, "--mission-key", str(path), "--json"]) == ExitCode.OK
     said = capsys.readouterr()
     (warning,) = json.loads(said.out)["warnings"]
-    assert f"names no mission key of this name: {theirs.hex()}" in warning
+    assert f"does not name this mission key: {theirs.hex()}" in warning
     assert said.err.startswith("warning: the trust root of this key store")
     assert main(["compile", *source, "--mission-key", str(path), "--deny-warnings"]) == ExitCode.UNTRUSTED

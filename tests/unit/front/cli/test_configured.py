@@ -48,7 +48,8 @@ def test_settable_parameters_are_parsed_as_numbers() -> None:
     read = settings_of(["FENCE_RADIUS=250", "FENCE_ALT_MAX=80.5"])
     assert {name: value_of(bits) for name, bits in read.items()} == {"FENCE_RADIUS": 250.0, "FENCE_ALT_MAX": 80.5}
     assert would_set(read) == [
-        "a flight would set FENCE_RADIUS to 250, FENCE_ALT_MAX to 80.5, and is judged so; nothing is set here"
+        "a flight would set FENCE_RADIUS to 250, FENCE_ALT_MAX to 80.5; this rehearsal assumes those values and "
+        "sets nothing"
     ]
     assert settings_of(None) == {}
     assert would_set({}) == []

@@ -90,7 +90,7 @@ def test_a_replacement_by_a_key_of_another_root_is_warned_of(
     capsys.readouterr()
     assert main([*words, "--json"]) == ExitCode.OK
     said = capsys.readouterr()
-    assert f"names no mission key of this name: {kid.hex()}" in json.loads(said.out)["warnings"][0]
+    assert f"does not name this mission key: {kid.hex()}" in json.loads(said.out)["warnings"][0]
     assert said.err.startswith("warning: the trust root of this key store")
 
 
@@ -403,5 +403,5 @@ def test_wrong_role_is_refused_before_the_prompt(
     words = ["approve", "low.bundle", "--step", "3", "-o", "yes", "--as", "bob", *FLIGHT]
     assert main(words) == ExitCode.USAGE
     said = " ".join(capsys.readouterr().err.split())
-    assert "the key of bob may not sign as supervisor, but as `nosuch`" in said
+    assert "the key of bob may sign as `nosuch`, but not as supervisor" in said
     assert not (here / "yes").exists()

@@ -79,7 +79,7 @@ def test_a_frame_log_with_a_gap_is_not_vouched_for(ended: Ended, monkeypatch: py
     ended.frames.write(NOW.utc_us, FRAME)
     (missing,) = ended.close()
     assert missing.endswith("missing: the last free space on the disk is reserved for the log (telemetry.tlog)")
-    assert ended.notes == [f"the frame log is not whole: {missing.removesuffix(' (telemetry.tlog)')}"]
+    assert ended.notes == [f"the frame log is incomplete: {missing.removesuffix(' (telemetry.tlog)')}"]
     _, effect, close = ended.records()
     assert (effect["event"], effect["detail"]) == ("frames-lost", missing.removesuffix(" (telemetry.tlog)"))
     assert (close["type"], close["tlog"]) == ("close", None)

@@ -90,7 +90,7 @@ def refused(source: Path, name: str, **options: str | int | None) -> str:
 
 
 def test_start_conditions_are_passed_to_the_simulator(source: Path) -> None:
-    assert incidents(source, "gusts and a lost fix", seed=9).words == [
+    assert incidents(source, "gusts and a lost fix", seed=9).options == [
         "--flavour", "px4", "--seed", "9", "--estimate", "real", "--battery", "80", "--wind", "3,270,0",
     ]  # fmt: skip
 
@@ -105,8 +105,8 @@ def test_missing_scenario_file_is_bad_input(source: Path) -> None:
 
 
 def test_unsupported_incident_is_refused_by_name(source: Path) -> None:
-    assert "`at 4 s runtime_killed(for = 2 s)` goes wrong in virtual time alone" in refused(source, "killed")
-    assert "the scenario says at what time it begins" in refused(source, "at its own time")
+    assert "`at 4 s runtime_killed(for = 2 s)` can be injected in virtual time only" in refused(source, "killed")
+    assert "the scenario sets its start time" in refused(source, "at its own time")
     assert "no scenario `nobody`" in refused(source, "nobody")
     assert "3 scenarios" in refused(source, "")
 

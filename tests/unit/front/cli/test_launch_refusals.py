@@ -39,7 +39,7 @@ START_CLOCK: Any = SimpleNamespace(now=lambda: START)
 def test_older_policy_version_is_refused(tmp_path: Path) -> None:
     FileReplayStore(tmp_path, VEHICLE).open_once(bytes(32), LATER, 0, POLICY.name, POLICY.version + 1)
     refused = refusal_of(replay_check.broke_off(tmp_path, loaded(), cast("Any", None), SystemClock(), []))
-    assert "a later version of `bridge_inspection` than 7" in refused.text
+    assert "already flown under a later version of `bridge_inspection` than 7" in refused.text
     assert (refused.code, refused.slug) == (ExitCode.REFUSED, "old-policy")
 
 
@@ -128,7 +128,7 @@ def test_unknown_link_timestamps_bring_an_airborne_vehicle_home(tmp_path: Path, 
     assert isinstance(signing.verifier, SignedLink), "it can be heard whether it flies"
     if resumed:
         assert timestamps_lost(signing, resumed=True) is None
-        assert any("brought down all the same" in note for note in signing.notes)
+        assert any("brought down anyway" in note for note in signing.notes)
     elif damage == "damaged":
         refused = refusal_of(timestamps_lost(signing, resumed=False))
         assert (refused.code, refused.slug) == (ExitCode.UNTRUSTED, "link-key-damaged")
@@ -216,7 +216,7 @@ def test_missing_log_is_not_reported_as_interrupted(tmp_path: Path) -> None:
     first.begin(log)
     first._held.close()
     before = LogBefore.settle(tmp_path, VEHICLE, None)
-    assert "before broke off" in hanging(before, loaded())
+    assert "broke off" in hanging(before, loaded())
     shutil.rmtree(log.parent)
     told = hanging(LogBefore.settle(tmp_path, VEHICLE, None), loaded())
     assert "is missing, so it is not known whether its flight ended" in told

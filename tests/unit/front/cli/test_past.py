@@ -55,7 +55,7 @@ def test_airborne_vehicle_does_not_wait_for_the_state_folder(tmp_path: Path, log
     grounded._held.close()
     flying = past(tmp_path)
     flying.begin(log, aloft=True)
-    assert "will not know of this one" in flying.note
+    assert "cannot name this one" in flying.note
     flying.end("ab" * 32)
 
 

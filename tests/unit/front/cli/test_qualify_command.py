@@ -44,7 +44,7 @@ LINK = ["--connect", "udpin:127.0.0.1:14550", "--vehicle", "quad-07"]
         ([SHORT, "--connect", "udpin:0.0.0.0:14550", *LINK[2:], "--sitl"], 2, "may be real"),
         ([SHORT, "--connect", "udpin:nowhere", "--vehicle", "quad-07", "--sitl"], 2, "--connect"),
         ([SHORT, *LINK[:2], "--vehicle", "quad-08", "--sitl"], 5, "the policy is for `quad-07`"),
-        ([SHORT, *LINK[:2], "--vehicle", "quad-08", "--sitl"], 5, "`identity` of the policy's `vehicle` says"),
+        ([SHORT, *LINK[:2], "--vehicle", "quad-08", "--sitl"], 5, "`identity` of its policy's `vehicle`"),
         (["missing.rts", *LINK, "--sitl"], 3, "missing.rts"),
         ([SHORT, *LINK, "--sitl"], 4, "holds no keys"),
     ],

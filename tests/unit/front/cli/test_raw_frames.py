@@ -111,4 +111,4 @@ def test_commands_that_were_sent_and_are_not_there_are_not_spoken_for(
     code, said = verify(folder(tmp_path, lines, encoded(without[:9])), capsys, "--audit")
     assert code == ExitCode.OK
     assert "frames" not in slugs(said["proven"])
-    assert "none of them is there" in next(c["text"] for c in said["unproven"] if c["slug"] == "telemetry")
+    assert "none of them is in the telemetry" in next(c["text"] for c in said["unproven"] if c["slug"] == "telemetry")

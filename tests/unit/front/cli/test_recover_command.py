@@ -147,7 +147,7 @@ def test_a_log_that_was_closed_is_not_ended_anew_where_its_end_was_cut_off(
     capsys.readouterr()
     for words in ((run,), ("--dry-run", run)):
         assert recover(*words) == ExitCode.EVIDENCE
-        assert "it was closed once" in capsys.readouterr().err
+        assert "was closed before with another last record" in capsys.readouterr().err
     assert log.read_bytes() == b"".join(whole[:kept])
     assert recover("--json", run) == ExitCode.EVIDENCE
     said = json.loads(capsys.readouterr().out)

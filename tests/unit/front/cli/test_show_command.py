@@ -260,7 +260,7 @@ def test_a_bundle_that_makes_no_sense(tmp_path: Path, capsys: pytest.CaptureFixt
     broken = replace(policy, contingency=tuple(replace(link, skill=99) for link in policy.contingency))
     (tmp_path / "x").write_bytes(case.seal(case.mission(), broken))
     assert app.main(["show", str(tmp_path / "x")]) == ExitCode.INPUT
-    assert "makes no sense" in capsys.readouterr().err
+    assert "is inconsistent" in capsys.readouterr().err
 
 
 def test_envelopes_of_other_kinds_are_not_shown_as_roots(bundle: Path, tmp_path: Path) -> None:

@@ -126,7 +126,7 @@ def test_unsigned_reachable_link_is_reported(tmp_path: Path, link: str | None, t
     at = None if link is None else address.parse(link)
     signing = sign_link(context(request(state=tmp_path, link=at)), loaded())
     assert isinstance(signing, LinkSigning)
-    assert any("speak as the vehicle" in note for note in signing.notes) == told
+    assert any("impersonate the vehicle" in note for note in signing.notes) == told
 
 
 def test_letting_the_radio_in_goes_with_a_key(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -142,11 +142,11 @@ def test_frames_signed_by_another_key_are_reported(tmp_path: Path, key_file: Pat
     assert isinstance(link, SignedLink)
     assert signing.rejected is None, "nothing came"
     link.accept(HEARTBEAT, now.monotonic_us)
-    assert signing.rejected == "frames come, and none is believed: 1 not signed"
+    assert signing.rejected == "frames arrive, but none is accepted: 1 not signed"
     link.accept(other.sign(HEARTBEAT, now.monotonic_us), now.monotonic_us)
     assert "1 signed with another key, 1 not signed" in (signing.rejected or "")
     _, text, help, _ = unmet("a vehicle", 10, None, signing.rejected, "nothing else matters then")
-    assert text.startswith("no heartbeat of a vehicle within 10 s: frames come")
+    assert text.startswith("no heartbeat from a vehicle within 10 s: frames arrive")
     assert "--signing-key" in help
     right = SignedLink(KEY, SigningState(0, {}), now.utc_us, now.monotonic_us, link=1)
     assert link.accept(right.sign(HEARTBEAT, now.monotonic_us), now.monotonic_us)

@@ -229,13 +229,13 @@ def test_telemetry_file_is_verified(run: Path, capsys: pytest.CaptureFixture[str
     assert "telemetry/changed" in capsys.readouterr().out
     (run / "telemetry.tlog").unlink()
     assert verify(run) == ExitCode.OK
-    assert "`telemetry.tlog` does not lie beside the log" in capsys.readouterr().out.replace("\n    ", " ")
+    assert "`telemetry.tlog` is missing beside the log" in capsys.readouterr().out.replace("\n    ", " ")
 
 
 def test_telemetry_that_was_not_whole_is_not_vouched_for(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (run / "telemetry.tlog").write_bytes(b"some frames")
     assert verify(run) == ExitCode.OK
-    assert "the log does not vouch for `telemetry.tlog`" in capsys.readouterr().out
+    assert "the log has no digest of `telemetry.tlog`" in capsys.readouterr().out
 
 
 def test_summary_file_is_reported_as_unsigned(run: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -243,7 +243,7 @@ def test_summary_file_is_reported_as_unsigned(run: Path, capsys: pytest.CaptureF
     assert "summary.json" not in capsys.readouterr().out
     (run / "summary.json").write_text("{}")
     assert verify(run) == ExitCode.OK
-    assert "- `summary.json`: nothing signs it" in capsys.readouterr().out
+    assert "- `summary.json`: it is not signed" in capsys.readouterr().out
 
 
 def test_as_json(run: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -103,7 +103,7 @@ class World:
 
 @pytest.fixture
 def begin(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., World]]:
-    monkeypatch.setattr(waiting, "TOLD_S", 0.01)
+    monkeypatch.setattr(waiting, "REPORT_S", 0.01)
     made: list[World] = []
     with tempfile.TemporaryDirectory(dir="/tmp") as name:
 
@@ -155,7 +155,7 @@ def test_documents_after_the_bundle_go_to_the_flight(
 def test_untrusted_bundle_changes_nothing(
     begin: Callable[..., World], capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(waiting, "SAID_S", 3600)
+    monkeypatch.setattr(waiting, "REFUSAL_S", 3600)
     world = begin()
     assert world.hand(approval(world.base)) == "not-flying"
     assert world.hand(replacement(world.base)) == "not-flying"
@@ -165,7 +165,7 @@ def test_untrusted_bundle_changes_nothing(
     assert world.tried == [b"", bytes(200_000)]
     assert world.ended is None
     told = [json.loads(line) for line in capfd.readouterr().out.splitlines()]
-    assert [each["slug"] for each in told if each["event"] == "not-admitted"] == ["not-flying"], "once in SAID_S"
+    assert [each["slug"] for each in told if each["event"] == "not-admitted"] == ["not-flying"], "once in REFUSAL_S"
 
 
 def test_followers_see_that_the_vehicle_waits(begin: Callable[..., World]) -> None:

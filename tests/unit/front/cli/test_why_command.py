@@ -89,7 +89,7 @@ def test_late(capsys: pytest.CaptureFixture[str]) -> None:
         ([STANDARD, "--step", "1", "--state", "position=here"], "is not a value of `position`"),
         ([STANDARD, "--step", "1", "--state", "position=0.5 N, 8.5 E"], "too far from the vehicle's home"),
         ([STANDARD, "--step", "1", "--at", "noon"], "is not a UTC time"),
-        ([STANDARD, "--record", "3"], "is no log"),
+        ([STANDARD, "--record", "3"], "is not a log"),
     ],
 )
 def test_wrong_words(words: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:

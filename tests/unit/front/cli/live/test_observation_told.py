@@ -39,7 +39,7 @@ def test_run_names_the_condition_a_deferral_waits_for() -> None:
     teller = Teller(run.loaded.policy.policy, run.loaded.bundle.mission, START.monotonic_us)
     told = [each for each in map(teller.tell, run.lines[1:]) if each is not None and each.event == "decision"]
     assert [each.outcome for each in told] == ["defer", "allow"]
-    assert told[0].waits == "it looks back 5 s, and observation began with the run"
+    assert told[0].waits == "the clause looks back 5 s, but observation began with the run"
     assert sentence(told[0]).endswith(f"because state/unknown: `{LATER.text}`; {told[0].waits}")
     assert told[1].waits == ""
 

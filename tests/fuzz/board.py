@@ -1,4 +1,4 @@
-"""What the compiler lets through, the vehicle loads; and whatever it is asked then, it answers."""
+"""Accepted programs load on the vehicle, which answers all requests."""
 
 from reference import world
 from rtshcua.diagnostics.refusal import Refusal
@@ -12,7 +12,7 @@ from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Request,
 from rtshcua.wire.trust import TrustRoot
 
 S = 1_000_000  # us
-#: the keys of the reference world, for every vehicle and whoever speaks
+#: the keys of the reference world, for every vehicle and source
 ROOT = TrustRoot(
     version=1,
     development=True,
@@ -35,7 +35,7 @@ def sealed(policy: bytes, mission: bytes) -> bytes:
 
 
 def opened(data: bytes, vehicle: str, utc_us: int) -> Loaded | Refusal:
-    """`load` on the vehicle of that identity at that time."""
+    """Load the bundle on the vehicle of that identity at that time."""
     return load(
         data,
         root=ROOT,
@@ -49,7 +49,7 @@ def opened(data: bytes, vehicle: str, utc_us: int) -> Loaded | Refusal:
 
 
 def flies(policy: Policy, mission: Mission) -> None:
-    """A compiled mission loads, and answers to requests of all kinds."""
+    """Check that a compiled mission loads and answers requests of all kinds."""
     payload = bundle.policy_payload(policy)
     bound = binding.bind(mission, bundle.policy_digest(payload))
     data = sealed(payload, bundle.mission_payload(bound))
@@ -59,7 +59,7 @@ def flies(policy: Policy, mission: Mission) -> None:
 
 
 def ask(loaded: Loaded, utc_us: int) -> None:
-    """Ask for the steps and links, in a state of which nothing is known and in one where all is zero."""
+    """Request the steps and links, in an unknown state and in one with all values zero."""
     policy = loaded.policy.policy
     count = len(policy.monitors)
     states = [
@@ -78,6 +78,6 @@ def ask(loaded: Loaded, utc_us: int) -> None:
 
 
 def answer(loaded: Loaded, request: bytes) -> None:
-    """Any octets are answered, by octets that can be read."""
+    """Check that any request bytes get a readable answer."""
     said = world.read_answer(loaded, request, loaded.boundary.enforce(request))
     assert not isinstance(said, Refusal), said

@@ -1,4 +1,4 @@
-"""Where fuzzing begins: what ships, the accepted and rejected sources, the examples, and what was found before."""
+"""The seed corpus of fuzzing: shipped, accepted and rejected sources, examples, and earlier findings."""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -43,7 +43,7 @@ mission flight under rules@1 on quad {
 
 
 def kept(target: str) -> list[Path]:
-    """The seeds that are kept because they were findings."""
+    """The seeds that were findings."""
     return sorted((SEEDS / target).iterdir()) if (SEEDS / target).is_dir() else []
 
 

@@ -1,4 +1,4 @@
-"""A dictionary for libFuzzer: the words of the grammar, and the names of the shipped sources."""
+"""A dictionary for libFuzzer: the keywords of the grammar, and the names of the shipped sources."""
 
 from fuzz.mutation.words import _MARKS, _UNITS, _pool
 
@@ -11,5 +11,5 @@ def dictionary() -> str:
 
 
 def _escaped(word: str) -> str:
-    """ASCII letters and digits as they are, all else by its octets."""
+    """Escape everything except ASCII letters and digits as bytes."""
     return "".join(chr(each) if chr(each).isalnum() and each < 128 else f"\\x{each:02X}" for each in word.encode())

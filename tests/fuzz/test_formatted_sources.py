@@ -38,7 +38,7 @@ def test_sentences_of_the_grammar_on_lines_at_random(seed: int) -> None:
 
 
 def test_most_of_them_are_laid_out() -> None:
-    """Else nothing would have been tried."""
+    """Otherwise the campaign would test nothing."""
     assert sum(one(seed) for seed in range(40)) > 20
 
 

@@ -1,4 +1,4 @@
-"""What fuzzing found once is not found again; and each target still takes what fuzzing begins with."""
+"""Earlier fuzzing findings stay fixed, and each target accepts its seeds."""
 
 import time
 from importlib import import_module
@@ -12,7 +12,7 @@ from fuzz import corpus
 
 TARGETS = sorted(path.stem for path in (Path(__file__).parent / "targets").glob("*.py"))
 KEPT = [(target, path) for target in TARGETS for path in corpus.kept(target)]
-#: how many of what each target begins with are tried, and changed once
+#: how many seeds of each target are tried, and changed once
 SAMPLE = 4
 #: CPU seconds for one input
 LIMIT = 10

@@ -1,4 +1,4 @@
-"""Sources that are nearly right, and sentences of the grammar: whatever they say, it is compiled or explained."""
+"""Near-valid sources and random sentences are compiled or get a diagnostic."""
 
 import time
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from fuzz import corpus
 from fuzz.mutation.sentences import mutated, sentence
 from fuzz.targets import check, condition, parse
 
-#: CPU seconds that nothing may take
+#: the limit in CPU seconds for each source
 LIMIT = 10
 SLOW = settings(suppress_health_check=list(HealthCheck))
 CHANCES = st.integers(0, (1 << 64) - 1)
@@ -21,7 +21,7 @@ CHANCES = st.integers(0, (1 << 64) - 1)
 
 @cache
 def texts() -> tuple[bytes, ...]:
-    """The sources that nothing is wrong with, and the twins that one thing is wrong with; the largest left out."""
+    """The valid sources and their invalid twins, without the largest."""
     return tuple(text for text in corpus.sources() if len(text) < check.MAX_LENGTH)
 
 

@@ -1,4 +1,4 @@
-"""Requests, anchors, answers and frames that somebody tampered with: nothing false is cosigned or believed by them."""
+"""Tampered requests, anchors, answers and frames: nothing false is cosigned or accepted."""
 
 from collections import Counter
 from random import Random
@@ -51,7 +51,7 @@ MARKS = [Judge(key).blindly(note) for key in WITNESSES[:2] for log in (LOG, FORK
 
 
 def mutated(of: Random, data: bytes, others: list[bytes]) -> bytes:
-    """Some octets changed, taken out, put in, or a stretch of something similar pasted over."""
+    """Change, remove or insert some bytes, or overwrite a part with similar data."""
     octets = bytearray(data)
     for _ in range(of.choice([1, 1, 1, 2, 5])):
         at = of.randrange(len(octets) + 1)
@@ -76,7 +76,7 @@ def mutated(of: Random, data: bytes, others: list[bytes]) -> bytes:
 
 
 def tamper_request(of: Random) -> str:
-    """A witness that saw the log up to record 13 cosigns nothing but a later checkpoint of this log."""
+    """Check that a witness that saw the log up to record 13 only cosigns a later checkpoint of it."""
     request = decode(mutated(of, of.choice(REQUESTS), REQUESTS))
     if isinstance(request, Declined):
         return str(request.status)
@@ -86,7 +86,7 @@ def tamper_request(of: Random) -> str:
     if isinstance(found, Declined):
         return str(found.status)
     text = split(found)[0]
-    # The other future is as consistent with record 13 as this one: the witness has not seen yet which is flown.
+    # Both futures are consistent with record 13, so the witness may accept either.
     assert text in TEXTS or text in {split(note)[0] for note in FORK.notes}
     assert witness.seen[ORIGIN].text == text
     assert int(text.split("\n")[1]) >= 13
@@ -94,7 +94,7 @@ def tamper_request(of: Random) -> str:
 
 
 def tamper_anchor(of: Random) -> str:
-    """Whatever stands beside a log that nobody witnessed beyond the fork, no more of it counts as anchored."""
+    """Check that no anchor file anchors a log beyond the fork, where it was not witnessed."""
     held = Anchors(ORIGIN, PUBLIC[:2], 2)
     for note in LOG.notes:
         assert held.checkpoint(note) is None
@@ -115,7 +115,7 @@ def tamper_anchor(of: Random) -> str:
 
 
 def tamper_answer(of: Random) -> str:
-    """An answer becomes an anchor only if a witness made it, for this note."""
+    """Check that an answer becomes an anchor only if a witness made it for this note."""
     note = of.choice(LOG.notes)
     line = of.choice(MARKS).rpartition("— ")[2]
     data = f"200\n— {line}".encode()
@@ -132,7 +132,7 @@ def tamper_answer(of: Random) -> str:
 
 
 def tamper_frames(of: Random) -> str:
-    """What is put together of damaged frames is one of the messages that were sent."""
+    """Check that messages assembled from damaged frames are among the sent ones."""
     codec, assembler = Codec(1, 191), Assembler()
     sent = [bytes(of.randrange(256) for _ in range(of.randrange(1, 500))) for _ in range(2)]
     frames = [codec.pack(each) for n, data in enumerate(sent) for each in messages(n, bytes([n]) * 8, data)]
@@ -146,7 +146,7 @@ def tamper_frames(of: Random) -> str:
 
 
 def campaign(seed: int, count: int) -> list[Counter[str]]:
-    """What came of each kind, so often."""
+    """Count the results of each kind."""
     of = Random(seed)
     ways = (tamper_request, tamper_anchor, tamper_answer, tamper_frames)
     return [Counter(way(of) for _ in range(count)) for way in ways]

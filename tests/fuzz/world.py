@@ -1,4 +1,4 @@
-"""What all fuzz targets share: a library in memory, and what must hold of every finding."""
+"""Shared parts of the fuzz targets: a library in memory, and the checks of every finding."""
 
 import json
 import posixpath
@@ -15,7 +15,7 @@ from rtshcua.diagnostics.span import Source, Span
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 LIBRARY = "lib"
-#: what the source under test is called
+#: the name of the source under test
 PROBE = "probe/probe.rts"
 ISSUED = 1_790_000_000_000_000  # us, UTC
 
@@ -24,7 +24,7 @@ Read = Callable[[str], bytes]
 
 @cache
 def files() -> dict[str, bytes]:
-    """Every file that a source may import: the shipped library, and what lies beside the accepted sources."""
+    """Every file that a source may import: the shipped library, and the files beside the accepted sources."""
     found = {
         f"{LIBRARY}/{folder}/{path.name}": path.read_bytes()
         for folder in ("skills", "policies", "missions")
@@ -38,7 +38,7 @@ def files() -> dict[str, bytes]:
 
 
 def reading(more: Mapping[str, bytes]) -> Read:
-    """Reads from memory: these files, and those of `files`."""
+    """Read from memory: these files, and those of `files`."""
 
     def read(path: str) -> bytes:
         data = more.get(path, files().get(path))
@@ -55,7 +55,7 @@ def listing(folder: str) -> Iterable[str]:
 
 
 def hold(diagnostics: Iterable[Diagnostic], sources: Mapping[str, Source]) -> None:
-    """Every finding speaks, points into its source, and can be shown, as text and as JSON."""
+    """Check that every finding has a message, points into its source, and can be shown as text and JSON."""
     found = tuple(diagnostics)
     for each in found:
         assert each.message, each

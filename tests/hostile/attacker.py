@@ -1,4 +1,4 @@
-"""Somebody who hears the link, and sends on it what he likes; he has no key."""
+"""An attacker on the link without a key, who receives all frames and sends arbitrary ones."""
 
 from collections.abc import Sequence
 from random import Random
@@ -9,7 +9,7 @@ from rtshcua.mavlink.framing import FLAG_SIGNED, checksum, with_flags
 from rtshcua.mavlink.signing import SignedLink, SigningState
 
 MARKER = 0xFD
-#: what he would most like to be believed
+#: the messages that are most useful to forge
 WANTED = ("HEARTBEAT", "GLOBAL_POSITION_INT", "COMMAND_ACK", "EXTENDED_SYS_STATE", "BATTERY_STATUS", "STATUSTEXT",
           "SYS_STATUS", "GPS_RAW_INT", "PARAM_VALUE", "MISSION_ACK", "MISSION_REQUEST_INT", "RADIO_STATUS",
           "COMMAND_LONG", "SETUP_SIGNING", "EKF_STATUS_REPORT", "ESTIMATOR_STATUS")  # fmt: skip
@@ -17,9 +17,9 @@ NUMBERS = {of.msgname: number for number, of in mavlink.mavlink_map.items()}
 
 
 class Attacker:
-    """Makes datagrams. `impersonate`: also under the vehicle's own ids, unsigned or wrongly signed.
+    """Makes datagrams; with `impersonate` also under the vehicle's own ids, unsigned or wrongly signed.
 
-    Without, no RADIO_STATUS: on a link without a key a modem's is believed, whatever ids it has.
+    Otherwise no RADIO_STATUS, because without a key a modem's is accepted under any ids.
     """
 
     def __init__(self, overheard: Sequence[bytes], seed: int, *, impersonate: bool) -> None:
@@ -35,7 +35,7 @@ class Attacker:
         self._numbers = [number for name, number in NUMBERS.items() if name not in believed]
 
     def datagram(self) -> bytes:
-        """The next."""
+        """Return the next datagram."""
         return self._chance.choice(self._ways)()
 
     def _garbage(self) -> bytes:
@@ -78,13 +78,13 @@ class Attacker:
         return b"".join(self.datagram() for _ in range(self._chance.randrange(4)))
 
     def _frame(self, system: int, component: int) -> bytes:
-        """A frame with a right checksum, of any message, most often of one that matters."""
+        """A frame with a valid checksum, of any message, mostly of an important one."""
         chance = self._chance
         number = NUMBERS[chance.choice(self._wanted)] if chance.random() < 0.7 else chance.choice(self._numbers)
         of = mavlink.mavlink_map[number]
         payload = bytearray(chance.randbytes(chance.randrange(1, of.unpacker.size + 1)))
         if number == 0 and len(payload) > 5:
-            payload[5] = chance.choice((3, 12))  # an autopilot that is known
+            payload[5] = chance.choice((3, 12))  # a known autopilot
         head = bytes([MARKER, len(payload), 0, 0, chance.randrange(256), system, component])
         frame = head + number.to_bytes(3, "little") + payload
         return frame + checksum(frame[1:] + bytes([of.crc_extra])).to_bytes(2, "little")

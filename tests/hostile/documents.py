@@ -1,4 +1,4 @@
-"""Documents that take long to decode, verify or hash for who takes them apart before it knows whose they are."""
+"""Documents that take long to decode, verify or hash if that happens before their signature is checked."""
 
 from rtshcua.wire import cose, names
 from rtshcua.wire.document import MAX_DOCUMENT
@@ -13,7 +13,7 @@ def head(major: int, count: int) -> bytes:
 
 
 def enveloped(protected: bytes, payload: bytes) -> bytes:
-    """An envelope that nobody signed."""
+    """An unsigned envelope."""
     return b"\xd2\x84" + _string(protected) + b"\xa0" + _string(payload) + _string(bytes(64))
 
 
@@ -25,14 +25,14 @@ def _string(octets: bytes) -> bytes:
 
 
 def nonsense(key: SigningKey) -> bytes:
-    """Tiny items as far as they fit, signed as a replacement."""
+    """As many tiny items as fit, signed as a replacement."""
     count = MAX_DOCUMENT - 300
     payload = b"\x83\x73" + names.REPLACEMENT.name.encode() + b"\x02" + head(4, count) + b"\x80" * count
     return cose.sign1(payload, key=key, duty=Duty.MISSION, content_type=names.REPLACEMENT.content_type)
 
 
 def hostile(key: SigningKey) -> dict[str, tuple[bytes, str]]:
-    """By name: a document, and how it is refused. `key` is one that is trusted for missions."""
+    """Documents by name, with the slugs of their refusals. `key` is trusted for missions."""
     return {
         "a header of tiny items": (enveloped(head(4, 260_000) + b"\x80" * 260_000, b""), "malformed"),
         "a header of pairs": (enveloped(head(5, 60_000) + b"\x00\x80" * 60_000, b""), "malformed"),

@@ -1,4 +1,4 @@
-"""What is attacked: a driver on the ground before an autopilot that it knows, with a key or without."""
+"""The target of attacks: a driver with a known autopilot on the ground, with or without a key."""
 
 from collections import deque
 from typing import Any
@@ -24,7 +24,7 @@ TOLD = ("crowd",)
 
 
 class Target:
-    """`heard` are the frames of the vehicle up to now; `known` is all that the driver may know from frames."""
+    """`heard` has the vehicle's frames so far; `known` is the state that the driver has from frames."""
 
     def __init__(self, flavour: str, *, keyed: bool, stored: SigningState = NEW, greet: bool = True) -> None:
         self.link = SignedLink(KEY, stored, UTC_US, 0)
@@ -47,7 +47,7 @@ class Target:
             self.events.clear()
 
     def _synchronise(self, frames: list[bytes]) -> None:
-        """Answer TIMESYNC, so that what it reports has an age and is taken in; it has been up for a second."""
+        """Answer TIMESYNC, so that reports have an age; the vehicle has been up for a second."""
         for frame in frames:
             for each in self._codec.parse(frame):
                 if each.name == "TIMESYNC":
@@ -61,30 +61,30 @@ class Target:
         return frame
 
     def receive(self, datagram: bytes) -> None:
-        """A datagram arrives."""
+        """Receive a datagram."""
         heard = self.driver.receive(datagram, self.now_us)
         self.sent += heard.answers
         self.events += heard.events
 
     def known(self) -> object:
-        """All that driver, boundary and link know, down to the last number, but for what they merely count."""
+        """The complete state of driver, boundary and link, except for counters."""
         return remembered(self.driver)
 
     def moved(self) -> list[bytes]:
-        """Which of the frames that move a vehicle would leave."""
+        """The motion frames that would be sent."""
         commands = [Command(1, "skill", kind, (0, 0), (1, 1), 5_000, 1_000) for kind in MotionKind]
         frames = [frame for command in commands for frame in self.driver.begin(command, self.now_us)[1]]
         return [frame for frame in frames if not _asks(frame)]
 
 
 def _asks(frame: bytes) -> bool:
-    """Whether it only asks for a message."""
+    """Whether the frame only requests a message."""
     message = Codec(9, 9).parse(frame)[0].message
     return getattr(message, "command", None) == mavlink.MAV_CMD_REQUEST_MESSAGE
 
 
 def remembered(thing: object) -> object:
-    """The state of an object of ours, and of all that it holds, as a value."""
+    """The state of an object and all its parts, as a value."""
     if isinstance(thing, dict):
         return {repr(key): remembered(value) for key, value in thing.items()}
     if isinstance(thing, list | tuple | set | frozenset | deque):

@@ -1,4 +1,4 @@
-"""How long the longest path through a graph of states takes, when some edges take time and others none."""
+"""The duration of the longest path in a graph of states, with some edges of zero duration."""
 
 from collections.abc import Sequence
 

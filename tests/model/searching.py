@@ -1,8 +1,8 @@
-"""Every reachable state of one bundle in force: the real runtime, boundary and executor, and whatever happens to them.
+"""All reachable states with one bundle in force: the real runtime, boundary and executor, and all events.
 
 Explicit states, breadth first. A state is a whole world (`snapshot`); an event is one call of `Runtime.step`. Time is
-an event too: the clock goes on by one `UNIT` and the vehicle reports. What happens is not held to what a sane vehicle
-would do: it may fail, succeed, land, fly or fall silent at any moment.
+an event too: the clock advances by one `UNIT` and the vehicle reports. Events are not limited to plausible ones: the
+vehicle may fail, succeed, land, fly or fall silent at any moment.
 """
 
 from collections import deque
@@ -44,9 +44,9 @@ from rtshcua.onboard.runtime.view import RunStage
 from rtshcua.wire.keys import Duty
 
 START = Now(BEGIN_US, ISSUED + 60 * UNIT, 20_000)
-#: nothing in a small world is compared with a longer time
+#: no limit in a small world is longer
 OLD_US = 2 * UNIT
-#: so many documents are handed over in one run
+#: documents presented in one run
 MOST_HANDED = 2
 
 EVENTS: dict[str, Callable[["World"], Event]] = {
@@ -74,7 +74,7 @@ def _without_the_second(of: Loaded) -> Mission:
     return replace(mission, issued_at_us=mission.issued_at_us + UNIT, invocations=steps)
 
 
-#: signed by whoever may; an approval is about the second step
+#: correctly signed; an approval is for the second step
 DOCUMENTS: dict[str, Callable[[Loaded], bytes]] = {
     "recall": lambda of: documents.recall(of, now=START),
     "granted": lambda of: documents.approval(of, 1, now=START),
@@ -85,7 +85,7 @@ DOCUMENTS: dict[str, Callable[[Loaded], bytes]] = {
 
 @dataclass
 class World:
-    """A run, and what surrounds it."""
+    """A run with its environment."""
 
     of: Loaded
     runtime: Runtime
@@ -93,20 +93,20 @@ class World:
     profile: str
     watch: Watch = field(default_factory=Watch)
     now_us: int = BEGIN_US
-    token: int = 0  # of the command that was sent last,
+    token: int = 0  # token of the last sent command,
     before: int = 0  # and of the one before
-    left: bool = False  # it was left alone, and the program has ended
-    restarted: bool = False  # the program was begun anew: that happens once
-    heard_us: int = BEGIN_US  # when the vehicle reported last
-    handed: int = 0  # documents that were handed over: refused ones are counted without end
+    left: bool = False  # unattended: the program has ended
+    restarted: bool = False  # the program was restarted, at most once
+    heard_us: int = BEGIN_US  # the time of the vehicle's last report
+    handed: int = 0  # presented documents; refused ones count without a limit
 
     @property
     def holds(self) -> bool:
-        """Whether what flies is to stand still."""
+        """Whether the running command is a hold."""
         return self.watch.command == MotionKind.HOLD
 
     def step(self, event: Event | None) -> None:
-        """One call of the runtime, and all that must hold of it."""
+        """Call the runtime once and check its properties."""
         self.ear.heard.clear()
         self.ear.passed.clear()
         if isinstance(event, Readings):
@@ -121,13 +121,13 @@ class World:
 
 
 class Broken(AssertionError):
-    """Something happened that must not; says how."""
+    """A violated property, with its cause."""
 
 
 @dataclass
 class Found:
-    """What a search found: the graph, by number of state. An edge says how many units pass, and in how many of them the
-    vehicle is heard.
+    """The result of a search: a graph by state number. An edge has the passed units, and in how many of them the
+    vehicle is received.
     """
 
     states: int = 0
@@ -141,7 +141,7 @@ class Found:
     parents: list[tuple[int, str]] = field(default_factory=list)
 
     def way(self, state: int) -> list[str]:
-        """What happens from the start to a state."""
+        """The events from the start to a state."""
         names = []
         while state >= 0:
             state, name = self.parents[state]
@@ -162,10 +162,10 @@ class Search:
         self._documents = {name: DOCUMENTS[name](template) for name in of.documents}
 
     def run(self, most: int | None = None, double_of: int | None = None) -> Found:
-        """All states from a first run, and from one that goes on after a crash of the program; at most so many.
+        """Explore all states from a first run, and from a run resumed after a crash, up to a limit.
 
-        With `double_of`, after every so many transitions one that led to a state which was found before is looked at
-        closer: what follows from it is what follows from the one that was found.
+        With `double_of`, every nth transition to a known state is checked: its successors must equal those of the
+        known state.
         """
         found = Found()
         numbers: dict[bytes, int] = {}
@@ -215,7 +215,7 @@ class Search:
         return found
 
     def _compare(self, found: Found, numbers: dict[bytes, int], known: int, data: bytes) -> None:
-        """Two states that count as one must lead to states that do, whatever happens."""
+        """Check that two states that count as equal lead to equal states after every event."""
         for (name, _, happen), target in zip(self._events(), found.next[known], strict=True):
             at = self._snapshots.restore(data)
             happen(at)
@@ -223,7 +223,7 @@ class Search:
                 raise Broken(f"not alike after {[*found.way(known), name]}")
 
     def _digest(self, at: World) -> bytes:
-        parts: object = _ending(at)  # when it is over, how it was is over too
+        parts: object = _ending(at)  # an ended run has no further state
         if parts is None:
             parts = (at.runtime, at.of, at.watch, at.profile, at.heard_us, at.restarted, at.handed)
         controller = at.runtime._controller
@@ -243,7 +243,7 @@ class Search:
         return replace(of, executor=Gate(of.executor, SESSION_KEY, self._ear))
 
     def _restart(self, at: World) -> None:
-        """The program dies, and is begun again: of what was, it knows that a run of this bundle broke off."""
+        """Restart the program: it only knows that a run of this bundle was interrupted."""
         if not at.restarted:
             at.restarted = True
             at.of = self._loaded()
@@ -253,7 +253,7 @@ class Search:
             at.step(_readings(at))
 
     def _events(self) -> list[tuple[str, int, Callable[[World], None]]]:
-        """All that can happen: its name, how many units pass, and how."""
+        """All possible events: name, passed units, and effect."""
         happen: list[tuple[str, int, Callable[[World], None]]] = []
         for name in self._of.events:
             if name == "restarted":
@@ -279,7 +279,7 @@ def _guarded(found: Found, state: int, name: str, happen: Callable[[World], None
 
 
 def _over(at: World) -> None:
-    """A run that ended does nothing any more, whatever happens."""
+    """Check that an ended run has no further effect."""
     for make in EVENTS.values():
         at.step(make(at))
     _tick(at)
@@ -315,13 +315,13 @@ def _silence(at: World) -> None:
 
 
 def _leave(at: World) -> None:
-    """As the program does it: one step more, then it has ended."""
+    """Leave as the program does: one more step, then the end."""
     at.left = True
     at.runtime.leave()
     at.step(None)
 
 
-#: what is no event of the ports: its name, how many units pass, and how
+#: events other than those of the ports: name, passed units, and effect
 PASSING: dict[str, tuple[int, Callable[[World], None]]] = {
     "time": (1, _tick),
     "silence": (1, _silence),

@@ -1,6 +1,6 @@
-"""Small policies and missions for the model: times are a unit long, so that all orders of them can be tried.
+"""Small policies and missions for the model: all times are one unit long, so that all orders can be tried.
 
-`UNIT` is how far the clock goes at once. Limits are whole units, so that a time which just equals one is tried as well.
+`UNIT` is one step of the clock. Limits are whole units, so that times equal to a limit are tried as well.
 """
 
 from dataclasses import dataclass
@@ -17,13 +17,13 @@ from rtshcua.model.flat.policy import AfterSilence, Policy, RuleKind
 from rtshcua.onboard.runtime.limits import Limits
 
 UNIT = S
-GRACE = UNIT // 2  # shorter than a skill may last, or it would never be over first
+GRACE = UNIT // 2  # shorter than the longest duration of a skill, or it would never expire first
 LIMITS = Limits(
     ready_us=UNIT, silent_us=UNIT // 2, fresh_us=UNIT, flapping_us=UNIT, retry_us=UNIT, tries=1, again_us=UNIT // 2
 )
 
 GOOD = dict(NOMINAL)
-#: what the vehicle may report: all is well; too windy for a step, not for links; no position; nothing known; no charge
+#: the vehicle's reports: nominal; too windy for a step, not for links; no position; nothing known; no charge
 PROFILES: dict[str, dict[int, int | None]] = {
     "good": GOOD,
     "windy": GOOD | {WIND: 12 * M},
@@ -37,7 +37,7 @@ CONFIRM = flat.rule(RuleKind.CONFIRM, GOTO, approver=flat.SUPERVISOR, within_us=
 
 @dataclass(frozen=True)
 class Small:
-    """What one search is about: policy, mission, what the vehicle may report and which documents come."""
+    """The parameters of one search: policy, mission, reports and documents."""
 
     name: str
     policy: Policy
@@ -47,7 +47,7 @@ class Small:
     documents: tuple[str, ...] = ()
 
 
-#: what happens, by who brings it about
+#: events by their cause
 VEHICLE = ("ready", "on the ground", "in the air", "succeeded", "failed", "time")
 LINK = ("link lost", "link back")
 PEOPLE = ("taken over", "interrupted", "left alone")
@@ -64,7 +64,7 @@ def policy(
     degrade: bool = False,
     after: AfterSilence = AfterSilence.CONTINGENCY,
 ) -> Policy:
-    """Permits everything; `chain` stands behind each step that flies, but for a take-off, which lands."""
+    """A policy that permits everything; each step has `chain` as its fallback, except a take-off, which lands."""
 
     def contract(of: Contract) -> Contract:
         duration_us = UNIT
@@ -91,7 +91,7 @@ def policy(
 
 
 def mission(of: Policy, skills: tuple[int, ...], otherwise: OnInadmissible = OnInadmissible.ABORT) -> Mission:
-    """These skills, one after the other."""
+    """A mission of these skills in order."""
     plans = {
         TAKEOFF: (Plan(MotionKind.CLIMB, (), 20 * M, 0), (20 * M,)),
         GOTO: (Plan(MotionKind.FLY, (110 * M, -20 * M), 20 * M, 0), (110 * M, -20 * M, 20 * M)),

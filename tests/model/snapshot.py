@@ -1,4 +1,4 @@
-"""A world as bytes: to go back to it, and to tell whether two are the same but for what nothing reads.
+"""A world as bytes, to restore it, and to compare two worlds except for unread state.
 
 Both follow whatever attributes the real objects have. What never changes (policy, mission, compiled conditions) is kept
 by reference. What is only written (evidence, what a display shows), and what is not read before it is set anew, is left
@@ -36,18 +36,18 @@ from rtshcua.wire.bundle import Bundle
 from rtshcua.wire.permit import AGAIN, SIZE, open_permit
 from rtshcua.wire.trust import TrustRoot
 
-#: where monotonic and UTC time begin, in us: far from every other number, and from each other
+#: the start of monotonic and UTC time, in us: distinct from every other number
 BEGIN_US = 1 << 52
 _REACH = 1 << 40
 _TIMES = 1 << 50
-#: where the serial numbers of permits begin: far from every other number too
+#: the first serial number of permits: distinct from every other number too
 SERIALS = 1 << 46
 
-#: where the classes of what a bundle says are; what is asked and answered (`situation`) is not among them
+#: the modules with the classes of a bundle's contents; requests and answers (`situation`) are not among them
 _FIXED = ("rtshcua.model.flat.", "rtshcua.wire.bundle", "rtshcua.wire.trust")
 _ONCE = (PreparedInvocation, PreparedPolicy, Recorder, Limits, Enum, type, FunctionType, BuiltinFunctionType)
-#: attributes that decide what is recorded, and how often, and nothing else; the moment of the last request, which is
-#: compared with time that goes back, and with nothing else; and what is kept so that it is not computed twice
+#: attributes that only affect records; the time of the last request, which is only compared to detect time going back;
+#: and caches
 _ONLY_WRITTEN: dict[type, tuple[str, ...]] = {
     Admission: ("_last", "_repeated", "recent"),
     EventHandler: ("_gap", "_refused_us", "_unrecorded"),
@@ -66,7 +66,7 @@ _ONLY_WRITTEN: dict[type, tuple[str, ...]] = {
     ),
     StateMonitor: ("_state", "_held"),
 }
-#: attributes that are read in these stages only, and are set anew whenever a run comes into them
+#: attributes that are only read in these stages, and set when a run enters them
 _READ_IN: dict[tuple[type, str], tuple[RunStage, ...]] = {
     (MissionController, "_began_us"): (RunStage.WAITING,),
     (MissionController, "retry"): (RunStage.DECIDING,),
@@ -78,12 +78,12 @@ _READ_IN: dict[tuple[type, str], tuple[RunStage, ...]] = {
 
 
 _PLAIN = frozenset((str, bool, type(None)))
-#: what is one and the same all through a search
+#: objects that are constant during a search
 _ALWAYS = frozenset((PreparedPolicy, Policy, TrustRoot, Limits))
 
 
 def _unread(stage: RunStage, late: bool) -> dict[type, tuple[str, ...]]:
-    """What is not read in a stage, by class. Where a step may be `late`, its release counts on while it runs."""
+    """The attributes that are not read in a stage, by class. A `late` step keeps its release while it runs."""
     unread = dict(_ONLY_WRITTEN)
     for (kind, name), stages in _READ_IN.items():
         counts_on = late and kind is InvocationQueue and stage is RunStage.RUNNING
@@ -96,7 +96,7 @@ _UNREAD = {(stage, late): _unread(stage, late) for stage in RunStage for late in
 
 
 def fixed(kind: type) -> bool:
-    """Whether objects of this class never change, and are made once."""
+    """Whether objects of this class are immutable and made once."""
     if issubclass(kind, _ONCE):
         return True
     frozen = issubclass(kind, Struct) and kind.__struct_config__.frozen
@@ -117,7 +117,7 @@ class Snapshots:
         self._compare = _Comparison(key, utc_us, old_us, unwatched, self._reference, late=late)
 
     def take(self, world: object) -> bytes:
-        """The world, to be restored as often as wanted."""
+        """Return the world in a form that can be restored any number of times."""
         buffer = io.BytesIO()
         pickler = pickle.Pickler(buffer, protocol=5)
         pickler.persistent_id = self._reference  # type: ignore[method-assign]
@@ -125,20 +125,20 @@ class Snapshots:
         return buffer.getvalue()
 
     def restore(self, data: bytes) -> Any:
-        """A world of its own."""
+        """Return an independent copy of the world."""
         unpickler = pickle.Unpickler(io.BytesIO(data))
         unpickler.persistent_load = self._shared.__getitem__  # type: ignore[method-assign]
         return unpickler.load()
 
     def canonical(self, world: object, now_us: int, stage: RunStage, standing: bytes | None) -> bytes:
-        """A digest that worlds share which differ only in what nothing reads, and in what time it is.
+        """A digest that is equal for worlds which differ only in unread state and absolute time.
 
-        `stage` is where the run stands, `standing` the one permit that is kept for later.
+        `stage` is the stage of the run, and `standing` the stored permit.
         """
         return blake2b(marshal.dumps(self.plain(world, now_us, stage, standing), 2), digest_size=16).digest()
 
     def plain(self, world: object, now_us: int, stage: RunStage, standing: bytes | None) -> Any:
-        """What is compared, as tuples."""
+        """Return the compared state as tuples."""
         return self._compare.plain(world, now_us, stage, standing)
 
     def _reference(self, thing: Any) -> int | None:
@@ -156,7 +156,7 @@ Rule = Callable[[Any], Any]
 
 
 class _Comparison:
-    """Makes plain tuples of a world. A rule a class, found once."""
+    """Makes plain tuples of a world, by one cached rule for each class."""
 
     def __init__(
         self, key: bytes, utc_us: int, old_us: int, unwatched: tuple[type, ...], refer: Callable[[Any], int | None],
@@ -206,7 +206,7 @@ class _Comparison:
         if issubclass(kind, Invocation):
             return lambda thing: ("invocation", thing.binding)
         if issubclass(kind, (PermitIssuer, FrameSession)):
-            return lambda thing: name  # the next serial is one that nobody has seen; no frame is sent in a search
+            return lambda thing: name  # the next serial is unused; no frame is sent in a search
         if issubclass(kind, type):
             return lambda thing: ("type", thing.__qualname__)
         if issubclass(kind, Enum):
@@ -253,7 +253,7 @@ class _Comparison:
         return found
 
     def _once(self, thing: Any) -> tuple[str, int] | None:
-        """An object that may change is described where it is met first."""
+        """Describe a mutable object where it first occurs."""
         seen = self._seen
         number = seen.get(id(thing))
         if number is not None:
@@ -266,7 +266,7 @@ class _Comparison:
         return tuple([rules[type(each)](each) if type(each) in rules else self._of(each) for each in thing])
 
     def _shared(self, thing: Any) -> Any:
-        """What never changes, by its value: a replacement that is opened twice says the same."""
+        """Describe an immutable object by its value: a replacement that is opened twice is equal."""
         number = self._alike.get(id(thing))
         if number is None:
             self._refer(thing)  # and it stays where it is
@@ -274,7 +274,7 @@ class _Comparison:
         return "shared", number
 
     def _members(self, thing: Any) -> Any:
-        """A set; of serials, those that can still be asked for."""
+        """Describe a set; of serials, those that can still be used."""
         stands = self._stands
         return tuple(sorted([self._of(each) for each in thing if not _is_serial(each) or each in stands]))
 
@@ -289,7 +289,7 @@ class _Comparison:
         return number
 
     def _serial(self, number: int) -> Any:
-        """A serial by its place behind the standing permit; older ones are told apart by what holds them."""
+        """Describe a serial by its distance from the standing permit; older ones are distinguished by their holders."""
         if number in self._stands:
             return "s", number - self._stands.start
         return ("s", "newer") if number > self._stands.start else ("s", "older")
@@ -298,7 +298,7 @@ class _Comparison:
         permit = open_permit(octets, self._key) if len(octets) == SIZE else None
         if permit is None:
             return octets
-        # It is kept for what it stands for, and until when it was good for its own step does not count any more.
+        # It is only kept for its links: the validity for its own step does not count any more.
         serial = self._number(permit.serial)
         return "p", permit.kind, permit.step, permit.link, serial, permit.fallbacks, permit.contingencies
 

@@ -1,4 +1,4 @@
-"""The search notices when the runtime is broken: each change here makes it fail, and says how."""
+"""The search detects a broken runtime: each mutation here makes it fail with its message."""
 
 from collections.abc import Callable
 from dataclasses import replace as with_fields
@@ -23,9 +23,9 @@ from rtshcua.onboard.runtime.runtime import EventHandler
 from rtshcua.onboard.runtime.supervisor import Grace, Supervisor
 
 LITTLE = small("little", (TAKEOFF, HOME), ("good",), VEHICLE, contingency=(BACK, DOWN), chain=(HOLD,))
-#: it holds in the air for an approval that does not come
+#: a run that holds in the air for an approval that never arrives
 HOLDING = small("holding", (TAKEOFF, GOTO), ("good",), VEHICLE, confirm=True)
-#: a silence of any length ends nothing
+#: a run in which no silence ends the mission
 GOING_ON = small(
     "going on", (TAKEOFF, HOME), ("good", "blind"), (*VEHICLE, *LINK), contingency=(DOWN,), chain=(HOLD,),
     after=AfterSilence.CONTINUE,
@@ -33,25 +33,25 @@ GOING_ON = small(
 
 
 def with_events(*events: str) -> Small:
-    """A small run in good weather, where the vehicle does what it likes and besides these happen."""
+    """A small run in good weather with arbitrary vehicle behaviour and these events."""
     return with_fields(LITTLE, events=(*VEHICLE, *events))
 
 
 def endless(found: Found) -> bool:
-    """Whether time may pass for ever."""
+    """Whether some path never ends."""
     return bool(longest([[(target, units) for target, units, _ in edges] for edges in found.edges])[1])
 
 
-# ------------------------------------------------------------------------------------------- what must never be
+# ------------------------------------------------------------------------------------------- safety
 
 
 def two_at_once(of: Any) -> Any:
-    """The command that flies is not ended when another one is sent."""
+    """Do not end the running command when another one is sent."""
     return lambda self, now, event, detail="": None if event == "replaced" else of(self, now, event, detail)
 
 
 def higher(of: Any) -> Any:
-    """A command flies higher than what was permitted."""
+    """Command a greater height than permitted."""
 
     def command(self: Any, *key: int) -> Any:
         made = of(self, *key)
@@ -61,7 +61,7 @@ def higher(of: Any) -> Any:
 
 
 def another_skill(of: Any) -> Any:
-    """A link lands, whatever was permitted."""
+    """Let a link land, whatever was permitted."""
 
     def command(self: Any, kind: int, *more: int) -> Any:
         made = of(self, kind, *more)
@@ -71,7 +71,7 @@ def another_skill(of: Any) -> Any:
 
 
 def past_the_executor(of: Any) -> Any:
-    """What is sent is not what the executor gave out."""
+    """Send a command other than that of the executor."""
 
     def send(self: Any, now: Any, dispatch: Any, *more: Any) -> bool:
         return bool(of(self, now, replace(dispatch) if isinstance(dispatch, Command) else dispatch, *more))
@@ -80,17 +80,17 @@ def past_the_executor(of: Any) -> Any:
 
 
 def ended_in_the_air(of: Any) -> Any:
-    """Whoever interrupts it ends it, wherever the vehicle is."""
+    """Let an interrupt end the run, also in the air."""
     return lambda self, now, cause, kind=0: self._end(now, cause)
 
 
 def without_release(of: Any) -> Any:
-    """It stands down without a word to whoever sends."""
+    """Stand down without releasing the vehicle."""
     return lambda self, now: None
 
 
 def nothing_ends(of: Any) -> Any:
-    """A landing is taken for the end of a command, and of nothing else."""
+    """Treat a landing only as the end of a command."""
     return lambda self, now: self.dispatcher.landed()
 
 
@@ -115,22 +115,22 @@ def test_broken_safety_property_is_detected(name: str, monkeypatch: pytest.Monke
 
 
 def goes_on(of: Any) -> Any:
-    """A takeover and a crash are recorded, and nothing follows."""
+    """Record a takeover or a crash without a reaction."""
     return lambda self, now, event: None
 
 
 def judges_at_once(of: Any) -> Any:
-    """When the link is back, what is known is judged as it is."""
+    """Judge the old state as soon as the link is back."""
     return lambda self, now_us: False
 
 
 def grace_runs(of: Any) -> Any:
-    """The time in which nothing was judged counts as if something had been."""
+    """Count the time without judgement as normal time."""
     return lambda self, us: None
 
 
 def flies_on(of: Any) -> Any:
-    """A hold that failed is recorded, and nothing follows."""
+    """Record a failed hold without a reaction."""
 
     def fall_back(self: Any, kind: int, cause: Any = None, *, holds: bool = True) -> None:
         if holds:
@@ -162,11 +162,11 @@ def test_broken_liveness_property_is_detected(name: str, monkeypatch: pytest.Mon
         Search(of).run()
 
 
-# --------------------------------------------------------------------------------------- what must always come
+# --------------------------------------------------------------------------------------- liveness
 
 
 def lasting_links(of: Any) -> Any:
-    """A link's time is never over."""
+    """Let the time limit of a link never expire."""
 
     def turn(self: Any, now: Any, state: Any) -> bool:
         return True if self._dispatcher.active is not None else of(self, now, state)
@@ -188,6 +188,6 @@ ENDLESS: dict[str, tuple[type, str, Callable[[Any], Any], str]] = {
 def test_endless_path_is_detected(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     owner, method, broken, event = ENDLESS[name]
     monkeypatch.setattr(owner, method, broken(getattr(owner, method)))
-    # a circle in a part is one in the whole
+    # a cycle in a part is a cycle in the whole
     parts = (Search(with_events(event)).run(most) for most in (150, 400, 3_000))
     assert any(endless(found) for found in parts)

@@ -1,7 +1,7 @@
 """Every reachable state of small runs, on the real runtime, boundary and executor (docs/model-checking.md).
 
-While a search goes on, `watching` holds each dispatch, end and stand-down against what may be. Afterwards, the graph
-says whether every path ends, and how long the longest takes.
+During a search, `watching` checks each dispatch, end and stand-down. Afterwards, the graph
+shows whether every path ends, and the duration of the longest.
 """
 
 from dataclasses import replace as with_fields
@@ -16,12 +16,12 @@ from rtshcua.onboard.runtime.limits import falling_us, run_us
 from rtshcua.wire.permit import LINK_VALID_US
 from virtual.rows import rows
 
-#: after every so many transitions, a state that counts as one with another is held against it
+#: the interval, in transitions, of checks that states counted as equal behave equally
 DOUBLE_OF = 101
 
 
 def check(of: Small) -> Found:
-    """Search it, and hold it to its bounds; prints the figures that docs/model-checking.md has."""
+    """Search it and check its bounds; print the figures of docs/model-checking.md."""
     found = Search(of).run(double_of=DOUBLE_OF)
     assert found.whole
     assert len(found.doubles) > 20

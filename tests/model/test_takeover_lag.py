@@ -1,6 +1,6 @@
-"""Every order in which a pilot's command, what the autopilot tells of it, and our next frame can fall within the lag.
+"""Every order of a pilot's command, the autopilot's report of it, and our next frame within the lag.
 
-PX4 acknowledges another mode, and its HEARTBEAT tells of it some 10 to 15 ms later (recorded, `px4-land-undone`). The
+PX4 acknowledges another mode, and its HEARTBEAT reports it some 10 to 15 ms later (recorded, `px4-land-undone`). The
 lag is the parameter; the driver, the simulated autopilot and the link are the real ones, and the moments are tried one
 after the other.
 """
@@ -21,16 +21,16 @@ from virtual.copying import copied
 from virtual.flyer import Flyer
 
 MS, S = 1_000, 1_000_000
-#: what reports may lag, from none to more than was recorded
+#: lags of reports, from none to more than the recorded one
 LAGS_US = (0, 10 * MS, 12 * MS, 15 * MS)
-#: when our next command is begun, after a time at which the pilot acts
+#: the time from the pilot's action to our next command
 BEGUN_MS = range(-45, 26)
 TAKEN = {"land": FlightMode.LAND, "return": FlightMode.RETURN, "position": FlightMode.POSITION}
 
 
 @cache
 def standing(lag_us: int, last: MotionKind) -> Flyer:
-    """It stands in Hold, and our next leg is due: after a climb, or a stop."""
+    """A vehicle in Hold with our next leg due, after a climb or a stop."""
     one = Flyer("px4", mode_lag_us=lag_us)
     one.vehicle._tick_us = MS
     one.up(20_000)
@@ -43,7 +43,7 @@ def standing(lag_us: int, last: MotionKind) -> Flyer:
 
 @cache
 def flying(lag_us: int) -> Flyer:
-    """It flies a leg that is to be stopped."""
+    """A vehicle on a leg that will be stopped."""
     one = copied(standing(lag_us, MotionKind.CLIMB))
     one.begin(MotionKind.FLY, (300_000, 0), altitude=20_000, speed=5_000)
     one.wait(4)
@@ -51,7 +51,7 @@ def flying(lag_us: int) -> Flyer:
 
 
 def taken_at(of: Flyer, mode: FlightMode, begun_ms: int, kind: MotionKind) -> Flyer:
-    """The pilot chooses a mode, and our next command is begun so much later, or sooner."""
+    """The pilot selects a mode, and our next command begins later or earlier by this time."""
     one = copied(of)
     now_us = one.vehicle.simulation.now_us
     takes_us = (now_us // (20 * MS) + 5) * 20 * MS
@@ -67,12 +67,12 @@ def taken_at(of: Flyer, mode: FlightMode, begun_ms: int, kind: MotionKind) -> Fl
 
 
 def orders() -> Iterator[tuple[int, MotionKind, str, int]]:
-    """(lag, what flew before, what the pilot chooses, when ours is begun)."""
+    """(lag, earlier command, the pilot's mode, the begin of ours)."""
     yield from product(LAGS_US, (MotionKind.CLIMB, MotionKind.HOLD), TAKEN, BEGUN_MS)
 
 
 def check(lag_us: int, last: MotionKind, name: str, begun_ms: int) -> str:
-    """The mode that a pilot chose is never taken back by a leg of ours, and the run stands down."""
+    """Check that our leg never overrides the pilot's mode, and that the run stands down."""
     one = taken_at(standing(lag_us, last), TAKEN[name], begun_ms, MotionKind.FLY)
     assert one.truth.mode is TAKEN[name], (lag_us, last, name, begun_ms)
     taken = [event for event in one.events if isinstance(event, TakenOver)]
@@ -83,7 +83,7 @@ def check(lag_us: int, last: MotionKind, name: str, begun_ms: int) -> str:
 
 @pytest.mark.slow
 def test_leg_does_not_override_pilots_mode() -> None:
-    """3 of 25 aimed tries did, at the real one. What left meanwhile changed no mode, and is told."""
+    """Regression: 3 of 25 targeted attempts did, on the real PX4. Commands sent meanwhile change no mode."""
     ends = Counter(
         check(15 * MS, MotionKind.HOLD, "land", begun_ms) for begun_ms in range(BEGUN_MS.start, BEGUN_MS.stop, 2)
     )
@@ -98,24 +98,24 @@ def test_no_leg_overrides_pilots_mode_in_any_order() -> None:
 
 @pytest.mark.slow
 def test_stop_does_not_override_pilots_mode() -> None:
-    """A fallback leaves on a mode report that may be 300 ms old: it asks for no mode where it is in Hold."""
+    """A fallback uses a mode report that may be 300 ms old, so in Hold it requests no mode."""
     for begun_ms in range(2, 20, 3):
         one = taken_at(flying(15 * MS), FlightMode.LAND, begun_ms, MotionKind.HOLD)
         assert one.truth.mode is FlightMode.LAND, begun_ms
         assert any(isinstance(event, TakenOver) for event in one.events)
 
 
-#: a command of ours that begins so long after the pilot's, through each moment up to the report that confirms it
+#: delays of our command after the pilot's, at each moment up to the confirming report
 AFTER_MS = range(0, 320, 10)
-#: what names a mode is undone where it falls between the pilot's and the answer to its own question
+#: the known gap: a command that names a mode overrides the pilot's before the answer to its mode request
 MAY_BE_LOST_MS = range(41)
-#: of the phases of our questions for the mode, which come every 150 ms
+#: phases of our mode requests, which are sent every 150 ms
 PHASES_MS = (0, 40, 80, 120)
 ANY_KIND = (MotionKind.FLY, MotionKind.HOLD, MotionKind.HOME, MotionKind.LAND)
 
 
 def begun_after(lag_us: int, phase_ms: int, after_ms: int, kind: MotionKind) -> tuple[bool, bool]:
-    """Whether a pilot who takes over in a leg keeps it, where a command begins so long after; whether it is told."""
+    """Whether a takeover during a leg persists if a command begins this much later, and whether it is reported."""
     one = copied(flying(lag_us))
     one.wait(phase_ms * MS / S)
     one.vehicle.simulation.inject(PilotMode(0, FlightMode.POSITION))
@@ -138,13 +138,13 @@ def check_after(lag_us: int, phase_ms: int, after_ms: int, kind: MotionKind) -> 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ANY_KIND)
 def test_command_before_a_confirmed_takeover_leaves_the_pilot_in_control(kind: MotionKind) -> None:
-    """One report of it may have come by then: it is neither forgotten, nor taken for the mode of what flew before."""
+    """One report may have arrived by then: it is neither forgotten nor taken for the earlier command's mode."""
     for after_ms in (*range(0, 140, 30), *range(140, 190, 10)):
         check_after(0, 0, after_ms, kind)
 
 
 def asks(frame: bytes) -> bool:
-    """Whether it is a question for a message."""
+    """Whether the frame requests a message."""
     (received,) = Codec(1, 1).parse(frame)
     return bool(getattr(received.message, "command", None) == mavlink.MAV_CMD_REQUEST_MESSAGE)
 
@@ -155,7 +155,7 @@ def test_lost_request_is_repeated_before_return(after_ms: int) -> None:
     one.vehicle.simulation.inject(PilotMode(0, FlightMode.POSITION))
     one.vehicle.lose = asks
     one.wait(after_ms / 1_000)
-    one.begin(MotionKind.HOME)  # its question is lost too
+    one.begin(MotionKind.HOME)  # its request is lost too
     one.vehicle.lose = lambda frame: False
     one.wait(1)
     assert one.truth.mode is FlightMode.POSITION
@@ -174,7 +174,7 @@ def far_away() -> Flyer:
 @pytest.mark.parametrize("kind", [MotionKind.HOME, MotionKind.LAND])
 @pytest.mark.parametrize("after_ms", range(180, 330, 50))
 def test_return_waits_for_link_round_trip(kind: MotionKind, after_ms: int) -> None:
-    """It left after 50 ms, on a report from before the pilot's, and undid what was chosen 320 ms before."""
+    """Regression: it left after 50 ms on an old report, and overrode the pilot's mode of 320 ms before."""
     one = copied(far_away())
     one.vehicle.simulation.inject(PilotMode(0, FlightMode.POSITION))
     one.wait(after_ms / 1_000)

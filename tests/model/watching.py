@@ -1,7 +1,7 @@
-"""What is watched from outside while a run goes on, and what must never be seen. Knows nothing of how a run works.
+"""Properties checked from outside during a run. This module does not know how a run works.
 
-`Gate` stands before the executor and opens every permit itself; `Ear` hears what is recorded; `Watch` holds both, and
-what was sent, against the bundle.
+`Gate` wraps the executor and opens every permit itself; `Ear` receives the records; `Watch` compares both, and
+the sent commands, with the bundle.
 """
 
 from collections.abc import Sequence
@@ -38,7 +38,7 @@ _HOMEWARD = (MotionKind.HOME, MotionKind.LAND)
 
 
 class Ear(Recorder):
-    """A recorder that keeps what it is told in one step instead of writing lines."""
+    """A recorder that keeps the records of one step instead of writing lines."""
 
     def __init__(self, of: Recorder) -> None:
         super().__init__(lambda text: b"", of._public, lambda: bytes(32))
@@ -46,7 +46,7 @@ class Ear(Recorder):
         self.passed: list[Command] = []
 
     def due(self, now: object) -> bool:
-        return False  # seals change nothing that a search looks at
+        return False  # seals do not change the state of a search
 
     overdue = due
 
@@ -61,7 +61,7 @@ class Ear(Recorder):
 
 
 class Gate:
-    """The executor, and what its permits say when somebody else opens them."""
+    """The executor, with its permits opened independently."""
 
     def __init__(self, executor: Any, key: bytes, ear: Ear) -> None:
         self._of = executor
@@ -96,7 +96,7 @@ class Gate:
         return result
 
 
-#: what says that state was looked at
+#: records that show a judgement of the state
 _JUDGED = ("fresh", "decision", "dispatched", "violated", "time-over", "long-silence")
 _STALE_US = UNIT + UNIT // 2
 _UNKNOWN = "unknown for longer"
@@ -104,23 +104,23 @@ _UNKNOWN = "unknown for longer"
 
 @dataclass
 class Watch:
-    """What was seen so far."""
+    """The observations so far."""
 
-    resumed: bool = False  # an earlier run of this bundle broke off
+    resumed: bool = False  # an earlier run of this bundle was interrupted
     down: bool = False  # the link
-    silent: bool = False  # a silence is under way: until state is judged again
-    lost_us: int = 0  # when the link was lost last,
-    back_us: int | None = None  # and when it was back first in this silence
-    awaited: bool = False  # what was known was current when the link was lost
-    heard_us: int = 0  # when the vehicle reported last
-    unknown_us: int | None = None  # so long something has been unknown while the link was up; None: all is known
+    silent: bool = False  # a silence: until state is judged again
+    lost_us: int = 0  # the time of the last link loss,
+    back_us: int | None = None  # and of the first return in this silence
+    awaited: bool = False  # the known state was current when the link was lost
+    heard_us: int = 0  # the time of the vehicle's last report
+    unknown_us: int | None = None  # how long a value has been unknown with the link up; None: all known
     unstopped: bool = False  # a hold failed, and nothing was sent since
     now_us: int = 0
 
-    flying: int | None = None  # the token of the command that flies
+    flying: int | None = None  # the token of the running command
     command: object | None = None
     step: int = -1  # the last step that was sent
-    unsent: tuple[int, bool] = (-1, False)  # what `step` and `ours` were before it
+    unsent: tuple[int, bool] = (-1, False)  # the earlier `step` and `ours`
     tokens: set[int] = field(default_factory=set)
     allowed: set[int] = field(default_factory=set)  # steps
     homeward: bool = False  # a link began a return or a landing
@@ -132,7 +132,7 @@ class Watch:
     ending: Ending | None = None
 
     def before(self, event: Event | None, now_us: int, heard_us: int, *, known: bool) -> None:
-        """What the vehicle says, as it says it. `known`: all that it reported last has a value."""
+        """Observe the vehicle's events. `known`: all of its last values are known."""
         passed_us = now_us - self.now_us if self.now_us else 0
         self.now_us, self.heard_us = now_us, heard_us
         stale = now_us - heard_us > _STALE_US

@@ -1,14 +1,13 @@
-"""Corollary 1: an agent that is taken over proposes, and does nothing else.
+"""Corollary 1: a compromised agent can only propose missions.
 
-Statement. From theorem 1: whatever an agent signs with its own key, what flies of it is what the policy permits to
-agents, under the policy's contracts or tighter ones, on this vehicle; its word approves nothing, recalls nothing, and
-sets nothing aside that a person ordered; what it cancels flies the policy's contingency, and no step any more.
-Whatever it does or does not do, at any moment, the flight ends as one that the policy allows: flown to its end, or
-brought down by a chain of the policy. The key is bound by the trust root to its source, roles and policies; approvals
-are bound to a person, the mission and the flight.
+Statement. From theorem 1: of a mission that an agent signs with its own key, only steps fly that the policy permits to
+agents, under the policy's contracts or tighter ones, on this vehicle. The agent cannot approve, recall, or replace
+steps that a person ordered; a cancelled mission only flies the policy's contingency. Whatever the agent does at any
+moment, the flight is completed or ended by a chain of the policy. The trust root binds the key to its source, roles and
+policies; approvals are bound to a person, the mission and the flight.
 
-Attacker: the agent, with the mission key that `keys init` makes for agents, and all that was ever signed. It compiles
-whatever it likes: it need not use our compiler.
+Attacker: the agent, with the mission key that `keys init` makes for agents, and all documents that were ever signed. It
+need not use our compiler.
 """
 
 from random import Random
@@ -76,7 +75,7 @@ def opened(mission: Mission, key: SigningKey = AGENT) -> Loaded | Refusal:
 
 
 def proposed(of: Random) -> Mission:
-    """A mission of the agent: arbitrary sources, roles and policies, and arbitrary contracts."""
+    """A mission of the agent, with arbitrary sources, roles, policies and contracts."""
     mission = of.choice([MISSION, low_mission()])
     steps = list(mission.invocations)
     for _ in range(of.choice([0, 1, 1, 2])):
@@ -127,7 +126,7 @@ def broken(of: Random) -> list[str]:
 
 
 def told(of: Random, step: Invocation) -> State:
-    """A state that is well, or near some threshold."""
+    """A nominal state, or one near a threshold."""
     values: dict[int, int | None] = {HEIGHT: 0, POSITION_X: 0, POSITION_Y: 0} if step.step == 0 else {}
     if of.random() < 0.3:
         slot = of.choice([*worlds.NEAR])
@@ -220,13 +219,13 @@ def test_cancelled_mission_flies_only_contingency(of: Random) -> None:
     assert any(answer.permit for answer in allowed)
 
 
-#: how a flight may end, whoever proposed it: nobody took it over, and nothing broke
+#: the allowed endings of a flight without a takeover or a fault
 ENDS = {Ending.COMPLETED, Ending.ABORTED, Ending.CANCELLED, Ending.REFUSED}
 
 
 def meddled(of: Random) -> Run:
-    """A whole flight, in a world in which steps are not always admitted, with an agent that does what it likes, at any
-    moment: it replaces, cancels, repeats itself, babbles, or is silent when it is asked for another step.
+    """A whole flight, in which steps are not always admitted, with arbitrary behaviour of the agent at any moment: it
+    replaces, cancels, repeats documents, sends garbage, or is silent when a replacement is requested.
     """
     otherwise = [OnInadmissible.REPLAN, *OnInadmissible]
     steps = [replace(each, on_inadmissible=of.choice(otherwise)) for each in MISSION.invocations]
@@ -246,7 +245,7 @@ def meddled(of: Random) -> Run:
 
 
 def paper_of(of: Random, flying: Loaded, handed: list[bytes]) -> bytes:
-    """Something that the agent of this flight signs, or sends."""
+    """Return a document that the agent of this flight signs or sends."""
     mission, kept = flying.bundle.mission, of.randrange(len(flying.bundle.mission.invocations))
     chance = of.random()
     if chance < 0.1:
@@ -266,7 +265,7 @@ def paper_of(of: Random, flying: Loaded, handed: list[bytes]) -> bytes:
 
 
 def met_its_end(run: Run) -> list[str]:
-    """What is wrong with how a flight ended."""
+    """Return the fault of a flight's ending, if any."""
     wrong = [] if run.ending in ENDS else [f"it ended as {run.ending}"]
     return [*wrong, "it was left in the air"] if run.vehicle.airborne else wrong
 

@@ -6,11 +6,11 @@ was admissible when its permit was made: valid_T and valid_S and L_rem <= ddl - 
 a rule asks for one. It is the command that was signed, sent once, within its deadline and validity, and not after a
 recall or a cancellation.
 
-Attacker: a runtime that is wholly taken over. It asks for whatever it likes, in any order, with any state, time,
-release and phase; it keeps and alters every permit; it hands in documents that people signed, that strangers signed,
-damaged ones, and all of them again. It holds no key. (What it says of the state is believed: the stated limit.)
+Attacker: a compromised runtime. It makes arbitrary requests, in any order, with any state, time, release and phase. It
+keeps and alters every permit. It presents documents signed by people or strangers, damaged ones, and replays. It holds
+no key. (Its claims about the state are accepted: the stated limit.)
 
-The oracle that admission is held against is `reference.oracle`, written apart from `decide`.
+Admission is compared with `reference.oracle`, which is independent of `decide`.
 """
 
 from random import Random
@@ -107,7 +107,7 @@ class TakenOver:
                     self.fly()
         return self.broken
 
-    # ------------------------------------------------------------------------------------------------ what it does
+    # ------------------------------------------------------------------------------------------------ actions
 
     def fly(self) -> None:
         """The actions of an honest runtime, to reach the rest of the mission."""
@@ -149,7 +149,7 @@ class TakenOver:
                 self.judge(asked, meant, answer.permit)
 
     def told(self, meant: Invocation, strange: float = 0.3) -> State:
-        """A state: well, or near a threshold, or with something missing."""
+        """A state: nominal, near a threshold, or with missing values."""
         values = dict(NOMINAL)
         if meant.step == 0:
             values |= {HEIGHT: 0, POSITION_X: 0, POSITION_Y: 0}
@@ -169,7 +169,7 @@ class TakenOver:
             chosen = chosen[: at // 8] + bytes([chosen[at // 8] ^ 1 << at % 8]) + chosen[at // 8 + 1 :]
         try:
             found = self.loaded.executor.dispatch(chosen, self.now.monotonic_us)
-        except LookupError:  # believed, and naming nothing
+        except LookupError:  # accepted, without an effect
             self.hold(False, "a permit that nobody made")
         else:
             if isinstance(found, Command):
@@ -213,7 +213,7 @@ class TakenOver:
             self.confirmed.add(before[receipt.step].invocation_id)
         self.recalled = self.recalled or (receipt.accepted and receipt.kind in (RECALL, CANCELLATION))
 
-    # ------------------------------------------------------------------------------------------- what must hold of it
+    # ------------------------------------------------------------------------------------------- properties
 
     def judge(self, asked: Request, meant: Invocation, permit: bytes) -> None:
         """A permit was made for a step: check that it was admissible."""

@@ -1,13 +1,13 @@
-"""Theorem 2: what is not admitted falls back, within bounds.
+"""Theorem 2: a step that is not admitted leads to a bounded fallback.
 
-Statement. Let fallbacks be bounded (assumption 3: the checker lets no chain compile that does not end in a link which
-needs nothing). Then whatever happens to the vehicle and its link, once the mission began: what flies is a step that was
-admitted, or a link of a chain that was signed, a step's own or the policy's contingency; each chain goes forward only;
-no step follows a return or a landing; the links are bounded in number; and the flight ends, in bounded time.
+Statement. Let fallbacks be bounded (assumption 3: each chain that compiles ends in a link without requirements). Then,
+whatever happens to the vehicle and its link after the start of the mission, every flown command is an admitted step, or
+a link of a signed chain: the step's own, or the policy's contingency. Each chain only advances; no step follows a
+return or a landing; the number of links is bounded; and the flight ends in bounded time.
 
-Attacker: the world. Sensors go silent, wind and obstacles come and go, the charge runs out, skills fail or never end,
-the link breaks, the disk fails, people interrupt. The runtime is honest, and in the end the vehicle does what it is
-told to: no rule helps a vehicle that obeys nothing.
+Attacker: the environment. Sensors fail, wind and obstacles come and go, the charge runs out, skills fail or never end,
+the link breaks, the disk fails, people interrupt. The runtime is honest, and the vehicle finally obeys: no rule helps
+a vehicle that ignores all commands.
 """
 
 from collections.abc import Callable

@@ -1,13 +1,13 @@
-"""Theorem 3: what was done is in evidence, and the evidence cannot be bent.
+"""Theorem 3: every action has evidence, and the evidence cannot be altered undetected.
 
-Statement. Each command that was sent has before it, in a log that verifies, the record that permits it, with everything
-that was read (the evidence tuple); the decision derives again from it. Who holds no key changes, adds or takes out
-nothing of a closed log unnoticed. Who took the vehicle, and with it the key of the present epoch, changes nothing that
-an earlier epoch sealed.
+Statement. Each sent command follows, in a log that verifies, a record that permits it, with all inputs of the decision
+(the evidence tuple); the decision derives again from it. Without a key, no change, addition or removal in a closed log
+remains undetected. An attacker who took the vehicle, and with it the key of the present epoch, cannot change records
+that an earlier epoch sealed.
 
-Attacker: whoever holds the file. First without keys, but diligent: lines are edited, moved, doubled, cut, swapped with
-those of another log, and all hashes, counts and links that need no key are then made anew. Then with the secrets of the
-last epoch. (Who holds the log key can write another log; only a witness tells: tests/attacks/test_log_anchored.py.)
+Attacker: a holder of the file. First without keys: lines are edited, moved, duplicated, cut, or swapped with those of
+another log, and all hashes, counts and links that need no key are recomputed. Then with the secrets of the last epoch.
+(A holder of the log key can write another log; only a witness detects it: tests/attacks/test_log_anchored.py.)
 """
 
 from collections.abc import Callable
@@ -42,9 +42,9 @@ from rtshcua.ground.audit.audit import audit
 from rtshcua.wire.keys import Duty, SigningKey
 
 STRANGER = SigningKey.from_seed(b"\x77" * 32, duty=Duty.LOG, development=True)
-#: how the rest of a log is made to fit, by whoever has no key
+#: how an attacker without a key recomputes the rest of a log
 FITTED = (list, renumbered, rehashed, rewritten, lambda lines: rewritten(renumbered(lines)))
-#: what the paper's evidence tuple has of a decision, by the fields of its record
+#: the fields of a record for each part of the paper's evidence tuple
 TUPLE = ("invocation", "state", "context", "outcome", "reason", "at_us", "utc_us", "binding", "target_link")
 
 

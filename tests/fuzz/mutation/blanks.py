@@ -1,4 +1,4 @@
-"""Comments and blanks where they may stand: between any two words of a source."""
+"""Mutations that insert comments and blanks between any two tokens of a source."""
 
 import re
 from random import Random
@@ -17,7 +17,7 @@ _BLANKS = (" ", "\n", "\n\n", "\n\n\n\n", "\t", "\r\n", "  \n  ", "\f", "")
 
 
 def sprinkled(text: str, of: Random) -> str:
-    """The text with comments and blanks put in at random: few in many places, or many in a few."""
+    """Insert comments and blanks at random: few in many places, or many in a few."""
     chance = of.choice([0.005, 0.02, 0.1, 0.5])
     only_blanks = of.random() < 0.2
     made = []
@@ -40,7 +40,7 @@ def _some(of: Random) -> str:
 
 
 def joined(text: str, of: Random) -> str:
-    """The text with line ends taken away or put in where blanks are, as someone may write it."""
+    """Remove or insert line ends at blanks."""
     chance = of.choice([0.1, 0.5, 1.0])
 
     def other(found: re.Match[str]) -> str:

@@ -1,4 +1,4 @@
-"""Changes of an evidence log that anyone can make who holds no key: of octets, lines, fields, and what follows."""
+"""Changes of an evidence log without a key: of bytes, lines and fields, with recomputed hashes."""
 
 from collections.abc import Callable, Sequence
 from random import Random
@@ -51,7 +51,7 @@ def _exchanged(data: bytes, of: Random) -> bytes:
 
 
 def _swollen(data: bytes, of: Random) -> bytes:
-    """Seldom: a megabyte of something put in."""
+    """Rarely insert a megabyte."""
     if of.random() < 0.98:
         return _flipped(data, of)
     at = _place(data, of)
@@ -65,7 +65,7 @@ OF_OCTETS: tuple[Callable[[bytes, Random], bytes], ...] = (
 
 
 def _of_lines(lines: Lines, others: Lines, of: Random) -> list[bytes]:
-    """Lines deleted, doubled, moved, or taken from another log."""
+    """Delete, duplicate or move lines, or take them from another log."""
     changed = list(lines)
     at, to = of.randrange(len(changed)), of.randrange(len(changed))
     match of.randrange(6):
@@ -85,7 +85,7 @@ def _of_lines(lines: Lines, others: Lines, of: Random) -> list[bytes]:
 
 
 def _of_fields(lines: Lines, of: Random) -> list[bytes]:
-    """A field changed, exchanged with that of another record, or anything else in the JSON of a line."""
+    """Change a field, exchange it with another record's, or change the JSON of a line."""
     changed = list(lines)
     at = of.randrange(len(changed))
     fields = read(changed[at])
@@ -104,7 +104,7 @@ def _of_fields(lines: Lines, of: Random) -> list[bytes]:
 
 
 def _followed_up(lines: list[bytes], of: Random) -> list[bytes]:
-    """Some of what an attacker then puts right, where it can be done at all."""
+    """Recompute some of the values that an attacker can."""
     try:
         return of.choice((list, list, rehashed, renumbered, rewritten))(lines)
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
@@ -112,7 +112,7 @@ def _followed_up(lines: list[bytes], of: Random) -> list[bytes]:
 
 
 def mutated(lines: Lines, others: Lines, of: Random) -> bytes:
-    """The octets of the log, changed somehow, once to four times."""
+    """Return the log with one to four changes."""
     draw = of.random()
     if draw < 0.55:
         data = b"".join(lines)

@@ -1,4 +1,4 @@
-"""Sentences of the grammar: derivations at random, with the terminals that sources use."""
+"""Random sentences of the grammar, with the terminals that sources use."""
 
 import re
 from functools import cache
@@ -11,7 +11,7 @@ from fuzz import corpus
 from fuzz.mutation.words import TOKEN, changed
 from rtshcua.ground.language import generate
 
-#: a derivation deeper than this takes the shortest way out
+#: deeper derivations use the shortest rules
 DEEPEST = 22
 _CONDITIONS = ("condition", "disjunction", "atom", "timed", "comparison")
 _ITEMS = (
@@ -19,7 +19,7 @@ _ITEMS = (
     "policy_item", "mission_item", "phase_item", "vehicle_item", "zone_item", "signal_item", "rule", "step", "use",
 )  # fmt: skip
 _NEVER = 1 << 20
-#: terminals that are told by what follows them, so that no word alone is one
+#: terminals that depend on the text after them, so that no single word matches
 _LED = {
     "LOCAL_TIME": ["local time"], "_ONE_OF": ["one of"], "_ON_INADMISSIBLE": ["on inadmissible"], "_GROW": ["grow"],
     "_CIRCLE": ["circle"], "_POLYGON": ["polygon"], "_CORRIDOR": ["corridor"], "COMBINE": ["union", "difference"],
@@ -44,7 +44,7 @@ def _rules() -> dict[str, list[Rule]]:
 
 @cache
 def _samples() -> dict[str, list[str]]:
-    """For each terminal the words of all sources that are one."""
+    """The words of all sources by terminal."""
     used = {token for source in corpus.sources() for token in TOKEN.findall(source.decode())}
     used |= {match for source in corpus.sources() for match in re.findall(r"[a-z_]+(?:\.[a-z_]+)+", source.decode())}
     found = {}
@@ -57,7 +57,7 @@ def _samples() -> dict[str, list[str]]:
 
 @cache
 def _depths() -> dict[str, int]:
-    """How deep the shortest derivation of each rule is."""
+    """The depth of the shortest derivation of each rule."""
     depths = dict.fromkeys(_rules(), _NEVER)
     for _ in range(len(depths)):
         for name, rules in _rules().items():
@@ -68,14 +68,14 @@ def _depths() -> dict[str, int]:
 
 
 def sentence(of: Random, start: str = "file") -> str:
-    """A sentence from one of the grammar's rules; terminals are parted by spaces."""
+    """A sentence of one of the grammar's rules, with spaces between terminals."""
     words: list[str] = []
     _expand(start, of, 0, words)
     return " ".join(words)
 
 
 def inserted(text: str, of: Random) -> str:
-    """The text with a sentence where something of its kind stands, or on some line."""
+    """Insert a sentence in place of a similar part, or on some line."""
     if of.random() < 0.5:
         found = list(re.finditer(r"\b(?:require|assume|maintain|when|inside)\s+([^\n{}]+)", text))
         if found:

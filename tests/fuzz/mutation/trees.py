@@ -1,4 +1,4 @@
-"""Near-valid nested values, of JSON and of CBOR: one leaf or one branch is another."""
+"""Near-valid nested values of JSON and CBOR, with one changed leaf or branch."""
 
 import json
 from random import Random
@@ -62,7 +62,7 @@ def _leaf(value: Any, of: Random, leaves: tuple[Any, ...]) -> Any:
 
 
 def mutated_json(data: bytes, of: Random) -> bytes:
-    """A JSON text after one to three changes; what is none gets a byte more."""
+    """A JSON text after one to three changes; other text gets an extra byte."""
     try:
         value = json.loads(data)
     except (ValueError, RecursionError):

@@ -1,4 +1,4 @@
-"""Near-valid sources: a text changed by the word, the line, the part or the whole declaration."""
+"""Near-valid sources: changes of words, lines, parts or whole declarations."""
 
 import re
 from collections.abc import Callable
@@ -70,7 +70,7 @@ def _by_token(text: str, of: Random) -> str:
 
 
 def _by_number(text: str, of: Random) -> str:
-    """One number, or one unit after a number, is another."""
+    """Change one number, or its unit."""
     found = list(re.finditer(r"(\d[\d_]*(?:\.\d+)?)( ?)([A-Za-z%/]*)", text))
     if not found:
         return text
@@ -121,7 +121,7 @@ _WAYS: tuple[Callable[[str, Random], str], ...] = (
 
 
 def changed(text: str, of: Random, times: int) -> str:
-    """The text after so many changes."""
+    """The text after a number of changes."""
     for _ in range(times):
         text = of.choice(_WAYS)(text, of)
     return text

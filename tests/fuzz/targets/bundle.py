@@ -1,6 +1,6 @@
-"""The bytes of a bundle: as they come; and the two payloads in them, signed by keys that are trusted.
+"""The bytes of a bundle, raw; or its two payloads, signed by trusted keys.
 
-The first byte says which: 0 for a bundle as it is, else two payloads, the first with its length in 3 octets before it.
+The first byte is 0 for a raw bundle; otherwise two payloads follow, the first after its length in 3 octets.
 """
 
 from functools import cache
@@ -84,7 +84,7 @@ def one(data: bytes) -> None:
 
 
 def raw(data: bytes, vehicle: str = reference.VEHICLE, utc_us: int = reference.START.utc_us) -> None:
-    """A bundle is shown, and loaded; each refusal is a value, or an `Untrusted`."""
+    """Show and load a bundle; each refusal must be a value or an `Untrusted`."""
     try:
         what = claimed(data)
     except Untrusted:

@@ -1,5 +1,5 @@
-"""Source text: loaded with the whole library at hand, checked, and where nothing is wrong compiled, signed and loaded
-on board.
+"""Source text: loaded with the library and checked; without errors also compiled, signed and
+loaded on board.
 """
 
 from collections.abc import Iterable

@@ -1,4 +1,4 @@
-"""The text of a condition in a skill: typed, lowered, evaluated on board, against the naive meaning of expressions."""
+"""The text of a condition in a skill: typed, lowered and evaluated, compared with a naive interpreter."""
 
 from collections.abc import Iterable
 from random import Random

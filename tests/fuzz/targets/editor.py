@@ -1,5 +1,5 @@
-"""Texts while they are written: after every edit what an editor is told is what a whole check says, and no question at
-any place is one too many.
+"""Texts during editing: after every edit the editor's findings equal those of a full check, and no request at
+any place fails.
 """
 
 from collections.abc import Iterable
@@ -24,7 +24,7 @@ from rtshcua.mavlink import dialect
 
 MAX_LENGTH = 8_000
 EDITS = 4
-#: places of each text at which everything is asked
+#: places of each text at which all requests are made
 PLACES = 3
 
 _PUT = (
@@ -94,7 +94,7 @@ def _same_as_whole(desk: Workspace, text: str) -> None:
 
 
 def _asked(desk: Workspace, of: Random) -> None:
-    """Everything that an editor may ask of a text."""
+    """All requests of an editor for a text."""
     file, now = world.PROBE, desk.open[world.PROBE]
     text, view = now.source.text, desk.view(file)
     for kept in (outline(now), folds(now), semantic_tokens(view, file)):

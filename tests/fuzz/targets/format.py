@@ -1,4 +1,4 @@
-"""Source text, formatted: the result is stable, and says the same with the same comments, by an oracle of its own."""
+"""Source text, formatted: the result is stable and has the same code and comments, by an independent oracle."""
 
 import re
 from collections.abc import Iterable
@@ -44,7 +44,7 @@ def mutated(data: bytes, of: Random) -> bytes:
 
 
 def check(text: str, width: int) -> str | None:
-    """The formatted text, if there is one, after all has been held against it that must be so."""
+    """Return the formatted text, if any, after checking its properties."""
     source = Source(world.PROBE, text)
     made = formatted(source, width)
     assert all(found.code is not UNSAFE_FORMAT for found in made.diagnostics), made.diagnostics
@@ -99,7 +99,7 @@ def without_spans(value: object) -> object:
 
 
 def tidy(text: str) -> None:
-    """What holds of the layout whatever the text says; comments of several lines have blanks of their own."""
+    """Check the layout rules, except within comments of several lines."""
     assert not text or (text.endswith("\n") and not text.endswith("\n\n"))
     if "/*" not in text:
         lines = text.split("\n")

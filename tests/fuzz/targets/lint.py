@@ -1,4 +1,4 @@
-"""Source text through the linter: found, ignored as a naive reading of the comments says, and fixed without harm."""
+"""Source text through the linter: findings, ignores by a naive reading of comments, and harmless fixes."""
 
 from collections.abc import Iterable
 from random import Random
@@ -43,13 +43,13 @@ _IMPORTS = ("skills/goto", "skills/hover", "policies/site", "skills/signals", "p
 
 
 def seeds() -> Iterable[bytes]:
-    """All texts, those with habits several times."""
+    """All texts; those with lint findings several times."""
     habits = [path.read_bytes() for path in sorted((corpus.TESTS / "rejected").glob("e13*.rts"))]
     return (*corpus.sources(), *habits * 6)
 
 
 def mutated(data: bytes, of: Random) -> bytes:
-    """A text that is changed, often by an ignore, a superfluous import or a name in another style."""
+    """A changed text, often with an ignore, an unused import or a name in another style."""
     choice = of.random()
     if choice < 0.4:
         return sentences.mutated(data, of)
@@ -75,7 +75,7 @@ def mutated(data: bytes, of: Random) -> bytes:
 
 
 class Held:
-    """One text, as `fix` reads and puts it."""
+    """One text, with the file operations of `fix`."""
 
     def __init__(self, data: bytes) -> None:
         self.data = data
@@ -87,7 +87,7 @@ class Held:
         self.data = data
 
     def examined(self) -> LintFindings:
-        """Everything that is found in the text."""
+        """All findings in the text."""
         program = load([world.PROBE], world.reading({world.PROBE: self.data}), world.LIBRARY, world.listing)
         checked = examine_program(program, dialect.load())
         found = checked.diagnostics
@@ -151,7 +151,7 @@ def _is_text(data: bytes) -> bool:
 
 
 def _same(before: Source, after: Source) -> None:
-    """Safe fixes take away imports and ignores, each with its line at most, and nothing else."""
+    """Check that safe fixes only remove imports and ignores, each with its line at most."""
     old, new = parse(before).unit, parse(after).unit
     for name in type(old).__struct_fields__:
         if name not in ("span", "imports"):

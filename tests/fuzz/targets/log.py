@@ -1,6 +1,6 @@
-"""The lines of an evidence log: as they come; and linked and signed anew, as the holder of the log key could.
+"""The lines of an evidence log, raw; or linked and signed again, as by a holder of the log key.
 
-The first byte says which: 0 for lines as they are.
+The first byte is 0 for raw lines.
 """
 
 import json
@@ -26,7 +26,7 @@ def seeds() -> tuple[bytes, ...]:
 
 
 def mutated(data: bytes, of: Random) -> bytes:
-    """Some line is another, is missing, or stands twice."""
+    """Change, remove or duplicate a line."""
     lines = data[1:].splitlines(keepends=True)
     if not lines:
         return data

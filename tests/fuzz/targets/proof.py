@@ -1,4 +1,4 @@
-"""Proofs of records, and receipts: nothing is believed that is not true of one of the logs that they are of."""
+"""Proofs of records, and receipts: each accepted one must be true of one of the logs."""
 
 from random import Random
 
@@ -12,7 +12,7 @@ def seeds() -> tuple[bytes, ...]:
 
 
 def mutated(data: bytes, of: Random) -> bytes:
-    """Its octets, its lines, or the parts of what it carries are changed."""
+    """Change its bytes, its lines, or the parts of its content."""
     return proof_mutations.changed(data, of)
 
 

@@ -39,7 +39,7 @@ def worlds() -> tuple[Loaded, ...]:
 
 
 def _sizes(of: Loaded) -> tuple[bytes, int]:
-    """What every request begins with, and how long the rest is."""
+    """The common prefix of requests, and the length of the rest."""
     one = encode(_asked(of, STEP, 0, -1))
     other = encode(_asked(of, CONTINGENCY_LINK, 0, 0))
     same = next(at for at, (left, right) in enumerate(zip(one, other, strict=True)) if left != right)
@@ -70,7 +70,7 @@ def seeds() -> tuple[bytes, ...]:
 
 
 def mutated(data: bytes, of: Random) -> bytes:
-    """An integer of 8 octets somewhere is another, small or large."""
+    """Change an integer of 8 octets to a small or large one."""
     if len(data) < 10:
         return data
     at = of.randrange(1, len(data) - 8)

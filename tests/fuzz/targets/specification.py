@@ -34,7 +34,7 @@ def one(data: bytes) -> None:
 
 
 def _resolve(value: object, pointer: str) -> None:
-    """A pointer leads to a value (RFC 6901), or to a key that is missing or written twice, under one."""
+    """Check that a pointer (RFC 6901) leads to a value, or to a missing or duplicate key under one."""
     *path, last = [part.replace("~1", "/").replace("~0", "~") for part in pointer.split("/")[1:]]
     for part in path:
         assert isinstance(value, dict | list), pointer

@@ -1,4 +1,4 @@
-"""A flight whose boundary signs its own evidence. It waits in the air for an approval, and receives forged input."""
+"""A flight whose boundary signs its own evidence, waits in the air for an approval, and receives forged input."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -38,7 +38,7 @@ def _approval(flight: Flight) -> bytes:
 
 
 def fly(session: int = 1, before: bytes = START) -> tuple[bytes, ...]:
-    """The lines of one; 3 s after the leg was deferred the answer comes, with a forged one and a forged frame."""
+    """The lines of the flight; 3 s after the leg was deferred come the approval, a forged one, and a forged frame."""
     boundary = BoundaryKey(case.BOUNDARY_KEY, session, before)
     flight = Flight(_bundle(), case.simulated("px4"), boundary=boundary)
     since: list[int] = []

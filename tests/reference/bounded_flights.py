@@ -87,7 +87,7 @@ def _place(of: Random, far: float) -> str:
 
 
 def _text(keeps: Keeps, steps: list[str], area: str, wide: int) -> str:
-    """The source. Each skill may take long, and much: what the steps take is proved for each."""
+    """The source. Each skill may take long and use much charge: the bounds are proved for each step."""
     here = f"{HOME[0]} N, {HOME[1]} E"
 
     def skill(name: str, motion: str, energy: int, fallback: str = "come_home, come_down") -> str:

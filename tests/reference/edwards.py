@@ -11,7 +11,7 @@ NEUTRAL: Point = (0, 1)
 
 
 def add(a: Point, b: Point) -> Point:
-    """The sum of two points (RFC 8032, section 5.1.4, in affine coordinates)."""
+    """Return the sum of two points (RFC 8032, section 5.1.4, in affine coordinates)."""
     k = D * a[0] * b[0] * a[1] * b[1]
     return (
         (a[0] * b[1] + b[0] * a[1]) * pow(1 + k, -1, P) % P,

@@ -14,10 +14,10 @@ PATIENCE_S = 20.0
 class FaultyDisk:
     """A disk that forwards to the real one, with injected faults.
 
-    `room` is how many bytes it still takes, `step` how many a call. An error number in `failing`, by the name of a
-    method, is what each call of it fails with; `once` are those of the next calls, None for one
-    that works. What is cleared in `open`
-    (`write`, `sync`) hangs until it is set. `durable` is how many bytes of each file survive a loss of power.
+    `room` is the number of bytes still accepted, `step` that of each call. An error number in `failing`, by the name of
+    a method, is the error of each call; `once` has those of the next calls, None for one that succeeds. An event
+    cleared in `open` (`write`, `sync`) blocks until it is set. `durable` is how many bytes of each file survive a power
+    cut.
     """
 
     def __init__(self, room: int = 1 << 40, step: int = 1 << 30) -> None:

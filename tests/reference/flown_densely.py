@@ -20,7 +20,7 @@ SURE, CLEAR = 0.6, 2.5
 DAY = 86_400
 #: 2026-06-01T00:00Z, seconds
 MIDNIGHT = 20_605 * DAY
-#: seconds: from the issue to the first step; deadline and longest duration of the steps; a link home lasts so long
+#: seconds: from the issue to the first step; deadline and longest duration of the steps; duration of a return
 WAIT, TAKEOFF, FLY, RETURN = 300, (10, 60), (5, 120), (10, 240)
 HOVER, HOMEWARD, ALL_LINKS = 10, 240, 1_500
 
@@ -42,7 +42,7 @@ def written(x: float, y: float) -> str:
 
 
 class Zone(NamedTuple):
-    """A circle, or a box, with heights, and when it exists: local seconds of the day, or seconds of UTC."""
+    """A circle or a box with heights, and its times: local seconds of the day, or seconds of UTC."""
 
     name: str
     x: float
@@ -70,7 +70,7 @@ class Zone(NamedTuple):
         return text + "\n"
 
     def depth(self, x: float, y: float, z: float) -> float:
-        """How far inside of it a place is, metres; below 0 how far outside, or less than that."""
+        """The depth of a place inside the zone, metres; negative outside, at most by its distance."""
         if self.high:
             flat = min(self.wide - abs(x - self.x), self.high - abs(y - self.y))
         else:
@@ -93,7 +93,7 @@ def _moment(at: int) -> str:
 
 
 class Leg(NamedTuple):
-    """A step: from where to where, m, and when it begins and has ended at the latest, s after the issue."""
+    """A step: start and end, m, and its earliest begin and latest end, s after the issue."""
 
     start: tuple[float, float, float]
     end: tuple[float, float, float]
@@ -104,7 +104,7 @@ class Leg(NamedTuple):
 
 
 class Drawn(NamedTuple):
-    """A random program and when its mission is issued, s of UTC; 0 where that is not known."""
+    """A random program with the time of issue of its mission, s of UTC; 0 if unknown."""
 
     text: str
     issued: int
@@ -116,7 +116,7 @@ class Drawn(NamedTuple):
     forbid: tuple[bool, Zone] | None
     legs: tuple[Leg, ...]
     within: float
-    returns: float  # the height above home that it returns at; 0: that is not said
+    returns: float  # the return altitude above home; 0: not declared
 
 
 def zone(of: Random, name: str, dated: bool) -> Zone:
@@ -229,7 +229,7 @@ def _homes(within: float) -> list[tuple[float, float]]:
 
 
 class Extent(NamedTuple):
-    """How deep inside a zone the places of a volume are, widened by the error: the least, and the most."""
+    """The least and the greatest depth inside a zone of a volume's places, widened by the error."""
 
     least: float
     most: float
@@ -251,7 +251,7 @@ def _moments(low: float, high: float) -> list[float]:
 
 
 class Need(NamedTuple):
-    """From `low` to `high` s after the issue a zone must exist, or must not. `sure`: whatever the margins."""
+    """A zone must, or must not, exist from `low` to `high` s after the issue. `sure`: independent of the margins."""
 
     zone: Zone
     exists: bool
@@ -260,7 +260,7 @@ class Need(NamedTuple):
 
 
 class Needs(NamedTuple):
-    """What must be so: surely, and with all margins; `never` and `hardly` say that no time helps."""
+    """The needs without and with all margins; `never` and `hardly` mean that no time satisfies them."""
 
     never: bool
     hardly: bool
@@ -271,7 +271,7 @@ class Needs(NamedTuple):
 def _stay(
     zone: Zone, inside: bool, extent: Extent, low: int, high: tuple[int, int]
 ) -> Iterator[tuple[bool, Need | None]]:
-    """What a volume needs of a zone, from `low` to the earlier of `high`, surely, and to the later with all margins."""
+    """The needs of a volume for a zone: from `low` to the earlier `high` surely, and to the later with all margins."""
     if inside:
         if extent.least < -SURE:
             yield True, None
@@ -308,7 +308,7 @@ def needs(program: Drawn) -> Needs:
             for rule, wanted in ((program.permit, True), (program.forbid, False)):
                 if rule:
                     side, each = rule
-                    depth = each._replace(ceiling=1_000.0).depth(*leg.end)  # of a parameter the height does not count
+                    depth = each._replace(ceiling=1_000.0).depth(*leg.end)  # the height of a parameter does not count
                     found += _asked(each, side == wanted, depth, leg.latest)
     for each, side in airspace:
         extent = _extent(each, _homes(program.within), 0, 0)
@@ -325,10 +325,10 @@ def _homeward(
     program: Drawn, zone: Zone, inside: bool, starts: list[tuple[float, float]], low: float, high: float,
     until: tuple[int, int],
 ) -> Iterator[tuple[bool, Need | None]]:  # fmt: skip
-    """What the ways home from some places, anywhere between two heights, need of a zone: up there, across, down."""
+    """The needs of the ways home from some places between two heights for a zone: climb, cruise and descent."""
     homes, returns = _homes(program.within), program.returns
     top = max(high, returns)
-    # who begins so near to home may stay as low as there: stock cones reach out to 10 m, or a third of the height
+    # near home a return may stay low: the default cones reach out to 10 m, or a third of the height
     near = max(10.0, returns / 3) + program.within + ERROR
     surely, hardly = ([not returns or hypot(*at) < near + each for at in starts] for each in (-SURE, CLEAR))
     for low_from, kinds in ((surely, (True, False)),) if surely == hardly else ((surely, (True,)), (hardly, (False,))):
@@ -342,7 +342,7 @@ def _homeward(
 
 
 def _asked(zone: Zone, inside: bool, depth: float, latest: int) -> Iterator[tuple[bool, Need | None]]:
-    """What a place must be of a zone when its step begins."""
+    """The needs of a place for a zone when its step begins."""
     return _stay(zone, inside, Extent(depth, depth), 0, (latest, latest))
 
 

@@ -27,7 +27,7 @@ from virtual.once import once
 
 LOG_KEY = case.KEYS[Duty.LOG]
 SIGNED = ("genesis", "seal", "recover", "close")
-#: the secret of a key that nobody was told to trust
+#: the secret of an untrusted key
 STRANGER = b"\x77" * 32
 
 
@@ -60,7 +60,7 @@ def prove(lines: Iterable[bytes], pinned: bytes = ROOT_KEY) -> Audit:
 
 
 def sound(lines: Iterable[bytes]) -> Audit:
-    """The audit of a log without a flaw, in which every decision is derived again."""
+    """Audit a valid log, deriving every decision again."""
     lines = list(lines)
     result = prove(lines)
     assert result.report.failure is None, result.report.failure
@@ -118,23 +118,23 @@ def renumbered(lines: Iterable[bytes]) -> list[bytes]:
 
 
 def rewritten(lines: Iterable[bytes]) -> list[bytes]:
-    """Numbered, linked and counted anew, the checkpoints left: all that can be done without any key."""
+    """Numbers, links and counts recomputed, checkpoints unchanged: all that is possible without a key."""
     return resealed(lines, seed_of, keep=("checkpoint",))
 
 
 def signed(lines: Iterable[bytes], key: SigningKey = LOG_KEY) -> list[bytes]:
-    """Rewritten and signed: what a holder of the log key and of all epoch keys can do."""
+    """Rewritten and signed, as by a holder of the log key and all epoch keys."""
     return resealed(lines, lambda public: seed_of(public, key))
 
 
 def captured(lines: Iterable[bytes], *secrets: bytes) -> list[bytes]:
-    """Rewritten, and signed wherever one of these secrets is what should sign: what a holder of some keys can do."""
+    """Rewritten, and signed where one of these secrets is the right key, as by a holder of some keys."""
     held = {public_of(secret).hex(): secret for secret in secrets}
     return resealed(lines, lambda public: held.get(public, b""))
 
 
 def by_one_key(lines: Iterable[bytes], secret: bytes) -> list[bytes]:
-    """Rewritten, and signed throughout by the holder of this secret, whosever turn it is."""
+    """Rewritten, and signed throughout with this secret."""
     return resealed(lines, lambda _: secret)
 
 

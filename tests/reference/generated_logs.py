@@ -1,6 +1,6 @@
 """Generated logs of a fleet that never flew, in the real format, with seals and trust.
 
-What they say of each flight is random, from a seed: such a log verifies, but its decisions do not follow from their
+The contents are random, from a seed: such a log verifies, but its decisions do not follow from their
 inputs. Used by bench/archive.py and by tests of the archive.
 """
 
@@ -25,7 +25,7 @@ from virtual import case
 ROOT_KEY = case.KEYS[Duty.ROOT].public
 LOG_KEY = case.KEYS[Duty.LOG]
 
-#: what answers look like: how often, outcome, reason, step that decided, clause
+#: decisions: frequency, outcome, reason, deciding step, clause
 ANSWERS = (
     (900, Outcome.ALLOW, Reason.ADMITTED, 8, None),
     (30, Outcome.DENY, Reason.NOT_PERMITTED, 3, "permit agent to goto when altitude <= 30 m"),
@@ -65,7 +65,7 @@ def lines(
     before: str | None = None,
     ending: str | None = "completed",
 ) -> Iterator[bytes]:
-    """The lines of a vehicle's flight of that number, some `records` of them; without `ending` it is not closed."""
+    """The lines of a vehicle's flight with about `records` records; without `ending` it is not closed."""
     name = f"{vehicle}/{number}/{version}"
     random, drawn = Random(name), sha256(name.encode())
 

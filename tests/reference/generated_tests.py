@@ -18,7 +18,7 @@ ENTRY = ((104_967, 113_402),)  # of bridge_a, local mm
 
 
 def play(text: str, others: Mapping[str, str]) -> cases.CaseSuite:
-    """The cases of a text; `others` are files beside it."""
+    """The test cases of a text; `others` are files beside it."""
 
     def read(path: str) -> bytes:
         name = Path(path).name
@@ -30,7 +30,7 @@ def play(text: str, others: Mapping[str, str]) -> cases.CaseSuite:
 
 
 def generated(text: str, name: str, imports: str, skills: tuple[str, ...] = ()) -> GeneratedTests:
-    """What is generated of the one policy in a text, which is in the file `name`, and imported as `imports`."""
+    """The tests generated from the only policy in a text, in the file `name`, imported as `imports`."""
 
     def read(path: str) -> bytes:
         return text.encode() if Path(path).name == name else (CHECKOUT / path).read_bytes()

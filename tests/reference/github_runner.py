@@ -1,4 +1,4 @@
-"""A runner of GitHub, as far as `action.yml` needs one: it executes the steps of a composite action in a workspace.
+"""A minimal GitHub runner for `action.yml`: it executes the steps of a composite action in a workspace.
 
 Installing is left to others (a wheel: `test_wheel.py`; an environment of its own: `test_pre_commit.py`): pip only notes
 what it was asked. What a workspace holds can get in between all the same: it is a Python that starts, isolated or not.

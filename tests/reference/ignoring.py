@@ -12,8 +12,8 @@ ABOUT = {"E1309", "E1310", "E1311"}
 
 
 class Remark(NamedTuple):
-    """A comment: what stands in it, the lines of its ends (from 0), whether no more than comments stand on them, the
-    next line that has something else, and whether it is before any declaration.
+    """A comment: its text, the lines of its ends (from 0), whether these lines only have comments, the
+    next line with other text, and whether it is before any declaration.
     """
 
     text: str

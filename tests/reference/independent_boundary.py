@@ -22,12 +22,12 @@ class Disputed(Exception):
 
 
 def after(digest: bytes, tag: int, payload: bytes, label: bytes = b"rtshcua/boundary") -> bytes:
-    """D(n) from D(n-1)."""
+    """Compute D(n) from D(n-1)."""
     return hashlib.sha256(label + b"\0" + digest + bytes([tag]) + len(payload).to_bytes(4) + payload).digest()
 
 
 def entry(record: dict) -> tuple[int, bytes] | None:
-    """Tag and payload of a record; None for one that makes no entry. Raises `Disputed` where it should and cannot."""
+    """Tag and payload of a record; None for one without an entry. Raises `Disputed` if its entry is malformed."""
     try:
         return _decided(record) if record["type"] == "decision" else _effect(record)
     except (struct.error, Malformed, ValueError, KeyError, OverflowError) as error:
@@ -94,7 +94,7 @@ def _now(record: dict) -> tuple[int, int, int]:
 
 
 class Boundary:
-    """What the statements of one log say, held against all of its records."""
+    """The statements of one log, compared with all of its records."""
 
     def __init__(self, genesis: dict, root: Root) -> None:
         self.keys = root.public("boundary", genesis["vehicle"], genesis["utc_us"])
@@ -104,8 +104,8 @@ class Boundary:
         self.last: list | None = None
         self.marks: dict[int, bytes] = {}
         self.stated = self.recovered = self.lost = False
-        self.gap_end = 0  # when the last gap of this epoch ended
-        self.claim = genesis if genesis["utc_error_us"] < _UNKNOWN else None  # the first since the statement before
+        self.gap_end = 0  # the end of this epoch's last gap
+        self.claim = genesis if genesis["utc_error_us"] < _UNKNOWN else None  # since the previous statement
 
     def line(self, record: dict) -> None:
         """Read the next record after the genesis. Raises `Disputed`."""
@@ -138,7 +138,7 @@ class Boundary:
             self.stated, self.gap_end = False, 0
 
     def _alone(self, record: dict) -> None:
-        """Read a record after which there was no boundary."""
+        """Read a record that follows the loss of the boundary."""
         event = record.get("event")
         by_standing = event == "dispatched" and record["kind"] in (1, 2)
         if record["type"] == "decision" or event == "boundary":
@@ -156,7 +156,7 @@ class Boundary:
         self._compare(len(self.digests) - 1)
 
     def _compare(self, number: int) -> None:
-        """Entry `number`, if a statement speaks of it."""
+        """Compare entry `number`, if a statement covers it."""
         digest = self.digests[number]
         if self.marks.pop(number, digest[:8]) != digest[:8]:
             raise Disputed("an entry is not that of its mark")
@@ -164,7 +164,7 @@ class Boundary:
             raise Disputed("another digest")
 
     def _time(self, record: dict, clock: list[int]) -> None:
-        """The time of day that is claimed, against that of a statement: `at_us`, `utc_us`, `utc_error_us`."""
+        """Compare the claimed time of day with that of a statement: `at_us`, `utc_us`, `utc_error_us`."""
         at, utc, error = clock
         since = at if self.last is None else self.last[14]
         for claim in (self.claim, record):

@@ -18,7 +18,7 @@ class Broken(Exception):
 
 @dataclass(frozen=True)
 class Note:
-    """A checkpoint and the signatures below it: names and what their base64 holds."""
+    """A checkpoint and the signatures below it: names and decoded base64."""
 
     text: bytes
     origin: str
@@ -31,7 +31,7 @@ class Note:
 
 
 def read_note(note: str) -> Note:
-    """A note taken apart. Raises `Broken` for whatever differs from its form by an octet."""
+    """Parse a note. Raises `Broken` for any deviation from its form."""
     head, gap, below = note.partition("\n\n")
     lines = head.split("\n")
     if not gap or len(lines) not in (4, 5, 6) or not below.endswith("\n"):
@@ -81,10 +81,10 @@ def cosigned(text: bytes, name: str, blob: bytes, public: bytes) -> bool:
 
 
 def claimed(name: str, blob: bytes, public: bytes) -> bool:
-    """Whether a signature line names a witness as who made it. Where one did not, the whole note says nothing."""
+    """Whether a signature line claims to be from a witness. If that is false, the whole note is rejected."""
     return len(blob) == 76 and blob[:4] == ident(name, 4, public)
 
 
 def ident(name: str, kind: int, public: bytes) -> bytes:
-    """The first octets of a signature, which say whose it is."""
+    """The first octets of a signature, which identify the key."""
     return hashlib.sha256(name.encode("utf-8", "replace") + b"\n" + bytes([kind]) + public).digest()[:4]

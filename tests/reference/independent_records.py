@@ -1,4 +1,4 @@
-"""Lines and records of docs/log-format.md, sections 1 and 4, read a second time with the standard library alone."""
+"""An independent reader of lines and records (docs/log-format.md, sections 1 and 4), with the standard library only."""
 
 import base64
 import binascii
@@ -29,7 +29,7 @@ def unbase64(text: str) -> bytes:
 
 
 def canonical(value: object) -> bytes:
-    """The JCS octets of a value of the kinds that occur here; all keys are ASCII, so code points sort them."""
+    """The JCS encoding of a value of the kinds in logs; all keys are ASCII, so they sort by code point."""
     return json.dumps(value, ensure_ascii=False, separators=(",", ":"), sort_keys=True).encode()
 
 
@@ -67,7 +67,7 @@ def _refuse(text: str) -> None:
 
 
 def integer(value: object) -> bool:
-    """An integer that a double holds; no boolean."""
+    """An integer that a double can represent; no boolean."""
     return type(value) is int and -LARGEST <= value <= LARGEST
 
 
@@ -92,7 +92,7 @@ def digits(n: int | None = None):
 
 
 def or_null(holds):
-    """What `holds` accepts, or null."""
+    """A value that `holds` accepts, or null."""
     return lambda value: value is None or holds(value)
 
 
@@ -108,7 +108,7 @@ def base64_text(value: object) -> bool:
 
 
 def listed(holds):
-    """A list of what `holds` accepts."""
+    """A list of values that `holds` accepts."""
     return lambda value: type(value) is list and all(map(holds, value))
 
 

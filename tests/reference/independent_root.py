@@ -1,6 +1,6 @@
-"""The trust root read a second time: COSE_Sign1 and deterministic CBOR with nothing but the standard library.
+"""An independent reader of the trust root: COSE_Sign1 and deterministic CBOR with the standard library only.
 
-Written apart from `rtshcua.wire`, for `independent_verifier`. RFC 9052 section 4.4, RFC 8949 section 4.2.1.
+Independent of `rtshcua.wire`, for `independent_verifier`. RFC 9052 section 4.4, RFC 8949 section 4.2.1.
 """
 
 import hashlib
@@ -17,18 +17,18 @@ _ROOT_FIELDS = {"version", "development", "issued_at_us", "expires_at_us", "keys
 
 
 class Untrusted(Exception):
-    """The root is not what the pinned key signed, or says what no root may say."""
+    """The root is not signed by the pinned key, or has invalid content."""
 
 
 @dataclass(frozen=True)
 class Root:
-    """What a verifier of logs needs of a root: its keys, and how many witnesses must sign."""
+    """The parts of a root for a verifier of logs: its keys, and the number of required witnesses."""
 
     keys: list[dict]
     witnesses: int
 
     def public(self, duty: str, vehicle: str, now_us: int) -> list[bytes]:
-        """The keys of a duty that speak for a vehicle at a UTC time."""
+        """The keys of a duty that are valid for a vehicle at a UTC time."""
         return [
             key["public"]
             for key in self.keys
@@ -44,7 +44,7 @@ def key_id(duty: str, public: bytes) -> bytes:
 
 
 _P = 2**255 - 19
-#: y of the points of small order, as section 6 of the page lists them
+#: y of the points of small order, as listed in section 6 of the page
 _WEAK = {0, 1, _P - 1} | {
     int.from_bytes(bytes.fromhex(text), "little")
     for text in (
@@ -54,9 +54,9 @@ _WEAK = {0, 1, _P - 1} | {
 }
 
 
-@lru_cache(maxsize=1024)  # of one flight many logs are made
+@lru_cache(maxsize=1024)  # tests make many logs of one flight
 def holds(public: bytes, signature: bytes, message: bytes) -> bool:
-    """Whether an Ed25519 signature counts: section 6 of the page."""
+    """Whether an Ed25519 signature is valid (section 6 of the page)."""
     if len(public) != 32 or len(signature) != 64 or weak(public) or weak(signature[:32]):
         return False
     try:
@@ -95,7 +95,7 @@ def _open(envelope: bytes, pinned: bytes, now_us: int) -> Root:
 
 
 def _parts(envelope: bytes, content: str) -> tuple[bytes, bytes, bytes, bytes]:
-    """The protected header, the payload, the signature and the key's name of a COSE_Sign1."""
+    """The protected header, payload, signature and key id of a COSE_Sign1."""
     if envelope[:1] != b"\xd2":
         raise Untrusted("no COSE_Sign1")
     match _whole(envelope[1:]):
@@ -110,13 +110,13 @@ def _parts(envelope: bytes, content: str) -> tuple[bytes, bytes, bytes, bytes]:
 
 
 def _signed(protected: bytes, duty: str, payload: bytes) -> bytes:
-    """What a COSE_Sign1 signs (RFC 9052 section 4.4)."""
+    """The signed bytes of a COSE_Sign1 (RFC 9052 section 4.4)."""
     label = f"rtshcua/duty/{duty}".encode()
     return _head(4, 4) + _text("Signature1") + _bytes(protected) + _bytes(label) + _bytes(payload)
 
 
 def check_bundle(bundle: bytes, root: Root, vehicle: str, mission: str, now_us: int) -> None:
-    """Step 3 of section 5: the bundle is signed by keys that may, and is of this vehicle and mission."""
+    """Step 3 of section 5: check that the bundle has authorised signatures and is for this vehicle and mission."""
     try:
         _bundle(bundle, root, vehicle, mission, now_us)
     except (AttributeError, IndexError, KeyError, TypeError) as error:
@@ -151,7 +151,7 @@ def _bundle(bundle: bytes, root: Root, vehicle: str, mission: str, now_us: int) 
 
 
 def _envelope(envelope: bytes, root: Root, duty: str, vehicle: str, now_us: int) -> tuple[bytes, dict]:
-    """What a key of a duty signed for a vehicle, and that key."""
+    """The payload that a key of a duty signed for a vehicle, and that key."""
     protected, payload, signature, kid = _parts(envelope, f"application/vnd.rtshcua.{duty}+cbor")
     keys = [each for each in root.keys if each["duty"] == duty and key_id(duty, each["public"]) == kid]
     if not keys or keys[0]["public"] not in root.public(duty, vehicle, now_us):
@@ -162,7 +162,7 @@ def _envelope(envelope: bytes, root: Root, duty: str, vehicle: str, now_us: int)
 
 
 def payload_of(envelope: bytes, duty: str, content: str, keys: list[bytes]) -> bytes:
-    """What one of these public keys of a duty signed. Raises `Untrusted`."""
+    """The payload that one of these public keys of a duty signed. Raises `Untrusted`."""
     protected, payload, signature, kid = _parts(envelope, content)
     public = next((each for each in keys if key_id(duty, each) == kid), None)
     if public is None or not holds(public, signature, _signed(protected, duty, payload)):
@@ -248,9 +248,9 @@ def _encode(value: object) -> bytes:
     raise Untrusted("no such value")
 
 
-@lru_cache(maxsize=256)  # bundles and roots are those of many logs; nobody changes what was read
+@lru_cache(maxsize=256)  # many logs share bundles and roots, and the decoded values are never changed
 def _whole(data: bytes) -> object:
-    """The one item of `data`; canonical, for it is the encoding of what was read."""
+    """The only item of `data`; canonical, because encoding it again gives `data`."""
     try:
         value, end = _item(data, 0, 0)
         canonical = end == len(data) and _encode(value) == data

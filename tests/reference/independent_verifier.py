@@ -1,6 +1,6 @@
 """A second verifier of evidence logs, written from docs/log-format.md alone: standard library and `cryptography`.
 
-It reads the whole log into memory and says only what became of it. Tests hold `rtshcua verify-log` against it.
+It reads the whole log into memory and only returns a verdict. Tests compare it with `rtshcua verify-log`.
 Run it as `python tests/reference/independent_verifier.py LOG ROOTKEY_HEX [ANCHORS...]`.
 """
 
@@ -25,8 +25,8 @@ _ANCHORED, _STALLED = "anchored", "stalled"
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of a log: `closed`, `incomplete`, `broken`, `untrusted`, `anchor` or `boundary`; `line` is the first
-    bad one. `gaps` are the lines before which nothing was recorded, each with its us.
+    """The verdict on a log: `closed`, `incomplete`, `broken`, `untrusted`, `anchor` or `boundary`; `line` is the first
+    bad one. `gaps` are the lines after a gap, each with its duration in us.
     """
 
     kind: str
@@ -48,7 +48,7 @@ def leaf(line: bytes) -> bytes:
 
 
 def merkle(leaves: Sequence[bytes]) -> bytes:
-    """MTH of RFC 9162 section 2.1.1, as it is written there."""
+    """MTH of RFC 9162 section 2.1.1, by its definition."""
     if not leaves:
         return hashlib.sha256().digest()
     if len(leaves) == 1:
@@ -59,12 +59,12 @@ def merkle(leaves: Sequence[bytes]) -> bytes:
 
 @dataclass
 class Growing:
-    """The same root, kept up as leaves come: the roots of the full subtrees, largest first, with their sizes."""
+    """The same root, computed incrementally: the roots of the full subtrees, largest first, with their sizes."""
 
     full: list[tuple[int, bytes]] = field(default_factory=list)
 
     def push(self, digest: bytes) -> None:
-        """One leaf more."""
+        """Add a leaf."""
         size = 1
         while self.full and self.full[-1][0] == size:
             digest = hashlib.sha256(b"\1" + self.full.pop()[1] + digest).digest()
@@ -82,12 +82,12 @@ class Growing:
 
 
 def verify(log: bytes, pinned: bytes, anchors: Iterable[bytes] = (), witnesses: int | None = None) -> Verdict:
-    """What a log proves to who pins a root key. `anchors` are the contents of files of anchors."""
+    """Verify a log under a pinned root key. `anchors` are the contents of anchor files."""
     return Walk(pinned).verdict(log, anchors, witnesses)
 
 
 class Walk:
-    """The state of reading a log forwards."""
+    """The state of a verifier that reads a log forwards."""
 
     def __init__(self, pinned: bytes) -> None:
         self.pinned = pinned
@@ -114,7 +114,7 @@ class Walk:
         self.disputed: tuple[str, int] | None = None
 
     def verdict(self, rest: bytes, anchors: Iterable[bytes] = (), witnesses: int | None = None) -> Verdict:
-        """What becomes of the log if these octets are what is still to be read of it."""
+        """The verdict on the log if these octets are its rest."""
         lines = rest.split(b"\n")
         torn = lines.pop()
         try:
@@ -136,7 +136,7 @@ class Walk:
         return Verdict(kind, "", None, self.seq, anchored, tuple(self.gaps))
 
     def line(self, line: bytes) -> None:
-        """One line more. Raises `Broken`, `Malformed` and `Untrusted`."""
+        """Read the next line. Raises `Broken`, `Malformed` and `Untrusted`."""
         if self.closed:
             raise Broken("something after the close")
         record = parse(line)
@@ -248,13 +248,13 @@ class Walk:
         self.closed = kind == "close"
 
     def end(self, torn: bytes) -> str:
-        """What the end of the file makes of the log. Raises `Broken`."""
+        """The verdict at the end of the file. Raises `Broken`."""
         if self.closed:
             if torn:
                 raise Broken("something after the close")
             return "closed"
         expected = b'{"_prev":"' + self.prev.hex().encode() + b'","at_us":'
-        zeros = torn == bytes(len(torn))  # of the disk's making
+        zeros = torn == bytes(len(torn))  # padding by the disk
         if len(torn) > LONGEST or (not zeros and torn[: len(expected)] != expected[: len(torn)]):
             raise Broken("the last line is torn and not what follows")
         if self.seq == 0:
@@ -262,7 +262,7 @@ class Walk:
         return "incomplete"
 
     def anchored(self, notes: Iterable[str], witnesses: int | None) -> int:
-        """The largest size that enough trusted witnesses cosigned. Raises `Broken` where one saw another log."""
+        """The largest size that enough trusted witnesses cosigned. Raises `Broken` if one saw another log."""
         assert self.trust is not None
         keys = self.trust.public("witness", self.genesis["vehicle"], self.genesis["utc_us"])
         enough = self.trust.witnesses if witnesses is None else witnesses

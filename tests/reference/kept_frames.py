@@ -11,7 +11,7 @@ Entries = list[tuple[int, bytes]]
 
 
 def kept(flight: Flight) -> Entries:
-    """A list that fills while the flight is flown: (UTC us, frame), what came and what was sent."""
+    """A list that fills during the flight: (UTC us, frame), received and sent."""
     entries: Entries = []
     vehicle, clock = flight.vehicle, flight.clock
     send, receive = vehicle._send, vehicle.driver.receive

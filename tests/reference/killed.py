@@ -1,7 +1,7 @@
-"""Writers of logs that are killed under load (SIGKILL), and so are those who recover them: `killed.py COUNT SEED`.
+"""Kill writers of logs, and recoveries, under load (SIGKILL): `killed.py COUNT SEED`.
 
-A writer says through a pipe how many lines were written and synced, as its flight would be told; after it was killed,
-no less may be in the log. It runs in a fork of a process without threads.
+A writer reports through a pipe how many lines were written and synced, as to its flight. After it was killed, the log
+must contain at least these. It runs in a fork of a process without threads.
 """
 
 import os
@@ -29,7 +29,7 @@ _PATIENCE_S = 10.0
 
 
 class Piecemeal(SystemFile):
-    """A file of which the system takes some octets at a time, so that a line can be torn."""
+    """A file that accepts a few octets at a time, so that lines can be torn."""
 
     __slots__ = ()
 
@@ -46,7 +46,7 @@ class PiecemealDisk(Disk):
 
 
 def campaign(count: int, seed: int) -> tuple[list[str], dict[str, int]]:
-    """What was wrong with the outcomes, and how much was done."""
+    """Return the faults of the outcomes, and the amount of work."""
     wrong: list[str] = []
     done = {"killed": 0, "acknowledged": 0, "torn": 0, "whole": 0, "unbegun": 0, "recoveries killed": 0}
     for number in range(seed, seed + count):
@@ -64,7 +64,7 @@ def _once(path: Path, chance: Random, number: int, done: dict[str, int]) -> str:
         os.close(inward)
         _write(path, number, outward)
     os.close(outward)
-    if chance.random() < 0.95:  # else it may not even have begun
+    if chance.random() < 0.95:  # otherwise it may not have begun
         select.select([inward], [], [], _PATIENCE_S)
     time.sleep(chance.random() * _LONGEST_S)
     _kill(writer)
@@ -112,7 +112,7 @@ def _write(path: Path, seed: int, outward: int) -> NoReturn:
 
 
 def _kill(process: int) -> bool:
-    """Whether it was still running."""
+    """Kill a process; return whether it was still running."""
     os.kill(process, signal.SIGKILL)
     return os.WIFSIGNALED(os.waitpid(process, 0)[1])
 

@@ -26,12 +26,12 @@ FAULTS: dict[str, tuple[Fault, ...]] = {
     "pilot": (PilotMode(15 * S),),
     "silence": (LinkSilence(15 * S),),
 }
-#: those that are flown with the whole reference mission; the others with its first leg, on which the fault comes
+#: faults flown with the whole reference mission; the others with its first leg, on which the fault occurs
 WHOLE = ("none", "obstacle")
 
 
 class Recorded(NamedTuple):
-    """The lines of a flight's log, and the frames that came and were sent: (UTC us, frame)."""
+    """The lines of a flight's log, and the received and sent frames: (UTC us, frame)."""
 
     lines: tuple[bytes, ...]
     entries: Entries
@@ -39,7 +39,7 @@ class Recorded(NamedTuple):
 
 @cache
 def recorded(fault: str, flavour: str, mode: EnforcementMode = EnforcementMode.SOFTWARE) -> Recorded:
-    """A mission with one of `FAULTS`. A vehicle that is never heard again flies for 2 minutes at most."""
+    """Fly a mission with one of `FAULTS`. A vehicle that is never received again flies for at most 2 minutes."""
     return once(f"{fault}-{flavour}-{mode}", lambda: _flown(fault, flavour, mode))
 
 

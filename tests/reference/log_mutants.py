@@ -1,4 +1,4 @@
-"""Every small change of a log of 200 records, and the result of every verifier: none may accept one as the log."""
+"""Every small change of a log of 200 records, with the result of every verifier; no verifier may accept one."""
 
 import copyreg
 import io
@@ -48,10 +48,10 @@ def flipped(data: bytes, at: int) -> bytes:
 
 
 class Verifiers:
-    """The careful and the independent verifier, each ready to go on before every line of the log, and the quick one.
+    """The careful and the independent verifier, each with its state before every line, and the quick one.
 
-    What a change does shows after it: so nobody need read the lines before it again. (Trust is another matter: what is
-    changed in the genesis goes through everything.)
+    A change only affects later lines, so earlier ones need not be read again. (Except trust: for a change in
+    the genesis the whole log is read.)
     """
 
     def __init__(self) -> None:
@@ -65,7 +65,7 @@ class Verifiers:
             other.line(line)
 
     def judge(self, number: int, rest: bytes) -> tuple[str, str, bool]:
-        """What they say if from a line on there are these octets: two words, and whether the quick one accepts."""
+        """The results if these octets follow from a line on: two verdicts, and whether the quick verifier accepts."""
         data = b"".join(self.lines[:number]) + rest
         if number == 0:
             return careful(data).report.verdict.value, independent(data), quick_accepts(data)
@@ -77,5 +77,5 @@ class Verifiers:
         return one.report().verdict.value, other.verdict(rest).kind, quick_accepts(data)
 
 
-#: words for what is no closed log
+#: verdicts on logs that are not closed
 REJECTED = {("failed", "broken"), ("failed", "untrusted"), ("failed", "anchor"), ("incomplete", "incomplete")}

@@ -1,4 +1,4 @@
-"""The test vectors of docs/log-format.md: logs, keys and what is to come out, made without `rtshcua.evidence`.
+"""The test vectors of docs/log-format.md: logs, keys and expected results, made without `rtshcua.evidence`.
 
 `python tests/reference/log_vectors.py` writes them to tests/vectors/log, always the same octets.
 """
@@ -33,7 +33,7 @@ FOLDER = Path(__file__).parents[1] / "vectors" / "log"
 WITNESSES = {f"rtshcua/witness/{n}": bytes([0xA0 + n]) * 32 for n in (1, 2, 3)}
 MONOTONIC_US, UTC_US = 7_000_000, case.flat.ISSUED + 60_000_000
 NULL = "0" * 64
-#: a name that the origin escapes
+#: a name with characters that the origin escapes
 ODD = "M\u00f6we 7/+~%"
 
 
@@ -51,7 +51,7 @@ def root() -> bytes:
 
 
 def times(ms: int, begun_us: int = MONOTONIC_US) -> Fields:
-    """Number and link to be filled in, and the moment some milliseconds after the start."""
+    """Placeholders for number and link, and the time, some milliseconds after the start."""
     at_us = begun_us + ms * 1000
     return {"_prev": NULL, "seq": 0, "at_us": at_us, "utc_us": UTC_US + ms * 1000, "utc_error_us": 1_000}
 
@@ -69,7 +69,7 @@ def genesis(**fields: object) -> Fields:
 
 
 def bundle(vehicle: str, **signers: SigningKey) -> str:
-    """The short mission for a vehicle, of the usual keys but for what is given, as a genesis holds it."""
+    """The bundle of the short mission for a vehicle in a genesis, with the usual keys unless given."""
     shipped = case.policy()
     under = replace(shipped, vehicle=replace(shipped.vehicle, identity=vehicle))
     keys = case.KEYS | {Duty(duty): key for duty, key in signers.items()}
@@ -84,7 +84,7 @@ def effect(ms: int, **fields: object) -> Fields:
 
 
 def sealing(kind: str, ms: int, **fields: object) -> Fields:
-    """A signed record of a kind, all to be filled in."""
+    """A signed record of a kind, with placeholders."""
     made = {"type": kind, "bytes": 0, "checkpoint": None, "digest": NULL, "epoch": 0, "records": 0}
     return made | times(ms) | fields
 
@@ -105,7 +105,7 @@ def log(*records: Fields) -> list[bytes]:
 
 
 def sealed() -> list[bytes]:
-    """Four epochs, one of them empty; texts that JCS is particular about."""
+    """Four epochs, one of them empty, with texts that JCS treats specially."""
     odd = 'quote " backslash \\ tab \t bell \x07 delete \x7f line \u2028 \u00e9 \U0001f681 <&>/'
     records = [
         genesis(), effect(10), effect(20, detail=odd), effect(20, event="landed", durability=2), seal(30, 1),
@@ -115,7 +115,7 @@ def sealed() -> list[bytes]:
 
 
 def recovered() -> tuple[list[bytes], bytes]:
-    """A log that was torn, and closed after a restart of the machine; and what was discarded."""
+    """A torn log that was closed after a restart of the machine, and its discarded bytes."""
     records = [genesis(), effect(10), seal(20, 1), effect(30), effect(40)]
     torn = log(*records, effect(50))[-1][:200]
     again = {"discarded_bytes": len(torn), "discarded_digest": sha256(torn).hexdigest(), "next_key": _epoch(2)}
@@ -155,7 +155,7 @@ def stalled() -> list[bytes]:
 
 
 def _rejected() -> Iterator[tuple[str, str, list[bytes]]]:
-    """Name, which rule of the page is broken, lines."""
+    """The rejected logs: name, violated rule of the page, lines."""
     good = sealed()
     text = good[1]
     yield "chain", "4: a record edited", [*good[:1], text.replace(b'"note"', b'"nose"'), *good[2:]]
@@ -213,12 +213,12 @@ def _rejected() -> Iterator[tuple[str, str, list[bytes]]]:
 
 
 def _with_text(lines: list[bytes], text: Callable[[int, str], str]) -> list[bytes]:
-    """Every checkpoint says what `text` makes of it, and is signed."""
+    """Replace every checkpoint by the result of `text`, signed."""
     return resealed(lines, seed_of, text=text)
 
 
 def _with_key(lines: list[bytes], epoch: int) -> list[bytes]:
-    """The first epoch sealed by the key of another."""
+    """Seal the first epoch with the key of another."""
     own = read(lines[0])["next_key"]
     return resealed(lines, lambda public: (epoch + 1).to_bytes(32) if public == own else seed_of(public))
 
@@ -234,7 +234,7 @@ def digests(lines: list[bytes]) -> list[str]:
 
 
 def expected(lines: list[bytes]) -> Fields:
-    """What every reader must find in a log that holds."""
+    """The results that every reader must find in a valid log."""
     leaves = [leaf(line) for line in lines]
     signed = {}
     for number, line in enumerate(lines):

@@ -1,10 +1,10 @@
-"""The source of a mission that flies low under the bridge, where the inspection asks a supervisor first."""
+"""The source of a mission that flies low under the bridge; the inspection needs a supervisor's approval."""
 
 INSPECTION = "inspect_area(bridge_a, altitude = 9 m, pattern = perimeter)"
 
 
 def low_source(work: str = INSPECTION) -> str:
-    """The mission that does this `work` at the bridge."""
+    """The mission with this `work` at the bridge."""
     return f"""import "lib:policies/bridge_inspection.rts"
 
 mission low under bridge_inspection@7 on quad {{

@@ -1,6 +1,6 @@
 """A naive interpreter of conditions over sets of situations, independent of `evaluate`.
 
-Truths are the letters T, F and U, and what a condition may be is a set of them. A single value is a set of one.
+Truths are the letters T, F and U; the possible truths of a condition are a set. A single value is a set of one.
 """
 
 from collections.abc import Callable
@@ -17,12 +17,12 @@ Truths = frozenset[str]
 T, F, U = frozenset("T"), frozenset("F"), frozenset("U")
 
 Point = tuple[int, int]
-#: widened legs (a, b, box) between two heights; a is None where nobody knows the place, the heights where not how high
+#: widened legs (a, b, box) between two heights; a is None for an unknown place, and so are unknown heights
 Leg = tuple[Point | None, Point | None, tuple[int, int, int, int], int | None, int | None]
 
 
 class TooNear(Exception):
-    """A circle is passed so near that rounding may count; the test should ask something else."""
+    """A circle is passed so near that rounding may matter; the test should use another case."""
 
 
 @dataclass
@@ -39,7 +39,7 @@ class World:
     heights: tuple[int, int] | None = None  # of the legs, where the height ranges over them
     monitors: str = ""
     phase: int = -1
-    through: int = 0  # zones are looked at from the moment to this much later
+    through: int = 0  # zones are evaluated from the moment to this much later
 
 
 def kleene_and(a: str, b: str) -> str:
@@ -72,7 +72,7 @@ def truths(code: tuple[int, ...], world: World) -> Truths:
 
 
 def joined(op: int, left: object, right: object, world: World) -> object:
-    """What an instruction makes of two numbers or two truths."""
+    """The result of an instruction on two numbers or two truths."""
     if op in (Op.AND, Op.OR):
         table = kleene_and if op == Op.AND else kleene_or
         return frozenset(table(x, y) for x, y in product(left, right))
@@ -140,7 +140,7 @@ RELATIONS: dict[int, Callable[[int, int], bool]] = {
 
 
 def compared(op: int, left: tuple[int, int], right: tuple[int, int], heights: tuple[int, int]) -> Truths:
-    """The relation at the lowest and the highest height, and in between where the difference is 0 there."""
+    """The relation at the lowest and the highest height, and where the difference is 0 in between."""
     differences = [(left[0] - right[0]) * height + left[1] - right[1] for height in heights]
     if min(differences) < 0 < max(differences):
         differences.append(0)
@@ -172,7 +172,7 @@ def both(left: Truths, right: Truths) -> Truths:
 
 
 def exists(world: World, zone: Zone) -> Truths:
-    """At each moment of the stretch: in its hours, and between its dates; the two looked at apart."""
+    """Whether the zone exists at each moment of the interval: in its hours, and between its dates."""
     first, error, offset = world.utc, world.error, world.policy.vehicle.utc_offset_us
     hours: set[str] = set()
     dates: set[str] = set()
@@ -209,7 +209,7 @@ def horizontal(a: tuple[int, int], b: tuple[int, int], box: tuple[int, int, int,
 
 
 def daytime(utc: int, error: int, offset: int, start: int, end: int) -> Truths:
-    """Look at the moment and, around it, at each boundary of the window that the error may reach."""
+    """Evaluate the moment and each nearby boundary of the window that the error may reach."""
     end = min(end, DAY - 1)
 
     def within(moment: int) -> bool:
@@ -226,7 +226,7 @@ def daytime(utc: int, error: int, offset: int, start: int, end: int) -> Truths:
 
 
 def on_the_wall(utc: int, error: int, vehicle: VehicleLimits, windows: tuple[int, ...], period: int) -> Truths:
-    """What a clock on the wall shows at both ends of what our clock allows, and wherever something changes between."""
+    """The local time at both ends of our clock's interval, and at each change in between."""
     edges = {each % period for each in windows}
 
     def offset(moment: int) -> int | None:

@@ -1,7 +1,7 @@
-"""The meaning of a condition by its definition: on the IR, over a history of observations, in fractions.
+"""The meaning of a condition by definition: evaluated on the IR, over a history of observations, in fractions.
 
-Written apart from the lowering: no linear forms, no code, no whole numbers. A number is an interval of what it can be,
-where a missing signal can be anything; a comparison is decided where the intervals leave no doubt. Truths are T, F, U.
+Independent of the lowering: no linear forms, code or integers. A number is the interval of its possible values,
+where a missing signal can be anything; a comparison is decided if all values give one result. Truths are T, F, U.
 """
 
 from collections.abc import Mapping, Sequence
@@ -39,7 +39,7 @@ class World:
 
 @dataclass(frozen=True)
 class Names:
-    """What names stand for: dimensions of numbers, members of enumerations, circles (x, y, radius)."""
+    """The meaning of names: dimensions of numbers, members of enumerations, circles (x, y, radius)."""
 
     dimensions: Mapping[str, Dimension]
     enumerations: Mapping[str, Mapping[str, int]]
@@ -176,7 +176,7 @@ def compared(operator: str, left: Interval, right: Interval) -> str:
 
 
 def number(node: ir.Value, world: World, names: Names) -> Interval:
-    """What a number can be, in SI units."""
+    """The interval of a number, in SI units."""
     match node:
         case ir.Quantity():
             return (Fraction(node.value, SI[node.dimension]),) * 2
@@ -232,7 +232,7 @@ def added(left: Interval, right: Interval) -> Interval:
 
 
 def times(value: Interval, factor: Fraction) -> Interval:
-    """A number that can be anything still can when it is taken zero times: without it nothing is known."""
+    """An unknown number times zero stays unknown."""
     low, high = value if factor >= 0 else opposite(value)
     size = abs(factor)
     return (None if low is None else low * size, None if high is None else high * size)

@@ -24,7 +24,7 @@ def edges(zone: Zone) -> list[tuple[Point, Point]]:
 
 
 def on_segment(p: Point, a: Point, b: Point) -> bool:
-    """p is a + t (b - a) for some t in 0..1: on their line, and nowhere beyond them."""
+    """Whether p is a + t (b - a) for some t in 0..1."""
     (x, y), (ax, ay), (bx, by) = p, a, b
     if (x - ax) * (by - ay) != (y - ay) * (bx - ax):
         return False
@@ -32,9 +32,9 @@ def on_segment(p: Point, a: Point, b: Point) -> bool:
 
 
 def well_formed(outlines: list[list[Point]]) -> bool:
-    """No two edges share a point but neighbours their corner, and a ring is a hole if an odd number of others holds it.
+    """Edges only share corners with their neighbours, and a ring is a hole if an odd number of others contain it.
 
-    The area of each ring by the shoelace formula says which way round it goes.
+    The shoelace formula gives the orientation of each ring.
     """
     if any(len(ring) < 3 or len(set(ring)) < len(ring) for ring in outlines):
         return False
@@ -56,18 +56,18 @@ def well_formed(outlines: list[list[Point]]) -> bool:
 
 
 def folded(one: tuple[Point, Point], other: tuple[Point, Point], at: Point) -> bool:
-    """Two segments with a common end share more than that: they lead the same way from it."""
+    """Whether two segments with a common end have the same direction there."""
     (a,), (b,) = set(one) - {at}, set(other) - {at}
     return on_segment(a, at, b) or on_segment(b, at, a)
 
 
 def inside_ring(p: Point, ring: list[Point]) -> bool:
-    """The ring winds around the point."""
+    """Whether the ring winds around the point."""
     return in_polygon(p, Zone("ring", AREA, 0, 0, (1, len(ring), *(c for corner in ring for c in corner))))
 
 
 def in_polygon(p: Point, zone: Zone) -> bool:
-    """Rays cast to the east cross the outlines an odd number of times; the outlines themselves are outside."""
+    """Whether a ray to the east crosses the outlines an odd number of times; the outlines themselves are outside."""
     if any(on_segment(p, a, b) for a, b in edges(zone)):
         return False
     crossings = 0
@@ -87,7 +87,7 @@ def in_shape(p: Point, zone: Zone) -> bool:
 
 
 def segments_meet(a: Point, b: Point, c: Point, d: Point) -> bool:
-    """Some a + t (b - a) is c + s (d - c), with t and s in 0..1."""
+    """Whether a + t (b - a) = c + s (d - c) for some t and s in 0..1."""
     for axis in (0, 1):
         one, other = sorted((a[axis], b[axis])), sorted((c[axis], d[axis]))
         if one[1] < other[0] or other[1] < one[0]:
@@ -129,7 +129,7 @@ def widened(a: Point, b: Point, box: tuple[int, int, int, int]) -> list[Point]:
 
 
 def in_hull(p: Point, outline: list[Point]) -> bool:
-    """Inside a convex outline, or on it."""
+    """Whether a point is inside a convex outline or on it."""
     if len(outline) < 3:
         return on_segment(p, outline[0], outline[-1])
     return all(

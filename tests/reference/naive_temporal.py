@@ -13,7 +13,7 @@ History = list[tuple[int, str]]
 
 
 def at_moment(history: History, tau: int) -> set[str]:
-    """The step function at one moment: the truths of the observations there, or what the one before leaves behind."""
+    """The step function at one moment: the truths of the observations there, or else the previous truth."""
     here = {letter for time, letter in history if time == tau}
     if here:
         return here
@@ -27,7 +27,7 @@ def at_moment(history: History, tau: int) -> set[str]:
 
 
 def in_window(history: History, start: int, end: int) -> set[str]:
-    """All truths from `start` to `end`. Between two observations nothing changes: both sides of each tell it all."""
+    """All truths from `start` to `end`. They only change at observations, so both sides of each suffice."""
     moments = {start, end}
     for time, _ in history:
         moments |= {time - 1, time, time + 1}
@@ -39,7 +39,7 @@ def negated(letter: str) -> str:
 
 
 def says(kind: int, window: int, history: History) -> str:
-    """What a monitor says at the last observation of its condition's history."""
+    """The truth of a monitor at the last observation of its condition's history."""
     now, last = history[-1]
     before = history[-2][1] if len(history) > 1 else "U"
     match kind:

@@ -94,24 +94,24 @@ class Native:
         self._library.rt_test_again(ctypes.c_void_p(numbers.buffer_info()[0]), times)
 
     def candidates(self) -> int:
-        """How many rules may speak of the step."""
+        """How many rules may apply to the step."""
         return int(self._library.rt_test_candidates())
 
     def along(self, zone: int, path: tuple[int, ...], error: int) -> int:
-        """The truth of the places along a path, widened by an error, being in a zone."""
+        """The truth of "the path, widened by an error, is in a zone"."""
         items = b"".join(cbor.encode(each) for each in path)
         return int(self._library.rt_test_along(zone, items, len(items), len(path), ctypes.c_int64(error)))
 
     def compared(self, zone: int, y0: int, y1: int, error: int) -> int:
-        """How many edges of a zone are compared with a leg between these heights at most."""
+        """The largest number of edges of a zone that are compared with a leg between these heights."""
         return int(self._library.rt_test_compared(zone, *map(ctypes.c_int64, (y0, y1, error))))
 
     def exists(self, zone: int, low: int, high: int, error: int) -> int:
-        """The truth of a zone's existing at the moments from one to another, which are known to within an error."""
+        """The truth of a zone's existence between two moments that are known to within an error."""
         return int(self._library.rt_test_exists(zone, *map(ctypes.c_int64, (low, high, error))))
 
     def time_of_day(self, start: int, end: int, low: int, high: int, error: int) -> int:
-        """The same of a window of the day."""
+        """The truth of a window of the day between such moments."""
         return int(self._library.rt_test_time_of_day(*map(ctypes.c_int64, (start, end, low, high, error))))
 
     def brings_home(self, charge: int, distance: int, low: int, high: int, asked: int, drain: int = 0) -> bool:
@@ -121,7 +121,7 @@ class Native:
         return bool(self._library.rt_test_home(ctypes.c_void_p(numbers.buffer_info()[0])))
 
     def same_words(self, one: str, other: str) -> bool:
-        """Whether two texts are the same when they are shown in one line."""
+        """Whether two texts are equal when shown in one line."""
         a, b = one.encode(), other.encode()
         return not self._library.rt_test_words(a, len(a), b, len(b))
 
@@ -140,7 +140,7 @@ class Native:
 
 
 def expected(invocation: PreparedInvocation, question: Question, decision: Decision | None = None) -> Answer:
-    """The answer of the reference, as the boundary numbers it; the decision may be there already."""
+    """The answer of the reference with the numbers of the boundary; the decision may be given."""
     policy, (state, context, now) = invocation.policy, question
     shared = {clause: at for at, clause in enumerate(shared_clauses(policy.policy))}
     own = {

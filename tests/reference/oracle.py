@@ -1,4 +1,4 @@
-"""A naive, independent `decide` over single situations, by the text of design 4.1 and 4.4."""
+"""A naive, independent `decide` for single situations, by the text of design 4.1 and 4.4."""
 
 from itertools import pairwise
 from math import ceil, isqrt
@@ -37,7 +37,7 @@ class Oracle:
         return None if slot == -1 else self.slots[slot]
 
     def place(self) -> tuple[int, int] | None:
-        """Where it is over ground, if that is known."""
+        """The place over ground, if known."""
         vehicle = self.policy.vehicle
         x, y = (None, None) if vehicle.position == -1 else self.slots[vehicle.position : vehicle.position + 2]
         return None if x is None or y is None else (x, y)
@@ -64,7 +64,7 @@ class Oracle:
     # ------------------------------------------------------------------------------------------ planned volume
 
     def volume(self, kind: int, path: tuple[int, ...], altitude: int | None) -> list[Leg]:
-        """From an unknown place nobody knows where the legs are, from an unknown height not how high."""
+        """The planned legs; unknown if the place is unknown, with unknown heights if the height is unknown."""
         place, z = self.place(), self.slot(self.policy.vehicle.height)
         error = self.policy.vehicle.position_error
         box = (-error, -error, error, error)
@@ -115,7 +115,7 @@ class Oracle:
         return self.in_airspace(self.volume(kind, path, altitude), longest) == "T"
 
     def enter(self, invocation: Invocation) -> None:
-        """From here on, questions are asked in the phase of an invocation of the hand-written mission."""
+        """Use the phase of an invocation of the hand-written mission from here on."""
         name = MISSION.phases[invocation.phase]
         self.phase = next((n for n, phase in enumerate(self.policy.phases) if phase == name), -1)
 

@@ -10,12 +10,12 @@ Ring = tuple[Point, ...]
 
 
 def fits(rings: list[Ring]) -> bool:
-    """Held to `naive_geometry.well_formed` by a test of its own; that one is too slow to try so many with."""
+    """A fast check; a separate test compares it with `naive_geometry.well_formed`, which is too slow here."""
     return next(problems(rings), None) is None
 
 
 def ring(of: Random, middle: Point, reach: int, corners: int) -> Ring:
-    """A simple counter-clockwise ring around a place: points are put in where they do not make it cross itself."""
+    """A simple counter-clockwise ring around a place: points are inserted where the ring does not cross itself."""
     x, y = middle
     found: Ring = ()
     while not found:
@@ -53,6 +53,6 @@ def polygon(ring: Ring, floor: int = LOWEST, ceiling: int = HIGHEST) -> Zone:
 
 
 def zig_zag(teeth: int) -> Ring:
-    """A thin band whose edges run through nearly all heights, and begin and end at heights of their own."""
+    """A thin band whose edges span nearly all heights, with distinct end heights."""
     low = [(4 * tooth, 10 * teeth + 5 * tooth if tooth % 2 else -5 * tooth) for tooth in range(teeth)]
     return (*low, *((x, y + 2) for x, y in reversed(low)))

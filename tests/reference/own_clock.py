@@ -1,14 +1,14 @@
-"""The oracle of `boundary/enforcement/clock.c`: the time of day that a boundary apart holds to, its own, never what the
-runtime names. Written apart from it; only tests use it.
+"""The oracle of `boundary/enforcement/clock.c`: the own clock of a separate boundary process, which never uses the time
+that the runtime claims. It is independent of the C code; only tests use it.
 
-Its sources, the first that tells: the machine's clock, where the kernel says that it is synchronised; the vehicle's
-SYSTEM_TIME, in frames of which the boundary verified the link's signature itself; what an operator stated when the
-boundary began. Once one was taken nothing moves any more: UTC is carried on by monotonic time, and its error grows. A
-boundary in the runtime's own process has no other clock than that: there the caller's counts (`SHARED`).
+The first available source counts: the machine's clock, if the kernel reports it as synchronised; the vehicle's
+SYSTEM_TIME, in frames with a signature that the boundary verified itself; the clock error that an operator stated at
+the boundary's start. The source is used once: then UTC advances with monotonic time, and its error grows. A boundary in
+the runtime's own process has no other clock, so there the caller's time counts (`SHARED`).
 
-The vehicle's time is taken in answer to a challenge, so that nobody hands in an hour that is past: the boundary draws a
-number, the vehicle sends it back (TIMESYNC), and a SYSTEM_TIME that the vehicle signed after that was made after the
-number was drawn. Time is an argument everywhere, monotonic and in us.
+The vehicle's time is taken in answer to a challenge, so that a past time cannot be replayed: the boundary draws a
+number, the vehicle returns it (TIMESYNC), and a SYSTEM_TIME that the vehicle signed afterwards is later than the draw.
+Time is an argument everywhere, monotonic and in us.
 """
 
 from typing import Final, NamedTuple
@@ -39,11 +39,11 @@ class _Challenge(NamedTuple):
 
 
 class OwnClock:
-    """The clock of a boundary with a process of its own. UTC is what was taken first, carried on."""
+    """The clock of a separate boundary process. UTC comes from the first source, and advances with monotonic time."""
 
     def __init__(self, machine: Now, stated_us: int | None = None) -> None:
-        """`machine` is the machine's clock, its error as the kernel says it (`UTC_UNKNOWN_US` where it is not
-        synchronised); `stated_us` what an operator says that it is off by at most.
+        """`machine` is the machine's clock, with the error that the kernel reports (`UTC_UNKNOWN_US` where it is not
+        synchronised); `stated_us` is the largest clock error stated by an operator.
         """
         self.source = ClockSource.UNKNOWN
         self._stated_us = stated_us
@@ -61,35 +61,35 @@ class OwnClock:
         return Now(monotonic_us, max(0, monotonic_us + self._ahead_us), min(error_us, UTC_UNKNOWN_US))
 
     def look(self, machine: Now) -> None:
-        """The machine's clock, once more: it is taken where it is synchronised, and nothing was taken before."""
+        """Check the machine's clock again: it is used if it is synchronised and no source was used before."""
         if self.source is ClockSource.UNKNOWN and machine.utc_error_us < UTC_UNKNOWN_US:
             self._take(
                 ClockSource.KERNEL, machine.utc_us - machine.monotonic_us, machine.utc_error_us, machine.monotonic_us
             )
 
     def settle(self, monotonic_us: int) -> None:
-        """No more is waited for: what the operator stated holds, if nothing better was told."""
+        """Stop waiting: without a better source, the operator's statement counts."""
         if self.source is ClockSource.UNKNOWN and self._stated_us is not None:
             self._take(ClockSource.OPERATOR, self._ahead_us, self._stated_us, monotonic_us)
 
     def asks(self, monotonic_us: int) -> bool:
-        """Whether a number is to be drawn for the next challenge."""
+        """Whether the next challenge needs a number."""
         return self.source is ClockSource.UNKNOWN and (
             self._challenge is None or monotonic_us - self._challenge.drawn_us > CHALLENGE_US
         )
 
     def challenge(self, number: int, monotonic_us: int) -> None:
-        """From now on the vehicle is asked to send this number back; above 0, and not to be guessed."""
+        """Challenge the vehicle to return this number, which is positive and not predictable."""
         self._challenge = _Challenge(number, monotonic_us)
 
     @property
     def number(self) -> int:
-        """The number that the vehicle is to send back; 0 where none is."""
+        """The number that the vehicle must return; 0 without a challenge."""
         return 0 if self._challenge is None or self.source is not ClockSource.UNKNOWN else self._challenge.number
 
     def hear(self, frame: bytes, link: int, vehicle_us: int, monotonic_us: int) -> None:
-        """A frame of which the link's signature was verified came in by a link of this id; its signature is off. The
-        vehicle's own UTC may be off by `vehicle_us`.
+        """Receive a frame with a verified signature, which was removed, on a link of this id. `vehicle_us` is the
+        possible error of the vehicle's own UTC.
 
         Frames of one stream are accepted in the order in which they were signed, and in no other.
         """
@@ -114,7 +114,7 @@ class OwnClock:
 
 
 def _of_autopilot(frame: bytes) -> tuple[int, bytes]:
-    """Message and first octets of a whole frame of an autopilot, with the zeros that are not sent; none of another."""
+    """The message id and first octets of a frame of an autopilot, with omitted zeros; -1 for other frames."""
     if len(frame) < HEADER or frame[0] != MARKER or frame[6] != AUTOPILOT:
         return -1, b""
     if len(frame) != HEADER + frame[1] + CHECKSUM:

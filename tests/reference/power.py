@@ -1,6 +1,6 @@
 """A disk that can fail at any operation, and whose power can be cut. The files are real; synced content is recorded.
 
-What was not synced when the power goes is lost page by page, as the disk pleases: of each page either the old octets
+In a power cut unsynced data is lost page by page, at random: each page has either the old octets
 are there or the new ones, or zeros where the file was shorter; the file ends anywhere between its old end and its new.
 """
 
@@ -18,7 +18,7 @@ class Died(BaseException):
 
 
 class PowerDisk:
-    """A `Disk`. `fault` is asked before each operation, by its number from 0 and its name, what is to happen to it:
+    """A `Disk`. `fault` returns the fault of each operation, by its number from 0 and its name:
 
     `""` nothing; `refused` OSError; `short` half is written (of a write); `failed` so too, and the next operation is
     refused; `died` the process dies before it; `torn` it dies within it, half done; `late` it dies once it is done.
@@ -28,7 +28,7 @@ class PowerDisk:
         self.fault = fault
         self.operations = 0
         self._synced: dict[Path, bytes] = {}
-        self.doubtful = False  # a sync failed: what the disk keeps without power is anybody's guess from then on
+        self.doubtful = False  # after a failed sync the content after a power cut is undefined
         self._dead = self._full = False
 
     def create(self, path: Path) -> "PowerFile":
@@ -49,11 +49,11 @@ class PowerDisk:
         self._end(self._begin("sync_folder"))
 
     def synced(self, path: Path) -> bytes:
-        """What is on the disk of a file whatever happens."""
+        """The content of a file that survives any failure."""
         return self._synced[path]
 
     def cut_power(self, chance: Random) -> None:
-        """What is on the disk afterwards is in the files. The processes that wrote them are no more."""
+        """Cut the power: the files get the content that survived, and their writers no longer exist."""
         for path, old in self._synced.items():
             if path.exists():
                 path.write_bytes(_survives(old, path.read_bytes(), chance))

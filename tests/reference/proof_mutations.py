@@ -1,7 +1,7 @@
 """Mutated proofs, and a check that every accepted one is true of its log.
 
-Octets are changed as they are; and what a proof carries is taken apart, changed, exchanged with what other proofs
-carry, and put together in its one form again, so that the verifier gets past its form.
+Raw octets are changed; or the content of a proof is taken apart, changed, exchanged with that of other proofs,
+and assembled in its canonical form again, so that the verifier accepts its form.
 """
 
 import json
@@ -32,13 +32,13 @@ SEEN_S = 1_750_000_100
 
 @cache
 def logs() -> tuple[SealedLog, ...]:
-    """One with a recovery, one of another boot of the same vehicle."""
+    """Two logs: one with a recovery, and one of another boot of the same vehicle."""
     return sealed_log(recovers=True), sealed_log(boot=bytes(16)), sealed_log(boot=bytes([7]) * 16, mission="other")
 
 
 @cache
 def proofs() -> tuple[bytes, ...]:
-    """Of every kind, of each log."""
+    """Proofs of every kind, of each log."""
     made: list[bytes | Flaw] = []
     for log in logs():
         last = len(log.lines) - 1
@@ -74,7 +74,7 @@ def changed(data: bytes, of: Random) -> bytes:
 
 
 def check(data: bytes) -> str:
-    """The slug of what is wrong; `true` when it proves something that is true of a log. Fails for anything else."""
+    """Return the slug of a refusal, or `true` if the proof is true of a log; fail for a false accepted proof."""
     result = check_receipt(data, PIN) if data[:1] == b"\xd2" else check_proof(data, PIN)
     if isinstance(result, Flaw):
         assert result.slug.partition("/")[0] in ("proof", "trust"), result
@@ -144,7 +144,7 @@ def _lines(data: bytes, of: Random) -> bytes:
 
 
 def _path(data: bytes, of: Random) -> bytes:
-    """Another hash in the place of one of the path, or of two, or one more, or one less."""
+    """Replace one or two hashes of a path, or add or remove one."""
     head, blank, note = data.partition(b"\n\n")
     lines = head.split(b"\n")
     if data[:1] == b"\xd2" or len(lines) < 4:
@@ -155,7 +155,7 @@ def _path(data: bytes, of: Random) -> bytes:
 
 
 def _parts(data: bytes, of: Random) -> bytes:
-    """Takes apart what a proof carries, and changes it."""
+    """Take the content of a proof apart, and change it."""
     other = of.choice(proofs())
     try:
         if data[:1] == b"\xd2":
@@ -170,7 +170,7 @@ def _parts(data: bytes, of: Random) -> bytes:
 
 
 def _changed(value: Any, theirs: Any, of: Random) -> Any:
-    """The value with something in it changed, or taken from another."""
+    """The value with a change, or with a part of another value."""
     if isinstance(value, dict) and value:
         key = of.choice(list(value))
         if isinstance(theirs, dict) and key in theirs and of.random() < 0.4:

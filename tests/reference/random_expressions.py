@@ -1,5 +1,5 @@
-"""Well-typed conditions at random, as IR: sums, products, quotients, `abs`, `min`, `max`, ranges, enumerations, places,
-times of day, phases, and temporal operators in each other. Numbers are round, so that ties are common.
+"""Random well-typed conditions, as IR: sums, products, quotients, `abs`, `min`, `max`, ranges, enumerations, places,
+times of day, phases, and nested temporal operators. Numbers are round, so that ties are common.
 """
 
 from random import Random
@@ -25,7 +25,7 @@ SIGNALS = {
     DURATION: [],
 }
 ARGUMENTS = {LENGTH: ["gap"], ALTITUDE: ["up"], SPEED: ["pace"], DURATION: ["wait"], RATIO: [], COUNT: []}
-#: what literals of a dimension are multiples of
+#: the unit of the literals of a dimension
 STEP = {LENGTH: 500, ALTITUDE: 500, SPEED: 500, DURATION: 500_000, RATIO: 2500, COUNT: 1}
 ENUMERATIONS = {
     "gps.fix": ["no_gps", "no_fix", "fix_2d", "fix_3d", "dgps", "rtk_float", "rtk_fixed", "static", "ppp"],
@@ -37,7 +37,7 @@ OPERATORS = ["<", "<=", ">", ">=", "==", "!="]
 
 
 class Maker:
-    """Draws conditions; `observed` ones stand under a temporal operator, and read no argument and no phase."""
+    """Draws conditions; `observed` ones are under a temporal operator, and read no argument and no phase."""
 
     def __init__(self, random: Random) -> None:
         self.random = random
@@ -63,7 +63,7 @@ class Maker:
                 return first
 
     def number(self, dimension: Dimension, depth: int, observed: bool) -> ir.Value:
-        """A number that reads something, or at the bottom perhaps a constant."""
+        """A number that reads a value, or at the lowest depth perhaps a constant."""
         kind = self.random.randrange(10) if depth else 0
         again = depth - 1
         match kind:

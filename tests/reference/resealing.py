@@ -1,7 +1,7 @@
 """Rewrite a log with all of its keys: number, link, count and sign it, without the evidence code.
 
-`resealed(lines, keys)` takes lines as they should be but for that; `keys` gives the secret seed of a public key;
-where it gives none, the checkpoint stays as it is, as do fields named in `keep` in all signed records.
+`resealed(lines, keys)` takes lines without these parts; `keys` gives the secret seed of a public key;
+without a seed, the checkpoint is unchanged, and so are fields named in `keep` in all signed records.
 """
 
 import json
@@ -42,7 +42,7 @@ def note_of(origin: str, text: str, seed: bytes) -> str:
 
 
 def checkpoint_text(origin: str, fields: Fields, leaves: list[bytes], before: str = "") -> str:
-    """What the checkpoint of a signed record says, `before` being the text of the one before."""
+    """The text of a signed record's checkpoint; `before` is the previous text."""
     own = leaf_of(line_of(fields | {"checkpoint": None}))
     lines = [origin, str(len(leaves)), b64encode(root_of(leaves)).decode(), f"record {b64encode(own).decode()}"]
     if "next_key" in fields:
@@ -60,7 +60,7 @@ def resealed(
     text: Callable[[int, str], str] = lambda number, text: text,
     relink: bool = True,
 ) -> list[bytes]:
-    """The lines written anew. `text` may change what the signed record of a number has signed."""
+    """The rewritten lines. `text` may change the signed text of a record by number."""
     done: list[bytes] = []
     leaves: list[bytes] = []
     origin = log_key = next_key = before = ""

@@ -23,7 +23,7 @@ _ANY = (MAX_VALUE, -MAX_VALUE, 0, 1, -1, MAX_COORDINATE, -MAX_COORDINATE, MAX_CO
 
 
 def speeds(of: Random) -> Speeds:
-    """Mostly those of a quadrotor; sometimes anything that is well-formed."""
+    """Mostly the speeds of a quadrotor; sometimes any well-formed ones."""
     if of.random() < 0.7:
         return Speeds(
             8 * M,
@@ -55,7 +55,7 @@ def speeds(of: Random) -> Speeds:
 
 
 def offsets(of: Random, near: int) -> tuple[int, ...]:
-    """Of a time zone that changes about a moment, or at random."""
+    """The offsets of a time zone that changes near a moment, or at random."""
     moments = sorted(
         {
             max(near + of.choice([-400, -3, -2, -1, 0, 1, 2, 3, 400]) * DAY + of.choice([-1, 0, 1, H]), 0)
@@ -71,7 +71,7 @@ def offsets(of: Random, near: int) -> tuple[int, ...]:
 
 
 def vehicle(of: Random, plain: VehicleLimits) -> VehicleLimits:
-    """With speeds, a return altitude and a local time at random."""
+    """A vehicle with random speeds, return altitude and local time."""
     made = replace(
         plain,
         speeds=speeds(of) if of.random() < 0.7 else None,
@@ -86,7 +86,7 @@ def vehicle(of: Random, plain: VehicleLimits) -> VehicleLimits:
 
 
 def week(of: Random, near: int) -> tuple[int, ...]:
-    """Windows of the week, some of which begin or end about a moment."""
+    """Windows of the week, some of which begin or end near a moment."""
     local = (near + 3 * DAY) % WEEK
     edges = {
         min(max(local + of.choice([-2 * DAY, -2 * H, -H, -S, 0, 1, S, H, 2 * H, 3 * DAY]), 0), WEEK) for _ in range(4)
@@ -96,12 +96,12 @@ def week(of: Random, near: int) -> tuple[int, ...]:
     return tuple(found) or (0, WEEK)
 
 
-#: about which the vehicle flies, or returns
+#: heights near which the vehicle flies or returns
 _HEIGHTS = (LOWEST, -1, 0, 5 * M, 20 * M, 25 * M, 28 * M, 30 * M, 31 * M, 60 * M, 98 * M, 100 * M, 101 * M, HIGHEST)
 
 
 def zone(of: Random, plain: Zone) -> Zone:
-    """With rings, between other heights, or at times of the week."""
+    """A zone with rings, other heights, or times of the week."""
     if of.random() < 0.5:
         floor, ceiling = sorted(of.sample(_HEIGHTS, 2))
         plain = replace(plain, floor=floor, ceiling=ceiling)
@@ -140,11 +140,11 @@ def policy(of: Random) -> Policy:
     rules = list(plain.rules)
     rules.insert(of.randrange(len(rules) + 1), added)
     if rules and of.random() < 0.2:
-        rules.append(of.choice(rules))  # two that are the same
+        rules.append(of.choice(rules))  # two equal ones
     patient = of.random() < 0.5  # so that something else ends an admission first
     inside, outside = (tuple(of.sample(range(len(zones)), of.choice([0, 1, 2]))) for _ in range(2))
     airspace = Airspace(inside[:1], outside, "airspace", 0, 0, 1) if of.random() < 0.5 else plain.airspace
-    measured = of.choice(["link.quality", "wind.speed", "", "", ""])  # what one of these tells is taken in a minute
+    measured = of.choice(["link.quality", "wind.speed", "", "", ""])  # clock errors that grow within a minute
     return replace(
         plain,
         airspace=airspace,
@@ -177,7 +177,7 @@ def mission(invocation: Invocation) -> Mission:
 
 
 def state(of: Random, monitors: int) -> State:
-    """Now and then with values at the ends of their ranges, ages at the edges of stale, or of another size."""
+    """A state, sometimes with values at the ends of their ranges, ages at the stale limit, or a wrong size."""
     plain = worlds.state(of, monitors)
     values, ages = list(plain.values), list(plain.ages)
     for slot in range(len(values)):
@@ -191,12 +191,12 @@ def state(of: Random, monitors: int) -> State:
 
 
 def now(of: Random) -> Now:
-    """By a clock that is mostly good."""
+    """The time of a mostly good clock."""
     plain = worlds.now(of)
-    if of.random() < 0.08:  # the reference takes long where nothing vouches for a clock
+    if of.random() < 0.08:  # the reference is slow with an unknown clock error
         errors = [1, S, 60 * S, H, DAY, WEEK] * 4 + [9 * WEEK, 400 * DAY, 1 << 48, UTC_UNKNOWN_US]
         plain = replace(plain, utc_error_us=of.choice(errors))
-    elif of.random() < 0.1:  # a step's validity begins or ends just then, as far as the clock tells
+    elif of.random() < 0.1:  # a step's validity begins or ends at that time, within the clock error
         edge = flat.ISSUED + of.choice([0, 10 * flat.MIN, 30 * flat.MIN]) + of.choice([-1, 0, 1]) * plain.utc_error_us
         return replace(plain, utc_us=edge + of.choice([-1, 0, 1]))
     return (
@@ -205,7 +205,7 @@ def now(of: Random) -> Now:
 
 
 def context(of: Random, invocation: Invocation) -> Context:
-    """As any, in sometimes strange phases, and rarely with a great remaining latency."""
+    """A context, sometimes with unusual phases, and rarely with a large remaining latency."""
     plain = worlds.context(of, invocation)
     if of.random() < 0.03:
         plain = replace(plain, phase=of.choice([62, 63, 64, 65_535]))

@@ -36,14 +36,14 @@ def sign(text: bytes) -> bytes:
 
 
 def now(number: int) -> Now:
-    """A millisecond a record."""
+    """The time of a record: one millisecond each."""
     return Now(5_000_000 + number * 1_000, UTC_US + number * 1_000, 2_000)
 
 
 @cache
 def sealed_log(epochs: int = 3, records: int = 5, *, recovers: bool = False, closed: bool = True,
                boot: bytes = bytes(range(16)), mission: str = "short") -> SealedLog:  # fmt: skip
-    """Epochs of so many ordinary records; with `recovers` the one in the middle ends with a recovery."""
+    """A log of epochs with a number of ordinary records; with `recovers` the middle one ends with a recovery."""
     draw = epoch_seeds()
     recorder = Recorder(sign, LOG_KEY.public, draw)
     root = case.root()[1]

@@ -5,7 +5,7 @@ from itertools import count
 
 
 class _Seeds:
-    """The numbers from 1 on, each as a secret; a copy of it goes on from where it is."""
+    """The numbers from 1 on, each as a secret; a copy continues at the present number."""
 
     def __init__(self) -> None:
         self._numbers = count(1)

@@ -2,7 +2,7 @@
 
     RTSHCUA_BOUNDARY=build/boundary/librtshcua.so pytest -p reference.shadow tests/unit tests/integration
 
-So every request of every flight in the tests is one more case, unless it flies in another process; `make soak` runs it.
+Every request of every flight in this process is one more case; `make soak` runs it.
 """
 
 import ctypes
@@ -25,7 +25,7 @@ _asked: Final = Counter[str]()
 _decide = decide_module.decide
 _c = native.Native(ctypes.CDLL(os.environ["RTSHCUA_BOUNDARY"]))
 _ready: list[Any] = [None, None]  # the policy and the invocation that C has
-_test: Final = SimpleNamespace(altered=False)  # whether the one that runs decides otherwise than the reference
+_test: Final = SimpleNamespace(altered=False)  # whether the tested decision differs from the reference
 
 
 def decide(
@@ -51,7 +51,7 @@ def decide(
 
 
 def _prepare(invocation: PreparedInvocation, policy: PreparedPolicy) -> None:
-    """Give C the step, in a mission with a phase of the same name, as far as the policy knows the name."""
+    """Give C the step, in a mission with a phase of the same name if the policy has that name."""
     step = invocation.invocation
     name = policy.policy.phases[invocation.phase] if invocation.phase >= 0 else "a phase that no condition names"
     phases = (*(f"phase {number}" for number in range(step.phase)), name)
@@ -60,7 +60,7 @@ def _prepare(invocation: PreparedInvocation, policy: PreparedPolicy) -> None:
 
 
 def pytest_configure() -> None:
-    """Take the place of `decide`, wherever it was imported to."""
+    """Replace `decide` in every module that imported it."""
     for module in list(sys.modules.values()):
         if getattr(module, "decide", None) is _decide:
             module.decide = decide  # type: ignore[attr-defined]

@@ -1,7 +1,7 @@
-"""Test vectors of which Ed25519 signatures count (docs/log-format.md, section 6), in the form of Project Wycheproof's.
+"""Test vectors for the validity of Ed25519 signatures (docs/log-format.md, section 6), in Wycheproof's form.
 
 `python tests/reference/signature_vectors.py` writes tests/vectors/ed25519.json, always the same octets. Whether each
-counts is known from how it was made, without any library.
+is valid is known from its construction, without any library.
 """
 
 import hashlib
@@ -34,7 +34,7 @@ from reference.edwards import (
 
 FILE = Path(__file__).parents[1] / "vectors" / "ed25519.json"
 TORSION = torsion()
-#: what a flag means
+#: the meaning of flags
 NOTES = {
     "Valid": "made as RFC 8032 has it",
     "MixedOrder": "the key has a part of small order; the equation holds without the cofactor",
@@ -62,26 +62,26 @@ class Vector(NamedTuple):
 
 
 class Key(NamedTuple):
-    """A secret scalar, and the octets of its public key, which may have a part of small order."""
+    """A secret scalar, and the octets of its public key, which may have a small-order component."""
 
     a: int
     public: bytes
 
     def signature(self, message: bytes, r: int, part: Point = NEUTRAL) -> bytes:
-        """By the nonce r; R has this part besides."""
+        """A signature with the nonce r; R also has this component."""
         first = encoded(add(times(r, BASE), part))
         s = (r + challenge(first, self.public, message) * self.a) % L
         return first + s.to_bytes(32, "little")
 
 
 def key(random: Random, part: Point = NEUTRAL) -> Key:
-    """A key with this part of small order."""
+    """A key with this small-order component."""
     a = random.randrange(1, L)
     return Key(a, encoded(add(times(a, BASE), part)))
 
 
 def vectors() -> Iterator[Vector]:
-    """All cases, those of a key one after another."""
+    """All cases, grouped by key."""
     random = Random(8032)
     good = key(random)
     yield from _plain(random, good)

@@ -1,4 +1,4 @@
-"""A vehicle with a clock of its own at the far end of a bad link, as an oracle: it knows when each frame was made."""
+"""A vehicle with its own clock behind a bad link, as an oracle: it knows when each frame was made."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -15,7 +15,7 @@ SECOND = 1_000_000
 
 @dataclass(frozen=True)
 class LinkKind:
-    """Delays in us: the least each way, and what may come on top; loss in percent; `ordered`: no frame overtakes."""
+    """Delays in us: the minimum each way, and the largest addition; loss in percent; `ordered`: no overtaking."""
 
     up_us: int = 2_000
     down_us: int = 2_000
@@ -26,7 +26,7 @@ class LinkKind:
 
 @dataclass
 class Arrival:
-    """A frame, when it came, when it was sent, and when what it says was measured, all on our clock."""
+    """A frame with its times of arrival, sending and measurement, on our clock."""
 
     frame: ReceivedFrame
     came_us: int
@@ -37,7 +37,7 @@ class Arrival:
 
 @dataclass
 class StampedVehicle:
-    """`ppm` is how much faster than ours its clock runs. Frames come from component 1."""
+    """`ppm` is how much faster its clock runs than ours. Frames come from component 1."""
 
     seed: int
     link: LinkKind
@@ -54,12 +54,12 @@ class StampedVehicle:
         self._random = Random(self.seed)
 
     def boot_us(self, our_us: int) -> int:
-        """Its clock when ours shows this."""
+        """Its clock at a time of ours."""
         passed = our_us - self.start_us
         return self.uptime_us + passed + passed * self.ppm // 1_000_000
 
     def run(self, source: Any, seconds: int) -> Iterator[Arrival]:
-        """Let time pass; asks and answers of TIMESYNC go through `source`, and each other frame is given on arrival."""
+        """Let time pass; TIMESYNC goes through `source`, and each other frame is yielded on arrival."""
         now_us, end_us = self.start_us, self.start_us + seconds * SECOND
         self._schedule(now_us, ("emit",))
         self._schedule(now_us, ("tick",))

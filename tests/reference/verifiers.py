@@ -16,22 +16,22 @@ from rtshcua.wire.keys import Duty
 from virtual import case
 
 ROOT_KEY = case.KEYS[Duty.ROOT].public
-#: words of the two for the same thing
+#: equivalent verdicts of the two
 WORDS = {
     LogVerdict.VERIFIED: ("closed",),
     LogVerdict.INCOMPLETE: ("incomplete",),
     LogVerdict.FAILED: ("broken", "untrusted", "anchor", "boundary"),
 }
-#: findings of things that docs/log-format.md says nothing about: what the records and the bundle mean
+#: findings outside docs/log-format.md: the meaning of records and bundle
 OF_MEANING = (
     "decision/", "dispatch/", "document/", "frames/", "preparation/", "genesis/other",
     "trust/bundle-binding-mismatch", "trust/bundle-id-mismatch",
 )  # fmt: skip
-#: the page says what a bundle must be as far as a verifier of logs needs it; the rest of its form is ours
+#: findings about the form of a bundle beyond what the page requires
 OF_FORM_OF_BUNDLES = ("trust/bundle-malformed",)
 
 
-#: findings that only who held the keys can bring about, and that the quick verifier says it did not look for
+#: findings that only a key holder can cause, and that the quick verifier reports as unchecked
 OF_FORM = ("record/", "clock/", "chain/sequence", "seal/missing", "seal/gap", "genesis/repeated")
 
 
@@ -45,7 +45,7 @@ def careful(data: bytes, pinned: bytes = ROOT_KEY, *, derive: bool = False) -> A
 
 
 def quick_accepts(data: bytes, pinned: bytes = ROOT_KEY) -> bool:
-    """Whether the quick verifier says yes, by itself: it asks nobody else where it does not."""
+    """Whether the quick verifier accepts, without its fallback to the careful one."""
     log = outline(lambda offset, length: data[offset : offset + length], len(data))
     if log is None:
         return False
@@ -67,7 +67,7 @@ def independent(data: bytes, pinned: bytes = ROOT_KEY) -> str:
 
 
 def agree(data: bytes, audit: Audit, pinned: bytes = ROOT_KEY) -> None:
-    """The independent verifier says what the audit does, as far as its page goes; the quick one takes nothing else."""
+    """Check that the independent verifier agrees with the audit, and that the quick one accepts no more."""
     report = audit.report
     slug = report.failure.slug if report.failure else ""
     short = report.shortfall is not None and report.shortfall.slug == "boundary/lost"

@@ -19,12 +19,12 @@ PUBLIC = [key.public for key in WITNESSES]
 
 
 def log_keys(vehicle: str) -> Iterable[bytes]:
-    """What the trust root says."""
+    """Return the log keys of the trust root."""
     return (LOG_KEY.public,) if vehicle == VEHICLE else ()
 
 
 class Log:
-    """A log in the making. A fork shares all that was written before it, and the key of the present epoch."""
+    """A growing log. A fork shares the earlier records and the key of the present epoch."""
 
     def __init__(self, seed: int = 1, *, bundle: bytes = b"bundle") -> None:
         self.seeds = iter(range(seed, 100_000))
@@ -60,14 +60,14 @@ class Log:
         return self.add(self.recorder.close(self.now(), ending="completed", tlog=None)) or ""
 
     def recover(self) -> str:
-        """A recover where the log stands: what whoever holds the log key can always write."""
+        """Append a recovery, which a holder of the log key can always write."""
         self.recorder = Recorder.resumed(
             self.recorder._head, ORIGIN, lambda text: LOG_KEY.sign(text, duty=Duty.LOG), LOG_KEY.public, self.draw
         )
         return self.add(self.recorder.recover(self.now(), discarded_bytes=0, discarded_digest=bytes(32))) or ""
 
     def fork(self) -> "Log":
-        """Another future of this log, by whoever holds its keys."""
+        """Another future of this log, by a holder of its keys."""
         other = object.__new__(Log)
         other.seeds, other.ms = iter(range(100_000, 200_000)), self.ms
         other.lines, other.submission = list(self.lines), deepcopy(self.submission)
@@ -116,7 +116,7 @@ class Judge:
         return cosign(text, self.time_s, self.key.public, lambda data: self.key.sign(data, duty=Duty.WITNESS))
 
     def blindly(self, note: str) -> str:
-        """What a witness that lies makes: it cosigns whatever it is shown."""
+        """The cosignature of a lying witness, which signs any checkpoint."""
         made = anchor(note, self.line(note.rpartition("\n\n")[0] + "\n"), [self.key.public])
         assert made is not None
         return made

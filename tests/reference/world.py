@@ -1,6 +1,6 @@
-"""A world for the runtime: a vehicle that flies at once, a clock that is set by hand, and one whole run over both.
+"""A world for the runtime: an obedient fake vehicle, a manual clock, and a whole run with both.
 
-It fakes the port, never the calls: the bundle is sealed, loaded and decided by the real code.
+Only the ports are faked: the real code seals, loads and decides.
 """
 
 import json
@@ -67,7 +67,7 @@ SESSION_KEY = bytes(range(32))
 FLIGHT = bytes(16)
 START = Now(monotonic_us=500 * S, utc_us=ISSUED + 60 * S, utc_error_us=20_000)
 TICK = 50_000  # us
-SKILL_US = 2 * S  # how long the fake vehicle takes for anything
+SKILL_US = 2 * S  # the duration of every skill of the fake vehicle
 NEVER = 1 << 60
 
 ROOT_KEY, POLICY_KEY, MISSION_KEY, LOG_KEY, APPROVAL_KEY = (
@@ -92,7 +92,7 @@ ROOT = TrustRoot(
 
 
 class The:
-    """A thing, told by which one it is: what equals it may be made of other types, and have other bytes."""
+    """An object compared by identity, because equal values may have other types and other bytes."""
 
     __slots__ = ("thing",)
 
@@ -188,7 +188,7 @@ class ManualClock:
 
 @dataclass
 class FakeVehicle:
-    """Does what it is told within `SKILL_US`, and says so; `values` is its telemetry, by state slot.
+    """Obeys commands within `SKILL_US` and reports it; `values` is its telemetry, by state slot.
 
     Skills in `fails` fail, those in `deaf` never end; slots in `silent` are not reported.
     """
@@ -253,7 +253,7 @@ class FakeVehicle:
 
 
 class Run:
-    """One run: the shell's loop over a fake vehicle, with everything it did kept for asserting."""
+    """One run: the loop with a fake vehicle, which records everything for assertions."""
 
     def __init__(
         self,
@@ -310,7 +310,7 @@ class Run:
         return [tuple(record[key] for key in keys) for record in self.records if record["type"] == "decision"]
 
     def step(self, *events: Event) -> list[Action]:
-        """One step of the shell at the present moment."""
+        """One turn of the loop at the present moment."""
         now = self.clock.now()
         actions = self.runtime.step(now, events)
         sent: list[Event] = []
@@ -330,12 +330,12 @@ class Run:
         return actions
 
     def tick(self, *events: Event) -> list[Action]:
-        """Time goes on by one tick, telemetry arrives, then `events`."""
+        """Advance by one tick: telemetry arrives, then `events`."""
         self.clock.advance(TICK)
         return self.step(*self.vehicle.poll(self.clock.now().monotonic_us), *events)
 
     def until(self, done: Callable[["Run"], bool], seconds: int = 120) -> "Run":
-        """Tick until `done`; a run that never gets there fails the test."""
+        """Tick until `done`; fail the test if that never happens."""
         for _ in range(seconds * S // TICK):
             if done(self):
                 return self
@@ -350,12 +350,12 @@ class Run:
 
 
 def dispatches(actions: Sequence[Action]) -> list[Command]:
-    """The commands that were to be sent."""
+    """The dispatched commands."""
     return [action for action in actions if isinstance(action, Command)]
 
 
 def assert_audited(run: Run) -> None:
-    """The closed log verifies with the root's key alone: each decision derives again, each dispatch is covered."""
+    """Check that the closed log verifies with the root's key: each decision derives again, each dispatch is covered."""
     close = run.recorder.close(run.clock.now(), ending=str(run.ending), tlog=None)
     found = audit([*run.lines, close], ROOT_KEY.public)
     agree(b"".join([*run.lines, close]), found, ROOT_KEY.public)
@@ -365,7 +365,7 @@ def assert_audited(run: Run) -> None:
 
 
 def assert_covered(run: Run) -> None:
-    """Every command was sent after a record that covers it, and one effect says that it was sent."""
+    """Check that each command was sent after a record that covers it, and has one `sent` effect."""
     allowed: set[tuple[object, ...]] = set()
     lines = iter(run.lines[1:])
     tokens = []

@@ -1,6 +1,6 @@
 """Random worlds: conditions, policies, invocations, situations and sets of situations, all well-formed.
 
-Each maker takes a seeded source of chance rather than drawing piece by piece: a policy has hundreds of pieces, and a
+Each maker takes a seeded random generator rather than drawing piece by piece: a policy has hundreds of pieces, and a
 seed is enough to see a failure again. Most pieces are the nominal ones, so that the later steps are reached.
 """
 
@@ -45,14 +45,14 @@ def number(of: Random, cells: list[int]) -> Code:
 
 
 class Reach(NamedTuple):
-    """What conditions may ask for beside state and arguments: how many temporal monitors, and whether for the phase."""
+    """What conditions may read beside state and arguments: how many temporal monitors, and whether the phase."""
 
     monitors: int = 0
     phased: bool = False
 
 
 NONE = Reach()
-PHASES = len(flat.POLICY.sets)  # the set of phases that a random policy asks for
+PHASES = len(flat.POLICY.sets)  # the set of phases that a random policy reads
 
 
 def atom(of: Random, contract: Contract | None, reach: Reach) -> Code:
@@ -171,7 +171,7 @@ def zone(of: Random) -> Zone:
 
 
 def timed(of: Random, zone: Zone) -> Zone:
-    """The zone at some times only, which begin or end about now."""
+    """The zone at some times only, which begin or end near now."""
     local = (flat.NOW.utc_us + flat.POLICY.vehicle.utc_offset_us) % DAY
     near = (-10 * flat.MIN, -20_000, -1, 0, 1, 20_000, 2 * flat.MIN, 5 * flat.MIN + 20_000, 10 * flat.MIN, 8 * flat.H)
     daily = (local + of.choice(near)) % DAY, (local + of.choice(near)) % DAY
@@ -204,7 +204,7 @@ def policy(of: Random) -> Policy:
 
 
 def _without(policy: Policy, well_known: str) -> Policy:
-    """A policy whose vehicle tells less."""
+    """A policy whose vehicle reports fewer signals."""
     vehicle = replace(policy.vehicle, **{well_known: -1})
     contracts = tuple(
         replace(c, reads=slots_read((*c.require, *c.assume, *c.maintain), vehicle, policy.monitors))
@@ -278,8 +278,8 @@ NEAR = {
 
 
 def state(of: Random, monitors: int = 0) -> State:
-    """Mostly nominal; a value may be near a threshold, missing, or at the edge of stale, and what the temporal monitors
-    say is rarely no truth, or of the wrong length."""
+    """Mostly nominal; a value may be near a threshold, missing, or nearly stale, and the truths of temporal monitors
+    are rarely invalid or of the wrong length."""
     values = {slot: of.choice(near) for slot, near in NEAR.items() if of.random() < 0.2}
     if of.random() < 0.2:
         values[of.randrange(flat.SLOTS)] = None
@@ -323,7 +323,7 @@ def context(of: Random, invocation: Invocation) -> Context:
 
 
 def sets(of: Random, monitors: int = 0) -> Sets:
-    """Mostly narrow: sets that hold everything teach little."""
+    """Mostly narrow sets, because wide ones test little."""
     moment = now(of)
     starts = [moment.utc_us, moment.utc_us + 3][: of.choice([1, 1, 2])]
     utc = tuple((low, low + of.choice([0, 0, 0, 20_000, flat.H])) for low in starts)

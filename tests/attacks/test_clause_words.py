@@ -21,12 +21,12 @@ from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.mission import Mission
 from rtshcua.onboard.calls import is_own
 
-#: what no battery meets, in whatever words
+#: a condition that no battery satisfies
 FULL = flat.apply(flat.Op.GT, flat.signal(flat.BATTERY), flat.const(10_000))
 
 
 def held_to(text: str, step: int = 0) -> Mission:
-    """A step with a clause that requires more than a full battery, and a text that says something else."""
+    """A step with a clause that requires more than a full battery, with a misleading text."""
     of = MISSION.invocations[step]
     contract = replace(of.contract, assume=(*of.contract.assume, flat.clause(text, FULL)))
     contract = replace(contract, reads=tuple(sorted({*contract.reads, flat.BATTERY})))

@@ -34,12 +34,12 @@ from rtshcua.virtual.boundary_in_process import Served
 from rtshcua.wire import cbor, cose, response
 from rtshcua.wire.cose import MAX_PROTECTED, EnvelopeError
 
-#: what takes as long as a document is, or as it has steps: the flight's thread does none of it
+#: functions whose time grows with the document: never called in the flight's thread
 LONG: list[tuple[Any, str]] = [
     (Commands, "_of_step"), (response, "own_clauses"), (words, "call"), (Encoded, "decoded"), (agents, "b64encode"),
     (runtime, "b64encode"),
 ]  # fmt: skip
-#: CBOR items that one turn may decode in the thread that flies: some 0.1 ms
+#: CBOR items that one turn may decode in the flight's thread: about 0.1 ms
 ITEMS = 150
 HOSTILE = hostile(MISSION_KEY)
 
@@ -54,10 +54,10 @@ class Flooded(Run):
         self.link.connect(str(folder / "s"))
         self.decoded: Counter[int] = Counter()
         self.looked_at: list[bytes] = []
-        self.came = b""  # of what came in, the line that has no end yet
+        self.came = b""  # the incomplete line of the input
         self.me = threading.get_ident()
         self.most = 0
-        self.busy: Counter[str] = Counter()  # what takes long, by name, as far as the flight's thread did it
+        self.busy: Counter[str] = Counter()  # slow functions called in the flight's thread, by name
         item, consider = cbor._item, of.boundary.consider
 
         def counted(*arguments: Any) -> Any:
@@ -93,7 +93,7 @@ class Flooded(Run):
         slug = ""
         while not slug:
             assert over or self.ending is None
-            if not self.agents._sockets[0].ahead:  # else the other thread is waited for
+            if not self.agents._sockets[0].ahead:  # otherwise wait for the other thread
                 self.clock.advance(GAP_US)
             before = self.decoded[self.me]
             if over:
@@ -159,7 +159,7 @@ def test_replacement_is_prepared_in_another_thread(
         document = large(of)
         assert len(document) > SHORT
         assert run.hand(document) == "accepted"
-        if mode is EnforcementMode.SOFTWARE:  # elsewhere it is the boundary that verifies it, in the call
+        if mode is EnforcementMode.SOFTWARE:  # a separate boundary verifies it in the call
             assert run.most <= ITEMS
             assert not +run.busy, "in the flight's thread"
         else:

@@ -145,7 +145,7 @@ def test_command_other_than_permitted_is_detected(kind: str, name: str) -> None:
 def test_command_before_its_record_is_detected(kind: str) -> None:
     lines, kept_entries = told(kind)
     at_us = moment(lines, "dispatched", 0)
-    sent_us = next(at for at, frame in kept_entries if at >= at_us and is_command(frame))  # once the mode was told
+    sent_us = next(at for at, frame in kept_entries if at >= at_us and is_command(frame))  # once the mode was reported
     moved = [(at_us - 1, frame) if at == sent_us and is_command(frame) else (at, frame) for at, frame in kept_entries]
     for entries in (moved, sorted(moved, key=lambda entry: entry[0])):
         found = judged(lines, entries)

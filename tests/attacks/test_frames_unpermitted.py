@@ -28,7 +28,7 @@ EVERYTHING = (ARM, FORCE, LAND, HOLD, HOME, GUIDED)
 
 
 def heard() -> Loaded:
-    """A bundle in force, before an ArduCopter that was heard."""
+    """A bundle in force, with a known ArduCopter."""
     of = loaded()
     of.executor.frames.observe(AUTOPILOT.pack(mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 0, 3)))
     return of

@@ -34,7 +34,7 @@ from rtshcua.wire.untrusted import Untrusted
 from virtual.sampling import each_once
 
 ANYONE = SigningKey.from_seed(bytes([5]) * 32, duty=Duty.POLICY)
-#: items that are decoded of what nobody verified, at most: 0.3 s on a slow machine
+#: the limit of decoded items of unverified input: 0.3 s on a slow machine
 ITEMS = 1 << 17
 MOST_BYTES = 64 << 20
 #: seconds of the processor with every call counted and all memory traced: several times the bound
@@ -80,7 +80,7 @@ def replacement(kind: str) -> str:
     return b64encode(claiming(names.REPLACEMENT, body)).decode()
 
 
-#: by name: who takes something that a stranger wrote, and what is given to it of tiny items of a kind
+#: readers of untrusted input by name, with their input made of tiny items of a kind
 ENTRIES: dict[str, tuple[Callable[[Any], object], Callable[[str], object]]] = {
     "a bundle": (envelopes, lambda kind: wrapped(names.BUNDLE, items(kind, MAX_BUNDLE - 32))),
     "the vehicle of a bundle": (claimed_vehicle, bundle),
@@ -149,7 +149,7 @@ JSON = {"lists": b"[]", "objects": b"{}", "numbers": b"1", "texts": b'""', "feat
         "a position and a list": b"[1,2],[]", "positions never closed": b"[1,2"}  # fmt: skip
 
 
-#: files of an eighth of the largest, under an eighth of the limits: who counts octets makes each of them slow
+#: files and limits of one eighth, because counting octets is slow
 _PART = 8
 
 

@@ -69,7 +69,7 @@ def test_genuine_log_verifies_with_boundary_claims() -> None:
     assert claim.text.startswith("session 1 of the boundary signed for 10 decisions, documents and dispatches")
     assert "1 were refused, 30 answers were repeated and 1 documents were refused" in claim.text
     assert "boundary" not in {claim.slug for claim in report.unproven}
-    assert signed(LINES) == list(LINES)  # the attacker's tool writes nothing else than the truth of the truth
+    assert signed(LINES) == list(LINES)  # the attacker's tool writes the true value unchanged
 
 
 # ---------------------------------------------------------------- altered
@@ -81,7 +81,7 @@ def test_an_outcome_is_altered(number: int) -> None:
     assert expect(signed(changed(number, edit(LINES[number], outcome=outcome)))) == ("boundary/differs", number)
 
 
-#: by the field of a decision, what it might be said to have been
+#: false values by the field of a decision
 FIELDS: dict[str, Any] = {
     "reason": "state/violated", "rule_step": 7, "target_link": 0, "valid_until_us": 1, "step": 2, "kind": 1, "link": 0,
     "binding": "00" * 32,
@@ -263,7 +263,7 @@ def test_another_mode() -> None:
     assert expect(signed(lines)) == ("boundary/beginning", STATEMENTS[0])
 
 
-# ---------------------------------------------------------------- what cannot be told from one log
+# ---------------------------------------------------------------- undetectable in a single log
 
 
 @pytest.mark.parametrize("seal", SEALS[1:2])
@@ -276,11 +276,11 @@ def test_a_log_cut_off_and_called_a_crash_says_what_is_not_shown(seal: int) -> N
     assert ("boundary", "what the boundary did after its last statement: the log ends") in report.unproven
 
 
-# ---------------------------------------------------------------- a loss that is claimed
+# ---------------------------------------------------------------- a claimed loss
 
 
 def lost_at(number: int, *more: int) -> list[bytes]:
-    """The log of who says before a record that the boundary is lost, and leaves out what it makes, but for `more`."""
+    """A log that claims the boundary's loss before a record, and omits its later output except `more`."""
     claim = edit(LINES[SENT[0]], event="boundary-lost", kind=-1, step=-1, link=-1, token=-1, detail="it is gone")
     claim = edit(claim, **moment(number))
     gone = {each for each in (*DECISIONS, *STATEMENTS, APPROVAL, *SENT) if each >= number} - set(more)

@@ -32,7 +32,7 @@ AFTER = [number for number in range(TAKEN + 1, len(LINES)) if number not in SIGN
 
 
 def by_the_thief(lines: list[bytes]) -> list[bytes]:
-    """Everything that the epoch's key allows: the thief names new keys from then on."""
+    """A log rewritten with the epoch's key: the thief names new keys from then on."""
     own = public_of(STRANGER).hex()
     named = [
         edit(line, next_key=own) if number > TAKEN and read(line)["type"] == "seal" else line
@@ -46,7 +46,7 @@ def edited(number: int) -> list[bytes]:
 
 
 def closed_at(number: int) -> bytes:
-    """The close as it would be right after this record."""
+    """The close that would follow this record."""
     return edit(LINES[-1], **{key: read(LINES[number])[key] for key in ("at_us", "utc_us")})
 
 

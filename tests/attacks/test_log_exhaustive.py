@@ -16,7 +16,7 @@ LINES = whole()
 DATA = b"".join(LINES)
 STARTS = (0, *accumulate(map(len, LINES)))
 SHARDS = 32
-STRIDE = 1_013  # of the sample: coprime to all that is regular in the log
+STRIDE = 1_013  # step of the sample, coprime to the log's periods
 
 
 @cache
@@ -29,7 +29,7 @@ def line_at(offset: int) -> int:
 
 
 def accepted(offsets: Iterable[int]) -> list[int]:
-    """Which bytes can be changed without being noticed by all three."""
+    """The bytes whose change not all three verifiers detect."""
     missed = []
     for at in offsets:
         number = line_at(at)
@@ -40,7 +40,7 @@ def accepted(offsets: Iterable[int]) -> list[int]:
 
 
 def not_incomplete(cuts: Iterable[int]) -> list[int]:
-    """Where the log can be cut without it being called cut off by all, or broken within its genesis."""
+    """The places of cuts that not all verifiers report as incomplete, or as broken within the genesis."""
     missed = []
     for at in cuts:
         number = line_at(at)
@@ -52,7 +52,7 @@ def not_incomplete(cuts: Iterable[int]) -> list[int]:
 
 
 def rearranged(numbers: Iterable[int]) -> list[tuple[str, int]]:
-    """Which records can be deleted, duplicated or swapped with the next without being noticed by all."""
+    """The records whose deletion, duplication or swap not all verifiers detect."""
     missed = []
     for number in numbers:
         line, after = LINES[number], LINES[number + 1 :]

@@ -78,7 +78,7 @@ def test_the_bundle_of_another_mission() -> None:
 
 
 def test_false_mode_none_is_detected() -> None:
-    """Mode `none` would free every dispatch of its permit, but each decision records the mode too."""
+    """With mode `none` no dispatch needs a permit, but each decision records the mode too."""
     assert expect(signed(begun(mode="none")))[0] == "decision/mode"
 
 

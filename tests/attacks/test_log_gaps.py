@@ -46,7 +46,7 @@ def gap_in(lines: tuple[bytes, ...] | list[bytes]) -> int:
 
 
 def gap_after(line: bytes, us: int, **fields: object) -> Fields:
-    """What the record of a gap would say there."""
+    """The record of a gap at that place."""
     before = read(line)
     times = {key: before[key] + us for key in ("at_us", "utc_us")}
     return (

@@ -15,7 +15,7 @@ STEP, FALLBACK, CONTINGENCY = 0, 1, 2
 
 @cache
 def flight() -> tuple[bytes, ...]:
-    """The whole mission, as it should be."""
+    """The whole mission without a fault."""
     run = Run(loaded()).until_over()
     return (*run.lines, run.recorder.close(run.clock.now(), ending=str(run.ending), tlog=None))
 
@@ -27,7 +27,7 @@ def number(event: str, step: int) -> int:
 
 
 def sent_after(at: int, *links: tuple[int, int, int, str]) -> list[bytes]:
-    """The flight with these sent after record `at`."""
+    """The flight with these commands sent after record `at`."""
     moment = {key: read(flight()[at])[key] for key in ("at_us", "utc_us")}
     example = flight()[number("dispatched", 1)]
     more = [

@@ -74,7 +74,7 @@ def test_reordered(number: int) -> None:
 
 
 def test_a_permission_written_after_the_deed_by_the_key_holder() -> None:
-    """The moments are forged too, so that no clock tells."""
+    """The times are forged too, so no clock check detects it."""
     swapped = list(LINES)
     swapped[FIRST], swapped[SENT] = swapped[SENT], swapped[FIRST]
     assert expect(signed(swapped))[0] == "dispatch/not-permitted"

@@ -43,7 +43,7 @@ from virtual.rows import rows
 
 BEFORE, AFTER = ISSUED, START.utc_us + 3_600 * S
 ONE, TWO, THREE = WITNESSES
-#: a log of vectors' world, whose root has three witnesses and asks for two
+#: a log of the test vectors, whose root requires two of three witnesses
 LINES = log(genesis(), effect(10), seal(20, 1), effect(30), close(60))
 SEEN_S = vectors.UTC_US // S + 3
 NEW_ROOT_KEY = SigningKey.from_seed(b"new root key".ljust(32), duty=Duty.ROOT, development=True)
@@ -61,7 +61,7 @@ def flown() -> tuple[bytes, ...]:
 def newer(
     issued_us: int, *keys: SigningKey, version: int = 2, of: TrustRoot = ROOT, by: SigningKey = ROOT_KEY
 ) -> bytes:
-    """The root of a version, by which these keys are revoked, and the names of those that the root before revokes."""
+    """The root of a version that revokes these keys, and those revoked by the previous root."""
     names = (*sorted(of.revocations), *(key.kid for key in keys))
     kept = tuple(key for key in of.keys if key.kid not in names)
     made = replace(of, version=version, issued_at_us=issued_us, expires_at_us=issued_us + ISSUED, keys=kept)

@@ -21,7 +21,7 @@ BREEZE = clause("wind.speed < 8 m/s", apply(Op.LT, signal(WIND), const(8 * M)))
 
 
 def armed() -> Loaded:
-    """Taking off needs the wind to have been calm for 3 s."""
+    """A bundle whose takeoff requires calm wind for 3 s."""
     takeoff = replace(
         CONTRACTS[TAKEOFF],
         require=(clause("wind.speed < 8 m/s for the last 3 s", (Op.MONITOR, 0, 0)),),

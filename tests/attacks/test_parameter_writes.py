@@ -38,7 +38,7 @@ BACK = asks(("FENCE_RADIUS", 300.0, 50.0), restoring=True)
 
 
 def prepares(settings: dict[str, float], owed: dict[str, Owed] | None = None) -> Loaded:
-    """A bundle in force, before an ArduCopter that stands on the ground."""
+    """A bundle in force, with an ArduCopter on the ground."""
     configured = {name: bits(value) for name, value in settings.items()}
     of = load(
         sealed(), root=ROOT, vehicle=VEHICLE, now=START, mode=EnforcementMode.SOFTWARE, session_key=SESSION_KEY,

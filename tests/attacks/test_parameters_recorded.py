@@ -25,7 +25,7 @@ from virtual.shipped import shipped, simulated
 
 @cache
 def flown(*, attested: bool = True) -> tuple[tuple[bytes, ...], Entries]:
-    """A flight for which a parameter was set, and put back; `attested`, by a boundary that signs."""
+    """A flight with a parameter that was set and restored; `attested`: its boundary signs."""
     bits = bits_of(80.0)
     assert bits is not None
     config = simulated("ardupilot", parameters=(("FENCE_ALT_MAX", 15.0),))
@@ -46,7 +46,7 @@ def found(lines: Sequence[bytes], entries: Sequence[tuple[int, bytes]]) -> str |
 
 
 def writes() -> list[tuple[int, bytes]]:
-    """When, and with what, parameters were set that are no switch of the fence."""
+    """The times and values of parameter writes, except for switches of the fence."""
     return [(at, octets) for at, octets in flown()[1] if octets[7] == 23 and b"FENCE_ALT_MAX" in octets]
 
 
@@ -60,7 +60,7 @@ def beside(octets: bytes, at_us: int) -> str | None:
 
 
 def moment(event: str, number: int = 0) -> int:
-    """When the record of an effect was made."""
+    """The time of an effect's record."""
     times = [int(each["utc_us"]) for each in map(read, flown()[0]) if each.get("event") == event]
     return times[number]
 
@@ -113,7 +113,7 @@ def test_a_log_that_lost_the_record_of_its_writes() -> None:
 
 
 def changed(number: int, detail: str) -> str | None:
-    """What is found where a record of a preparation says something else."""
+    """The finding for a preparation record with changed fields."""
     lines = list(flown()[0])
     listed = [at for at, line in enumerate(lines) if read(line).get("event") == "preparation"]
     lines[listed[number]] = edit(lines[listed[number]], detail=detail)

@@ -62,7 +62,7 @@ def sign(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
 
 
 def near_the_entry(one: Invocation, _: Policy) -> Invocation:
-    """It stays at one corner, for as long as the step lasts: in the zone, and nothing is inspected."""
+    """A path that stays at one corner of the zone for the whole step, without an inspection."""
     return replace(one, plan=replace(one.plan, path=one.plan.path[:2] * 40))
 
 
@@ -109,7 +109,7 @@ def unknown_skill(one: Invocation, policy: Policy) -> Invocation:
 
 
 def test_unloadable_bundle_is_not_approved(sign: Sign, capsys: pytest.CaptureFixture[str]) -> None:
-    """Whoever signs what makes no sense gets no traceback out of it, and no yes."""
+    """A signed malformed bundle causes neither a traceback nor an approval."""
     for change in (unknown_skill, lambda one, _: replace(one, plan=replace(one.plan, altitude=50_000))):
         sign(change)
         for words in ((), ("--refuse",)):

@@ -90,7 +90,7 @@ def test_something_after_the_end_of_the_log() -> None:
 
 
 def test_a_captured_epoch_key_makes_an_earlier_epoch_anew() -> None:
-    """Whoever takes the vehicle over has the last epoch's key; the checkpoint of the first was signed by another."""
+    """A captured vehicle has the last epoch's key; the first checkpoint was signed by another key."""
     captured = SigningKey.from_seed((3).to_bytes(32), duty=Duty.LOG)  # the third that the recorder drew
     parts = inclusion(3)
     text = parts.note.rpartition("\n\n")[0] + "\n"
@@ -101,7 +101,7 @@ def test_a_captured_epoch_key_makes_an_earlier_epoch_anew() -> None:
 
 
 def test_a_log_of_the_forgers_own_under_the_root_of_others() -> None:
-    """All of it is sound but for the key: the trust root names another for duty `log`."""
+    """Everything is valid except the key: the trust root names another one for duty `log`."""
     recorder = Recorder(lambda text: THIEF.sign(text, duty=Duty.LOG), THIEF.public, lambda: bytes(32))
     genesis = recorder.genesis(
         now(0), bundle=b"", root=case.root()[1], boot=bytes(16), vehicle="quad-07", mission="m", mode="software"

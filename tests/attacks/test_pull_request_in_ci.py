@@ -22,13 +22,13 @@ FILES = [
     ROOT / "examples/starter/.pre-commit-config.yaml",
     ROOT / "docs/ci.md",
 ]
-#: modules that a Python imports soon: by their names, where the working folder comes first
+#: modules that Python imports early, which the working folder could shadow
 TAKEN = ("json", "pip", "pathlib", "os", "sitecustomize", "usercustomize", "rtshcua", "typer", "encodings")
 
 
 @pytest.fixture
 def hostile(tmp_path: Path) -> Path:
-    """A repository of a sound project, with modules in it that say when they run."""
+    """A repository of a valid project, with modules that leave a mark when they run."""
     place = tmp_path / "repository"
     for name, data in project("riverside").items():
         (place / name).parent.mkdir(parents=True, exist_ok=True)

@@ -51,7 +51,7 @@ def entitled(**fields: object) -> Loaded:
 
 @pytest.mark.parametrize("skill", ["takeoff", "goto"])
 def test_in_the_air_the_contingency_flies(skill: str) -> None:
-    """Its first link is a hold, the second the way home; the step's own chain is not asked."""
+    """Its first link is a hold, the second the return; the step's own chain is not used."""
     run = Run(fresh()).until_flies(skill)
     run.tick()
     if skill == "takeoff":
@@ -104,7 +104,7 @@ def test_document_waits_while_link_is_lost() -> None:
 
 
 def test_no_step_is_decided_or_sent_afterwards() -> None:
-    """Also for a runtime that was taken over and acts as if it had not come."""
+    """This includes a compromised runtime that ignores the recall."""
     of = fresh()
     permit = allowed(of)
     assert presented(of, recall(of)).accepted
@@ -173,7 +173,7 @@ YEAR = 365 * 24 * 60 * MIN
 
 
 def issued(mission_us: int, steps_us: int) -> Mission:
-    """The mission, that says it was issued then, and of its steps that they were."""
+    """The mission and its steps with this time of issue."""
     steps = tuple(replace(each, issued_at_us=steps_us) for each in MISSION.invocations)
     return replace(MISSION, issued_at_us=mission_us, invocations=steps)
 
@@ -208,7 +208,7 @@ def test_recall_of_earlier_flight_is_refused() -> None:
 
 
 def test_postdated_mission_is_recalled() -> None:
-    """An agent chooses what its mission says of itself: one of today, by its steps, that says it is of next year."""
+    """An agent chooses the fields of its mission: the steps are of today, the claimed issue is next year."""
     of = loaded(mission=issued(ISSUED + YEAR, ISSUED))
     under_policy = recall(OF, flight=b"", mission=b"", policy=POLICY_DIGEST)
     allowed(of)

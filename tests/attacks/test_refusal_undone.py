@@ -97,7 +97,7 @@ def test_refusal_follows_a_moved_step(kept: int) -> None:
 
 @pytest.mark.parametrize("kept", [0, ASKED, ASKED + 1])
 def test_replacement_does_not_evade_refusal(kept: int) -> None:
-    """A person said yes, and now no. Meanwhile the mission is replaced by itself: the yes would outlive it."""
+    """A person approved, then refused. A replacement by the same mission must not restore the approval."""
     of = flown_to_the_inspection() if kept else renewed(OF)
     grant, refusal = approval(of), approval(of, granted=0)
     assert presented(of, grant).accepted
@@ -139,7 +139,7 @@ def test_later_step_stays_refused() -> None:
 
 
 def test_refusal_does_not_apply_to_different_step() -> None:
-    """What was refused is a skill with its arguments: at another height it is asked about anew."""
+    """A refusal applies to a skill with its arguments: at another height a new approval is requested."""
     of = flown_to_the_inspection()
     assert presented(of, approval(of, granted=0)).accepted
     first, second, third, last = of.bundle.mission.invocations
@@ -183,7 +183,7 @@ def test_an_id_that_was_seen_before_is_refused() -> None:
 
 
 def test_the_audit_finds_a_refusal_undone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A boundary that forgot the refusal decided and recorded the step as if nobody had said no."""
+    """A faulty boundary decided and recorded the step without the refusal."""
     run = Run(renewed(OF)).until_flies("goto")
     assert hand(run, approval(run.loaded, granted=0, now=run.clock.now())) == "accepted"
     assert hand(run, same_again(run.loaded)) == "accepted"
@@ -202,7 +202,7 @@ def test_the_audit_finds_a_refusal_undone(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_the_audit_computes_ids_again() -> None:
-    """A boundary that took a bundle, and one that took a replacement, with ids of somebody's own making."""
+    """Faulty boundaries accepted a bundle and a replacement with chosen ids."""
     run = Run(renewed(OF)).until_flies("goto")
     assert hand(run, same_again(run.loaded)) == "accepted"
     run.until_over()

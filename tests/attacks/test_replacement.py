@@ -52,7 +52,7 @@ def fresh() -> Loaded:
 def forged(
     of: Loaded, mission: Mission, kept: int = 2, supersedes: bytes | None = None, *, bound: bool = True
 ) -> bytes:
-    """A document that an honest compiler would not make, rightly signed."""
+    """A correctly signed document that an honest compiler would not make."""
     over = of.bundle.mission_digest if supersedes is None else supersedes
     whole = bind(mission, of.bundle.policy_digest, after=cbor.encode([FLIGHT, over, kept])) if bound else mission
     return sign_document(names.REPLACEMENT, ReplacementDocument(FLIGHT, over, kept, whole), MISSION_KEY, Duty.MISSION)
@@ -317,7 +317,7 @@ def test_replacements_of_one_flight_are_limited() -> None:
 
 
 def test_replacement_verified_ahead_is_accepted_alike() -> None:
-    """Nothing but time comes of it, whoever had it considered, and when."""
+    """Early verification only changes the time needed."""
     of = fresh()
     document, other = replacement(of), replacement(of, 1)
     of.boundary.consider(document, START)

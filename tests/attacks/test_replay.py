@@ -33,7 +33,7 @@ def test_deferred_step_is_not_a_replay() -> None:
 
 
 def test_unauthenticated_request_uses_no_id() -> None:
-    """Else a forger could have the honest request refused."""
+    """Otherwise a forger could cause the refusal of the honest request."""
     of = loaded()
     forged = answer_to(of, request_for(of, binding=bytes(32)))
     assert isinstance(forged, Decision)

@@ -13,7 +13,7 @@ OF = low()
 
 
 def back() -> Run:
-    """A new run of a bundle that flies already; nothing was heard yet."""
+    """A new run of a flying bundle, before the first report."""
     return Run(renewed(OF), FakeVehicle(armed=True, airborne=True), resumed=True, ready=False)
 
 
@@ -47,7 +47,7 @@ def test_vehicle_that_is_never_ready_is_brought_down(known: bool) -> None:
 
 
 def test_unresponsive_vehicle_gets_no_command() -> None:
-    """What brings it home is chosen when it arrives; chosen before, on what was known then, it lands it on the spot."""
+    """The fallback must be chosen when commands arrive; chosen earlier, on the old state, it would land on the spot."""
     run = back()
     run.tick(AirState(0, True, True), VehicleAnswers(0, answers=False))
     run.until(lambda run: run.clock.now().monotonic_us > START.monotonic_us + Limits().ready_us + 10 * S, 140)
@@ -71,7 +71,7 @@ def test_unresponsive_vehicle_is_given_up_after_endurance() -> None:
 
 
 def test_armed_vehicle_is_told_to_land() -> None:
-    """The program died between the takeoff and the lift-off: nothing else would keep it from going up unwatched."""
+    """The program died between takeoff command and lift-off: otherwise the vehicle would climb without supervision."""
     run = Run(renewed(OF), FakeVehicle(armed=True), resumed=True, ready=False)
     run.tick(AirState(0, True, False))
     assert (run.flown, run.ending) == ([], None)

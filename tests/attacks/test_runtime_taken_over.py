@@ -62,7 +62,7 @@ ENFORCE = [
     Vehicle("px4", (1, 17), sign_cfg=1.0), Vehicle("px4", (1, 17), sign_cfg=2.0),
     Vehicle("px4", (1, 17), usb=True, sign_cfg=2.0), Vehicle("px4", (1, 18)), Vehicle("px4", (1, 18), usb=True),
 ]  # fmt: skip
-#: and in which it does not
+#: and of vehicles that do not
 OBEY_ANYONE = [
     Vehicle("ardupilot", (4, 7), usb=True), Vehicle("px4", (1, 16)), Vehicle("px4", (1, 17), sign_cfg=0.0),
     Vehicle("px4", (1, 17), usb=True, sign_cfg=1.0),
@@ -78,7 +78,7 @@ def long(number: int, *parameters: float) -> Any:
 
 
 def hostile() -> list[Any]:
-    """What moves a vehicle, sets its parameters, or undoes its key."""
+    """Frames that move a vehicle, set its parameters, or remove its key."""
     place = (473_980_000, 85_460_000)
     sets = [
         m.MAVLink_param_set_message(1, 1, name, value, kind)
@@ -102,7 +102,7 @@ def hostile() -> list[Any]:
 
 
 class TakenOver:
-    """The runtime, a vehicle that it reaches by itself, and the boundary that it is to ask."""
+    """The runtime, a vehicle that it reaches directly, and the boundary."""
 
     def __init__(self, vehicle: Vehicle, folder: Path) -> None:
         key = folder / "link.key"
@@ -168,7 +168,7 @@ class TakenOver:
         return frame
 
     def attack(self, messages: list[Any]) -> list[bytes]:
-        """Whatever the runtime can make of these: its frames, and others that it was given a signature for."""
+        """Send all that the runtime can make of these: its own frames, and frames that the boundary signed."""
         forger = SignedLink(b"x" * 32, SigningState(0, {}), self.utc_us + 90 * S, 0)
         passed = []
         for message in messages:
@@ -189,7 +189,7 @@ class TakenOver:
         return passed
 
     def state(self) -> object:
-        """What an attack would have changed."""
+        """The state that a successful attack would change."""
         a, truth = self.simulation._autopilot, self.simulation.truth()
         return truth.armed, a.vehicle.mode, dict(a.parameters._values), a.signing.on, len(a.mission.items)
 

@@ -98,7 +98,7 @@ def version() -> int:
 
 
 def refused(capsys: pytest.CaptureFixture[str], *words: str) -> str:
-    """The slug of what a command refuses."""
+    """The slug of a command's refusal."""
     capsys.readouterr()
     assert main([*words, "--json"]) == ExitCode.UNTRUSTED
     said = json.loads(capsys.readouterr().out)
@@ -309,7 +309,7 @@ class Late(SystemClock):
 
 
 def expiring(fleet: KeyStore, duty: Duty) -> None:
-    """The next root, by which each key of a duty expires within the year; of the root's, the root itself does."""
+    """The next root, in which each key of a duty expires within the year; for duty `root`, the root itself."""
     root, soon = opened_root(fleet.root()), SystemClock().now().utc_us + 86_400_000_000
     keys = tuple(replace(key, expires_us=soon) if key.duty is duty is not Duty.ROOT else key for key in root.keys)
     until = root.expires_at_us if duty is Duty.ROOT else 1 << 60
@@ -345,7 +345,7 @@ def test_vehicle_in_flight_lands_after_expiry(fleet: KeyStore, duty: Duty, accep
 
 
 def test_wait_brings_down_only_its_own_flight(fleet: KeyStore, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A run died, the vehicle came home otherwise, and later somebody flies it in a mode that is ours too."""
+    """A run died, the vehicle returned otherwise, and later a pilot flies it in a mode that we use too."""
     monkeypatch.setattr(waiting, "BUNDLE", "old.bundle")
     base = launched(order())
     past: Any = SimpleNamespace(broken_off=Path.cwd())
@@ -367,7 +367,7 @@ def test_wait_brings_down_only_its_own_flight(fleet: KeyStore, monkeypatch: pyte
 
 
 def replace_mission(base: Loaded) -> Loaded:
-    """Another mission is waited with."""
+    """Wait with another mission."""
     flight = SimpleNamespace(flight=base.in_force.flight)
     bundle = SimpleNamespace(policy_digest=base.bundle.policy_digest, mission_digest=b"")
     return cast("Loaded", SimpleNamespace(bundle=bundle, in_force=flight))

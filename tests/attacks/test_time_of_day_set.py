@@ -17,7 +17,7 @@ OF, LOW = loaded(), low()
 
 
 def after(us: int, *, said: int | None = None) -> Now:
-    """The moment so long after the start, or another time of day that is said to be then."""
+    """The moment so long after the start, optionally with a false time of day."""
     return Now(START.monotonic_us + us, START.utc_us + (us if said is None else said), START.utc_error_us)
 
 
@@ -26,7 +26,7 @@ def asked(of: Loaded, now: Now) -> Decision | Status:
 
 
 def met(of: Loaded = OF) -> Loaded:
-    """A session that was asked once, for a step out of turn."""
+    """A session after one request for a step out of turn."""
     of = renewed(of)
     assert answer_to(of, request_for(of, step=2)) is Status.NOT_CURRENT
     return of

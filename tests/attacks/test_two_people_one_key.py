@@ -38,7 +38,7 @@ def trust() -> TrustRoot:
 
 
 def asking(second: int) -> Policy:
-    """The policy whose `confirm` asks a supervisor and another person of a role."""
+    """The policy whose `confirm` requires a supervisor and another person of a role."""
     rules = list(POLICY.rules)
     rules[CONFIRM_RULE] = replace(rules[CONFIRM_RULE], second=second)
     return replace(POLICY, rules=tuple(rules))

@@ -69,5 +69,5 @@ def test_mission_signed_by_agent_flies(hand_in: Callable[[str], str]) -> None:
 
 
 def test_waiting_mission_does_not_fly(hand_in: Callable[[str], str]) -> None:
-    """A person may have signed it, for what no agent may ask."""
+    """A person may have signed it, with rights that no agent has."""
     assert hand_in("base.bundle") == "waited-with"

@@ -45,7 +45,7 @@ Lines = tuple[bytes, ...]
 
 
 def withdrawn(thief: Thief, permit: bytes) -> str:
-    """What the boundary says to a runtime that says that nothing was sent by a permit."""
+    """The boundary's answer to a claim that nothing was sent under a permit."""
     answer = thief.of._answer(bytes([WITHDRAW]) + struct.pack(">q", thief.of.flight.clock.monotonic_us) + permit)
     return answer[1:].decode() if answer[0] else "unsent"
 
@@ -72,7 +72,7 @@ def test_step_with_frames_signed_ahead_is_not_withdrawn(apart: Callable[..., Apa
 def test_late_takeoff_flies_with_frames_signed_ahead(
     boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch, at_its_frame: bool
 ) -> None:
-    """Late when it was to be sent, or when its first frame was: nothing was signed ahead by then."""
+    """The command or its first frame was late, before any frames were signed ahead."""
 
     def make() -> Flight:
         return Apart(boundary, monkeypatch, bundle(), config("px4", KEY), KEY).flight
@@ -207,7 +207,7 @@ def test_sent_frame_contradicts_log_without_dispatch(attested: bool) -> None:
 
 
 def test_frame_at_end_of_step_is_detected() -> None:
-    """It was allowed until then; the record which says that nothing was sent comes later."""
+    """The frame was allowed at that time; the record that nothing was sent follows it."""
     lines, entries = tried_twice(False)
     (failed,), again = where(lines, "failed"), read(lines[where(lines, "dispatched")[1]])["utc_us"]
     sent = next(octets for at_us, octets in entries if at_us >= again and is_motion(octets))

@@ -50,7 +50,7 @@ def records(log: Log, anchors: list[str], threshold: int = 2) -> int:
 
 @pytest.fixture
 def futures() -> tuple[Log, Log]:
-    """Two logs that are one up to record 4, and then are not."""
+    """Two logs that are equal up to record 4."""
     flown = Log()
     flown.effects(3)
     flown.seal()
@@ -103,7 +103,7 @@ def test_retracted_history_is_refused(futures: tuple[Log, Log]) -> None:
 
 
 def test_split_view_of_one_witness_is_detected(futures: tuple[Log, Log]) -> None:
-    """It cosigns both futures, and a later end of the forged one. With the honest one's anchor all of it comes out."""
+    """It cosigns both futures, and a later end of the forged one. The honest witness's anchor reveals it."""
     flown, told = futures
     honest, liar = Judge(), Judge(WITNESSES[1])
     marks = [anchored(flown, honest), liar.blindly(flown.notes[-1])]
@@ -141,7 +141,7 @@ def test_a_cosignature_moved_to_another_checkpoint(futures: tuple[Log, Log]) -> 
 
 
 def test_a_cosignature_by_a_key_of_the_vehicle(futures: tuple[Log, Log]) -> None:
-    """The log key and the epochs' keys are nobody's witness."""
+    """The log key and the epoch keys are not witness keys."""
     flown, _ = futures
     name = f"rtshcua/witness/{WITNESSES[0].kid.hex()}"
     own = flown.notes[-1].rpartition("— ")[2].split(" ")[1]
@@ -149,7 +149,7 @@ def test_a_cosignature_by_a_key_of_the_vehicle(futures: tuple[Log, Log]) -> None
 
 
 def test_witness_with_reset_state(futures: tuple[Log, Log]) -> None:
-    """Who deletes its memory gets a second cosignature; the first is still out there."""
+    """An attacker who deletes its state gets a second cosignature, but the first one still exists."""
     flown, told = futures
     witness = Judge()
     first = anchored(flown, witness)

@@ -42,7 +42,7 @@ def harmless(text: str) -> bool:
     return all(line.isprintable() for line in text.replace("\t", " ").split("\n")) and not {*text} & {*"\ufe0f\u3164"}
 
 
-#: what a file may be called on this system
+#: file names that this system allows
 NAME = ESCAPES.replace("/", "")
 
 
@@ -94,7 +94,7 @@ def test_approval_prompt_comes_before_signature(
 
 
 def test_mission_name_cannot_imitate_signed_content(low: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Whoever has a mission key signs what no compiler would: a name that reads as the step, and pushes ours away."""
+    """A holder of a mission key signs a mission whose name imitates the step and displaces our text."""
     store = KeyStore(data_folder())
     trusted, data = opened_root(store.root()), (low / "low.bundle").read_bytes()
     bundle = open_bundle(data, root=trusted, vehicle=None, now_us=0)
@@ -137,7 +137,7 @@ def test_error_is_one_escaped_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert "\nerror: none" not in err
 
 
-#: commands over files that somebody else named, and how they end: what prints a name at success is here too
+#: commands on files with foreign names, and their exit codes, successful ones included
 OVER_NAMES = [
     (("check", "{source}"), ExitCode.OK), (("check", "{source}", "--json"), ExitCode.OK),
     (("compile", "{source}", "-o", "{made}"), ExitCode.OK),
@@ -168,7 +168,7 @@ OVER_NAMES = [
 
 
 def test_foreign_names_are_escaped_everywhere(low: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Over every command that takes a file: what it says at success, as JSON, as a report, and when it fails."""
+    """For every command that takes a file: its text output, JSON, reports and errors."""
     names = {"source": f"{NAME}.rts", "bundle": f"{NAME}.bundle", "untidy": f"{NAME} u.rts", "folder": f"{NAME}-site"}
     (low / names["source"]).write_text(LOW.replace("/* only hover(5 s), near home */ ", ""))
     (low / names["untidy"]).write_text(LOW.replace("  intent", " intent"))
@@ -208,7 +208,7 @@ def test_annotation_is_one_escaped_line() -> None:
 
 @pytest.mark.parametrize("character", [*"\x1b\x9b\u202e\u2066\u200b\u00ad\ufe0f\u2028\u3164\x08\r\ufeff", "\U000e0041"])
 def test_misleading_source_text_is_refused(character: str) -> None:
-    """Also in a comment and in a text, where the grammar takes everything."""
+    """Also in comments and strings, where the grammar accepts any character."""
     for source in (LOW.replace("only", character), LOW.replace("Low", character), f"x{character}"):
         found = parse(Source("low.rts", source)).diagnostics
         assert [each.code for each in found] == [codes.HIDDEN_CHARACTER]

@@ -20,7 +20,7 @@ ARTEFACTS = {
     Duty.MISSION: names.MISSION,
     Duty.APPROVAL: names.APPROVAL,
     Duty.LOG: names.LOG,
-    Duty.WITNESS: names.RECEIPT,  # in earnest it signs no envelope
+    Duty.WITNESS: names.RECEIPT,  # in production it signs no envelope
     Duty.BOUNDARY: names.STATEMENT,
 }
 KEYS = {

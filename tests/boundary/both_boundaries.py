@@ -39,12 +39,12 @@ from rtshcua.wire.trust import TrustRoot
 from rtshcua.wire.untrusted import Untrusted
 from virtual import case
 
-#: what the boundary in C signs its own evidence with
+#: the key with which the boundary in C signs its own evidence
 OWN_KEY = case.BOUNDARY_KEY.private.private_bytes_raw()
-#: and logs
+#: the key for logs
 LOG_KEY = case.KEYS[Duty.LOG].private.private_bytes_raw()
 
-#: frames that links are flown by, on either autopilot
+#: frames that fly links, on either autopilot
 LINKS = [
     Codec(1, OURS).pack(message)
     for message in (
@@ -215,7 +215,7 @@ class BothExecutors:
     def __init__(self, here: Any, there: IsolatedExecutor, counts: dict[str, int]) -> None:
         self._here, self._there, self._counts = here, there, counts
         self.frames: Any = BothGates(here.frames, there.frames, counts)
-        self._sealed = bytes(SIZE)  # the last permit that came, and when
+        self._sealed = bytes(SIZE)  # the last received permit, and its time
         self._now_us = 0
 
     def _both(self, what: str, one: Command | Refusal, other: Command | Refusal) -> Command | Refusal:
@@ -225,7 +225,7 @@ class BothExecutors:
         return one
 
     def _look_ahead(self) -> None:
-        """Both sign the same frames ahead for each link, by the last permit."""
+        """Check that both sign the same frames ahead for each link, under the last permit."""
         for kind, link in product((STEP, FALLBACK_LINK, CONTINGENCY_LINK), range(-1, 4)):
             for frames in ((), LINKS[:2], *([frame] for frame in (*LINKS, *self.frames.lately))):
                 one = self._here.ahead(self._sealed, kind, link, frames, self._now_us)
@@ -269,7 +269,7 @@ class Shadow:
 
     def __init__(self, boundary: ctypes.CDLL) -> None:
         self._library = boundary
-        self.roots: dict[TrustRoot, tuple[bytes, bytes]] = {}  # signed, and the key that it is pinned by
+        self.roots: dict[TrustRoot, tuple[bytes, bytes]] = {}  # the signed root, and its pinned key
         self.counts = dict.fromkeys(
             (
                 "requests",

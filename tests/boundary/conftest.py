@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 @pytest.fixture(scope="session")
 def boundary() -> ctypes.CDLL:
-    """The library: what is in `boundary/` now, or the one that RTSHCUA_BOUNDARY names (a sanitized one, say)."""
+    """The library of the present `boundary/`, or the one named by RTSHCUA_BOUNDARY (such as a sanitized one)."""
     named = os.environ.get("RTSHCUA_BOUNDARY")
     if named is not None:
         return ctypes.CDLL(named)

@@ -1,4 +1,4 @@
-"""Reads the file in which a boundary's process keeps what must outlive it (boundary/enforcement/kept.h)."""
+"""Reads the file with the persistent state of a boundary's process (boundary/enforcement/kept.h)."""
 
 from hashlib import sha256
 from pathlib import Path
@@ -10,7 +10,7 @@ from rtshcua.mavlink.signing import SigningState as LinkState
 from rtshcua.model.flat import home_limits
 
 LAYOUT = 0x7274736863756103
-#: layout, turn, restarts, floor, and how many missions, policies and streams there are
+#: layout, turn, restarts, floor, and the numbers of missions, policies and streams
 HEAD, OPENED, VERSION, STREAM = Struct("<QQQqQQQ"), Struct("<32sq"), Struct("<32sq"), Struct("<BBB5xq")
 _SESSION, _TIMESTAMP, _CHECK = Struct("<32sq"), Struct("<q"), 32
 
@@ -19,7 +19,7 @@ class Sizes:
     """Where everything is in one slot, by how many missions and policies are remembered."""
 
     def __init__(self, opened: int, policies: int) -> None:
-        self.session = HEAD.size + (opened + 1) * OPENED.size  # behind whose it is, and since when
+        self.session = HEAD.size + (opened + 1) * OPENED.size  # after the owner and the time of creation
         self.versions = self.session + _SESSION.size
         self.link = self.versions + policies * VERSION.size
         self.streams = self.link + _TIMESTAMP.size

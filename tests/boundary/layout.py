@@ -1,7 +1,7 @@
 """The structs of boundary/model/flat.h as ctypes, read from the header itself, and their comparison with Python's.
 
 A struct of the flat form has the same field names in both. In C a tuple is a table with a count beside it, or a list: a
-view into the bytes; what may be None has a flag `has_...`.
+view into the bytes; an optional field has a flag `has_...`.
 """
 
 import ctypes
@@ -47,7 +47,7 @@ def structs() -> dict[str, Any]:
 
 
 def differences(here: Any, there: Any, path: str = "") -> list[str]:
-    """The fields in which a Python value and what C read of it differ."""
+    """The fields that differ between a Python value and its reading in C."""
     if isinstance(there, Bytes):
         expected = here.encode() if isinstance(here, str) else here
         return [] if there.octets() == expected else [path]

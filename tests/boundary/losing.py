@@ -28,7 +28,7 @@ S, M = case.S, case.M
 
 
 def to_and_fro(legs: int) -> tuple[Invocation, ...]:
-    """Up, so many legs of 40 m or so, and home."""
+    """A mission that climbs, flies a number of legs of about 40 m, and returns home."""
     up, _, back = case.short_steps()
     places = ((40 * M, 20 * M), (0, 0))
     steps = [up]
@@ -40,7 +40,7 @@ def to_and_fro(legs: int) -> tuple[Invocation, ...]:
 
 
 class Apart:
-    """A flight by a boundary elsewhere, which answers until it is `dead`; `key` is the link's."""
+    """A flight with a separate boundary, which answers until it is `dead`; `key` is the link's."""
 
     def __init__(
         self, boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch, bundle: bytes, config: SimulationConfig,

@@ -85,7 +85,7 @@ def other(value: Any, random: Random) -> Any:
 
 
 def in_range(value: Any) -> Any:
-    """With integers of 64 bits, as CBOR has them here."""
+    """The value with its integers limited to 64 bits, as in our CBOR."""
     match value:
         case bool():
             return value

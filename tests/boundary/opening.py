@@ -56,7 +56,7 @@ class Boundary:
 
 
 def agree_on_root(c: Boundary, data: bytes, pinned: bytes | None, now_us: int = NOW) -> TrustRoot | str:
-    """The root, or the slug of why it is refused, provided that both say the same."""
+    """Check that both agree on a root; return the root, or the slug of its refusal."""
     found: TrustRoot | str
     try:
         found = open_root(data, pinned=pinned, now_us=now_us)
@@ -70,7 +70,7 @@ def agree_on_root(c: Boundary, data: bytes, pinned: bytes | None, now_us: int = 
 def agree_on_bundle(
     c: Boundary, data: bytes, trust: TrustRoot, vehicle: str = VEHICLE, now_us: int = NOW
 ) -> str | None:
-    """The slug of why a bundle is refused under the root that C holds, provided that both say the same."""
+    """Check that both agree on a bundle under the root of C; return the slug of its refusal."""
     found: str | tuple[bytes, bytes, bytes]
     try:
         opened = bundle.open_bundle(data, root=trust, vehicle=vehicle, now_us=now_us)
@@ -82,7 +82,7 @@ def agree_on_bundle(
 
 
 def signed_with(payload: bytes, key: SigningKey, kind: Artefact, random: Random) -> bytes:
-    """An envelope that the key signed, of which some part may be wrong."""
+    """An envelope signed by the key, in which some part may be wrong."""
     header: Any = {1: cose.ED25519, 3: kind.content_type, 4: key.kid}
     parts: list[Any] = [cbor.encode(header), {}, payload]
     duty = key.duty

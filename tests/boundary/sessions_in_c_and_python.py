@@ -1,9 +1,9 @@
-"""The boundary's process and the one in Python, which are asked the same in sequences that chance draws: several starts
-of the process on one vehicle, with what it keeps of it, and several bundles to a start.
+"""The boundary's process and the one in Python get the same random requests, in several starts of the process for one
+vehicle with its stored state, and several bundles per start.
 
-The process draws the key of its permits, which nobody reads: a permit of one is compared with that of the other but for
-its MAC, and each is shown the one that it sealed. Python's end of a link with a key is begun at the time of the
-process's, as the first frames that it signs tell: all that they sign and keep is the same then.
+The process draws a secret key for its permits, so permits of both are compared without their MACs, and each gets the
+permit that it sealed. Python's end of a link with a key starts at the time of the process's, taken from its first
+signed frames, so that both sign and store the same.
 """
 
 import json
@@ -78,23 +78,23 @@ from rtshcua.wire.response import Status
 from virtual import case
 
 MAC, EVIDENCE = 32, 32
-#: how often the process of one vehicle is started, and what it is asked before it ends
+#: the number of starts of one vehicle's process, and of requests before it ends
 STARTS, CALLS = (1, 1, 2, 3, 4), (30, 80, 150, 150)
-#: what brings a vehicle home or down, or halts it, by autopilot
+#: commands that return, land or stop a vehicle, by autopilot
 LINK_FRAMES = {
     12: [*(messages.set_mode(SYSTEM, mode) for mode in (Px4Mode.RETURN, Px4Mode.LAND)), messages.stop_here(SYSTEM)],
     3: [messages.set_mode(SYSTEM, mode) for mode in (CopterMode.RTL, CopterMode.LAND, CopterMode.BRAKE)],
 }
 GREETING = pack(m.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
 LOGS = case.KEYS[Duty.LOG]
-#: how many of the links that are signed ahead are signed until no more are
+#: how many links are signed ahead repeatedly, up to the limit
 FLOODS = 1 / 2_000
 PIN = ROOT_KEY.verification().public
 SIGNED_ROOT = ROOT.sign(ROOT_KEY)
 
 
 def without_mac(answer: bytes, said: Decision | Status | Refusal) -> bytes:
-    """An answer of `enforce`, but for the MAC of a permit in it."""
+    """An answer of `enforce`, without the MAC of its permit."""
     if not isinstance(said, Decision) or not said.permit:
         return answer
     return answer[: -MAC - EVIDENCE] + answer[-EVIDENCE:]
@@ -129,7 +129,7 @@ class Together:
         return replace(START, monotonic_us=self.us, utc_us=self._utc_us + self.us - self._began_us)
 
     def run(self) -> None:
-        """Some starts of the process, each with some calls, and the same kept of all of them. Raises `Differs`."""
+        """Start the process several times, each with some calls, on the same stored state. Raises `Differs`."""
         for _ in range(self.random.choice(STARTS)):
             self._begin()
             try:
@@ -209,7 +209,7 @@ class Together:
         return link
 
     def _end(self) -> None:
-        """Let it end, or kill it: what it kept is what was kept here."""
+        """Let the process end, or kill it; its stored state must equal ours."""
         random = self.random
         killed = random.random() < 0.3
         if killed:
@@ -231,7 +231,7 @@ class Together:
             same("the link that was not used", self._kept_link, found.link)
         elif not killed:
             same("the link", self._link.state, found.link)
-        self._kept_link = found.link  # of one that was killed, what it had kept last and the reserve
+        self._kept_link = found.link  # after a kill: the last stored state and the reserve
         if random.random() < 0.1:
             self._spoil()
         self._utc_us = self.now.utc_us + random.choice((0, 0, 60 * S, 20 * MIN, 40 * MIN, 180 * MIN, -20 * MIN))
@@ -249,14 +249,14 @@ class Together:
     # ------------------------------------------------------------ bundles, evidence
 
     def ask_nothing_in_force(self) -> None:
-        """Nothing is in force: it says so."""
+        """Check the answers without a bundle in force."""
         if self.random.random() < 0.3:
             kind = self.random.choice((ENFORCE, DISPATCH, STAND_IN, ENDED, PERMIT, PREPARE, PREPARED, LOG, AHEAD))
             answer = self.caller(kind, self.random.randbytes(self.random.randrange(99)))
             same(f"call {kind}", "not-loaded", slug_of(answer))
 
     def load(self) -> None:
-        """Hand a bundle to both, in place of the one before, which then is in force no more."""
+        """Load a bundle into both, in place of the previous one."""
         bundle, now = self._some_bundle(), self.now
         if self.here is not None and self.here.executor._flight is not None:
             same("load", "flies", slug_of(self.caller.load(bundle, now)))
@@ -293,7 +293,7 @@ class Together:
         self.counts["bundles opened again" if self._reopened else "bundles"] += 1
 
     def _some_bundle(self) -> bytes:
-        """Mostly a new one of the mission, now and then an old one, of an older policy, or damaged."""
+        """Mostly a new bundle of the mission, sometimes an old one, one of an older policy, or a damaged one."""
         random = self.random
         if self._bundles and random.random() < 0.3:
             return random.choice(self._bundles[-3:])
@@ -314,7 +314,7 @@ class Together:
         return damaged(bundle, random) if random.random() < 0.1 else bundle
 
     def _open(self, here: Loaded) -> str | None:
-        """Why a bundle is not opened, by what is kept. One that was opened before is only brought down."""
+        """The expected refusal of a bundle, by the stored state. An opened one may only be landed."""
         policy, self._digest = here.bundle.policy, here.bundle.mission_digest
         self._reopened = (self._replay.folder / self._digest.hex()).exists()
         if self._reopened:
@@ -324,7 +324,7 @@ class Together:
         return None if opening is MissionOpening.OPENED else str(opening)
 
     def _go_on(self, here: Loaded) -> None:
-        """What goes on from the bundle before: the numbers of permits, the link, and preparations; but no permit."""
+        """Continue from the previous bundle: the numbers of permits, the link, and preparations, but no permit."""
         if self._issuer is not None:
             here = replace(here, preparation=self._issuer)
         self.here, self._issuer = here, here.preparation
@@ -338,12 +338,12 @@ class Together:
             here.in_force.recalled = self.here.executor._commands.called_off = True
 
     def _give_back(self) -> None:
-        """What nothing was sent of may be opened again."""
+        """Release a bundle of which nothing was sent."""
         if self.here is not None and not self._reopened and not self.here.executor._used:
             self._replay.give_back(self._digest)
 
     def begin_session(self) -> None:
-        """Its own evidence begins, with the session after the one that it kept, or a later one that it is told of."""
+        """Begin a session of its own evidence, after the stored one or after a later given one."""
         if self._begun:
             return
         last, digest = self._session
@@ -373,7 +373,7 @@ class Together:
         self.counts["statements"] += one is not None
 
     def sign_log(self) -> None:
-        """The checkpoint that begins the flight's log is signed once, and no other text."""
+        """Check that only the first checkpoint of the flight's log is signed, and only once."""
         flight, wrong = self.here.in_force.flight, self.random.random() < 0.4
         text = begins(bytes(a ^ 1 for a in flight) if wrong else flight).encode()
         wanted: bytes | str = "not-its-log" if wrong else LOGS.sign(text, duty=Duty.LOG)
@@ -420,7 +420,7 @@ class Together:
         self.counts[f"requests {said.outcome.name if isinstance(said, Decision) else said}"] += 1
 
     def permit(self) -> tuple[bytes, bytes]:
-        """One that was granted, mostly the last; or one that neither sealed."""
+        """A granted permit, mostly the last; or one that neither sealed."""
         random = self.random
         if not self.permits or random.random() < 0.05:
             made = Permit(random.randrange(3), random.randrange(4), -1, random.randrange(99), 2, 3, self.us + S)
@@ -466,7 +466,7 @@ class Together:
         self.counts["refused permits" if isinstance(one, Refusal) else "dispatches"] += 1
 
     def tell(self) -> None:
-        """How it goes."""
+        """Report the progress of a command."""
         what = self.random.choice(("ended",) * 6 + ("landed", "release"))
         with_token = what == "ended" and self.random.random() < 0.5
         arguments = (self.random.choice((self.command.token, 1)),) if with_token else ()
@@ -487,7 +487,7 @@ class Together:
         self.counts["documents accepted" if one.accepted else "documents refused"] += 1
 
     def ahead(self) -> None:
-        """Have links signed ahead: all behind the step that was sent last, in their order, or any."""
+        """Request frames ahead: for all links of the last sent step in order, or for any."""
         random, executor = self.random, self.here.executor
         one, other = self.standing if self.standing and random.random() < 0.9 else self.permit()
         if len(other) != SIZE:
@@ -524,7 +524,7 @@ class Together:
         return isinstance(here, SignedAhead)
 
     def _flood(self, one: bytes, other: bytes, kind: int, link: int, frames: list[bytes]) -> None:
-        """More frames than are signed ahead of one moment."""
+        """Request more frames ahead than the limit at one moment."""
         for _ in range(MOST_AHEAD // MOST + 1):
             if not self._sign_ahead(one, other, kind, link, frames * MOST):
                 break
@@ -533,7 +533,7 @@ class Together:
     # ------------------------------------------------------------ preparations
 
     def stand(self) -> None:
-        """The vehicle says whether it stands on the ground, disarmed; mostly it does."""
+        """Report whether the vehicle is disarmed on the ground; mostly it is."""
         armed, landed = self.random.choice((0, 0, 0, 0, 128)), self.random.choice((1, 1, 1, 1, 2))
         self._hear(pack(m.MAVLink_heartbeat_message(2, self.autopilot, armed, 0, 4, 3), 1))
         self._hear(pack(m.MAVLink_extended_sys_state_message(0, landed), 1))
@@ -542,7 +542,7 @@ class Together:
         self.counts["stands"] += here
 
     def ask_to_set(self) -> None:
-        """Ask for the permit to set what was configured, or to put back what is owed, or for something like it."""
+        """Request a permit to set configured parameters or to restore them, or a similar one."""
         random = self.random
         restoring = random.random() < 0.4
         listed = [*((name, each.before) for name, each in self.here.preparation._owed.items())]
@@ -566,7 +566,7 @@ class Together:
         self.counts["refused settings" if isinstance(one, Refusal) else "settings"] += 1
 
     def prepare(self) -> None:
-        """Begin a preparation by a permit, or by what is none."""
+        """Begin a preparation with a permit, or with an invalid one."""
         random = self.random
         one = other = random.randbytes(random.randrange(140))
         if self.preparations and random.random() < 0.95:
@@ -588,7 +588,7 @@ class Together:
             each.executor.prepared()
 
     def set_parameter(self, name: str | None = None, bits: int | None = None) -> None:
-        """A frame that sets a parameter: as was permitted, as was configured, or otherwise."""
+        """Send a frame that sets a parameter: as permitted, as configured, or otherwise."""
         random = self.random
         if name is None or bits is None:
             name, bits = random.choice([*self.settings.items(), (random.choice([*SETTABLE]), drawn_bits(random))])
@@ -632,7 +632,7 @@ class Together:
 
 
 def listed(parameters: Mapping[str, Owed]) -> bytes:
-    """Parameters as a process is given them when it begins."""
+    """Parameters in the form of the process's start-up input."""
     writes = tuple(ParameterWrite(name, *each) for name, each in parameters.items())
     return encode_preparation(Preparation(0, False, 0, writes))
 
@@ -642,14 +642,14 @@ def slug_of(answer: bytes | Refusal) -> str | None:
 
 
 def some_other(random: Random, now: Now) -> Now:
-    """A time of day, or a moment, that does not go on from the one before."""
+    """A time of day, or a moment, that does not continue the previous one."""
     by_us = random.choice((-S, -60 * S, 4 * S, 1 << 40))
     part = random.choice(("monotonic_us", "utc_us", "utc_error_us"))
     return replace(now, **{part: max(getattr(now, part) + by_us, 0)})
 
 
 def told(random: Random, step: Invocation) -> State:
-    """A state that is well, or near some threshold, or in which something is not known."""
+    """A state that is nominal, near a threshold, or partly unknown."""
     values: dict[int, int | None] = {worlds.flat.HEIGHT: 0} if step.step == 0 else {}
     if step.step == 0:
         values |= {worlds.flat.POSITION_X: 0, worlds.flat.POSITION_Y: 0}
@@ -660,7 +660,7 @@ def told(random: Random, step: Invocation) -> State:
 
 
 def some_document(random: Random, of: Loaded, now: Now, documents: list[bytes]) -> bytes:
-    """Something that people or the agent sign, for this flight or nearly, or that was handed over before."""
+    """A document of people or the agent, for this flight or a similar one, or a replay."""
     chance, steps = random.random(), of.bundle.mission.invocations
     if documents and chance < 0.1:
         return random.choice(documents)
@@ -683,7 +683,7 @@ def some_document(random: Random, of: Loaded, now: Now, documents: list[bytes]) 
 
 
 def some_mission(random: Random, mission: Mission, kept: int) -> Mission:
-    """What may take a mission's place from a step on: mostly with ids that are new."""
+    """A mission that may replace another from a step on, mostly with new ids."""
     steps = list(mission.invocations[:kept])
     for _ in range(random.randrange(3)):
         new = {} if random.random() < 0.2 else {"invocation_id": random.randbytes(16)}
@@ -693,12 +693,12 @@ def some_mission(random: Random, mission: Mission, kept: int) -> Mission:
 
 
 def ask_both(first: int, requests: int, folder: Path, make: type[Together] = Together) -> Counter[str]:
-    """What both were asked, vehicle after vehicle, and answered alike: so many requests to decide, and all else.
+    """Compare the answers of both, vehicle after vehicle, until this number of decision requests.
 
-    What is drawn of a vehicle comes from its number alone, but for the times of a signed link.
+    The sequence of a vehicle depends on its number only, except for the times of a signed link.
     """
     counts, number = Counter[str](), first
-    with patch.object(boundary_process, "ANSWER_S", boundary_process.PATIENCE_S):  # nothing flies that waits
+    with patch.object(boundary_process, "ANSWER_S", boundary_process.PATIENCE_S):  # a waiting run does not fly
         while decided(counts) < requests:
             with TemporaryDirectory(dir=folder) as place:
                 both = make(Random(number), Path(place))
@@ -713,5 +713,5 @@ def ask_both(first: int, requests: int, folder: Path, make: type[Together] = Tog
 
 
 def decided(counts: Counter[str]) -> int:
-    """How many of them were requests to decide."""
+    """Return the number of decision requests."""
     return sum(many for what, many in counts.items() if what.startswith("requests"))

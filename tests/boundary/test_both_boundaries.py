@@ -1,4 +1,4 @@
-"""Whole flights under both boundaries at once: each request, document, permit and frame is answered the same."""
+"""Whole flights under both boundaries at once: the same answers to each request, document, permit and frame."""
 
 import ctypes
 from random import Random
@@ -24,7 +24,7 @@ FLAVOURS = ("px4", "ardupilot")
 
 
 def watched(boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch) -> Shadow:
-    """Flights have both boundaries from now on."""
+    """Use both boundaries for all later flights."""
     made = Shadow(boundary)
 
     def spied(data: bytes, *, pinned: bytes | None, now_us: int) -> TrustRoot:
@@ -39,7 +39,7 @@ def watched(boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch) -> Shadow:
 
 @pytest.fixture
 def shadow(boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch) -> Shadow:
-    """Flights of this test have both boundaries."""
+    """Use both boundaries for the flights of this test."""
     made = watched(boundary, monkeypatch)
     made.know(ROOT, ROOT.sign(ROOT_KEY), ROOT_KEY.verification().public)
 

@@ -30,7 +30,7 @@ def c(boundary: ctypes.CDLL) -> Boundary:
 
 
 def compare(c: Boundary, seed: int, count: int) -> Counter[str]:
-    """How many mutants of roots and bundles were accepted and refused by both, and why."""
+    """Count the mutants of roots and bundles that both accept or refuse, by reason."""
     random, found = Random(seed), Counter[str]()
     for number in range(count):
         pin = random.choice(
@@ -85,7 +85,7 @@ def test_roots_have_the_same_limits(c: Boundary) -> None:
 
 
 def test_item_and_header_limits_are_the_same(c: Boundary) -> None:
-    """Whatever is below is not looked at: the same items of a form that makes no sense are malformed in another way."""
+    """Below these limits another check applies: the same items in an invalid form are malformed for another reason."""
     trust = agree_on_root(c, SIGNED_ROOT, ROOT.public)
     assert isinstance(trust, TrustRoot)
     for count in (names.FEW - 4, names.FEW - 3, 8 << 20):

@@ -50,7 +50,7 @@ def some_frame(random: Random, number: int) -> bytes:
             )
         )
     )
-    if random.random() < 0.2 and frame[7] == m.MAVLINK_MSG_ID_TIMESYNC:  # as autopilots of today send it
+    if random.random() < 0.2 and frame[7] == m.MAVLINK_MSG_ID_TIMESYNC:  # as present autopilots send it
         frame = frame[:1] + b"\x12" + frame[2:10] + frame[10:-2].ljust(16, b"\0") + b"\x01\xbf" + frame[-2:]
     if random.random() < 0.1:
         at = random.randrange(len(frame))

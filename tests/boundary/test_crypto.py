@@ -96,7 +96,7 @@ def test_altered_signature_is_refused(boundary: ctypes.CDLL) -> None:
             altered[bit // 8] ^= 1 << bit % 8
             assert not agreed(boundary, key, bytes(altered), message)
         assert not agreed(boundary, key, signature, message + b"\0")
-        # the same s, L more: as good as it by the equation, as long as it fits
+        # s + L satisfies the same equation, if it fits
         s = int.from_bytes(signature[32:], "little")
         for more in range(1, 16):
             if s + more * L < 1 << 256:

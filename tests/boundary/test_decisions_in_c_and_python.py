@@ -115,7 +115,7 @@ def test_random_worlds_are_decided_alike(native: Native) -> None:
 
 @pytest.mark.soak
 def test_a_million_random_situations_are_decided_alike(native: Native) -> None:
-    """It resumes where it was stopped, and begins with other worlds at the end."""
+    """It resumes where it stopped, and continues with new worlds at the end."""
     PROGRESS.parent.mkdir(exist_ok=True)
     done = json.loads(PROGRESS.read_text()) if PROGRESS.exists() else {"seed": 1_000_000, "asked": 0}
     if done["asked"] >= SOAK:
@@ -127,7 +127,7 @@ def test_a_million_random_situations_are_decided_alike(native: Native) -> None:
         PROGRESS.write_text(json.dumps(done))
 
 
-# ------------------------------------------------------------------------------------------------ what is refused
+# ------------------------------------------------------------------------------------------------ refusals
 
 
 @rows(("policy", "what"), POLICIES, ids=[what for _, what in POLICIES])
@@ -151,7 +151,7 @@ def test_a_malformed_mission_is_refused(native: Native) -> None:
 
 
 def mutated(native: Native, plain: PreparedPolicy, of: Random) -> tuple[bool, bool]:
-    """Whether both accept a policy, and a mission under the plain one, of which a place or two are others."""
+    """Check that both agree on a mutated policy, and on a mutated mission under the plain policy."""
     payload = altered(bundle.policy_payload(rich_worlds.policy(of) if of.random() < 0.5 else flat.POLICY), of)
     try:
         policy = prepare(bundle.parse(names.POLICY, payload, Policy))
@@ -351,7 +351,7 @@ def test_texts_match_with_any_white_space(native: Native) -> None:
 
 @pytest.mark.slow
 def test_an_outline_of_as_many_corners_as_fit(native: Native) -> None:
-    """Its edges run through nearly all heights: the worst for the sweep, and for a place in it."""
+    """Its edges span nearly all heights: the worst case for the sweep and for containment."""
     ring = outlines.zig_zag(MAX_TOTAL_VERTICES // 2)
     zone = outlines.area([ring])
     payload = replace(

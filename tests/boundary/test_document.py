@@ -132,7 +132,7 @@ class Flight:
         return None
 
     def agree_on_answers(self, now: Now = START) -> int:
-        """How many answers decisions on the steps in force are told of, the same on both sides."""
+        """Check that both pass the same answers to decisions on the steps in force; return their number."""
         total = 0
         for step, invocation in enumerate(self.bundle.mission.invocations):
             out, expected = (ctypes.c_int64 * (5 * MAX_ANSWERS))(), self._approvals.about(invocation, now)
@@ -145,7 +145,7 @@ class Flight:
         return total
 
     def loaded(self) -> Loaded:
-        """What is in force, as what makes documents wants it."""
+        """The mission in force, in the form that the document makers need."""
         of = renewed(LOW)
         of.in_force.bundle = self.bundle
         return of
@@ -220,7 +220,7 @@ def unchecked(mission: Mission, of: Loaded, kept: int, key: SigningKey, flight: 
 
 
 def replace_bundle(of: Loaded, mission: Mission) -> Any:
-    """The bundle as though that mission were in force: so that `sign_replacement` finds that nothing changed."""
+    """The bundle as if that mission were in force, so that `sign_replacement` finds no change."""
     return with_fields(of.bundle, mission=mission)
 
 
@@ -311,7 +311,7 @@ def some_document(flight: Flight, random: Random) -> bytes:
 
 
 def compare(library: ctypes.CDLL, seed: int, count: int) -> Counter[str]:
-    """How many documents were accepted and refused by both, and why, over many flights."""
+    """Count the documents that both accept or refuse, by reason, over many flights."""
     random, found, flight = Random(seed), Counter[str](), Flight(library)
     for number in range(count):
         if number % 40 == 39:
@@ -334,7 +334,7 @@ def test_documents_of_each_kind_take_effect(flight: Flight) -> None:
     assert flight.take(approval(of, key=SECOND)) == "accepted"
     assert flight.take(approval(of, key=SECOND, granted=0)) == "accepted"
     assert flight.agree_on_answers() == 3
-    assert flight.agree_on_answers(replace(START, utc_us=START.utc_us + 5 * MIN)) == 1  # a refusal is for good
+    assert flight.agree_on_answers(replace(START, utc_us=START.utc_us + 5 * MIN)) == 1  # a refusal is final
     assert flight.take(recall(of)) == "accepted"
     assert flight.take(recall(of, policy=of.bundle.policy_digest, mission=b"", flight=b"")) == "accepted"
     assert flight.take(cancellation(of)) == "accepted"

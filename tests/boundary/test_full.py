@@ -33,7 +33,7 @@ from rtshcua.wire.keys import Duty, SigningKey
 from rtshcua.wire.permit import LINK_VALID_US, Permit, seal
 from rtshcua.wire.request import CONTINGENCY_LINK
 
-CROWD_SIZE, STEPS = 64, 33  # who answer twice about each step, and so more than is kept
+CROWD_SIZE, STEPS = 64, 33  # who answer twice about each step, which exceeds the limit
 PEOPLE = [
     SigningKey.from_seed(number.to_bytes(32, "big"), duty=Duty.APPROVAL, development=True)
     for number in range(1_000, 1_000 + CROWD_SIZE)

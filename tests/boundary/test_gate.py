@@ -56,7 +56,7 @@ class InC:
         self._lib.rt_test_gate_observe(frame, len(frame), ctypes.c_int64(now_us))
 
     def sign_ahead(self, frame: bytes, now_us: int) -> str | None:
-        """For the command that it was opened for last; why not."""
+        """Sign ahead for the command that it was last opened for; return the refusal."""
         slug = self._lib.rt_test_gate_sign_ahead(frame, len(frame), ctypes.c_int64(now_us))
         return slug and slug.decode()
 
@@ -83,7 +83,7 @@ def drawn_command(random: Random, home: Projection) -> Command:
 
 
 def drawn_frame(random: Random, of: Command) -> bytes:
-    """A frame that carries out the command, or nearly, or housekeeping, or anything else, sometimes damaged."""
+    """A frame for the command, a similar one, housekeeping, or any other, sometimes damaged."""
     x, y = random.choice([*zip(of.geo[::2], of.geo[1::2], strict=True), (2**31 - 1, 2**31 - 1), (1, 2)])
     height = of.altitude / 1000 + random.choice((0, 0, 0.001, 0.003, 1.999, 2.002, -5.0))
     speed = of.speed / 1000 + random.choice((0, 0, 0.0015, 0.0025))

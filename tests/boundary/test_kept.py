@@ -69,7 +69,7 @@ def test_next_frame_is_accepted_after_kill(tmp_path: Path, heard: int) -> None:
     now_us = monotonic_ns() // 1_000
     assert all(gate.accept(frame, now_us) for frame in frames)
     while keeping.read(kept_file(tmp_path, VEHICLE)).link.streams.get((1, 1, 0), 0) < timestamp_in(frames[0]):
-        gate.accept(frames[0], monotonic_ns() // 1_000)  # a replay; each call lets it keep what is due
+        gate.accept(frames[0], monotonic_ns() // 1_000)  # a replay; each call lets it store due state
     os.kill(process.pid, signal.SIGKILL)
     process.close()
     process, gate = begin()

@@ -21,7 +21,7 @@ from virtual.sampling import each_once
 
 FLAVOURS = ("px4", "ardupilot")
 KEYS = {"signed": KEY, "keyless": None}
-#: what moves the vehicle is among these
+#: all motion frames are among these
 MOVING = (COMMAND_INT, COMMAND_LONG, SET_POSITION_TARGET_GLOBAL_INT)
 
 Make = Callable[..., Apart]
@@ -66,7 +66,7 @@ def after_loss(flown: Any) -> list[tuple[int, int, int]]:
 
 
 def came_down(flown: Any) -> None:
-    """The vehicle came down by our command, and the log proves as much as the boundary signed, and no more."""
+    """Check that the vehicle landed by our command, and that the log proves exactly what the boundary signed."""
     assert flown.ending is Ending.ABORTED
     truth = flown.vehicle.simulation.truth()
     assert not truth.in_air
@@ -169,7 +169,7 @@ def test_next_link_flies_when_one_fails(flavour: str, apart: Make) -> None:
     flown = of.fly(flies(1))
     came_down(flown)
     assert [(kind, link) for kind, _, link in after_loss(flown)] == [(FALLBACK_LINK, 0), (FALLBACK_LINK, 1)]
-    # nothing can be asked any more: each leaves once a heartbeat has come, by the second on PX4, and for 5 s
+    # no more requests: each frame is sent after a heartbeat, once a second on PX4, for 5 s
     assert moving.count("hover") in (5, 6)
     failed = [record["detail"] for record in flown.records if record.get("event") == "failed"]
     assert failed, "what did not arrive had no effect"
@@ -201,7 +201,7 @@ def test_frames_ahead_are_renewed_silently_during_flight(apart: Make) -> None:
 def test_earlier_decision_is_recorded_before_loss_despite_late_seal(
     call: int, apart: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It dies in the call after its decision about a leg, in the same step."""
+    """The boundary dies in the call after its decision about a leg, in the same step."""
     of = apart("px4", legs=4)
     answer, calls = of._answer, []
 

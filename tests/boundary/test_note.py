@@ -87,7 +87,7 @@ def test_checkpoint_is_not_signed_before_a_flight(boundary: ctypes.CDLL) -> None
 
 
 def compare(boundary: ctypes.CDLL, seed: int) -> bool:
-    """A text with some changed octets: it is signed if Python reads it as the beginning of this log."""
+    """Check that a text with changed octets is signed only if Python reads it as the beginning of this log."""
     of = Random(seed)
     caller, flight = held(boundary)
     text = bytearray(begins(flight).encode())

@@ -24,7 +24,7 @@ from virtual.shipped import shipped, simulated
 
 AUTOPILOT, ADAPTER = Codec(1, 1), Codec(1, OURS)
 SAMPLE, SOAK = 16, 20_000
-#: floats at and beside the bounds of what may be set, and some that are no number
+#: floats at and near the bounds of parameters, and NaNs
 EDGES = (
     0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 7.0, 8.0, 10.0, 15.0, 15.5, 16.0, 29.99, 30.0, 30.5, 100.0, 100.01, -100.0, -100.01,
     -0.5, 1_000.0, 1_000.5, 3_000.0, 3_001.0, 10_000.0, 10_001.0, 300_000.0, 300_000.03, 300_001.0, 1e-45, 3e38,
@@ -39,7 +39,7 @@ def drawn_bits(of: Random) -> int:
 
 
 def fitting(of: Random, name: str) -> int:
-    """Mostly something that the parameter may be set to."""
+    """Mostly an allowed value of the parameter."""
     allowed_here = SETTABLE.get(name)
     found = bits_of(of.choice(allowed_here)) if allowed_here is not None and of.random() < 0.9 else None
     return drawn_bits(of) if found is None else found
@@ -101,7 +101,7 @@ def walk(boundary: ctypes.CDLL, seed: int) -> int:
             number = ctypes.c_float.from_buffer_copy(ctypes.c_uint32(value)).value
             frame = m.MAVLink_param_set_message(1, 1, name.encode(), number, of.choice((9, 9, 6)))
             made.executor.frames.seal(ADAPTER.pack(frame), now_us)
-    made.attestation.statement(START, final=True)  # the evidence of both is the same
+    made.attestation.statement(START, final=True)  # both have the same evidence
     for permit in permits:
         assert isinstance(made.executor.prepare(permit, now_us), Refusal)
     return begun

@@ -1,4 +1,4 @@
-"""The boundary's process and the one in Python answer the same, whatever they are asked in turn: in the soak a million
+"""The boundary's process and the one in Python give the same answers to random requests: in the soak a million
 requests, among documents, dispatches, links by standing permits and links that are signed ahead, frames, reports,
 parameters that are set and put back, statements and logs, over several starts of the process and several bundles.
 """
@@ -62,7 +62,7 @@ def test_an_answer_that_differs_is_noticed(
 
 @cache
 def answers_done() -> Path:
-    """Where it is noted what both were asked already: of this program, and of this Python."""
+    """The file that records the finished comparisons of this program and this Python version."""
     built = program()
     assert built is not None
     digest = sha256(built.read_bytes())

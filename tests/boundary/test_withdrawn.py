@@ -114,7 +114,7 @@ UNSENT, SENT, AGAIN, REPLAYED = "permit/unsent", "permit/sent", "admitted", "fre
         ("allow:0 send:0 ended withdraw:0", UNSENT, 0, AGAIN),
         ("allow:0 send:0 withdraw:0", UNSENT, 0, AGAIN),
         ("allow:0 send:0 late ended withdraw:0", UNSENT, 0, AGAIN),  # the gate refused its frame as late
-        ("allow:0 send:0 blocked withdraw:0", UNSENT, 0, AGAIN),  # and one of something else
+        ("allow:0 send:0 blocked withdraw:0", UNSENT, 0, AGAIN),  # and a permit of another step
         ("allow:0 withdraw:0", UNSENT, 0, AGAIN),  # it was never dispatched
         ("allow:0 send:0 landed withdraw:0", UNSENT, 0, AGAIN),
         ("allow:0 send:0 ended allow:1 send:1 ended withdraw:1", UNSENT, 1, AGAIN),
@@ -122,7 +122,7 @@ UNSENT, SENT, AGAIN, REPLAYED = "permit/unsent", "permit/sent", "admitted", "fre
         ("allow:0 send:0 arms withdraw:0", SENT, 0, REPLAYED),
         ("allow:0 send:0 arms ended withdraw:0", SENT, 0, REPLAYED),
         ("allow:0 send:0 arms landed withdraw:0", SENT, 0, REPLAYED),
-        # a link flew by it, whether a frame left or not
+        # a link flew under it, with or without a sent frame
         ("allow:0 send:0 link:0 withdraw:0", SENT, 0, REPLAYED),
         ("allow:0 send:0 chain:0 ended withdraw:0", SENT, 0, REPLAYED),
         # another step followed, or its turn is over
@@ -164,7 +164,7 @@ def test_link_permit_cannot_be_withdrawn(both: Callable[[], Loaded]) -> None:
 
 @pytest.mark.parametrize("kind", [DISPATCH, STAND_IN, WITHDRAW, PREPARE])
 def test_permit_at_other_time_is_reported_as_refused(boundary: ctypes.CDLL, kind: int) -> None:
-    """An honest process that stood still records it, and the boundary signs for the same."""
+    """An honest process that stalled records it, and the boundary's statement agrees."""
     clock = [AT]
     caller = begin(
         boundary, ROOT.sign(ROOT_KEY), ROOT_KEY.verification().public, VEHICLE, SESSION_KEY, START,

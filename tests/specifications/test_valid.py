@@ -25,7 +25,7 @@ def test_there_are_a_hundred_numbered_from_one() -> None:
     assert [path.name[:4] for path in SPECIFICATIONS] == [f"{number:03}_" for number in range(1, 101)]
 
 
-def test_each_says_first_what_it_alone_is_about() -> None:
+def test_each_specification_begins_with_a_unique_comment() -> None:
     first_lines = [path.read_text(encoding="utf-8").splitlines()[0] for path in SPECIFICATIONS]
     assert all(line.startswith(("// ", "/* ")) for line in first_lines)
     assert len(set(first_lines)) == len(SPECIFICATIONS)
@@ -33,6 +33,6 @@ def test_each_says_first_what_it_alone_is_about() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("specifications", parts(SPECIFICATIONS, 4))
-def test_nothing_is_found(specifications: Sequence[Path]) -> None:
+def test_valid_specifications_have_no_findings(specifications: Sequence[Path]) -> None:
     found = {path.stem: findings(path) for path in specifications}
     assert {name: text for name, text in found.items() if text} == {}

@@ -26,7 +26,8 @@ class Sizes:
         self.slot = self.streams + MOST_STREAMS * STREAM.size + _CHECK
 
 
-PROCESS = Sizes(4_094, 256)
+MOST_OPENED = 4_094
+PROCESS = Sizes(MOST_OPENED, 256)
 TRUSTZONE_M = Sizes(home_limits.TRUSTZONE_M["MOST_OPENED"], home_limits.TRUSTZONE_M["MOST_POLICIES"])
 SLOT = PROCESS.slot
 

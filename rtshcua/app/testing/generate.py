@@ -28,7 +28,7 @@ from rtshcua.model.ir.tests import NominalDecl
 _IN_MEMORY = "generated_tests.rts"
 
 _TESTS = "generated tests"
-_FEWER = "`--skill` says for which skills, one file after the other"
+_FEWER = "use `--skill` to generate one file for each skill"
 
 
 class GenerateRequest(NamedTuple):
@@ -71,8 +71,8 @@ def generate(files: Sequence[Path], request: GenerateRequest) -> WrittenTests | 
     if refused is not None:
         return refused
     if output is not None and os.path.lexists(output) and not (request.force and output.is_file()):
-        help = "`--force` replaces it" if output.is_file() else ""
-        return Refusal("output", f"`{output}` exists, and is not written over", help)
+        help = "replace it with `--force`" if output.is_file() else ""
+        return Refusal("output", f"`{output}` exists, and is not overwritten", help)
     found: dict[tuple[str, str, str], _Candidate] = {}
     for path in files:
         reading = read_sources([path])

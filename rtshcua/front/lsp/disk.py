@@ -1,4 +1,4 @@
-"""Files as the server has them: their URIs and names, and what it reads of the disk. It writes nothing."""
+"""The files of the server: their URIs and names, and reading them from the disk. Nothing is written."""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -12,17 +12,17 @@ from rtshcua.ground.language.paths import shown
 
 SOURCE = ".rts"
 MOST = 2_000
-"""Sources of a workspace that are looked through for references."""
+"""The most sources of a workspace that are searched for references."""
 _DRIVE = re.compile(r"/[A-Za-z]:(?=/|\Z)")
 
 
 def desk(library: str, readable: ReadableSources) -> Workspace:
-    """An empty desk over what may be read of the disk."""
+    """An empty workspace over the readable files of the disk."""
     return Workspace(readable.read, library, readable.listing, readable.pack)
 
 
 def sources(folders: Iterable[str]) -> Iterator[str]:
-    """The sources below folders, but for hidden ones, as far as they are not too many."""
+    """The sources below folders except hidden ones, `MOST` at most."""
     found = 0
     for top in folders:
         for place, below, files in walk(top):
@@ -36,7 +36,7 @@ def sources(folders: Iterable[str]) -> Iterator[str]:
 
 
 def name_of(uri: str) -> str:
-    """The name of a text, as `shown` gives it. What is no file gets a name in the working folder that tells the URI."""
+    """The name of a text, as from `shown`. Another URI gets a name in the working folder made of the URI."""
     return shown(path_of(uri) or re.sub(r"[\\/\0]+", "_", unquote(uri)))
 
 

@@ -1,5 +1,5 @@
-"""The answers to an editor's questions, in the terms of the protocol: about a place, about changes to texts (renaming,
-formatting, what may be done about a finding), and about the whole workspace (in steps: see `searching`).
+"""The answers to an editor's requests, in the types of the protocol: about a position, about changes to texts
+(renaming, formatting, code actions), and about the whole workspace (in steps, see `searching`).
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -27,11 +27,11 @@ from rtshcua.ground.format.format import formatted
 
 LEGEND = lsp.SemanticTokensLegend(list(coloured.TOKEN_KINDS), ["declaration"])
 _MOST = 500
-"""Symbols of a workspace that are listed."""
+"""The most symbols of a workspace that are listed."""
 
 
 class NotDone(JsonRpcException):
-    """A request that is well-formed and is refused; the text is for a person."""
+    """A well-formed request that is refused; the text is shown to the user."""
 
     CODE = -32803  # LSPErrorCodes.RequestFailed
 
@@ -40,7 +40,7 @@ class NotDone(JsonRpcException):
 
 
 def hovered(session: EditorSession, params: lsp.HoverParams) -> lsp.Hover | None:
-    """What stands at a place."""
+    """The hover text at a position."""
     spot = session.spot(params.text_document.uri, params.position)
     found = spot and hover(spot.view, spot.name, spot.offset, session.dialect)
     if spot is None or found is None:
@@ -50,13 +50,13 @@ def hovered(session: EditorSession, params: lsp.HoverParams) -> lsp.Hover | None
 
 
 def defined(session: EditorSession, params: lsp.DefinitionParams) -> list[lsp.Location]:
-    """Where a name is given."""
+    """The definitions of the name at a position."""
     spot = session.spot(params.text_document.uri, params.position)
     return [] if spot is None else _locations(session, definitions(spot.view, spot.name, spot.offset))
 
 
 def highlighted(session: EditorSession, params: lsp.DocumentHighlightParams) -> list[lsp.DocumentHighlight]:
-    """All places of the file that mean the same."""
+    """All occurrences in the file of the symbol at a position."""
     spot = session.spot(params.text_document.uri, params.position)
     if spot is None:
         return []
@@ -68,7 +68,7 @@ def highlighted(session: EditorSession, params: lsp.DocumentHighlightParams) -> 
 
 
 def completed(session: EditorSession, params: lsp.CompletionParams) -> lsp.CompletionList:
-    """What may be written at a place."""
+    """The completions at a position."""
     spot, opened = session.spot(params.text_document.uri, params.position), session.cut(params.text_document.uri)
     if spot is None or opened is None:
         return lsp.CompletionList(is_incomplete=False, items=[])
@@ -87,7 +87,7 @@ def completed(session: EditorSession, params: lsp.CompletionParams) -> lsp.Compl
 
 
 def signed(session: EditorSession, params: lsp.SignatureHelpParams) -> lsp.SignatureHelp | None:
-    """What the call that is being written takes."""
+    """The signature of the call at a position."""
     spot, opened = session.spot(params.text_document.uri, params.position), session.cut(params.text_document.uri)
     found = None if spot is None or opened is None else signature(spot.view, opened[0], spot.offset)
     if found is None:
@@ -105,21 +105,21 @@ def outline(session: EditorSession, params: lsp.DocumentSymbolParams) -> list[ls
         return []
     cut, lines = opened
 
-    def told(symbol: outlined.OutlineSymbol) -> lsp.DocumentSymbol:
+    def converted(symbol: outlined.OutlineSymbol) -> lsp.DocumentSymbol:
         return lsp.DocumentSymbol(
             name=symbol.name,
             kind=SYMBOLS.get(symbol.kind, lsp.SymbolKind.Object),
             range=range_of(lines, symbol.whole.start, symbol.whole.end),
             selection_range=range_of(lines, symbol.at.start, symbol.at.end),
             detail=symbol.kind,
-            children=[told(each) for each in symbol.inner],
+            children=[converted(each) for each in symbol.inner],
         )
 
-    return [told(each) for each in outlined.outline(cut)]
+    return [converted(each) for each in outlined.outline(cut)]
 
 
 def folded(session: EditorSession, params: lsp.FoldingRangeParams) -> list[lsp.FoldingRange]:
-    """What may be folded."""
+    """The foldable ranges of a file."""
     opened = session.cut(params.text_document.uri)
     if opened is None:
         return []
@@ -127,14 +127,14 @@ def folded(session: EditorSession, params: lsp.FoldingRangeParams) -> list[lsp.F
     found: list[lsp.FoldingRange] = []
     for each in outlined.folds(cut):
         first, last = lines.place(each.start), lines.place(each.end)
-        end = last.line if each.kind else max(first.line, last.line - 1)  # the bracket that closes stays to be seen
+        end = last.line if each.kind else max(first.line, last.line - 1)  # the closing bracket stays visible
         if end > first.line:
             found.append(lsp.FoldingRange(first.line, end, kind=each.kind or None))
     return found
 
 
 def coloured_all(session: EditorSession, params: lsp.SemanticTokensParams) -> lsp.SemanticTokens:
-    """What each name is, as the protocol packs it: relative to the one before."""
+    """The semantic tokens of a file, each relative to the previous one, as the protocol encodes them."""
     name = name_of(params.text_document.uri)
     lines = session.lines(name)
     if lines is None:
@@ -153,7 +153,7 @@ def coloured_all(session: EditorSession, params: lsp.SemanticTokensParams) -> ls
 
 
 def may_rename(session: EditorSession, params: lsp.PrepareRenameParams) -> lsp.PrepareRenamePlaceholder:
-    """The name that would be changed. Raises NotDone with the reason why it may not."""
+    """The name at a position that can be renamed. Raises NotDone with the reason if it cannot."""
     view, name, lines, offset = _renaming(session, params)
     found = renamable(session.desk, view, name, offset)
     if isinstance(found, Refusal):
@@ -162,7 +162,7 @@ def may_rename(session: EditorSession, params: lsp.PrepareRenameParams) -> lsp.P
 
 
 def renamed(texts: Texts, search: Search, params: lsp.RenameParams) -> lsp.WorkspaceEdit:
-    """The changes that give a thing another name. Raises NotDone with the reason why not."""
+    """The changes of a renaming. Raises NotDone with the reason if it is refused."""
     view, name, _, offset = _renaming(texts, params)
 
     def steps(each: Sequence[ProgramView]) -> Iterator[ProgramView]:
@@ -185,8 +185,8 @@ def _renaming(texts: Texts, params: lsp.PrepareRenameParams | lsp.RenameParams) 
 
 
 def laid_out(session: EditorSession, params: lsp.DocumentFormattingParams) -> list[lsp.TextEdit]:
-    """The change that puts a text into the one style, as wide as its project says: from the first character that
-    differs to the last. Nothing where the text has errors, which are told of anyway, or the project leaves it out.
+    """The change that formats a text, from the first character that differs to the last, with the line width of its
+    project. Nothing if the text has errors, which are reported anyway, or the project excludes it.
     """
     opened = session.cut(params.text_document.uri)
     if opened is None:
@@ -202,7 +202,7 @@ def laid_out(session: EditorSession, params: lsp.DocumentFormattingParams) -> li
 
 
 def offered(session: EditorSession, params: lsp.CodeActionParams) -> list[lsp.CodeAction]:
-    """What may be done about the findings in a range, and about all of them where that is safe."""
+    """The code actions for the findings in a range, and the safe fix of all findings."""
     name = name_of(params.text_document.uri)
     lines = session.lines(name)
     if lines is None:
@@ -238,7 +238,7 @@ def _corrected(texts: Texts, name: str, fixes: Iterable[Fix]) -> lsp.WorkspaceEd
 
 
 def _workspace_edit(texts: Texts, changes: Mapping[str, list[tuple[Span, str]]]) -> lsp.WorkspaceEdit:
-    """Changes by file; with the version of a text that is open, so that no editor applies them to another."""
+    """Changes by file, with the version of each open text, so that an editor does not apply them to another version."""
     edits: list[lsp.TextDocumentEdit | lsp.CreateFile | lsp.RenameFile | lsp.DeleteFile] = []
     plain: dict[str, list[lsp.TextEdit]] = {}
     for name, places in changes.items():
@@ -263,7 +263,7 @@ def _text_edit(lines: LineIndex, span: Span, text: str) -> lsp.TextEdit:
 
 
 def referred(texts: Texts, search: Search, params: lsp.ReferenceParams) -> list[lsp.Location]:
-    """All places of the workspace that mean the same; of an import all that import the same file."""
+    """All references in the workspace to the symbol at a position; for an import, all imports of the same file."""
     spot = texts.spot(params.text_document.uri, params.position)
     if spot is None:
         return []
@@ -283,7 +283,7 @@ def referred(texts: Texts, search: Search, params: lsp.ReferenceParams) -> list[
 
 
 def symbols(texts: Texts, search: Search, params: lsp.WorkspaceSymbolParams) -> list[lsp.WorkspaceSymbol]:
-    """The declarations of the workspace, and of what the open texts import, whose names hold what is asked for."""
+    """The declarations of the workspace and of imported files whose names contain the query."""
     wanted = params.query.casefold()
     imported = (file for name in texts.opened for file in texts.desk.view(name).program.sources)
     found: list[lsp.WorkspaceSymbol] = []

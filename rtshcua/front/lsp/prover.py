@@ -1,9 +1,8 @@
-"""The process in which whole checks run (parse, check, lower, prove, lint), and what keeps it.
+"""The process that runs complete checks (parse, check, lower, prove, lint), and its client.
 
-One job at a time, of each source only the newest, and none that hangs. A check cannot be interrupted. So a job whose
-source has changed meanwhile runs on for at most `PATIENCE`; then the process is ended, and another one takes the newer
-text. A process that ends by itself, or answers what is no answer, is replaced, and asked once more. What cannot be had
-is said, and the next change of the text tries again.
+It runs one job at a time, and for each source only the newest. A check cannot be interrupted, so an outdated job runs
+on for at most `PATIENCE` seconds; then the process is killed, and a new one checks the newer text. A process that ends
+or sends an invalid answer is replaced once. A failure is reported, and the next change of the text tries again.
 
 `python -P -m rtshcua.front.lsp.prover LIBRARY` reads jobs from its standard input and writes what was
 found to its standard output, each as its length in eight bytes and a pickle. Both ends are ours: nothing that comes
@@ -31,11 +30,11 @@ from rtshcua.ground.project.project_settings import IgnoredCode
 
 LENGTH = 8  # bytes, in front of each message
 PATIENCE = 10.0
-"""Seconds that an outdated job may take."""
+"""The longest time of an outdated job, in seconds."""
 LONGEST = 120.0
-"""Seconds that any job may take."""
+"""The longest time of a job, in seconds."""
 LARGEST = 1 << 28
-"""Bytes of an answer; what says that it is longer is none."""
+"""The most bytes of an answer; a longer one is invalid."""
 TRIES = 2
 
 log = logging.getLogger("rtshcua.lsp")
@@ -47,10 +46,10 @@ Found = tuple[Diagnostic, ...] | None
 
 
 def main(library: str) -> None:
-    """Works until its input ends."""
+    """Process jobs until the input ends."""
     incoming, outgoing = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # whatever prints must not reach the messages
-    os.nice(5)  # a keystroke that is answered meanwhile goes first
+    os.dup2(2, 1)  # printed text must not get between the messages
+    os.nice(5)  # answers to keystrokes have priority
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING)
     readable = ReadableSources(library)
     known = desk(library, readable)
@@ -66,22 +65,22 @@ def main(library: str) -> None:
 
 
 def examined(known: Workspace, job: Job) -> tuple[Diagnostic, ...]:
-    """Everything that `rtshcua lint` finds in a program, for its first file the habits too."""
-    asked, texts, _ = job
+    """The findings of `rtshcua lint` in a program, with the lint rules applied to its first file."""
+    file, texts, _ = job
     for name in [each for each in known.open if each not in texts]:
         known.close(name)
     for name, text in texts.items():
         known.put(name, text)
     known.forget()
-    view = known.view(asked)
-    result = find(view.program, {asked: None})
-    untold = {asked} if has_errors(result.found) else ()
+    view = known.view(file)
+    result = find(view.program, {file: None})
+    untold = {file} if has_errors(result.found) else ()
     found = (*result.found, *result.habits)
-    return filter_findings(found, view.program.sources, {asked}, _configured(view), untold).found
+    return filter_findings(found, view.program.sources, {file}, _configured(view), untold).found
 
 
 def _configured(view: ProgramView) -> dict[str, tuple[IgnoredCode, ...]]:
-    """What the project's configuration ignores in the first file."""
+    """The codes that the project's configuration ignores in the first file."""
     project = Projects().of(Path(view.name))
     return {view.name: ignored_in(project, Path(view.name))} if isinstance(project, Project) else {}
 
@@ -104,7 +103,7 @@ def _message(content: Job | Found) -> bytes:
 
 
 class Broken(Exception):
-    """The process has ended, or what it says is no answer."""
+    """The process has ended, or sent an invalid answer."""
 
 
 class Slow(Exception):
@@ -112,8 +111,8 @@ class Slow(Exception):
 
 
 class Proving:
-    """Jobs for the process, which is started with the first of them. `end` stops it. `say` gets what goes wrong, in
-    words; `command` is the process.
+    """Runs jobs in the process, which is started with the first job. `end` stops it. `say` receives error texts;
+    `command` is the command of the process.
     """
 
     def __init__(
@@ -138,8 +137,8 @@ class Proving:
     def ask(
         self, name: str, texts: Mapping[str, str], done: Callable[[Found], None], folders: tuple[str, ...] = ()
     ) -> None:
-        """Has the program of `name` checked, with what lies in `folders`; `done` gets what was found, None where the
-        check failed. A later question about the same takes the place of this one, if it still waits.
+        """Check the program of `name`, whose imports may lead to `folders`; `done` receives the findings, or None if
+        the check failed. A later job for the same name replaces one that still waits.
         """
         self._waiting[name] = ((name, dict(texts), folders), done)
         self._newer.set()
@@ -147,17 +146,17 @@ class Proving:
             self._task = asyncio.get_running_loop().create_task(self._work())
 
     def forget(self, name: str) -> None:
-        """Nobody wants to know of `name` any more."""
+        """Drop a waiting job for `name`."""
         self._waiting.pop(name, None)
 
     def end(self) -> None:
-        """Ends the process."""
+        """End the process."""
         if self._task is not None:
             self._task.cancel()
         self._kill()
 
     async def ended(self) -> None:
-        """Returns when the processes that `end` and faults have ended are gone."""
+        """Wait until all ended processes are gone."""
         if self._task is not None:
             await asyncio.wait({self._task})
         for process in self._killed:
@@ -177,18 +176,20 @@ class Proving:
                 return await self._answer(job)
             except Slow:
                 self._kill()
-                self._say(f"the proofs of {job[0]} took too long and were given up: save it and run `rtshcua check`")
+                self._say(
+                    f"the proofs of {job[0]} took too long and were stopped: save the file and run `rtshcua check`"
+                )
                 return None
             except (OSError, Broken) as error:
                 self._kill()
                 if left and job[0] not in self._waiting:
                     continue
-                self._say(f"the proofs of {job[0]} could not be had: {error}")
+                self._say(f"the proofs of {job[0]} failed: {error}")
                 return None
         return None
 
     async def _answer(self, job: Job) -> Found:
-        """What the process says. Raises Slow, Broken, OSError."""
+        """The answer of the process. Raises Slow, Broken, OSError."""
         asking = asyncio.ensure_future(self._exchange(job))
         try:
             await asyncio.wait({asking}, timeout=self._patience)
@@ -211,16 +212,16 @@ class Proving:
             await process.stdin.drain()
             length = int.from_bytes(await process.stdout.readexactly(LENGTH), "big")
             if length > LARGEST:
-                raise Broken("the process that proves gave no answer")
+                raise Broken("the prover process gave an invalid answer")
             answer = await process.stdout.readexactly(length)
         except (OSError, asyncio.IncompleteReadError) as error:
-            raise Broken("the process that proves has ended") from error
+            raise Broken("the prover process has ended") from error
         try:
             found = pickle.loads(answer)
-        except Exception as error:  # whatever it is that garbage raises
-            raise Broken("the process that proves gave no answer") from error
+        except Exception as error:  # an invalid pickle may raise anything
+            raise Broken("the prover process gave an invalid answer") from error
         if found is not None and not (type(found) is tuple and all(isinstance(each, Diagnostic) for each in found)):
-            raise Broken("the process that proves gave no answer")
+            raise Broken("the prover process gave an invalid answer")
         return found
 
     async def _running(self) -> asyncio.subprocess.Process:

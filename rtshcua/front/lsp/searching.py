@@ -1,7 +1,7 @@
-"""Questions about the whole workspace, in a thread of their own, so that findings do not wait for them.
+"""Requests about the whole workspace, answered in a separate thread, so that findings are not delayed.
 
-One at a time, on a copy of the session's texts, in steps of one program each; between steps the thread looks whether
-the editor has taken its question back. The answer is true of the texts as they were when it was asked: a renaming names
+They run one at a time, on a copy of the session's texts, in steps of one program; between steps the thread checks
+whether the editor has cancelled the request. The answer is for the texts at the time of the request: a renaming names
 their versions, and an editor does not apply it to others.
 """
 
@@ -18,22 +18,22 @@ from rtshcua.front.lsp.texts import Texts
 
 T = TypeVar("T")
 Tell = Callable[[int, int], None]
-"""Is told how many steps are done, of how many."""
+"""Receives the number of finished steps, and of all steps."""
 
 
 class Search:
-    """One question: its steps, and whether anybody still wants to know."""
+    """One request: its steps, and whether it was cancelled."""
 
     def __init__(self, tell: Tell | None = None) -> None:
         self._gone = Event()
         self._tell = tell
 
     def give_up(self) -> None:
-        """Nobody wants to know any more."""
+        """Cancel the request."""
         self._gone.set()
 
     def steps(self, each: Iterable[T], *, told: bool = True) -> Iterator[T]:
-        """The same, one after the other. Raises JsonRpcRequestCancelled as soon as nobody wants to know any more."""
+        """Yield the items, and report progress if `told`. Raises JsonRpcRequestCancelled once cancelled."""
         every = list(each)
         for done, one in enumerate(every):
             if self._gone.is_set():
@@ -44,7 +44,7 @@ class Search:
 
 
 class Searching:
-    """The thread, and what runs in it. `end` has it stop."""
+    """The thread and its running requests."""
 
     def __init__(self) -> None:
         self._thread = ThreadPoolExecutor(1, "search")
@@ -53,7 +53,7 @@ class Searching:
     async def answer(
         self, texts: Texts, work: Callable[[Texts, Search, Any], T], params: Any, tell: Tell | None = None
     ) -> T:
-        """What `work` says of the texts as they are now. Raises what it raises."""
+        """Run `work` on a copy of the present texts, and return its result. Raises its exceptions."""
         loop = asyncio.get_running_loop()
 
         def told(done: int, of: int) -> None:
@@ -72,14 +72,14 @@ class Searching:
             self._running.discard(search)
 
     def end(self) -> None:
-        """Gives up all that runs and waits."""
+        """Cancel all running and waiting requests."""
         for search in tuple(self._running):
             search.give_up()
         self._thread.shutdown(wait=False, cancel_futures=True)
 
 
 class Shown:
-    """Progress that the editor shows: begun with the first step, ended with `end`."""
+    """The progress display of the editor, from the first step until `end`."""
 
     def __init__(self, notify: Callable[[lsp.ProgressParams], None], token: int | str | None, title: str) -> None:
         self._notify = notify
@@ -88,7 +88,7 @@ class Shown:
         self._last = -1  # per cent
 
     def tell(self, done: int, of: int) -> None:
-        """So many steps are done; each whole per cent is told once."""
+        """Report the number of finished steps; each whole per cent once."""
         percent = 100 * done // max(of, 1)
         if self._token is None or percent == self._last:
             return
@@ -101,7 +101,7 @@ class Shown:
         self._notify(lsp.ProgressParams(self._token, value))
 
     def end(self) -> None:
-        """It is over."""
+        """End the progress display."""
         if self._token is not None and self._last >= 0:
             self._notify(lsp.ProgressParams(self._token, lsp.WorkDoneProgressEnd()))
             self._token = None

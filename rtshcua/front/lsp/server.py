@@ -1,4 +1,4 @@
-"""The server: which features it has, and how messages of the editor reach the session."""
+"""The language server: its features, and the dispatch of messages to the session."""
 
 import gc
 import logging
@@ -23,11 +23,11 @@ from rtshcua.front.lsp.texts import place
 from rtshcua.ground.editor.positions import Encoding, TextChange
 
 GRACE = 5.0
-"""Seconds from the end of the editor's stream until the process ends, whatever still runs in it."""
+"""The longest time from the end of the editor's stream to the end of the process, in seconds."""
 LARGEST = 64 << 20
-"""Bytes of a message: a source of 8 MiB has six times as many where each character is escaped."""
+"""The most bytes of a message: a source of 8 MiB has six times as many if each character is escaped."""
 LONGEST = 64 << 10
-"""Bytes of a line before a message."""
+"""The most bytes of a header line."""
 _WATCHED = "**/*.{rts,geojson,json,toml}"
 
 
@@ -37,7 +37,7 @@ def _change(change: lsp.TextDocumentContentChangeEvent) -> TextChange:
     return TextChange(None, None, change.text)
 
 
-#: what the editor tells, and what the session does then
+#: the notifications of the editor, with their actions
 _NOTICES: dict[str, Callable[[EditorSession, Any], None]] = {
     lsp.TEXT_DOCUMENT_DID_OPEN: lambda session, told: session.open(
         told.text_document.uri, told.text_document.version, told.text_document.text
@@ -50,7 +50,7 @@ _NOTICES: dict[str, Callable[[EditorSession, Any], None]] = {
     lsp.WORKSPACE_DID_CHANGE_WATCHED_FILES: lambda session, _: session.reread(),
     lsp.SHUTDOWN: lambda session, _: session.end(),
 }
-#: what it asks: the method, the answer, and what the server says that it can
+#: the requests of the editor: method, answer, and the options that the server registers
 _QUESTIONS = (
     (lsp.TEXT_DOCUMENT_HOVER, features.hovered, None),
     (lsp.TEXT_DOCUMENT_DEFINITION, features.defined, None),
@@ -65,30 +65,30 @@ _QUESTIONS = (
     (lsp.TEXT_DOCUMENT_CODE_ACTION, features.offered, lsp.CodeActionOptions(
         [lsp.CodeActionKind.QuickFix, lsp.CodeActionKind.SourceFixAll])),
 )  # fmt: skip
-#: what is asked of the whole workspace, besides with a title for the progress
+#: the requests about the whole workspace, with a title for the progress
 _SEARCHES = (
-    (lsp.TEXT_DOCUMENT_REFERENCES, features.referred, "looking for uses",
+    (lsp.TEXT_DOCUMENT_REFERENCES, features.referred, "finding references",
      lsp.ReferenceOptions(work_done_progress=True)),
-    (lsp.WORKSPACE_SYMBOL, features.symbols, "looking for names", lsp.WorkspaceSymbolOptions(work_done_progress=True)),
+    (lsp.WORKSPACE_SYMBOL, features.symbols, "finding symbols", lsp.WorkspaceSymbolOptions(work_done_progress=True)),
     (lsp.TEXT_DOCUMENT_RENAME, features.renamed, "renaming", lsp.RenameOptions(True, work_done_progress=True)),
 )  # fmt: skip
 
 
 def serve(library: str, port: int | None = None, host: str = "127.0.0.1") -> None:
-    """Serves one editor over the standard streams, or the first that connects to a port; ends with it.
+    """Serve one editor over the standard streams, or the first one that connects to a port, until it disconnects.
 
-    What goes wrong is written to the standard error, nothing but messages to the standard output.
+    Errors are written to the standard error, and only messages to the standard output.
     """
     logging.basicConfig(stream=sys.stderr, level=logging.WARNING, format="%(levelname)s %(name)s: %(message)s")
     for each in logging.getLogger().handlers:
         each.setFormatter(OneLine("%(levelname)s %(name)s: %(message)s"))
     logging.getLogger("pygls.protocol.json_rpc").addFilter(_is_a_fault)
-    gc.set_threshold(50_000, 20, 100)  # syntax trees come by thousands, and live long
+    gc.set_threshold(50_000, 20, 100)  # there are thousands of long-lived syntax trees
     server, session = make(library)
     try:
         if port is None:
             outgoing = sys.stdout.buffer
-            sys.stdout = sys.stderr  # whatever prints must not reach the editor
+            sys.stdout = sys.stderr  # printed text must not reach the editor
             server.start_io(Watched(sys.stdin.buffer), outgoing)  # type: ignore[arg-type]
         else:
             _over(server, host, port)
@@ -97,7 +97,7 @@ def serve(library: str, port: int | None = None, host: str = "127.0.0.1") -> Non
 
 
 def _over(server: LanguageServer, host: str, port: int) -> None:
-    """Serves the first editor that connects, and ends with the connection, however that ends."""
+    """Serve the first editor that connects, until the connection ends."""
     with socket.create_server((host, port)) as listening:
         connection, _ = listening.accept()
     with connection, connection.makefile("rb") as incoming, connection.makefile("wb") as outgoing:
@@ -108,10 +108,10 @@ def _over(server: LanguageServer, host: str, port: int) -> None:
 
 
 class OneLine(logging.Formatter):
-    """What went wrong in a line, for what an editor sends is no fault of ours; all of it with RTSHCUA_DEBUG=1."""
+    """Formats an error as one line, because the editor's input caused it; with RTSHCUA_DEBUG=1 as a traceback."""
 
     def format(self, record: logging.LogRecord) -> str:
-        """What is logged."""
+        """Format a log record."""
         if os.environ.get("RTSHCUA_DEBUG") == "1":
             return super().format(record)
         line = f"{record.levelname} {record.name}: {record.getMessage().partition(chr(10))[0]}"
@@ -120,12 +120,12 @@ class OneLine(logging.Formatter):
 
 
 def _is_a_fault(record: logging.LogRecord) -> bool:
-    """A request that is refused with a reason is no fault of the server's, so nothing is logged of it."""
+    """Whether a log record reports an error of the server; a refused request is not one."""
     return not (record.exc_info and isinstance(record.exc_info[1], features.NotDone))
 
 
 def make(library: str) -> tuple[LanguageServer, EditorSession]:
-    """The server with all its features, and its session. `library` is the folder that `lib:` stands for."""
+    """Create the server with all features, and its session. `library` is the folder for `lib:`."""
     server = LanguageServer("rtshcua", __version__, protocol_cls=Protocol)
     session = EditorSession(library, server.text_document_publish_diagnostics, _saying(server))
     _lifecycle(server, session)
@@ -139,7 +139,7 @@ def make(library: str) -> tuple[LanguageServer, EditorSession]:
 
 
 def _saying(server: LanguageServer) -> Callable[[str], None]:
-    """Shows each thing once, and logs it every time."""
+    """A function that logs each text, and shows it once."""
     said: set[str] = set()
 
     def say(text: str) -> None:
@@ -152,50 +152,50 @@ def _saying(server: LanguageServer) -> Callable[[str], None]:
 
 
 class Protocol(LanguageServerProtocol):
-    """The protocol of pygls, which logs what it cannot read, and with an answer (-32602, `Invalid params`): an editor
-    waits for each of its requests.
+    """The protocol of pygls, with an answer (-32602, `Invalid params`) to malformed requests, which pygls only logs: an
+    editor waits for each answer.
     """
 
     def structure_message(self, data: dict[str, Any]) -> Any:
-        """A message; None for a request that was malformed, and is answered. Raises JsonRpcException for any other."""
+        """The parsed message; None for a malformed request, which is answered here. Raises JsonRpcException otherwise."""
         try:
             return super().structure_message(data)
         except JsonRpcException as error:
             asked, number = data.get("method"), data.get("id")
             if not isinstance(asked, str) or not isinstance(number, int | str):
                 raise
-            why = f"these are no parameters of `{asked}`"
+            why = f"invalid parameters of `{asked}`"
             self._send_response(number, error=JsonRpcInvalidParams(message=why, data=str(error)).to_response_error())
             return None
 
     def handle_message(self, message: Any) -> None:
-        """Hands a message to its feature, unless it is answered already."""
+        """Pass a message to its feature, unless it was already answered."""
         if message is not None:
             super().handle_message(message)
 
 
 class Watched:
-    """What comes from the editor. Where that ends, the process does too, by itself or by force: a check that cannot be
-    interrupted, or a process that is just being started, holds up nobody's end.
+    """The editor's stream. When it ends, the process ends too, by force if needed, because a check cannot be
+    interrupted.
     """
 
     def __init__(self, stream: BinaryIO) -> None:
         self._stream = stream
 
     def readline(self) -> bytes:
-        """One line; a part of one, or nothing, at the end. A line that no header is as long as is the end."""
+        """Read a header line; at the end a part of one, or nothing. A line over `LONGEST` counts as the end."""
         data = self._stream.readline(LONGEST)
         return self._seen(data, ended=not data.endswith(b"\n"))
 
     def read(self, size: int) -> bytes:
-        """So many bytes; fewer at the end. More than any message has are not waited for: that is the end."""
+        """Read `size` bytes; fewer at the end. A size over `LARGEST` counts as the end."""
         if size > LARGEST:
             logging.getLogger("rtshcua.lsp").warning("a message of %d bytes is not read", size)
         data = self._stream.read(size) if size <= LARGEST else b""
         return self._seen(data, ended=len(data) < size)
 
     def _seen(self, data: bytes, *, ended: bool) -> bytes:
-        # Told by what is cut off, too: whoever cannot answer it, for nobody listens any more, reads no further.
+        # A cut message is checked too: if its answer cannot be sent, nothing more is read.
         if ended:
             forced = Timer(GRACE, os._exit, (0,))
             forced.daemon = True
@@ -204,7 +204,7 @@ class Watched:
 
 
 def _asked(answer: Any, session: EditorSession) -> Any:
-    """The answer as a handler of its own: pygls looks at the names of a handler's arguments."""
+    """Wrap an answer as a handler, because pygls inspects the names of a handler's arguments."""
 
     def handler(params: Any) -> Any:
         return answer(session, params)
@@ -213,7 +213,7 @@ def _asked(answer: Any, session: EditorSession) -> Any:
 
 
 def _searched(server: LanguageServer, search: Any, session: EditorSession, title: str) -> Any:
-    """The answer from the thread that searches, with its progress where the editor wants to show it."""
+    """Wrap a search as a handler that runs it in the search thread, with progress."""
 
     async def handler(params: Any) -> Any:
         shown = Shown(server.progress, params.work_done_token, title)

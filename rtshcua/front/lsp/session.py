@@ -1,8 +1,8 @@
-"""What is open in the editor, what was found in it, and when the editor is told.
+"""The open texts of an editor, their findings, and when findings are published.
 
-A change is told of twice. At once: what the parser and the checks of declarations find. When the author pauses: what
-lowering, the proofs and the habits find besides, from another process. What was found in an older text is never told
-over a newer one, but for one case: where only comments and blanks changed, all that was found still holds, further on.
+After a change, findings are published twice: at once those of the parser and the checks of declarations; after a pause
+also those of lowering, proofs and lint rules, from another process. Findings of an older text are never published for a
+newer one, except if only comments and blanks changed: then all findings are kept and moved.
 """
 
 import asyncio
@@ -27,14 +27,14 @@ from rtshcua.mavlink import dialect
 log = logging.getLogger("rtshcua.lsp")
 
 AT_ONCE = 0.005
-"""Seconds that a check waits for the next change, which may be on its way already."""
+"""How long a check waits for a further change, in seconds."""
 PAUSE = 0.25
-"""Seconds without a change after which proofs begin."""
+"""The time without a change after which proofs begin, in seconds."""
 _IGNORE = "rtshcua:"
 
 
 class EditorSession(Texts):
-    """One editor's session. `tell` publishes the findings of one text, `say` tells a person what could not be done."""
+    """The session of one editor. `tell` publishes the findings of a text, `say` shows an error to the user."""
 
     def __init__(
         self,
@@ -53,7 +53,7 @@ class EditorSession(Texts):
         self._last: dict[str, list[lsp.Diagnostic]] = {}  # and which
 
     def end(self) -> None:
-        """Stops everything that runs."""
+        """Stop all running work."""
         for timer in (self._soon, self._later):
             if timer is not None:
                 timer.cancel()
@@ -63,23 +63,23 @@ class EditorSession(Texts):
     # ------------------------------------------------------------------------------------------ what is open
 
     def look_in(self, folders: list[str]) -> None:
-        """The workspace is these folders: imports lead to no others."""
+        """Set the folders of the workspace; imports may lead only to these."""
         self.folders = folders
         self._readable.folders = [os.path.realpath(each) for each in folders]
 
     def open(self, uri: str, version: int, text: str) -> None:
-        """A text was opened. Where there is no workspace, its project is one."""
+        """Open a text. Without a workspace, its project becomes one."""
         name = name_of(uri)
         if not self.folders and path_of(uri) is not None:
             self._readable.ask(name)
         self.opened[name] = OpenText(uri, version, LineIndex(text, self.encoding))
         self.desk.put(name, text)
         self.desk.forget()
-        gc.freeze()  # what is open stays: the collector need not look at it with every keystroke
+        gc.freeze()  # open texts live long: the garbage collector skips them
         self._outdated(None, first=name)
 
     def change(self, uri: str, version: int, changes: list[TextChange]) -> None:
-        """A text was changed."""
+        """Change an open text."""
         name = name_of(uri)
         opened = self.opened.get(name)
         if opened is None:
@@ -92,7 +92,7 @@ class EditorSession(Texts):
         self._outdated(name, cut if _only_moves(old, cut) else None)
 
     def close(self, uri: str) -> None:
-        """A text was closed: what is on disk counts, and its findings are not of interest any more."""
+        """Close a text: use the file on the disk again, and clear its findings."""
         name = name_of(uri)
         gone = self.opened.pop(name, None)
         if gone is not None:
@@ -103,7 +103,7 @@ class EditorSession(Texts):
             self._outdated(None)
 
     def reread(self) -> None:
-        """Files on the disk have changed."""
+        """Read files again after they changed on the disk."""
         self.desk.forget()
         self._outdated(None)
 
@@ -164,7 +164,7 @@ class EditorSession(Texts):
         return take
 
     def findings(self, name: str) -> tuple[Diagnostic, ...]:
-        """What is found in a file by the programs of all that is open, each thing once."""
+        """The findings of a file from the programs of all open texts, each once."""
         found: dict[tuple[object, ...], Diagnostic] = {}
         for own, opened in self.opened.items():
             for each in opened.found:
@@ -174,9 +174,9 @@ class EditorSession(Texts):
         return tuple(found.values())
 
     def _publish(self, changed: str | None = None) -> None:
-        """Tells what is new; of the text that was changed in any case."""
+        """Publish new findings, and in any case those of the changed text."""
         if changed is not None and any(each.quick_stamp != each.stamp for each in self.opened.values()):
-            self._publish_one(changed)  # of the others not everything is known yet
+            self._publish_one(changed)  # the other texts are not checked yet
             return
         files = {own if each.span is None else each.span.file
                  for own, opened in self.opened.items() for each in opened.found}  # fmt: skip

@@ -53,12 +53,12 @@ ITEMS = {
 
 @dataclass(slots=True)
 class OpenText:
-    """One text that is open: as the editor calls it, its lines, and what was found in the program that it makes."""
+    """An open text: its URI, version and lines, and the findings of its program."""
 
     uri: str
     version: int
     lines: LineIndex
-    stamp: int = 0  # goes up with every change of the program
+    stamp: int = 0  # increases with every change of the program
     quick: tuple[Diagnostic, ...] = ()
     whole: tuple[Diagnostic, ...] | None = None  # None: not known for the present text
     files: frozenset[str] = frozenset()
@@ -67,14 +67,14 @@ class OpenText:
 
     @property
     def found(self) -> tuple[Diagnostic, ...]:
-        """What is known of the present text; nothing while it waits to be looked at."""
+        """The findings of the present text; empty until it is checked."""
         if self.quick_stamp != self.stamp:
             return ()
         return self.quick if self.whole is None else self.whole
 
 
 class Spot(NamedTuple):
-    """Where an editor points: a program, the name and the lines of its first file, and the character in these."""
+    """A position in a text: its program, the name and lines of the first file, and the character offset."""
 
     view: ProgramView
     name: str
@@ -84,30 +84,30 @@ class Spot(NamedTuple):
 
 @dataclass(eq=False)
 class Texts:
-    """What is open, over what is on the disk, and how the editor counts and calls it."""
+    """The open texts over the files of the disk, and the editor's encoding and URIs."""
 
     desk: Workspace
     library: str
     dialect: Dialect
     encoding: Encoding = Encoding.UTF_16
     folders: list[str] = field(default_factory=list)
-    versioned: bool = False  # whether the editor takes changes that name the version they are for
+    versioned: bool = False  # whether the editor accepts versioned changes
     opened: dict[str, OpenText] = field(default_factory=dict)
 
     def copied(self) -> "Texts":
-        """The same as they are just now, for another thread: what is found in them is true of these versions."""
+        """A copy of the present texts for another thread."""
         opened = {name: copy(each) for name, each in self.opened.items()}
         desk = self.desk.with_texts({})
         return Texts(desk, self.library, self.dialect, self.encoding, list(self.folders), self.versioned, opened)
 
     def spot(self, uri: str, at: lsp.Position) -> Spot | None:
-        """A place in a text; None where there is no such text."""
+        """A position in a text; None if there is no such text."""
         name = name_of(uri)
         lines = self.lines(name)
         return None if lines is None else Spot(self.desk.view(name), name, lines, lines.offset(place(at)))
 
     def cut(self, uri: str) -> tuple[ParsedText, LineIndex] | None:
-        """A text that is open, and its lines."""
+        """An open text and its lines; None if it is not open."""
         cut = self.desk.open.get(name_of(uri))
         lines = None if cut is None else self.lines(cut.source.file)
         return None if cut is None or lines is None else (cut, lines)
@@ -135,32 +135,32 @@ class Texts:
         return None if text is None else LineIndex(text, self.encoding)
 
     def uri(self, name: str) -> str:
-        """What the editor calls a file."""
+        """The URI of a file in the editor."""
         opened = self.opened.get(name)
         return uri_of(name) if opened is None else opened.uri
 
     def locate(self, span: Span) -> lsp.Location | None:
-        """A place in any file; None where the file is gone."""
+        """The location of a span in any file; None if the file is gone."""
         lines = self.lines(span.file)
         return None if lines is None else lsp.Location(self.uri(span.file), range_of(lines, *span[1:]))
 
     def page(self, code: Code) -> str | None:
-        """Where a code is explained."""
+        """The URI of the page about a code."""
         return uri_of(f"{self.library}/docs/codes/{code.id}.md")
 
 
 def position(place: TextPosition) -> lsp.Position:
-    """A place."""
+    """Convert a position for the protocol."""
     return lsp.Position(place.line, place.column)
 
 
 def place(at: lsp.Position) -> TextPosition:
-    """A place of the editor's."""
+    """Convert a position from the protocol."""
     return TextPosition(at.line, at.character)
 
 
 def range_of(lines: LineIndex, start: int, end: int) -> lsp.Range:
-    """A range of characters."""
+    """The range between two character offsets."""
     return lsp.Range(position(lines.place(start)), position(lines.place(end)))
 
 
@@ -170,7 +170,7 @@ def diagnostic(
     locate: Callable[[Span], lsp.Location | None],
     page: Callable[[Code], str | None],
 ) -> lsp.Diagnostic:
-    """A finding in the file of `lines`; one without a place is at its beginning. `page` is where a code is told."""
+    """Convert a finding in the file of `lines`; without a span it is at the beginning. `page` gives a code's page."""
     span = found.span
     further = [lsp.DiagnosticRelatedInformation(at, label.text) for label in found.labels
                if (at := locate(label.span)) is not None]  # fmt: skip

@@ -39,7 +39,7 @@ def token_of(path: Path) -> bytes:
     if others is not None:
         raise BadToken(f"`{path}` is not private: {others}")
     if not TOKEN.fullmatch(token):
-        raise BadToken(f"`{path}` holds no token: 32 letters, digits or `-._~+/` at least, and nothing else")
+        raise BadToken(f"`{path}` has no valid token: at least 32 letters, digits or `-._~+/`, and nothing else")
     return token
 
 

@@ -32,10 +32,10 @@ def fitted(schema: Mapping[str, Any], arguments: Mapping[str, Any]) -> dict[str,
     for name in arguments:
         if name not in fields:
             known = ", ".join(f"`{each}`" for each in fields) or "none"
-            raise Unfit(f"there is no argument `{name[:MOST_SHOWN]}`", f"leave it out; there are: {known}")
+            raise Unfit(f"unknown argument `{name[:MOST_SHOWN]}`", f"leave it out; accepted: {known}")
     for name in schema["required"]:
         if name not in arguments:
-            raise Unfit(f"the argument `{name}` is missing", f"give {_ASKED[fields[name]['type']]} as `{name}`")
+            raise Unfit(f"the argument `{name}` is missing", f"pass {_ASKED[fields[name]['type']]} as `{name}`")
     return {name: _value(name, fields[name], value) for name, value in arguments.items()}
 
 
@@ -46,16 +46,16 @@ def _value(name: str, field: Mapping[str, Any], value: Any) -> Any:
     if kind == "integer" and isinstance(value, float) and value.is_integer():
         value = int(value)  # the same number to JSON Schema
     if isinstance(value, bool) or not isinstance(value, _TYPES[kind]):
-        help = f"give {_ASKED[kind]} as `{name}`"
+        help = f"pass {_ASKED[kind]} as `{name}`"
         if isinstance(value, str) and kind == "integer" and value.isascii() and value.isdecimal():
             help = f"write {int(value[:18])} without quotes as `{name}`"
         elif kind == "string" and isinstance(value, int | float):
             help = f"write {json.dumps(str(value))} as `{name}`"
-        raise Unfit(f"{_ASKED[kind]} is asked as `{name}`, and this is {_FOUND.get(type(value), 'none')}", help)
+        raise Unfit(f"`{name}` must be {_ASKED[kind]}, not {_FOUND.get(type(value), 'another type')}", help)
     least, most = field.get("minimum"), field.get("maximum")
     if (least is not None and value < least) or (most is not None and value > most):
-        within = f"from {least}" + (f" to {most}" if most is not None else " on")
-        raise Unfit(f"`{name}` is {str(value)[:MOST_SHOWN]}", f"it goes {within}")
+        within = f"from {least}" + (f" to {most}" if most is not None else "")
+        raise Unfit(f"`{name}` is {str(value)[:MOST_SHOWN]}", f"accepted: {within}")
     return value
 
 

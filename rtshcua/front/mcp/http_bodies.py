@@ -52,7 +52,7 @@ class Bodies:
             return
         asked = None if isinstance(read, Wrong) else self._asked(read, scope)
         if asked in self._open:
-            read = Wrong(NO_REQUEST, "`id` is that of another request, which was not answered yet")
+            read = Wrong(NO_REQUEST, "`id` is in use by another request that has no answer yet")
         if isinstance(read, Wrong):
             await _say(send, 400, read.answer())
             return

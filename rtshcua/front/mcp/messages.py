@@ -74,7 +74,7 @@ class _Reading:
         return made
 
     def constant(self, name: str) -> None:
-        self.wrong = f"the message has {name}, which is no number of JSON"
+        self.wrong = f"the message has {name}, which is not a number in JSON"
 
     def whole(self, text: str) -> int | None:
         if len(text) <= MOST_DIGITS:
@@ -112,7 +112,7 @@ def read_message(line: bytes, *, whole: bool = True) -> dict[str, Any] | Wrong:
         return Wrong(NO_JSON, "the message is not JSON")
     wrong = reading.wrong
     if "\\u" in text and _SURROGATE.search(json.dumps(told, ensure_ascii=False)):
-        wrong = "the message has half a surrogate pair, which is no character"
+        wrong = "the message has a lone surrogate, which is not a character"
     checked = _checked(told)
     if not wrong:
         return checked
@@ -139,22 +139,22 @@ def writable(told: Any) -> tuple[Any, str]:
 
 def _checked(told: Any) -> dict[str, Any] | Wrong:
     if isinstance(told, list):
-        return Wrong(NO_REQUEST, "several messages at once are not read: one message a line")
+        return Wrong(NO_REQUEST, "batches are not supported: send one message a line")
     if not isinstance(told, dict):
-        return Wrong(NO_REQUEST, "a message is an object")
+        return Wrong(NO_REQUEST, "a message must be an object")
     known = told.get("id")
     wrong = _wrong_id(known) if "id" in told else ""
     if wrong:
         return Wrong(NO_REQUEST, wrong)
     asked = known if "method" in told else None  # else it is the number of a request of ours
     if told.get("jsonrpc") != "2.0":
-        return Wrong(NO_REQUEST, '`jsonrpc` is "2.0" in each message', asked)
+        return Wrong(NO_REQUEST, '`jsonrpc` must be "2.0"', asked)
     if not isinstance(told.get("params", {}), dict):
-        return Wrong(NO_REQUEST, "`params` is an object", asked)
+        return Wrong(NO_REQUEST, "`params` must be an object", asked)
     if "method" in told:
-        return told if isinstance(told["method"], str) else Wrong(NO_REQUEST, "`method` is a text", asked)
+        return told if isinstance(told["method"], str) else Wrong(NO_REQUEST, "`method` must be a text", asked)
     if known is None or ("result" in told) == ("error" in told):
-        return Wrong(NO_REQUEST, "a message has a `method`, or is the answer to a request")
+        return Wrong(NO_REQUEST, "a message must have a `method`, or be the answer to a request")
     return told
 
 
@@ -162,11 +162,11 @@ def _wrong_id(known: Any) -> str:
     """What is wrong with an id; nothing where it can stand in an answer."""
     if isinstance(known, str):
         if _SURROGATE.search(known):
-            return "`id` has half a surrogate pair, which is no character"
-        return f"`id` has {len(known)} characters, {MOST_ID} at most" if len(known) > MOST_ID else ""
+            return "`id` has a lone surrogate, which is not a character"
+        return f"`id` has {len(known)} characters; the limit is {MOST_ID}" if len(known) > MOST_ID else ""
     if not isinstance(known, int) or isinstance(known, bool):
-        return "`id` is a whole number or a text"
-    return f"`id` is a number of more than {MOST_ID_BITS} bits" if known.bit_length() > MOST_ID_BITS else ""
+        return "`id` must be a whole number or a text"
+    return f"`id` has more than {MOST_ID_BITS} bits" if known.bit_length() > MOST_ID_BITS else ""
 
 
 def _id_of_large(line: bytes) -> int | str | None:

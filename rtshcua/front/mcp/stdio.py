@@ -109,16 +109,16 @@ class _Host:
             message = types.JSONRPCMessage.model_validate(read)
         except ValueError:
             self._open.discard(read.get("id", ""))
-            await self._put(Wrong(NO_REQUEST, "the message is none of the protocol", read.get("id")).answer())
+            await self._put(Wrong(NO_REQUEST, "the message is not a message of MCP", read.get("id")).answer())
             return
         await self._messages.send(SessionMessage(message))
 
     def _opened(self, request: dict[str, Any]) -> dict[str, Any] | Wrong:
         known = request["id"]
         if known in self._open:
-            return Wrong(NO_REQUEST, "`id` is that of another request, which was not answered yet")
+            return Wrong(NO_REQUEST, "`id` is in use by another request that has no answer yet")
         if len(self._open) >= MOST_OPEN:
-            return Wrong(NO_REQUEST, f"{MOST_OPEN} requests wait for their answers: one more is not taken", known)
+            return Wrong(NO_REQUEST, f"{MOST_OPEN} requests wait for their answers, which is the limit", known)
         self._open.add(known)
         return request
 

@@ -221,7 +221,7 @@ def _hiding(source: Source, tree: JsonTree) -> Iterator[Diagnostic]:
             control = _CONTROL.search(text)
             at = hiding(text) if control is None else control.start()
             if at is not None:
-                message = f"`{visible(text[at])}` hides or reorders what a person reads"
+                message = f"`{visible(text[at])}` hides or reorders the displayed text"
                 help = "remove control characters and invisible characters from the strings of the specification"
                 yield Diagnostic(HIDDEN_CHARACTER, message, span, help)
 

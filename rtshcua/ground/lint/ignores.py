@@ -184,7 +184,7 @@ def _unknown_ignore(name: str, code: Code | None, span: Span, *, guess: bool) ->
         near = nearest(name, [*(code.id for code in can), *(code.slug for code in can)])
     help = "write a code as `E1304` or `repeated-number`" if near is None else f"did you mean `{near}`?"
     fixes = () if near is None else (Fix(span, near, f"write `{near}`"),)
-    return Diagnostic(codes.UNKNOWN_IGNORE, f"there is no code `{name}`", span, help, fixes=fixes)
+    return Diagnostic(codes.UNKNOWN_IGNORE, f"unknown code `{name}`", span, help, fixes=fixes)
 
 
 def _removal(source: Source, comment: SourceComment, names: list[tuple[str, Span]], at: int) -> Fix:

@@ -134,7 +134,7 @@ class SettingsTable:
 
 def _near_code(name: str) -> str:
     near = nearest(name, [*REGISTRY, *(code.slug for code in REGISTRY.values())])
-    return "codes are written as `E1304` or `repeated-number`" if near is None else f"did you mean `{near}`?"
+    return "write a code as `E1304` or `repeated-number`" if near is None else f"did you mean `{near}`?"
 
 
 def _kind(found: object) -> str:

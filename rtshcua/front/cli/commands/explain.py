@@ -46,7 +46,7 @@ def explain(
             )
         near = nearest(code, [*REGISTRY, *(each.slug for each in REGISTRY.values())])
         help = f"did you mean `{near}`?" if near is not None else "run `rtshcua explain` to list all codes"
-        return fail(ExitCode.USAGE, f"there is no code `{code}`", help)
+        return fail(ExitCode.USAGE, f"unknown code `{code}`", help)
     page = read_page(found)
     if as_json:
         out_json(json.dumps(_row(found) | page._asdict(), indent=2, ensure_ascii=False))

@@ -74,7 +74,7 @@ def as_text(result: ProofResult, path: Path, pinned: Pin, *, kept: bool, first: 
         lines += _fields(result)
         proven, unproven = claims(result)
         if kept:
-            proven.append(Claim("checkpoint", "the checkpoint that you kept is one of this log"))
+            proven.append(Claim("checkpoint", "the log contains the checkpoint that you kept"))
         lines += listed("Proven", "green", "+", proven) + listed("Not proven", "yellow", "-", unproven)
     write(lines)
 
@@ -82,30 +82,30 @@ def as_text(result: ProofResult, path: Path, pinned: Pin, *, kept: bool, first: 
 def claims(result: Proven | ReceiptClaim) -> tuple[list[Claim], list[Claim]]:
     """Return the claims that the proof proves, and those that it does not."""
     key = f"log key {_key(result)}, which the trust root names for `{_name(result).vehicle}`"
-    last = "that nothing was added, and what the other records say: `verify-log` proves a log"
-    rewritten = "unanchored: too few witnesses vouch for it here, and the log key's holder could have written it anew"
+    last = "that no record was added, and the contents of other records: `verify-log` proves a log"
+    rewritten = "unanchored: too few witnesses cosigned it, so a holder of the log key could have rewritten it"
     unproven = [Claim("rest", last), Claim("anchor", rewritten)]
     if isinstance(result, ReceiptClaim):
-        text = f"record {result.number} stands in the log of {many(result.size, 'record')} that {key}, signed on export"
+        text = f"record {result.number} is in the log of {many(result.size, 'record')}, signed on export by {key}"
         return [Claim("inclusion", text)], unproven
     size = many(result.checkpoint.size, "record")
     chain = Claim("signature", f"the log of {size} was signed in the chain of keys that begins with {key}")
     match result.kind:
         case ProofKind.INCLUSION:
-            what = Claim("inclusion", f"record {result.number} stands in the log as it was signed at {size}")
+            what = Claim("inclusion", f"record {result.number} is in the log as signed at {size}")
         case ProofKind.CONSISTENCY:
             before = f"{many(result.number, 'record')} that {'was' if result.number == 1 else 'were'} signed before"
             text = f"the log of {size} begins with the {before}"
-            more = f"what was added since record {result.number}, and what any record says: `verify-log` proves a log"
+            more = f"records added since record {result.number}, and the contents of records: `verify-log` proves a log"
             unproven[0] = Claim("rest", more)
-            what = Claim("consistency", f"{text}: none of those was changed, added or taken out")
+            what = Claim("consistency", f"{text}: none of them was changed, added or removed")
         case ProofKind.RECORD:
-            what = Claim("record", f"record {result.number} was signed itself, as it stands here")
+            what = Claim("record", f"record {result.number} is a signed record, and is unchanged")
     cosigned = result.believed.cosigned
     if not cosigned:
         return [what, chain], unproven
     seen = ", ".join(f"`{each.name}` {utc(each.time_s * 1_000_000)}" for each in cosigned)
-    anchor = Claim("anchor", f"outside the vehicle witnesses saw this very log at {size}: {seen}")
+    anchor = Claim("anchor", f"witnesses outside the vehicle cosigned this log at {size}: {seen}")
     return [what, chain, anchor], unproven[:-1] if result.believed.anchored else unproven
 
 

@@ -72,7 +72,7 @@ def test_add_reports_an_unclosed_log(runs: Path, capsys: pytest.CaptureFixture[s
     assert archive("add", runs, *ROOT) == ExitCode.INCOMPLETE
     first, last = capsys.readouterr().out.splitlines()
     assert first.startswith(f"incomplete  {runs / 'quad-08-2' / 'log.jsonl'}: close/missing, the log ends after")
-    assert last == "6 logs, 6 of them verified now, under the key that you gave: 5 verified, 1 incomplete"
+    assert last == "6 logs, 6 of them verified now, under the key on the command line: 5 verified, 1 incomplete"
     assert archive("add", runs / "quad-07-0", *ROOT) == ExitCode.OK
     assert "1 log, 0 of them verified now" in capsys.readouterr().out
 
@@ -326,7 +326,7 @@ def test_other_files_do_not_block_the_logs_of_a_folder(
     out = capsys.readouterr().out
     assert out.count("it is not a log of this program") == 2
     assert "flown/log.jsonl: not a regular file" in out
-    assert out.splitlines()[-1] == "1 log, 1 of them verified now, under the key that you gave: 1 verified"
+    assert out.splitlines()[-1] == "1 log, 1 of them verified now, under the key on the command line: 1 verified"
     assert archive("add", "flown", *ROOT, "--json") == ExitCode.INPUT
     assert [Path(each["path"]).parent.name for each in as_json(capsys)["skipped"]] == ["a", "b", "flown"]
     assert archive("add", "flown/a", "flown/b", *ROOT) == ExitCode.INPUT

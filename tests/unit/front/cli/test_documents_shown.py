@@ -258,7 +258,7 @@ def test_a_step_refused_on_the_ground_flies_nothing(tmp_path: Path, capsys: pyte
     path = tmp_path / "log.jsonl"
     path.write_bytes(b"".join(run.lines))
     assert main(["why", str(path)]) == ExitCode.OK
-    assert "flies         nothing: it had not left the ground" in capsys.readouterr().out
+    assert "flies         nothing: the vehicle was on the ground" in capsys.readouterr().out
 
 
 def test_numbers_in_a_log_are_labelled(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

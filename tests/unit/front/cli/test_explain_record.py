@@ -41,7 +41,7 @@ def test_a_decision(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert re.search(r"battery = 99 %, 5\d\d(\.\d)? ms old", told)
     assert "position = 47.39" in told
     assert "gps.fix = fix_3d" in told
-    assert "durability 3 (synced first): on the disk before what it permits went out" in told
+    assert "durability 3 (synced first): on the disk before the permitted command was sent" in told
     seal = next(record["seq"] for record in RECORDS if record["type"] == "seal")
     key = RECORDS[0]["next_key"]
     assert f"signed by record {seal}, which seals epoch 0, with epoch key {key}, which record 0 names" in told
@@ -53,7 +53,7 @@ def test_dispatch_record_names_its_permit(log: Path, capsys: pytest.CaptureFixtu
     assert explain(log, SENT["seq"]) == ExitCode.OK
     told = words(capsys)
     assert f"permitted by record {DECISION['seq']}" in told
-    assert "durability 1 (written): it outlives the process" in told
+    assert "durability 1 (written): survives the end of the process" in told
 
 
 @pytest.mark.slow

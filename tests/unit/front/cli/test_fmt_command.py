@@ -117,7 +117,7 @@ def test_other_files_are_skipped_and_sources_formatted(
     [
         (["none.rts"], ExitCode.INPUT, "no such file"),
         (["b/notes.txt/x.rts"], ExitCode.INPUT, "no such file"),
-        (["empty"], ExitCode.INPUT, "there is no source (.rts) in `empty`"),
+        (["empty"], ExitCode.INPUT, "there is no source (.rts) in or below `empty`"),
         (["-", "a.rts"], ExitCode.USAGE, "`-` cannot be combined with other paths"),
         (["--stdin-filename", "x.rts", "a.rts"], ExitCode.USAGE, "`--stdin-filename` requires `-`"),
         (["--config", "none.toml", "a.rts"], ExitCode.INPUT, "none.toml"),

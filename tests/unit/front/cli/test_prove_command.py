@@ -53,7 +53,7 @@ def test_a_record_in_and_out(capsys: pytest.CaptureFixture[str]) -> None:
     assert "PROVEN  record-3.tlog-proof" in out
     assert "vehicle  quad 07/é" in out
     assert "detail           goto 3" in out
-    assert "record 3 stands in the log as it was signed at 6 records" in out
+    assert "record 3 is in the log as signed at 6 records" in out
     assert "Not proven" in out
     assert "complete" not in out
     assert "\033" not in out
@@ -100,7 +100,7 @@ def test_a_receipt(capsys: pytest.CaptureFixture[str]) -> None:
     assert prove(3, "--cose", "--log-key", "log.key") == ExitCode.OK
     assert Path("record-3.cose").read_bytes()[:1] == b"\xd2"
     assert verify("record-3.cose") == ExitCode.OK
-    assert "stands in the log of 6 records" in capsys.readouterr().out
+    assert "is in the log of 6 records" in capsys.readouterr().out
     assert verify("record-3.cose", "--json") == ExitCode.OK
     object = told(capsys)
     assert (object["kind"], object["size"]) == ("receipt", 6)
@@ -111,7 +111,7 @@ def test_the_close_is_proven_by_itself(capsys: pytest.CaptureFixture[str]) -> No
     last = len(LOG.lines) - 1
     assert prove(last) == ExitCode.OK
     assert verify(f"record-{last}.tlog-proof") == ExitCode.OK
-    assert f"record {last} was signed itself" in capsys.readouterr().out
+    assert f"record {last} is a signed record" in capsys.readouterr().out
     assert prove(last, "--cose", "--log-key", "log.key") == ExitCode.INPUT
     assert "has no receipt" in capsys.readouterr().err
 
@@ -121,7 +121,7 @@ def test_a_checkpoint_that_somebody_kept(capsys: pytest.CaptureFixture[str]) -> 
     Path("kept").write_text(kept, encoding="utf-8")
     assert prove("--since", SIGNED[1], "-o", "p") == ExitCode.OK
     assert verify("p", "--checkpoint", "kept") == ExitCode.OK
-    assert "the checkpoint that you kept is one of this log" in capsys.readouterr().out
+    assert "the log contains the checkpoint that you kept" in capsys.readouterr().out
     Path("kept").write_text(other, encoding="utf-8")
     assert verify("p", "--checkpoint", "kept") == ExitCode.EVIDENCE
     lines = kept.split("\n")
@@ -170,7 +170,7 @@ def test_proof_includes_cosignatures(folder: Path, capsys: pytest.CaptureFixture
     capsys.readouterr()
     assert verify("p") == ExitCode.OK
     out = capsys.readouterr().out
-    assert "outside the vehicle witnesses saw this very log at 6 records:" in out
+    assert "witnesses outside the vehicle cosigned this log at 6 records:" in out
     assert "2025-06-15 15:08:20Z" in out
     assert "unanchored" not in out
     assert verify("p", "--json") == ExitCode.OK
@@ -198,8 +198,8 @@ def test_the_nearest_checkpoint_that_witnesses_saw_vouches_for_it(
         assert (object["anchored"], object["size"]) == (True, size)
     assert verify("since") == ExitCode.OK
     out = " ".join(capsys.readouterr().out.split())
-    assert "none of those was changed, added or taken out" in out
-    assert "- what was added since record 0, and what any record says" in out
+    assert "none of them was changed, added or removed" in out
+    assert "- records added since record 0, and the contents of records" in out
     assert "that nothing was added" not in out
     assert prove(1, "--at", first, "-o", "at") == ExitCode.OK
     assert "not anchored: too few witnesses cosigned the checkpoint that covers it" in capsys.readouterr().out

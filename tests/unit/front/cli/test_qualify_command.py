@@ -106,7 +106,7 @@ def test_table_lists_failed_checks_with_reasons() -> None:
         "                     help: declare `brakes`",
         "-     takeover/mode  not asked for",
         "NOT qualified: 1 hold, 1 do not, 1 not checked, in 61 s of flight",
-        "not flown: climb, leg; `doctor` and `run` take a vehicle for qualified when all were flown",
+        "not flown: climb, leg; `doctor` and `run` accept it after all sorties were flown",
     ]
     sorties = [QualificationCheck(f"sortie/{name}", CheckOutcome.HELD, "", "") for name in ("climb", "leg")]
     assert list(told(record(held, *sorties), None))[-1].startswith("qualified: 3 hold")

@@ -78,7 +78,7 @@ def test_every_field_of_a_contract_is_visible_where_nobody_wrote_it(
         "deadline   2 s after release",
         "valid      for 30 min after issue, in any phase",
         "lasts      at most 5 min",
-        "grace      500 ms: how long a signal may be unknown while it runs",
+        "grace      500 ms: how long a signal may be unknown while the step runs",
         "assume     nothing",
         "maintain   nothing",
         "energy     at most 1 %",
@@ -144,7 +144,7 @@ def test_damaged_log_is_shown_up_to_the_damage(tmp_path: Path, capsys: pytest.Ca
     assert "allow     step 1: admitted" in out
     assert "follows" in out
     assert "The rest is not shown" in out
-    assert f"line {at + 1} is no record" in out
+    assert f"line {at + 1} is not a record" in out
 
 
 @pytest.mark.parametrize("link", [-2, 0, 99])

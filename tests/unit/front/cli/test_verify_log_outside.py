@@ -64,7 +64,7 @@ def test_a_file_of_anchors_that_holds_none(how: list[str], log: Path, capsys: py
     (log.parent / "empty.anchors").touch()
     assert verify(log, *how) == ExitCode.OK
     out = " ".join(capsys.readouterr().out.split())
-    assert "- what witnesses would say in `log.anchors`: these files contain no readable notes" in out
+    assert "- the notes of witnesses in `log.anchors`: these files contain no readable notes" in out
 
 
 def test_missing_path_is_reported(log: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -77,7 +77,7 @@ def test_a_process_that_fails_once_is_replaced(tmp_path: Path, fault: str) -> No
 def test_failing_prover_is_reported_and_tried_again(tmp_path: Path) -> None:
     found, said, starts = asked(tmp_path, f"if starts < 2:\n  sys.exit(1){RIGHT}", "a", "b")
     assert found == [None, FOUND]
-    assert said == ["the proofs of a could not be had: the process that proves has ended"]
+    assert said == ["the proofs of a failed: the prover process has ended"]
     assert starts == 3
 
 
@@ -86,7 +86,7 @@ def test_hanging_prover_is_killed(tmp_path: Path, hangs: str) -> None:
     """This includes one that does not read its request."""
     found, said, starts = asked(tmp_path, f"if not starts:\n  {hangs}{RIGHT}", "a", "b", longest=0.5)
     assert found == [None, FOUND]
-    assert [each[: each.index(":")] for each in said] == ["the proofs of a took too long and were given up"]
+    assert [each[: each.index(":")] for each in said] == ["the proofs of a took too long and were stopped"]
     assert starts == 2
 
 

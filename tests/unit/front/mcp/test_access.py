@@ -83,7 +83,7 @@ def test_invalid_token_is_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "token"
     path.write_text(text, "utf-8")
     path.chmod(0o600)
-    with pytest.raises(BadToken, match="holds no token"):
+    with pytest.raises(BadToken, match="has no valid token"):
         token_of(path)
 
 

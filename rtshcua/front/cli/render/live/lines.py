@@ -23,12 +23,12 @@ _BESIDE_TIME: Final = WIDTH - 13
 _ALARMS: Final = {
     "recall": "RECALLED: no further step begins. In the air the policy's contingency flies",
     "cancellation": "CANCELLED by its proposer: no further step begins. In the air the policy's contingency flies",
-    "taken-over": "TAKEN OVER: somebody else flies the vehicle. Nothing more is sent to it",
+    "taken-over": "TAKEN OVER: another pilot or program flies the vehicle. Nothing more is sent to it",
 }
 
 
 #: what a detail means to a person
-_TOLD: Final = {WITHDRAWN: "nothing was sent: it is tried again, up to its deadline"}
+_TOLD: Final = {WITHDRAWN: "nothing was sent: the step is tried again until its deadline"}
 
 
 def plain(message: Message) -> Iterable[str]:

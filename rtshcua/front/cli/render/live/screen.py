@@ -174,7 +174,7 @@ def _signals(board: Board, width: int) -> Iterator[Text]:
     longest = max((cell_len(reading.name) for reading in readings), default=0)
     for reading in readings:
         unknown = None in reading.values
-        value = "never told" if unknown else visible(board.value(reading))
+        value = "no value" if unknown else visible(board.value(reading))
         late = f", {tenths(reading.age_us // 1_000)} s old" if reading.stale and not unknown else ""
         text = Text(f"{visible(reading.name):<{min(longest, width // 2)}}  ")
         yield text.append(f"{value}{late}", style="red" if reading.stale or unknown else "green")

@@ -69,7 +69,7 @@ def recorded(detail: str, people: People = NOBODY) -> str:
     try:
         return said(b64decode(detail, validate=True)).told(people)
     except (ValueError, Untrusted):
-        return "what it holds is no document"
+        return "the document is malformed"
 
 
 def kind_of_document(data: bytes) -> Artefact | None:

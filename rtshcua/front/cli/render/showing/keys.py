@@ -24,9 +24,9 @@ def show_root(page: TextPage, data: bytes, now_us: int) -> dict[str, object]:
     kid = cose.unverified(data, limit=MAX_ROOT).kid
     root = open_root(data, pinned=kid, now_us=0)
     over = " (expired)" if now_us >= root.expires_at_us else ""
-    page.head("Development root: its keys lie unencrypted where they were made" if root.development else "Trust root")
+    page.head("Development root: its keys are not encrypted" if root.development else "Trust root")
     page.row("version", str(root.version))
-    page.row("signed by", f"{kid.hex()}; compare it with the pin that you were given")
+    page.row("signed by", f"{kid.hex()}; compare it with the pin of the operator")
     page.row("valid", f"{utc(root.issued_at_us)} to {utc(root.expires_at_us)}{over}")
     page.head("Keys")
     for key in root.keys:

@@ -43,7 +43,7 @@ def show_log(page: TextPage, lines: Iterable[bytes]) -> dict[str, object]:
     start_us, names, entries, stopped = 0, Names(None), [], None
     for number, record in enumerate(_records(lines)):
         if isinstance(record, Flaw):
-            stopped = f"line {number + 1} is no record: {record.text}"
+            stopped = f"line {number + 1} is not a record: {record.text}"
             break
         if isinstance(record, Genesis):
             start_us, names = record.at_us, Names.of(record)

@@ -44,7 +44,7 @@ def fields(policy: Policy, contract: Contract) -> list[tuple[str, str]]:
         ("deadline", f"{words.duration(contract.deadline_us)} after release"),
         ("valid", f"for {words.duration(contract.validity_us)} after issue{during}"),
         ("lasts", f"at most {words.duration(contract.duration_us)}"),
-        ("grace", f"{words.duration(contract.grace_us)}: how long a signal may be unknown while it runs"),
+        ("grace", f"{words.duration(contract.grace_us)}: how long a signal may be unknown while the step runs"),
         *_list("require", _texts(contract.require)),
         *_list("assume", _texts(contract.assume)),
         *_list("maintain", _texts(contract.maintain)),
@@ -65,13 +65,13 @@ def _list(name: str, values: Sequence[str]) -> list[tuple[str, str]]:
 
 #: what `without evidence` says, and means
 _WITHOUT_EVIDENCE: dict[int, str] = {
-    WithoutEvidence.LAND: "evidence land: while records are not kept the mission is given up",
-    WithoutEvidence.REFUSE: "evidence refuse: while records are not kept no further step begins",
+    WithoutEvidence.LAND: "evidence land: while records cannot be kept, the mission is aborted",
+    WithoutEvidence.REFUSE: "evidence refuse: while records cannot be kept, no further step begins",
 }
 #: what `without link` says, and means
 _AFTER_SILENCE: dict[int, str] = {
-    AfterSilence.CONTINUE: "continue: after a longer silence the step goes on, if all that must hold holds",
-    AfterSilence.CONTINGENCY: "contingency: after a longer silence the mission is given up, and the contingency flies",
+    AfterSilence.CONTINUE: "continue: after a longer silence the step continues while its conditions hold",
+    AfterSilence.CONTINGENCY: "contingency: after a longer silence the mission is aborted, and the contingency flies",
 }
 _HOUR_US = 3_600_000_000
 _MINUTE_US = 60_000_000
@@ -118,8 +118,8 @@ def _of_vehicle(policy: Policy) -> Iterator[tuple[str, str]]:
         yield "returns", f"at {words.length(vehicle.return_altitude)} above home, if it flies lower"
     if vehicle.braking:
         braking, reaction = words.speed(vehicle.braking), words.duration(vehicle.reaction_us)
-        yield "brakes", f"by {braking} in a second, after {reaction}: limits count where it would come to stand"
-    yield "position", f"true to {words.length(vehicle.position_error)}: every planned path is widened by this"
+        yield "brakes", f"by {braking} in a second, after {reaction}: limits apply at the point where it would stop"
+    yield "position", f"true to {words.length(vehicle.position_error)}: every planned path is widened by this error"
     hover, reserve = words.duration(vehicle.endurance_us), words.ratio(vehicle.reserve)
     yield "energy", f"a full battery hovers {hover}; {reserve} stay in reserve"
     if vehicle.without:
@@ -141,7 +141,7 @@ def _show_rules(page: TextPage, policy: Policy) -> None:
     page.rows("contingency", [f"{n} {words.link(policy, link)}" for n, link in enumerate(policy.contingency)])
     if policy.contingency and all(0 <= link.skill < len(policy.contracts) for link in policy.contingency):
         most = words.duration(-(-falling_us(policy, None, Limits(), WAIT_US) // _MINUTE_US) * _MINUTE_US)
-        page.row("", f"at most {most} until it is down, or given up after the last tries")
+        page.row("", f"at most {most} until the vehicle is on the ground, or the last attempt has failed")
     page.row("without", _WITHOUT_EVIDENCE.get(policy.without_evidence, f"evidence: {policy.without_evidence}?"))
     then = _AFTER_SILENCE.get(policy.after_silence, f"{policy.after_silence}?")
     page.row("without", f"link for {words.duration(policy.silence_us)} {then}")

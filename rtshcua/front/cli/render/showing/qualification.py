@@ -40,7 +40,7 @@ def told(record: Qualification, broken: Ending | None) -> Iterator[str]:
     end = "NOT qualified" if not record.qualifies else "partly qualified" if left_out else "qualified"
     yield f"{end}: {counts['ok']} hold, {counts['FAIL']} do not, {counts['-']} not checked, in {flown}"
     if left_out:
-        yield f"not flown: {', '.join(left_out)}; `doctor` and `run` take a vehicle for qualified when all were flown"
+        yield f"not flown: {', '.join(left_out)}; `doctor` and `run` accept it after all sorties were flown"
 
 
 def _number(octets: bytes) -> str:

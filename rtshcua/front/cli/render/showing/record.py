@@ -24,8 +24,8 @@ from rtshcua.wire.untrusted import Untrusted
 
 _ASKED = {STEP: "to begin a step", FALLBACK_LINK: "to fall back", CONTINGENCY_LINK: "to fly the contingency"}
 _MEANS = (
-    "lost with the process", "it outlives the process", "on the disk within {} ms",
-    "on the disk before what it permits went out",
+    "lost if the process dies", "survives the end of the process", "on the disk within {} ms",
+    "on the disk before the permitted command was sent",
 )  # fmt: skip
 
 
@@ -196,7 +196,7 @@ def _firmness(told: Told, report: LogReport) -> dict[str, str]:
         text = meaning.format(f"{genesis.sync_us / 1_000:g}") if record.durability == SYNCED else meaning
         found["durability"] = f"{record.durability} ({word}): {text}"
     else:
-        found["durability"] = "signed records are on the disk before anything goes on"
+        found["durability"] = "signed records are on the disk before the run continues"
     if isinstance(record, Genesis):
         found["signed by"] = f"log key {record.log_kid}"
     elif sealed is None:
@@ -214,7 +214,7 @@ def _outside(number: int, report: LogReport) -> str:
     outside = report.outside
     saw = 0 if outside is None else sum(seen.size >= number for seen in outside.witnessed)
     if outside is None or not saw:
-        return "no: no witness outside saw it"
+        return "no: no witness cosigned it"
     return f"no: cosigned by {saw} of {outside.threshold} required witnesses"
 
 
@@ -228,7 +228,7 @@ def _key(told: Told, genesis: Genesis, sealed: Sealing) -> str:
 def _verified(report: LogReport) -> str:
     finding = report.failure or report.shortfall
     if finding is None:
-        return "yes: the log is whole and signed to its end"
+        return "yes: the log is complete and signed to its end"
     if report.verdict is LogVerdict.INCOMPLETE:
         return f"as far as it goes: the log is incomplete, {finding.text}"
     return f"NO, the log fails at record {finding.record}, {finding.slug}: {finding.text}"

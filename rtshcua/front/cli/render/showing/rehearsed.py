@@ -19,7 +19,7 @@ def show_rehearsal(rehearsal: FlightRehearsal, *, as_json: bool) -> ExitCode:
     else:
         page = _page(rehearsal)
         if rehearsal.interrupted:
-            page.text("(interrupted: this is as it stood then)")
+            page.text("(interrupted: the state at that time)")
         out_rendered(str(page))
     return rehearsal.exit_code
 
@@ -27,7 +27,7 @@ def show_rehearsal(rehearsal: FlightRehearsal, *, as_json: bool) -> ExitCode:
 def _page(rehearsal: FlightRehearsal) -> TextPage:
     loaded, found, _, refusal, unready, _ = rehearsal
     mission, page = loaded.bundle.mission, for_terminal()
-    page.head(f"Rehearsal of {mission.name} on {loaded.vehicle}: nothing is sent, nothing is used up")
+    page.head(f"Rehearsal of {mission.name} on {loaded.vehicle}: nothing is sent, and the bundle can still fly")
     if refusal is not None:
         page.row("would not begin", refusal)
     if unready is not None:
@@ -43,15 +43,18 @@ def _page(rehearsal: FlightRehearsal) -> TextPage:
             page.row("because", f"{decision.reason.value}{clause}", indent=7, width=10)
             if each.observing:
                 page.row(
-                    "waits", "until it was observed for as long as it looks back, from the run on", indent=7, width=10
+                    "waits",
+                    "until the condition was observed for its whole window, from the start of the run",
+                    indent=7,
+                    width=10,
                 )
             page.rows("would pass", [would_pass(one) for one in each.nearest], indent=7, width=10)
     page.text("")
     waits = sum(each.hopeful and each.decision.outcome is not Outcome.ALLOW for each in found)
     admitted = sum(each.decision.outcome is Outcome.ALLOW for each in found)
     others = len(found) - admitted - waits
-    page.text(f"{admitted} of {len(found)} steps admitted, {waits} waiting for what will come, {others} would not fly")
-    page.text("(a later step is judged where those before it end, with all else as it is now)")
+    page.text(f"{admitted} of {len(found)} steps admitted, {waits} waiting for later events, {others} would not fly")
+    page.text("(a later step is judged at the end position of the previous ones, with the present state)")
     return page
 
 

@@ -100,7 +100,7 @@ def show_why(page: TextPage, trace: Trace, case: Case) -> dict[str, object]:
 
 def _flies(target: Link | None, aloft: bool | None) -> str:
     if aloft is False:
-        return "nothing: it had not left the ground, and nothing was sent"
+        return "nothing: the vehicle was on the ground, and nothing was sent"
     if target is None:
         return "nothing: no link may fly now"
     return target.text if aloft else f"{target.text}, in the air; on the ground nothing is sent"

@@ -107,7 +107,7 @@ def show_link(
         whose = f"the degrade rule `{' '.join(found.rule.text.split())}`"
     page.head(f"{found.link.link.text}, of {whose}: {record.outcome}, {record.reason}")
     page.row("flies", words.link(policy, found.link.link))
-    page.row("asked for", "its skill's `require`, and that it leads no further out of the airspace; nothing else")
+    page.row("asked for", "its skill's `require`, and that it does not lead further out of the airspace")
     for check in found.checks:
         text = "" if check.clause is None else " ".join(check.clause.text.split())
         page.row(check.role, f"{truth_of(check)}: `{text}`", indent=5, width=10)

@@ -73,7 +73,7 @@ def test_external_text_cannot_control_the_terminal() -> None:
 
 def test_repeated_step_is_shown_as_repeated() -> None:
     told = sentence(Happening("refused", 1, 0, "takeoff()", detail="permit/unsent"))
-    assert told == "refused      takeoff()  nothing was sent: it is tried again, up to its deadline"
+    assert told == "refused      takeoff()  nothing was sent: the step is tried again until its deadline"
     assert sentence(Happening("refused", 1, 0, "takeoff()", detail="permit/sent")).endswith("permit/sent")
 
 
@@ -112,7 +112,7 @@ def test_the_screen_shows_steps_state_and_countdown() -> None:
     assert "fix_3d" in text
     assert "fix_3d, 5.0 s old" in text
     assert "10.0 m E, 4.0 m S" in text
-    assert "never" in text
+    assert "no value" in text
     assert "contract inspect_area  may go on for 10.0 s" in text
     assert "running, mode software, 10x speed" in text
     assert "X" in text

@@ -74,8 +74,10 @@ def test_dry_run_names_the_awaited_condition() -> None:
     of, values = waiting(), FakeVehicle().values
     state = State(tuple(values[slot] for slot in range(len(values))), (10_000,) * len(values), (UNKNOWN, UNKNOWN))
     page = str(rehearsed._page(FlightRehearsal(of, rehearse(of, state, START), (), None, None, interrupted=False)))
-    assert "waits until it was observed for as long as it looks back, from the run on" in " ".join(page.split())
-    assert "1 waiting for what will come, 0 would not fly" in page
+    assert "waits until the condition was observed for its whole window, from the start of the run" in " ".join(
+        page.split()
+    )
+    assert "1 waiting for later events, 0 would not fly" in page
 
 
 def test_degraded_skill_is_named_if_it_is_unique() -> None:

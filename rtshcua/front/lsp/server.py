@@ -157,7 +157,7 @@ class Protocol(LanguageServerProtocol):
     """
 
     def structure_message(self, data: dict[str, Any]) -> Any:
-        """The parsed message; None for a malformed request, which is answered here. Raises JsonRpcException otherwise."""
+        """The parsed message; None for a malformed request, which is answered here. Raises JsonRpcException."""
         try:
             return super().structure_message(data)
         except JsonRpcException as error:

@@ -253,7 +253,7 @@ WRONG = [
     (("--boundary-socket", "s"), "requires `--connect`"),
     (("--boundary-socket", "s", "--connect", "udpin:127.0.0.1:1", "--vehicle", "v", "--mode", "software"), "software"),
     *(
-        (("--boundary-socket", "s", "--connect", "udpin:127.0.0.1:1", "--vehicle", "v", name, *value), f"`{name}` does")
+        (("--boundary-socket", "s", "--connect", "udpin:127.0.0.1:1", "--vehicle", "v", name, *value), f"`{name}` cannot")
         for name, *value in (
             ("--signing-key", "k"), ("--boundary-user", "nobody"), ("--log-key", "k"), ("--boundary-key", "k"),
             ("--passphrase-file", "k"), ("--set", "GF_ACTION=2"), ("--dry-run",), ("--utc-error", "1s"),

@@ -54,7 +54,7 @@ def test_doctor_examines_a_vehicle_over_udp() -> None:
         (["--connect", "serial:/dev/no-such-device:57600"], 8, "no such file"),
         (["--connect", "udpin:127.0.0.1:14550", "missing.bundle"], 3, "no such file"),
         ([], 2, "--connect"),
-        (["--connect", "udpin:127.0.0.1:14550", "--agent-user", "no-such-user"], 2, "no user `no-such-user`"),
+        (["--connect", "udpin:127.0.0.1:14550", "--agent-user", "no-such-user"], 2, "unknown user `no-such-user`"),
     ],
 )
 def test_wrong_options_are_refused(commands: Forked, words: list[str], code: int, says: str, tmp_path: Path) -> None:

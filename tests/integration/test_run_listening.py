@@ -98,7 +98,7 @@ def test_vehicle_of_a_killed_runtime_is_brought_down(ground: Any, made: Listenin
     records = [json.loads(line) for line in (other / "log.jsonl").read_text().splitlines()]
     assert "resumed" in [record.get("event") for record in records]
     assert records[0]["mode"] == "process"
-    assert any("`rtshcua recover` ends it" in event.get("text", "") for event in second.events)
+    assert any("run `rtshcua recover` where the log's key is" in event.get("text", "") for event in second.events)
     assert aboard.verified(killed)[0] == 10
     assert aboard.verified(other)[0] == 0
 
@@ -253,7 +253,7 @@ WRONG = [
     (("--boundary-socket", "s"), "requires `--connect`"),
     (("--boundary-socket", "s", "--connect", "udpin:127.0.0.1:1", "--vehicle", "v", "--mode", "software"), "software"),
     *(
-        (("--boundary-socket", "s", "--connect", "udpin:127.0.0.1:1", "--vehicle", "v", name, *value), f"`{name}` cannot")
+        (("--boundary-socket", "s", "--connect", "udpin:127.0.0.1:1", "--vehicle", "v", name, *value), f"`{name}` ")
         for name, *value in (
             ("--signing-key", "k"), ("--boundary-user", "nobody"), ("--log-key", "k"), ("--boundary-key", "k"),
             ("--passphrase-file", "k"), ("--set", "GF_ACTION=2"), ("--dry-run",), ("--utc-error", "1s"),

@@ -58,7 +58,7 @@ def test_project_settings_apply(place: Path, capsys: pytest.CaptureFixture[str])
     assert changed == 1
     settings.write_text(text, encoding="utf-8")
     assert app.main(["test", "."]) == 13
-    assert "less than 100 %" in capsys.readouterr().out
+    assert "below the required 100 %" in capsys.readouterr().out
 
 
 @pytest.mark.slow

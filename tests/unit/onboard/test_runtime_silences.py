@@ -594,7 +594,7 @@ def test_unresponsive_vehicle_is_awaited_while_it_can_fly(situation: Situation) 
     go_on(run, 3 * TICK)
     assert run.ending is Ending.LINK_LOST
     assert [record["detail"] for record in run.records if record.get("event") == "link-lost"] == [
-        "the vehicle is heard but answers nothing"
+        "the vehicle is heard, but answers nothing"
     ]
     assert "stranded" not in run.events
     assert_audited(run)

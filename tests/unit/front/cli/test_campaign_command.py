@@ -3,6 +3,7 @@
 import json
 import signal
 from collections.abc import Callable
+from html import unescape
 from pathlib import Path
 from typing import Any
 
@@ -78,7 +79,7 @@ def test_flights_that_are_flown_and_judged(here: Path, capsys: pytest.CaptureFix
     assert set(found["kinds"]) == set(found["near"]) <= {"link-silence", "wind"}, "as sources and `--fault` call them"
     titles = {each["name"]: each["title"] for each in found["margins"]}
     assert titles["fence_mm"] == "least distance to the airspace's edge, inside"
-    text = Path("made/report.html").read_text()
+    text = unescape(Path("made/report.html").read_text())
     assert titles["fence_mm"] in text
     for internal in ("fence_mm", "ended_us", "LinkSilence", "WindStep"):
         assert internal not in text

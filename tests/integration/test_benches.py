@@ -35,6 +35,7 @@ SAMPLES: dict[str, dict[str, Any]] = {
     "flood": {"BLOCKS": 1, "BLOCK_S": 0.5, "STEPS": (4, 20), "TRIES": 1},
     "format": {"LINES": 100, "ROUNDS": 1},
     "hostile_link": {"DATAGRAMS": 8_000, "BLOCK": 1_000, "GOOD": 100},
+    "isolation": {"BLOCKS": 1, "ROUNDS": 2},
     "lint": {"ROUNDS": 1, "FEW": 10, "MANY": 20},
     "many_rules": {"FEW": 10, "MANY": 40, "ROUNDS": 1},
     "missions": {"SIZES": (15, 30), "ROUNDS": 1},

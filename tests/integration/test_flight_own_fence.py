@@ -11,10 +11,10 @@ from virtual.shipped import shipped, simulated
 NARROW = {
     "a circle": ("ardupilot", {"FENCE_RADIUS": 50.0}, "`FENCE_RADIUS`", "take 2 out of `FENCE_TYPE`, which is 7"),
     "a ceiling": ("ardupilot", {"FENCE_ALT_MAX": 15.0}, "`FENCE_ALT_MAX`", "take 1 out of `FENCE_TYPE`"),
-    "a margin": ("ardupilot", {"FENCE_ALT_MAX": 31.0, "FENCE_MARGIN": 20.0}, "`FENCE_ALT_MAX`", "50 at the least"),
-    "a floor": ("ardupilot", {"FENCE_TYPE": 15.0, "FENCE_ALT_MIN": 40.0}, "`FENCE_ALT_MIN`", "at the most"),
-    "a circle of PX4's": ("px4", {"GF_MAX_HOR_DIST": 50.0}, "`GF_MAX_HOR_DIST`", "at the least"),
-    "a ceiling of PX4's": ("px4", {"GF_MAX_VER_DIST": 15.0}, "`GF_MAX_VER_DIST`", "at the least"),
+    "a margin": ("ardupilot", {"FENCE_ALT_MAX": 31.0, "FENCE_MARGIN": 20.0}, "`FENCE_ALT_MAX`", "at least 50"),
+    "a floor": ("ardupilot", {"FENCE_TYPE": 15.0, "FENCE_ALT_MIN": 40.0}, "`FENCE_ALT_MIN`", "at most"),
+    "a circle of PX4's": ("px4", {"GF_MAX_HOR_DIST": 50.0}, "`GF_MAX_HOR_DIST`", "at least"),
+    "a ceiling of PX4's": ("px4", {"GF_MAX_VER_DIST": 15.0}, "`GF_MAX_VER_DIST`", "at least"),
 }
 
 

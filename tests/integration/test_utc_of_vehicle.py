@@ -73,7 +73,7 @@ def test_rehearsal_uses_the_clock_of_the_flights_boundary(ground: Any, capfd: An
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--utc-error", "soon", "--connect", "udpin:127.0.0.1:1", "--vehicle", "quad-07"], "is no time"),
+        (["--utc-error", "soon", "--connect", "udpin:127.0.0.1:1", "--vehicle", "quad-07"], "is not a duration"),
         (["--utc-error", "1s"], "requires `--connect`"),
     ],
 )

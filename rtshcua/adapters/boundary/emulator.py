@@ -1,0 +1,125 @@
+"""What the homes of the boundary in an emulated machine share: the setup, the emulator's process, and how a start fails."""
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from struct import Struct
+from typing import Final, NamedTuple
+
+from rtshcua.adapters.boundary.home import BoundaryError, BoundaryHome
+from rtshcua.adapters.clock import monotonic_ns
+from rtshcua.adapters.store.signing import read_link_key
+from rtshcua.adapters.store.writing import PRIVATE_FILE, lock
+from rtshcua.model.flat.situation import UTC_UNKNOWN_US
+
+#: what it does not keep out
+EMULATED: Final = "hardware: its secure world is emulated, in reach of whoever has this machine's root"
+#: what becomes of a wish (boundary/home/trustzone_m/mailbox.h)
+READY, DONE, DONE_KEEP, KEEP_FIRST, NOT_BEGUN = b"r", b"d", b"k", b"f", b"b"
+
+#: boundary/home/trustzone_m/world.c
+_SETUP: Final = Struct("<4sI32s32s32s32s32sqqqq8I")
+_LINK_KEY, _BOUNDARY_KEY, _LOG_KEY, _PACED, _SETTINGS, _OWED = 1, 2, 4, 8, 16, 32
+_UNTRUSTED, _DAMAGED = 65, 78
+#: starts a program that the kernel ends when the thread ends that started it (PR_SET_PDEATHSIG, SIGKILL)
+_WITH_US: Final = "import ctypes, os, sys; ctypes.CDLL(None).prctl(1, 9, 0, 0, 0); os.execvp(sys.argv[1], sys.argv[1:])"
+
+
+class Setup(NamedTuple):
+    """What a home in an emulator is given at its start."""
+
+    root: bytes
+    pinned: bytes
+    vehicle: str
+    link_key: Path | None
+    own_seed: bytes | None
+    log_seed: bytes | None
+    settings: bytes | None
+    owed: bytes | None
+    paced: bool
+    utc_error_us: int | None
+
+    def packed(self, kept: bytes, device_key: bytes, most: int) -> bytes:
+        """The octets, `most` at most. Raises BoundaryError and LinkKeyError."""
+        given: Mapping[int, object] = {
+            _LINK_KEY: self.link_key, _BOUNDARY_KEY: self.own_seed, _LOG_KEY: self.log_seed,
+            _PACED: self.paced or None, _SETTINGS: self.settings, _OWED: self.owed,
+        }  # fmt: skip
+        parts = (self.root, self.pinned, self.vehicle.encode(), self.settings or b"", self.owed or b"", kept)
+        link_key = read_link_key(self.link_key) if self.link_key is not None else bytes(32)
+        head = _SETUP.pack(
+            b"RTZ1", sum(flag for flag, value in given.items() if value is not None), os.urandom(32), link_key,
+            self.own_seed or bytes(32), self.log_seed or bytes(32), device_key, monotonic_ns() // 1_000,
+            time.time_ns() // 1_000, UTC_UNKNOWN_US, -1 if self.utc_error_us is None else self.utc_error_us,
+            *map(len, parts), 0, 0,
+        )  # fmt: skip
+        if len(head) + sum(map(len, parts)) > most:
+            raise BoundaryError("not-begun", "what the boundary is given does not fit: the trust root is too large")
+        return head + b"".join(parts)
+
+
+class EmulatedHome(BoundaryHome):
+    """A boundary in an emulator that is started here and ends with the run."""
+
+    _process: subprocess.Popen[bytes] | None = None
+    _lock = -1
+
+    @property
+    def missing(self) -> Sequence[str]:
+        """See `BoundaryHome`: an emulator is no hardware."""
+        return (EMULATED,)
+
+    @property
+    def pid(self) -> int:
+        """The emulator's process."""
+        assert self._process is not None
+        return self._process.pid
+
+    def _hold(self, place: Path, vehicle: str) -> None:
+        """Hold what is kept of a vehicle, for this run alone."""
+        try:
+            self._lock = lock(place, mode=PRIVATE_FILE)
+        except BlockingIOError:
+            text = f"another run's boundary holds what is kept of `{vehicle}`"
+            raise BoundaryError("in-use", text, "wait until that run is over") from None
+
+    def _launch(self, words: Sequence[str], files: Sequence[int], help: str) -> None:
+        """Start the emulator, which gets these files."""
+        try:
+            self._process = subprocess.Popen(
+                [sys.executable, "-I", "-S", "-c", _WITH_US, *words], pass_fds=files, stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+            )  # fmt: skip
+        except OSError as error:
+            text = f"`{words[0]}` does not start: {(error.strerror or str(error)).lower()}"
+            raise BoundaryError("not-begun", text, help) from None
+
+    def _kill(self) -> None:
+        """End the emulator at once: it must not go on behind the back of who did not wait for it."""
+        if self._process is not None:
+            with suppress(ProcessLookupError):
+                self._process.kill()
+
+    def _end(self) -> None:
+        """End the emulator, and let go of what is kept."""
+        if self._process is not None:
+            self._kill()
+            self._process.wait()
+            self._process = None
+        if self._lock >= 0:
+            os.close(self._lock)
+            self._lock = -1
+
+
+def not_begun(code: bytes, said: bytes, kept: Path, where: str) -> BoundaryError:
+    """Why a boundary did not begin, by its answer to the first wish; `where`: its home, in words."""
+    if code == NOT_BEGUN and said == bytes([_DAMAGED]):
+        text = f"`{kept}` is damaged: which bundles the boundary has opened is not known"
+        return BoundaryError("damaged", text, "docs/flying/isolation.md says what to do")
+    if code == NOT_BEGUN and said == bytes([_UNTRUSTED]):
+        return BoundaryError("untrusted", f"the boundary in {where} does not trust the trust root")
+    return BoundaryError("not-begun", f"the boundary in {where} does not begin")

@@ -1,4 +1,4 @@
-"""What the homes of the boundary in an emulated machine share: the setup, the emulator's process, and how a start fails."""
+"""What the homes of the boundary in an emulated machine share: the setup, the process, and how a start fails."""
 
 import os
 import subprocess

@@ -10,51 +10,30 @@ import mmap
 import os
 import shutil
 import socket
-import subprocess
-import sys
 import threading
-import time
-from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from struct import Struct
 from typing import Final, NamedTuple
 
-from rtshcua.adapters.boundary.home import (
-    ANSWER_S,
-    GREETING_BYTES,
-    PATIENCE_S,
-    BoundaryError,
-    BoundaryHome,
-    kept_file,
-)
-from rtshcua.adapters.clock import monotonic_ns
+from rtshcua.adapters.boundary.emulator import DONE, DONE_KEEP, KEEP_FIRST, READY, EmulatedHome, Setup, not_begun
+from rtshcua.adapters.boundary.home import ANSWER_S, GREETING_BYTES, PATIENCE_S, BoundaryError, kept_file
 from rtshcua.adapters.store.reading import read_if_there, read_regular
-from rtshcua.adapters.store.signing import read_link_key
-from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, create_whole, lock, make_folder, replace
+from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, create_whole, make_folder, replace
 from rtshcua.model.flat.home_limits import TRUSTZONE_M
-from rtshcua.model.flat.situation import UTC_UNKNOWN_US
 from rtshcua.onboard.enforcement.isolated import LOAD
 
 #: the program that emulates, and what installs it
 EMULATOR: Final = "qemu-system-arm"
 INSTALL: Final = "apt-get install qemu-system-arm gcc-arm-none-eabi libnewlib-arm-none-eabi, then `make trustzone-m`"
-#: what it does not keep out
-EMULATED: Final = "hardware: its secure world is emulated, in reach of whoever has this machine's root"
 _BUILT: Final = Path(__file__).resolve().parents[3] / "build" / "boundary" / "trustzone_m"
 _PACKAGED: Final = Path(__file__).resolve().parents[2] / "boundary" / "trustzone_m"
 
 #: where the setup is put, in secure memory, and how much fits
 _SETUP_AT, _SETUP_SIZE = 0x38180000, 0x80000
-_SETUP: Final = Struct("<4sI32s32s32s32s32sqqqq8I")
-_LINK_KEY, _BOUNDARY_KEY, _LOG_KEY, _PACED, _SETTINGS, _OWED = 1, 2, 4, 8, 16, 32
 _HEAD: Final = Struct("<II")
 _MAILBOX: Final = 0x10000
 _MEMORY: Final = 16 << 20
-_READY, _DONE, _DONE_KEEP, _KEEP_FIRST, _VIOLATED, _NOT_BEGUN = b"r", b"d", b"k", b"f", b"v", b"b"
-_DAMAGED, _UNTRUSTED = 78, 65
-#: starts a program that the kernel ends when the thread ends that started it (PR_SET_PDEATHSIG, SIGKILL)
-_WITH_US: Final = "import ctypes, os, sys; ctypes.CDLL(None).prctl(1, 9, 0, 0, 0); os.execvp(sys.argv[1], sys.argv[1:])"
 
 
 class Images(NamedTuple):
@@ -79,7 +58,7 @@ def missing_packages() -> BoundaryError | None:
     return None
 
 
-class SecureWorld(BoundaryHome):
+class SecureWorld(EmulatedHome):
     """A boundary in the secure world, started here, until `close`.
 
     The arguments are those of `process.BoundaryProcess`; there is no user. Raises BoundaryError, LinkKeyError and
@@ -101,39 +80,16 @@ class SecureWorld(BoundaryHome):
             raise missing or BoundaryError("missing", "the programs of the secure world were not built", INSTALL)
         self._kept = kept_file(state, vehicle).with_suffix(".trustzone-m")
         make_folder(self._kept.parent, mode=PRIVATE_FOLDER)
-        self._lock = self._hold(vehicle)
-        self._process: subprocess.Popen[bytes] | None = None
+        self._hold(self._kept.with_suffix(".trustzone-m-lock"), vehicle)
         self._later = _Keeper(self._kept)
+        setup = Setup(root, pinned, vehicle, link_key, own_seed, log_seed, settings, owed, paced, utc_error_us)
         try:
             kept = read_if_there(self._kept, _SETUP_SIZE) or b""
-            parts = (root, pinned, vehicle.encode(), settings or b"", owed or b"", kept)
-            flags = (_LINK_KEY if link_key is not None else 0) | (_BOUNDARY_KEY if own_seed is not None else 0)
-            flags |= (_LOG_KEY if log_seed is not None else 0) | (_PACED if paced else 0)
-            flags |= (_SETTINGS if settings is not None else 0) | (_OWED if owed is not None else 0)
-            keys = (os.urandom(32), read_link_key(link_key) if link_key is not None else bytes(32))
-            stated = -1 if utc_error_us is None else utc_error_us
-            head = _SETUP.pack(
-                b"RTZ1", flags, *keys, own_seed or bytes(32), log_seed or bytes(32), self._device_key(),
-                monotonic_ns() // 1_000, time.time_ns() // 1_000, UTC_UNKNOWN_US, stated, *map(len, parts), 0, 0,
-            )  # fmt: skip
-            if len(head) + sum(map(len, parts)) > _SETUP_SIZE:
-                raise BoundaryError("not-begun", "what the boundary is given does not fit: the trust root is too large")
-            self._start(found, head + b"".join(parts))
+            self._start(found, setup.packed(kept, self._device_key(), _SETUP_SIZE))
             self._greet()
         except BaseException:
             self.close()
             raise
-
-    @property
-    def missing(self) -> Sequence[str]:
-        """See `BoundaryHome`: an emulator is no hardware."""
-        return (EMULATED,)
-
-    @property
-    def pid(self) -> int:
-        """The emulator's process."""
-        assert self._process is not None
-        return self._process.pid
 
     @property
     def counter(self) -> int:
@@ -143,7 +99,7 @@ class SecureWorld(BoundaryHome):
     def call(self, octets: bytes) -> bytes:
         """One call. Raises OSError when nobody answers; an empty answer says that it is gone."""
         code, answer = self._ask(b"C", octets, PATIENCE_S if octets[0] == LOAD else ANSWER_S)
-        return answer if code == _DONE else b""
+        return answer if code == DONE else b""
 
     def violations(self) -> int:
         """How often the normal world reached for what is not its own."""
@@ -157,22 +113,10 @@ class SecureWorld(BoundaryHome):
                 self._ask(b"E", b"", ANSWER_S)
         self._later.close()
         if self._process is not None:
-            with suppress(ProcessLookupError):
-                self._process.kill()
-            self._process.wait()
-            self._process = None
+            self._end()
             self._bell.close()
             self._memory.close()
-        if self._lock >= 0:
-            os.close(self._lock)
-            self._lock = -1
-
-    def _hold(self, vehicle: str) -> int:
-        try:
-            return lock(self._kept.with_suffix(".trustzone-m-lock"), mode=PRIVATE_FILE)
-        except BlockingIOError:
-            text = f"another run's boundary holds what is kept of `{vehicle}`"
-            raise BoundaryError("in-use", text, "wait until that run is over") from None
+        self._end()
 
     def _device_key(self) -> bytes:
         """What a chip has fused, and nothing but its secure world reads: here a file beside what is kept."""
@@ -187,9 +131,8 @@ class SecureWorld(BoundaryHome):
             os.ftruncate(ram, _MEMORY)
             self._memory = mmap.mmap(ram, _MAILBOX)
             os.pwrite(given, setup, 0)
-            self._process = subprocess.Popen(
+            self._launch(
                 [
-                    sys.executable, "-I", "-S", "-c", _WITH_US,
                     EMULATOR, "-M", "mps2-an505,memory-backend=mailbox", "-nodefaults", "-nographic", "-monitor",
                     "none", "-no-reboot", "-object",
                     f"memory-backend-file,id=mailbox,mem-path=/proc/self/fd/{ram},size={_MEMORY},share=on",
@@ -197,12 +140,9 @@ class SecureWorld(BoundaryHome):
                     "-device", f"loader,file=/proc/self/fd/{given},addr={_SETUP_AT:#x},force-raw=on",
                     "-chardev", f"socket,id=bell,fd={theirs.fileno()}", "-serial", "chardev:bell",
                 ],
-                pass_fds=[ram, given, theirs.fileno()], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL, start_new_session=True,
+                [ram, given, theirs.fileno()],
+                INSTALL,
             )  # fmt: skip
-        except OSError as error:
-            text = f"`{EMULATOR}` does not start: {(error.strerror or str(error)).lower()}"
-            raise BoundaryError("not-begun", text, INSTALL) from None
         finally:
             theirs.close()
             os.close(ram)
@@ -211,30 +151,25 @@ class SecureWorld(BoundaryHome):
     def _greet(self) -> None:
         self._bell.settimeout(PATIENCE_S)
         try:
-            ready = self._bell.recv(1) == _READY
+            ready = self._bell.recv(1) == READY
             code, greeting = self._ask(b"G", b"", PATIENCE_S) if ready else (b"", b"")
         except OSError:
             code, greeting = b"", b""
-        if code == _DONE and len(greeting) == GREETING_BYTES + 8:
+        if code == DONE and len(greeting) == GREETING_BYTES + 8:
             self._read_greeting(greeting[:-8])
             self._counter = int.from_bytes(greeting[-8:], "little")
             return
-        if code == _NOT_BEGUN and greeting == bytes([_DAMAGED]):
-            text = f"`{self._kept}` is damaged: which bundles the boundary has opened is not known"
-            raise BoundaryError("damaged", text, "docs/flying/isolation.md says what to do")
-        if code == _NOT_BEGUN and greeting == bytes([_UNTRUSTED]):
-            raise BoundaryError("untrusted", "the boundary in the secure world does not trust the trust root")
-        raise BoundaryError("not-begun", "the boundary in the secure world does not begin")
+        raise not_begun(code, greeting, self._kept, "the secure world")
 
     def _ask(self, want: bytes, octets: bytes, patience_s: float) -> tuple[bytes, bytes]:
         """What becomes of a wish, and its answer. What must be kept first is kept first. Raises OSError."""
         if len(octets) > _MAILBOX - _HEAD.size:
             return b"", b""
         code, answer, blob = self._exchange(want, octets, patience_s)
-        if code == _KEEP_FIRST:
+        if code == KEEP_FIRST:
             code, answer, _ = self._exchange(b"K" if self._later.keep(blob) else b"N", b"", patience_s)
-        elif code == _DONE_KEEP:
-            code = _DONE
+        elif code == DONE_KEEP:
+            code = DONE
             self._later.keep_later(blob)
         return code, answer
 
@@ -246,8 +181,7 @@ class SecureWorld(BoundaryHome):
             self._bell.send(want)
             code = self._bell.recv(1)
         except TimeoutError:
-            if self._process is not None:
-                self._process.kill()  # it must not go on behind the back of who did not wait for it
+            self._kill()
             raise
         answer, blob = _HEAD.unpack(self._memory[: _HEAD.size])
         end = _HEAD.size + answer

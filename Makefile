@@ -12,7 +12,7 @@ test slow: JOBS ?= 6
 soak mutate wrong: JOBS ?= 4
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test slow clients lint soak fuzz mutate wrong bench size dist trustzone-m clean
+.PHONY: help setup demo test slow clients lint soak fuzz mutate wrong bench size dist trustzone-m optee clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-6s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -66,6 +66,9 @@ size: setup ## count modules, code lines, shared names and long functions by pac
 
 trustzone-m: setup ## fly a mission by the boundary in the secure world of a Cortex-M33, emulated; as root, install what is missing
 	@.make/trustzone-m fly
+
+optee: setup ## fly a mission by the boundary in a trusted application of OP-TEE, emulated; as root, install what is missing
+	@.make/optee fly
 
 dist: setup ## build the wheels into dist, and their bill of materials (CycloneDX); the same bytes each time
 	@.make/dist $(BIN)/python

@@ -20,9 +20,9 @@ from msgspec.structs import replace
 
 from reference import flat_case as flat
 from reference.world import ROOT, ROOT_KEY, START, VEHICLE, loaded, request_for, sealed_again
+from rtshcua.adapters.boundary import optee, trustzone_m
 from rtshcua.adapters.boundary.home import BoundaryHome
 from rtshcua.adapters.boundary.process import BoundaryProcess
-from rtshcua.adapters.boundary.trustzone_m import SecureWorld, missing_packages
 from rtshcua.onboard.enforcement.isolated import Caller
 from rtshcua.onboard.enforcement.load import EnforcementMode, Loaded, load
 from rtshcua.wire.request import CONTINGENCY_LINK
@@ -30,8 +30,13 @@ from rtshcua.wire.request import CONTINGENCY_LINK
 BLOCKS, ROUNDS, PAUSE_S = 41, 100, 0.002
 PUBLISHED_MS, PERIOD_MS = 172.8, 20.0
 #: what a home may add at the median, in ms
-LIMITS_MS = {"none": None, "software": None, "process": 0.3, "trustzone-m": 1.0}
-HOMES: dict[str, Callable[..., BoundaryHome]] = {"process": BoundaryProcess, "trustzone-m": SecureWorld}
+LIMITS_MS = {"none": None, "software": None, "process": 0.3, "trustzone-m": 1.0, "optee": 10.0}
+HOMES: dict[str, Callable[..., BoundaryHome]] = {
+    "process": BoundaryProcess,
+    "trustzone-m": trustzone_m.SecureWorld,
+    "optee": optee.TrustedApplication,
+}
+LACKING = {"trustzone-m": trustzone_m.missing_packages, "optee": optee.missing_packages}
 
 
 def in_force(name: str, bundle: bytes, caller: Caller | None) -> Loaded:
@@ -48,7 +53,7 @@ def begin(stack: ExitStack, bundle: bytes) -> dict[str, Loaded]:
     """Every mode that is available here, with the bundle in force."""
     made: dict[str, Loaded] = {name: in_force(name, bundle, None) for name in ("none", "software")}
     for name, home in HOMES.items():
-        lacking = missing_packages() if name == "trustzone-m" else None
+        lacking = LACKING[name]() if name in LACKING else None
         if lacking is not None:
             print(f"not here: {name}: {lacking}; {lacking.help}")
             continue

@@ -27,6 +27,8 @@ from rtshcua.onboard.enforcement.isolated import LOAD
 #: the program that emulates, and what installs it and builds the rest
 EMULATOR: Final = "qemu-system-aarch64"
 INSTALL: Final = "apt-get install qemu-system-arm, then `make optee` as root, which builds what it runs"
+#: what makes it a model for development
+DEVELOPMENT: Final = "a public key signs its trusted applications, and it has no monotonic counter"
 #: how long firmware, OP-TEE and Linux may take to start, in s: 4 to 14 on two cores, by what else they do
 BOOT_S: Final = 90.0
 _BUILT: Final = Path(__file__).resolve().parents[3] / "build" / "optee"

@@ -4,6 +4,7 @@ from itertools import islice, takewhile
 from pathlib import Path
 from typing import Final
 
+from rtshcua.adapters.boundary.optee import DEVELOPMENT
 from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.evidence.finding import Claim
@@ -12,7 +13,7 @@ from rtshcua.evidence.records import Effect, Genesis
 from rtshcua.evidence.report import LogReport
 
 #: modes in which the boundary's secure world is emulated
-EMULATED: Final = ("trustzone-m",)
+EMULATED: Final = ("trustzone-m", "optee")
 #: the event of the effect
 SIMULATED: Final = "simulated"
 
@@ -34,6 +35,8 @@ def with_simulated(report: LogReport, log: Path) -> LogReport:
     claims, detail = [], simulated(log)
     if _mode(log) in EMULATED:
         claims.append(Claim("emulated", "that hardware kept the boundary out of reach: its secure world was emulated"))
+    if _mode(log) == "optee":
+        claims.append(Claim("development", f"that only its maker could change the boundary: {DEVELOPMENT}"))
     if detail is not None:
         claims.append(Claim("simulated", f"that anything flew: times are those of {detail}"))
     return report._replace(unproven=(*report.unproven, *claims))

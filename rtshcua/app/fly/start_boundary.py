@@ -10,6 +10,7 @@ from typing import Final, NamedTuple, TypeAlias
 from msgspec.structs import replace
 
 from rtshcua.adapters.boundary.home import BoundaryError, BoundaryHome
+from rtshcua.adapters.boundary.optee import TrustedApplication
 from rtshcua.adapters.boundary.process import BoundaryProcess, ListeningBoundary
 from rtshcua.adapters.boundary.trustzone_m import SecureWorld
 from rtshcua.adapters.clock import UTC_ERROR_US
@@ -41,6 +42,8 @@ from rtshcua.wire.preparation import ParameterWrite, Preparation, encode
 from rtshcua.wire.trust import MAX_ROOT, TrustRoot, key_refusal
 from rtshcua.wire.untrusted import Untrusted
 
+#: the interval of reports while a machine boots, in s
+_BOOTS_S: Final = 3
 #: the slug if another run uses the boundary of the vehicle
 IN_USE: Final = "boundary-in-use"
 #: the note of a flight whose boundary does not sign
@@ -216,14 +219,19 @@ def connect_boundary(path: Path, *, paced: bool) -> ListeningBoundary | Refusal:
 
 def start_home(
     request: FlightRequest, vehicle: str, signed_root: bytes, own_key: SigningKey | None, log_key: SigningKey,
-    owed: Mapping[str, Owed],
+    owed: Mapping[str, Owed], progress: Callable[[int], None],
 ) -> BoundaryHome | Refusal:  # fmt: skip
-    """Start a boundary for one run. The caller closes it. Raises OSError."""
+    """Start a boundary for one run. The caller closes it. `progress` receives the seconds that a booting machine has taken.
+    Raises OSError.
+    """
     pinned = cose.unverified(signed_root, limit=MAX_ROOT).kid
-    process = request.mode is EnforcementMode.PROCESS
-    make = partial(BoundaryProcess, user=request.boundary_user) if process else SecureWorld
+    homes: Mapping[EnforcementMode, Callable[..., BoundaryHome]] = {
+        EnforcementMode.PROCESS: partial(BoundaryProcess, user=request.boundary_user),
+        EnforcementMode.TRUSTZONE_M: SecureWorld,
+        EnforcementMode.OPTEE: partial(TrustedApplication, progress=progress),
+    }
     try:
-        return make(
+        return homes[request.mode](
             signed_root, pinned, vehicle, request.kept_in, link_key=request.signing_key, paced=request.speed != 1,
             own_seed=None if own_key is None else own_key.private.private_bytes_raw(),
             log_seed=log_key.private.private_bytes_raw(),
@@ -234,6 +242,12 @@ def start_home(
         return _not_begun(error)
     except LinkKeyError as error:
         return of_link_key(error)
+
+
+def _boots(context: FlightContext, passed_s: int) -> None:
+    """Tell a person how long the machine of the boundary boots."""
+    if passed_s % _BOOTS_S == 0 and not context.console.as_json:
+        context.console.say(f"OP-TEE boots in the emulator, which takes 5 to 15 s: {passed_s} s")
 
 
 def of_link_key(error: LinkKeyError) -> Refusal:
@@ -302,8 +316,8 @@ class BoundaryClient:
         return loaded
 
     def _unfit(self, bundle: bytes, now: Now) -> tuple[str, ...]:
-        """Descriptions of what is too large in a bundle for the secure world; empty for an untrusted bundle."""
-        if self._mode is not EnforcementMode.TRUSTZONE_M:
+        """Descriptions of what is too large in a bundle for its home; empty for an untrusted bundle."""
+        if not self._mode.emulated:
             return ()
         try:
             opened = open_bundle(bundle, root=self._root, vehicle=self._vehicle, now_us=now.utc_us)
@@ -434,7 +448,9 @@ def _open(
     if not request.mode.apart or request.dry_run or trusted.distrust is not None:
         return None
     assert not isinstance(own_key, HeldByBoundary)
-    started = start_home(request, loaded.vehicle, trusted.signed, own_key, log_key.key(), owed)
+    started = start_home(
+        request, loaded.vehicle, trusted.signed, own_key, log_key.key(), owed, partial(_boots, context)
+    )
     if isinstance(started, Refusal):
         return started
     context.resources.callback(started.close)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Final
 
-#: `trustzone-m`: the whole state stays below 310 KB, the peak that the paper gives for its trusted application
+#: `trustzone-m` and `optee`: the state stays below 310 KB, the peak that the paper gives for its trusted application
 TRUSTZONE_M: Final[Mapping[str, int]] = MappingProxyType(
     {
         "MAX_BUNDLE": 1 << 16,

@@ -102,11 +102,17 @@ class EnforcementMode(StrEnum):
     SOFTWARE = "software"
     PROCESS = "process"
     TRUSTZONE_M = "trustzone-m"
+    OPTEE = "optee"
 
     @property
     def apart(self) -> bool:
         """Whether the boundary is outside of the runtime, and called."""
-        return self in (EnforcementMode.PROCESS, EnforcementMode.TRUSTZONE_M)
+        return self is EnforcementMode.PROCESS or self.emulated
+
+    @property
+    def emulated(self) -> bool:
+        """Whether the boundary is in the secure world of an emulated machine."""
+        return self in (EnforcementMode.TRUSTZONE_M, EnforcementMode.OPTEE)
 
 
 class Loaded(msgspec.Struct, frozen=True):

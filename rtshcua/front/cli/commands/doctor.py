@@ -14,9 +14,10 @@ import msgspec
 import typer
 
 from rtshcua import library
+from rtshcua.adapters.boundary import optee, trustzone_m
+from rtshcua.adapters.boundary.emulator import EMULATED
 from rtshcua.adapters.boundary.home import BoundaryError
 from rtshcua.adapters.boundary.process import MISSING, UNBUILT, UNBUILT_HELP, ListeningBoundary, measures_here, program
-from rtshcua.adapters.boundary.trustzone_m import EMULATED, missing_packages
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.doctor.diagnosis import MissionVerdict, VehicleFinding, diagnose, settled, settling, told_apart
 from rtshcua.adapters.doctor.examination import ExaminingDriver
@@ -214,15 +215,22 @@ def _boundary(mode: EnforcementMode, socket: Path | None = None) -> list[Vehicle
         built = program() is not None
         text, help = (_SOFTWARE, "leave out `--mode`") if built else (UNBUILT, UNBUILT_HELP)
         return [VehicleFinding(slug, MissionVerdict.WARN, text, "a separate process", help)]
-    if mode is EnforcementMode.TRUSTZONE_M:
-        lacking = missing_packages()
+    if mode.emulated:
+        application = mode is EnforcementMode.OPTEE
+        lacking = optee.missing_packages() if application else trustzone_m.missing_packages()
         if lacking is not None:
             return [VehicleFinding(slug, MissionVerdict.STOP, str(lacking), "its emulator and programs", lacking.help)]
-        where = "a run decides in the secure world of an emulated Cortex-M33 (`run --mode trustzone-m`)"
-        return [
-            VehicleFinding(slug, MissionVerdict.OK, where),
+        home = (
+            "a trusted application of OP-TEE, emulated" if application else "the secure world of an emulated Cortex-M33"
+        )
+        found = [
+            VehicleFinding(slug, MissionVerdict.OK, f"a run decides in {home} (`run --mode {mode}`)"),
             VehicleFinding("boundary/hardware", MissionVerdict.WARN, f"the boundary would run without {EMULATED}"),
         ]
+        if application:
+            text = f"the boundary would be a model for development: {optee.DEVELOPMENT}"
+            found.append(VehicleFinding("boundary/development", MissionVerdict.WARN, text))
+        return found
     try:
         if socket is None:
             here, where = measures_here(None), "a run decides in a separate process (`run --mode process`)"

@@ -52,7 +52,7 @@ DecidesIn = Annotated[
     EnforcementMode | None,
     typer.Option(
         help="where decisions are made: in a separate process (default with --connect if its program is built) or in "
-        "this one; `trustzone-m`: in an emulated secure world; `none` enforces nothing, simulation only",
+        "this one; `trustzone-m`, `optee`: in an emulated secure world; `none` enforces nothing, simulation only",
     ),
 ]
 UtcError = Annotated[

@@ -22,7 +22,9 @@ def show_bundle(page: TextPage, data: bytes, now_us: int) -> dict[str, object]:
     page.row("mission", f"key {what.mission_kid.hex()}")
     page.row("signatures", verdict)
     unfit = exceeded(what.policy, what.mission, len(data), TRUSTZONE_M)
-    page.row("memory", f"too large for `--mode trustzone-m`: {', '.join(unfit)}" if unfit else "fits every mode")
+    page.row(
+        "memory", f"too large for `--mode trustzone-m` and `optee`: {', '.join(unfit)}" if unfit else "fits every mode"
+    )
     show_mission(page, what.mission, what.policy)
     show_policy(page, what.policy)
     return {
@@ -33,7 +35,7 @@ def show_bundle(page: TextPage, data: bytes, now_us: int) -> dict[str, object]:
         "mission_key": what.mission_kid.hex(),
         "trusted": trusted,
         "verdict": verdict,
-        "too_large_for": {"trustzone-m": unfit} if unfit else {},
+        "too_large_for": {"trustzone-m": unfit, "optee": unfit} if unfit else {},
         "mission": named(what.mission),
         "policy": named(what.policy),
     }

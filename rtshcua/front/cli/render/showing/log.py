@@ -7,6 +7,7 @@ from contextlib import suppress
 
 import msgspec
 
+from rtshcua.adapters.boundary.optee import DEVELOPMENT
 from rtshcua.adapters.utc import CLOCK
 from rtshcua.app.documents import Claimed, claimed, replaced
 from rtshcua.app.wording import many, true_to, utc
@@ -107,7 +108,7 @@ def _head(page: TextPage, genesis: Genesis) -> None:
     found = _bundle(genesis)
     if found is not None:
         page.row("received", _received(genesis, found.mission.issued_at_us))
-    page.row("mode", genesis.mode)
+    page.row("mode", f"optee, a model for development: {DEVELOPMENT}" if genesis.mode == "optee" else genesis.mode)
     page.row("log key", genesis.log_kid)
     page.row("boot", genesis.boot)
     if genesis.before is not None:

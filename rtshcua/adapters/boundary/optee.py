@@ -125,6 +125,10 @@ class TrustedApplication(EmulatedHome):
         code, answer = self._ask(b"C", octets, PATIENCE_S if octets[0] == LOAD else ANSWER_S)
         return answer if code == DONE else b""
 
+    def kept(self) -> bytes:
+        """What is in secure storage: `rt_kept` of boundary/enforcement/kept.h, and its check. Raises OSError."""
+        return self._ask(b"L", b"", PATIENCE_S)[1]
+
     def close(self) -> None:
         """End the emulator, whatever state it is in; an application that answers first keeps what is to be kept."""
         if self._process is not None:

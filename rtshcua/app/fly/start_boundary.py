@@ -448,9 +448,8 @@ def _open(
     if not request.mode.apart or request.dry_run or trusted.distrust is not None:
         return None
     assert not isinstance(own_key, HeldByBoundary)
-    started = start_home(
-        request, loaded.vehicle, trusted.signed, own_key, log_key.key(), owed, partial(_boots, context)
-    )
+    boots = partial(_boots, context)
+    started = start_home(request, loaded.vehicle, trusted.signed, own_key, log_key.key(), owed, boots)
     if isinstance(started, Refusal):
         return started
     context.resources.callback(started.close)

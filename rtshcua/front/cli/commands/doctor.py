@@ -220,9 +220,7 @@ def _boundary(mode: EnforcementMode, socket: Path | None = None) -> list[Vehicle
         lacking = optee.missing_packages() if application else trustzone_m.missing_packages()
         if lacking is not None:
             return [VehicleFinding(slug, MissionVerdict.STOP, str(lacking), "its emulator and programs", lacking.help)]
-        home = (
-            "a trusted application of OP-TEE, emulated" if application else "the secure world of an emulated Cortex-M33"
-        )
+        home = "an emulated OP-TEE" if application else "the secure world of an emulated Cortex-M33"
         found = [
             VehicleFinding(slug, MissionVerdict.OK, f"a run decides in {home} (`run --mode {mode}`)"),
             VehicleFinding("boundary/hardware", MissionVerdict.WARN, f"the boundary would run without {EMULATED}"),

@@ -22,9 +22,8 @@ def show_bundle(page: TextPage, data: bytes, now_us: int) -> dict[str, object]:
     page.row("mission", f"key {what.mission_kid.hex()}")
     page.row("signatures", verdict)
     unfit = exceeded(what.policy, what.mission, len(data), TRUSTZONE_M)
-    page.row(
-        "memory", f"too large for `--mode trustzone-m` and `optee`: {', '.join(unfit)}" if unfit else "fits every mode"
-    )
+    small = "`--mode trustzone-m` and `optee`"
+    page.row("memory", f"too large for {small}: {', '.join(unfit)}" if unfit else "fits every mode")
     show_mission(page, what.mission, what.policy)
     show_policy(page, what.policy)
     return {

@@ -28,7 +28,9 @@ enum {
 };
 
 #define RT_MAILBOX 0x80000000u
+#ifndef RT_MAILBOX_SIZE
 #define RT_MAILBOX_SIZE 0x10000u
+#endif
 #define RT_MAILBOX_HEAD 8 /* size of the answer (4), size of the blob behind it (4) */
 
 #endif

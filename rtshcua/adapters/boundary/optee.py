@@ -36,9 +36,9 @@ _FILES: Final = ("flash.bin", "machine.dtb", "kernel", "initrd.gz", "storage.img
 #: where `.make/optee` tells firmware and kernel that these are
 _KERNEL_AT, _INITRD_AT = 0x40200000, 0x48000000
 _HEAD: Final = Struct("<cI")
-_MAILBOX: Final = 0x10000
+_MAILBOX: Final = 0x8000
 #: room that the application needs behind the setup for what was kept
-_KEPT_ROOM: Final = 0x4000
+_KEPT_ROOM: Final = 0x2000
 
 
 class Machine(NamedTuple):

@@ -61,9 +61,9 @@ class Machine(NamedTuple):
         ]  # fmt: skip
 
 
-def machine() -> Machine | None:
+def machine(folder: Path = _BUILT) -> Machine | None:
     """What a checkout has built; None where it was not."""
-    return Machine(_BUILT) if all((_BUILT / name).is_file() for name in _FILES) else None
+    return Machine(folder) if all((folder / name).is_file() for name in _FILES) else None
 
 
 def missing_packages() -> BoundaryError | None:

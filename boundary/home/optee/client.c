@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 enum { RT_READY = 'r', HEAD = 5 };
+static const uint8_t damaged[] = {78}; /* as in ../process/main.c */
 
 static int transfer(int port, uint8_t *octets, size_t size, int out) {
     while (size > 0) {
@@ -58,7 +59,11 @@ int main(int count, char **words) {
     while (transfer(port, head, sizeof head, 0)) {
         const uint32_t size = head[1] | (uint32_t)head[2] << 8 | (uint32_t)head[3] << 16 | (uint32_t)head[4] << 24;
         if (size > RT_MAILBOX_SIZE || !transfer(port, memory.buffer, size, 0)) return 4;
-        if (!invoke(&session, &memory, head[0], size, &done)) return 5;
+        if (!invoke(&session, &memory, head[0], size, &done)) {
+            /* OP-TEE ends an application that opens a damaged object: nothing else of the beginning can fail */
+            if (head[0] == RT_WANT_BEGIN) (void)say(port, RT_NOT_BEGUN, sizeof damaged, damaged);
+            return 5;
+        }
         if (head[0] == RT_WANT_BEGIN) {
             memset(memory.buffer, 0, RT_MAILBOX_SIZE); /* it had the keys */
             if (!say(port, RT_READY, 0, NULL)) return 4;

@@ -157,8 +157,9 @@ class TrustedApplication(EmulatedHome):
     def _begin(self, setup: Setup) -> None:
         """Give it the setup, which names the time, and take its first message."""
         try:
-            code, _ = self._ask(b"B", setup.packed(b"", bytes(32), _MAILBOX - _KEPT_ROOM), PATIENCE_S)
-            code, greeting = self._ask(b"G", b"", PATIENCE_S) if code == READY else (b"", b"")
+            code, greeting = self._ask(b"B", setup.packed(b"", bytes(32), _MAILBOX - _KEPT_ROOM), PATIENCE_S)
+            if code == READY:
+                code, greeting = self._ask(b"G", b"", PATIENCE_S)
         except OSError:
             code, greeting = b"", b""
         if code != DONE or len(greeting) != GREETING_BYTES + 8:

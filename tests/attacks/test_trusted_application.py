@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from boundary.c_and_python import PIN, SIGNED_ROOT
+from boundary.sessions_in_c_and_python import PIN, SIGNED_ROOT
 from boundary.trusted_application import needs_optee
 from reference.world import VEHICLE
 from rtshcua.adapters.boundary.home import BoundaryError, kept_file

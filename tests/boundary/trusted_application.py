@@ -1,4 +1,4 @@
-"""The boundary in OP-TEE and the one in Python, given the same requests: `c_and_python.Together` in that home."""
+"""The boundary in OP-TEE and the one in Python, given the same requests: `sessions_in_c_and_python.Together` in that home."""
 
 from contextlib import closing
 from typing import Any, ClassVar
@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import pytest
 
 from boundary import kept as keeping
-from boundary.c_and_python import PIN, SIGNED_ROOT, Together
+from boundary.sessions_in_c_and_python import PIN, SIGNED_ROOT, Together
 from reference.world import VEHICLE
 from rtshcua.adapters.boundary.optee import TrustedApplication, missing_packages
 

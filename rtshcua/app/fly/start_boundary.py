@@ -221,8 +221,8 @@ def start_home(
     request: FlightRequest, vehicle: str, signed_root: bytes, own_key: SigningKey | None, log_key: SigningKey,
     owed: Mapping[str, Owed], progress: Callable[[int], None],
 ) -> BoundaryHome | Refusal:  # fmt: skip
-    """Start a boundary for one run. The caller closes it. `progress` receives the seconds that a booting machine has taken.
-    Raises OSError.
+    """Start a boundary for one run. The caller closes it. `progress` receives the seconds since a machine began to
+    boot. Raises OSError.
     """
     pinned = cose.unverified(signed_root, limit=MAX_ROOT).kid
     homes: Mapping[EnforcementMode, Callable[..., BoundaryHome]] = {

@@ -88,7 +88,9 @@ def hardest(agility: Agility) -> float:
 
 
 def is_above(body: Body, north: float, east: float, within: float) -> bool:
-    """Return whether it is over a place: within `within`, and nearly at rest unless `within` leaves room to stop."""
+    """Return whether the vehicle is less than `within` metres from a place, measured horizontally. If `within` is at
+    most `ARRIVED_M`, it must also move slower than `ARRIVED_M_S`.
+    """
     if hypot(north - body.north, east - body.east) >= within:
         return False
     return within > ARRIVED_M or hypot(body.v_north, body.v_east) < ARRIVED_M_S

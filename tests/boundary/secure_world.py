@@ -1,4 +1,4 @@
-"""The boundary in the secure world and the one in Python, asked the same: `sessions_in_c_and_python.Together` in that home."""
+"""The boundary in the secure world and the one in Python, given the same requests."""
 
 from typing import Any, ClassVar
 

@@ -147,7 +147,9 @@ def test_a_prepared_flight_is_the_same_under_both(
     assert shadow.counts["preparations"] == 2, "set, and put back"
 
 
-def test_owed_parameter_is_restored_by_both_boundaries(boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_both_boundaries_restore_parameter_left_by_interrupted_run(
+    boundary: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from boundary.test_both_boundaries import watched
 
     shadow = watched(boundary, monkeypatch)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from boundary import c_and_python
+from boundary import sessions_in_c_and_python as c_and_python
 from boundary.secure_world import lower_limits
 from boundary.trusted_application import InTrustedApplication, needs_optee
 

@@ -1,4 +1,4 @@
-"""The boundary in OP-TEE and the one in Python, given the same requests: `sessions_in_c_and_python.Together` in that home."""
+"""The boundary in OP-TEE and the one in Python, given the same requests."""
 
 from contextlib import closing
 from typing import Any, ClassVar

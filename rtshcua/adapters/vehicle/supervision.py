@@ -421,7 +421,7 @@ class SpeedWatch:
 #: us: observations are judged together within this time (height, flight, stopped motors). Between observations further
 #: apart it may have landed.
 RECENT_US: Final = 2_000_000
-#: us between two reports of a tilt; a single one proves nothing
+#: us: a tilt counts as a crash once it was reported for at least this long; one report is not enough
 LASTS_US: Final = 400_000
 #: us: motors cannot stop a fall (`FALLS`) to standing (`STOPPED`) within this time between two speed reports.
 AT_ONCE_US: Final = 400_000

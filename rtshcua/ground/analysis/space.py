@@ -112,10 +112,10 @@ def _reported(signal: Signal) -> list[int]:
 
 
 def _moments(prepared: PreparedPolicy, contract: Contract | None) -> tuple[Span, ...]:
-    """Return times that represent every effect of the time on conditions.
+    """Return time spans that cover every way in which time can affect a condition.
 
-    For each interval between two dates of zones, they contain a day, or a week if a condition reads the day of the
-    week, and the days around each kind of clock change.
+    The start and end dates of the zones divide time into intervals. Each interval contributes one day, or one week if a
+    condition reads the day of the week. It also contributes the days around one clock change of each kind.
     """
     policy, local = prepared.policy, prepared.tables.local
     period = WEEK if reads_days(policy, contract) else DAY

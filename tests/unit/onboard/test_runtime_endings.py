@@ -109,7 +109,7 @@ def test_standstill_warning_says_what_to_do() -> None:
 
 
 @pytest.mark.parametrize("way", [Interrupted(0), EvidenceFailed(0, "the disk is full"), None])
-def test_obeying_vehicle_that_never_flew_has_not_landed(way: Event | None) -> None:
+def test_failed_landing_after_accepted_takeoff_warns_that_vehicle_may_fly(way: Event | None) -> None:
     """It always reports that it rests, but obeyed a takeoff: the landing that was sent failed."""
     run = start(vehicle=FakeVehicle(deaf={"takeoff"}, fails={"emergency_land"})).until_flies("takeoff")
     token = run.vehicle.commands[-1].token

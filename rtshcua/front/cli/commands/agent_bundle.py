@@ -32,7 +32,7 @@ COPIED: Final = (f"skills/{NAME}/SKILL.md", "hooks/keep_out.py")
 #: tools of a host that can access files
 _REACHING: Final = "Bash|Read|Edit|Write|NotebookEdit"
 _DATA: Final = "RTSHCUA_DATA_DIR"
-#: variables that locate the user's data, which hosts do not pass to the servers they start
+#: environment variables that set the user's data directory; hosts do not pass them to the servers that they start
 _CHOOSING: Final = (_DATA, "XDG_DATA_HOME")
 
 

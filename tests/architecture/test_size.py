@@ -11,17 +11,17 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the limits of the counts of `make size`: lower a limit in the commit that lowers the count
 HELD = {
-    "modules": 734,
-    "code lines": 85_613,  # rose with typed services in place of logic in commands, and a secure world
+    "modules": 736,
+    "code lines": 85_839,  # rose with typed services in place of logic in commands, and a secure world
     "shared class names": 0,
     "of them across packages": 0,
     "shared file names": 69,
     "import cycles": 0,
     "modules below 80 lines with one importer": 13,
     "functions of more than 60 lines": 0,
-    "functions of a complexity over 15": 67,
+    "functions of a complexity over 15": 66,
     "functions of a complexity over 25": 0,
-    "lines of application logic in the command line": 888,
+    "lines of application logic in the command line": 893,
 }
 
 

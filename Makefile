@@ -43,6 +43,7 @@ lint: setup ## check style, format, types and layers, of our sources too
 	$(BIN)/rtshcua lint skills policies missions examples
 
 soak: setup ## run the long campaigns, and every property test with many examples; flights go on where they stopped
+	@.make/optee || echo "soak: the tests by OP-TEE are skipped"
 	$(BIN)/pytest -n $(JOBS) --most 0 -m "soak or hypothesis" --hypothesis-profile soak
 	RTSHCUA_BOUNDARY=build/boundary/librtshcua.so $(BIN)/pytest -p reference.shadow
 	@if command -v frama-c >/dev/null; then make -C boundary proof; else echo "soak: no frama-c, so nothing was proved"; fi

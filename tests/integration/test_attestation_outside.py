@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from boundary.secure_world import needs_emulator
+from boundary.trusted_application import needs_optee
 from rtshcua.wire.keys import Duty
 
 pytestmark = pytest.mark.clients
@@ -45,7 +46,14 @@ def outside(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return python
 
 
-@pytest.mark.parametrize("mode", ["process", pytest.param("trustzone-m", marks=needs_emulator)])
+@pytest.mark.parametrize(
+    "mode",
+    [
+        "process",
+        pytest.param("trustzone-m", marks=needs_emulator),
+        pytest.param("optee", marks=[needs_optee, pytest.mark.soak]),
+    ],
+)
 def test_token_of_a_flight_is_verified_by_another_library(mode: str, ground: Any, outside: Path) -> None:
     flown = ground.run(ground.bundle(), "--mode", mode, speed=10).end()
     assert flown.code == 0, flown.stderr

@@ -31,8 +31,8 @@ INSTALL: Final = "apt-get install qemu-system-arm, then `make optee` as root, wh
 DEVELOPMENT: Final = "a public key signs its trusted applications, and it has no monotonic counter"
 #: how long firmware, OP-TEE and Linux may take to start, in s: 4 to 14 on two cores, by what else they do
 BOOT_S: Final = 90.0
-#: how long an answer may take, in s: longer than in other homes, as one may wait for secure storage (0.1 s and more on a
-#: busy machine); less than clocks may be apart (APART_US)
+#: how long an answer may take, in s: longer than in other homes, as one may wait for secure storage (0.1 s and more on
+#: a busy machine); less than clocks may be apart (APART_US)
 ANSWER_S: Final = 1.5
 _BUILT: Final = Path(__file__).resolve().parents[3] / "build" / "optee"
 _FILES: Final = ("flash.bin", "machine.dtb", "kernel", "initrd.gz", "storage.img", "machine")

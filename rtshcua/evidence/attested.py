@@ -206,6 +206,8 @@ class BoundaryEvidence:
             home = open_attestation(octets(record.detail) or b"", self._keys)
         except Untrusted as error:
             return Flaw(f"attested/{error.slug}", f"the attestation of the boundary's home is not trusted: {error}")
+        if self._home is not None:
+            return Flaw("attested/again", "the boundary's home attests itself once per flight")
         if home.flight != self._flight:
             text = "the boundary's home attested this in another flight"
             return Flaw("attested/other-flight", text, home.flight.hex(), self._flight.hex())

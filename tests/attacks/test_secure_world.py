@@ -2,17 +2,21 @@
 
 import os
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from pathlib import Path
 from struct import pack, unpack
 
 import pytest
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
 from boundary.both_boundaries import LOG_KEY, OWN_KEY
 from boundary.secure_world import needs_emulator
 from boundary.sessions_in_c_and_python import PIN, SIGNED_ROOT
-from reference.world import VEHICLE
+from boundary.test_note import begins
+from reference.world import START, VEHICLE, sealed
+from rtshcua.adapters.boundary.home import BoundaryError
 from rtshcua.adapters.boundary.trustzone_m import Images, SecureWorld, images
-from rtshcua.onboard.enforcement.isolated import DIGEST
+from rtshcua.onboard.enforcement.isolated import DIGEST, LOG, Caller
 
 pytestmark = [needs_emulator, pytest.mark.clients]
 
@@ -115,3 +119,41 @@ def test_a_setup_is_gone_once_it_was_read(tmp_path: Path, attack: Attack, world:
     command = Path(f"/proc/{world.pid}/cmdline").read_bytes()
     assert not any(key in command or key.hex().encode() in command for key in (OWN_KEY, LOG_KEY))
     assert os.getpgid(world.pid) == world.pid
+
+
+def test_interrupted_call_is_not_replaced_by_another(world: SecureWorld) -> None:
+    """An interrupt of the normal world calls again, with another text, while the log's key signs the first one."""
+    caller = Caller(world.call, part=world.part, most_ahead=world.most_ahead)
+    assert world.log_public is not None
+    key, interrupts = Ed25519PublicKey.from_public_bytes(world.log_public), 0
+    for delay_us in (200, 300, 400, 600, 800, 900, 1_200, 1_500, 2_000):
+        flight = caller.load(sealed(), START)
+        assert isinstance(flight, bytes), flight
+        text = begins(flight).encode()
+        assert world._ask(b"o", bytes([LOG]) + b"another text".ljust(len(text), b"!"), 5)[0] == b"d"
+        code, answer = world._ask(b"L", pack("<I", 20 * delay_us) + bytes([LOG]) + text, 5)
+        assert (code, answer[:1]) == (b"d", b"\0")
+        key.verify(answer[1:], text)  # raises InvalidSignature
+        interrupts += unpack("<II", world._ask(b"F", b"", 5)[1])[0]
+    assert interrupts > 0
+
+
+@pytest.mark.parametrize("left", [b"", bytes(6_223)])
+def test_emptied_or_cut_state_is_damage(left: bytes, tmp_path: Path) -> None:
+    begin = partial(SecureWorld, SIGNED_ROOT, PIN, VEHICLE, tmp_path, log_seed=LOG_KEY, paced=True, programs=images())
+    begin().close()
+    (kept,) = tmp_path.rglob("*.trustzone-m")
+    kept.write_bytes(left)
+    with pytest.raises(BoundaryError) as refused:
+        begin()
+    assert refused.value.slug == "damaged"
+    kept.unlink()
+    with pytest.raises(BoundaryError) as refused:
+        begin()
+    assert refused.value.slug == "damaged"
+
+
+def test_no_key_is_left_in_an_open_file_of_the_emulator(world: SecureWorld) -> None:
+    setups = [file for file in Path(f"/proc/{world.pid}/fd").iterdir() if "memfd:setup" in str(file.readlink())]
+    assert setups
+    assert [file.read_bytes() for file in setups] == [b""] * len(setups)

@@ -56,5 +56,6 @@
 #define SYST_RELOAD 0xE000E014u
 #define SYST_VALUE 0xE000E018u
 #define NVIC_ENABLE_1 0xE000E104u
+#define NVIC_PRIORITY 0xE000E400u /* one octet for each interrupt */
 
 #endif

@@ -31,6 +31,7 @@ enum {
 #ifndef RT_MAILBOX_SIZE
 #define RT_MAILBOX_SIZE 0x10000u
 #endif
+#define RT_BLOB_SIZE 6224u /* rtshcua/adapters/boundary/trustzone_m.py */
 #define RT_MAILBOX_HEAD 8 /* size of the answer (4), size of the blob behind it (4) */
 
 #endif

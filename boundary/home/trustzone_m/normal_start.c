@@ -25,9 +25,12 @@ void halt(void) {
     for (;;) __asm volatile("wfi");
 }
 
+void ticked(void);
+__attribute__((weak)) void ticked(void) { halt(); }
+
 typedef void (*handler)(void);
 const struct { uint32_t *stack; handler handlers[15]; handler interrupts[UART0_RECEIVED + 1]; } normal_vectors __attribute__((section(".vectors"), used)) = {
-    &normal_stack_top, {normal_reset, halt, halt, halt, halt, halt, 0, 0, 0, 0, halt, halt, 0, halt, halt}, {[UART0_RECEIVED] = received}};
+    &normal_stack_top, {normal_reset, halt, halt, halt, halt, halt, 0, 0, 0, 0, halt, halt, 0, halt, ticked}, {[UART0_RECEIVED] = received}};
 
 void normal_reset(void) {
     for (uint32_t *to = &normal_bss_start; to < &normal_bss_end;) *to++ = 0;

@@ -21,12 +21,10 @@ static void count_ticks(void) {
     last_count = now;
 }
 
+/* Only while interrupts are masked. */
 static int64_t own_time_us(void) {
-    __asm volatile("cpsid i" ::: "memory");
     count_ticks();
-    const uint64_t ticks = passed;
-    __asm volatile("cpsie i" ::: "memory");
-    return started_us + (int64_t)(ticks / TICKS_PER_US);
+    return started_us + (int64_t)(passed / TICKS_PER_US);
 }
 
 void tick(void);
@@ -62,8 +60,13 @@ static volatile uint32_t violations;
 /* All that the normal world can ask. `mailbox` must be its own memory, of RT_MAILBOX_SIZE octets. */
 uint32_t __attribute__((cmse_nonsecure_entry)) rt_gateway(uint32_t want, uint8_t *mailbox, uint32_t size);
 uint32_t rt_gateway(uint32_t want, uint8_t *mailbox, uint32_t size) {
-    if (cmse_check_address_range(mailbox, RT_MAILBOX_SIZE, CMSE_NONSECURE | CMSE_MPU_READWRITE) == NULL) return RT_WRONG;
-    return rt_world_answer(want, mailbox, size, own_time_us(), violations);
+    /* Nothing interrupts: an interrupt of the normal world could call again, and change what this call has checked already. */
+    __asm volatile("cpsid i" ::: "memory");
+    uint32_t done = RT_WRONG;
+    if (cmse_check_address_range(mailbox, RT_MAILBOX_SIZE, CMSE_NONSECURE | CMSE_MPU_READWRITE) != NULL)
+        done = rt_world_answer(want, mailbox, size, own_time_us(), violations);
+    __asm volatile("cpsie i" ::: "memory");
+    return done;
 }
 
 /* ------------------------------------------------------------------------------------------------ protection */
@@ -114,10 +117,13 @@ static bool is_nonsecure_code(uint32_t address) { return address >= NONSECURE_CO
    world, or makes no sense, everything stops. */
 void violated(uint32_t returns, uint32_t *main_frame, uint32_t *process_frame);
 void violated(uint32_t returns, uint32_t *main_frame, uint32_t *process_frame) {
-    uint32_t *frame = returns & 1u << 2 ? process_frame : main_frame;
+    uint32_t control;
     if (returns & 1u << 6) stop(); /* the secure world itself */
+    __asm volatile("mrs %0, control_ns" : "=r"(control));
+    uint32_t *frame = (returns & 1u << 3) && (control & 1u << 1) ? process_frame : main_frame; /* thread mode with a stack of its own */
     frame = cmse_check_address_range(frame, 32, CMSE_NONSECURE | CMSE_MPU_READWRITE);
     if (frame == NULL) stop();
+    if (violations == 0) rt_world_wipe(); /* nothing is answered any more */
     violations += violations < 0xFFFFFFFFu;
     uint32_t at = frame[6];
     if (is_nonsecure_code(at)) {
@@ -134,18 +140,21 @@ void __attribute__((naked)) fault(void) {
     __asm volatile("mov r0, lr\nmrs r1, msp_ns\nmrs r2, psp_ns\npush {r3, lr}\nbl violated\npop {r3, pc}");
 }
 
-extern uint32_t stack_low, stack_top, data_start, data_end, data_image, bss_start, bss_end;
+extern uint32_t stack_low, stack_top[2], data_start, data_end, data_image, bss_start, bss_end;
 void reset(void);
 static void unexpected(void) { stop(); }
 
 typedef void (*handler)(void);
 const struct { uint32_t *stack; handler handlers[15]; handler interrupts[96]; } vectors __attribute__((section(".vectors"), used)) = {
-    &stack_top, {reset, unexpected, fault, fault, fault, fault, fault, 0, 0, 0, unexpected, unexpected, 0, unexpected, tick}, {0}};
+    stack_top, {reset, unexpected, fault, fault, fault, fault, fault, 0, 0, 0, unexpected, unexpected, 0, unexpected, tick}, {0}};
 
 void reset(void) {
     for (uint32_t *to = &data_start, *from = &data_image; to < &data_end;) *to++ = *from++;
     for (uint32_t *to = &bss_start; to < &bss_end;) *to++ = 0;
     __asm volatile("msr msplim, %0" ::"r"(&stack_low));
+    /* seals, so that a forged return finds no frame above the stack (Arm, "Secure stack sealing") */
+    stack_top[0] = stack_top[1] = 0xFEF5EDA5u;
+    __asm volatile("msr psp, %0\nmsr psplim, %0" ::"r"(stack_top));
     protect();
     start_clock();
     const rt_home home = measured();

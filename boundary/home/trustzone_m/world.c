@@ -128,6 +128,7 @@ static uint32_t hand_out(uint8_t *mailbox, bool keeps, bool must) {
     memcpy(mailbox + RT_MAILBOX_HEAD + size + sizeof kept, mac, sizeof mac);
     return must ? RT_KEEP_FIRST : RT_DONE_KEEP;
 }
+_Static_assert(sizeof(rt_kept) + RT_DIGEST_BYTES == RT_BLOB_SIZE, "as the other side expects it");
 _Static_assert(RT_MAILBOX_HEAD + RT_MAX_RESULT + sizeof(rt_kept) + RT_DIGEST_BYTES <= RT_MAILBOX_SIZE, "room for all of it");
 _Static_assert(RT_MAILBOX_HEAD + RT_MAX_CALL <= RT_MAILBOX_SIZE, "and for any call");
 
@@ -192,4 +193,5 @@ int64_t rt_world_begin(const uint8_t *setup, uint32_t size, const rt_home *home)
 void rt_world_wipe(void) {
     rt_wipe(&keys, sizeof keys);
     rt_wipe(sealing, sizeof sealing);
+    rt_wipe(&boundary, sizeof boundary); /* it has copies of keys */
 }

@@ -17,7 +17,7 @@ from rtshcua.adapters.store.writing import PRIVATE_FILE, lock
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US
 
 #: what it does not keep out
-EMULATED: Final = "hardware: its secure world is emulated, in reach of whoever has this machine's root"
+EMULATED: Final = "hardware: its secure world is emulated, and root and the run's user can read the emulator's memory"
 #: what becomes of a wish (boundary/home/trustzone_m/mailbox.h)
 READY, DONE, DONE_KEEP, KEEP_FIRST, NOT_BEGUN = b"r", b"d", b"k", b"f", b"b"
 
@@ -25,8 +25,13 @@ READY, DONE, DONE_KEEP, KEEP_FIRST, NOT_BEGUN = b"r", b"d", b"k", b"f", b"b"
 _SETUP: Final = Struct("<4sI32s32s32s32s32sqqqq8I")
 _LINK_KEY, _BOUNDARY_KEY, _LOG_KEY, _PACED, _SETTINGS, _OWED = 1, 2, 4, 8, 16, 32
 _UNTRUSTED, _DAMAGED = 65, 78
-#: starts a program that the kernel ends when the thread ends that started it (PR_SET_PDEATHSIG, SIGKILL)
-_WITH_US: Final = "import ctypes, os, sys; ctypes.CDLL(None).prctl(1, 9, 0, 0, 0); os.execvp(sys.argv[1], sys.argv[1:])"
+#: starts a program that leaves no core dump, and that the kernel ends when the thread ends that started it
+#: (PR_SET_PDEATHSIG, SIGKILL); not at all if that thread has ended already
+_WITH_US: Final = (
+    "import ctypes, os, resource, sys; ctypes.CDLL(None).prctl(1, 9, 0, 0, 0); "
+    "resource.setrlimit(resource.RLIMIT_CORE, (0, 0)); "
+    "os.getppid() == int(sys.argv[1]) and os.execvp(sys.argv[2], sys.argv[2:])"
+)
 
 
 class Setup(NamedTuple):
@@ -91,8 +96,9 @@ class EmulatedHome(BoundaryHome):
         """Start the emulator, which gets these files."""
         try:
             self._process = subprocess.Popen(
-                [sys.executable, "-I", "-S", "-c", _WITH_US, *words], pass_fds=files, stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+                [sys.executable, "-I", "-S", "-c", _WITH_US, str(os.getpid()), *words],
+                pass_fds=files, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL, start_new_session=True,
             )  # fmt: skip
         except OSError as error:
             text = f"`{words[0]}` does not start: {(error.strerror or str(error)).lower()}"
@@ -104,12 +110,16 @@ class EmulatedHome(BoundaryHome):
             with suppress(ProcessLookupError):
                 self._process.kill()
 
-    def _end(self) -> None:
-        """End the emulator, and let go of what is kept."""
+    def _end_process(self) -> None:
+        """End the emulator."""
         if self._process is not None:
             self._kill()
             self._process.wait()
             self._process = None
+
+    def _end(self) -> None:
+        """End the emulator, and let go of what is kept."""
+        self._end_process()
         if self._lock >= 0:
             os.close(self._lock)
             self._lock = -1

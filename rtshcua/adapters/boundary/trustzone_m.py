@@ -18,10 +18,13 @@ from typing import Final, NamedTuple
 
 from rtshcua.adapters.boundary.emulator import DONE, DONE_KEEP, KEEP_FIRST, READY, EmulatedHome, Setup, not_begun
 from rtshcua.adapters.boundary.home import ANSWER_S, GREETING_BYTES, PATIENCE_S, BoundaryError, kept_file
+from rtshcua.adapters.boundary.process import first_kept
+from rtshcua.adapters.clock import monotonic_ns
 from rtshcua.adapters.store.reading import read_if_there, read_regular
 from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, create_whole, make_folder, replace
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.home_limits import TRUSTZONE_M
-from rtshcua.onboard.enforcement.isolated import LOAD
+from rtshcua.onboard.enforcement.isolated import LOAD, Caller
 
 #: the program that emulates, and what installs it
 EMULATOR: Final = "qemu-system-arm"
@@ -34,6 +37,11 @@ _SETUP_AT, _SETUP_SIZE = 0x38180000, 0x80000
 _HEAD: Final = Struct("<II")
 _MAILBOX: Final = 0x10000
 _MEMORY: Final = 16 << 20
+#: octets of a sealed blob (RT_BLOB_SIZE)
+_BLOB: Final = 6_224
+_KEY_BYTES: Final = 32
+#: how far the clock of the secure world may lag, in us: a fraction of what clocks may be apart
+_LAG_US: Final = 500_000
 
 
 class Images(NamedTuple):
@@ -80,13 +88,19 @@ class SecureWorld(EmulatedHome):
             raise missing or BoundaryError("missing", "the programs of the secure world were not built", INSTALL)
         self._kept = kept_file(state, vehicle).with_suffix(".trustzone-m")
         make_folder(self._kept.parent, mode=PRIVATE_FOLDER)
-        self._hold(self._kept.with_suffix(".trustzone-m-lock"), vehicle)
+        place = kept_file(state, vehicle)
+        create_whole(place, first_kept(), mode=PRIVATE_FILE)
+        self._hold(place, vehicle)  # the file of a process: one boundary has a vehicle, whatever its home
+        self._lost, self._given = False, -1
         self._later = _Keeper(self._kept)
         setup = Setup(root, pinned, vehicle, link_key, own_seed, log_seed, settings, owed, paced, utc_error_us)
         try:
-            kept = read_if_there(self._kept, _SETUP_SIZE) or b""
+            self._given = os.memfd_create("setup")
+            kept = self._read_kept()
             self._start(found, setup.packed(kept, self._device_key(), _SETUP_SIZE))
             self._greet()
+            self._first.unlink(missing_ok=True)
+            self._check_clock(paced)
         except BaseException:
             self.close()
             raise
@@ -108,24 +122,57 @@ class SecureWorld(EmulatedHome):
 
     def close(self) -> None:
         """End the emulator, whatever state it is in; one that answers hands out first what is to be kept."""
-        if self._process is not None:
-            with suppress(OSError):
-                self._ask(b"E", b"", ANSWER_S)
-        self._later.close()
-        if self._process is not None:
+        try:
+            if self._process is not None:
+                with suppress(OSError):
+                    self._ask(b"E", b"", ANSWER_S)
+        finally:
+            started = self._process is not None
+            self._forget_setup()
+            self._end_process()
+            self._later.close()
+            if started:
+                self._bell.close()
+                self._memory.close()
             self._end()
-            self._bell.close()
-            self._memory.close()
-        self._end()
+
+    def _forget_setup(self) -> None:
+        """Empty the file of the setup, which the emulator keeps open."""
+        if self._given >= 0:
+            os.ftruncate(self._given, 0)
+            os.close(self._given)
+            self._given = -1
+
+    def _read_kept(self) -> bytes:
+        """The sealed blob; empty at the first start. A blob that is missing after that is damage."""
+        self._device = self._kept.with_suffix(".trustzone-m-device")
+        self._first = self._kept.with_suffix(".trustzone-m-first")
+        kept = read_if_there(self._kept, _SETUP_SIZE)
+        if kept is None and not self._device.exists():
+            create_whole(self._first, b"", mode=PRIVATE_FILE)
+        if (kept is None and self._first.exists()) or (kept is not None and len(kept) == _BLOB):
+            return kept or b""
+        text = f"`{self._kept}` is missing, empty or cut: which bundles the boundary has opened is not known"
+        raise BoundaryError("damaged", text, "docs/flying/isolation.md says what to do")
 
     def _device_key(self) -> bytes:
         """What a chip has fused, and nothing but its secure world reads: here a file beside what is kept."""
-        place = self._kept.with_suffix(".trustzone-m-device")
-        create_whole(place, os.urandom(32), mode=PRIVATE_FILE)
-        return read_regular(place, 64)
+        create_whole(self._device, os.urandom(_KEY_BYTES), mode=PRIVATE_FILE)
+        key = read_regular(self._device, 2 * _KEY_BYTES)
+        if len(key) != _KEY_BYTES:
+            raise BoundaryError("damaged", f"`{self._device}` is not the device key that was made here")
+        return key
+
+    def _check_clock(self, paced: bool) -> None:
+        """The clock of the secure world begins at the time of the setup, and so lags by the emulator's start."""
+        if paced:
+            return
+        told = Caller(self.call).time()
+        if isinstance(told, Refusal) or monotonic_ns() // 1_000 - told.now.monotonic_us > _LAG_US:
+            raise BoundaryError("not-begun", "the emulator took too long to start", "try again on a machine at rest")
 
     def _start(self, programs: Images, setup: bytes) -> None:
-        ram, given = os.memfd_create("mailbox"), os.memfd_create("setup")
+        ram, given = os.memfd_create("mailbox"), self._given
         self._bell, theirs = socket.socketpair()
         try:
             os.ftruncate(ram, _MEMORY)
@@ -133,8 +180,8 @@ class SecureWorld(EmulatedHome):
             os.pwrite(given, setup, 0)
             self._launch(
                 [
-                    EMULATOR, "-M", "mps2-an505,memory-backend=mailbox", "-nodefaults", "-nographic", "-monitor",
-                    "none", "-no-reboot", "-object",
+                    EMULATOR, "-M", "mps2-an505,memory-backend=mailbox,dump-guest-core=off", "-nodefaults",
+                    "-nographic", "-monitor", "none", "-no-reboot", "-object",
                     f"memory-backend-file,id=mailbox,mem-path=/proc/self/fd/{ram},size={_MEMORY},share=on",
                     "-kernel", str(programs.secure), "-device", f"loader,file={programs.normal}",
                     "-device", f"loader,file=/proc/self/fd/{given},addr={_SETUP_AT:#x},force-raw=on",
@@ -146,7 +193,6 @@ class SecureWorld(EmulatedHome):
         finally:
             theirs.close()
             os.close(ram)
-            os.close(given)
 
     def _greet(self) -> None:
         self._bell.settimeout(PATIENCE_S)
@@ -155,6 +201,7 @@ class SecureWorld(EmulatedHome):
             code, greeting = self._ask(b"G", b"", PATIENCE_S) if ready else (b"", b"")
         except OSError:
             code, greeting = b"", b""
+        self._forget_setup()
         if code == DONE and len(greeting) == GREETING_BYTES + 8:
             self._read_greeting(greeting[:-8])
             self._counter = int.from_bytes(greeting[-8:], "little")
@@ -163,14 +210,18 @@ class SecureWorld(EmulatedHome):
 
     def _ask(self, want: bytes, octets: bytes, patience_s: float) -> tuple[bytes, bytes]:
         """What becomes of a wish, and its answer. What must be kept first is kept first. Raises OSError."""
-        if len(octets) > _MAILBOX - _HEAD.size:
+        if len(octets) > _MAILBOX - _HEAD.size or self._lost:
             return b"", b""
+        self._lost = True  # until all of it was exchanged: no answer may be taken for that to another call
         code, answer, blob = self._exchange(want, octets, patience_s)
+        if code in (KEEP_FIRST, DONE_KEEP) and len(blob) != _BLOB:
+            return b"", b""
         if code == KEEP_FIRST:
             code, answer, _ = self._exchange(b"K" if self._later.keep(blob) else b"N", b"", patience_s)
         elif code == DONE_KEEP:
             code = DONE
             self._later.keep_later(blob)
+        self._lost = False
         return code, answer
 
     def _exchange(self, want: bytes, octets: bytes, patience_s: float) -> tuple[bytes, bytes, bytes]:
@@ -191,31 +242,31 @@ class SecureWorld(EmulatedHome):
 
 
 class _Keeper:
-    """Writes what is handed out to be kept: at once where an answer waits for it, else in a thread of its own."""
+    """Writes sealed blobs in a thread of its own, the newest one only; an answer may wait for one."""
 
     def __init__(self, place: Path) -> None:
         self._place = place
         self._turn = threading.Condition()
-        self._next: bytes | None = None
+        self._next = b""
+        self._given = self._written = self._failed = 0
         self._over = False
-        self._thread = threading.Thread(target=self._write_later, daemon=True)
+        self._thread = threading.Thread(target=self._write, daemon=True)
         self._thread.start()
 
     def keep(self, blob: bytes) -> bool:
-        """Write it now; False where it could not be."""
+        """Wait until it is on the disk; False if it could not be written."""
+        number = self.keep_later(blob)
         with self._turn:
-            self._next = None
-            try:
-                replace(self._place, blob, mode=PRIVATE_FILE)
-            except OSError:
-                return False
-            return True
+            self._turn.wait_for(lambda: self._written >= number)
+            return self._failed < number
 
-    def keep_later(self, blob: bytes) -> None:
-        """Write it when there is time, unless a newer one comes before."""
+    def keep_later(self, blob: bytes) -> int:
+        """Write it when there is time, unless a newer one comes before; returns its number."""
         with self._turn:
             self._next = blob
+            self._given += 1
             self._turn.notify_all()
+            return self._given
 
     def close(self) -> None:
         """Write what is left, and end."""
@@ -224,12 +275,18 @@ class _Keeper:
             self._turn.notify_all()
         self._thread.join(PATIENCE_S)
 
-    def _write_later(self) -> None:
+    def _write(self) -> None:
         while True:
             with self._turn:
-                self._turn.wait_for(lambda: self._next is not None or self._over)
-                if self._next is None:
+                self._turn.wait_for(lambda: self._given > self._written or self._over)
+                if self._given == self._written:
                     return
-                blob, self._next = self._next, None
-                with suppress(OSError):
-                    replace(self._place, blob, mode=PRIVATE_FILE)
+                blob, number = self._next, self._given
+            try:
+                replace(self._place, blob, mode=PRIVATE_FILE)
+                failed = 0
+            except OSError:
+                failed = number
+            with self._turn:
+                self._written, self._failed = number, failed or self._failed
+                self._turn.notify_all()

@@ -244,6 +244,15 @@ def start_home(
         return of_link_key(error)
 
 
+def _unfit_root(trusted: Trusted) -> str:
+    """The limit of a home with little memory that a trust root exceeds; empty if it fits."""
+    if len(trusted.root.keys) > TRUSTZONE_M["MAX_KEYS"]:
+        return f"{len(trusted.root.keys)} keys (at most {TRUSTZONE_M['MAX_KEYS']})"
+    if len(trusted.signed) > TRUSTZONE_M["MAX_ROOT"]:
+        return f"{len(trusted.signed):,} octets (at most {TRUSTZONE_M['MAX_ROOT']:,})"
+    return ""
+
+
 def _boots(context: FlightContext, passed_s: int) -> None:
     """Tell a person how long the machine of the boundary boots."""
     if passed_s % _BOOTS_S == 0 and not context.console.as_json:
@@ -447,6 +456,12 @@ def _open(
         return BoundaryClient(process, EnforcementMode.PROCESS, loaded.vehicle, trusted.root, request.settings)
     if not request.mode.apart or request.dry_run or trusted.distrust is not None:
         return None
+    unfit = _unfit_root(trusted) if request.mode.emulated else ""
+    if unfit:
+        help = "a root with fewer keys, or `--mode process`"
+        return Refusal(
+            "boundary-too-large", f"the trust root does not fit in its home: {unfit}", help, ExitCode.REFUSED
+        )
     assert not isinstance(own_key, HeldByBoundary)
     boots = partial(_boots, context)
     started = start_home(request, loaded.vehicle, trusted.signed, own_key, log_key.key(), owed, boots)

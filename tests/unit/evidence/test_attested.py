@@ -122,6 +122,7 @@ def test_genuine_flight_has_no_flaw() -> None:
 @pytest.mark.parametrize(("debug", "told"), [(0, "enabled"), (1, "disabled")])
 def test_attested_home_is_proven(log: Log, debug: int, told: str) -> None:
     assert log.take(at_home(log, {263: debug})) is None
+    assert log.take(at_home(log, {263: debug})) == ("attested/again", 3)
     assert [log.refuse(), log.state(final=True), log.take(CLOSE)] == [None] * 3
     proven, unproven = log.evidence.claims()
     (home,) = [claim.text for claim in proven if claim.slug == "home"]

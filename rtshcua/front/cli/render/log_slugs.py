@@ -28,6 +28,7 @@ _FOUND: Final = {
     "anchor/signature": "a note of a witness is damaged or forged, so it is ignored",
     "archive/changed": "the file in the archive differs from the one that was added",
     "archive/missing": "the file is missing in the archive",
+    "attested/again": "the boundary's home attested itself more than once",
     "attested/moved": "the attestation of the boundary's home belongs to another point of its evidence",
     "attested/other-flight": "the attestation of the boundary's home belongs to another flight",
     "attested/other-mode": "the attestation of the boundary's home names another mode than the log",

@@ -15,6 +15,7 @@ PACKAGE = Path(__file__).resolve().parents[2] / "rtshcua"
 #: modules outside the store that open or write files
 ALLOWED = {
     "adapters/archive/asking.py": "reads the SQL that ships",
+    "adapters/boundary/optee.py": "reads what `.make/optee` built; its disk is opened for the emulator",
     "adapters/vehicle/transport.py": "a serial device is not a regular file",
     "campaign/campaign_report.py": "reads the template that ships",
     "front/cli/commands/agent_bundle.py": "reads the example that ships",

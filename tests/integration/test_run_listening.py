@@ -124,7 +124,7 @@ def test_broken_off_flight_lands_without_the_boundary(ground: Any, made: Listeni
     assert (other.code, other.events[-1]["slug"]) == (5, "boundary-missing")
     second = aboard.run().end()
     assert second.code == 6, second.stderr
-    assert any("nobody can verify this log" in event.get("text", "") for event in second.events)
+    assert any("nobody can verify it" in event.get("text", "") for event in second.events)
     (log,) = aboard.runs() - {killed}
     assert aboard.verified(log)[0] == 4
 

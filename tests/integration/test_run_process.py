@@ -81,7 +81,7 @@ def test_broken_off_flight_lands_if_the_boundary_does_not_start(ground: Any, por
     other_bundle = ground.bundle(name="another")
     refused = ground.run(other_bundle, *words, speed=SPEED).end()
     assert refused.code == 3, refused.stderr
-    assert f"run {killed / 'mission.bundle'}` brings down" in refused.events[-1]["help"]
+    assert f"run {killed / 'mission.bundle'}` brings the vehicle down" in refused.events[-1]["help"]
     second = ground.run(bundle, *words, speed=SPEED).end()
     assert second.code == 6, second.stderr
     (told,) = [event["text"] for event in second.events if "is damaged" in event.get("text", "")]

@@ -71,7 +71,7 @@ def test_bash_completes_all_of_it(tab: Complete) -> None:
     }  # fmt: skip
     assert "--if-missing" in tab("keys", "init", "--i")
     assert tab("check", "--deny") == ["--deny-warnings"]
-    assert tab("run", "--mode", "") == ["none", "process", "software", "trustzone-m"]
+    assert tab("run", "--mode", "") == ["none", "optee", "process", "software", "trustzone-m"]
     assert tab("explain", "E031") == [f"E031{digit}" for digit in range(10)]
     assert tab("explain", "datum") == ["datum-mismatch", "datum-not-allowed"]
     assert tab("lint", "--format", "") == ["github", "human", "json", "junit", "sarif"]
@@ -97,7 +97,7 @@ def test_fish_completes(place: Path, capsys: pytest.CaptureFixture[str]) -> None
     asking = "source .script; " + "; ".join(f'complete -C "{line}" | string split -f1 \\t; echo .' for line in lines)
     done = subprocess.run(["fish", "--no-config", "-c", asking], capture_output=True, text=True, check=True)
     assert [sorted(part.split()) for part in done.stdout.split(".\n")[:3]] == [
-        ["verify-log", "verify-proof"], ["none", "process", "software", "trustzone-m"],
+        ["verify-log", "verify-proof"], ["none", "optee", "process", "software", "trustzone-m"],
         ["datum-mismatch", "datum-not-allowed"],
     ]  # fmt: skip
     assert done.stdout.endswith("b.bundle\nsub/\n.\n")

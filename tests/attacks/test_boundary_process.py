@@ -411,7 +411,7 @@ def tried(state: Path) -> BoundaryProcess | Refusal:
     """Start it as `run` does."""
     _, signed = case.root(issued_us())
     of = request(state=state, link=Address(LinkCarrier.UDP_IN, "127.0.0.1", 1), mode=EnforcementMode.PROCESS)
-    return start_home(of, VEHICLE, signed, None, case.KEYS[Duty.LOG], {})
+    return start_home(of, VEHICLE, signed, None, case.KEYS[Duty.LOG], {}, lambda _: None)
 
 
 def begun(state: Path) -> BoundaryProcess:

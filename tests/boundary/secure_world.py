@@ -21,6 +21,7 @@ class InSecureWorld(Together):
     """Both boundaries, the one in C in the secure world."""
 
     home: ClassVar[Any] = SecureWorld
+    requests: ClassVar[int] = 300
 
     def _kept(self) -> keeping.Kept:
         sizes, blob = keeping.TRUSTZONE_M, kept_file(self._folder, VEHICLE).with_suffix(".trustzone-m").read_bytes()

@@ -107,6 +107,8 @@ class Together:
 
     #: where the boundary in C is
     home: ClassVar[Callable[..., Any]] = BoundaryProcess
+    #: the weight of requests to decide, among some 60 of all other calls
+    requests: ClassVar[int] = 60
 
     def __init__(self, random: Random, folder: Path) -> None:
         self.random, self.counts, self._folder = random, Counter[str](), folder
@@ -150,10 +152,10 @@ class Together:
             self.load()
             return
         weights: dict[Callable[[], None], int] = {
-            self.enforce: 60, self.dispatch: 14, self.stand_in: 5, self.tell: 12, self.present: 4, self.observe: 6,
-            self.seal: 12, self.state: 2, self.ahead: 6, self.begin_session: 2, self.sign_log: 1, self.load: 1,
-            self.withdraw: 4, self.stand: 1, self.ask_to_set: 2, self.prepare: 2, self.set_parameter: 2,
-            self.prepared: 1,
+            self.enforce: self.requests, self.dispatch: 14, self.stand_in: 5, self.tell: 12, self.present: 4,
+            self.observe: 6, self.seal: 12, self.state: 2, self.ahead: 6, self.begin_session: 2, self.sign_log: 1,
+            self.load: 1, self.withdraw: 4, self.stand: 1, self.ask_to_set: 2, self.prepare: 2,
+            self.set_parameter: 2, self.prepared: 1,
         }  # fmt: skip
         if self._on_ground:
             weights |= {

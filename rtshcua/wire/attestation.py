@@ -89,10 +89,11 @@ def _read(claims: object) -> HomeAttestation | None:
             sizes = (len(flight), len(ueid), len(evidence)) == (FLIGHT_BYTES, _UEID_BYTES, DIGEST_BYTES)
             named = len(log_kid) in (0, KID_BYTES) and len(link_name) in (0, _LINK_NAME_BYTES)
             known = (profile, software) == (PROFILE, SOFTWARE) and debug in (0, 1) and boots >= 0 and measures >= 0
-            if not others and code is not None and sizes and named and known:
-                return HomeAttestation(
-                    flight, ueid, DebugState(debug), boots, code, mode, evidence, measures, log_kid, link_name
-                )
+            if others or code is None or not (sizes and named and known):
+                return None
+            return HomeAttestation(
+                flight, ueid, DebugState(debug), boots, code, mode, evidence, measures, log_kid, link_name
+            )
     return None
 
 

@@ -91,9 +91,8 @@ def _read(claims: object) -> HomeAttestation | None:
             known = (profile, software) == (PROFILE, SOFTWARE) and debug in (0, 1) and boots >= 0 and measures >= 0
             if others or code is None or not (sizes and named and known):
                 return None
-            return HomeAttestation(
-                flight, ueid, DebugState(debug), boots, code, mode, evidence, measures, log_kid, link_name
-            )
+            state = DebugState(debug)
+            return HomeAttestation(flight, ueid, state, boots, code, mode, evidence, measures, log_kid, link_name)
     return None
 
 

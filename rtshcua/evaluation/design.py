@@ -1,0 +1,33 @@
+"""What the published evaluation varies: missions, deadlines, modes and repetitions."""
+
+from typing import Final, NamedTuple
+
+#: the missions, by their number of steps: 3, 6 and 12
+MISSIONS: Final = ("short", "standard", "extended")
+#: the deadlines of a step, in us from its release
+DEADLINES_US: Final = (100_000, 200_000, 300_000, 500_000, 750_000, 1_000_000, 1_500_000)
+#: `unenforced` takes only the steps timing, phase, state and safety of the decision; the others are modes of `run`
+UNENFORCED: Final = "unenforced"
+MODES: Final = ("none", UNENFORCED, "software", "process", "trustzone-m", "optee")
+#: how often each cell is repeated
+RUNS: Final = 30
+
+
+class EvaluationPoint(NamedTuple):
+    """A mission whose steps all have one deadline."""
+
+    mission: str
+    deadline_us: int
+
+
+POINTS: Final = tuple(EvaluationPoint(mission, deadline_us) for mission in MISSIONS for deadline_us in DEADLINES_US)
+
+
+class WorkUnit(NamedTuple):
+    """What one process runs at a time, and what is run again as a whole after an interruption.
+
+    `experiment` is `X1` to `X7`; `key` identifies the unit in it (for X1: mission, deadline, mode and seed).
+    """
+
+    experiment: str
+    key: tuple[str | int, ...]

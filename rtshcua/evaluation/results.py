@@ -1,0 +1,137 @@
+"""The raw results of the evaluation: one JSON object for each run, as a line of a file for each experiment.
+
+All durations are integers in nanoseconds of the computer's clock. Where a mode is not available on this computer, one
+`UnavailableMode` stands in place of its runs.
+"""
+
+import msgspec
+
+
+class StepTiming(msgspec.Struct, frozen=True, kw_only=True):
+    """One invocation of a flight: what was decided for the step, and how long it took.
+
+    `end_to_end_ns` counts from the frame that released the step to its first command frame handed to the socket, with
+    the evidence written between; `validation_ns` from request bytes to answer bytes of `enforce`; `dispatch_ns` from
+    that answer to the frame. None where nothing was sent.
+    """
+
+    step: int
+    outcome: str
+    reason: str
+    validation_ns: int
+    end_to_end_ns: int | None
+    dispatch_ns: int | None
+
+
+class PointFlight(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="flight"):
+    """X1, X2, X5: one flight. `proposal_ns` counts from the mission's text to its first command frame.
+
+    `misses` counts invocations that were not dispatched by their deadline, `fallbacks` outcomes and dispatched links.
+    """
+
+    mission: str
+    deadline_us: int
+    mode: str
+    seed: int
+    ending: str
+    misses: int
+    fallbacks: int
+    proposal_ns: int
+    invocations: tuple[StepTiming, ...]
+
+
+class EnforceCheck(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="check"):
+    """X3: one request through `enforce`.
+
+    `as_expected`: outcome and reason are those of the table. `agrees`: outcome, reason, clause, target and end of
+    validity are those of `decide`. `permits`: how many permits came with the answer.
+    """
+
+    case: str
+    mission: str
+    deadline_us: int
+    mode: str
+    repetition: int
+    outcome: str
+    reason: str
+    as_expected: bool
+    agrees: bool
+    permits: int
+
+
+class CaseFlight(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="case-flight"):
+    """X3, through the whole runtime in virtual time: one flight with the fault of a case.
+
+    `expected` says in words what is to be dispatched, `dispatched` lists what was from the fault on.
+    """
+
+    case: str
+    mission: str
+    deadline_us: int
+    flavour: str
+    seed: int
+    aloft: bool
+    expected: str
+    dispatched: tuple[str, ...]
+    ending: str
+    holds: bool
+
+
+class FallbackTiming(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="fallback"):
+    """X4: one triggered condition. `local_ns`: admission, selection of the fallback, and the record of evidence.
+
+    `written_ns` is the same with the record written to its file, `synced_ns` with it on the disk.
+    """
+
+    case: str
+    mode: str
+    repetition: int
+    local_ns: int
+    written_ns: int
+    synced_ns: int
+
+
+class AppendTiming(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="append"):
+    """X6: the appends of one log, by durability (`buffered`, `written`, `synced-first`), one duration a record."""
+
+    durability: str
+    repetition: int
+    octets: int
+    appended_ns: tuple[int, ...]
+
+
+class VerificationTiming(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="verification"):
+    """X6: one verification of a log: `fast`, `default`, `audit-no-derive`, `audit`."""
+
+    way: str
+    records: int
+    repetition: int
+    took_ns: int
+
+
+class ComponentSize(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="component"):
+    """X7: one component. `domain`: `companion` or `secure-world`; None where a size does not apply, in octets.
+
+    `artifact` is the size of its sources or its ELF file, `memory` its peak while it flies the standard mission.
+    """
+
+    component: str
+    domain: str
+    files: tuple[str, ...]
+    code_lines: int | None
+    artifact: int | None
+    memory: int | None
+    state: str
+
+
+class UnavailableMode(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="unavailable"):
+    """A mode that this computer does not have, and why."""
+
+    mode: str
+    why: str
+
+
+Result = (
+    PointFlight | EnforceCheck | CaseFlight | FallbackTiming | AppendTiming | VerificationTiming
+    | ComponentSize | UnavailableMode
+)  # fmt: skip

@@ -81,18 +81,23 @@ def rates(policy: Policy, contracts: Iterable[Contract] = ()) -> dict[str, Rate]
     return found
 
 
-def delivered(asked: Mapping[str, Rate]) -> dict[str, int]:
-    """The interval between two reports of a message, on a link with enough capacity, from any autopilot."""
-    return {name: max(rate.asked, AT_BEST.get(name, 0)) for name, rate in asked.items()}
+def delivered(asked: Mapping[str, Rate], message: str, every_us: int | None = None) -> int:
+    """The interval between two reports of a message, on a link with enough capacity, from any autopilot; `every_us`:
+    how often its sender reports it, where that is known.
+    """
+    return max(asked[message].asked, AT_BEST.get(message, 0) if every_us is None else every_us)
 
 
 def awaited(policy: Policy, skill: int, contract: Contract) -> Iterator[Clause]:
-    """The clauses that a decision on a contract may wait for: its own, and those of the `forbid` rules that may
-    match.
+    """The clauses that a decision on a contract may wait for: its own, and those of the `forbid` and `degrade` rules
+    that may match.
     """
     yield from (*contract.require, *contract.assume, *contract.maintain)
     for rule in policy.rules:
-        if rule.kind == RuleKind.FORBID and rule.when is not None and skill in (rule.skills or (skill,)):
+        if rule.when is None or skill not in (rule.skills or (skill,)):
+            continue
+        # a rule that degrades to the same skill does not apply to it
+        if rule.kind == RuleKind.FORBID or (rule.target is not None and rule.target.skill != skill):
             yield rule.when
 
 

@@ -221,6 +221,8 @@ def _signal(signal: SignalDecl, dialect: Dialect | None) -> Iterator[str]:
             known = None if message is None else message.fields.get(field.text)
             unit = f" in `{known.unit}`" if known is not None and known.unit else ""
             yield f"MAVLink `{source.message.text}.{field.text}`{unit}"
+    if signal.every is not None:
+        yield f"reported every {display(signal.every.value, Dimension.DURATION)}"
     yield f"unknown when older than {display(signal.stale_after.value, Dimension.DURATION)}"
     if signal.unknown_at:
         yield "unknown at " + ", ".join(f"`{each.text}`" for each in signal.unknown_at)

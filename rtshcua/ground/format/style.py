@@ -43,7 +43,7 @@ _PLAIN_ITEMS = (
     "import_file", "enum", "vehicle", "skill", "sizes", "role", "template", "policy", "mission", "nominal", "test",
     "scenario",
     # of signals and zones
-    "unknown", "stale", "floor", "ceiling", "entry", "daily", "on_days", "dates",
+    "unknown", "every", "stale", "floor", "ceiling", "entry", "daily", "on_days", "dates",
     # of vehicles
     "identity", "home", "speed", "climb", "position_error", "endurance", "reserve", "cells", "clock", "time_zone",
     "elevation", "return_at", "brakes", "speeds", "accelerates", "wind", "not_fitted",
@@ -64,7 +64,7 @@ ITEMS = dict.fromkeys(_PLAIN_ITEMS, Style()) | {
     **dict.fromkeys(
         ("use", "contingency", "without_evidence", "without_link", "repeat", "step", "deed", "rows"), _WITHOUT_COLUMN
     ),
-    "signal": _style("or", "where", cuts=(":", "=", "unknown", "stale")),
+    "signal": _style("or", "where", cuts=(":", "=", "unknown", "every", "stale")),
     "zone": _style("feature", "hole", cuts=("=", "from")),
     "validity": _style("during"),
     "sized": _style("during"),

@@ -8,20 +8,19 @@ wait: it falls back within its 200 ms. A person cannot approve a reflex in that 
 `PERSON_US`. A step may shorten the deadline in its own block, so such a step is proved again.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 from rtshcua.decision import tree
 from rtshcua.decision.evaluate import Environment, build
-from rtshcua.decision.rates import awaited
+from rtshcua.decision.rates import MOST_OFTEN, awaited
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.prove.certain_refusal import refusing_rules
 from rtshcua.ground.prove.observability import (
+    Intervals,
     arrives,
     duration,
-    most_frequent,
-    report_interval,
     report_intervals,
     signals_read,
 )
@@ -41,7 +40,7 @@ NEVER = 1 << 62
 def prove_deferrals(proof: ProofContext) -> None:
     """Report deferrals of skills that no report can end in time, and approvals that no person can give in time."""
     policy = proof.policy
-    often = report_intervals(policy)
+    often = report_intervals(proof)
     reported: set[str] = set()
     for number, contract in enumerate(policy.contracts):
         if contract.timing_class == TimingClass.REFLEX:
@@ -53,7 +52,7 @@ def prove_deferrals(proof: ProofContext) -> None:
                 if signal.name not in watched | reported:  # else it is E1201
                     reported.add(signal.name)
                     _report_never(proof, signal, clause)
-            elif report_interval(signal, often) > contract.deadline_us and contract.name not in reported:
+            elif often[signal.name].us > contract.deadline_us and contract.name not in reported:
                 reported.add(contract.name)
                 _report_late(proof, contract, signal, clause, often)
     _prove_approval_times(proof)
@@ -65,11 +64,11 @@ def prove_step_deferral(proof: ProofContext, step: MissionStep) -> None:
     if step.overrides is None or flat.contract.timing_class == TimingClass.REFLEX:
         return
     policy = proof.policy
-    skills, often = policy.contracts[flat.skill], report_intervals(policy, (flat.contract,))
-    if any(report_interval(signal, often) > skills.deadline_us for _, signal in _awaited(proof, flat.skill, skills)):
+    skills, often = policy.contracts[flat.skill], report_intervals(proof, (flat.contract,))
+    if any(often[signal.name].us > skills.deadline_us for _, signal in _awaited(proof, flat.skill, skills)):
         return  # already reported for the skill
     for clause, signal in _awaited(proof, flat.skill, flat.contract):
-        if arrives(signal) and report_interval(signal, often) > flat.contract.deadline_us:
+        if arrives(signal) and often[signal.name].us > flat.contract.deadline_us:
             own = step.overrides.deadline
             _report_late(proof, flat.contract, signal, clause, often, step.span if own is None else own.span)
             return
@@ -203,18 +202,26 @@ def _report_late(
     contract: Contract,
     signal: Signal,
     clause: Clause,
-    often: Mapping[str, int],
+    often: Intervals,
     span: Span | None = None,
 ) -> None:
     deadline = proof.skills[contract.name].deadline
     assert deadline is not None
-    every = duration(report_interval(signal, often))
+    us, message, assumed = often[signal.name]
+    every = duration(us)
+    help = f"set the deadline to {every} or more"
+    if us <= MOST_OFTEN:
+        help += ": no message is requested more often"
+    elif assumed:
+        help += f", read `{signal.name}` from another message, or write `every` if its sender reports it more often"
+    else:
+        help += f", or read `{signal.name}` from another message"
     proof.report.add(
         codes.NO_RESOLVER,
         span or deadline.span,
         f"`{contract.name}` waits at most {duration(contract.deadline_us)} for `{signal.name}`, but "
-        f"`{most_frequent(signal, often).message}` is sent only every {every}",
-        help=f"set the deadline to {every} or more, or read `{signal.name}` from a message that is sent more often",
+        f"`{message}` is sent only every {every}",
+        help=help,
         labels=[(proof.span(clause), "this condition waits for the signal")],
     )
 

@@ -11,7 +11,8 @@ again.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from operator import attrgetter
+from typing import NamedTuple, TypeAlias
 
 from rtshcua.decision import rates
 from rtshcua.decision.rates import signal_of
@@ -24,7 +25,7 @@ from rtshcua.mavlink.dialect import Dialect
 from rtshcua.model.flat.code import Clause, Op
 from rtshcua.model.flat.contract import Contract
 from rtshcua.model.flat.policy import MonitorKind, Policy, RuleKind
-from rtshcua.model.flat.signal import Signal, SignalSource
+from rtshcua.model.flat.signal import Signal
 from rtshcua.model.quantity import Dimension, display
 
 #: messages that a vehicle receives, and never sends as telemetry
@@ -42,12 +43,39 @@ COMMAND_MESSAGES = frozenset({
 STAMPS = frozenset({"time_boot_ms", "time_usec"})
 
 
-def report_intervals(policy: Policy, contracts: Sequence[Contract] = ()) -> dict[str, int]:
-    """Return the interval in us between two reports of each message from which the policy reads a signal.
-
-    It is the requested interval, or a longer one if autopilots do not report so often.
+class SignalInterval(NamedTuple):
+    """The interval in us between two reports of a signal, and the message that is reported most often. `assumed`: it is
+    not the requested interval, but what is known of the senders of that message.
     """
-    return rates.delivered(rates.rates(policy, contracts))
+
+    us: int
+    message: str
+    assumed: bool
+
+
+Intervals: TypeAlias = Mapping[str, SignalInterval]
+
+
+def report_intervals(proof: ProofContext, contracts: Sequence[Contract] = ()) -> Intervals:
+    """Return the interval between two reports of each signal.
+
+    It is the requested interval, or a longer one if autopilots do not report so often, or the signal declares that its
+    sender does not (`every`).
+    """
+    asked, declared = rates.rates(proof.policy, contracts), proof.context.symbols.signals
+    found: dict[str, SignalInterval] = {}
+    for signal in proof.policy.signals:
+        every = declared[signal.name].every
+        each = [
+            SignalInterval(
+                rates.delivered(asked, message, None if every is None else every.value),
+                message,
+                every is None and rates.AT_BEST.get(message, 0) > asked[message].asked,
+            )
+            for message in (source.message for source in signal.sources)
+        ]
+        found[signal.name] = min(each, key=attrgetter("us"))
+    return found
 
 
 def older_by(message: str, dialect: Dialect) -> int:
@@ -61,16 +89,6 @@ def older_by(message: str, dialect: Dialect) -> int:
 def arrives(signal: Signal) -> bool:
     """Whether a vehicle ever reports a signal."""
     return any(source.message not in COMMAND_MESSAGES for source in signal.sources)
-
-
-def most_frequent(signal: Signal, intervals: Mapping[str, int]) -> SignalSource:
-    """Return the source of a signal that reports most often."""
-    return min(signal.sources, key=lambda source: intervals[source.message])
-
-
-def report_interval(signal: Signal, intervals: Mapping[str, int]) -> int:
-    """Return the interval in us between two reports of a signal, from its most frequent message."""
-    return intervals[most_frequent(signal, intervals).message]
 
 
 #: `L_rem`, as assumed on board until it is measured, us; a test compares the two constants
@@ -95,7 +113,7 @@ class WatchedSignal(NamedTuple):
 def prove_observability(proof: ProofContext) -> None:
     """Report signals and windows that cannot be observed, clauses that cannot change, and late reactions."""
     policy = proof.policy
-    intervals = report_intervals(policy)
+    intervals = report_intervals(proof)
     found: dict[str, WatchedSignal] = {}
     for clause in _watched(proof):
         for signal in signals_read(proof, clause):
@@ -123,7 +141,7 @@ def prove_step_observability(proof: ProofContext, step: MissionStep) -> None:
     if own is None:
         return
     flat = step.flat
-    intervals = report_intervals(proof.policy, (flat.contract,))
+    intervals = report_intervals(proof, (flat.contract,))
     contract, skills = flat.contract, proof.policy.contracts[flat.skill]
     watched = (*contract.assume[len(skills.assume) :], *contract.maintain[len(skills.maintain) :])
     before = {signal.name for clause in _watched(proof) for signal in signals_read(proof, clause)}
@@ -167,7 +185,7 @@ def signals_read(proof: ProofContext, *clauses: Clause) -> Iterator[Signal]:
     yield from {signal.name: signal for slot in slots for signal in (signal_of(policy, slot),)}.values()
 
 
-def _observable(proof: ProofContext, watched: WatchedSignal, intervals: Mapping[str, int]) -> None:
+def _observable(proof: ProofContext, watched: WatchedSignal, intervals: Intervals) -> None:
     signal, span = watched
     declared = proof.context.symbols.signals[signal.name]
     if not arrives(signal):
@@ -182,10 +200,10 @@ def _observable(proof: ProofContext, watched: WatchedSignal, intervals: Mapping[
     _stays_known(proof, watched, intervals, "this monitors it in flight")
 
 
-def _stays_known(proof: ProofContext, watched: WatchedSignal, intervals: Mapping[str, int], reads: str) -> None:
+def _stays_known(proof: ProofContext, watched: WatchedSignal, intervals: Intervals, reads: str) -> None:
     """Report a signal that goes stale before its next report can arrive."""
     signal, span = watched
-    often, message = report_interval(signal, intervals), most_frequent(signal, intervals).message
+    often, message, _ = intervals[signal.name]
     older = older_by(message, proof.context.dialect)
     if signal.stale_us >= often + older:
         return
@@ -200,13 +218,13 @@ def _stays_known(proof: ProofContext, watched: WatchedSignal, intervals: Mapping
     )
 
 
-def _windows(proof: ProofContext, intervals: Mapping[str, int]) -> None:
+def _windows(proof: ProofContext, intervals: Intervals) -> None:
     """Report windows shorter than the time between two reports: they add nothing to the last report."""
     for monitor in proof.policy.monitors:
         signals = [signal for signal in signals_read(proof, monitor.when) if arrives(signal)]
         if monitor.kind not in (MonitorKind.FOR_LAST, MonitorKind.WITHIN_LAST) or not signals:
             continue
-        often = min(report_interval(signal, intervals) for signal in signals)
+        often = min(intervals[signal.name].us for signal in signals)
         if monitor.window_us < often:
             names = ", ".join(f"`{signal.name}`" for signal in signals)
             proof.report.add(
@@ -234,18 +252,18 @@ class _LateReaction(NamedTuple):
     delay: str
 
 
-def _late_reaction(proof: ProofContext, contract: Contract, intervals: Mapping[str, int]) -> _LateReaction | None:
+def _late_reaction(proof: ProofContext, contract: Contract, intervals: Intervals) -> _LateReaction | None:
     """Return a reaction, to a violated condition or a lost signal, that takes longer than the skill runs; else None."""
     signals = [signal for signal in signals_read(proof, *contract.assume, *contract.maintain) if arrives(signal)]
     lasts = contract.duration_us
     if not signals or not lasts:
         return None
-    seldom = max(signals, key=lambda signal: report_interval(signal, intervals))
+    seldom = max(signals, key=lambda signal: intervals[signal.name].us)
     late = max(signals, key=lambda signal: signal.stale_us)
-    breach = report_interval(seldom, intervals) + DECIDE_US + ACTUATE_US
+    breach = intervals[seldom.name].us + DECIDE_US + ACTUATE_US
     lost = late.stale_us + contract.grace_us + DECIDE_US + ACTUATE_US
     if breach > lasts:
-        delay = f"{duration(report_interval(seldom, intervals))} until `{seldom.name}` is reported"
+        delay = f"{duration(intervals[seldom.name].us)} until `{seldom.name}` is reported"
         return _LateReaction(seldom, breach, delay)
     if lost > max(lasts, BLIND_US):
         delay = f"{duration(late.stale_us)} until `{late.name}` is stale, {duration(contract.grace_us)} of grace"
@@ -253,7 +271,7 @@ def _late_reaction(proof: ProofContext, contract: Contract, intervals: Mapping[s
     return None
 
 
-def _reaction(proof: ProofContext, contract: Contract, intervals: Mapping[str, int], span: Span) -> None:
+def _reaction(proof: ProofContext, contract: Contract, intervals: Intervals, span: Span) -> None:
     """Report a contract whose fallback may begin only after the skill has ended."""
     late = _late_reaction(proof, contract, intervals)
     if late is None:

@@ -44,11 +44,13 @@ class SignalDecl(Node):
     """`signal battery : ratio = BATTERY_STATUS.battery_remaining unknown at -1 stale after 5 s`.
 
     `type` is a dimension's name, `position`, `altitude`, or an enumeration. `sources` are alternatives (`or`), of
-    which the newest counts. `unknown_at` are raw field values, or enumerators, that mean "unknown".
+    which the newest counts. `unknown_at` are raw field values, or enumerators, that mean "unknown". `every`: how often
+    the sender reports it, where that is known.
     """
 
     name: Name
     type: Name
     sources: tuple[SourceDecl, ...]
     unknown_at: tuple[Name, ...]
+    every: Quantity | None
     stale_after: Quantity

@@ -14,7 +14,7 @@ from rtshcua.decision.rates import (
     rates,
     signal_of,
 )
-from rtshcua.model.flat.contract import Contract, TimingClass
+from rtshcua.model.flat.contract import Contract, Link, TimingClass
 from rtshcua.model.flat.policy import Policy, RuleKind
 from virtual import case
 from virtual.policy import BATTERY, POLICY, POSITION_X
@@ -54,23 +54,34 @@ def test_a_reflex_waits_for_nothing() -> None:
     assert rates(GIVEN, [quick(60_000, timing_class=TimingClass.REFLEX)]) == rates(GIVEN)
 
 
-def test_signals_of_forbid_rules_are_awaited() -> None:
+@pytest.mark.parametrize("kind", [RuleKind.FORBID, RuleKind.DEGRADE])
+def test_signals_of_forbid_and_degrade_rules_are_awaited(kind: RuleKind) -> None:
     permits = [rule for rule in GIVEN.rules if rule.kind == RuleKind.PERMIT]
     clause = quick(S).require[0]
-    rule = replace(permits[0], kind=RuleKind.FORBID, when=clause, skills=())
+    target = Link(skill=99, arguments=(), limit_us=0, text="", source=0, start=0, end=0)
+    rule = replace(permits[0], kind=kind, when=clause, skills=(), target=target if kind is RuleKind.DEGRADE else None)
     bare: Policy = replace(GIVEN, rules=(), contracts=tuple(
         replace(each, require=(), assume=(), maintain=()) for each in GIVEN.contracts
     ))  # fmt: skip
     step = quick(100_000, require=(), assume=(), maintain=())
     without = rates(bare, [step])
-    for skills in ((), (GIVEN.contracts.index(next(c for c in GIVEN.contracts if c.name == step.name)),)):
+    own = GIVEN.contracts.index(next(c for c in GIVEN.contracts if c.name == step.name))
+    for skills in ((), (own,)):
         assert rates(replace(bare, rules=(replace(rule, skills=skills),)), [step]) != without
+    if kind is RuleKind.DEGRADE:  # no step degrades to itself
+        itself = replace(rule, skills=(own,), target=replace(target, skill=own))
+        assert rates(replace(bare, rules=(itself,)), [step]) == without
     assert rates(replace(bare, rules=(replace(rule, skills=(99,)),)), [step]) == without
 
 
 def test_rate_is_limited_by_message_source() -> None:
     asked = {"HEARTBEAT": Rate(100_000, S), "RADIO_STATUS": Rate(50_000, S), "WIND": Rate(50_000, S)}
-    assert delivered(asked) == {"HEARTBEAT": AT_BEST["HEARTBEAT"], "RADIO_STATUS": S, "WIND": 50_000}
+    assert {name: delivered(asked, name) for name in asked} == {
+        "HEARTBEAT": AT_BEST["HEARTBEAT"], "RADIO_STATUS": S, "WIND": 50_000,
+    }  # fmt: skip
+    assert delivered(asked, "RADIO_STATUS", 100_000) == 100_000, "this sender is known"
+    assert delivered(asked, "RADIO_STATUS", 10_000) == 50_000, "no more often than requested"
+    assert delivered(asked, "WIND", 2 * S) == 2 * S
 
 
 def test_the_signal_of_a_slot() -> None:

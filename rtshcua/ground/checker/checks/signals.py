@@ -69,6 +69,7 @@ def _enum(context: CheckContext, enum: EnumDecl) -> None:
 
 def _signal(context: CheckContext, signal: SignalDecl) -> None:
     quantity(context, signal.stale_after, Dimension.DURATION, most=MAX_STALE)
+    quantity(context, signal.every, Dimension.DURATION, most=MAX_STALE)
     name = signal.type.text
     known = NAMED.get(name)
     if known == ZONE or (known is None and name not in context.symbols.enums):

@@ -189,7 +189,10 @@ def describe_type(signal: SignalDecl) -> str:
 def describe_sources(signal: SignalDecl) -> str:
     """Describe the MAVLink fields of a signal."""
     words = listed([_source(each) for each in signal.sources], "or")
-    return words if len(signal.sources) == 1 else f"{words}, whichever is newer"
+    words = words if len(signal.sources) == 1 else f"{words}, whichever is newer"
+    if signal.every is None:
+        return words
+    return f"{words}; its sender reports it every {display(signal.every.value, Dimension.DURATION)}"
 
 
 def _source(source: SourceDecl) -> str:

@@ -4,6 +4,7 @@ import pytest
 
 from reference.sources import findings, found, mission, policy, program, skill
 from rtshcua.adapters.vehicle import manoeuvre
+from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.ground.prove import observability
 from rtshcua.ground.prove.observability import COMMAND_MESSAGES
 from rtshcua.mavlink import dialect
@@ -169,6 +170,65 @@ def test_deferral_by_a_forbid_counts_only_for_its_skills() -> None:
     assert codes(heard, quick, policy("forbid takeoff by any when heard < 9 %")) == []
 
 
+def test_deferral_by_a_degrade_counts_for_the_skills_that_it_may_replace() -> None:
+    heard, quick = "signal heard : ratio = RADIO_STATUS.txbuf stale after 5 s\n", skill("quick()", deadline="900 ms")
+    assert codes(heard, quick, policy("degrade quick when heard < 9 % to return_home")) == ["E0717"]
+    assert codes(heard, quick, policy("degrade takeoff when heard < 9 % to return_home")) == []
+
+
+@rows(
+    ("signal", "deadline", "cures"),
+    [
+        # the deadline, the signal; every advice of the help that does not apply is absent
+        ("RADIO_STATUS.txbuf stale after 5 s", "100 ms", [
+            ("1 s", "RADIO_STATUS.txbuf stale after 5 s"),
+            ("100 ms", "BATTERY_STATUS.battery_remaining stale after 5 s"),
+            ("100 ms", "RADIO_STATUS.txbuf every 100 ms stale after 5 s"),
+        ]),
+        ("SYS_STATUS.battery_remaining every 3 s stale after 7 s", "2999 ms", [
+            ("3 s", "SYS_STATUS.battery_remaining every 3 s stale after 7 s"),
+            ("2999 ms", "BATTERY_STATUS.battery_remaining stale after 5 s"),
+        ]),
+        ("SYS_STATUS.battery_remaining every 10 ms stale after 5 s", "49 ms", [
+            ("50 ms", "SYS_STATUS.battery_remaining every 10 ms stale after 5 s"),
+        ]),
+    ],
+)  # fmt: skip
+def test_each_advice_about_a_late_signal_removes_the_finding(
+    signal: str, deadline: str, cures: list[tuple[str, str]]
+) -> None:
+    def found_for(deadline: str, signal: str) -> list[Diagnostic]:
+        probe = skill("probe()", deadline=deadline, require="told > 20 %")
+        return findings(program(f"signal told : ratio = {signal}\n", probe, policy()))
+
+    (late,) = found_for(deadline, signal)
+    assert late.code.id == "E0717"
+    assert late.help is not None
+    assert f"set the deadline to {cures[0][0]} or more" in late.help
+    assert ("from another message" in late.help) == (len(cures) > 1)
+    assert ("`every`" in late.help) == (len(cures) > 2)
+    for cure in cures:
+        assert not found_for(*cure)
+
+
+@rows(
+    ("every", "stale", "expected"),
+    [
+        ("1 s", "1100 ms", []),  # a report a second, as old as the position before it
+        ("1 s", "1099 ms", ["E1201"]),
+        ("100 ms", "200 ms", []),
+        ("100 ms", "199 ms", ["E1201"]),
+        ("0 s", "5 s", ["E0319"]),
+        ("100 m", "5 s", ["E0310"]),
+    ],
+)
+def test_signal_that_declares_its_interval_must_arrive_before_it_is_stale(
+    every: str, stale: str, expected: list[str]
+) -> None:
+    heard = f"signal heard : ratio = RADIO_STATUS.txbuf every {every} stale after {stale}\n"
+    assert codes(heard, skill("probe()", assume="heard > 20 %"), policy()) == expected
+
+
 def test_confirm_rule_for_a_reflex_is_refused() -> None:
     rule = policy("confirm probe by role supervisor within 30 s")
     assert codes(skill("probe()", **{"class": "reflex", "deadline": "100 ms"}), rule) == ["E0717"]
@@ -269,6 +329,20 @@ def test_signal_must_be_reported_before_it_is_stale(source: str, stale: str, exp
     assert codes(signal, skill("probe()"), policy("degrade any when here > 9 m/s to return_home")) == expected
     assert codes(signal, skill("probe()", require="here < 9 m/s"), policy()) == expected
     assert codes(signal, skill("probe()"), policy("forbid probe by any when here > 9 m/s")) == expected
+
+
+@rows("stale", ["1 ms", "50 ms", "149 ms", "266 ms"])
+@rows("source", ["WIND.speed", "LOCAL_POSITION_NED.vx", "GPS_RAW_INT.vel", "GPS_RAW_INT.vel every 700 ms"])
+def test_advised_stale_time_removes_the_finding(stale: str, source: str) -> None:
+    def found_for(stale: str) -> list[Diagnostic]:
+        signal = f"signal here : speed = {source} stale after {stale}\n"
+        return findings(program(signal, skill("probe()", assume="here < 9 m/s"), policy()))
+
+    for finding in found_for(stale):
+        assert finding.code.id == "E1201"
+        assert finding.help is not None
+        advised = finding.help.removeprefix("set `stale after` to ").removesuffix(" or more")
+        assert not found_for(advised.strip("`")), advised
 
 
 @pytest.mark.parametrize(("window", "expected"), [("1 s", []), ("999 ms", ["E1201"])])

@@ -1,14 +1,15 @@
 """Where the shipped library is: the grammar, what ships written in the language, and a page for each code.
 
 A wheel carries it inside the package (`rtshcua/_library/`, see the build section of pyproject.toml); a checkout, and
-an editable install of it, has it beside the package. Only `front` and `app` call this; other layers are given a path.
+an editable install of it, has it beside the package. Only `front`, `app` and `evaluation` call this; other layers are
+given a path.
 """
 
 from errno import ENOENT
 from functools import cache
 from pathlib import Path
 
-FOLDERS = ("grammar", "skills", "policies", "missions", "examples", "docs/codes")
+FOLDERS = ("grammar", "skills", "policies", "missions", "evaluation", "examples", "docs/codes")
 
 
 @cache

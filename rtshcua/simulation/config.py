@@ -124,6 +124,8 @@ class SimulationConfig:
     """Parameters that the owner has set: names that the flavour has, and values."""
     extras: frozenset[Equipment] = EQUIPPED
     """Equipment beside GPS, barometer and battery."""
+    radio_us: int = 1_000_000
+    """The interval between two reports of the radio; a SiK radio reports once a second."""
     faults: tuple[Fault, ...] = ()
     signing_key: bytes | None = None
     """The link's initial signing key; without it, SETUP_SIGNING can set one."""
@@ -155,6 +157,7 @@ class SimulationConfig:
                 key is None or release >= (1, 17) or self.flavour is not AutopilotKind.PX4,
                 "PX4 supports signing keys from release 1.17 on",
             ),
+            (self.radio_us > 0, "report interval of the radio must be greater than 0"),
             (self.speed > 0, "speed must be greater than 0"),
             (2_000 <= self.return_mm <= 1_000_000, "return height must be from 2000 to 1000000 mm"),
             (self.land_mm_s is None or 100 <= self.land_mm_s <= 2_000, "landing speed must be from 100 to 2000 mm/s"),

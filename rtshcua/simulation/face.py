@@ -21,17 +21,19 @@ from rtshcua.simulation.telemetry import radio_status
 COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 FENCE_PREFIXES = ("FENCE_", "GF_")
 """Name prefixes of the parameters that change the fence."""
-_RADIO_INTERVAL_US = 1_000_000
 _NEVER = 1 << 62
 
 _COMMAND_ACK = maker(mavlink.MAVLink_command_ack_message)
 
 
 class Face:
-    """The MAVLink endpoint of an autopilot as (system, 1), and of its radio, if fitted, as (51, 68)."""
+    """The MAVLink endpoint of an autopilot as (system, 1), and of its radio, if fitted, as (51, 68). The radio reports
+    every `radio_us`.
+    """
 
-    def __init__(self, autopilot: Autopilot, system: int) -> None:
+    def __init__(self, autopilot: Autopilot, system: int, radio_us: int = 1_000_000) -> None:
         self._autopilot = autopilot
+        self._radio_us = radio_us
         self._system = system
         self._codec = Codec(system, COMPONENT)
         self._radio = Codec(RADIO_SYSTEM, RADIO)
@@ -80,7 +82,7 @@ class Face:
 
     def radio(self, now_us: int) -> bytes:
         """Return the radio's frame, due since `radio_due_us`."""
-        self.radio_due_us = now_us + _RADIO_INTERVAL_US
+        self.radio_due_us = now_us + self._radio_us
         return self._radio.pack(radio_status(self._autopilot))
 
     def _is_for_me(self, message: Message) -> bool:

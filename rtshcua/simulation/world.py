@@ -57,7 +57,7 @@ class Simulation:
     def __init__(self, config: SimulationConfig) -> None:
         flavour, recorded = FLAVOURS[config.flavour], config.answers is Answers.RECORDED
         self._autopilot = Autopilot(flavour, config)
-        self._face = Face(self._autopilot, config.system)
+        self._face = Face(self._autopilot, config.system, config.radio_us)
         self._system = config.system
         self._up = FaultyLink(Random(f"{config.seed} uplink"))
         self._down = FaultyLink(Random(f"{config.seed} downlink"))

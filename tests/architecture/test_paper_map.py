@@ -37,9 +37,9 @@ def test_every_named_file_exists(file: str) -> None:
     assert (ROOT / file).is_file()
 
 
-def test_every_theorem_has_a_row() -> None:
+def test_every_theorem_and_assumption_has_a_row() -> None:
     found = {str(path.relative_to(ROOT)) for path in (ROOT / "tests" / "theorems").glob("test_*.py")}
-    assert len(found) == 4
+    assert len(found) == 8
     assert found <= set(FILES)
 
 

@@ -2,6 +2,7 @@
 
 from random import Random
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from msgspec import to_builtins
@@ -98,6 +99,7 @@ def nonsense(seed: int) -> None:
         allowed(session)
 
 
+@pytest.mark.claim("A4")
 @given(SEEDS)
 def test_malformed_signed_document_is_refused(seed: int) -> None:
     nonsense(seed)

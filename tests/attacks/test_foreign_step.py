@@ -121,6 +121,7 @@ def test_malformed_request_is_refused_and_forgotten(data: bytes) -> None:
     assert read_answer(ONE, data, ONE.boundary.enforce(data)) is Status.MALFORMED
 
 
+@pytest.mark.claim("A4")
 @given(st.data())
 def test_altered_request_gets_no_permit(data: st.DataObject) -> None:
     of = ONE

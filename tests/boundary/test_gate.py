@@ -266,6 +266,7 @@ def test_both_refuse_a_flood_of_frames_to_sign_ahead_at_the_same_frame(boundary:
     assert answers == [False] * MOST_AHEAD + [True] * 2 + [False] * 50 + [True] * 10
 
 
+@pytest.mark.claim("A1", drawn="from seeds")
 @pytest.mark.parametrize("compare", [compare_gates, compare_links])
 def test_both_gates_let_out_and_believe_the_same(compare: Any, boundary: ctypes.CDLL) -> None:
     passed = [compare(boundary, seed) for seed in range(SAMPLE)]
@@ -277,6 +278,7 @@ def seeds(request: pytest.FixtureRequest) -> range:
     return range(request.param, request.param + 1_000)
 
 
+@pytest.mark.claim("A1", drawn="from seeds")
 @pytest.mark.soak
 @pytest.mark.parametrize("compare", [compare_gates, compare_links])
 def test_both_gates_agree_for_long(compare: Any, seeds: range, boundary: ctypes.CDLL) -> None:

@@ -20,6 +20,8 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 CHUNKS, CHUNK = 100, 10_000
 
 
+@pytest.mark.claim("A4", drawn="from seeds")
+@pytest.mark.claim("A2", drawn="from seeds")
 def test_both_answer_the_same(tmp_path: Path) -> None:
     counts = ask_both(0, 1_000, tmp_path)
     assert decided(counts) >= 1_000
@@ -73,6 +75,8 @@ def answers_done() -> Path:
     return folder
 
 
+@pytest.mark.claim("A4", drawn="from seeds")
+@pytest.mark.claim("A2", drawn="from seeds")
 @pytest.mark.soak
 @pytest.mark.parametrize("chunk", range(1, CHUNKS + 1))
 def test_both_answer_a_million_requests_the_same(chunk: int, tmp_path: Path) -> None:

@@ -61,6 +61,7 @@ def campaign(seed: int, count: int, every: int) -> dict[str, int]:
     return found
 
 
+@pytest.mark.claim("T3", drawn="from seeds")
 @pytest.mark.slow
 def test_some_mutated_logs() -> None:
     found = campaign(1, SAMPLE, 1)
@@ -68,6 +69,7 @@ def test_some_mutated_logs() -> None:
     assert len(found) > 15, found
 
 
+@pytest.mark.claim("T3", drawn="from seeds")
 @pytest.mark.soak
 @pytest.mark.parametrize("shard", range(SHARDS))
 def test_a_million_mutated_logs(shard: int) -> None:

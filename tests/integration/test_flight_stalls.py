@@ -30,6 +30,7 @@ def bundle() -> bytes:
     return case.seal(case.mission(case.short_steps()))
 
 
+@pytest.mark.claim("T3")
 @pytest.mark.slow
 @given(
     stalls=STALLS,

@@ -8,6 +8,13 @@ policies; approvals are bound to a person, the mission and the flight.
 
 Attacker: the agent, with the mission key that `keys init` makes for agents, and all documents that were ever signed. It
 need not use our compiler.
+
+Enforced by: `rtshcua/wire/trust.py`, `rtshcua/wire/bundle.py`, `rtshcua/decision/checks/mission.py`,
+`rtshcua/decision/checks/contracts.py`, `rtshcua/decision/session.py`, and what enforces theorem 1.
+
+Not covered: an agent may propose any mission that the policy permits to agents, however unwise, and as often as it
+likes. Its assumptions about keys are stronger than those of the paper: with a mission key that is bound to nothing, the
+corollary is false.
 """
 
 from random import Random
@@ -157,11 +164,13 @@ def papers(of: Random, found: Loaded) -> list[str]:
     return []
 
 
+@pytest.mark.claim("C1")
 @given(worlds.CHANCES)
 def test_agent_cannot_do_what_policy_forbids(of: Random) -> None:
     assert broken(of) == []
 
 
+@pytest.mark.claim("C1")
 @pytest.mark.soak
 @settings(max_examples=20_000)
 @given(worlds.CHANCES)
@@ -197,6 +206,7 @@ def test_agent_cannot_cancel_mission_of_a_person() -> None:
         assert (receipt.kind, receipt.accepted) == (REPLACEMENT, accepted), receipt
 
 
+@pytest.mark.claim("C1")
 @given(worlds.CHANCES)
 def test_cancelled_mission_flies_only_contingency(of: Random) -> None:
     """For any proposal and any step: the links of the policy are decided as usual."""
@@ -270,6 +280,7 @@ def met_its_end(run: Run) -> list[str]:
     return [*wrong, "it was left in the air"] if run.vehicle.airborne else wrong
 
 
+@pytest.mark.claim("C1")
 @pytest.mark.slow
 @given(worlds.CHANCES)
 @settings(max_examples=20)
@@ -279,6 +290,7 @@ def test_flight_ends_by_policy_for_any_agent_behaviour(of: Random) -> None:
     assert_audited(run)
 
 
+@pytest.mark.claim("C1")
 @pytest.mark.soak
 @settings(max_examples=2_000)
 @given(worlds.CHANCES)
@@ -303,11 +315,13 @@ def breaks(what: str, most: int = 400) -> bool:
     return any(what in each for seed in range(most) for each in broken(Random(seed)))
 
 
+@pytest.mark.claim("C1", broken="a mission key that is not bound to its source, roles and policies")
 def test_search_detects_unrestricted_key(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bundle, "check_proposer", lambda *_: None)
     assert breaks("it speaks as somebody else")
 
 
+@pytest.mark.claim("C1", broken="contracts that a mission may loosen")
 def test_search_detects_loosened_contract(monkeypatch: pytest.MonkeyPatch) -> None:
     first = MISSION.invocations[0]
     lax = replace(MISSION, invocations=(replace(first, contract=replace(first.contract, **LAX)),))
@@ -321,6 +335,7 @@ def test_search_detects_loosened_contract(monkeypatch: pytest.MonkeyPatch) -> No
     assert judged(found, step, state) != [], "it would fly, on an empty battery"
 
 
+@pytest.mark.claim("C1", broken="an agent that is trusted for approvals")
 def test_search_detects_approval_by_anybody(monkeypatch: pytest.MonkeyPatch) -> None:
     named = AS_APPROVER.verification(roles=("supervisor",), sources=("operator",), vehicles=(VEHICLE,), person="agent")
     monkeypatch.setitem(globals(), "TRUST", replace(TRUST, keys=(*TRUST.keys, named)))

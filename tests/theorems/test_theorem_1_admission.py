@@ -8,7 +8,14 @@ recall or a cancellation.
 
 Attacker: a compromised runtime. It makes arbitrary requests, in any order, with any state, time, release and phase. It
 keeps and alters every permit. It presents documents signed by people or strangers, damaged ones, and replays. It holds
-no key. (Its claims about the state are accepted: the stated limit.)
+no key.
+
+Enforced by: `rtshcua/decision/decide.py`, `rtshcua/decision/session.py`, `rtshcua/onboard/enforcement/boundary.py`,
+`rtshcua/onboard/enforcement/executor.py`, `rtshcua/wire/permit.py`, and in C `boundary/decision`,
+`boundary/enforcement`.
+
+Not covered: claims of the runtime about the state are accepted (the stated limit): the theorem speaks of the state in
+the request. In mode `none` it is false by design.
 
 Admission is compared with `reference.oracle`, which is independent of `decide`.
 """
@@ -251,11 +258,13 @@ class TakenOver:
             self.broken.append(what)
 
 
+@pytest.mark.claim("T1")
 @given(worlds.CHANCES)
 def test_no_history_dispatches_unadmitted_step(of: Random) -> None:
     assert TakenOver(of).go(40) == []
 
 
+@pytest.mark.claim("T1")
 @pytest.mark.soak
 @settings(max_examples=20_000)
 @given(worlds.CHANCES)
@@ -283,10 +292,12 @@ def test_histories_reach_all_cases_of_theorem() -> None:
     raise AssertionError(reached)
 
 
+@pytest.mark.claim("T1", broken="mode `none`, which enforces nothing")
 def test_theorem_fails_without_enforcement() -> None:
     assert breaks("a permit for what is inadmissible", UNENFORCED)
 
 
+@pytest.mark.claim("T1", broken="a decision without any one of its steps")
 @pytest.mark.slow
 @pytest.mark.altered
 @pytest.mark.parametrize("step", [name for _, name in NAMES])
@@ -295,11 +306,13 @@ def test_search_detects_decision_without_a_step(step: str, monkeypatch: pytest.M
     assert breaks("a permit for what is inadmissible")
 
 
+@pytest.mark.claim("T1", broken="an executor that checks no MAC of a permit")
 def test_search_detects_executor_without_mac(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(permits, "compare_digest", lambda _, __: True)
     assert breaks("a permit that nobody made")
 
 
+@pytest.mark.claim("T1", broken="an executor that sends late")
 def test_search_detects_executor_without_time_check(monkeypatch: pytest.MonkeyPatch) -> None:
     dispatch = executors.Executor._dispatch
 

@@ -2,6 +2,7 @@
 
 from random import Random
 
+import pytest
 from hypothesis import assume, given, settings
 
 from reference import flat_case as flat
@@ -25,6 +26,7 @@ def prepared(of: Random) -> tuple[PreparedPolicy, PreparedInvocation]:
     return policy, invocation
 
 
+@pytest.mark.claim("A2")
 @MANY
 @given(worlds.CHANCES)
 def test_the_oracle_decides_the_same(of: Random) -> None:
@@ -45,6 +47,7 @@ def test_the_oracle_decides_the_same(of: Random) -> None:
     assert (decision.link, decision.target) == (target or (None, None))
 
 
+@pytest.mark.claim("A2")
 @MANY
 @given(worlds.CHANCES)
 def test_the_oracle_chooses_the_same_links(of: Random) -> None:

@@ -121,12 +121,14 @@ def fly(acts: list[tuple[int, str, int]]) -> Run:
 STORIES = st.lists(st.tuples(MOMENT, ACTS, st.integers(0, 4)), max_size=8)
 
 
+@pytest.mark.claim("C1")
 @settings(max_examples=settings().max_examples * 2 // 5)
 @given(STORIES)
 def test_any_document_sequence_ends_with_valid_log(acts: list[tuple[int, str, int]]) -> None:
     fly(acts)
 
 
+@pytest.mark.claim("C1")
 @pytest.mark.soak
 @settings(max_examples=3_000, phases=[Phase.explicit, Phase.reuse, Phase.generate])
 @given(STORIES)

@@ -89,6 +89,7 @@ def covered(of: Case, octets: bytes, at_us: int, autopilot: int) -> bool:
     )
 
 
+@pytest.mark.claim("T3")
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", AUTOPILOTS)
 @given(data=some.data())

@@ -119,6 +119,20 @@ def _names(top: str, around: _Around, base: str | None) -> list[str]:
     return [os.fsdecode(name) for name in names.split(b"\0") if name]
 
 
+def checkout_commit(folder: Path) -> str | None:
+    """The commit of a checkout, `-dirty` appended if it has changes; None where the folder is no checkout's top, or git
+    cannot tell.
+    """
+    try:
+        top, around = _top(os.path.realpath(folder))
+        if top != os.path.realpath(folder):
+            return None
+        said = _git("describe", "--always", "--dirty", "--abbrev=40", "--exclude=*", folder=top, around=around)
+    except NoChanges:
+        return None
+    return said.decode().strip()
+
+
 def _folders(path: Path) -> tuple[str, ...]:
     """The folders to ask about a path: itself or its nearest existing parent, and the same for its target."""
     found: dict[str, None] = {}

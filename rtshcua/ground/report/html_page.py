@@ -81,6 +81,8 @@ GLOSSARY: Final = (
 _HIDDEN = re.compile(
     "[\x00-\x09\x0b-\x1f\x7f-\x9f\xad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb]"
 )
+#: the package of the common templates
+OWN: Final = "rtshcua.ground.report"
 #: the size of the footer on A4: margins of 14 and 16 mm, letters of 6 pt, 1.3 mm wide
 FOOT_LINES, FOOT_COLUMNS = 4, 116
 #: the space between a number and its unit, where a line must not break
@@ -106,9 +108,11 @@ def page(report: PolicyReport) -> str:
     )
 
 
-def rendered(template: str, more_style: str = "", **values: object) -> str:
-    """Render a template with values, the common style and an additional one."""
-    environment, style = templates()
+def rendered(template: str, more_style: str = "", package: str = OWN, **values: object) -> str:
+    """Render a template with values, the common style and an additional one. A package may have templates of its own
+    besides the common ones, in its folder `templates`.
+    """
+    environment, style = templates(package)
     style += more_style
     digest = b64encode(sha256(style.encode()).digest()).decode("ascii")
     text = environment.get_template(template).render(style=Markup(style), style_digest=digest, **values)
@@ -134,10 +138,15 @@ def _footer(report: PolicyReport) -> str:
 
 
 @cache
-def templates() -> tuple[Environment, str]:
-    """The compiled templates, and the style of the page."""
-    folder = files("rtshcua.ground.report") / "templates"
-    texts = {each.name: each.read_text(encoding="utf-8") for each in folder.iterdir() if each.is_file()}
+def templates(package: str = OWN) -> tuple[Environment, str]:
+    """The compiled templates, and the style of the page, which is followed by that of a package with its own."""
+    texts = {
+        each.name: each.read_text(encoding="utf-8")
+        for name in (OWN, package)
+        for each in (files(name) / "templates").iterdir()
+        if each.is_file()
+    }
+    styles = [text for name, text in texts.items() if name.endswith(".css")]
     environment = Environment(
         loader=DictLoader(texts),
         autoescape=True,
@@ -147,7 +156,7 @@ def templates() -> tuple[Environment, str]:
         keep_trailing_newline=True,
     )
     environment.filters |= {"told": _told, "px": number}
-    return environment, texts["policy_report.css"]
+    return environment, "".join(styles)
 
 
 def _told(text: str, anchors: dict[str, str] | None = None) -> Markup:

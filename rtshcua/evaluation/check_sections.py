@@ -1,0 +1,366 @@
+"""The report's sections about decisions, evidence, size and random faults: X3, X6, X7 and campaigns."""
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Sequence
+from statistics import median
+from typing import Final
+
+from rtshcua.campaign.campaign_report import CampaignSummary, FindingSummary, margin_told
+from rtshcua.evaluation.design import UNENFORCED
+from rtshcua.evaluation.headline_claims import passes
+from rtshcua.evaluation.measures import distribution
+from rtshcua.evaluation.published import CASES, FIGURES, FOOTPRINT, FOOTPRINT_TOTAL
+from rtshcua.evaluation.report_parts import (
+    NONE,
+    UNMEASURED,
+    Measured,
+    ReportCell,
+    ReportChart,
+    ReportRow,
+    ReportSection,
+    ReportTable,
+    columns,
+    digits,
+    ordered_modes,
+    us,
+)
+from rtshcua.evaluation.results import (
+    AppendTiming,
+    CaseFlight,
+    ComponentSize,
+    EnforceCheck,
+    VerificationTiming,
+)
+from rtshcua.ground.report.drawing.bar_chart import StackedPart, StackedRow, stacked_chart
+
+#: how many failing checks are listed
+_LISTED: Final = 20
+_OUTCOMES: Final = ("allow", "fallback", "defer", "deny")
+#: the style of each ending of a flight; all others are drawn as `deny`
+_ENDINGS: Final = {"completed": "allow", "aborted": "fallback", "stood-down": "defer"}
+
+
+def decision_section(measured: Measured) -> ReportSection:
+    """X3: the degraded and security suite."""
+    checks = [each for each in measured.results if isinstance(each, EnforceCheck) and each.mode != UNENFORCED]
+    flown = [each for each in measured.results if isinstance(each, CaseFlight)]
+    lead = (
+        "Twelve cases at 21 points, 30 times, as request bytes to `enforce` and answer bytes back: 7,560 checks in "
+        "each mode. Recoverable trouble falls back, missing state defers, and what is not authentic or not permitted "
+        "is denied. The paper names the cases marked [P]; the others are ours.",
+    )
+    parts: list[ReportTable | ReportChart] = [_by_case(measured, checks)]
+    if checks:
+        title = "Decisions of X3 by case, all modes together"
+        chart = stacked_chart(title, "The counts are those of the table above.", _stacked(checks))
+        parts.append(ReportChart(chart, f"{title}. Hatched: another decision than expected, or than the reference."))
+    wrong = [each for each in checks if not passes(each)]
+    if wrong:
+        parts.append(_disagreements(wrong))
+    if any(each.mode == "none" for each in checks):
+        parts.append(_permitted(checks))
+    parts.append(_flown(flown))
+    return ReportSection("x3", "X3: degraded and security cases", lead, tuple(parts))
+
+
+def _by_case(measured: Measured, checks: Sequence[EnforceCheck]) -> ReportTable:
+    """How many checks pass, by case and mode."""
+    modes = ordered_modes({*(each.mode for each in checks), *measured.absent} - {UNENFORCED})
+    passed = Counter((each.case, each.mode) for each in checks if passes(each))
+    seen = Counter((each.case, each.mode) for each in checks)
+
+    def cell(mode: str, cases: Sequence[str]) -> str | ReportCell:
+        right, of = (sum(counted[case, mode] for case in cases) for counted in (passed, seen))
+        return ReportCell(f"{right:,} of {of:,}", "held" if right == of else "missed") if of else measured.missing(mode)
+
+    rows: list[ReportRow] = []
+    for case in CASES:
+        mark = " (apart)" if case.extra else " [P]" if case.named else ""
+        name = f"{case.number}. {case.name}{mark}: {case.perturbation}"
+        rows.append((name, f"{case.outcome}, `{case.reason}`", *(cell(mode, [case.name]) for mode in modes)))
+    twelve = [case.name for case in CASES if not case.extra]
+    rows.append(("the twelve; paper [P]: 7,560 of 7,560", "", *(cell(mode, twelve) for mode in modes)))
+    return ReportTable(
+        "Checks that decide as expected and as the reference, by case and mode",
+        columns("Case, and what strikes", "Expected", *(f"#{mode}" for mode in modes)),
+        tuple(rows),
+        ("cases", "agreement", "repetitions"),
+    )
+
+
+def _stacked(checks: Sequence[EnforceCheck]) -> list[StackedRow]:
+    """A bar for each case, with a part for each outcome."""
+    rows = []
+    for case in CASES:
+        said = Counter(
+            each.outcome if passes(each) else f"wrong: {each.outcome}" for each in checks if each.case == case.name
+        )
+        parts = [
+            StackedPart(outcome if outcome in _OUTCOMES else "wrong", number, f"{outcome} {number:,}")
+            for outcome, number in sorted(said.items(), key=lambda each: -each[1])
+        ]
+        rows.append(StackedRow(f"{case.number}. {case.name}", tuple(parts)))
+    return rows
+
+
+def _disagreements(wrong: Sequence[EnforceCheck]) -> ReportTable:
+    """The first checks that fail."""
+    rows = tuple(
+        (
+            f"{each.case}, {each.mission}, {each.deadline_us / 1e6:g} s, `{each.mode}`, {each.repetition}",
+            f"{each.outcome}, `{each.reason}`",
+            "yes" if each.as_expected else "no",
+            "yes" if each.agrees else "no",
+        )
+        for each in wrong[:_LISTED]
+    )
+    return ReportTable(
+        f"Checks that fail: {len(wrong):,}; the first {len(rows)}",
+        columns("Case, mission, deadline, mode, repetition", "Decided", "As expected", "As the reference"),
+        rows,
+    )
+
+
+def _permitted(checks: Sequence[EnforceCheck]) -> ReportTable:
+    """What is permitted though it was not allowed: everything in `none`, nothing elsewhere."""
+    refused, permitted = Counter[str](), Counter[str]()
+    for each in checks:
+        if each.outcome != "allow":
+            refused[each.mode] += 1
+            permitted[each.mode] += each.permits > 0
+    rows = tuple((f"`{mode}`", f"{refused[mode]:,}", f"{permitted[mode]:,}") for mode in ordered_modes(refused))
+    return ReportTable(
+        "Checks that are not allowed, and how many of them come with a permit",
+        columns("Mode", "#Not allowed", "#With a permit"),
+        rows,
+        ("agreement", "none"),
+    )
+
+
+def _flown(flown: Sequence[CaseFlight]) -> ReportTable:
+    """The cases through the whole runtime."""
+    found: defaultdict[tuple[str, bool, str], list[CaseFlight]] = defaultdict(list)
+    for each in flown:
+        found[each.case, each.aloft, each.expected].append(each)
+    rows: list[ReportRow] = []
+    for (case, aloft, expected), flights in found.items():
+        good = sum(each.holds for each in flights)
+        cell = ReportCell(f"{good:,} of {len(flights):,}", "held" if good == len(flights) else "missed")
+        endings = Counter(each.ending for each in flights)
+        ended = ", ".join(f"{number:,} {ending}" for ending, number in sorted(endings.items()))
+        rows.append((case, "in the air" if aloft else "on the ground", expected, cell, ended))
+    return ReportTable(
+        "The cases through the whole runtime, in virtual time: what is dispatched",
+        columns("Case", "Struck", "Expected", "#As expected", "Endings"),
+        tuple(rows),
+        ("whole-runtime",),
+        () if flown else (f"No case was flown: {UNMEASURED}.",),
+    )
+
+
+def evidence_section(measured: Measured) -> ReportSection:
+    """X6: append and audit."""
+    lead = ("A log of 1,000 records as in the paper, and a long one. The paper's rows are comparable to ours in bold.",)
+    parts = (_appends(measured), _verifications(measured))
+    return ReportSection("x6", "X6: evidence", lead, parts)
+
+
+def _appends(measured: Measured) -> ReportTable:
+    """Append by durability and length of the log."""
+    found: defaultdict[tuple[str, int], list[AppendTiming]] = defaultdict(list)
+    for each in measured.results:
+        if isinstance(each, AppendTiming):
+            found[each.durability, len(each.appended_ns)].append(each)
+    stated = (FIGURES[f"x6/{key}"].text for key in ("append-median", "append-p95", "append-p99"))
+    rows: list[ReportRow] = [("paper [P]", FIGURES["x6/records"].text, *stated, NONE, FIGURES["x6/octets"].text, NONE)]
+    for (durability, records), logs in sorted(found.items(), key=lambda each: each[0][1]):
+        spread = distribution(took for log in logs for took in log.appended_ns)
+        if spread is None:
+            continue
+        mean = sum(log.octets for log in logs) / (records * len(logs))
+        times = [us(each) for each in (spread.median, spread.p95, spread.p99, spread.largest)]
+        compared = durability == "written" and records == FIGURES["x6/records"].low
+        name = ReportCell(durability, "compared") if compared else durability
+        rows.append((name, f"{records:,}", *times, digits(mean), str(len(logs))))
+    return ReportTable(
+        "Append of a record, in us",
+        columns("Append", "#Records", "#Median", "#P95", "#P99", "#Greatest", "#Mean record, bytes", "#Logs"),
+        tuple(rows),
+        ("durability", "percentile"),
+        () if found else (f"No append was timed: {UNMEASURED}.",),
+    )
+
+
+def _verifications(measured: Measured) -> ReportTable:
+    """Verification by depth and length of the log."""
+    found: defaultdict[tuple[str, int], list[float]] = defaultdict(list)
+    for each in measured.results:
+        if isinstance(each, VerificationTiming) and each.records:
+            found[each.way, each.records].append(each.took_ns / each.records)
+    rows: list[ReportRow] = [
+        ("paper [P]", FIGURES["x6/records"].text, FIGURES["x6/verification"].text, FIGURES["x6/throughput"].text, NONE)
+    ]
+    for (way, records), took in sorted(found.items(), key=lambda each: each[0][1]):
+        middle = median(took)
+        compared = way == "default" and records == FIGURES["x6/records"].low
+        name = ReportCell(way, "compared") if compared else way
+        rows.append((name, f"{records:,}", us(middle), digits(1e9 / middle) if middle else NONE, str(len(took))))
+    return ReportTable(
+        "Verification of a log: time of a record in us, the median of the runs",
+        columns("Verification", "#Records", "#Record", "#Records in a second", "#Runs"),
+        tuple(rows),
+        ("verification",),
+        () if found else (f"No verification was timed: {UNMEASURED}.",),
+    )
+
+
+def footprint_section(measured: Measured) -> ReportSection:
+    """X7: the footprint on board."""
+    ours = [each for each in measured.results if isinstance(each, ComponentSize)]
+    lead = ("Without the agent, the model, the simulator, the libraries of MAVLink, OP-TEE itself and the autopilot.",)
+    parts = (_published_sizes(), _measured_sizes(ours))
+    return ReportSection("x7", "X7: footprint on board", lead, parts)
+
+
+def _published_sizes() -> ReportTable:
+    rows = [
+        (
+            *(each.component, each.domain, f"{each.code_lines:,}"),
+            *(f"{size:.2f}" for size in (each.artifact_kb, each.memory_kb)),
+            each.state,
+        )
+        for each in (*FOOTPRINT, FOOTPRINT_TOTAL)
+    ]
+    sums = (FIGURES[f"x7/{key}-summed"].text for key in ("lines", "artifact", "memory"))
+    rows.append(("sum of the rows [D]", "", *sums, ""))
+    shared, further = FIGURES["x7/artifact-shared"].text, FIGURES["x7/artifact-unexplained"].text
+    return ReportTable(
+        "Published: code lines without blanks, comments and docstrings; artifact and peak memory in KB",
+        columns("Component", "Domain", "#Code lines [P]", "#Artifact [P]", "#Peak memory [P]", "State"),
+        tuple(rows),
+        notes=(
+            "The printed totals are not the sums of the printed rows. Artifacts may share files: with the 8.29 KB that "
+            f"two rows have in common counted once, the sum is {shared} KB [D], and {further} KB more are shared [D].",
+        ),
+    )
+
+
+def _measured_sizes(ours: Sequence[ComponentSize]) -> ReportTable:
+    rows = [
+        (
+            *(each.component, each.domain),
+            *_sizes(each.code_lines, each.artifact, each.memory),
+            *(each.state, ", ".join(each.files)),
+        )
+        for each in ours
+    ]
+    if ours:
+        rows.append(("sum of the rows", "", *_sizes(*(_sum(ours, of) for of in (_lines, _artifact, _memory))), "", ""))
+    return ReportTable(
+        "Ours: code lines counted alike; artifact and peak memory in KB of 1,024 bytes",
+        columns("Component", "Domain", "#Code lines", "#Artifact", "#Peak memory", "State", "Files"),
+        tuple(rows),
+        ("footprint",),
+        () if ours else (f"X7 was {UNMEASURED}.",),
+    )
+
+
+def _lines(each: ComponentSize) -> int | None:
+    return each.code_lines
+
+
+def _artifact(each: ComponentSize) -> int | None:
+    return each.artifact
+
+
+def _memory(each: ComponentSize) -> int | None:
+    return each.memory
+
+
+def _sum(components: Sequence[ComponentSize], of: Callable[[ComponentSize], int | None]) -> int:
+    return sum(of(each) or 0 for each in components)
+
+
+def _sizes(lines: int | None, artifact: int | None, memory: int | None) -> tuple[str, str, str]:
+    """Code lines, and two sizes in KB."""
+    size, peak = (NONE if each is None else f"{each / 1024:,.2f}" for each in (artifact, memory))
+    return NONE if lines is None else f"{lines:,}", size, peak
+
+
+def campaign_section(campaigns: Sequence[CampaignSummary]) -> ReportSection:
+    """The flights with random faults."""
+    lead = (
+        "Flights in virtual time with random faults, each judged by the true state of the simulated vehicle. The judge "
+        "uses no code of the runtime, and decides each log again. The paper has no such experiment.",
+    )
+    if not campaigns:
+        return ReportSection(
+            "campaign", "Random faults", (*lead, f"No campaign was given (`--campaign DIR`): {UNMEASURED}."), ()
+        )
+    parts: list[ReportTable | ReportChart] = []
+    for summary in campaigns:
+        name = f"`{summary.mission}`, seed {summary.campaign}"
+        parts += [_endings(summary, name), _findings(summary, name), _margins(summary, name)]
+    rows = [
+        StackedRow(
+            f"{summary.mission}, {flavour}",
+            tuple(StackedPart(_ENDINGS.get(ending, "deny"), n, f"{ending} {n:,}") for ending, n in counts.items()),
+        )
+        for summary in campaigns
+        for flavour, counts in summary.endings.items()
+    ]
+    title = "How flights with random faults end, by autopilot"
+    chart = stacked_chart(title, "The counts are those of the tables.", rows)
+    return ReportSection("campaign", "Random faults", lead, (ReportChart(chart, f"{title}."), *parts))
+
+
+def _endings(summary: CampaignSummary, name: str) -> ReportTable:
+    endings = sorted({ending for counts in summary.endings.values() for ending in counts})
+    rows = tuple(
+        (flavour, *(f"{counts.get(ending, 0):,}" for ending in endings), f"{sum(counts.values()):,}")
+        for flavour, counts in summary.endings.items()
+    )
+    return ReportTable(
+        f"{name}: {summary.flights:,} flights, {summary.failed:,} failed, {summary.flown_us / 3.6e9:.1f} h in the air",
+        columns("Autopilot", *(f"#{ending}" for ending in endings), "#Flights"),
+        rows,
+        ("campaign",),
+    )
+
+
+def _findings(summary: CampaignSummary, name: str) -> ReportTable:
+    """Failures, and what could not have been prevented on board."""
+
+    def row(each: FindingSummary, kind: str) -> ReportRow:
+        flights = ", ".join(map(str, each.first[:3]))
+        return ReportCell(kind, "missed" if kind == "failure" else "open"), f"`{each.slug}`", each.why or each.text, (
+            f"{each.flights:,}"
+        ), flights  # fmt: skip
+
+    rows = (
+        *(row(each, "failure") for each in summary.failures),
+        *(row(each, "excused") for each in summary.exceptions),
+    )
+    return ReportTable(
+        f"{name}: failures, and excused failures, which could not have been prevented on board",
+        columns("Kind", "Failure", "What or why", "#Flights", "#First flights"),
+        rows,
+        notes=() if summary.failures else ("No flight failed.",),
+    )
+
+
+def _margins(summary: CampaignSummary, name: str) -> ReportTable:
+    rows = tuple(
+        (
+            each.title,
+            *(margin_told(each.name, value) for value in (each.least, each.middle, each.greatest)),
+            f"{each.least_in} and {each.greatest_in}",
+            f"{each.flights:,}",
+        )
+        for each in summary.margins
+    )
+    return ReportTable(
+        f"{name}: margins. The worst distance is the least, the worst time the greatest",
+        columns("Margin", "#Least", "#Median", "#Greatest", "#In flights", "#Flights"),
+        rows,
+    )

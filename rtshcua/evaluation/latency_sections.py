@@ -1,0 +1,340 @@
+"""The report's sections about latency: X1, X2, X4 and X5."""
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+from itertools import chain
+from statistics import median
+from typing import Final, NamedTuple
+
+from rtshcua.evaluation.design import DEADLINES_US, MISSIONS, MODES, POINTS
+from rtshcua.evaluation.headline_claims import is_undisturbed
+from rtshcua.evaluation.measures import (
+    PAIRED,
+    Averaged,
+    Distribution,
+    Durations,
+    Reduction,
+    dispatch,
+    distribution,
+    end_to_end,
+    p95,
+    proposal,
+    remaining,
+    validation,
+)
+from rtshcua.evaluation.published import FIGURES, PUBLISHED_MODES, PublishedFigure
+from rtshcua.evaluation.report_parts import (
+    NONE,
+    UNMEASURED,
+    Measured,
+    ReportChart,
+    ReportSection,
+    ReportTable,
+    columns,
+    digits,
+    ms,
+    ordered_modes,
+    span,
+)
+from rtshcua.evaluation.results import FallbackTiming, PointFlight
+from rtshcua.ground.report.drawing.bar_chart import ChartBar, ChartGroup, bar_chart
+
+#: the isolated modes, with the median that this project wants to add at most, in ms
+ISOLATED: Final = {"process": "0.3", "trustzone-m": "1", "optee": "10"}
+_WHISKERS: Final = "Bars are means over the seven deadlines, whiskers the least and the greatest of the seven."
+
+
+class _Quantity(NamedTuple):
+    """A latency by mission and mode, with the key of its published figures (`{mission}` and `{mode}`)."""
+
+    title: str
+    of: Durations
+    by: Reduction
+    key: str
+    choices: tuple[str, ...]
+
+
+_P95 = _Quantity(
+    "P95 end-to-end", end_to_end, p95, "x1/p95/{mission}/{mode}", ("end-to-end", "percentile", "missions", "none")
+)
+_MEDIAN = _Quantity(
+    "Median end-to-end", end_to_end, median, "x2/median/{mission}/{mode}", ("end-to-end", "cell-average", "none")
+)
+_VALIDATION = _Quantity(
+    "P95 validation", validation, p95, "x2/validation/{mode}", ("validation", "percentile", "cell-average", "none")
+)
+
+
+def normal_section(measured: Measured) -> ReportSection:
+    """X1: the matrix of flights without trouble."""
+    lead = (
+        "Each mission is flown with each deadline, in each mode, 30 times, without any fault. The paper publishes the "
+        "P95 of the end-to-end latency as the mean of the seven deadlines, and no value of a single deadline.",
+    )
+    parts = (*_compared(measured, _P95), _outcomes(measured), _proposals(measured))
+    return ReportSection("x1", "X1: flights without trouble", lead, parts)
+
+
+def scaling_section(measured: Measured) -> ReportSection:
+    """X2: the same flights by the length of their mission."""
+    lead = (
+        "The flights of X1 by the length of the mission. Longer missions have more invocations; an invocation should "
+        "not cost more.",
+    )
+    parts = (*_compared(measured, _MEDIAN), *_compared(measured, _VALIDATION), _flatness(measured), _shares(measured))
+    return ReportSection("x2", "X2: scaling with the mission", lead, parts)
+
+
+def _compared(measured: Measured, quantity: _Quantity) -> tuple[ReportTable, ReportChart]:
+    """The table and the chart of a quantity: published and ours, by mission and mode."""
+    rows: list[tuple[str, ...]] = []
+    groups = []
+    for mission in MISSIONS:
+        bars = []
+        for mode in MODES:
+            stated = FIGURES.get(quantity.key.format(mission=mission, mode=mode))
+            found = measured.flights.average(mode, mission, quantity.of, quantity.by)
+            rows.append(
+                (
+                    f"{mission}, `{mode}`",
+                    stated.text if stated else NONE,
+                    *_ours(measured, mode, mission, quantity, stated),
+                )
+            )
+            if stated:
+                ends = (stated.low, stated.high) if stated.low < stated.high else (None, None)
+                bars.append(ChartBar(f"paper, {mode}", stated.high, f"{stated.text} ms", "published", *ends))
+            bars.append(_bar(measured, mode, mode, found))
+        groups.append(ChartGroup(mission, tuple(bars)))
+    published = " (of each mission a value within the range)" if "{mission}" not in quantity.key else ""
+    title = f"{quantity.title} in ms, by mission and mode"
+    table = ReportTable(
+        f"{title}: published{published} and measured",
+        columns(
+            "Mission, mode", "#Paper [P]", "#Ours", "#Least to greatest of the deadlines", "#Paper / ours", "#Flights"
+        ),
+        tuple(rows),
+        quantity.choices,
+    )
+    chart = bar_chart(title, "The figures are those of the table above.", groups, logarithmic=True)
+    return table, ReportChart(chart, f"{title}; logarithmic axis. Hatched: published. {_WHISKERS}")
+
+
+def _ours(
+    measured: Measured, mode: str, mission: str, quantity: _Quantity, stated: PublishedFigure | None
+) -> tuple[str, str, str, str]:
+    """Our columns: mean, whiskers, how many times below the paper, and flights."""
+    found = measured.flights.average(mode, mission, quantity.of, quantity.by)
+    flights = f"{sum(1 for _ in _of_mission(measured, mode, mission)):,}"
+    if found is None:
+        return measured.missing(mode), NONE, NONE, flights
+    few = "" if found.cells == len(DEADLINES_US) else f" ({found.cells} of {len(DEADLINES_US)} deadlines)"
+    below = NONE if stated is None else digits(stated.low / (found.mean / 1e6))
+    return ms(found.mean), span(found) + few, below, flights
+
+
+def _bar(measured: Measured, label: str, mode: str, found: Averaged | None) -> ChartBar:
+    """Our bar, with whiskers."""
+    if found is None:
+        return ChartBar(label, None, measured.missing(mode), "ours")
+    return ChartBar(label, found.mean / 1e6, f"{ms(found.mean)} ms", "ours", found.low / 1e6, found.high / 1e6)
+
+
+def _outcomes(measured: Measured) -> ReportTable:
+    """What became of the flights of X1, by mode."""
+    rows: list[tuple[str, ...]] = []
+    for mode in MODES:
+        flights = measured.flights.flights(mode)
+        if not flights:
+            rows.append((f"`{mode}`", measured.missing(mode), *[NONE] * 6))
+            continue
+        said = Counter(each.outcome for flight in flights for each in flight.invocations)
+        others = ", ".join(f"{count:,} {outcome}" for outcome, count in sorted(said.items()) if outcome != "allow")
+        counts = (len(flights), sum(said.values()), sum(each.ending == "completed" for each in flights))
+        bad = (sum(each.misses for each in flights), sum(each.fallbacks for each in flights))
+        wrong = sum(not is_undisturbed(each) for each in flights)
+        rows.append((f"`{mode}`", *(f"{each:,}" for each in (*counts, *bad, wrong)), others or "none"))
+    return ReportTable(
+        "Flights of X1. The paper has 1,890 in three modes, with 0 misses and 0 fallbacks",
+        columns(
+            "Mode", "#Flights", "#Invocations", "#Completed", "#Deadline misses", "#Fallbacks", "#Disturbed flights",
+            "Outcomes besides allow",
+        ),
+        tuple(rows),
+        ("deadline", "repetitions", "modes"),
+    )  # fmt: skip
+
+
+def _proposals(measured: Measured) -> ReportTable:
+    """The other reading of end-to-end."""
+    rows: list[tuple[str, ...]] = []
+    for mode in MODES:
+        spreads = [
+            distribution(chain.from_iterable(map(proposal, _of_mission(measured, mode, mission))))
+            for mission in MISSIONS
+        ]
+        told = [NONE if each is None else f"{ms(each.median)} / {ms(each.p95)}" for each in spreads]
+        rows.append((f"`{mode}`", *(told if any(spreads) else (measured.missing(mode), NONE, NONE))))
+    return ReportTable(
+        "The other reading of end-to-end, from the mission's text to the first command frame: median / P95 in ms",
+        columns("Mode", *(f"#{mission}" for mission in MISSIONS)),
+        tuple(rows),
+        ("end-to-end",),
+    )
+
+
+def _of_mission(measured: Measured, mode: str, mission: str) -> Iterator[PointFlight]:
+    return (each for each in measured.flights.flights(mode) if each.mission == mission)
+
+
+def _flatness(measured: Measured) -> ReportTable:
+    """The ratio of the largest to the smallest median."""
+    rows: list[tuple[str, ...]] = []
+    for mode in MODES:
+        ours = measured.flights.flatness(mode)
+        stated = [FIGURES[f"x2/median/{mission}/{mode}"].low for mission in MISSIONS if mode in PUBLISHED_MODES]
+        ratio = f"{max(stated) / min(stated):.2f}" if stated else NONE
+        rows.append((f"`{mode}`", ratio, measured.missing(mode) if ours is None else f"{ours:.2f}"))
+    return ReportTable(
+        "The largest of the three median end-to-end latencies divided by the smallest",
+        columns("Mode", "#Paper [D]", "#Ours"),
+        tuple(rows),
+        ("flat",),
+    )
+
+
+def _shares(measured: Measured) -> ReportTable:
+    """Where the time of an invocation goes."""
+    rows: list[tuple[str, ...]] = []
+    for mode in MODES:
+        flights = measured.flights.flights(mode)
+        found = [
+            distribution(chain.from_iterable(map(of, flights))) for of in (end_to_end, validation, dispatch, remaining)
+        ]
+        told = [NONE if each is None else f"{ms(each.median)} / {ms(each.p95)}" for each in found]
+        rows.append((f"`{mode}`", *(told if any(found) else (measured.missing(mode), NONE, NONE, NONE))))
+    return ReportTable(
+        "Where the time of an invocation goes: median / P95 in ms, all flights of a mode. The rest is the decoding of "
+        "the frame, the state, and the written record",
+        columns("Mode", "#End-to-end", "#Validation", "#Dispatch", "#Rest"),
+        tuple(rows),
+        ("end-to-end", "validation"),
+    )
+
+
+def fallback_section(measured: Measured) -> ReportSection:
+    """X4: the microbenchmark of triggered conditions."""
+    found: defaultdict[tuple[str, str], list[FallbackTiming]] = defaultdict(list)
+    for each in measured.results:
+        if isinstance(each, FallbackTiming):
+            found[each.mode, each.case].append(each)
+    modes = ordered_modes(mode for mode, _ in found)
+    ordered = [(mode, case) for mode in modes for other, case in found if other == mode]
+    middle, high = FIGURES["x4/median"], FIGURES["x4/p95"]
+    table = ReportTable(
+        "Admission, selection of the fallback and its record, in ms, by condition; and the medians with the record "
+        "written to its file, and on the disk",
+        columns(
+            "Condition, mode", "#Median", "#P95", "#P99", "#Greatest", "#Written, median", "#Synced, median", "#Runs"
+        ),
+        (
+            ("paper [P], each condition", middle.text, f"below {high.text}", NONE, NONE, NONE, NONE, "30"),
+            *(_condition(mode, case, found[mode, case]) for mode, case in ordered),
+        ),
+        ("conditions", "percentile"),
+        () if found else (f"X4 was {UNMEASURED}.",),
+    )
+    published = ChartBar("every condition", middle.high, f"{middle.text} ms", "published", middle.low, high.high)
+    groups = [
+        ChartGroup("paper", (published,)),
+        *(ChartGroup(mode, tuple(_condition_bar(case, found[mode, case]) for of, case in ordered if of == mode))
+          for mode in modes),
+    ]  # fmt: skip
+    title = "Fallback latency in ms, by condition"
+    chart = bar_chart(title, "The figures are those of the table above.", groups, logarithmic=True)
+    caption = f"{title}; logarithmic axis. Hatched: published. Bars are medians, whiskers reach to the P95."
+    lead = ("No vehicle and no network: a condition strikes, and the decision, the fallback and its record are timed.",)
+    return ReportSection("x4", "X4: fallback", lead, (table, *([ReportChart(chart, caption)] if found else ())))
+
+
+def _condition(mode: str, case: str, runs: Sequence[FallbackTiming]) -> tuple[str, ...]:
+    stored = (distribution(each.written_ns for each in runs), distribution(each.synced_ns for each in runs))
+    local = _told(distribution(each.local_ns for each in runs))
+    return f"{case}, `{mode}`", *local, *(ms(each and each.median) for each in stored), str(len(runs))
+
+
+def _condition_bar(case: str, runs: Sequence[FallbackTiming]) -> ChartBar:
+    took = [each.local_ns for each in runs]
+    middle = median(took)
+    return ChartBar(case, middle / 1e6, f"{ms(middle)} ms", "ours", middle / 1e6, p95(took) / 1e6)
+
+
+def _told(found: Distribution | None) -> tuple[str, str, str, str]:
+    """Median, P95, P99 and maximum in ms."""
+    if found is None:
+        return NONE, NONE, NONE, NONE
+    return ms(found.median), ms(found.p95), ms(found.p99), ms(found.largest)
+
+
+def isolation_section(measured: Measured) -> ReportSection:
+    """X5: what an isolated mode adds to `software`."""
+    rows: list[tuple[str, ...]] = []
+    stated = {
+        "median validation": f"{FIGURES['x5/validation-median'].text} ({FIGURES['x5/validation-range'].text})",
+        "median end-to-end": FIGURES["x5/end-to-end-median"].text,
+        "P95 end-to-end": FIGURES["x5/end-to-end-p95"].text,
+    }
+    for mode, goal in ISOLATED.items():
+        for title, of, by in PAIRED:
+            found = measured.flights.added_average(mode, None, of, by)
+            few = "" if found is None or found.cells == len(POINTS) else f" ({found.cells} of {len(POINTS)} points)"
+            ours = (measured.missing(mode), NONE) if found is None else (ms(found.mean), span(found) + few)
+            paper = stated[title] if mode == "optee" else NONE
+            rows.append((f"{title}, `{mode}`", paper, *ours, goal if title == PAIRED[0][0] else NONE))
+    table = ReportTable(
+        "What an isolated mode adds to `software`, in ms: the mean over the points, and the least and greatest of them",
+        columns("Quantity, mode", "#Paper [P]", "#Ours", "#Least to greatest", "#Our goal, at most"),
+        tuple(rows),
+        ("pairs", "modes", "percentile"),
+    )
+    groups = []
+    for mission in MISSIONS:
+        bars = []
+        for title, key in (("median end-to-end", "median"), ("P95 end-to-end", "p95")):
+            figure = FIGURES[f"x5/{key}/{mission}"]
+            bars.append(ChartBar(f"paper, optee, {title} [D]", figure.high, f"+{figure.text} ms", "published"))
+        for mode in ISOLATED:
+            for title, of, by in PAIRED:
+                found = measured.flights.added_average(mode, mission, of, by)
+                bars.append(_bar(measured, f"{mode}, {title}", mode, found))
+        groups.append(ChartGroup(mission, tuple(bars)))
+    title = "What an isolated mode adds to software, in ms, by mission"
+    chart = bar_chart(title, "The means over all points are in the table above.", groups, logarithmic=True)
+    lead = ("Flights of an isolated mode less those of `software`, paired by mission, deadline and seed.",)
+    caption = (
+        f"{title}; logarithmic axis, on which nothing is below its start. Hatched: derived from published figures. "
+    )
+    parts = (table, ReportChart(chart, caption + _WHISKERS))
+    return ReportSection("x5", "X5: the cost of isolation", lead, parts)
+
+
+def cell_section(measured: Measured) -> ReportSection:
+    """Every cell of X1: its end-to-end and validation latencies."""
+    rows: list[tuple[str, ...]] = []
+    for mode in MODES:
+        for point in POINTS:
+            flights = measured.flights.cell(mode, point)
+            if flights:
+                spreads = (measured.flights.spread(mode, point, of) for of in (end_to_end, validation))
+                name = f"{point.mission}, {point.deadline_us / 1e6:g} s, `{mode}`"
+                rows.append((name, *chain.from_iterable(map(_told, spreads)), str(len(flights))))
+    statistics = ("#median", "#P95", "#P99", "#greatest")
+    names = [each.replace("#", f"#{kind}, ") for kind in ("End-to-end", "Validation") for each in statistics]
+    table = ReportTable(
+        "Every cell with flights: end-to-end and validation latency in ms, over all invocations",
+        columns("Cell", *names, "#Flights"),
+        tuple(rows),
+        ("end-to-end", "validation", "percentile"),
+    )
+    lead = ("The paper publishes no value of a single cell.",)
+    return ReportSection("cells", "Every cell of X1", lead, (table,))

@@ -1,0 +1,167 @@
+"""The report as HTML and Markdown: well formed, self-contained, safe against hostile texts, with every choice."""
+
+import re
+from base64 import b64decode
+from hashlib import sha256
+from html import unescape
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from msgspec.structs import replace
+
+from reference.evaluation_results import COMPUTER, campaign, checks, everything
+from reference.html_outline import Outline
+from rtshcua.evaluation import report_page, report_text
+from rtshcua.evaluation.published import CHOICES
+from rtshcua.evaluation.report_content import evaluation_report
+from rtshcua.evaluation.report_parts import EvaluationReport, ReportTable, digits
+from rtshcua.evaluation.results import Result, UnavailableMode
+
+HOSTILE = (
+    '"><svg onload=alert(1)>',
+    "</style><script>1</script>",
+    "{{ 7 * 7 }}",
+    "`<b>`",
+    "a | b\nc `",
+    "[x](http://y)",
+)
+
+
+def made(results: list[Result], **more: str) -> EvaluationReport:
+    return evaluation_report(
+        results, replace(COMPUTER, **more), "2026-11-29 00:00 UTC", (("jobs", "2"),), (campaign(),)
+    )
+
+
+@pytest.fixture(scope="module")
+def report() -> EvaluationReport:
+    return made(list(everything(runs=2)))
+
+
+@pytest.fixture(scope="module")
+def text(report: EvaluationReport) -> str:
+    return report_page.render(report)
+
+
+@pytest.fixture(scope="module")
+def outline(text: str) -> Outline:
+    return Outline(text)
+
+
+def test_elements_are_nested_and_every_link_has_its_target(outline: Outline) -> None:
+    assert (outline.wrong, outline.open) == ([], [])
+    ids = [attributes["id"] for _, attributes in outline.elements if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    links = [attributes["href"] for attributes in outline.of("a")]
+    assert not {link for link in links if not link.startswith("#") or link[1:] not in ids}
+    labelled = {word for _, attributes in outline.elements for word in attributes.get("aria-labelledby", "").split()}
+    assert not labelled - set(ids)
+    levels = [int(tag[1]) for tag, _ in outline.elements if re.fullmatch(r"h[1-6]", tag)]
+    assert levels[0] == 1
+    assert all(after <= before + 1 for before, after in pairwise(levels))
+
+
+def test_page_loads_nothing_and_has_no_script(outline: Outline, text: str) -> None:
+    assert not {tag for tag, _ in outline.elements} & {"script", "link", "img", "iframe", "object", "form", "base"}
+    for _, attributes in outline.elements:
+        assert not {name for name in attributes if name.startswith("on") or name in ("src", "style", "srcset")}
+    assert "@import" not in text
+    assert "url(" not in text
+
+
+def test_content_security_policy_allows_only_the_own_style(outline: Outline, text: str) -> None:
+    (policy,) = (each["content"] for each in outline.of("meta") if each.get("http-equiv") == "Content-Security-Policy")
+    (style,) = re.findall(r"<style>(.*?)</style>", text, re.DOTALL)
+    digest = re.search(r"style-src 'sha256-([^']+)'", policy)
+    assert digest is not None
+    assert b64decode(digest[1]) == sha256(style.encode()).digest()
+    assert policy.startswith("default-src 'none'; ")
+    assert "unsafe" not in policy
+
+
+def test_charts_have_titles_and_tables_have_captions(outline: Outline, text: str) -> None:
+    tags = [tag for tag, _ in outline.elements]
+    assert tags.count("table") == tags.count("caption") > 15
+    assert tags.count("svg") == tags.count("figcaption") == 7
+    assert all(each["role"] == "img" and each["aria-labelledby"] for each in outline.of("svg"))
+    assert text.count("bar published") > 20
+    assert "nan" not in re.findall(r'(?:x|y|width|height|d)="([^"]*)"', text)
+
+
+@pytest.mark.parametrize("hostile", HOSTILE)
+def test_hostile_texts_are_escaped(hostile: str) -> None:
+    absent = UnavailableMode(mode="process", why=hostile)
+    shown = made([absent], processor=hostile, commit=hostile)
+    text = report_page.render(shown)
+    outline = Outline(text)
+    assert (outline.wrong, outline.open) == ([], [])
+    assert not {"script", "b"} & {tag for tag, _ in outline.elements}
+    assert not any(name.startswith("on") for _, attributes in outline.elements for name in attributes)
+    assert "49" not in re.findall(r"<td[^>]*>([^<]*)</td>", text)
+    if "`" not in hostile:
+        assert hostile in unescape(text)
+    lines = report_text.render(shown).splitlines()
+    (row,) = (line for line in lines if line.startswith("| `process` | 0 of 630 | not available"))
+    assert len(re.findall(r"(?<!\\)\|", row)) == 5
+    assert "](http" not in re.sub(r"\\.", "", row)
+    assert "<" not in re.sub(r"\\<|`[^`]*`", "", row)
+
+
+def test_every_choice_of_a_table_is_explained(report: EvaluationReport, text: str) -> None:
+    named = {
+        name for section in report.sections for part in section.parts if isinstance(part, ReportTable)
+        for name in part.choices
+    }  # fmt: skip
+    known = {each.anchor for each in CHOICES}
+    assert named <= known
+    assert known - named <= {"plots"}
+    assert all(f'id="choice-{each}"' in text for each in known)
+
+
+def test_every_choice_is_on_the_documentation_page() -> None:
+    page = Path(__file__).resolve().parents[3] / "docs" / "evaluation.md"
+    _, *rows = "\n".join(report_text.choice_lines()).partition("| Choice |")
+    assert "".join(rows) in page.read_text(encoding="utf-8")
+
+
+def test_partial_results_say_so(report: EvaluationReport) -> None:
+    text = report_text.render(report)
+    assert "No headline claim fails: 3 held, 15 not measured, 3 not available here." in text
+    assert "| X1, `software`: no missed deadlines and no fallbacks; all flights complete | " in text
+    assert "| 42 of 630 | not measured |" in text
+
+
+def test_a_failed_claim_is_in_the_verdict() -> None:
+    results: list[Result] = [replace(each, agrees=False) for each in checks(["process"], runs=1)]
+    shown = made(results)
+    assert shown.verdict.startswith("Headline claims fail: `x3/process`, `x3/extra`.")
+    text = report_page.render(shown)
+    assert 'class="verdict missed"' in text
+    assert "Checks that fail: 294; the first 20" in text
+    assert 'class="part wrong"' in text
+
+
+def test_nothing_measured_is_a_report_too() -> None:
+    shown = evaluation_report([], replace(COMPUTER, memory=None, load=(), commit=""), "now")
+    assert shown.verdict == "No headline claim fails: 21 not measured."
+    outline = Outline(report_page.render(shown))
+    assert (outline.wrong, outline.open) == ([], [])
+    assert "commit `unknown`" in report_text.render(shown)
+
+
+def test_same_results_give_the_same_bytes(report: EvaluationReport, text: str) -> None:
+    again = made(list(everything(runs=2)))
+    assert report_page.render(again) == text
+    assert report_text.render(again) == report_text.render(report)
+
+
+@pytest.mark.parametrize(
+    ("value", "expected"),
+    [
+        (0, "0"), (0.0123456, "0.0123"), (1, "1.00"), (9.999, "10.0"), (135, "135"), (999.6, "1,000"),
+        (1234.5, "1,234"), (-0.04, "-0.0400"), (71_600, "71,600"),
+    ],
+)  # fmt: skip
+def test_numbers_have_three_digits(value: float, expected: str) -> None:
+    assert digits(value) == expected

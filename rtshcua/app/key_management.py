@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Final, NamedTuple, TypeVar
 
-from rtshcua.adapters.boundary.process import first_kept
+from rtshcua.adapters.boundary.home import first_kept
 from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.link_setup import LinkSetup, SetUp, carry_out
 from rtshcua.adapters.store.folders import data_folder, state_folder

@@ -57,6 +57,10 @@ _SELF_MEASURED: Final = Claim(
     "home", "that the boundary measured its own code correctly: nothing below it vouches for that"
 )
 
+_UNATTESTED: Final = Claim("home", "which code the boundary ran: the log has no attestation of its home")
+#: the modes whose boundary is part of the runtime, so that nothing attests itself
+_HOMELESS: Final = frozenset({UNENFORCED, "software"})
+
 _MOVED: Final = (
     "the boundary made no such entry here: this record was altered, invented or moved, or an earlier one was removed"
 )
@@ -115,6 +119,7 @@ class BoundaryEvidence:
         self._flight = bytes.fromhex(genesis.boot)
         self._enforced = genesis.mode != UNENFORCED
         self._mode = genesis.mode
+        self._log_kid = genesis.log_kid
         self._home: HomeAttestation | None = None
         self._bundle = sha256(octets(genesis.bundle) or b"").digest()
         #: the boundary's chain, recomputed from the records
@@ -217,6 +222,9 @@ class BoundaryEvidence:
         if home.evidence != self.digest:
             text = "the boundary's home attested this at another point of its evidence"
             return Flaw("attested/moved", text, home.evidence.hex(), self.digest.hex())
+        if home.log_kid and home.log_kid.hex() != self._log_kid:
+            text = "the boundary's home attested that it has another log key than the one that signed this log"
+            return Flaw("attested/other-log-key", text, home.log_kid.hex(), self._log_kid)
         self._home = home
         return None
 
@@ -358,6 +366,8 @@ class BoundaryEvidence:
         proven = (Claim("boundary", text), *proven)
         if self._home is not None:
             proven, unproven = (*proven, _of_home(self._home)), (_SELF_MEASURED, *unproven)
+        elif self._mode not in _HOMELESS:
+            unproven = (_UNATTESTED, *unproven)
         ahead = (*_ahead(last.ahead), *unproven)
         if last.final and self._lost is None:
             return proven, ahead

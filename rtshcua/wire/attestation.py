@@ -6,6 +6,7 @@ signs carries the duty's label, so neither is taken for the other. A home measur
 
 from collections.abc import Mapping
 from enum import IntEnum
+from hashlib import sha256
 from typing import Final
 
 import msgspec
@@ -26,11 +27,13 @@ SOFTWARE: Final = "rtshcua-boundary"
 MAX_ATTESTATION: Final = 512
 
 _UEID_BYTES: Final = 17
+#: the type of a UEID that is a random number (RFC 9711, section 4.2.1.1): here the digest of a public key
+_RANDOM: Final = b"\1"
 _LINK_NAME_BYTES: Final = 8
 
 
 class AttestationError(Untrusted):
-    """A token that is refused: `malformed`."""
+    """A token that is refused: `malformed`, or `other-boundary`: its UEID is not that of the key that signed it."""
 
 
 class DebugState(IntEnum):
@@ -73,6 +76,8 @@ def open_attestation(token: bytes, keys: Mapping[bytes, VerificationKey]) -> Hom
     found = _read(claims)
     if found is None:
         raise AttestationError("malformed", "not the claims of a boundary's home")
+    if found.ueid != _RANDOM + sha256(opened.key.public).digest()[: _UEID_BYTES - 1]:
+        raise AttestationError("other-boundary", "the UEID is not that of the key that signed it")
     return found
 
 

@@ -21,7 +21,7 @@ import pytest
 
 from reference.flying import refusal_of
 from rtshcua.adapters.boundary import process as boundary_process
-from rtshcua.adapters.boundary.home import BoundaryError
+from rtshcua.adapters.boundary.home import BoundaryError, first_kept
 from rtshcua.adapters.boundary.process import ListeningBoundary, Measure
 from rtshcua.adapters.clock import monotonic_ns
 from rtshcua.app.fly import start_boundary
@@ -56,7 +56,7 @@ class Provisioned:
         self.put("log.seed", LOG_SEED.hex().encode() + b"\n")
         self.put("boundary.seed", OWN_SEED.hex().encode() + b"\n")
         self.put("link.key", b"5a" * 32 + b"\n")
-        self.put("kept", boundary_process.first_kept())
+        self.put("kept", first_kept())
         made.give()
 
     def put(self, name: str, octets: bytes) -> None:
@@ -308,10 +308,10 @@ def test_invalid_files_are_reported(provisioned: Provisioned) -> None:
     put("kept", b"")
     provisioned.made.give()
     assert provisioned.why_not() == "damaged"
-    put("kept", boundary_process.first_kept(0, case.KEYS[Duty.LOG].public))
+    put("kept", first_kept(0, case.KEYS[Duty.LOG].public))
     provisioned.made.give()
     assert provisioned.why_not() == "damaged", "it is another boundary's"
-    put("kept", boundary_process.first_kept(0, case.BOUNDARY_KEY.public))
+    put("kept", first_kept(0, case.BOUNDARY_KEY.public))
     provisioned.made.give()
     ListeningBoundary(provisioned.socket).close()
     provisioned.made.await_gone(1)

@@ -22,9 +22,10 @@ from msgspec.structs import replace
 from pymavlink.dialects.v20 import ardupilotmega as m
 
 from reference.flying import refusal_of, request
+from rtshcua.adapters.boundary import home
 from rtshcua.adapters.boundary import process as boundary_process
-from rtshcua.adapters.boundary.home import ANSWER_S, PATIENCE_S, BoundaryError, kept_file
-from rtshcua.adapters.boundary.process import AGAIN_S, BoundaryProcess, Measure, first_kept
+from rtshcua.adapters.boundary.home import ANSWER_S, PATIENCE_S, BoundaryError, first_kept, kept_file
+from rtshcua.adapters.boundary.process import AGAIN_S, BoundaryProcess, Measure
 from rtshcua.adapters.clock import monotonic_ns
 from rtshcua.adapters.store.signing import LinkKeyError, fingerprint, read_link_key
 from rtshcua.adapters.store.writing import lock
@@ -427,7 +428,7 @@ def why_not(state: Path) -> tuple[ExitCode, str]:
 
 
 def test_each_reason_not_to_begin_has_a_slug_and_an_exit_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(boundary_process, "ENDING_S", 0.05)
+    monkeypatch.setattr(home, "ENDING_S", 0.05)
     first = begun(tmp_path)
     assert why_not(tmp_path) == (ExitCode.REFUSED, "boundary-in-use")
     first.close()

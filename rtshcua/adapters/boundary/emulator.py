@@ -10,10 +10,9 @@ from pathlib import Path
 from struct import Struct
 from typing import Final, NamedTuple
 
-from rtshcua.adapters.boundary.home import BoundaryError, BoundaryHome
+from rtshcua.adapters.boundary.home import BoundaryError, BoundaryHome, not_kept
 from rtshcua.adapters.clock import monotonic_ns
 from rtshcua.adapters.store.signing import read_link_key
-from rtshcua.adapters.store.writing import PRIVATE_FILE, lock
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US
 
 #: what it does not keep out
@@ -84,14 +83,6 @@ class EmulatedHome(BoundaryHome):
         assert self._process is not None
         return self._process.pid
 
-    def _hold(self, place: Path, vehicle: str) -> None:
-        """Hold what is kept of a vehicle, for this run alone."""
-        try:
-            self._lock = lock(place, mode=PRIVATE_FILE)
-        except BlockingIOError:
-            text = f"another run's boundary holds what is kept of `{vehicle}`"
-            raise BoundaryError("in-use", text, "wait until that run is over") from None
-
     def _launch(self, words: Sequence[str], files: Sequence[int], help: str) -> None:
         """Start the emulator, which gets these files."""
         try:
@@ -132,4 +123,6 @@ def not_begun(code: bytes, said: bytes, kept: Path, where: str) -> BoundaryError
         return BoundaryError("damaged", text, "docs/flying/isolation.md says what to do")
     if code == NOT_BEGUN and said == bytes([_UNTRUSTED]):
         return BoundaryError("untrusted", f"the boundary in {where} does not trust the trust root")
+    if code == DONE and said[1:] == b"not-kept":
+        return not_kept(f"`{kept}`")
     return BoundaryError("not-begun", f"the boundary in {where} does not begin")

@@ -19,8 +19,8 @@ from struct import Struct
 from typing import Final, NamedTuple
 
 from rtshcua.adapters.boundary.emulator import DONE, READY, EmulatedHome, Setup, not_begun
-from rtshcua.adapters.boundary.home import GREETING_BYTES, PATIENCE_S, BoundaryError, kept_file
-from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, create_whole, make_folder
+from rtshcua.adapters.boundary.home import GREETING_BYTES, PATIENCE_S, BoundaryError, hold_kept, kept_file
+from rtshcua.adapters.store.writing import PRIVATE_FILE, create_whole
 from rtshcua.model.flat.home_limits import TRUSTZONE_M
 from rtshcua.onboard.enforcement.isolated import LOAD
 
@@ -98,11 +98,11 @@ class TrustedApplication(EmulatedHome):
         if missing is not None or runs is None:
             raise missing or BoundaryError("missing", "the trusted application was not built", INSTALL)
         self._storage = kept_file(state, vehicle).with_suffix(".optee")
-        make_folder(self._storage.parent, mode=PRIVATE_FOLDER)
+        self._lost = False
         self._port, theirs = socket.socketpair()
         setup = Setup(root, pinned, vehicle, link_key, own_seed, log_seed, settings, owed, paced, utc_error_us)
         try:
-            self._hold(self._storage.with_suffix(".optee-lock"), vehicle)
+            self._lock = hold_kept(state, vehicle)
             create_whole(self._storage, (runs.folder / "storage.img").read_bytes(), mode=PRIVATE_FILE)
             setup.packed(b"", bytes(32), _MAILBOX - _KEPT_ROOM)  # what is wrong with it shows before the start
             storage = os.open(self._storage, os.O_RDWR | os.O_CLOEXEC)
@@ -172,17 +172,22 @@ class TrustedApplication(EmulatedHome):
 
     def _ask(self, want: bytes, octets: bytes, patience_s: float) -> tuple[bytes, bytes]:
         """What becomes of a wish, and its answer. Raises OSError."""
-        if len(octets) > _MAILBOX - 8:
+        if len(octets) > _MAILBOX - 8 or self._lost:
             return b"", b""
+        self._lost = True  # until all of it was exchanged: no answer may be taken for that to another call
         self._port.settimeout(patience_s)
         try:
             self._port.sendall(_HEAD.pack(want, len(octets)) + octets)
             head = self._receive(_HEAD.size)
             code, size = _HEAD.unpack(head) if head else (b"", 0)
-            return (code, self._receive(size)) if size <= _MAILBOX else (b"", b"")
+            answer = self._receive(size) if size <= _MAILBOX else b""
         except TimeoutError:
             self._kill()
             raise
+        if code == b"" or len(answer) != size:
+            return b"", b""
+        self._lost = False
+        return code, answer
 
     def _receive(self, size: int) -> bytes:
         """So many octets; none where the other end is gone. Raises OSError."""

@@ -13,22 +13,24 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from enum import IntFlag
-from errno import ENOSPC
-from hashlib import sha256
 from pathlib import Path
-from struct import Struct
 from typing import Final
 
-from rtshcua.adapters.boundary.home import ANSWER_S, GREETING_BYTES, PATIENCE_S, BoundaryError, BoundaryHome, kept_file
+from rtshcua.adapters.boundary.home import (
+    ANSWER_S,
+    GREETING_BYTES,
+    PATIENCE_S,
+    BoundaryError,
+    BoundaryHome,
+    hold_kept,
+    kept_file,
+    not_kept,
+)  # fmt: skip
 from rtshcua.adapters.store.signing import no_link_key, open_link_key
-from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, create_whole, lock, make_folder
 from rtshcua.onboard.enforcement.isolated import LOAD, MAX_PART
-from rtshcua.wire.keys import PUBLIC_BYTES
 
 #: an extra time: if the whole machine stood still, both times are over, and one process resumes first
 AGAIN_S: Final = 0.2
-#: the time for the boundary of a killed run to write its state and end
-ENDING_S: Final = 2.0
 #: the same for a listening one: if it hangs, the kernel ends it 3 s after its last activity, and nobody else may
 LISTENING_ENDING_S: Final = 5.0
 _PACKAGED: Final = Path(__file__).resolve().parents[2] / "boundary" / "rtshcua-boundary"
@@ -37,8 +39,6 @@ _BUILT: Final = Path(__file__).resolve().parents[3] / "build" / "boundary" / "rt
 _ASKING_S: Final = 0.1
 #: octets of the largest call and answer
 _CALL, _ANSWER = MAX_PART + 64, 2_112
-_FIRST: Final = Struct(f"<Qq{PUBLIC_BYTES}s")
-_FIRST_LAYOUT: Final = 0x7274736863756100
 
 #: the message without a program, if none was requested
 UNBUILT: Final = "the boundary's program was not built, so the run decides in its own process, without isolation"
@@ -92,15 +92,6 @@ _DAMAGED_HELP: Final = (
 def program() -> Path | None:
     """The program, in a checkout or in the package; None where it was not built."""
     return next((each for each in (_BUILT, _PACKAGED) if each.is_file()), None)
-
-
-def first_kept(since_us: int = 0, public: bytes = bytes(PUBLIC_BYTES)) -> bytes:
-    """The initial content of a boundary's file (`rt_kept_first` of boundary/enforcement/kept.h); an empty file is
-    damage. It opens no mission that was issued before `since_us` (UTC), and belongs to a boundary with this public key,
-    or to any.
-    """
-    said = _FIRST.pack(_FIRST_LAYOUT, since_us, public)
-    return said + sha256(said).digest()
 
 
 def measures_here(user: tuple[int, int] | None) -> Measure:
@@ -306,25 +297,7 @@ class BoundaryProcess(_Connected):
     def _handles(
         self, vehicle: str, state: Path, link_key: Path | None, given: Mapping[str, bytes | None]
     ) -> Iterator[tuple[str, int]]:
-        place = kept_file(state, vehicle)
-        make_folder(place.parent, mode=PRIVATE_FOLDER)
-        try:
-            create_whole(place, first_kept(), mode=PRIVATE_FILE)
-        except OSError as error:
-            if error.errno == ENOSPC:
-                raise _unbegun(_IO, f"`{place}`") from None
-            raise
-        until_s = time.monotonic() + ENDING_S
-        while True:
-            try:
-                kept = lock(place)
-                break
-            except BlockingIOError:
-                if time.monotonic() > until_s:
-                    text = f"another run's boundary has locked the records of `{vehicle}`"
-                    raise BoundaryError("in-use", text, "wait until that run ends") from None
-                time.sleep(0.02)
-        yield "--kept", kept
+        yield "--kept", hold_kept(state, vehicle)
         for name, data in given.items():
             if data is not None:
                 handle = os.memfd_create(name, os.MFD_CLOEXEC)
@@ -356,6 +329,6 @@ def _unbegun(code: int, kept: str, help: str = "") -> BoundaryError:
         text = f"{kept} is damaged, so the bundles that the boundary has opened are not known"
         return BoundaryError("damaged", text, _DAMAGED_HELP)
     if code == _IO:
-        return BoundaryError("not-kept", f"{kept} cannot be read or written, or the disk is full", help)
+        return not_kept(kept, help)
     text = f"the boundary's process did not start: {_ENDED.get(code, f'it ended with {code}')}"
     return BoundaryError("untrusted" if code == _UNTRUSTED else "not-begun", text, help)

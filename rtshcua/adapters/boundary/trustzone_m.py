@@ -17,11 +17,17 @@ from struct import Struct
 from typing import Final, NamedTuple
 
 from rtshcua.adapters.boundary.emulator import DONE, DONE_KEEP, KEEP_FIRST, READY, EmulatedHome, Setup, not_begun
-from rtshcua.adapters.boundary.home import ANSWER_S, GREETING_BYTES, PATIENCE_S, BoundaryError, kept_file
-from rtshcua.adapters.boundary.process import first_kept
+from rtshcua.adapters.boundary.home import (
+    ANSWER_S,
+    GREETING_BYTES,
+    PATIENCE_S,
+    BoundaryError,
+    hold_kept,
+    kept_file,
+)  # fmt: skip
 from rtshcua.adapters.clock import monotonic_ns
 from rtshcua.adapters.store.reading import read_if_there, read_regular
-from rtshcua.adapters.store.writing import PRIVATE_FILE, PRIVATE_FOLDER, create_whole, make_folder, replace
+from rtshcua.adapters.store.writing import PRIVATE_FILE, create_whole, replace
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.home_limits import TRUSTZONE_M
 from rtshcua.onboard.enforcement.isolated import LOAD, Caller
@@ -87,10 +93,7 @@ class SecureWorld(EmulatedHome):
         if missing is not None or found is None:
             raise missing or BoundaryError("missing", "the programs of the secure world were not built", INSTALL)
         self._kept = kept_file(state, vehicle).with_suffix(".trustzone-m")
-        make_folder(self._kept.parent, mode=PRIVATE_FOLDER)
-        place = kept_file(state, vehicle)
-        create_whole(place, first_kept(), mode=PRIVATE_FILE)
-        self._hold(place, vehicle)  # the file of a process: one boundary has a vehicle, whatever its home
+        self._lock = hold_kept(state, vehicle)
         self._lost, self._given = False, -1
         self._later = _Keeper(self._kept)
         setup = Setup(root, pinned, vehicle, link_key, own_seed, log_seed, settings, owed, paced, utc_error_us)

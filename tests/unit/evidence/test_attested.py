@@ -39,6 +39,7 @@ _ROOT = rooted(GENESIS, ROOT_KEY)
 assert isinstance(_ROOT, TrustRoot)
 ROOT = _ROOT
 NEVER = b"\x01" * 32
+UEID = b"\1" + sha256(case.BOUNDARY_KEY.public).digest()[:16]
 
 
 class Log:
@@ -93,7 +94,7 @@ def stated(said: Statement) -> Effect:
 def at_home(log: Log, claims: dict[int, object]) -> Effect:
     """What the boundary's home attests at this point, but for these claims."""
     said = {
-        10: bytes.fromhex(GENESIS.boot), 256: b"\1" + bytes(16), 263: 0, 265: PROFILE, 267: 4, 270: SOFTWARE,
+        10: bytes.fromhex(GENESIS.boot), 256: UEID, 263: 0, 265: PROFILE, 267: 4, 270: SOFTWARE,
         273: ((60, cbor.encode({1: -16, 2: bytes([9]) * 32})),), -70001: GENESIS.mode, -70002: log.chain.digest,
         -70003: 0, -70004: (b"", b""),
     } | claims  # fmt: skip
@@ -136,6 +137,15 @@ def test_home_that_does_not_fit_the_log_is_a_flaw(log: Log) -> None:
     assert log.take(at_home(log, {-70001: "optee"})) == ("attested/other-mode", 3)
     assert log.take(at_home(log, {-70002: bytes(32)})) == ("attested/moved", 4)
     assert log.take(effect("attested", "no token")) == ("attested/malformed", 5)
+    assert log.take(at_home(log, {-70004: (bytes(16), b"")})) == ("attested/other-log-key", 6)
+    assert log.take(at_home(log, {-70004: (bytes.fromhex(GENESIS.log_kid), b"")})) is None
+
+
+def test_boundary_apart_without_attestation_is_not_proven() -> None:
+    log = Log(replace(GENESIS, mode="process"))
+    assert [log.state(), log.refuse()] == [None] * 2
+    (home,) = [claim.text for claim in log.evidence.claims()[1] if claim.slug == "home"]
+    assert "no attestation" in home
 
 
 def test_root_without_boundary_key_requires_no_evidence() -> None:

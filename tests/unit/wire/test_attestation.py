@@ -1,5 +1,6 @@
 """Attestation tokens: what they say, and every way not to be one."""
 
+from hashlib import sha256
 from typing import Any
 
 import pytest
@@ -10,9 +11,10 @@ from rtshcua.wire.keys import Duty, SigningKey
 
 KEY = SigningKey.from_seed(bytes([7]) * 32, duty=Duty.BOUNDARY)
 KEYS = {KEY.kid: KEY.verification(vehicles=("*",))}
+UEID = b"\1" + sha256(KEY.public).digest()[:16]
 CODE = cbor.encode({1: -16, 2: bytes([1]) * 32})
 CLAIMS: dict[int, Any] = {
-    10: bytes([2]) * 16, 256: b"\1" + bytes(16), 263: 1, 265: attestation.PROFILE, 267: 3, 270: attestation.SOFTWARE,
+    10: bytes([2]) * 16, 256: UEID, 263: 1, 265: attestation.PROFILE, 267: 3, 270: attestation.SOFTWARE,
     273: ((60, CODE),), -70001: "process", -70002: bytes([3]) * 32, -70003: 5, -70004: (b"", bytes(8)),
 }  # fmt: skip
 
@@ -28,7 +30,7 @@ def test_token_states_the_home() -> None:
     found = open_attestation(token(cbor.encode(CLAIMS)), KEYS)
     assert (found.flight, found.mode, found.boots, found.debug) == (bytes([2]) * 16, "process", 3, DebugState.DISABLED)
     assert (found.code, found.evidence) == (bytes([1]) * 32, bytes([3]) * 32)
-    assert (found.ueid, found.measures, found.log_kid, found.link_name) == (b"\1" + bytes(16), 5, b"", bytes(8))
+    assert (found.ueid, found.measures, found.log_kid, found.link_name) == (UEID, 5, b"", bytes(8))
 
 
 @pytest.mark.parametrize(
@@ -44,6 +46,12 @@ def test_claim_that_no_home_makes_is_refused(label: int, value: Any) -> None:
     with pytest.raises(AttestationError) as refused:
         open_attestation(token(cbor.encode(CLAIMS | {label: value})), KEYS)
     assert refused.value.slug == "malformed"
+
+
+def test_identity_of_another_boundary_is_refused() -> None:
+    with pytest.raises(AttestationError) as refused:
+        open_attestation(token(cbor.encode(CLAIMS | {256: b"\1" + bytes(16)})), KEYS)
+    assert refused.value.slug == "other-boundary"
 
 
 @pytest.mark.parametrize("missing", CLAIMS)

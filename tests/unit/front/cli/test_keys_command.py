@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from rtshcua.adapters.boundary import process as boundary_process
+from rtshcua.adapters.boundary.home import first_kept
 from rtshcua.adapters.store import reading
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import PROPOSERS, KeyStore
@@ -476,7 +476,7 @@ def first_of(folder: Path) -> tuple[int, bytes]:
     """The time from which a folder opens missions, and its boundary."""
     data = (folder / "quad-07" / "kept").read_bytes()
     since_us, public = struct.unpack_from("<q32s", data, 8)
-    assert data == boundary_process.first_kept(since_us, public)
+    assert data == first_kept(since_us, public)
     return since_us, public
 
 

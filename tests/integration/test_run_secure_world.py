@@ -1,7 +1,9 @@
 """`rtshcua run --mode trustzone-m`, over UDP: the boundary in the secure world of an emulated Cortex-M33."""
 
 import os
+import re
 import signal
+import subprocess
 import time
 from pathlib import Path
 from typing import Any
@@ -16,6 +18,7 @@ from virtual.sampling import each_once
 pytestmark = [needs_emulator, pytest.mark.clients]
 
 SPEED = 3
+CHECKOUT = Path(__file__).resolve().parents[2]
 MODE = ("--mode", "trustzone-m")
 
 
@@ -26,7 +29,9 @@ def test_a_flight_by_the_secure_world(ground: Any) -> None:
     assert flown.code == 0, flown.stderr
     verified = ground.start("verify-log", "--audit", str(flown.folder), "--json").end()
     assert verified.code == 0, verified.events
-    assert "boundary" in {claim["slug"] for claim in verified.events[0]["proven"]}
+    proven = {claim["slug"]: claim["text"] for claim in verified.events[0]["proven"]}
+    assert "boundary" in proven
+    assert code_image("trustzone-m") in proven["home"], "the boundary attested the code that was built"
     assert flown.log()[0]["mode"] == "trustzone-m"
     data = Path(ground.environment["RTSHCUA_DATA_DIR"])
     for marker in data.rglob("replay/vehicle-quad-07/*"):
@@ -77,6 +82,14 @@ def test_a_machine_without_the_emulator_says_what_installs_it(ground: Any) -> No
     assert (refused.code, refused.events[-1]["slug"]) == (5, "boundary-missing")
     assert EMULATOR in refused.events[-1]["text"]
     assert "apt-get install" in refused.events[-1]["help"]
+
+
+def code_image(home: str) -> str:
+    """The digest that `make size` prints for what was built."""
+    table = subprocess.run([CHECKOUT / ".make/footprint"], capture_output=True, text=True, check=True).stdout
+    found = re.search(rf"^{home} .*\n.*: ([0-9a-f]{{64}})$", table, re.MULTILINE)
+    assert found is not None, table
+    return found[1]
 
 
 def is_gone(process: int) -> bool:

@@ -65,7 +65,7 @@ static int64_t own_time_us(void) {
 }
 
 /* Begin with the setup in the mailbox; the client draws no key and says nothing about what was kept. */
-static bool begin(uint32_t size) {
+static bool begin_once(uint32_t size) {
     size_t kept = 0;
     if (begun || size < SETUP_HEAD || size > RT_MAILBOX_SIZE - KEPT_SIZE - 1 || word(mailbox + SETUP_SIZES + 20) != 0) return false;
     begun = true;
@@ -129,7 +129,7 @@ TEE_Result TA_InvokeCommandEntryPoint(void *context, uint32_t want, uint32_t typ
         return TEE_SUCCESS;
     }
     memcpy(mailbox + head, shared, size); /* what is looked at is a copy: the normal world may go on writing there */
-    if (want == RT_WANT_BEGIN) return begin(size) ? TEE_SUCCESS : TEE_ERROR_BAD_STATE;
+    if (want == RT_WANT_BEGIN) return begin_once(size) ? TEE_SUCCESS : TEE_ERROR_BAD_STATE;
     if (!begun) return TEE_ERROR_BAD_STATE;
     parameters[1].value.a = want == RT_WANT_LOOK ? look(&size) : serve(want, &size);
     parameters[1].value.b = size;

@@ -1,6 +1,8 @@
 """What the homes of the boundary in an emulated machine share: the setup, the process, and how a start fails."""
 
 import os
+import select
+import socket
 import subprocess
 import sys
 import time
@@ -70,7 +72,7 @@ class EmulatedHome(BoundaryHome):
     """A boundary in an emulator that is started here and ends with the run."""
 
     _process: subprocess.Popen[bytes] | None = None
-    _lock = -1
+    _lock = _errors = -1
 
     @property
     def missing(self) -> Sequence[str]:
@@ -85,11 +87,12 @@ class EmulatedHome(BoundaryHome):
 
     def _launch(self, words: Sequence[str], files: Sequence[int], help: str) -> None:
         """Start the emulator, which gets these files."""
+        self._errors = os.memfd_create("errors")
         try:
             self._process = subprocess.Popen(
                 [sys.executable, "-I", "-S", "-c", _WITH_US, str(os.getpid()), *words],
                 pass_fds=files, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL, start_new_session=True,
+                stderr=self._errors, start_new_session=True,
             )  # fmt: skip
         except OSError as error:
             text = f"`{words[0]}` does not start: {(error.strerror or str(error)).lower()}"
@@ -111,13 +114,28 @@ class EmulatedHome(BoundaryHome):
     def _end(self) -> None:
         """End the emulator, and let go of what is kept."""
         self._end_process()
-        if self._lock >= 0:
-            os.close(self._lock)
-            self._lock = -1
+        for file in (self._lock, self._errors):
+            if file >= 0:
+                os.close(file)
+        self._lock = self._errors = -1
+
+    def _not_begun(self, code: bytes, said: bytes, kept: Path, where: str) -> BoundaryError:
+        """Why the boundary did not begin, by its answer to the first wish; `where`: its home, in words."""
+        found = _reason(code, said, kept, where)
+        if found is not None:
+            return found
+        # what the emulator complains of last, such as an option that this version does not have
+        lines = os.pread(self._errors, 4_096, max(0, os.fstat(self._errors).st_size - 4_096)).splitlines()
+        last = lines[-1].decode("ascii", "replace") if lines else ""
+        return BoundaryError("not-begun", f"the boundary in {where} does not begin" + (f": {last}" if last else ""))
 
 
-def not_begun(code: bytes, said: bytes, kept: Path, where: str) -> BoundaryError:
-    """Why a boundary did not begin, by its answer to the first wish; `where`: its home, in words."""
+def is_quiet(port: socket.socket) -> bool:
+    """Whether nothing waits there: what came before a wish is no answer to it."""
+    return not select.select([port], [], [], 0)[0]
+
+
+def _reason(code: bytes, said: bytes, kept: Path, where: str) -> BoundaryError | None:
     if code == NOT_BEGUN and said == bytes([_DAMAGED]):
         text = f"`{kept}` is damaged: which bundles the boundary has opened is not known"
         return BoundaryError("damaged", text, "docs/flying/isolation.md says what to do")
@@ -125,4 +143,4 @@ def not_begun(code: bytes, said: bytes, kept: Path, where: str) -> BoundaryError
         return BoundaryError("untrusted", f"the boundary in {where} does not trust the trust root")
     if code == DONE and said[1:] == b"not-kept":
         return not_kept(f"`{kept}`")
-    return BoundaryError("not-begun", f"the boundary in {where} does not begin")
+    return None

@@ -18,7 +18,7 @@ from pathlib import Path
 from struct import Struct
 from typing import Final, NamedTuple
 
-from rtshcua.adapters.boundary.emulator import DONE, READY, EmulatedHome, Setup, not_begun
+from rtshcua.adapters.boundary.emulator import DONE, READY, EmulatedHome, Setup, is_quiet
 from rtshcua.adapters.boundary.home import GREETING_BYTES, PATIENCE_S, BoundaryError, hold_kept, kept_file
 from rtshcua.adapters.store.writing import PRIVATE_FILE, create_whole
 from rtshcua.model.flat.home_limits import TRUSTZONE_M
@@ -166,13 +166,13 @@ class TrustedApplication(EmulatedHome):
         except OSError:
             code, greeting = b"", b""
         if code != DONE or len(greeting) != GREETING_BYTES + 8:
-            raise not_begun(code, greeting, self._storage, "OP-TEE")
+            raise self._not_begun(code, greeting, self._storage, "OP-TEE")
         self._read_greeting(greeting[:-8])
         self._counter = int.from_bytes(greeting[-8:], "little")
 
     def _ask(self, want: bytes, octets: bytes, patience_s: float) -> tuple[bytes, bytes]:
         """What becomes of a wish, and its answer. Raises OSError."""
-        if len(octets) > _MAILBOX - 8 or self._lost:
+        if len(octets) > _MAILBOX - 8 or self._lost or not is_quiet(self._port):
             return b"", b""
         self._lost = True  # until all of it was exchanged: no answer may be taken for that to another call
         self._port.settimeout(patience_s)

@@ -16,7 +16,7 @@ from pathlib import Path
 from struct import Struct
 from typing import Final, NamedTuple
 
-from rtshcua.adapters.boundary.emulator import DONE, DONE_KEEP, KEEP_FIRST, READY, EmulatedHome, Setup, not_begun
+from rtshcua.adapters.boundary.emulator import DONE, DONE_KEEP, KEEP_FIRST, READY, EmulatedHome, Setup, is_quiet
 from rtshcua.adapters.boundary.home import (
     ANSWER_S,
     GREETING_BYTES,
@@ -119,8 +119,10 @@ class SecureWorld(EmulatedHome):
         return answer if code == DONE else b""
 
     def violations(self) -> int:
-        """How often the normal world reached for what is not its own."""
-        _, answer = self._ask(b"S", b"", ANSWER_S)
+        """How often the normal world reached for what is not its own. Raises OSError, also where nobody says it."""
+        code, answer = self._ask(b"S", b"", ANSWER_S)
+        if code != DONE:
+            raise ConnectionResetError
         return int.from_bytes(answer, "little")
 
     def close(self) -> None:
@@ -209,11 +211,11 @@ class SecureWorld(EmulatedHome):
             self._read_greeting(greeting[:-8])
             self._counter = int.from_bytes(greeting[-8:], "little")
             return
-        raise not_begun(code, greeting, self._kept, "the secure world")
+        raise self._not_begun(code, greeting, self._kept, "the secure world")
 
     def _ask(self, want: bytes, octets: bytes, patience_s: float) -> tuple[bytes, bytes]:
         """What becomes of a wish, and its answer. What must be kept first is kept first. Raises OSError."""
-        if len(octets) > _MAILBOX - _HEAD.size or self._lost:
+        if len(octets) > _MAILBOX - _HEAD.size or self._lost or not is_quiet(self._bell):
             return b"", b""
         self._lost = True  # until all of it was exchanged: no answer may be taken for that to another call
         code, answer, blob = self._exchange(want, octets, patience_s)

@@ -39,8 +39,8 @@ lint: setup ## check style, format, types and layers, of our sources too
 	$(BIN)/mypy
 	MYPYPATH=tests $(BIN)/mypy bench
 	$(BIN)/lint-imports
-	$(BIN)/rtshcua fmt --check skills policies missions examples
-	$(BIN)/rtshcua lint skills policies missions examples
+	$(BIN)/rtshcua fmt --check skills policies missions evaluation examples
+	$(BIN)/rtshcua lint skills policies missions evaluation examples
 
 soak: setup ## run the long campaigns, and every property test with many examples; flights go on where they stopped
 	@.make/optee || echo "soak: the tests by OP-TEE are skipped"

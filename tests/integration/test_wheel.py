@@ -90,7 +90,7 @@ def library(run: Run) -> Path:
 
 def test_wheel_contains_the_whole_library(library: Path, place: Path, checkout: Path) -> None:
     assert library.is_relative_to(place / "venv")
-    for folder in ("grammar", "skills", "policies", "missions", "examples"):
+    for folder in ("grammar", "skills", "policies", "missions", "evaluation", "examples"):
         ours, shipped = (
             {
                 file.relative_to(top): file.read_bytes()

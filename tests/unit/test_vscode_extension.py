@@ -18,7 +18,8 @@ from virtual.rows import rows
 
 CHECKOUT = Path(__file__).resolve().parents[2]
 EXTENSION = CHECKOUT / "editors" / "vscode"
-SOURCES = sorted(path for folder in ("policies", "skills", "missions") for path in (CHECKOUT / folder).glob("*.rts"))
+FOLDERS = ("policies", "skills", "missions", "evaluation")
+SOURCES = sorted(path for folder in FOLDERS for path in (CHECKOUT / folder).glob("*.rts"))
 SAMPLE = CHECKOUT / "tests" / "unit" / "ground" / "report" / "everything.rts"
 
 

@@ -9,10 +9,12 @@ wait: it falls back within its 200 ms. A person cannot approve a reflex in that 
 """
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 from rtshcua.decision import tree
 from rtshcua.decision.evaluate import Environment, build
 from rtshcua.decision.rates import MOST_OFTEN, awaited
+from rtshcua.decision.tree import where
 from rtshcua.decision.values import FALSE, TRUE
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
@@ -22,11 +24,11 @@ from rtshcua.ground.prove.observability import (
     arrives,
     duration,
     report_intervals,
+    signals_in,
     signals_read,
 )
 from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.step_times import MissionStep, approval
-from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Contract, TimingClass
 from rtshcua.model.flat.policy import MonitorKind, RuleKind
 from rtshcua.model.flat.signal import Signal
@@ -47,14 +49,15 @@ def prove_deferrals(proof: ProofContext) -> None:
             _report_reflex_approval(proof, number, contract)
             continue
         watched = {signal.name for signal in signals_read(proof, *contract.assume, *contract.maintain)}
-        for clause, signal in _awaited(proof, number, contract):
+        for each in _awaited(proof, number, contract):
+            signal = each.signal
             if not arrives(signal):
                 if signal.name not in watched | reported:  # else it is E1201
                     reported.add(signal.name)
-                    _report_never(proof, signal, clause)
+                    _report_never(proof, each)
             elif often[signal.name].us > contract.deadline_us and contract.name not in reported:
                 reported.add(contract.name)
-                _report_late(proof, contract, signal, clause, often)
+                _report_late(proof, contract, each, often)
     _prove_approval_times(proof)
 
 
@@ -65,20 +68,31 @@ def prove_step_deferral(proof: ProofContext, step: MissionStep) -> None:
         return
     policy = proof.policy
     skills, often = policy.contracts[flat.skill], report_intervals(proof, (flat.contract,))
-    if any(often[signal.name].us > skills.deadline_us for _, signal in _awaited(proof, flat.skill, skills)):
+    if any(often[each.signal.name].us > skills.deadline_us for each in _awaited(proof, flat.skill, skills)):
         return  # already reported for the skill
-    for clause, signal in _awaited(proof, flat.skill, flat.contract):
-        if arrives(signal) and often[signal.name].us > flat.contract.deadline_us:
+    for each in _awaited(proof, flat.skill, flat.contract):
+        if arrives(each.signal) and often[each.signal.name].us > flat.contract.deadline_us:
             own = step.overrides.deadline
-            _report_late(proof, flat.contract, signal, clause, often, step.span if own is None else own.span)
+            _report_late(proof, flat.contract, each, often, step.span if own is None else own.span)
             return
 
 
-def _awaited(proof: ProofContext, number: int, contract: Contract) -> Iterator[tuple[Clause, Signal]]:
-    """Yield the signals for which a decision on a contract may wait, with the clauses that read them."""
-    for clause in awaited(proof.policy, number, contract):
+class _Awaited(NamedTuple):
+    """A signal for which a decision may wait, where that is written, and how the place is labelled."""
+
+    signal: Signal
+    span: Span
+    label: str
+
+
+def _awaited(proof: ProofContext, number: int, contract: Contract) -> Iterator[_Awaited]:
+    """Yield the signals for which a decision on a contract may wait: of its clauses, then place and charge."""
+    policy, declared = proof.policy, proof.context.symbols.signals
+    for clause in awaited(policy, number, contract):
         for signal in signals_read(proof, clause):
-            yield clause, signal
+            yield _Awaited(signal, proof.span(clause), "this condition waits for the signal")
+    for signal in signals_in(policy, (*where(policy.vehicle), policy.vehicle.battery)):
+        yield _Awaited(signal, declared[signal.name].name.span, "every step waits for this signal")
 
 
 def _prove_approval_times(proof: ProofContext) -> None:
@@ -186,11 +200,12 @@ def _needed(proof: ProofContext, at: Environment, node: tree.Node, wanted: bool)
             return 0 if possible else NEVER
 
 
-def _report_never(proof: ProofContext, signal: Signal, clause: Clause) -> None:
+def _report_never(proof: ProofContext, late: _Awaited) -> None:
+    signal = late.signal
     message = proof.context.symbols.signals[signal.name].sources[0].message
     proof.report.add(
         codes.NO_RESOLVER,
-        proof.span(clause),
+        late.span,
         f"`{signal.name}` is always unknown: vehicles receive `{message.text}` but never send it",
         help="read the signal from a message that the vehicle reports",
         labels=[(message.span, "read from this message")],
@@ -200,13 +215,13 @@ def _report_never(proof: ProofContext, signal: Signal, clause: Clause) -> None:
 def _report_late(
     proof: ProofContext,
     contract: Contract,
-    signal: Signal,
-    clause: Clause,
+    late: _Awaited,
     often: Intervals,
     span: Span | None = None,
 ) -> None:
     deadline = proof.skills[contract.name].deadline
     assert deadline is not None
+    signal = late.signal
     us, message, assumed = often[signal.name]
     every = duration(us)
     help = f"set the deadline to {every} or more"
@@ -222,7 +237,7 @@ def _report_late(
         f"`{contract.name}` waits at most {duration(contract.deadline_us)} for `{signal.name}`, but "
         f"`{message}` is sent only every {every}",
         help=help,
-        labels=[(proof.span(clause), "this condition waits for the signal")],
+        labels=[(late.span, late.label)],
     )
 
 

@@ -1,8 +1,9 @@
 """Prove that the conditions monitored in flight are observable (E1201, E1203), and in time for a reaction (E0808).
 
 Vehicles must report each signal that `assume`, `maintain`, a `degrade` rule or a temporal monitor reads, at least as
-often as it goes stale. A clause of `assume` or `maintain` must read a value that can change. The report rates are those
-that the adapters request (`decision.rates`).
+often as it goes stale, and so must they report place and charge, and the velocity where the vehicle declares `brakes`.
+A clause of `assume` or `maintain` must read a value that can change. The report rates are those that the adapters
+request (`decision.rates`).
 
 A violated condition and a lost signal must both be noticed while the skill still runs. The reaction time is the time to
 the next report (or until the signal is stale and the grace is over), plus the decision, plus one round trip of the
@@ -10,13 +11,13 @@ command that begins the fallback. A step's own block may shorten the duration or
 again.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from operator import attrgetter
 from typing import NamedTuple, TypeAlias
 
 from rtshcua.decision import rates
 from rtshcua.decision.rates import signal_of
-from rtshcua.decision.tree import slots_read
+from rtshcua.decision.tree import slots_read, where
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
 from rtshcua.ground.prove.proof_context import ProofContext
@@ -125,6 +126,11 @@ def prove_observability(proof: ProofContext) -> None:
             if signal.name not in found and arrives(signal):
                 found[signal.name] = WatchedSignal(signal, proof.span(clause))
                 _stays_known(proof, found[signal.name], intervals, "this reads it")
+    vehicle = policy.vehicle
+    for signal in signals_in(policy, (*where(vehicle), vehicle.battery, vehicle.north, vehicle.east, vehicle.down)):
+        if signal.name not in found and arrives(signal):
+            name = proof.context.symbols.signals[signal.name].name
+            _stays_known(proof, WatchedSignal(signal, name.span), intervals, "it is read in every flight")
     _windows(proof, intervals)
     for contract in policy.contracts:
         for clause in (*contract.assume, *contract.maintain):
@@ -183,6 +189,13 @@ def signals_read(proof: ProofContext, *clauses: Clause) -> Iterator[Signal]:
     policy = proof.policy
     slots = slots_read(clauses, policy.vehicle, policy.monitors)
     yield from {signal.name: signal for slot in slots for signal in (signal_of(policy, slot),)}.values()
+
+
+def signals_in(policy: Policy, slots: Collection[int]) -> Iterator[Signal]:
+    """Yield the signals that have one of these slots."""
+    for signal in policy.signals:
+        if not set(slots).isdisjoint(signal.slots):
+            yield signal
 
 
 def _observable(proof: ProofContext, watched: WatchedSignal, intervals: Intervals) -> None:

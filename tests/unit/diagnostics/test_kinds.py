@@ -54,7 +54,9 @@ def test_source_that_begins_with_a_hash_is_not_markdown() -> None:
 
 def test_shipped_sources_are_recognised_as_sources() -> None:
     files = [
-        path for folder in ("skills", "policies", "missions", "examples") for path in (CHECKOUT / folder).rglob("*")
+        path
+        for folder in ("skills", "policies", "missions", "evaluation", "examples")
+        for path in (CHECKOUT / folder).rglob("*")
     ]
     ours = [path for path in files if path.suffix == ".rts" or path.name == "proposal.json"]
     assert len(ours) > 20

@@ -40,7 +40,7 @@ def said(capsys: pytest.CaptureFixture[str]) -> tuple[str, str]:
 
 
 def test_shipped_sources_are_formatted(capsys: pytest.CaptureFixture[str]) -> None:
-    folders = [str(CHECKOUT / folder) for folder in ("skills", "policies", "missions", "examples")]
+    folders = [str(CHECKOUT / folder) for folder in ("skills", "policies", "missions", "evaluation", "examples")]
     assert main(["fmt", "--check", "--isolated", *folders]) == ExitCode.OK, capsys.readouterr()
 
 

@@ -130,6 +130,8 @@ def test_hover_describes_a_name(desk: Workspace, file: str, around: str, said: l
         ("expect rea|ction", ["to the first frame of the fallback"]),
         ("because state/vio|lated", ["does not hold"]),
         ("f|lies  dip", ["the mission"]),
+        ("signal ro|om", ["reported every 100 ms", "unknown when older than 3 s"]),
+        ("eve|ry 100 ms", ["`every 100 ms`: the sender"]),
     ],
 )
 def test_hover_describes_names_in_a_scenario(desk: Workspace, around: str, said: list[str]) -> None:
@@ -143,6 +145,7 @@ scenario "it" {
   expect reaction <= 200 ms
   expect fallback hover because state/violated
 }
+signal room : ratio = RADIO_STATUS.txbuf  every 100 ms  stale after 3 s
 """
     desk.put("/w/s.rts", text)
     found = hover(desk.view("/w/s.rts"), "/w/s.rts", place(desk, "/w/s.rts", around), dialect.load())

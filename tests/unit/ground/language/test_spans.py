@@ -23,7 +23,7 @@ from rtshcua.model.ir.places import Circle, Combination, Corridor, Daily, Dates,
 from rtshcua.model.ir.policies import Delegation, RuleDecl, Use
 from virtual.rows import rows
 
-SHIPPED = sorted(path for folder in ("skills", "policies", "missions") for path in
+SHIPPED = sorted(path for folder in ("skills", "policies", "missions", "evaluation") for path in
                  (Path(__file__).resolve().parents[4] / folder).glob("*.rts"))  # fmt: skip
 
 FORMS = Path(__file__).with_name("forms.rts")

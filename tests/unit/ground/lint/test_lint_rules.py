@@ -13,7 +13,7 @@ from virtual.rows import rows
 
 SHIPPED = sorted(
     path.relative_to(CHECKOUT)
-    for name in ("skills", "policies", "missions")
+    for name in ("skills", "policies", "missions", "evaluation")
     for path in (CHECKOUT / name).glob("*.rts")
 )
 

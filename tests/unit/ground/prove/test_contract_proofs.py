@@ -1,10 +1,15 @@
 """Proofs of contracts: last links, times, deferrals, reactions and observability."""
 
+import re
+from pathlib import Path
+
 import pytest
 
 from reference.sources import findings, found, mission, policy, program, skill
 from rtshcua.adapters.vehicle import manoeuvre
 from rtshcua.diagnostics.diagnostic import Diagnostic
+from rtshcua.ground.language.load import load
+from rtshcua.ground.pipeline.program import check_program
 from rtshcua.ground.prove import observability
 from rtshcua.ground.prove.observability import COMMAND_MESSAGES
 from rtshcua.mavlink import dialect
@@ -227,6 +232,37 @@ def test_signal_that_declares_its_interval_must_arrive_before_it_is_stale(
 ) -> None:
     heard = f"signal heard : ratio = RADIO_STATUS.txbuf every {every} stale after {stale}\n"
     assert codes(heard, skill("probe()", assume="heard > 20 %"), policy()) == expected
+
+
+CHECKOUT = Path(__file__).resolve().parents[4]
+
+
+@rows(
+    ("name", "rate", "deadline", "expected"),
+    [
+        # no clause reads them, but every step or every flight does
+        ("position", "every 1 s stale after 2 s", "1 s", []),
+        ("position", "every 1 s stale after 2 s", "999 ms", ["E0717"]),
+        ("battery", "every 3 s stale after 5 s", "2999 ms", ["E0717"]),
+        ("velocity.north", "every 1 s stale after 2 s", "100 ms", []),  # read in flight only
+        ("velocity.north", "every 1 s stale after 999 ms", "1 s", ["E1201"]),
+        ("height", "every 1 s stale after 999 ms", "1 s", ["E1201"]),
+    ],
+)
+def test_signals_that_every_flight_reads_are_proved_without_a_clause(
+    name: str, rate: str, deadline: str, expected: list[str], tmp_path: Path
+) -> None:
+    for file in ("signals.rts", "policy.rts"):
+        text = (CHECKOUT / "evaluation" / file).read_text(encoding="utf-8").replace("lib:evaluation/", "")
+        (tmp_path / file).write_text(re.sub(rf"(?m)^(signal {name} .*?)stale.*$", rf"\1{rate}", text))
+    site = (tmp_path / "policy.rts").read_text()
+    rules = "policy rules version 1 {\n  permit down by any\n  contingency down\n}\n"
+    (tmp_path / "policy.rts").write_text(site[: site.index("policy evaluation")] + rules)
+    (tmp_path / "skills.rts").write_text(skill("down()", motion="land", fallback="", deadline=deadline))
+    flight = 'mission m under rules@1 on testbed {\n  intent "Land."\n  proposed by operator ada for role operator\n'
+    (tmp_path / "m.rts").write_text(f'import "policy.rts"\n{flight}  phase land {{ down() }}\n}}\n')
+    found_here = check_program(load([str(tmp_path / "m.rts")], lambda path: Path(path).read_bytes()), dialect.load())
+    assert [each.code.id for each in found_here if each.code.id in ("E0717", "E1201")] == expected
 
 
 def test_confirm_rule_for_a_reflex_is_refused() -> None:

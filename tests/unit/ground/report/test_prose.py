@@ -135,6 +135,13 @@ def test_condition_is_described(text: str, words: str) -> None:
     assert describe_condition(condition(text), NAMES) == words
 
 
+def test_interval_of_a_signal_is_described() -> None:
+    text = "signal room : ratio = RADIO_STATUS.txbuf {}stale after 3 s"
+    found = [parse(Source("x.rts", text.format(every))).unit.signals[0] for every in ("every 100 ms ", "")]
+    source = "`RADIO_STATUS` field `txbuf`"
+    assert [describe_sources(each) for each in found] == [f"{source}; its sender reports it every 100 ms", source]
+
+
 def test_sample_has_every_node_of_the_language(everything_program: Program) -> None:
     for module in iter_modules(ir.__path__):
         import_module(f"rtshcua.model.ir.{module.name}")

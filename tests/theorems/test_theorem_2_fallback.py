@@ -12,9 +12,9 @@ Enforced by: `rtshcua/onboard/runtime/fallback_flight.py`, `rtshcua/onboard/runt
 `rtshcua/onboard/runtime/supervisor.py`, `rtshcua/onboard/enforcement/executor.py`, `rtshcua/decision/fallbacks.py`.
 
 Not covered: no rule helps a vehicle that ignores all commands. A runtime that was taken over can delay or suppress a
-fallback. The vehicle of these histories obeys at once; campaigns fly the simulated autopilots, and an independent judge
-looks at the true state (`docs/flying/campaigns.md`). Every reachable state of small missions is searched, not drawn
-(`docs/model-checking.md`).
+fallback. The vehicle of the drawn histories obeys at once; the flights of campaigns are those of simulated autopilots,
+and an independent judge looks at the true state (`docs/flying/campaigns.md`), but no physical one was flown. Every
+reachable state of small missions is searched, not drawn (`docs/model-checking.md`).
 """
 
 from collections.abc import Callable

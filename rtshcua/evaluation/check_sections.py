@@ -1,7 +1,7 @@
 """The report's sections about decisions, evidence, size and random faults: X3, X6, X7 and campaigns."""
 
 from collections import Counter, defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from statistics import median
 from typing import Final
 
@@ -9,7 +9,7 @@ from rtshcua.campaign.campaign_report import CampaignSummary, FindingSummary, ma
 from rtshcua.evaluation.design import UNENFORCED
 from rtshcua.evaluation.headline_claims import passes
 from rtshcua.evaluation.measures import distribution
-from rtshcua.evaluation.published import CASES, FIGURES, FOOTPRINT, FOOTPRINT_TOTAL
+from rtshcua.evaluation.published import CASES, FIGURES, FOOTPRINT, FOOTPRINT_TOTAL, PublishedComponent
 from rtshcua.evaluation.report_parts import (
     NONE,
     UNMEASURED,
@@ -36,6 +36,9 @@ from rtshcua.ground.report.drawing.bar_chart import StackedPart, StackedRow, sta
 #: how many failing checks are listed
 _LISTED: Final = 20
 _OUTCOMES: Final = ("allow", "fallback", "defer", "deny")
+#: our rows whose components have another name in the paper; a home is one of several places of the boundary
+_HOME: Final = "trusted enforcement: "
+_OURS: Final = {"trusted enforcement TA": f"{_HOME}optee"}
 #: the style of each ending of a flight; all others are drawn as `deny`
 _ENDINGS: Final = {"completed": "allow", "aborted": "fallback", "stood-down": "defer"}
 
@@ -218,51 +221,65 @@ def footprint_section(measured: Measured) -> ReportSection:
     """X7: the footprint on board."""
     ours = [each for each in measured.results if isinstance(each, ComponentSize)]
     lead = ("Without the agent, the model, the simulator, the libraries of MAVLink, OP-TEE itself and the autopilot.",)
-    parts = (_published_sizes(), _measured_sizes(ours))
+    parts = (_sizes_table(ours), _files_table(ours))
     return ReportSection("x7", "X7: footprint on board", lead, parts)
 
 
-def _published_sizes() -> ReportTable:
-    rows = [
-        (
-            *(each.component, each.domain, f"{each.code_lines:,}"),
-            *(f"{size:.2f}" for size in (each.artifact_kb, each.memory_kb)),
-            each.state,
-        )
-        for each in (*FOOTPRINT, FOOTPRINT_TOTAL)
-    ]
-    sums = (FIGURES[f"x7/{key}-summed"].text for key in ("lines", "artifact", "memory"))
-    rows.append(("sum of the rows [D]", "", *sums, ""))
+def _sizes_table(ours: Sequence[ComponentSize]) -> ReportTable:
+    """Each component, published and ours, and the sums of the rows."""
+    found = {each.component: each for each in ours}
+    rows: list[ReportRow] = []
+    for stated in FOOTPRINT:
+        measured = found.pop(_OURS.get(stated.component, stated.component), None)
+        also = "" if measured is None or measured.component == stated.component else f" (ours: {measured.component})"
+        rows.append(_size_row(stated.component + also, stated, measured))
+    rows += [_size_row(each.component, None, each) for each in found.values()]
+    rows.append(_size_row(FOOTPRINT_TOTAL.component, FOOTPRINT_TOTAL, None))
+    key = "x7/{}-summed"
+    sums = (FIGURES[key.format(kind)].text for kind in ("lines", "artifact", "memory"))
+    rows.append(("sum of the rows [D]", "", *(each for text in sums for each in (text, NONE)), ""))
+    rows += _our_sums(ours)
     shared, further = FIGURES["x7/artifact-shared"].text, FIGURES["x7/artifact-unexplained"].text
     return ReportTable(
-        "Published: code lines without blanks, comments and docstrings; artifact and peak memory in KB",
-        columns("Component", "Domain", "#Code lines [P]", "#Artifact [P]", "#Peak memory [P]", "State"),
-        tuple(rows),
-        notes=(
-            "The printed totals are not the sums of the printed rows. Artifacts may share files: with the 8.29 KB that "
-            f"two rows have in common counted once, the sum is {shared} KB [D], and {further} KB more are shared [D].",
+        "Code lines without blanks, comments and docstrings; artifact and peak memory in KB (ours: of 1,024 bytes)",
+        columns(
+            "Component", "Domain", "#Lines [P]", "#Lines", "#Artifact [P]", "#Artifact", "#Peak memory [P]",
+            "#Peak memory", "State",
         ),
-    )
-
-
-def _measured_sizes(ours: Sequence[ComponentSize]) -> ReportTable:
-    rows = [
-        (
-            *(each.component, each.domain),
-            *_sizes(each.code_lines, each.artifact, each.memory),
-            *(each.state, ", ".join(each.files)),
-        )
-        for each in ours
-    ]
-    if ours:
-        rows.append(("sum of the rows", "", *_sizes(*(_sum(ours, of) for of in (_lines, _artifact, _memory))), "", ""))
-    return ReportTable(
-        "Ours: code lines counted alike; artifact and peak memory in KB of 1,024 bytes",
-        columns("Component", "Domain", "#Code lines", "#Artifact", "#Peak memory", "State", "Files"),
         tuple(rows),
         ("footprint",),
-        () if ours else (f"X7 was {UNMEASURED}.",),
-    )
+        (
+            "The printed totals are not the sums of the printed rows. Artifacts may share files: with the 8.29 KB that "
+            f"two rows have in common counted once, the sum is {shared} KB [D], and {further} KB more are shared [D].",
+            *(() if ours else (f"X7 was {UNMEASURED}.",)),
+        ),
+    )  # fmt: skip
+
+
+def _our_sums(ours: Sequence[ComponentSize]) -> Iterator[ReportRow]:
+    """The sums of our rows for each home of the boundary, of which a vehicle has one."""
+    without = [each for each in ours if not each.component.startswith(_HOME)]
+    for home in ours:
+        if home.component.startswith(_HOME):
+            sums = (_sum([*without, home], of) for of in (_lines, _artifact, _memory))
+            told = (each for text in _sizes(*sums) for each in (NONE, text))
+            yield f"sum of our rows, `{home.component.removeprefix(_HOME)}` as the only home", "", *told, ""
+
+
+def _size_row(name: str, stated: PublishedComponent | None, ours: ComponentSize | None) -> ReportRow:
+    """A component: each published size, and ours after it."""
+    paper = (NONE,) * 3 if stated is None else (
+        f"{stated.code_lines:,}", f"{stated.artifact_kb:.2f}", f"{stated.memory_kb:.2f}"
+    )  # fmt: skip
+    measured = (NONE,) * 3 if ours is None else _sizes(ours.code_lines, ours.artifact, ours.memory)
+    domain = ours.domain if ours is not None else stated.domain if stated is not None else ""
+    pairs = (each for pair in zip(paper, measured, strict=True) for each in pair)
+    return name, domain, *pairs, ours.state if ours is not None else NONE
+
+
+def _files_table(ours: Sequence[ComponentSize]) -> ReportTable:
+    rows = tuple((each.component, ", ".join(f"`{path}`" for path in each.files)) for each in ours)
+    return ReportTable("The files of our components", columns("Component", "Files"), rows)
 
 
 def _lines(each: ComponentSize) -> int | None:
@@ -333,9 +350,9 @@ def _findings(summary: CampaignSummary, name: str) -> ReportTable:
 
     def row(each: FindingSummary, kind: str) -> ReportRow:
         flights = ", ".join(map(str, each.first[:3]))
-        return ReportCell(kind, "missed" if kind == "failure" else "open"), f"`{each.slug}`", each.why or each.text, (
-            f"{each.flights:,}"
-        ), flights  # fmt: skip
+        text = f"{each.text} ({each.why})" if each.why else each.text
+        style = "missed" if kind == "failure" else "open"
+        return ReportCell(kind, style), f"`{each.slug}`", text, f"{each.flights:,}", flights
 
     rows = (
         *(row(each, "failure") for each in summary.failures),
@@ -350,17 +367,14 @@ def _findings(summary: CampaignSummary, name: str) -> ReportTable:
 
 
 def _margins(summary: CampaignSummary, name: str) -> ReportTable:
-    rows = tuple(
-        (
-            each.title,
-            *(margin_told(each.name, value) for value in (each.least, each.middle, each.greatest)),
-            f"{each.least_in} and {each.greatest_in}",
-            f"{each.flights:,}",
-        )
-        for each in summary.margins
-    )
+    """The worst margins: the least distances and the longest times."""
+    rows = []
+    for each in summary.margins:
+        worst = (each.least, each.least_in) if each.name.endswith("_mm") else (each.greatest, each.greatest_in)
+        told = (margin_told(each.name, worst[0]), f"{worst[1]:,}", margin_told(each.name, each.middle))
+        rows.append((each.title, *told, f"{each.flights:,}"))
     return ReportTable(
-        f"{name}: margins. The worst distance is the least, the worst time the greatest",
-        columns("Margin", "#Least", "#Median", "#Greatest", "#In flights", "#Flights"),
-        rows,
+        f"{name}: margins",
+        columns("Margin", "#Worst", "#In flight", "#Median", "#Flights"),
+        tuple(rows),
     )

@@ -161,7 +161,7 @@ def _outcomes(measured: Measured) -> ReportTable:
             "Outcomes besides allow",
         ),
         tuple(rows),
-        ("deadline", "repetitions", "modes"),
+        ("deadline", "reports", "repetitions", "modes"),
     )  # fmt: skip
 
 
@@ -209,14 +209,14 @@ def _shares(measured: Measured) -> ReportTable:
     for mode in MODES:
         flights = measured.flights.flights(mode)
         found = [
-            distribution(chain.from_iterable(map(of, flights))) for of in (end_to_end, validation, dispatch, remaining)
+            distribution(chain.from_iterable(map(of, flights))) for of in (end_to_end, remaining, validation, dispatch)
         ]
         told = [NONE if each is None else f"{ms(each.median)} / {ms(each.p95)}" for each in found]
         rows.append((f"`{mode}`", *(told if any(found) else (measured.missing(mode), NONE, NONE, NONE))))
     return ReportTable(
-        "Where the time of an invocation goes: median / P95 in ms, all flights of a mode. The rest is the decoding of "
-        "the frame, the state, and the written record",
-        columns("Mode", "#End-to-end", "#Validation", "#Dispatch", "#Rest"),
+        "Where the time of an invocation goes: median / P95 in ms, all flights of a mode. Before: from the frame that "
+        "releases the step to the request. Dispatch: from the answer to the frame, the written record included",
+        columns("Mode", "#End-to-end", "#Before", "#Validation", "#Dispatch"),
         tuple(rows),
         ("end-to-end", "validation"),
     )

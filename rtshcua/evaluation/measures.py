@@ -43,7 +43,7 @@ def dispatch(flight: PointFlight) -> Iterator[int]:
 
 
 def remaining(flight: PointFlight) -> Iterator[int]:
-    """What of each end-to-end latency is neither validation nor dispatch: frames, state, and the record."""
+    """What of each end-to-end latency is neither validation nor dispatch: decoding, state and the request."""
     for each in flight.invocations:
         if each.end_to_end_ns is not None:
             yield each.end_to_end_ns - each.validation_ns - (each.dispatch_ns or 0)

@@ -205,6 +205,11 @@ CHOICES: Final = (
         "every step has the deadline of its point, counted from its release",
     ),
     OpenChoice(
+        "reports", "X1 to X3, X5", "how often the vehicle reports its state",
+        "each message of the signals of `lib:evaluation/` is requested twice within the shortest deadline; the radio "
+        "reports every 100 ms",
+    ),
+    OpenChoice(
         "none", "X1, X2", "what mode `none` leaves out",
         "`none` decides and records everything, and permits each step whatever was decided. It therefore costs what "
         "`software` costs. `unenforced` takes only the steps timing, phase, state and safety of the decision, without "
@@ -288,6 +293,11 @@ CHOICES: Final = (
     OpenChoice(
         "plots", "X1, X2, X4, X5", "the published plots have linear axes, except the second panel of X2",
         "logarithmic axes throughout, so that published and measured bars are legible on one axis",
+    ),
+    OpenChoice(
+        "peers", "comparison", "today's peers, and what shows the paper's own entries",
+        "further rows by our judgement, with their sources; each entry of this system names the tests and pages that "
+        "show it",
     ),
     OpenChoice(
         "campaign", "campaign", "random faults", "flights with random faults, judged by the true state of the vehicle",

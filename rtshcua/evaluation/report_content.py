@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from rtshcua.campaign.campaign_report import CampaignSummary
 from rtshcua.evaluation.check_sections import campaign_section, decision_section, evidence_section, footprint_section
+from rtshcua.evaluation.comparison import COLUMNS, COMPARISON, OURS, Aim
 from rtshcua.evaluation.computer import Computer
 from rtshcua.evaluation.design import MODES, POINTS, RUNS
 from rtshcua.evaluation.headline_claims import Claims, ClaimVerdict, Target, judge
@@ -56,6 +57,7 @@ def evaluation_report(
         evidence_section(measured),
         footprint_section(measured),
         campaign_section(campaigns),
+        _comparison_section(),
         cell_section(measured),
     )
     return EvaluationReport(
@@ -74,27 +76,28 @@ def verdict(claims: Claims) -> str:
 
 def _claim_section(claims: Claims) -> ReportSection:
     rows: list[ReportRow] = [
-        (each.text, each.published, each.measured or NONE, f"{each.runs:,} of {each.planned:,}", _cell(each.verdict))
+        (each.text, _cell(each.verdict), each.published, each.measured or NONE, f"{each.runs:,} of {each.planned:,}")
         for each in claims.claims
     ]
     headline = ReportTable(
         "Headline claims. A claim holds only if all its runs are there; one that fails makes the exit code 1",
-        columns("Claim", "Paper [P]", "Ours", "#Runs", "Verdict"),
+        columns("Claim", "Verdict", "Paper [P]", "Ours", "#Runs"),
         tuple(rows),
         ("flat", "microseconds", "agreement", "modes"),
     )
     targets: list[ReportRow] = [
         (
-            *(each.text, f"{each.published:g} {each.unit}", f"{each.limit:.4g} {each.unit}"),
+            *(each.text, _cell(each.verdict, _distance(each))),
+            *(f"{each.published:g} {each.unit}", f"{each.limit:.4g} {each.unit}"),
             NONE if each.measured is None else f"{digits(each.measured)} {each.unit}",
-            *(f"{each.runs:,} of {each.planned:,}", _cell(each.verdict, _distance(each))),
+            f"{each.runs:,} of {each.planned:,}",
         )
         for each in claims.targets
     ]
     tenfold = ReportTable(
         "Our targets: a tenth of the published figure. A missed target does not change the exit code; X2 shows where "
         "the time goes",
-        columns("Target", "#Paper [P]", "#At most", "#Ours", "#Runs", "Verdict"),
+        columns("Target", "Verdict", "#Paper [P]", "#At most", "#Ours", "#Runs"),
         tuple(targets),
         ("tenfold", "end-to-end", "durability", "verification"),
     )
@@ -148,6 +151,34 @@ def _computer_section(computer: Computer, settings: Sequence[tuple[str, str]], m
         ("modes", "none"),
     )
     return ReportSection("computer", "Computers and modes", (), (machine, modes))
+
+
+def _comparison_section() -> ReportSection:
+    """The comparison table of the paper, with today's peers, and what shows our entries."""
+    works: list[ReportRow] = [
+        (
+            f"{each.work} {each.judge}",
+            *(ReportCell(entry.aim, "open" if entry.aim is Aim.NO else "") for entry in each.entries),
+            " ".join([each.note, *(f"`{source}`" for source in each.sources)]).strip() or NONE,
+        )
+        for each in COMPARISON
+    ]
+    compared = ReportTable(
+        "Whether a property is an aim of a design of the first rank, in part, or not at all. [P]: the paper's "
+        "judgement; [ours]: our judgement by the sources named, read in November 2026",
+        columns("Work", *(each.title for each in COLUMNS), "What decided, and sources"),
+        tuple(works),
+        ("peers",),
+    )
+    shown = ReportTable(
+        "What shows the entries of this system: tests and pages of this project",
+        columns("Property", "What counts as an aim", "Shown by"),
+        tuple(
+            (each.title, each.meaning, ", ".join(f"`{path}`" for path in OURS.entry(each.key).shown_by))
+            for each in COLUMNS
+        ),
+    )
+    return ReportSection("comparison", "Comparison with other work", (), (compared, shown))
 
 
 def _available(measured: Measured, mode: str) -> ReportCell:

@@ -117,7 +117,7 @@ def sizes() -> Iterator[ComponentSize]:
         artifact=60_109, memory=15_000, state="-",
     )  # fmt: skip
     yield ComponentSize(
-        component="trusted application", domain="secure-world", files=("boundary",), code_lines=None,
+        component="trusted enforcement: optee", domain="secure-world", files=("boundary",), code_lines=None,
         artifact=130_000, memory=None, state="keys, ids, chain",
     )  # fmt: skip
 

@@ -26,7 +26,8 @@ def test_a_system_that_tells_nothing_is_no_error(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(computer.platform, "freedesktop_os_release", missing)
     monkeypatch.setattr(computer, "LIBRARIES", ("no such library",))
     found = this_computer()
-    assert (found.processor, found.versions) != ("", {"msgspec": ""})
+    assert found.versions == {}
+    assert found.system.startswith(f"{computer.platform.system()} ")
 
 
 @pytest.mark.slow

@@ -171,12 +171,13 @@ def test_evidence_that_takes_longer_than_microseconds_fails() -> None:
     assert claim(slow, "x6/verification").verdict is HELD
 
 
-def test_other_appends_and_short_logs_are_not_compared() -> None:
+def test_other_appends_and_logs_of_other_lengths_are_not_compared() -> None:
     others: list[Result] = [
         AppendTiming(durability="buffered", repetition=1, octets=1, appended_ns=(1,) * 1000),
         AppendTiming(durability="written", repetition=1, octets=1, appended_ns=(1,) * 999),
         VerificationTiming(way="fast", records=1000, repetition=1, took_ns=1),
         VerificationTiming(way="default", records=999, repetition=1, took_ns=1),
+        VerificationTiming(way="default", records=262_144, repetition=1, took_ns=1),
     ]
     for slug in ("x6/append", "x6/verification"):
         assert claim(others, slug).verdict is NOT_MEASURED

@@ -128,8 +128,8 @@ def test_every_choice_is_on_the_documentation_page() -> None:
 def test_partial_results_say_so(report: EvaluationReport) -> None:
     text = report_text.render(report)
     assert "No headline claim fails: 3 held, 15 not measured, 3 not available here." in text
-    assert "| X1, `software`: no missed deadlines and no fallbacks; all flights complete | " in text
-    assert "| 42 of 630 | not measured |" in text
+    assert "| X1, `software`: no missed deadlines and no fallbacks; all flights complete | not measured | " in text
+    assert "| 42 of 630 |" in text
 
 
 def test_a_failed_claim_is_in_the_verdict() -> None:

@@ -1,6 +1,6 @@
 """An in-process stand-in for the boundary process, in virtual time, which can die like a process.
 
-It replaces `boundary/home/process.c` and answers the calls of `boundary/enforcement/calls.h` with the boundary in
+It replaces `boundary/home/process` and answers the calls of `boundary/enforcement/calls.h` with the boundary in
 Python. It has neither the link's key nor the log's: it signs no frame and begins no log (LOG is `malformed`).
 """
 

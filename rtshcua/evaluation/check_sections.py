@@ -63,6 +63,9 @@ def decision_section(measured: Measured) -> ReportSection:
     if any(each.mode == "none" for each in checks):
         parts.append(_permitted(checks))
     parts.append(_flown(flown))
+    lost = [each for each in flown if not each.holds]
+    if lost:
+        parts.append(_undone(lost))
     return ReportSection("x3", "X3: degraded and security cases", lead, tuple(parts))
 
 
@@ -114,12 +117,13 @@ def _disagreements(wrong: Sequence[EnforceCheck]) -> ReportTable:
             f"{each.outcome}, `{each.reason}`",
             "yes" if each.as_expected else "no",
             "yes" if each.agrees else "no",
+            each.differs or NONE,
         )
         for each in wrong[:_LISTED]
     )
     return ReportTable(
         f"Checks that fail: {len(wrong):,}; the first {len(rows)}",
-        columns("Case, mission, deadline, mode, repetition", "Decided", "As expected", "As the reference"),
+        columns("Case, mission, deadline, mode, repetition", "Decided", "As expected", "As the reference", "Answers"),
         rows,
     )
 
@@ -158,6 +162,25 @@ def _flown(flown: Sequence[CaseFlight]) -> ReportTable:
         tuple(rows),
         ("whole-runtime",),
         () if flown else (f"No case was flown: {UNMEASURED}.",),
+    )
+
+
+def _undone(lost: Sequence[CaseFlight]) -> ReportTable:
+    """The first flights in which a case does not hold."""
+    rows = tuple(
+        (
+            f"{each.case}, {each.mission}, {each.deadline_us / 1e6:g} s, {each.flavour}, seed {each.seed}",
+            each.expected,
+            ", ".join(each.dispatched) or "nothing",
+            each.ending,
+            each.differs or NONE,
+        )
+        for each in lost[:_LISTED]
+    )
+    return ReportTable(
+        f"Flights in which a case does not hold: {len(lost):,}; the first {len(rows)}",
+        columns("Case, mission, deadline, autopilot, seed", "Expected", "Dispatched", "Ending", "What differs"),
+        rows,
     )
 
 

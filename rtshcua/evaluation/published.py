@@ -145,6 +145,30 @@ PLATFORM: Final = (
 )
 
 
+#: what the paper defines: (symbol or term, meaning)
+DEFINITIONS: Final = (
+    ("I", "an invocation: `<sid, src, op, args, pre, ddl, vw, sc, auth, inv, f_b, ev>`"),
+    ("T", "its times `<t_g, t_r, ddl, vw, cls>`: generation, receipt on board, deadline, validity window, class"),
+    (
+        "class",
+        "semantic: seconds or longer; tactical: from below a second to a second; reflex: without an agent in the loop",
+    ),
+    ("valid", "`valid_T`, deadline and window against the time `t`, and `valid_S`, the state clauses against `S_t`"),
+    ("L_rem", "`L_val + L_disp` for what is queued on board; otherwise `L_src + L_comp + L_val + L_disp`"),
+    ("admissible", "`valid_T and valid_S and L_rem <= ddl - t`"),
+    ("eta(I, S_t, P)", "the outcome: allow, deny, defer or fallback"),
+    (
+        "binding",
+        "in the model `H(sid, op, args, auth, ddl, vw, P_ver)`, in the prototype `H(sid, src, op, args, ddl, vw, auth, "
+        "inv, P_ver)`; neither covers `pre`, `sc`, `f_b` and `ev`",
+    ),
+    ("evidence", "`<h_intent, h_agent, I, S_t, P_ver, r_eta, r_time, B, f_b, act>`"),
+    ("fallback actions", "hover or local hold, `return_home`, `emergency_land`, confirmation by a user"),
+    ("deadline", "0.1 to 1.5 s; bounds the admission and dispatch of a skill, never a control loop"),
+    ("cell-averaged P95", "the mean over the seven deadline cells of a mission and mode; whiskers: least and greatest"),
+)
+
+
 class PublishedCase(NamedTuple):
     """A case of X3: what strikes the request, and the outcome and reason that must follow.
 
@@ -174,7 +198,12 @@ CASES: Final = (
     PublishedCase(11, "binding tampered", "one bit of the binding differs", "deny", "integrity/binding-mismatch"),
     PublishedCase(12, "replay", "the id was used before", "deny", "freshness/replayed", named=True),
     PublishedCase(
-        13, "policy version mismatch", "bound to another version", "deny", "integrity/binding-mismatch", extra=True
+        13,
+        "policy version mismatch",
+        "bound to another version",
+        "deny",
+        "integrity/binding-mismatch",
+        extra=True,
     ),
     PublishedCase(14, "validity over", "later than issue and validity", "deny", "freshness/expired", extra=True),
 )

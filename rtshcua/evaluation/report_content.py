@@ -18,7 +18,7 @@ from rtshcua.evaluation.latency_sections import (
     normal_section,
     scaling_section,
 )
-from rtshcua.evaluation.published import PLATFORM
+from rtshcua.evaluation.published import DEFINITIONS, PLATFORM
 from rtshcua.evaluation.report_parts import (
     NONE,
     EvaluationReport,
@@ -59,6 +59,7 @@ def evaluation_report(
         campaign_section(campaigns),
         _comparison_section(),
         cell_section(measured),
+        _definition_section(),
     )
     return EvaluationReport(
         "The published evaluation, measured again", made, computer, verdict(claims), claims, sections
@@ -179,6 +180,12 @@ def _comparison_section() -> ReportSection:
         ),
     )
     return ReportSection("comparison", "Comparison with other work", (), (compared, shown))
+
+
+def _definition_section() -> ReportSection:
+    lead = ("`docs/paper-map.md` names the code of each symbol.",)
+    table = ReportTable("What the paper defines", columns("Symbol or term", "Meaning [P]"), DEFINITIONS)
+    return ReportSection("definitions", "Definitions of the paper", lead, (table,))
 
 
 def _available(measured: Measured, mode: str) -> ReportCell:

@@ -44,7 +44,8 @@ class EnforceCheck(msgspec.Struct, frozen=True, kw_only=True, tag_field="result"
     """X3: one request through `enforce`.
 
     `as_expected`: outcome and reason are those of the table. `agrees`: outcome, reason, clause, target and end of
-    validity are those of `decide`. `permits`: how many permits came with the answer.
+    validity are those of `decide`. `permits`: how many permits came with the answer. `differs`: both answers in words,
+    where one of the two is not so.
     """
 
     case: str
@@ -57,12 +58,14 @@ class EnforceCheck(msgspec.Struct, frozen=True, kw_only=True, tag_field="result"
     as_expected: bool
     agrees: bool
     permits: int
+    differs: str = ""
 
 
 class CaseFlight(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="case-flight"):
     """X3, through the whole runtime in virtual time: one flight with the fault of a case.
 
-    `expected` says in words what is to be dispatched, `dispatched` lists what was from the fault on.
+    `expected` says in words what is to be dispatched, `dispatched` lists what was from the fault on. `differs` says
+    what does not hold.
     """
 
     case: str
@@ -75,6 +78,7 @@ class CaseFlight(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", 
     dispatched: tuple[str, ...]
     ending: str
     holds: bool
+    differs: str = ""
 
 
 class FallbackTiming(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="fallback"):

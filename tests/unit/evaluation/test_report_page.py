@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from reference.evaluation_results import COMPUTER, campaign, checks, everything
+from reference.evaluation_results import COMPUTER, campaign, case_flights, checks, everything
 from reference.html_outline import Outline
 from rtshcua.evaluation import report_page, report_text
+from rtshcua.evaluation.design import POINTS
 from rtshcua.evaluation.published import CHOICES
 from rtshcua.evaluation.report_content import evaluation_report
 from rtshcua.evaluation.report_parts import EvaluationReport, ReportTable, digits
@@ -133,13 +134,19 @@ def test_partial_results_say_so(report: EvaluationReport) -> None:
 
 
 def test_a_failed_claim_is_in_the_verdict() -> None:
-    results: list[Result] = [replace(each, agrees=False) for each in checks(["process"], runs=1)]
+    results: list[Result] = [
+        *(replace(each, agrees=False, differs="one; `decide`: two") for each in checks(["process"], runs=1)),
+        *(replace(each, holds=False, differs="sent late") for each in case_flights(POINTS[:1])),
+    ]
     shown = made(results)
-    assert shown.verdict.startswith("Headline claims fail: `x3/process`, `x3/extra`.")
+    assert shown.verdict.startswith("Headline claims fail: `x3/process`, `x3/extra`, `x3/runtime`.")
     text = report_page.render(shown)
     assert 'class="verdict missed"' in text
     assert "Checks that fail: 294; the first 20" in text
     assert 'class="part wrong"' in text
+    assert "one; <code>decide</code>: two" in text
+    assert "Flights in which a case does not hold: 14; the first 14" in text
+    assert "sent late" in text
 
 
 def test_nothing_measured_is_a_report_too() -> None:

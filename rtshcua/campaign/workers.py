@@ -10,7 +10,9 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from multiprocessing.connection import wait
+from threading import Thread
 from typing import Any, Final, Protocol, TypeVar
 
 F = TypeVar("F", bound="Numbered")
@@ -192,7 +194,15 @@ def _loose(untyped: Any) -> Any:
 
 
 def _quiet() -> None:
-    """Ignore SIGINT: Ctrl-C is for the parent process, which terminates the workers."""
+    """Ignore SIGINT: Ctrl-C is for the parent process, which terminates the workers. End with it if it is killed."""
     import signal  # noqa: PLC0415
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    if parent is not None:
+        wait([parent.sentinel])
+        os._exit(1)

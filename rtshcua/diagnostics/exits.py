@@ -13,7 +13,11 @@ class ExitCode(IntEnum):
     meaning: str
 
     OK = 0, "ok", "done; a flight succeeded, a log verified, sources have no errors"
-    DIAGNOSTICS = 1, "diagnostics", "the sources or the mission specification have errors; each was reported"
+    DIAGNOSTICS = (
+        1,
+        "diagnostics",
+        "the sources or the mission specification have errors; each was reported; of `bench`: a headline claim fails",
+    )
     USAGE = 2, "usage", "the command line is wrong: unknown command or option, missing argument"
     INPUT = 3, "input", "a file is missing, unreadable, too large or malformed"
     UNTRUSTED = 4, "untrusted", "a signature, key, duty, digest, expiry or format version is not trusted"

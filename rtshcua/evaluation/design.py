@@ -23,10 +23,18 @@ class EvaluationPoint(NamedTuple):
 POINTS: Final = tuple(EvaluationPoint(mission, deadline_us) for mission in MISSIONS for deadline_us in DEADLINES_US)
 
 
+class EvaluationPlan(NamedTuple):
+    """What is asked for: how often each cell is repeated, in which modes; `quick`: a sample in two minutes."""
+
+    runs: int = RUNS
+    modes: tuple[str, ...] = MODES
+    quick: bool = False
+
+
 class WorkUnit(NamedTuple):
     """What one process runs at a time, and what is run again as a whole after an interruption.
 
-    `experiment` is `X1` to `X7`; `key` identifies the unit in it (for X1: mission, deadline, mode and seed).
+    `experiment` is `X1` to `X7`; `key` identifies the unit in it (for X1: mission, deadline, seed and mode).
     """
 
     experiment: str

@@ -6,6 +6,7 @@ degraded cases strike, assume charge, link quality, clearance, wind and a fix.
 """
 
 from functools import lru_cache
+from pathlib import Path
 from typing import Any, Final
 
 from rtshcua import library
@@ -23,6 +24,11 @@ from rtshcua.virtual.fitting import fitting
 SHIPPED_US: Final = 1_000_000
 #: the interval between two reports of the radio, us, which the signals declare
 RADIO_US: Final = 100_000
+
+
+def folder() -> Path:
+    """The folder of what ships for the evaluation."""
+    return library.root() / "evaluation"
 
 
 def source(mission: str, deadline_us: int) -> str:

@@ -17,6 +17,7 @@ ALLOWED = {
     "front/cli/app.py": "the version and the overview: our own words",
     "front/cli/commands/archive.py": "a count",
     "front/cli/render/archive_tables.py": "a CSV writer; each text passed `visible`",
+    "front/cli/commands/bench.py": "counts, and names of ours",
     "front/cli/commands/campaign.py": "counts, and slugs of ours",
     "front/cli/render/claims.py": "in colour; each line passes `visible`",
     "front/cli/commands/completion.py": "a script for a shell: our own words",

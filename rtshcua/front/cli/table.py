@@ -91,6 +91,7 @@ COMMANDS = (
     Row("verify-proof", "audit", "verify such a proof without the log"),
     Row("archive", "audit", "store many verified logs and query them", ends_in_order=True),
     Row("why", "audit", "explain a decision: what decided, and which values would pass"),
+    Row("bench", "audit", "run the published evaluation on this computer", reports=True),
     Row("show", "audit", "print the contents of a bundle, key, trust root or log"),
 )
 

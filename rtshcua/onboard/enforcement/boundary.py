@@ -51,13 +51,16 @@ class PermitIssuer:
         """A step's permit, which also stands for so many links of its chain and of the contingency."""
         serial = self._serial
         self._serial += 1 + fallbacks + contingencies + AGAIN
-        return seal(Permit(STEP, step, -1, serial, fallbacks, contingencies, not_after_us), self._key)
+        return self._seal(Permit(STEP, step, -1, serial, fallbacks, contingencies, not_after_us))
 
     def link(self, ref: Ref, not_after_us: int) -> bytes:
         """A permit for a link that was just decided; the `link` of a degrade rule's target is `-1 - rule`."""
         serial = self._serial
         self._serial += 1
-        return seal(Permit(*ref, serial, 0, 0, not_after_us), self._key)
+        return self._seal(Permit(*ref, serial, 0, 0, not_after_us))
+
+    def _seal(self, permit: Permit) -> bytes:
+        return seal(permit, self._key)
 
 
 class _Ready(NamedTuple):

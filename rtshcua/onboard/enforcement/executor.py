@@ -179,7 +179,7 @@ class Executor:
 
     def dispatch(self, sealed: bytes, now_us: int) -> Command | Refusal:
         """The command of a permit at a monotonic time, or why it is refused."""
-        permit = open_permit(sealed, self._key)
+        permit = self._open(sealed)
         return self._chained(FORGED if permit is None else self._dispatch(permit, now_us), now_us)
 
     def stand_in(self, sealed: bytes, kind: int, link: int, now_us: int) -> Command | Refusal:
@@ -190,7 +190,7 @@ class Executor:
         """Withdraw the permit of a step. Returns `UNSENT` if no frame of it was or can have been sent, else why it is
         not withdrawn. The step may then be decided again, and the permit covers no link any more.
         """
-        permit = open_permit(sealed, self._key)
+        permit = self._open(sealed)
         refused = FORGED if permit is None else self._withdraw(permit)
         self._chain.add(Tag.REFUSED, boundary_chain.refused(refused.slug, now_us))
         return refused
@@ -226,7 +226,7 @@ class Executor:
 
     def _standing_for(self, sealed: bytes, kind: int, link: int) -> Permit | Refusal:
         """The command that a standing permit covers for a link; or why it is refused."""
-        permit = open_permit(sealed, self._key)
+        permit = self._open(sealed)
         if permit is None:
             return FORGED
         fallback = kind == FALLBACK_LINK
@@ -273,6 +273,9 @@ class Executor:
         self._prepared.add(permit.serial)
         self._frames.prepare(permit.writes, permit.not_after_us)
         return permit
+
+    def _open(self, sealed: bytes) -> Permit | None:
+        return open_permit(sealed, self._key)
 
     def _unprepared(self, permit: Preparation, now_us: int) -> Refusal | None:
         if self._chain.over:

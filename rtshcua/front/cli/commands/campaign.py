@@ -20,6 +20,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.faults import say
 from rtshcua.front.cli.interrupts import Stopped, StopRequest
 from rtshcua.front.cli.render.findings import Findings
+from rtshcua.front.cli.render.progress import time_left
 from rtshcua.front.cli.stdout import out
 from rtshcua.simulation.config import AutopilotKind
 
@@ -178,11 +179,7 @@ class _Progress:
             sys.stderr.flush()
 
     def _left(self, reached: int) -> str:
-        seconds = (time.monotonic() - self._began_s) / max(self.done, 1) * (self.flights - reached)
-        minutes = round(seconds / 60)
-        return (
-            f"{minutes // 60} h {minutes % 60} min" if minutes >= 60 else f"{minutes} min" if minutes else "under 1 min"
-        )
+        return time_left((time.monotonic() - self._began_s) / max(self.done, 1) * (self.flights - reached))
 
     def _say(self, text: str) -> None:
         sys.stderr.write(f"{_CLEAR}{text}" if self._changes else f"{text}\n")

@@ -39,3 +39,11 @@ def counting(*, quiet: bool) -> Callable[[str], None]:
             sys.stderr.flush()
 
     return say
+
+
+def time_left(seconds: float) -> str:
+    """Return a rest of the time in words: `2 h 5 min`, `12 min`, `under 1 min`."""
+    minutes = round(seconds / 60)
+    if minutes >= 60:
+        return f"{minutes // 60} h {minutes % 60} min"
+    return f"{minutes} min" if minutes else "under 1 min"

@@ -1,0 +1,87 @@
+"""The experiments by name, and one unit of work of each in a process of a pool."""
+
+import os
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from itertools import groupby
+from typing import Final, NamedTuple
+
+from rtshcua.evaluation import flights
+from rtshcua.evaluation.design import EvaluationPlan, WorkUnit
+from rtshcua.evaluation.results import Result
+
+
+class Experiment(NamedTuple):
+    """One experiment: its units of work, what makes one, and which of them one process runs after each other."""
+
+    units: Callable[[EvaluationPlan], Sequence[WorkUnit]]
+    run: Callable[[WorkUnit], Sequence[Result]]
+    together: Callable[[WorkUnit], object] = lambda unit: unit
+
+
+EXPERIMENTS: Final[Mapping[str, Experiment]] = {"X1": Experiment(flights.units, flights.run, flights.together)}
+#: which experiment's results answer a name
+SOURCES: Final[Mapping[str, str]] = {"X1": "X1", "X2": "X1", "X5": "X1"}
+
+
+class WorkBatch(NamedTuple):
+    """Units that one process runs after each other."""
+
+    number: int
+    units: tuple[WorkUnit, ...]
+
+
+class UnitResults(NamedTuple):
+    """The results of a unit, how long it took, in s, when it ended, and the load of the computer then. `failed` says
+    why there are none.
+    """
+
+    unit: WorkUnit
+    results: tuple[Result, ...]
+    took_s: float
+    at: int
+    load: float
+    failed: str = ""
+
+
+class BatchResults(NamedTuple):
+    """The results of a batch."""
+
+    number: int
+    units: tuple[UnitResults, ...]
+
+
+class EvaluationWork(NamedTuple):
+    """Runs batches in a process of a pool; `scratch` is the folder for the files that a run makes."""
+
+    scratch: str
+
+    def fly(self, flight: WorkBatch) -> BatchResults:
+        """Run the units of a batch."""
+        tempfile.tempdir = self.scratch
+        return BatchResults(flight.number, tuple(_measured(unit) for unit in flight.units))
+
+    def lost(self, flight: WorkBatch) -> BatchResults:
+        """Say that the process died."""
+        died = "the process that ran it died twice"
+        return BatchResults(flight.number, tuple(_failed(unit, 0.0, died) for unit in flight.units))
+
+
+def batches(units: Sequence[WorkUnit]) -> Sequence[WorkBatch]:
+    """The batches of units, in their order."""
+    grouped = groupby(units, key=lambda unit: (unit.experiment, EXPERIMENTS[unit.experiment].together(unit)))
+    return [WorkBatch(number, tuple(group)) for number, (_, group) in enumerate(grouped)]
+
+
+def _measured(unit: WorkUnit) -> UnitResults:
+    began_s = time.monotonic()
+    try:
+        results = tuple(EXPERIMENTS[unit.experiment].run(unit))
+    except Exception as error:  # noqa: BLE001  one unit must not end the others
+        return _failed(unit, time.monotonic() - began_s, f"{type(error).__name__}: {error}")
+    return UnitResults(unit, results, time.monotonic() - began_s, int(time.time()), os.getloadavg()[0])
+
+
+def _failed(unit: WorkUnit, took_s: float, why: str) -> UnitResults:
+    return UnitResults(unit, (), took_s, int(time.time()), os.getloadavg()[0], why)

@@ -1,0 +1,197 @@
+"""The raw data of an evaluation: a folder with one file of JSON lines for each experiment, only ever appended to.
+
+- The first line describes the computer, the program and the design: a run continues a file only if program and design
+  are the same.
+- Each further line holds one result, with the key of its unit of work, its place among the unit's results, and the
+  load of the computer.
+
+A unit is done when all its results are there. Lines that a crash cut off are skipped, and their unit runs again. One
+process at a time writes to a folder.
+"""
+
+import os
+import shutil
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from hashlib import sha256
+from itertools import groupby
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Final, NamedTuple
+
+import msgspec
+
+from rtshcua.adapters.store.reading import open_regular, read_regular, walk
+from rtshcua.adapters.store.writing import append, create_whole, lock, make_folder
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.evaluation.computer import Computer
+from rtshcua.evaluation.design import WorkUnit
+from rtshcua.evaluation.results import Result
+
+FORMAT: Final = 1
+#: octets of the longest line: a whole log's append times
+_LONGEST: Final = 1 << 24
+_ANOTHER: Final = "name another folder with `-o`, or remove this one"
+_LOCK: Final = ".lock"
+#: the beginning of the name of a folder for the files of a run, which a killed process leaves behind
+_SCRATCH: Final = ".work-"
+#: what must be the same to continue a file
+_DIFFERS: Final = {
+    "program": "version of this program",
+    "commit": "commit of this program",
+    "design": "design of the measurements",
+    "quick": "extent (`--quick`)",
+}
+
+
+class RawHeader(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The first line of a file. `design` is SHA-256 of what is measured and how (`design_digest`); `quick`: fewer and
+    smaller measurements. `began` is the start in seconds of UTC since 1970.
+    """
+
+    format: int
+    experiment: str
+    program: str
+    commit: str
+    design: str
+    quick: bool
+    began: int
+    computer: Computer
+
+
+class KeptResult(msgspec.Struct, frozen=True, kw_only=True):
+    """One result: `part` of `parts` of the unit `key` (no result: the unit gave none). `load` is the load average of
+    one minute then, `jobs` how many processes measured.
+    """
+
+    key: tuple[str | int, ...]
+    part: int
+    parts: int
+    at: int
+    load: float
+    jobs: int
+    result: Result | None
+
+
+class RawExperiment(NamedTuple):
+    """The content of a file: its header, the results of the units that are done, and how many lines were skipped
+    because they are cut off or malformed.
+    """
+
+    header: RawHeader
+    units: Mapping[WorkUnit, tuple[KeptResult, ...]]
+    skipped: int
+
+    @property
+    def results(self) -> tuple[Result, ...]:
+        """All results, in the order of their units' completion."""
+        return tuple(each.result for kept in self.units.values() for each in kept if each.result is not None)
+
+
+_HEADER: Final = msgspec.json.Decoder(RawHeader)
+_KEPT: Final = msgspec.json.Decoder(KeptResult)
+
+
+class RawFolder:
+    """A folder of raw data. Use it within `held` to write."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    @contextmanager
+    def held(self) -> Iterator[str]:
+        """Make the folder and hold it; yields the path of an empty folder on the same disk, which is removed at the
+        end. Raises BlockingIOError if another process holds it, and OSError.
+        """
+        make_folder(self.path)
+        handle = lock(self.path / _LOCK)
+        try:
+            for left in self.path.glob(f"{_SCRATCH}*"):
+                shutil.rmtree(left, ignore_errors=True)
+            with TemporaryDirectory(prefix=_SCRATCH, dir=self.path, ignore_cleanup_errors=True) as scratch:
+                yield scratch
+        finally:
+            os.close(handle)
+
+    def read(self, experiment: str) -> RawExperiment | Refusal | None:
+        """Read a file; None if it is not there. Raises OSError."""
+        path = self._file(experiment)
+        try:
+            with open_regular(path, self.path) as file:
+                first = file.readline(_LONGEST)
+                lines = [*file]
+        except FileNotFoundError:
+            return None
+        try:
+            header = _HEADER.decode(first)
+        except msgspec.MsgspecError:
+            return Refusal("malformed", f"`{path}` does not begin as raw data of an evaluation", _ANOTHER)
+        if header.format != FORMAT:
+            return Refusal("malformed", f"`{path}` has format {header.format}; accepted: {FORMAT}", _ANOTHER)
+        return _whole(header, lines)
+
+    def differs(self, header: RawHeader) -> Refusal | None:
+        """Why a file cannot be continued; None where it can, or is not there. Raises OSError."""
+        found = self.read(header.experiment)
+        if not isinstance(found, RawExperiment):
+            return found
+        differ = [text for name, text in _DIFFERS.items() if getattr(found.header, name) != getattr(header, name)]
+        text = f"`{self._file(header.experiment)}` was measured with another {' and another '.join(differ)}"
+        return Refusal("usage", text, _ANOTHER) if differ else None
+
+    def begin(self, header: RawHeader) -> Refusal | None:
+        """Begin a file, or continue one of the same program and design. Raises OSError."""
+        refused, path = self.differs(header), self._file(header.experiment)
+        if refused is not None:
+            return refused
+        create_whole(path, msgspec.json.encode(header) + b"\n")
+        with open_regular(path, self.path) as file:
+            file.seek(-1, os.SEEK_END)
+            whole = file.read() == b"\n"
+        if not whole:  # the last line was cut off: the next one has its own
+            append(path, b"\n", self.path)
+        return None
+
+    def keep(self, unit: WorkUnit, results: Sequence[Result], *, at: int, load: float, jobs: int) -> None:
+        """Store the results of a unit on the disk. Raises OSError."""
+        parts: Sequence[Result | None] = results or (None,)
+        lines = (
+            KeptResult(key=unit.key, part=number, parts=len(parts), at=at, load=load, jobs=jobs, result=each)
+            for number, each in enumerate(parts)
+        )
+        append(self._file(unit.experiment), b"".join(msgspec.json.encode(each) + b"\n" for each in lines), self.path)
+
+    def _file(self, experiment: str) -> Path:
+        return self.path / f"{experiment}.jsonl"
+
+
+def _whole(header: RawHeader, lines: Iterable[bytes]) -> RawExperiment:
+    """The units of which each part is there, in a row; of a unit that was kept twice, the last."""
+    kept, skipped = list[KeptResult](), 0
+    for line in lines:
+        try:
+            kept.append(_KEPT.decode(line))
+        except (msgspec.MsgspecError, RecursionError):
+            skipped += line != b"\n"
+    units: dict[WorkUnit, tuple[KeptResult, ...]] = {}
+    for key, group in groupby(kept, key=lambda each: each.key):
+        parts = [*group]
+        first = max((at for at, each in enumerate(parts) if each.part == 0), default=0)
+        last = parts[first:]
+        if [each.part for each in last] == [*range(last[0].parts)]:
+            units[WorkUnit(header.experiment, key)] = tuple(last)
+        skipped += len(parts) - len(last)
+    return RawExperiment(header, units, skipped)
+
+
+def design_digest(folders: Sequence[Path]) -> str:
+    """SHA-256 over the names and contents of the files in folders that say what is measured, in hexadecimal."""
+    found = sha256()
+    for folder in folders:
+        for above, _, names in sorted(walk(folder)):
+            for name in sorted(names):
+                if not name.endswith((".py", ".rts")):
+                    continue
+                octets = read_regular(Path(above) / name, _LONGEST)
+                found.update(f"{Path(above).relative_to(folder)}/{name} {len(octets)}\n".encode() + octets)
+    return found.hexdigest()

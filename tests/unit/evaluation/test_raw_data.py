@@ -1,0 +1,170 @@
+"""The raw data of an evaluation: what survives a crash, and which folders are continued."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from msgspec.structs import replace
+
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.evaluation.computer import Computer
+from rtshcua.evaluation.design import WorkUnit
+from rtshcua.evaluation.raw_data import FORMAT, RawExperiment, RawFolder, RawHeader, design_digest
+from rtshcua.evaluation.results import Result, UnavailableMode, VerificationTiming
+from virtual.rows import rows
+
+COMPUTER = Computer(
+    processor="a processor", cores=2, memory=None, system="", python="", program="1", commit="c", versions={}, load=()
+)
+HEADER = RawHeader(
+    format=FORMAT, experiment="X6", program="1", commit="c", design="d", quick=False, began=0, computer=COMPUTER
+)
+FIRST, SECOND = WorkUnit("X6", ("verify", 1000, 1)), WorkUnit("X6", ("verify", 1000, 2))
+
+
+def verified(*repetitions: int) -> list[Result]:
+    return [VerificationTiming(way="fast", records=1000, repetition=each, took_ns=each) for each in repetitions]
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Iterator[RawFolder]:
+    made = RawFolder(tmp_path / "evaluation")
+    with made.held():
+        assert made.begin(HEADER) is None
+        yield made
+
+
+def keep(folder: RawFolder, unit: WorkUnit, *results: Result) -> None:
+    folder.keep(unit, results, at=7, load=0.5, jobs=2)
+
+
+def found(folder: RawFolder) -> RawExperiment:
+    read = folder.read("X6")
+    assert isinstance(read, RawExperiment)
+    return read
+
+
+def test_results_come_back_as_they_were_kept(folder: RawFolder) -> None:
+    keep(folder, FIRST, *verified(1, 2, 3))
+    keep(folder, SECOND, UnavailableMode(mode="optee", why="not installed"))
+    read = found(folder)
+    assert read.header == HEADER
+    assert [*read.units] == [FIRST, SECOND]
+    assert read.results == (*verified(1, 2, 3), UnavailableMode(mode="optee", why="not installed"))
+    assert {(each.at, each.load, each.jobs) for each in read.units[FIRST]} == {(7, 0.5, 2)}
+    assert read.skipped == 0
+
+
+def test_unit_without_results_is_done(folder: RawFolder) -> None:
+    keep(folder, FIRST)
+    assert [*found(folder).units] == [FIRST]
+    assert found(folder).results == ()
+
+
+def test_every_cut_of_the_last_unit_leaves_the_units_before_it(folder: RawFolder) -> None:
+    keep(folder, FIRST, *verified(1))
+    path = folder.path / "X6.jsonl"
+    before = path.stat().st_size
+    keep(folder, SECOND, *verified(2, 3))
+    whole = path.read_bytes()
+    for length in range(before, len(whole)):
+        path.write_bytes(whole[:length])
+        done = length >= len(whole) - 1  # only the end of the last line is missing
+        assert [*found(folder).units] == ([FIRST, SECOND] if done else [FIRST]), length
+        assert folder.begin(HEADER) is None
+        keep(folder, SECOND, *verified(4, 5))
+        assert found(folder).results == (*verified(1), *verified(4, 5)), length
+
+
+def test_second_process_cannot_write(folder: RawFolder) -> None:
+    with pytest.raises(BlockingIOError), RawFolder(folder.path).held():
+        pass
+
+
+def test_files_of_a_killed_run_are_removed(tmp_path: Path) -> None:
+    left = tmp_path / ".work-abc" / "log"
+    left.mkdir(parents=True)
+    with RawFolder(tmp_path).held() as scratch:
+        assert not left.exists()
+        assert Path(scratch).parent == tmp_path
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".lock"]
+
+
+@rows(
+    "change, said",
+    [
+        ({"program": "2"}, "version of this program"),
+        ({"commit": "e"}, "commit of this program"),
+        ({"design": "e"}, "design of the measurements"),
+        ({"quick": True}, "extent (`--quick`)"),
+    ],
+)
+def test_other_measurements_are_not_continued(change: dict[str, Any], said: str, tmp_path: Path) -> None:
+    made = RawFolder(tmp_path)
+    with made.held():
+        assert made.begin(HEADER) is None
+        keep(made, FIRST, *verified(1))
+        refused = made.begin(replace(HEADER, **change))
+    assert isinstance(refused, Refusal)
+    assert refused.text == f"`{tmp_path}/X6.jsonl` was measured with another {said}"
+    assert "-o" in refused.help
+    assert found(made).results == (*verified(1),)
+
+
+def test_another_time_and_load_are_continued(folder: RawFolder) -> None:
+    later = replace(HEADER, began=9, computer=replace(COMPUTER, load=(9.0,)))
+    assert folder.begin(later) is None
+    assert found(folder).header == HEADER
+
+
+@rows("first", [b"", b"{}\n", b"[1]\n", b'{"format":1'])
+def test_foreign_file_is_refused(first: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "X6.jsonl"
+    path.write_bytes(first)
+    refused = RawFolder(tmp_path).read("X6")
+    assert isinstance(refused, Refusal)
+    assert refused.slug == "malformed"
+    assert path.read_bytes() == first
+
+
+def test_later_format_is_refused(folder: RawFolder) -> None:
+    (folder.path / "X1.jsonl").write_bytes(
+        (folder.path / "X6.jsonl").read_bytes().replace(b'"format":1', b'"format":2', 1)
+    )
+    refused = folder.read("X1")
+    assert isinstance(refused, Refusal)
+    assert "has format 2" in refused.text
+
+
+def test_links_are_not_followed(folder: RawFolder, tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    other.write_bytes((folder.path / "X6.jsonl").read_bytes())
+    (folder.path / "X6.jsonl").unlink()
+    (folder.path / "X6.jsonl").symlink_to(other)
+    before = other.read_bytes()
+    with pytest.raises(OSError, match="links are not followed"):
+        folder.read("X6")
+    with pytest.raises(OSError, match="links are not followed"):
+        keep(folder, FIRST, *verified(1))
+    assert other.read_bytes() == before
+
+
+def test_pipe_is_refused_without_waiting(tmp_path: Path) -> None:
+    import os
+
+    os.mkfifo(tmp_path / "X6.jsonl")
+    with pytest.raises(OSError, match="regular"):
+        RawFolder(tmp_path).read("X6")
+
+
+def test_design_changes_with_each_file(tmp_path: Path) -> None:
+    (tmp_path / "a.py").write_text("a")
+    first = design_digest([tmp_path])
+    assert design_digest([tmp_path]) == first
+    (tmp_path / "cache.pyc").write_text("b")
+    assert design_digest([tmp_path]) == first
+    (tmp_path / "b.rts").write_text("b")
+    second = design_digest([tmp_path])
+    (tmp_path / "b.rts").write_text("c")
+    assert len({first, second, design_digest([tmp_path])}) == 3

@@ -6,7 +6,7 @@ from statistics import median
 from typing import Final
 
 from rtshcua.campaign.campaign_report import CampaignSummary, FindingSummary, margin_told
-from rtshcua.evaluation.design import UNENFORCED
+from rtshcua.evaluation.design import MODES, UNENFORCED
 from rtshcua.evaluation.headline_claims import passes
 from rtshcua.evaluation.measures import distribution
 from rtshcua.evaluation.published import CASES, FIGURES, FOOTPRINT, FOOTPRINT_TOTAL, PublishedComponent
@@ -19,6 +19,7 @@ from rtshcua.evaluation.report_parts import (
     ReportRow,
     ReportSection,
     ReportTable,
+    case_order,
     columns,
     digits,
     ordered_modes,
@@ -71,7 +72,7 @@ def decision_section(measured: Measured) -> ReportSection:
 
 def _by_case(measured: Measured, checks: Sequence[EnforceCheck]) -> ReportTable:
     """How many checks pass, by case and mode."""
-    modes = ordered_modes({*(each.mode for each in checks), *measured.absent} - {UNENFORCED})
+    modes = ordered_modes({*(each.mode for each in checks), *MODES} - {UNENFORCED})
     passed = Counter((each.case, each.mode) for each in checks if passes(each))
     seen = Counter((each.case, each.mode) for each in checks)
 
@@ -150,7 +151,7 @@ def _flown(flown: Sequence[CaseFlight]) -> ReportTable:
     for each in flown:
         found[each.case, each.aloft, each.expected].append(each)
     rows: list[ReportRow] = []
-    for (case, aloft, expected), flights in found.items():
+    for (case, aloft, expected), flights in sorted(found.items(), key=lambda each: case_order(each[0][0])):
         good = sum(each.holds for each in flights)
         cell = ReportCell(f"{good:,} of {len(flights):,}", "held" if good == len(flights) else "missed")
         endings = Counter(each.ending for each in flights)

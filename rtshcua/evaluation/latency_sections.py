@@ -25,11 +25,11 @@ from rtshcua.evaluation.measures import (
 from rtshcua.evaluation.published import FIGURES, PUBLISHED_MODES, PublishedFigure
 from rtshcua.evaluation.report_parts import (
     NONE,
-    UNMEASURED,
     Measured,
     ReportChart,
     ReportSection,
     ReportTable,
+    case_order,
     columns,
     digits,
     ms,
@@ -55,7 +55,11 @@ class _Quantity(NamedTuple):
 
 
 _P95 = _Quantity(
-    "P95 end-to-end", end_to_end, p95, "x1/p95/{mission}/{mode}", ("end-to-end", "percentile", "missions", "none")
+    "P95 end-to-end",
+    end_to_end,
+    p95,
+    "x1/p95/{mission}/{mode}",
+    ("end-to-end", "clock", "percentile", "missions", "none"),
 )
 _MEDIAN = _Quantity(
     "Median end-to-end", end_to_end, median, "x2/median/{mission}/{mode}", ("end-to-end", "cell-average", "none")
@@ -161,7 +165,7 @@ def _outcomes(measured: Measured) -> ReportTable:
             "Outcomes besides allow",
         ),
         tuple(rows),
-        ("deadline", "reports", "repetitions", "modes"),
+        ("misses", "deadline", "reports", "repetitions", "modes"),
     )  # fmt: skip
 
 
@@ -229,7 +233,9 @@ def fallback_section(measured: Measured) -> ReportSection:
         if isinstance(each, FallbackTiming):
             found[each.mode, each.case].append(each)
     modes = ordered_modes(mode for mode, _ in found)
-    ordered = [(mode, case) for mode in modes for other, case in found if other == mode]
+    cases = sorted({case for _, case in found}, key=case_order)
+    ordered = [(mode, case) for mode in modes for case in cases if (mode, case) in found]
+    there = ("software", *ISOLATED)  # modes that enforce
     middle, high = FIGURES["x4/median"], FIGURES["x4/p95"]
     table = ReportTable(
         "Admission, selection of the fallback and its record, in ms, by condition; and the medians with the record "
@@ -240,9 +246,9 @@ def fallback_section(measured: Measured) -> ReportSection:
         (
             ("paper [P], each condition", middle.text, f"below {high.text}", NONE, NONE, NONE, NONE, "30"),
             *(_condition(mode, case, found[mode, case]) for mode, case in ordered),
+            *((f"`{mode}`", measured.missing(mode), *[NONE] * 5, "0") for mode in there if mode not in modes),
         ),
         ("conditions", "percentile"),
-        () if found else (f"X4 was {UNMEASURED}.",),
     )
     published = ChartBar("every condition", middle.high, f"{middle.text} ms", "published", middle.low, high.high)
     groups = [

@@ -261,6 +261,15 @@ CHOICES: Final = (
         "dispatch",
     ),
     OpenChoice(
+        "clock", "X1, X2, X5", "in which time the vehicle flies",
+        "the simulated vehicle in virtual time; everything between the frame that ends a step and the next command "
+        "frame in real time, after a sleep of 4 ms, without which latencies would be those of a warm cache",
+    ),
+    OpenChoice(
+        "misses", "X1", "how a missed deadline is found",
+        "by the measured times: no command frame until the deadline after the release",
+    ),
+    OpenChoice(
         "validation", "X1, X2, X5", "where validation latency starts and ends",
         "from the bytes of the request to the bytes of the answer of `enforce`",
     ),
@@ -303,8 +312,9 @@ CHOICES: Final = (
     ),
     OpenChoice(
         "footprint", "X7", "which files make up a component, and how its artifact is measured",
-        "the files that the table names, the size of their sources or ELF file, and the peak of `tracemalloc` while "
-        "the `standard` mission is flown; totals are the sums of our rows",
+        "the files that the table names, the size of their sources or program, and the peak of `tracemalloc` while "
+        "the `standard` mission is flown; of a secure world its data and stack by its ELF sections, of a process its "
+        "greatest resident memory. Totals are the sums of our rows",
     ),
     OpenChoice(
         "flat", "claims", "how far an overhead is flat over mission length",

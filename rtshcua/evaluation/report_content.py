@@ -160,16 +160,24 @@ def _comparison_section() -> ReportSection:
         (
             f"{each.work} {each.judge}",
             *(ReportCell(entry.aim, "open" if entry.aim is Aim.NO else "") for entry in each.entries),
-            " ".join([each.note, *(f"`{source}`" for source in each.sources)]).strip() or NONE,
         )
         for each in COMPARISON
     ]
     compared = ReportTable(
         "Whether a property is an aim of a design of the first rank, in part, or not at all. [P]: the paper's "
-        "judgement; [ours]: our judgement by the sources named, read in November 2026",
-        columns("Work", *(each.title for each in COLUMNS), "What decided, and sources"),
+        "judgement; [ours]: our judgement",
+        columns("Work", *(each.title for each in COLUMNS)),
         tuple(works),
         ("peers",),
+    )
+    decided = ReportTable(
+        "What decided our rows, by sources read in November 2026",
+        columns("Work", "What decided", "Sources"),
+        tuple(
+            (each.work, each.note, ", ".join(f"`{source}`" for source in each.sources) or NONE)
+            for each in COMPARISON
+            if each.note
+        ),
     )
     shown = ReportTable(
         "What shows the entries of this system: tests and pages of this project",
@@ -179,7 +187,7 @@ def _comparison_section() -> ReportSection:
             for each in COLUMNS
         ),
     )
-    return ReportSection("comparison", "Comparison with other work", (), (compared, shown))
+    return ReportSection("comparison", "Comparison with other work", (), (compared, decided, shown))
 
 
 def _definition_section() -> ReportSection:

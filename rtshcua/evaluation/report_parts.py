@@ -10,6 +10,7 @@ from rtshcua.evaluation.computer import Computer
 from rtshcua.evaluation.design import MODES
 from rtshcua.evaluation.headline_claims import Claims
 from rtshcua.evaluation.measures import Averaged, FlightTable
+from rtshcua.evaluation.published import CASES
 from rtshcua.evaluation.results import Result, UnavailableMode
 from rtshcua.ground.report.drawing.bar_chart import BarChart, StackedChart
 
@@ -118,6 +119,11 @@ def us(nanoseconds: float | None) -> str:
 def span(found: Averaged) -> str:
     """Return the ends of the whiskers in ms, and how many cells they are of where that is not all."""
     return f"{ms(found.low)} to {ms(found.high)}"
+
+
+def case_order(name: str) -> int:
+    """The place of a case of X3 in the table of cases; unknown ones last."""
+    return next((case.number for case in CASES if case.name == name), len(CASES) + 1)
 
 
 def ordered_modes(found: Iterable[str]) -> Sequence[str]:

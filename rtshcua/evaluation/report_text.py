@@ -1,7 +1,7 @@
 """Renders the report of the evaluation as Markdown. The charts are in the HTML page; their figures are in tables."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Final
 
 from rtshcua.diagnostics.excerpt import visible
@@ -9,7 +9,10 @@ from rtshcua.evaluation.published import CHOICES
 from rtshcua.evaluation.report_parts import EvaluationReport, ReportCell, ReportSection, ReportTable
 
 #: what Markdown reads as markup in texts of others
-_SPECIAL: Final = re.compile(r"([\\*_<>|#&~]|\](?=[(\[:]))")
+_SPECIAL: Final = re.compile(r"([\\*_<>|#&~]|\](?=[(\[]))")
+
+#: the kinds of cells that stand out
+_BOLD: Final = ("compared", "missed")
 
 
 def render(report: EvaluationReport) -> str:
@@ -42,10 +45,10 @@ def _table(table: ReportTable) -> Iterator[str]:
     """A table with its caption, notes and choices; nothing but those where it has no rows."""
     yield from (f"**{_text(table.caption)}**", "")
     if table.rows:
-        yield _row(column.name for column in table.columns)
+        yield _row(_text(column.name) for column in table.columns)
         yield "|" + "|".join("---:" if column.number else "---" for column in table.columns) + "|"
         for row in table.rows:
-            yield _row(each.text if isinstance(each, ReportCell) else each for each in row)
+            yield _row(map(_cell, row))
         yield ""
     for note in table.notes:
         yield from (_text(note), "")
@@ -53,8 +56,14 @@ def _table(table: ReportTable) -> Iterator[str]:
         yield from (f"[?] {', '.join(table.choices)}", "")
 
 
-def _row(cells: Iterator[str]) -> str:
-    return "| " + " | ".join(_text(each) or " " for each in cells) + " |"
+def _row(cells: Iterable[str]) -> str:
+    return "| " + " | ".join(each or " " for each in cells) + " |"
+
+
+def _cell(cell: str | ReportCell) -> str:
+    if isinstance(cell, ReportCell):
+        return f"**{_text(cell.text)}**" if cell.kind in _BOLD else _text(cell.text)
+    return _text(cell)
 
 
 def choice_lines() -> list[str]:

@@ -141,6 +141,8 @@ def test_a_flown_case_that_does_not_hold_fails() -> None:
     results[3] = replace(results[3], holds=False)
     assert claim(results, "x3/runtime").verdict is MISSED
     assert claim(list(case_flights(POINTS[:3])), "x3/runtime").verdict is NOT_MEASURED
+    grounded = [replace(each, aloft=False) for each in case_flights()]
+    assert claim(grounded, "x3/runtime").verdict is NOT_MEASURED
 
 
 def scaled(factor: float) -> list[Result]:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from itertools import groupby
 from typing import Final, NamedTuple
 
-from rtshcua.evaluation import flights
+from rtshcua.evaluation import case_checks, evidence_costs, fallback_costs, flights, footprint
 from rtshcua.evaluation.design import EvaluationPlan, WorkUnit
 from rtshcua.evaluation.results import Result
 
@@ -20,9 +20,17 @@ class Experiment(NamedTuple):
     together: Callable[[WorkUnit], object] = lambda unit: unit
 
 
-EXPERIMENTS: Final[Mapping[str, Experiment]] = {"X1": Experiment(flights.units, flights.run, flights.together)}
+EXPERIMENTS: Final[Mapping[str, Experiment]] = {
+    "X1": Experiment(flights.units, flights.run, flights.together),
+    "X3": Experiment(case_checks.units, case_checks.run),
+    "X4": Experiment(fallback_costs.units, fallback_costs.run),
+    "X6": Experiment(evidence_costs.units, evidence_costs.run),
+    "X7": Experiment(footprint.units, footprint.run),
+}
 #: which experiment's results answer a name
-SOURCES: Final[Mapping[str, str]] = {"X1": "X1", "X2": "X1", "X5": "X1"}
+SOURCES: Final[Mapping[str, str]] = {
+    "X1": "X1", "X2": "X1", "X3": "X3", "X4": "X4", "X5": "X1", "X6": "X6", "X7": "X7",
+}  # fmt: skip
 
 
 class WorkBatch(NamedTuple):

@@ -18,6 +18,7 @@ class InTrustedApplication(Together):
     """Both boundaries, the one in C in OP-TEE."""
 
     home: ClassVar[Any] = TrustedApplication
+    requests: ClassVar[int] = 300
 
     def _kept(self) -> keeping.Kept:
         """Secure storage can only be read by the application, so it is started once more."""

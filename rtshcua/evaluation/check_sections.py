@@ -38,8 +38,8 @@ from rtshcua.ground.report.drawing.bar_chart import StackedPart, StackedRow, sta
 _LISTED: Final = 20
 _OUTCOMES: Final = ("allow", "fallback", "defer", "deny")
 #: our rows whose components have another name in the paper; a home is one of several places of the boundary
-_HOME: Final = "trusted enforcement: "
-_OURS: Final = {"trusted enforcement TA": f"{_HOME}optee"}
+HOME: Final = "trusted enforcement: "
+OURS: Final = {"trusted enforcement TA": f"{HOME}optee"}
 #: the style of each ending of a flight; all others are drawn as `deny`
 _ENDINGS: Final = {"completed": "allow", "aborted": "fallback", "stood-down": "defer"}
 
@@ -254,7 +254,7 @@ def _sizes_table(ours: Sequence[ComponentSize]) -> ReportTable:
     found = {each.component: each for each in ours}
     rows: list[ReportRow] = []
     for stated in FOOTPRINT:
-        measured = found.pop(_OURS.get(stated.component, stated.component), None)
+        measured = found.pop(OURS.get(stated.component, stated.component), None)
         also = "" if measured is None or measured.component == stated.component else f" (ours: {measured.component})"
         rows.append(_size_row(stated.component + also, stated, measured))
     rows += [_size_row(each.component, None, each) for each in found.values()]
@@ -282,12 +282,12 @@ def _sizes_table(ours: Sequence[ComponentSize]) -> ReportTable:
 
 def _our_sums(ours: Sequence[ComponentSize]) -> Iterator[ReportRow]:
     """The sums of our rows for each home of the boundary, of which a vehicle has one."""
-    without = [each for each in ours if not each.component.startswith(_HOME)]
+    without = [each for each in ours if not each.component.startswith(HOME)]
     for home in ours:
-        if home.component.startswith(_HOME):
+        if home.component.startswith(HOME):
             sums = (_sum([*without, home], of) for of in (_lines, _artifact, _memory))
             told = (each for text in _sizes(*sums) for each in (NONE, text))
-            yield f"sum of our rows, `{home.component.removeprefix(_HOME)}` as the only home", "", *told, ""
+            yield f"sum of our rows, `{home.component.removeprefix(HOME)}` as the only home", "", *told, ""
 
 
 def _size_row(name: str, stated: PublishedComponent | None, ours: ComponentSize | None) -> ReportRow:

@@ -81,15 +81,16 @@ def checks(
                     )  # fmt: skip
 
 
-def case_flights(points: Sequence[EvaluationPoint] = POINTS) -> Iterator[CaseFlight]:
-    """The cases through the whole runtime, which all hold."""
-    for point in points:
-        for case in CASES:
-            yield CaseFlight(
-                case=case.name, mission=point.mission, deadline_us=point.deadline_us, flavour="px4", seed=1, aloft=True,
-                expected="the skill" if case.outcome == "allow" else "the first admissible link", dispatched=("hover",),
-                ending="completed" if case.outcome == "allow" else "aborted", holds=True,
-            )  # fmt: skip
+def case_flights(point: EvaluationPoint = POINTS[0]) -> Iterator[CaseFlight]:
+    """The cases through the whole runtime, in the air and on the ground, which all hold."""
+    for case in CASES:
+        for flavour in () if case.extra else ("px4", "ardupilot"):
+            for aloft in (True, False):
+                yield CaseFlight(
+                    case=case.name, mission=point.mission, deadline_us=point.deadline_us, flavour=flavour, seed=1,
+                    aloft=aloft, expected="the skill" if case.outcome == "allow" else "the first admissible link",
+                    dispatched=("hover",), ending="completed" if case.outcome == "allow" else "aborted", holds=True,
+                )  # fmt: skip
 
 
 def timings(runs: int = RUNS) -> Iterator[Result]:

@@ -20,7 +20,7 @@ def test_markdown_of_a_few_results_matches_the_golden() -> None:
     results = [
         *flights(modes, points, runs=2),
         *checks(modes, points, runs=1),
-        *case_flights(points[:1]),
+        *case_flights(),
         *timings(2),
         *sizes(),
         UnavailableMode(mode="optee", why="qemu-system-aarch64 is not installed"),

@@ -140,9 +140,9 @@ def test_a_flown_case_that_does_not_hold_fails() -> None:
     assert claim(results, "x3/runtime").verdict is HELD
     results[3] = replace(results[3], holds=False)
     assert claim(results, "x3/runtime").verdict is MISSED
-    assert claim(list(case_flights(POINTS[:3])), "x3/runtime").verdict is NOT_MEASURED
-    grounded = [replace(each, aloft=False) for each in case_flights()]
-    assert claim(grounded, "x3/runtime").verdict is NOT_MEASURED
+    for missing in ({"aloft": False}, {"flavour": "px4"}, {"case": "normal allow"}):
+        some = [replace(each, **missing) for each in case_flights()]
+        assert claim(some, "x3/runtime").verdict is NOT_MEASURED, missing
 
 
 def scaled(factor: float) -> list[Result]:

@@ -4,7 +4,10 @@ from statistics import fmean
 
 import pytest
 
+from rtshcua.evaluation import cases
+from rtshcua.evaluation.check_sections import HOME, OURS
 from rtshcua.evaluation.design import DEADLINES_US, MISSIONS, POINTS, RUNS
+from rtshcua.evaluation.footprint import COMPANION, HOMES
 from rtshcua.evaluation.published import CASES, CHOICES, FIGURES, FOOTPRINT, FOOTPRINT_TOTAL, PUBLISHED_MODES, Origin
 
 
@@ -46,6 +49,20 @@ def test_derived_sums_follow_from_the_published_footprint() -> None:
     assert value("x7/artifact-shared") == pytest.approx(artifacts - 8.29)
     assert value("x7/artifact-unexplained") == pytest.approx(artifacts - 8.29 - FOOTPRINT_TOTAL.artifact_kb)
     assert value("x6/throughput-derived") == pytest.approx(1e6 / value("x6/verification"), abs=10)
+
+
+def test_cases_are_those_that_are_measured() -> None:
+    measured = [(each, False) for each in cases.CASES] + [(each, True) for each in cases.EXTRAS]
+    assert [(each.number, each.name, each.outcome, each.reason, each.extra) for each in CASES] == [
+        (each.number, each.name, each.outcome.name.lower(), each.reason, extra) for each, extra in measured
+    ]
+
+
+def test_components_that_are_measured_have_the_published_names() -> None:
+    measured = {each.name for each in COMPANION} | {each.name for each in HOMES}
+    assert {OURS.get(each.component, each.component) for each in FOOTPRINT} <= measured
+    assert all(each.name.startswith(HOME) for each in HOMES)
+    assert not any(each.name.startswith(HOME) for each in COMPANION)
 
 
 def test_choices_have_unique_anchors() -> None:

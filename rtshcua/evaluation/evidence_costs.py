@@ -3,7 +3,7 @@ ways, each for the published 1,000 records and for a long log.
 
 An append is all of the runtime's work on a record and its place in the file: the record, its encoding, the chain, the
 tree and the write. The paper does not say whether its append includes a sync, nor what its verification checks: the
-comparable pair is `written` and `default`.
+comparable pair is `written` and `default`. A seal, after 1,024 records, counts as one of them.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -108,8 +108,9 @@ def _root() -> bytes:
 
 
 class _Log:
-    """Logs in which a step is decided again and again, in the full form of a decision: its inputs, its result and its
-    reason. It is deferred, so that it may be asked again.
+    """Logs of which half are decisions, with their inputs, result and reason, and half events, so that a record is
+    about as long on average as in logs of flights. The same step is decided again and again: it is deferred, so that
+    it may be asked again.
     """
 
     def __init__(self, program: FlatProgram) -> None:
@@ -148,16 +149,18 @@ class _Log:
             gone_us = number * _APART_US
             now = Now(RECEIVED.monotonic_us + gone_us, RECEIVED.utc_us + gone_us, RECEIVED.utc_error_us)
             start_ns = perf_counter_ns()
-            file.append(self._line(recorder, now, last=number == records - 1), durability)
+            file.append(self._line(recorder, now, number, last=number == records - 1), durability)
             took_ns.append(perf_counter_ns() - start_ns)
         file.close()
         return tuple(took_ns)
 
-    def _line(self, recorder: Recorder, now: Now, *, last: bool) -> bytes:
+    def _line(self, recorder: Recorder, now: Now, number: int, *, last: bool) -> bytes:
         if last:
             return recorder.close(now, ending="completed", tlog=None)
         if recorder.due(now):
             return recorder.seal(now)
+        if number % 2:
+            return recorder.effect(now, "said", Ref(STEP, 0, -1), token=1, detail="6: PreArm: waiting for a 3D fix")
         answer = replace(self._answer, valid_until_us=now.monotonic_us)
         invocation = self._step.invocation
         return recorder.decision(

@@ -36,7 +36,8 @@ PACKAGE: Final = Path(__file__).resolve().parents[1]
 CHECKOUT: Final = PACKAGE.parent
 #: programs of a checkout, or of a wheel
 BUILT: Final = CHECKOUT / "build" / "boundary"
-_POINT: Final = EvaluationPoint("standard", 1_000_000)
+#: the deadline of the steps of the mission that is flown, in us
+_DEADLINE_US: Final = 1_000_000
 _TICK_US: Final = 50_000
 #: us of the flight between two samples of memory
 SAMPLE_US: Final = 10_000_000
@@ -95,13 +96,13 @@ HOMES: Final = (
 
 
 def units(plan: EvaluationPlan) -> list[WorkUnit]:
-    """One unit with all components."""
-    return [WorkUnit(NAME, ("components",))]
+    """One unit with all components, and the mission that is flown: as published, or a shorter one."""
+    return [WorkUnit(NAME, ("components", "short" if plan.quick else "standard"))]
 
 
 def run(unit: WorkUnit) -> Sequence[Result]:
     """The size of every component."""
-    program = program_at(_POINT)
+    program = program_at(EvaluationPoint(str(unit.key[1]), _DEADLINE_US))
     peaks = _peaks(program)
     companion = [_companion(each, peaks[each.name]) for each in COMPANION]
     return [*companion, *(_home(each, _resident(program) if each.resident else None) for each in HOMES)]

@@ -37,7 +37,7 @@ def test_each_record_of_a_log_is_an_append(durability: str, monkeypatch: pytest.
     (found,) = evidence_costs.run(WorkUnit("X6", ("append", durability, 20, 1)))
     assert isinstance(found, AppendTiming)
     assert (found.durability, found.repetition, len(found.appended_ns)) == (durability, 1, 20)
-    assert found.octets > 20 * 500
+    assert found.octets > 20 * 400
 
 
 def test_log_is_verified_each_way() -> None:

@@ -70,7 +70,7 @@ def test_sizes_of_a_program_are_those_of_readelf() -> None:
 @pytest.mark.slow
 def test_each_component_has_lines_octets_and_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(footprint, "SAMPLE_US", 60_000_000)
-    found = footprint.run(WorkUnit("X7", ("components",)))
+    found = footprint.run(WorkUnit("X7", ("components", "short")))
     sizes = [each for each in found if isinstance(each, ComponentSize)]
     assert [each.component for each in sizes] == [each.name for each in (*COMPANION, *HOMES)]
     companion = sizes[: len(COMPANION)]

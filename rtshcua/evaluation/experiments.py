@@ -21,7 +21,7 @@ class Experiment(NamedTuple):
 
 
 EXPERIMENTS: Final[Mapping[str, Experiment]] = {
-    "X1": Experiment(flights.units, flights.run, flights.together),
+    "X1": Experiment(flights.units, flights.run),
     "X3": Experiment(case_checks.units, case_checks.run),
     "X4": Experiment(fallback_costs.units, fallback_costs.run),
     "X6": Experiment(evidence_costs.units, evidence_costs.run),

@@ -2,8 +2,7 @@
 
 The vehicle is simulated in virtual time; what is between a frame of the vehicle and the frame of a command runs in real
 time, as in `run`: decoding, state, decision, permit, evidence written by its thread to a file, encoding, and a real UDP
-socket. The frames that end a step are known from a flight of the same mission, deadline and seed before; the process
-sleeps before each of them, as it does in real time, so that a step does not find everything in the processor's cache.
+socket. The simulation runs in the same process, so that a step finds the processor's caches as cold as after a wait.
 While the vehicle flies the runtime's clock stands still during a computation, so its own estimate of the latency is
 the conservative one at first and 0 later; misses are judged here, by the measured times.
 """
@@ -14,7 +13,7 @@ import socket
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from functools import lru_cache, partial
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter_ns
@@ -56,8 +55,6 @@ EMULATED: Final = ("trustzone-m", "optee")
 _QUICK_POINTS: Final = (
     EvaluationPoint("short", 1_500_000), EvaluationPoint("short", 100_000), EvaluationPoint("standard", 500_000),
 )  # fmt: skip
-#: the sleep before a frame that ends a step
-SLEEP_S: Final = 0.004
 #: the loop's longest wait, and how often it reads the vehicle's frames, in us of the flight
 _WAIT_US: Final = 100_000
 _TICK_US: Final = 50_000
@@ -121,15 +118,13 @@ class _Begun(NamedTuple):
 
 
 class _TimedVehicle(VirtualVehicle):
-    """Time-stamps the frames that release steps, sleeping before the expected ones; sends commands to a socket."""
+    """Time-stamps the frames that release steps, and sends commands to a socket."""
 
-    def begin_timing(self, expected: frozenset[int], link: socket.socket, address: tuple[str, int]) -> None:
-        """Set which datagrams release steps, and where frames go."""
-        self._expected, self._link, self._address = expected, link, address
-        self._number = 0
+    def begin_timing(self, link: socket.socket) -> None:
+        """Set where frames go: a socket that sends to itself."""
+        self._link, self._address = link, link.getsockname()
         self._released = (0, 0)  # on the flight's clock in us, and on the computer's in ns
         self._turned = (0, 0)  # the same for the last advance of the flight's clock
-        self.releases: list[int] = []
         self.begun: list[_Begun] = []
 
     def poll(self, now_us: int, timeout_us: int) -> Sequence[Event]:
@@ -162,32 +157,23 @@ class _TimedVehicle(VirtualVehicle):
     def _take(self, datagrams: Iterable[bytes], events: list[Event]) -> None:
         take = super()._take
         for datagram in datagrams:
-            self._number += 1
             before = len(events)
-            if self._number in self._expected:
-                time.sleep(SLEEP_S)
             came_ns = perf_counter_ns()
             take([datagram], events)
             if any(type(event) is Succeeded for event in events[before:]):
                 self._released = self.clock.elapsed_us, came_ns
-                self.releases.append(self._number)
 
 
 class _Flown(NamedTuple):
-    """What one flight gave: how it ended, how long loading took, the requests and commands, and the numbers of the
-    releasing datagrams.
-    """
+    """What one flight gave: how it ended, how long loading took, the requests and the commands."""
 
     ending: str
     loaded_ns: int
     asked: Sequence[_Asked]
     begun: Sequence[_Begun]
-    releases: frozenset[int]
 
 
-def fly(
-    point: CompiledPoint, mode: str, seed: int, expected: frozenset[int], link: socket.socket, folder: Path
-) -> _Flown:
+def fly(point: CompiledPoint, mode: str, seed: int, link: socket.socket, folder: Path) -> _Flown:
     """Fly a mission once. Raises RuntimeError for a refused bundle, BoundaryError and OSError."""
     policy, mission = point.policy, point.mission
     clock = VirtualClock(Now(START.monotonic_us, mission.issued_at_us + LATER_US, START.utc_error_us))
@@ -204,7 +190,7 @@ def fly(
         vehicle = _TimedVehicle(
             policy, config, clock, loaded.executor.frames, tick_us=_TICK_US, steps=mission.invocations
         )
-        vehicle.begin_timing(expected, link, link.getsockname())
+        vehicle.begin_timing(link)
         recorder, sink = _evidence(mode, folder)
         stack.callback(sink.close)
         _open_log(recorder, sink, loaded, point, now)
@@ -217,7 +203,7 @@ def fly(
             ending = loop.turn()
         closing = recorder.closing(clock.now(), ending=ending or "none", tlog=None)
         append_all(sink, closing, SYNCED_FIRST)
-    return _Flown(ending or "none", loaded_ns, boundary.asked, vehicle.begun, frozenset(vehicle.releases))
+    return _Flown(ending or "none", loaded_ns, boundary.asked, vehicle.begun)
 
 
 def _evidence(mode: str, folder: Path) -> tuple[Recorder, EvidenceSink]:
@@ -240,7 +226,7 @@ def _open_log(recorder: Recorder, sink: EvidenceSink, loaded: Loaded, point: Com
 
 
 def units(plan: EvaluationPlan) -> Sequence[WorkUnit]:
-    """Each flight: mission, deadline, seed and mode; `together` says which share a reference flight.
+    """Each flight: mission, deadline, seed and mode. Those that differ in the mode only follow each other.
 
     Flights in an emulated home are slow and come last. A mode that is not available here has one unit.
     """
@@ -258,11 +244,6 @@ def units(plan: EvaluationPlan) -> Sequence[WorkUnit]:
     return [*(WorkUnit("X1", (ABSENT, mode)) for mode in absent), *found]
 
 
-def together(unit: WorkUnit) -> object:
-    """What units have in common that one process is to fly after each other."""
-    return unit.key if unit.key[-1] in EMULATED else unit.key[:-1]
-
-
 def run(unit: WorkUnit) -> Sequence[Result]:
     """Fly one flight. Raises RuntimeError for a refused bundle, BoundaryError and OSError."""
     if unit.key[0] == ABSENT:
@@ -270,11 +251,10 @@ def run(unit: WorkUnit) -> Sequence[Result]:
         why = "" if absent is None else f"{absent.text}; {absent.help}"
         return (UnavailableMode(mode=str(unit.key[1]), why=why),)
     mission, deadline_us, seed, mode = str(unit.key[0]), int(unit.key[1]), int(unit.key[2]), str(unit.key[3])
-    expected = _releases(mission, deadline_us, seed)
     began_ns = perf_counter_ns()
     point = compiled(mission, deadline_us, _issued_us(seed, mode))
     compiled_ns = perf_counter_ns() - began_ns
-    flown = _flown(point, mode, seed, expected)
+    flown = _flown(point, mode, seed)
     first_ns = next((each.took_ns for each in flown.begun), 0)
     steps = tuple(_steps(point, flown))
     late = sum(each.end_to_end_ns is None or each.end_to_end_ns > 1_000 * deadline_us for each in steps)
@@ -293,20 +273,14 @@ def _issued_us(seed: int, mode: str) -> int:
     return ISSUED_US + seed * SECOND + MODES.index(mode)
 
 
-@lru_cache(maxsize=8)
-def _releases(mission: str, deadline_us: int, seed: int) -> frozenset[int]:
-    """The numbers of the datagrams that end a step, found by a flight that is not measured."""
-    return _flown(compiled(mission, deadline_us, _issued_us(seed, UNENFORCED)), UNENFORCED, seed, frozenset()).releases
-
-
-def _flown(point: CompiledPoint, mode: str, seed: int, expected: frozenset[int]) -> _Flown:
+def _flown(point: CompiledPoint, mode: str, seed: int) -> _Flown:
     """Fly in a folder of its own, with a socket that nothing reads as the vehicle."""
     with (
         TemporaryDirectory(prefix="rtshcua-flight-") as folder,
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as link,
     ):
         link.bind(("127.0.0.1", 0))
-        return fly(point, mode, seed, expected, link, Path(folder))
+        return fly(point, mode, seed, link, Path(folder))
 
 
 def _steps(point: CompiledPoint, flown: _Flown) -> Iterator[StepTiming]:

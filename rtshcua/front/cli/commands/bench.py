@@ -97,7 +97,9 @@ def _told(ended: EvaluationOutcome, written: WrittenReport) -> Sequence[str]:
     """The claims, the targets that were missed, and where the report is."""
     claims = written.report.claims
     measured = [each for each in claims.claims if each.measured]
-    lines = [f"{each.verdict:<18} {each.text}: {each.measured}" for each in measured]
+    lines = [
+        f"{each.verdict:<18} {each.text}: {each.measured} ({each.runs:,} of {each.planned:,} runs)" for each in measured
+    ]
     lines += [f"{len(claims.claims) - len(measured)} of {len(claims.claims)} claims have no measurement yet"]
     lines += [f"{'target missed':<18} {each.text}" for each in claims.targets if each.verdict is ClaimVerdict.MISSED]
     if ended.failed:

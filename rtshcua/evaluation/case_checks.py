@@ -25,6 +25,7 @@ from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Context, Now
 from rtshcua.model.outcome import Outcome
+from rtshcua.model.step_number import number_of
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.wire.request import Request, encode
 from rtshcua.wire.response import Status, decode
@@ -168,7 +169,7 @@ class StruckBundle:
         contract = self.mission.invocations[request.step].contract
         said = decode(self._loaded.boundary.enforce(encode(request)), self._program.policy, contract)
         if not isinstance(said, Decision) or said.outcome is not Outcome.ALLOW:
-            raise RuntimeError(f"an honest request is not allowed at step {request.step}: {_words(said)}")
+            raise RuntimeError(f"an honest request is not allowed at step {number_of(request.step)}: {_words(said)}")
 
 
 class Prepared(NamedTuple):

@@ -204,11 +204,11 @@ def elf_sizes(program: bytes) -> ElfSizes:
 
 
 #: what the header of OP-TEE's application asks for: its loader gives that, and no section has it
-_ASKED: Final = re.compile(r"TA_(?:STACK|DATA)_SIZE \((\d+) \* 1024\)")
+_ASKED: Final = re.compile(r"TA_STACK_SIZE \((\d+) \* 1024\)")
 
 
 def stack_of(home: SecureHome, sizes: ElfSizes) -> int:
-    """The stack of a home, with the heap that its loader gives, in octets."""
+    """The stack of a home, which for OP-TEE is in no section of its file, in octets."""
     header = CHECKOUT / "boundary" / "home" / "optee" / "user_ta_header_defines.h"
     if sizes.stack or not home.name.endswith("optee") or not header.is_file():
         return sizes.stack

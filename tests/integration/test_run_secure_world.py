@@ -4,6 +4,7 @@ import os
 import re
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -86,7 +87,9 @@ def test_a_machine_without_the_emulator_says_what_installs_it(ground: Any) -> No
 
 def code_image(home: str) -> str:
     """The digest that `make size` prints for what was built."""
-    table = subprocess.run([CHECKOUT / ".make/footprint"], capture_output=True, text=True, check=True).stdout
+    table = subprocess.run(
+        [sys.executable, CHECKOUT / ".make/footprint"], capture_output=True, text=True, check=True
+    ).stdout
     found = re.search(rf"^{home} .*\n.*: ([0-9a-f]{{64}})$", table, re.MULTILINE)
     assert found is not None, table
     return found[1]

@@ -14,6 +14,8 @@ from rtshcua.adapters.boundary.optee import EMULATOR
 
 #: with a link key each frame is a call of some ms, so a busy machine flies no faster than time
 SPEED = 1
+#: without a key; a vehicle that flies faster needs no time of day
+FASTER = 3
 MODE = ("--mode", "optee")
 
 
@@ -34,7 +36,7 @@ def test_a_flight_by_the_trusted_application(ground: Any) -> None:
     data = Path(ground.environment["RTSHCUA_DATA_DIR"])
     for marker in data.rglob("replay/vehicle-quad-07/*"):
         marker.unlink()
-    again = ground.run(bundle, *MODE, speed=SPEED).end()
+    again = ground.run(bundle, *MODE, speed=FASTER).end()
     assert again.code == 5, again.stderr
     assert "undecided" in [event["event"] for event in again.events], "by the boundary"
 
@@ -65,16 +67,16 @@ def test_a_trusted_application_that_dies_or_hangs_in_flight(flavour: str, how: s
 @needs_optee
 @pytest.mark.soak
 def test_the_emulator_ends_with_a_run_that_is_killed(ground: Any, port: int) -> None:
-    ground.vehicle(port, SPEED)
+    ground.vehicle(port, FASTER)
     words = ("--connect", f"udpin:127.0.0.1:{port}", "--vehicle", "quad-07", *MODE)
     bundle = ground.bundle()
-    first = ground.run(bundle, *words, speed=SPEED)
+    first = ground.run(bundle, *words, speed=FASTER)
     first.until("dispatched", step=1)
     emulator = first.child(EMULATOR)
     first.signal(signal.SIGKILL)
     first.process.wait()
     assert is_gone(emulator)
-    second = ground.run(bundle, *words, speed=SPEED).end()
+    second = ground.run(bundle, *words, speed=FASTER).end()
     assert second.code == 6, second.stderr
 
 

@@ -67,8 +67,11 @@ class EvaluationWork(NamedTuple):
 
     def fly(self, flight: WorkBatch) -> BatchResults:
         """Run the units of a batch."""
-        tempfile.tempdir = self.scratch
-        return BatchResults(flight.number, tuple(_measured(unit) for unit in flight.units))
+        before, tempfile.tempdir = tempfile.tempdir, self.scratch
+        try:
+            return BatchResults(flight.number, tuple(_measured(unit) for unit in flight.units))
+        finally:
+            tempfile.tempdir = before
 
     def lost(self, flight: WorkBatch) -> BatchResults:
         """Say that the process died."""

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 from errno import ENOSPC
 from pathlib import Path
+from tempfile import gettempdir
 
 import pytest
 
@@ -177,6 +178,20 @@ def test_failed_unit_is_reported_and_left_for_the_next_run(tmp_path: Path, tiny:
     (failed,) = outcome.failed
     assert (failed.unit.key, failed.failed) == (("none", 1), "RuntimeError: the home does not start")
     assert [unit.key for unit in asked(tmp_path).left] == [("none", 1)]
+
+
+def test_folder_of_temporary_files_is_restored(tmp_path: Path, tiny: dict[str, Experiment]) -> None:
+    """A measurement has one of its own, which is gone afterwards."""
+    before, seen = gettempdir(), list[str]()
+
+    def noting(unit: WorkUnit) -> Sequence[Result]:
+        seen.append(gettempdir())
+        return timing(unit)
+
+    tiny["X1"] = Experiment(units, noting)
+    ended(asked(tmp_path))
+    assert {Path(each).parent for each in seen} == {tmp_path}
+    assert gettempdir() == before
 
 
 def test_units_that_belong_together_make_one_batch(tiny: dict[str, Experiment]) -> None:

@@ -1,5 +1,5 @@
 /* What libFuzzer calls: the trusted application of OP-TEE, with what stands in secure storage, and commands of the normal world with any
-   parameters. Seals and signatures count as good. Every fourth access to storage fails where the input says so.
+   parameters. Seals and signatures count as good. Of each eight accesses to storage those fail whose bits the input sets.
 
    An input is records: how storage fails (1) and what it holds; then commands: which (1), types and room of the parameters (1), octets. */
 #include "world.h"

@@ -28,6 +28,7 @@ from rtshcua.evaluation import sources
 from rtshcua.evaluation.design import MODES, POINTS, UNENFORCED, EvaluationPlan, EvaluationPoint, WorkUnit
 from rtshcua.evaluation.modes import NoEvidence, NoRecorder, load_in, started, unavailable
 from rtshcua.evaluation.results import PointFlight, Result, StepTiming, UnavailableMode
+from rtshcua.evaluation.worlds import ISSUED_US
 from rtshcua.evidence.log_writer import Recorder
 from rtshcua.model.decision import Decision
 from rtshcua.model.durability import SYNCED_FIRST
@@ -46,8 +47,6 @@ from rtshcua.wire.request import STEP
 from rtshcua.wire.request import decode as decode_request
 from rtshcua.wire.response import decode as decode_response
 
-#: UTC at which the mission of seed 0 is issued, in us; that of each further seed one second later, so that ids differ
-ISSUED_US: Final = 1_767_225_600_000_000
 #: the key of the unit that says why a mode is not available; its second part is the mode
 ABSENT: Final = "unavailable"
 #: the modes in an emulator, whose flights take minutes
@@ -270,6 +269,7 @@ def run(unit: WorkUnit) -> Sequence[Result]:
 
 
 def _issued_us(seed: int, mode: str) -> int:
+    """When the mission of a flight is issued: that of each seed one second later, so that ids differ."""
     return ISSUED_US + seed * SECOND + MODES.index(mode)
 
 

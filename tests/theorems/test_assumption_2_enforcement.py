@@ -13,7 +13,8 @@ Enforced by: `rtshcua/onboard/enforcement/boundary.py`, `rtshcua/decision/decide
 `boundary/enforcement/boundary.c`.
 
 Not covered: the state in a request is the runtime's word (the stated limit). In mode `none` the assumption is false by
-design: a step's permit is issued whatever was decided; the mode flies simulated vehicles only.
+design: a step's permit is issued whatever was decided; the mode flies simulated vehicles only. Expired missions and
+missing approvals are rare under random policies: theorem 1 attacks them under one of its own.
 
 Decisions are compared with `reference.oracle`, which is independent of `decide`; policies and missions are random.
 """
@@ -66,6 +67,7 @@ class Requests:
     def __init__(self, of: Random, mode: EnforcementMode = EnforcementMode.SOFTWARE) -> None:
         self.of, self.loaded, self.now = of, opened(of, mode), START
         self.issued: set[bytes] = set()
+        self.used: set[int] = set()
         self.step = 0
         self.allowed = {STEP: 0, FALLBACK_LINK: 0, CONTINGENCY_LINK: 0}
         self.broken: list[str] = []
@@ -102,7 +104,7 @@ class Requests:
         if of.random() < 0.5:
             state = replace(flat.state(), monitors=(1,) * monitors)
         asked = Request(
-            kind, step, link, of.choice((binding,) * 30 + (bytes(32), steps[0].binding)), self.now,
+            kind, step, link, of.choice((binding,) * 8 + (bytes(32), steps[0].binding)), self.now,
             replace(state, ages=tuple(max(age, 0) for age in state.ages)),
             max(self.now.monotonic_us - of.choice((0,) * 20 + (flat.S, 3 * flat.S)), 0),
             of.choice((1,) * 20 + (0, 2)), of.choice((5_000,) * 20 + (3 * flat.S,)),
@@ -124,6 +126,8 @@ class Requests:
         self.allowed[kind] += 1
         self.hold(self.admissible(asked, before), "a permit for what is inadmissible")
         if kind == STEP:
+            self.hold(step not in self.used, "an id was allowed twice")
+            self.used.add(step)
             self.step = min(step + 1, STEPS - 1)
             self.loaded.executor.ended()
             if self.of.random() < 0.8:
@@ -234,6 +238,22 @@ def test_search_detects_mode_none() -> None:
 def test_search_detects_decision_without_state(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(decide, "state", lambda *_: decide.PASSED)
     assert breaks("a permit for what is inadmissible")
+
+
+@pytest.mark.altered
+@pytest.mark.slow
+@pytest.mark.claim("A2", broken="a decision without its step integrity, authority, phase, timing or safety")
+@pytest.mark.parametrize("step", ["integrity", "authority", "phase", "timing", "safety"])
+def test_search_detects_decision_without_a_step(step: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(decide, step, lambda *_: decide.PASSED)
+    assert breaks("a permit for what is inadmissible")
+
+
+@pytest.mark.altered
+@pytest.mark.claim("A2", broken="a session that forgets which ids were used")
+def test_search_detects_session_without_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(session.Session, "consumed", lambda *_: 0)
+    assert breaks("an id was allowed twice")
 
 
 @pytest.mark.altered

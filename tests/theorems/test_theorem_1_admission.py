@@ -117,19 +117,33 @@ class TakenOver:
     # ------------------------------------------------------------------------------------------------ actions
 
     def fly(self) -> None:
-        """The actions of an honest runtime, to reach the rest of the mission."""
+        """The actions of an honest runtime, to reach the rest of the mission; one in four requests has a single fault,
+        so that nothing but the check of that can refuse it.
+        """
         steps = self.loaded.bundle.mission.invocations
         if self.step >= len(steps):
             return
         meant, at = steps[self.step], self.now.monotonic_us
         state = self.told(meant, strange=0.25)
         asked = Request(STEP, meant.step, -1, meant.binding, self.now, state, at, meant.phase, 5_000)
-        self.enforce(asked, meant)
+        self.enforce(self.spoiled(asked) if self.of.random() < 0.25 else asked, meant)
         if self.permits and self.permits[-1] in self.admitted and self.admitted[self.permits[-1]][0] is meant:
             self.loaded.executor.ended()
             self.send(self.permits[-1])
             self.loaded.executor.ended()
             self.step += 1
+
+    def spoiled(self, asked: Request) -> Request:
+        """A request with a single fault."""
+        match self.of.randrange(4):
+            case 0:
+                return replace(asked, binding=asked.binding[:-1] + bytes([asked.binding[-1] ^ 1]))
+            case 1:
+                return replace(asked, phase=(asked.phase + self.of.choice([1, 2])) % 3)
+            case 2:
+                return replace(asked, released_us=max(asked.released_us - 9 * S, 0))
+            case _:
+                return replace(asked, remaining_us=20 * S)
 
     def ask(self) -> None:
         of, steps = self.of, self.loaded.bundle.mission.invocations
@@ -259,6 +273,7 @@ class TakenOver:
 
 
 @pytest.mark.claim("T1")
+@settings(max_examples=settings().max_examples * 5)
 @given(worlds.CHANCES)
 def test_no_history_dispatches_unadmitted_step(of: Random) -> None:
     assert TakenOver(of).go(40) == []

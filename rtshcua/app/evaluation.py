@@ -2,7 +2,7 @@
 
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, closing
 from pathlib import Path
 from typing import Final, NamedTuple, Protocol
@@ -14,7 +14,7 @@ from rtshcua.adapters.store.reading import read_if_there
 from rtshcua.adapters.store.writing import replace
 from rtshcua.app.exit_codes import words_of
 from rtshcua.app.wording import utc
-from rtshcua.campaign.campaign_report import CampaignSummary
+from rtshcua.campaign.campaign_report import MARGINS, CampaignSummary
 from rtshcua.campaign.workers import FlightWorkers, Look, WorkerProcesses, cores
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -22,14 +22,25 @@ from rtshcua.evaluation import report_page, report_text, sources
 from rtshcua.evaluation.computer import this_computer
 from rtshcua.evaluation.design import MODES, RUNS, EvaluationPlan, WorkUnit
 from rtshcua.evaluation.experiments import EXPERIMENTS, SOURCES, EvaluationWork, UnitResults, batches
-from rtshcua.evaluation.raw_data import FORMAT, RawExperiment, RawFolder, RawHeader, design_digest
+from rtshcua.evaluation.modes import unavailable
+from rtshcua.evaluation.raw_data import (
+    FORMAT,
+    MALFORMED,
+    KeptResult,
+    RawExperiment,
+    RawFolder,
+    RawHeader,
+    design_digest,
+)
 from rtshcua.evaluation.report_content import evaluation_report
 from rtshcua.evaluation.report_parts import EvaluationReport
-from rtshcua.evaluation.results import Result
+from rtshcua.evaluation.results import FailedAttempt, Result, UnavailableMode
 
 #: where raw data and report go by default
 OUTPUT: Final = Path("runs") / "evaluation"
 _LARGEST: Final = 1 << 24
+#: characters of why an attempt failed that are kept
+_LONGEST_WHY: Final = 500
 
 
 class EvaluationRequest(NamedTuple):
@@ -110,7 +121,7 @@ def prepare(request: EvaluationRequest) -> Evaluation | Refusal:
         found = folder.differs(header) or folder.read(header.experiment)
         if isinstance(found, Refusal):
             return found
-        done |= set() if found is None else found.units.keys()
+        done |= set() if found is None else {unit for unit, kept in found.units.items() if not _available_now(kept)}
     left = [unit for unit in units if unit not in done]
     return Evaluation(folder, headers, plan, request.jobs or cores(), units, left, campaigns)
 
@@ -150,11 +161,11 @@ def _run(
             progress.begun(made)
             for batch in workers.fly(EvaluationWork(scratch), batches(made.left)):
                 for found in batch.units:
+                    results, load = found.results, round(found.load, 2)
                     if found.failed:
                         failed.append(found)
-                    else:
-                        load = round(found.load, 2)
-                        made.folder.keep(found.unit, found.results, at=found.at, load=load, jobs=made.jobs)
+                        results = (FailedAttempt(why=found.failed[:_LONGEST_WHY]),)
+                    made.folder.keep(found.unit, results, at=found.at, load=load, jobs=made.jobs)
                     progress.measured(found, clock.after(found))
     finally:
         progress.clear()
@@ -183,6 +194,12 @@ def report(made: Evaluation) -> WrittenReport | Refusal:
     return written
 
 
+def _available_now(kept: Sequence[KeptResult]) -> bool:
+    """Whether all that a unit gave is that its mode was not available, and it is now."""
+    missing = [each.result.mode for each in kept if isinstance(each.result, UnavailableMode)]
+    return len(missing) == len(kept) > 0 and all(unavailable(mode) is None for mode in missing)
+
+
 def _campaigns(paths: Sequence[Path]) -> Sequence[CampaignSummary] | Refusal:
     """The summaries of the campaigns in folders. Raises OSError."""
     found = list[CampaignSummary]()
@@ -201,15 +218,24 @@ def _campaign(path: Path) -> CampaignSummary | Refusal:
     if octets is None:
         return Refusal("input", f"`{path}` has no `report.json` of a campaign", help, ExitCode.INPUT)
     try:
-        return msgspec.json.decode(octets, type=CampaignSummary)
-    except msgspec.MsgspecError:
+        summary = msgspec.json.decode(octets, type=CampaignSummary)
+    except MALFORMED:
+        summary = None
+    if summary is None or not {each.name for each in summary.margins} <= MARGINS.keys():
         return Refusal("input", f"`{path / 'report.json'}` is not the report of a campaign", help, ExitCode.INPUT)
+    return summary
 
 
 def _settings(found: Sequence[RawExperiment]) -> Sequence[tuple[str, str]]:
-    """How the results of each experiment were measured: by how many processes, at which load."""
-    told = []
+    """How the results of each experiment were measured: by how many processes, at which load, and what is not in them.
+    Another computer than that of the first experiment is named.
+    """
+    told, first = [], found[0].header.computer if found else None
     for each in found:
+        name, computer = each.header.experiment, each.header.computer
+        if first is not None and computer.described != first.described:
+            told.append((f"{name}, computer", computer.described))
+        told += [(f"{name}, not counted", text) for text in _left_out(each)]
         kept = [part for parts in each.units.values() for part in parts]
         if not kept:
             continue
@@ -217,13 +243,27 @@ def _settings(found: Sequence[RawExperiment]) -> Sequence[tuple[str, str]]:
         began, ended = (utc(1_000_000 * second) for second in (each.header.began, max(part.at for part in kept)))
         told.append(
             (
-                f"{each.header.experiment}, measured",
+                f"{name}, measured",
                 f"{began} to {ended}, by {' or '.join(map(str, jobs))} processes at a time; load average "
                 f"{loads[0]:.1f} to {loads[-1]:.1f}, median {loads[len(loads) // 2]:.1f}"
                 f"{'; a sample (`--quick`)' if each.header.quick else ''}",
             )
         )
     return told
+
+
+def _left_out(found: RawExperiment) -> Iterator[str]:
+    """What a file holds besides results."""
+    if found.skipped:
+        yield f"{found.skipped:,} lines that are cut off, malformed or of units that are not complete"
+    if found.failed:
+        unit, first = found.failed[0]
+        units = len({unit for unit, _ in found.failed})
+        open_ = len({unit for unit, _ in found.failed} - found.units.keys())
+        yield (
+            f"{len(found.failed):,} attempts at {units:,} units of work failed, {open_:,} of which have no results "
+            f"yet; the first: {' '.join(map(str, unit.key))}: {first.why}"
+        )
 
 
 class _TimeLeft:
@@ -252,7 +292,7 @@ def _headers(asked: Sequence[str], *, quick: bool) -> Sequence[RawHeader]:
     """The headers of new files of what is asked for. Raises OSError."""
     names = {SOURCES[name] for name in asked}
     computer, began = this_computer(), int(time.time())
-    package = Path(__file__).resolve().parents[1] / "evaluation"
+    package = Path(__file__).resolve().parents[1]
     design = design_digest([package, sources.folder()])
     return [
         RawHeader(

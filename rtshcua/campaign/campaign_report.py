@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from hashlib import sha256
 from importlib.resources import files
-from typing import Any, Final, NamedTuple
+from typing import Annotated, Any, Final, NamedTuple
 
 import msgspec
 from jinja2 import DictLoader, Environment, StrictUndefined
@@ -47,14 +47,16 @@ def margin_told(name: str, value: int) -> str:
 
 #: bars of a histogram
 _BARS: Final = 24
+#: a number of a report; a file with another one was not written by us
+Whole = Annotated[int, msgspec.Meta(ge=-(1 << 53), le=1 << 53)]
 
 
 class FindingSummary(msgspec.Struct, frozen=True):
     """All flights with the same failure: their count, and the lowest numbers."""
 
     slug: str
-    flights: int
-    first: tuple[int, ...]
+    flights: Whole
+    first: tuple[Whole, ...]
     text: str
     incidents: tuple[str, ...]
     why: str = ""
@@ -69,13 +71,13 @@ class MarginSummary(msgspec.Struct, frozen=True):
 
     name: str
     title: str
-    flights: int
-    least: int
-    least_in: int
-    middle: int
-    greatest: int
-    greatest_in: int
-    bars: tuple[int, ...]
+    flights: Whole
+    least: Whole
+    least_in: Whole
+    middle: Whole
+    greatest: Whole
+    greatest_in: Whole
+    bars: tuple[Whole, ...]
     """The number of flights in each of equal intervals from the least to the greatest value."""
 
 
@@ -84,16 +86,16 @@ class CampaignSummary(msgspec.Struct, frozen=True):
 
     mission: str
     campaign: int
-    flights: int
-    failed: int
-    flown_us: int
-    took_us: int
-    endings: dict[str, dict[str, int]]
+    flights: Whole
+    failed: Whole
+    flown_us: Whole
+    took_us: Whole
+    endings: dict[str, dict[str, Whole]]
     failures: tuple[FindingSummary, ...]
     exceptions: tuple[FindingSummary, ...]
     margins: tuple[MarginSummary, ...]
-    kinds: dict[str, dict[str, int]]
-    near: dict[str, dict[str, int]]
+    kinds: dict[str, dict[str, Whole]]
+    near: dict[str, dict[str, Whole]]
     """How often a kind of fault took place near a state change."""
 
 

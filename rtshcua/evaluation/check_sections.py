@@ -243,7 +243,8 @@ def _verifications(measured: Measured) -> ReportTable:
 
 def footprint_section(measured: Measured) -> ReportSection:
     """X7: the footprint on board."""
-    ours = [each for each in measured.results if isinstance(each, ComponentSize)]
+    sizes = {each.component: each for each in measured.results if isinstance(each, ComponentSize)}
+    ours = [*sizes.values()]
     lead = ("Without the agent, the model, the simulator, the libraries of MAVLink, OP-TEE itself and the autopilot.",)
     parts = (_sizes_table(ours), _files_table(ours))
     return ReportSection("x7", "X7: footprint on board", lead, parts)

@@ -12,6 +12,7 @@ import msgspec
 from rtshcua import __version__
 from rtshcua.adapters.store.git import checkout_commit
 from rtshcua.adapters.store.reading import open_regular
+from rtshcua.evaluation.results import Natural
 
 #: the libraries whose versions are printed
 LIBRARIES: Final = ("cryptography", "msgspec", "pymavlink", "shapely")
@@ -24,14 +25,21 @@ class Computer(msgspec.Struct, frozen=True, kw_only=True):
     """
 
     processor: str
-    cores: int
-    memory: int | None
+    cores: Natural
+    memory: Natural | None
     system: str
     python: str
     program: str
     commit: str
     versions: dict[str, str]
     load: tuple[float, ...]
+
+    @property
+    def described(self) -> str:
+        """The computer and its software, without its load."""
+        memory = "unknown memory" if self.memory is None else f"{self.memory / 2**30:.1f} GiB"
+        libraries = (f"{name} {number}" for name, number in sorted(self.versions.items()))
+        return "; ".join((self.processor, f"{self.cores} usable cores", memory, self.system, self.python, *libraries))
 
 
 def this_computer() -> Computer:

@@ -2,8 +2,10 @@
 
 from typing import Final, NamedTuple
 
-#: the missions, by their number of steps: 3, 6 and 12
+#: the missions
 MISSIONS: Final = ("short", "standard", "extended")
+#: how many steps each has
+STEPS: Final = {"short": 3, "standard": 6, "extended": 12}
 #: the deadlines of a step, in us from its release
 DEADLINES_US: Final = (100_000, 200_000, 300_000, 500_000, 750_000, 1_000_000, 1_500_000)
 #: `unenforced` takes only the steps timing, phase, state and safety of the decision; the others are modes of `run`

@@ -255,7 +255,8 @@ def run(unit: WorkUnit) -> Sequence[Result]:
     compiled_ns = perf_counter_ns() - began_ns
     flown = _flown(point, mode, seed)
     first_ns = next((each.took_ns for each in flown.begun), 0)
-    steps = tuple(_steps(point, flown))
+    answers = [*_answers(point, flown)]
+    steps = tuple(_steps(flown, {step: (asked, answer) for step, asked, answer in answers}))
     late = sum(each.end_to_end_ns is None or each.end_to_end_ns > 1_000 * deadline_us for each in steps)
     fallbacks = sum(each.outcome == "fallback" for each in steps) + sum(
         not each.command.needs_record for each in flown.begun
@@ -264,6 +265,7 @@ def run(unit: WorkUnit) -> Sequence[Result]:
         PointFlight(
             mission=mission, deadline_us=deadline_us, mode=mode, seed=seed, ending=flown.ending, misses=late,
             fallbacks=fallbacks, proposal_ns=compiled_ns + flown.loaded_ns + first_ns, invocations=steps,
+            asked_again=len(answers) - len(steps),
         ),
     )  # fmt: skip
 
@@ -283,17 +285,20 @@ def _flown(point: CompiledPoint, mode: str, seed: int) -> _Flown:
         return fly(point, mode, seed, link, Path(folder))
 
 
-def _steps(point: CompiledPoint, flown: _Flown) -> Iterator[StepTiming]:
-    """The invocations of a flight: of each step its last answer, and what was sent by it."""
+def _answers(point: CompiledPoint, flown: _Flown) -> Iterator[tuple[int, _Asked, Decision]]:
+    """The decisions about steps, in their order, each with its step."""
     policy, steps = point.policy, point.mission.invocations
-    last: dict[int, tuple[_Asked, Decision]] = {}
     for each in flown.asked:
         request = decode_request(each.request, policy.slots, len(policy.monitors))
         if isinstance(request, Refusal) or request.kind != STEP:
             continue
         answer = decode_response(each.answer, policy, steps[request.step].contract)
         if isinstance(answer, Decision):
-            last[request.step] = each, answer
+            yield request.step, each, answer
+
+
+def _steps(flown: _Flown, last: Mapping[int, tuple[_Asked, Decision]]) -> Iterator[StepTiming]:
+    """The invocations of a flight: of each step its last answer, and what was sent by it."""
     granted = ((_granting(last, begun), begun) for begun in flown.begun)
     sent = {asked.answered_ns: begun for asked, begun in granted if asked is not None}
     for step, (each, answer) in sorted(last.items()):

@@ -56,18 +56,25 @@ _QUEUE, _MONITOR = "onboard/runtime/admission.py", ("onboard/runtime/monitor.py"
 _EXECUTOR: Final = "onboard/enforcement/executor.py"
 #: those on the companion computer, with the names of the paper
 COMPANION: Final = (
-    Component("runtime dispatcher", ("onboard/runtime/*.py",), (_QUEUE, *_MONITOR), "the command that flies"),
+    Component(
+        "runtime dispatcher", ("onboard/runtime/*.py", "adapters/loop.py"), (_QUEUE, *_MONITOR),
+        "the command that flies",
+    ),
     Component("invocation queue", (_QUEUE,), (), "the current step, its release, the last answers"),
     Component("state monitor", _MONITOR, (), "a snapshot of the vehicle's state, with ages"),
     Component("skill executor", (_EXECUTOR,), (), "serials of permits that were used"),
     Component("skill executor: MAVLink manoeuvres", ("adapters/vehicle/**/*.py",), (), "the manoeuvre that flies"),
-    Component("enforcement client", ("onboard/enforcement/*.py",), (_EXECUTOR,), "the bundle in force, used ids"),
+    Component(
+        "enforcement client", ("onboard/enforcement/*.py", "adapters/boundary/*.py"), (_EXECUTOR,),
+        "the bundle in force, used ids",
+    ),
     Component("enforcement: decision", ("decision/*.py", "decision/*/*.py"), (), "the prepared policy and mission"),
     Component(
         "evidence logger", ("evidence/**/*.py", "adapters/store/evidence_file.py"), (), "chain and tree of the log"
     ),
     Component("wire: keys, COSE, CBOR", ("wire/*.py",), (), "none"),
-)
+    Component("model: flat form, situation, outcome", ("model/*.py", "model/flat/*.py"), (), "none"),
+)  # fmt: skip
 
 
 class SecureHome(NamedTuple):

@@ -11,7 +11,7 @@ from typing import Final, NamedTuple
 
 from rtshcua.evaluation.case_flights import FLAVOURS, ON_GROUND
 from rtshcua.evaluation.cases import CASES as MEASURED_CASES
-from rtshcua.evaluation.design import MISSIONS, MODES, POINTS, RUNS, UNENFORCED
+from rtshcua.evaluation.design import MISSIONS, MODES, POINTS, RUNS, STEPS, UNENFORCED
 from rtshcua.evaluation.measures import PAIRED, FlightTable, end_to_end, p95, validation
 from rtshcua.evaluation.published import CASES, FIGURES, FLAT, MICROSECONDS
 from rtshcua.evaluation.results import (
@@ -21,6 +21,7 @@ from rtshcua.evaluation.results import (
     FallbackTiming,
     PointFlight,
     Result,
+    StepTiming,
     UnavailableMode,
     VerificationTiming,
 )
@@ -75,24 +76,50 @@ class Claims(NamedTuple):
         """The headline claims that the results contradict."""
         return tuple(each for each in self.claims if each.verdict is ClaimVerdict.MISSED)
 
+    @property
+    def style(self) -> str:
+        """How the verdict on all headline claims looks: `held` only where every claim is."""
+        held = all(each.verdict is ClaimVerdict.HELD for each in self.claims)
+        return "missed" if self.failed else "held" if held else "open"
+
 
 def judge(results: Iterable[Result]) -> Claims:
     """Judge the headline claims and the targets."""
     kept = tuple(results)
     flights = FlightTable(kept)
-    absent = {each.mode for each in kept if isinstance(each, UnavailableMode)}
+    absent = set(absent_modes(kept))
     claims = (*_dispatched(kept, flights, absent), *_flat(flights, absent), *_decided(kept, absent), *_evidence(kept))
     return Claims(claims, tuple(_targets(kept, flights, absent)))
 
 
+def absent_modes(results: Iterable[Result]) -> dict[str, str]:
+    """The modes that are not available, and why: those of which nothing was measured."""
+    kept = tuple(results)
+    there = {each.mode for each in kept if isinstance(each, PointFlight | EnforceCheck | FallbackTiming)}
+    return {each.mode: each.why for each in kept if isinstance(each, UnavailableMode) and each.mode not in there}
+
+
 def is_undisturbed(flight: PointFlight) -> bool:
-    """Whether a flight of X1 completed its mission without a missed deadline and without a fallback."""
-    return flight.ending == "completed" and bool(flight.invocations) and not flight.misses and not flight.fallbacks
+    """Whether a flight of X1 completed its mission without a missed deadline and without a fallback: by what it counts,
+    and by each of its steps.
+    """
+    steps = {each.step for each in flight.invocations if each.outcome == "allow" and _in_time(each, flight.deadline_us)}
+    whole = steps == {*range(STEPS.get(flight.mission, 0))} and len(flight.invocations) == len(steps) > 0
+    return whole and flight.ending == "completed" and not flight.misses and not flight.fallbacks
+
+
+def _in_time(step: StepTiming, deadline_us: int) -> bool:
+    return step.end_to_end_ns is not None and step.end_to_end_ns <= 1_000 * deadline_us
+
+
+_EXPECTED: Final = {case.name: (case.outcome, case.reason) for case in CASES}
 
 
 def passes(check: EnforceCheck) -> bool:
-    """Whether a check of X3 has the expected outcome and reason, and agrees with the pure decision."""
-    return check.as_expected and check.agrees
+    """Whether a check of X3 agrees with the pure decision, and has the outcome and the reason of the table: by what it
+    says of itself, and by the table.
+    """
+    return check.as_expected and check.agrees and _EXPECTED.get(check.case) == (check.outcome, check.reason)
 
 
 def _verdict(runs: int, complete: bool, right: bool, absent: bool) -> ClaimVerdict:
@@ -138,7 +165,7 @@ def _decided(results: Sequence[Result], absent: set[str]) -> Iterator[HeadlineCl
         yield _checked(f"x3/{mode}", text, mine, len(_TWELVE), (mode,), absent)
     there = tuple(mode for mode in modes if mode not in absent)
     more = [each for each in checks if each.case in _FURTHER]
-    yield _checked("x3/extra", "X3: the two further cases, in all modes", more, len(_FURTHER), there, absent)
+    yield _checked("x3/extra", "X3: the two further cases, in each available mode", more, len(_FURTHER), there, absent)
     yield _flown(results)
 
 
@@ -193,7 +220,7 @@ def _flat(flights: FlightTable, absent: set[str]) -> Iterator[HeadlineClaim]:
         yield HeadlineClaim(
             f"x2/{mode}",
             f"X2, `{mode}`: median end-to-end flat over 3, 6 and 12 steps (largest/smallest at most {FLAT})",
-            f"{max(stated) / min(stated):.2f}" if stated else "not published",
+            f"{max(stated) / min(stated):.2f} [D]" if stated else "not published",
             "" if ratio is None else f"{ratio:.2f}",
             runs,
             len(POINTS) * RUNS,

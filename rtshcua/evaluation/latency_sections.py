@@ -133,7 +133,7 @@ def _ours(
     if found is None:
         return measured.missing(mode), NONE, NONE, flights
     few = "" if found.cells == len(DEADLINES_US) else f" ({found.cells} of {len(DEADLINES_US)} deadlines)"
-    below = NONE if stated is None else digits(stated.low / (found.mean / 1e6))
+    below = NONE if stated is None or not found.mean else digits(stated.low / (found.mean / 1e6))
     return ms(found.mean), span(found) + few, below, flights
 
 
@@ -150,23 +150,30 @@ def _outcomes(measured: Measured) -> ReportTable:
     for mode in MODES:
         flights = measured.flights.flights(mode)
         if not flights:
-            rows.append((f"`{mode}`", measured.missing(mode), *[NONE] * 6))
+            rows.append((f"`{mode}`", measured.missing(mode), *[NONE] * 7))
             continue
         said = Counter(each.outcome for flight in flights for each in flight.invocations)
         others = ", ".join(f"{count:,} {outcome}" for outcome, count in sorted(said.items()) if outcome != "allow")
         counts = (len(flights), sum(said.values()), sum(each.ending == "completed" for each in flights))
         bad = (sum(each.misses for each in flights), sum(each.fallbacks for each in flights))
         wrong = sum(not is_undisturbed(each) for each in flights)
-        rows.append((f"`{mode}`", *(f"{each:,}" for each in (*counts, *bad, wrong)), others or "none"))
+        numbers = (f"{each:,}" for each in (*counts, *bad, wrong))
+        rows.append((f"`{mode}`", *numbers, others or "none", _deferred(flights)))
     return ReportTable(
         "Flights of X1. The paper has 1,890 in three modes, with 0 misses and 0 fallbacks",
         columns(
             "Mode", "#Flights", "#Invocations", "#Completed", "#Deadline misses", "#Fallbacks", "#Disturbed flights",
-            "Outcomes besides allow",
+            "Outcomes besides allow", "#Deferred before",
         ),
         tuple(rows),
         ("misses", "deadline", "reports", "repetitions", "modes"),
     )  # fmt: skip
+
+
+def _deferred(flights: Sequence[PointFlight]) -> str:
+    """How many answers deferred a step before its last one; nothing where some flight did not count them."""
+    again = [each.asked_again for each in flights if each.asked_again is not None]
+    return f"{sum(again):,}" if len(again) == len(flights) else NONE
 
 
 def _proposals(measured: Measured) -> ReportTable:

@@ -97,13 +97,13 @@ PAIRED: Final[tuple[tuple[str, Durations, Reduction], ...]] = (
 
 
 class FlightTable:
-    """The flights of X1 by mode, point and seed. A flight that was repeated counts once, by its last line."""
+    """The flights of X1 by mode, point and seed. A flight that was repeated counts once, by its first line."""
 
     def __init__(self, results: Iterable[Result]) -> None:
         self._cells: defaultdict[tuple[str, EvaluationPoint], dict[int, PointFlight]] = defaultdict(dict)
         for each in results:
             if isinstance(each, PointFlight):
-                self._cells[each.mode, EvaluationPoint(each.mission, each.deadline_us)][each.seed] = each
+                self._cells[each.mode, EvaluationPoint(each.mission, each.deadline_us)].setdefault(each.seed, each)
 
     def cell(self, mode: str, point: EvaluationPoint) -> tuple[PointFlight, ...]:
         """Return the flights of a cell."""

@@ -263,7 +263,7 @@ CHOICES: Final = (
     OpenChoice(
         "clock", "X1, X2, X5", "in which time the vehicle flies",
         "the simulated vehicle in virtual time; everything between the frame that ends a step and the next command "
-        "frame in real time, after a sleep of 4 ms, without which latencies would be those of a warm cache",
+        "frame in real time. Frames of the vehicle are handed over in the process, those to it to a UDP socket",
     ),
     OpenChoice(
         "misses", "X1", "how a missed deadline is found",
@@ -285,7 +285,8 @@ CHOICES: Final = (
     OpenChoice(
         "pairs", "X5", "how the modes are compared",
         "paired by mission, deadline and seed: of each pair of flights the difference of the medians and of the P95; "
-        "of a point the median of its pairs",
+        "of a point the median of its pairs. The flights in an emulator are flown after all others, and so at another "
+        "load",
     ),
     OpenChoice(
         "cases", "X3", "seven of the twelve cases, all parameters, and the step that they strike",
@@ -312,9 +313,9 @@ CHOICES: Final = (
     ),
     OpenChoice(
         "footprint", "X7", "which files make up a component, and how its artifact is measured",
-        "the files that the table names, the size of their sources or program, and the peak of `tracemalloc` while "
-        "the `standard` mission is flown; of a secure world its data and stack by its ELF sections, of a process its "
-        "greatest resident memory. Totals are the sums of our rows",
+        "the files that the table names, the size of their sources or program, and the greatest of samples of "
+        "`tracemalloc`, one each 10 s of the flight of the `standard` mission; of a secure world its data and stack by "
+        "its ELF sections, of a process its greatest resident memory. Totals are the sums of our rows",
     ),
     OpenChoice(
         "flat", "claims", "how far an overhead is flat over mission length",

@@ -5,8 +5,9 @@
 - Each further line holds one result, with the key of its unit of work, its place among the unit's results, and the
   load of the computer.
 
-A unit is done when all its results are there. Lines that a crash cut off are skipped, and their unit runs again. One
-process at a time writes to a folder.
+A unit is done when all its results are there. Lines that a crash cut off are skipped, and their unit runs again; a
+failed attempt is kept, and its unit runs again. All results of a unit that is there twice count: nothing replaces a
+measurement. One process at a time writes to a folder.
 """
 
 import os
@@ -14,19 +15,18 @@ import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
-from itertools import groupby
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Final, NamedTuple
+from typing import Annotated, BinaryIO, Final, NamedTuple
 
 import msgspec
 
 from rtshcua.adapters.store.reading import open_regular, read_regular, walk
-from rtshcua.adapters.store.writing import append, create_whole, lock, make_folder
+from rtshcua.adapters.store.writing import UNFINISHED, append, create_whole, lock, make_folder
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evaluation.computer import Computer
 from rtshcua.evaluation.design import WorkUnit
-from rtshcua.evaluation.results import Result
+from rtshcua.evaluation.results import FailedAttempt, Natural, Result
 
 FORMAT: Final = 1
 #: octets of the longest line: a whole log's append times
@@ -34,7 +34,7 @@ _LONGEST: Final = 1 << 24
 _ANOTHER: Final = "name another folder with `-o`, or remove this one"
 _LOCK: Final = ".lock"
 #: the beginning of the name of a folder for the files of a run, which a killed process leaves behind
-_SCRATCH: Final = ".work-"
+_SCRATCH: Final = f"{UNFINISHED}work-"
 #: what must be the same to continue a file
 _DIFFERS: Final = {
     "program": "version of this program",
@@ -42,11 +42,15 @@ _DIFFERS: Final = {
     "design": "design of the measurements",
     "quick": "extent (`--quick`)",
 }
+#: what must be the same of the computer
+_COMPUTER: Final = ("processor", "cores", "python", "versions")
+#: seconds of UTC since 1970, until the year 6325
+_Seconds = Annotated[int, msgspec.Meta(ge=0, le=1 << 37)]
 
 
 class RawHeader(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The first line of a file. `design` is SHA-256 of what is measured and how (`design_digest`); `quick`: fewer and
-    smaller measurements. `began` is the start in seconds of UTC since 1970.
+    """The first line of a file. `design` is SHA-256 of what measures and is measured (`design_digest`); `quick`: fewer
+    and smaller measurements. `began` is the start in seconds of UTC since 1970.
     """
 
     format: int
@@ -55,7 +59,7 @@ class RawHeader(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     commit: str
     design: str
     quick: bool
-    began: int
+    began: _Seconds
     computer: Computer
 
 
@@ -65,22 +69,23 @@ class KeptResult(msgspec.Struct, frozen=True, kw_only=True):
     """
 
     key: tuple[str | int, ...]
-    part: int
-    parts: int
-    at: int
-    load: float
-    jobs: int
+    part: Natural
+    parts: Natural
+    at: _Seconds
+    load: Annotated[float, msgspec.Meta(ge=0, le=1e6)]
+    jobs: Natural
     result: Result | None
 
 
 class RawExperiment(NamedTuple):
-    """The content of a file: its header, the results of the units that are done, and how many lines were skipped
-    because they are cut off or malformed.
+    """The content of a file: its header, the results of the units that are done, how many lines were skipped because
+    they are cut off or malformed, and the attempts that failed.
     """
 
     header: RawHeader
     units: Mapping[WorkUnit, tuple[KeptResult, ...]]
     skipped: int
+    failed: Sequence[tuple[WorkUnit, FailedAttempt]] = ()
 
     @property
     def results(self) -> tuple[Result, ...]:
@@ -90,6 +95,8 @@ class RawExperiment(NamedTuple):
 
 _HEADER: Final = msgspec.json.Decoder(RawHeader)
 _KEPT: Final = msgspec.json.Decoder(KeptResult)
+#: what decoders raise for lines of others
+MALFORMED: Final = (msgspec.MsgspecError, RecursionError, UnicodeDecodeError)
 
 
 class RawFolder:
@@ -118,17 +125,14 @@ class RawFolder:
         path = self._file(experiment)
         try:
             with open_regular(path, self.path) as file:
-                first = file.readline(_LONGEST)
-                lines = [*file]
+                header = _HEADER.decode(file.readline(_LONGEST))
+                if header.format == FORMAT:
+                    return _whole(header, _lines(file))
         except FileNotFoundError:
             return None
-        try:
-            header = _HEADER.decode(first)
-        except msgspec.MsgspecError:
+        except MALFORMED:
             return Refusal("malformed", f"`{path}` does not begin as raw data of an evaluation", _ANOTHER)
-        if header.format != FORMAT:
-            return Refusal("malformed", f"`{path}` has format {header.format}; accepted: {FORMAT}", _ANOTHER)
-        return _whole(header, lines)
+        return Refusal("malformed", f"`{path}` has format {header.format}; accepted: {FORMAT}", _ANOTHER)
 
     def differs(self, header: RawHeader) -> Refusal | None:
         """Why a file cannot be continued; None where it can, or is not there. Raises OSError."""
@@ -136,6 +140,9 @@ class RawFolder:
         if not isinstance(found, RawExperiment):
             return found
         differ = [text for name, text in _DIFFERS.items() if getattr(found.header, name) != getattr(header, name)]
+        mine, other = header.computer, found.header.computer
+        if any(getattr(mine, name) != getattr(other, name) for name in _COMPUTER):
+            differ.append("computer (processor, cores, Python or libraries)")
         text = f"`{self._file(header.experiment)}` was measured with another {' and another '.join(differ)}"
         return Refusal("usage", text, _ANOTHER) if differ else None
 
@@ -165,23 +172,41 @@ class RawFolder:
         return self.path / f"{experiment}.jsonl"
 
 
+def _lines(file: BinaryIO) -> Iterator[bytes]:
+    """The lines of a file; in place of one that is too long, one that is malformed."""
+    while line := file.readline(_LONGEST):
+        if len(line) < _LONGEST or line.endswith(b"\n"):
+            yield line
+            continue
+        while len(line) == _LONGEST and not line.endswith(b"\n"):
+            line = file.readline(_LONGEST)
+        yield b"too long"
+
+
 def _whole(header: RawHeader, lines: Iterable[bytes]) -> RawExperiment:
-    """The units of which each part is there, in a row; of a unit that was kept twice, the last."""
+    """The units of which each part is there, in a row."""
     kept, skipped = list[KeptResult](), 0
     for line in lines:
         try:
             kept.append(_KEPT.decode(line))
-        except (msgspec.MsgspecError, RecursionError):
+        except MALFORMED:
             skipped += line != b"\n"
     units: dict[WorkUnit, tuple[KeptResult, ...]] = {}
-    for key, group in groupby(kept, key=lambda each: each.key):
-        parts = [*group]
-        first = max((at for at, each in enumerate(parts) if each.part == 0), default=0)
-        last = parts[first:]
-        if [each.part for each in last] == [*range(last[0].parts)]:
-            units[WorkUnit(header.experiment, key)] = tuple(last)
-        skipped += len(parts) - len(last)
-    return RawExperiment(header, units, skipped)
+    failed: list[tuple[WorkUnit, FailedAttempt]] = []
+    attempts = list[list[KeptResult]]()
+    for each in kept:
+        if each.part == 0 or not attempts or attempts[-1][0].key != each.key:
+            attempts.append([])
+        attempts[-1].append(each)
+    for parts in attempts:
+        unit = WorkUnit(header.experiment, parts[0].key)
+        if any((each.part, each.parts) != (number, len(parts)) for number, each in enumerate(parts)):
+            skipped += len(parts)
+        elif isinstance(parts[0].result, FailedAttempt):
+            failed.append((unit, parts[0].result))
+        else:
+            units[unit] = (*units.get(unit, ()), *parts)
+    return RawExperiment(header, units, skipped, failed)
 
 
 def design_digest(folders: Sequence[Path]) -> str:

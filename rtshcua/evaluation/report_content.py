@@ -82,7 +82,7 @@ def _claim_section(claims: Claims) -> ReportSection:
     ]
     headline = ReportTable(
         "Headline claims. A claim holds only if all its runs are there; one that fails makes the exit code 1",
-        columns("Claim", "Verdict", "Paper [P]", "Ours", "#Runs"),
+        columns("Claim", "Verdict", "Paper [P], unless marked", "Ours", "#Runs"),
         tuple(rows),
         ("flat", "microseconds", "agreement", "modes"),
     )

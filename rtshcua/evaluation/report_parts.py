@@ -8,10 +8,10 @@ from typing import Final, NamedTuple
 
 from rtshcua.evaluation.computer import Computer
 from rtshcua.evaluation.design import MODES
-from rtshcua.evaluation.headline_claims import Claims
+from rtshcua.evaluation.headline_claims import Claims, absent_modes
 from rtshcua.evaluation.measures import Averaged, FlightTable
 from rtshcua.evaluation.published import CASES
-from rtshcua.evaluation.results import Result, UnavailableMode
+from rtshcua.evaluation.results import Result
 from rtshcua.ground.report.drawing.bar_chart import BarChart, StackedChart
 
 ABSENT: Final = "not available here"
@@ -86,8 +86,7 @@ class Measured(NamedTuple):
     def of(cls, results: Iterable[Result]) -> "Measured":
         """Sort the raw results."""
         kept = tuple(results)
-        absent = {each.mode: each.why for each in kept if isinstance(each, UnavailableMode)}
-        return cls(kept, FlightTable(kept), absent)
+        return cls(kept, FlightTable(kept), absent_modes(kept))
 
     def missing(self, mode: str) -> str:
         """Say why there is no figure of a mode."""

@@ -81,7 +81,8 @@ def choice_lines() -> list[str]:
 def _text(text: str) -> str:
     """Escape a text on one line: outside of backticks what Markdown reads as markup, within them only the bar."""
     parts = visible(text).split("`")
-    if len(parts) % 2 == 0:  # a backtick without its pair is a letter
+    # a backtick without its pair is a letter; of several in a row Markdown makes other pairs than we
+    if len(parts) % 2 == 0 or "" in parts[1:-1]:
         return _SPECIAL.sub(r"\\\1", visible(text)).replace("`", "\\`")
     return "`".join(
         part.replace("|", "\\|") if number % 2 else _SPECIAL.sub(r"\\\1", part) for number, part in enumerate(parts)

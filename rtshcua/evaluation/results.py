@@ -1,10 +1,15 @@
 """The raw results of the evaluation: one JSON object for each run, as a line of a file for each experiment.
 
 All durations are integers in nanoseconds of the computer's clock. Where a mode is not available on this computer, one
-`UnavailableMode` stands in place of its runs.
+`UnavailableMode` stands in place of its runs. A unit of work that failed leaves a `FailedAttempt`, and runs again.
 """
 
+from typing import Annotated
+
 import msgspec
+
+#: a count, a size or a duration; a line with another number was not written by us
+Natural = Annotated[int, msgspec.Meta(ge=0, le=1 << 53)]
 
 
 class StepTiming(msgspec.Struct, frozen=True, kw_only=True):
@@ -15,29 +20,31 @@ class StepTiming(msgspec.Struct, frozen=True, kw_only=True):
     that answer to the frame. None where nothing was sent.
     """
 
-    step: int
+    step: Natural
     outcome: str
     reason: str
-    validation_ns: int
-    end_to_end_ns: int | None
-    dispatch_ns: int | None
+    validation_ns: Natural
+    end_to_end_ns: Natural | None
+    dispatch_ns: Natural | None
 
 
 class PointFlight(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="flight"):
     """X1, X2, X5: one flight. `proposal_ns` counts from the mission's text to its first command frame.
 
     `misses` counts invocations that were not dispatched by their deadline, `fallbacks` outcomes and dispatched links.
+    `asked_again` counts answers about a step before its last one, which defer it; None: not counted.
     """
 
     mission: str
-    deadline_us: int
+    deadline_us: Natural
     mode: str
-    seed: int
+    seed: Natural
     ending: str
-    misses: int
-    fallbacks: int
-    proposal_ns: int
+    misses: Natural
+    fallbacks: Natural
+    proposal_ns: Natural
     invocations: tuple[StepTiming, ...]
+    asked_again: Natural | None = None
 
 
 class EnforceCheck(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="check"):
@@ -50,14 +57,14 @@ class EnforceCheck(msgspec.Struct, frozen=True, kw_only=True, tag_field="result"
 
     case: str
     mission: str
-    deadline_us: int
+    deadline_us: Natural
     mode: str
-    repetition: int
+    repetition: Natural
     outcome: str
     reason: str
     as_expected: bool
     agrees: bool
-    permits: int
+    permits: Natural
     differs: str = ""
 
 
@@ -70,9 +77,9 @@ class CaseFlight(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", 
 
     case: str
     mission: str
-    deadline_us: int
+    deadline_us: Natural
     flavour: str
-    seed: int
+    seed: Natural
     aloft: bool
     expected: str
     dispatched: tuple[str, ...]
@@ -89,28 +96,28 @@ class FallbackTiming(msgspec.Struct, frozen=True, kw_only=True, tag_field="resul
 
     case: str
     mode: str
-    repetition: int
-    local_ns: int
-    written_ns: int
-    synced_ns: int
+    repetition: Natural
+    local_ns: Natural
+    written_ns: Natural
+    synced_ns: Natural
 
 
 class AppendTiming(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="append"):
     """X6: the appends of one log, by durability (`buffered`, `written`, `synced-first`), one duration a record."""
 
     durability: str
-    repetition: int
-    octets: int
-    appended_ns: tuple[int, ...]
+    repetition: Natural
+    octets: Natural
+    appended_ns: tuple[Natural, ...]
 
 
 class VerificationTiming(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="verification"):
     """X6: one verification of a log: `fast`, `default`, `audit-no-derive`, `audit`."""
 
     way: str
-    records: int
-    repetition: int
-    took_ns: int
+    records: Natural
+    repetition: Natural
+    took_ns: Natural
 
 
 class ComponentSize(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="component"):
@@ -122,9 +129,9 @@ class ComponentSize(msgspec.Struct, frozen=True, kw_only=True, tag_field="result
     component: str
     domain: str
     files: tuple[str, ...]
-    code_lines: int | None
-    artifact: int | None
-    memory: int | None
+    code_lines: Natural | None
+    artifact: Natural | None
+    memory: Natural | None
     state: str
 
 
@@ -135,7 +142,13 @@ class UnavailableMode(msgspec.Struct, frozen=True, kw_only=True, tag_field="resu
     why: str
 
 
+class FailedAttempt(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="failed"):
+    """A unit of work that ended without results, and why."""
+
+    why: str
+
+
 Result = (
     PointFlight | EnforceCheck | CaseFlight | FallbackTiming | AppendTiming | VerificationTiming
-    | ComponentSize | UnavailableMode
+    | ComponentSize | UnavailableMode | FailedAttempt
 )  # fmt: skip

@@ -1,15 +1,26 @@
 """The service `bench paper` with a tiny experiment: what is run, kept, continued and refused."""
 
+import re
 from collections.abc import Sequence
 from contextlib import nullcontext
 from errno import ENOSPC
 from pathlib import Path
 from tempfile import gettempdir
 
+import msgspec
 import pytest
 
+from reference.evaluation_results import campaign
 from rtshcua.app import evaluation
-from rtshcua.app.evaluation import Evaluation, EvaluationOutcome, EvaluationRequest, measure, prepare
+from rtshcua.app.evaluation import (
+    Evaluation,
+    EvaluationOutcome,
+    EvaluationRequest,
+    WrittenReport,
+    measure,
+    prepare,
+    report,
+)
 from rtshcua.campaign.workers import Here, Look, cores
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
@@ -17,7 +28,7 @@ from rtshcua.evaluation import experiments, raw_data
 from rtshcua.evaluation.design import MODES, RUNS, EvaluationPlan, WorkUnit
 from rtshcua.evaluation.experiments import Experiment, UnitResults, batches
 from rtshcua.evaluation.raw_data import RawExperiment, RawFolder
-from rtshcua.evaluation.results import Result, VerificationTiming
+from rtshcua.evaluation.results import FailedAttempt, Result, UnavailableMode, VerificationTiming
 from virtual.rows import rows
 
 TWO = ("none", "software")
@@ -178,6 +189,56 @@ def test_failed_unit_is_reported_and_left_for_the_next_run(tmp_path: Path, tiny:
     (failed,) = outcome.failed
     assert (failed.unit.key, failed.failed) == (("none", 1), "RuntimeError: the home does not start")
     assert [unit.key for unit in asked(tmp_path).left] == [("none", 1)]
+    assert kept(tmp_path).failed == [(failed.unit, FailedAttempt(why=failed.failed))]
+
+
+def test_report_counts_what_is_not_in_the_results(tmp_path: Path, tiny: dict[str, Experiment]) -> None:
+    """Failed attempts and malformed lines stay visible, also after the unit was run successfully."""
+
+    def failing(unit: WorkUnit) -> Sequence[Result]:
+        raise RuntimeError(f"no {unit.key[0]}")
+
+    tiny["X1"] = Experiment(units, failing)
+    assert ended(asked(tmp_path, runs=1)).done == 0
+    tiny["X1"] = Experiment(units, timing)
+    ended(asked(tmp_path, runs=1, modes=("software",)))
+    path = tmp_path / "X1.jsonl"
+    path.write_bytes(path.read_bytes() + b"x\n")
+    written = report(asked(tmp_path))
+    assert isinstance(written, WrittenReport)
+    text = " ".join(written.text.read_text().replace("\\", "").split())
+    assert "| X1, not counted | - | 1 lines that are cut off, malformed or of units that are not complete |" in text
+    assert "2 attempts at 2 units of work failed, 1 of which have no results yet; the first: none 0: Run" in text
+
+
+def test_mode_that_became_available_is_measured(
+    tmp_path: Path, tiny: dict[str, Experiment], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    missing = Refusal("missing", "QEMU is missing", "install it")
+    monkeypatch.setattr(evaluation, "unavailable", lambda mode: missing if mode == "software" else None)
+    tiny["X1"] = Experiment(units, lambda unit: [UnavailableMode(mode=str(unit.key[0]), why="QEMU is missing")])
+    ended(asked(tmp_path, runs=1, modes=("software",)))
+    assert asked(tmp_path, runs=1, modes=("software",)).left == []
+    monkeypatch.setattr(evaluation, "unavailable", lambda mode: None)
+    tiny["X1"] = Experiment(units, timing)
+    assert ended(asked(tmp_path, runs=1, modes=("software",))).done == 1
+    assert asked(tmp_path, runs=1, modes=("software",)).left == []
+    assert len(kept(tmp_path).results) == 3
+
+
+@rows(
+    "written",
+    [
+        b"", b"{}", b"\xff", b"[" * 200_000, b'{"mission":' + b"[" * 200_000,
+        msgspec.json.encode(campaign()).replace(b'"flown_us":', b'"flown_us":' + b"9" * 400),
+        re.sub(rb'"name":"[^"]*"', b'"name":"other_mm"', msgspec.json.encode(campaign())),
+    ],
+)  # fmt: skip
+def test_report_of_a_campaign_by_others_is_refused(written: bytes, tmp_path: Path) -> None:
+    (tmp_path / "report.json").write_bytes(written)
+    refused = prepare(EvaluationRequest((), TWO, 1, 1, quick=False, output=tmp_path / "e", campaigns=(tmp_path,)))
+    assert isinstance(refused, Refusal)
+    assert (refused.code, "is not the report of a campaign" in refused.text) == (ExitCode.INPUT, True)
 
 
 def test_folder_of_temporary_files_is_restored(tmp_path: Path, tiny: dict[str, Experiment]) -> None:

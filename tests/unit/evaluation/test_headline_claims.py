@@ -1,6 +1,6 @@
 """The headline claims and targets, by results that hold, fail, or are missing."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import pytest
@@ -74,6 +74,48 @@ def test_a_failure_is_not_undone_by_flying_again() -> None:
     found = claim(results, "x1/software")
     assert (found.verdict, found.runs, found.planned) == (MISSED, len(POINTS), len(POINTS))
     assert found.measured.startswith("1 and 0")
+
+
+def steps_of(flight: PointFlight, **change: Any) -> PointFlight:
+    """A flight that says of itself that nothing happened, with its second step changed."""
+    first, second, *others = flight.invocations
+    return replace(flight, invocations=(first, replace(second, **change), *others))
+
+
+@pytest.mark.parametrize(
+    "contradicted",
+    [
+        lambda flight: steps_of(flight, end_to_end_ns=1_000 * flight.deadline_us + 1),
+        lambda flight: steps_of(flight, end_to_end_ns=None),
+        lambda flight: steps_of(flight, outcome="deny"),
+        lambda flight: steps_of(flight, step=0),
+        lambda flight: replace(flight, invocations=flight.invocations[:-1]),
+        lambda flight: replace(flight, invocations=(*flight.invocations, flight.invocations[-1])),
+        lambda flight: replace(flight, mission="other", invocations=()),
+    ],
+)
+def test_a_flight_is_judged_by_its_steps_too(contradicted: Callable[[PointFlight], PointFlight]) -> None:
+    """Counts of zero do not hide a step that was late, not allowed, or not flown."""
+    results = [contradicted(each) if number == 3 else each for number, each in enumerate(flights(["none"], runs=1))]
+    assert claim(results, "x1/none").verdict is MISSED
+
+
+def test_a_check_is_judged_by_the_table_too() -> None:
+    results = [
+        replace(each, outcome="allow", reason="admitted") if number == 11 else each
+        for number, each in enumerate(checks(["none"], runs=1))
+    ]
+    assert claim(results, "x3/none").verdict is MISSED
+    other = [replace(each, case="another") for each in checks(["none"], POINTS[:1], runs=1)]
+    assert not any(map(headline_claims.passes, other))
+
+
+def test_verdict_looks_good_only_where_every_claim_holds() -> None:
+    assert judge([]).style == "open"
+    assert judge(everything(runs=1)).style == "open"
+    assert judge([replace(flight(*POINT, "software", 1), misses=1)]).style == "missed"
+    held = tuple(each._replace(verdict=HELD) for each in judge([]).claims)
+    assert judge([])._replace(claims=held).style == "held"
 
 
 def test_a_missing_cell_leaves_a_claim_not_measured() -> None:

@@ -8,10 +8,11 @@ import pytest
 from msgspec.structs import replace
 
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.evaluation import raw_data
 from rtshcua.evaluation.computer import Computer
 from rtshcua.evaluation.design import WorkUnit
 from rtshcua.evaluation.raw_data import FORMAT, RawExperiment, RawFolder, RawHeader, design_digest
-from rtshcua.evaluation.results import Result, UnavailableMode, VerificationTiming
+from rtshcua.evaluation.results import FailedAttempt, Result, UnavailableMode, VerificationTiming
 from virtual.rows import rows
 
 COMPUTER = Computer(
@@ -20,6 +21,9 @@ COMPUTER = Computer(
 HEADER = RawHeader(
     format=FORMAT, experiment="X6", program="1", commit="c", design="d", quick=False, began=0, computer=COMPUTER
 )
+#: a header whose computer is nested deeply
+DEEP = b'{"format":1,"computer":{"x":' + b"[" * 200_000
+PARTS = "processor, cores, Python or libraries"
 FIRST, SECOND = WorkUnit("X6", ("verify", 1000, 1)), WorkUnit("X6", ("verify", 1000, 2))
 
 
@@ -74,7 +78,70 @@ def test_every_cut_of_the_last_unit_leaves_the_units_before_it(folder: RawFolder
         assert [*found(folder).units] == ([FIRST, SECOND] if done else [FIRST]), length
         assert folder.begin(HEADER) is None
         keep(folder, SECOND, *verified(4, 5))
-        assert found(folder).results == (*verified(1), *verified(4, 5)), length
+        assert found(folder).results == (*verified(1), *(verified(2, 3) if done else []), *verified(4, 5)), length
+
+
+def test_nothing_replaces_a_measurement(folder: RawFolder) -> None:
+    """All results of a unit that was kept twice count, so that no failure disappears behind a success."""
+    keep(folder, FIRST, *verified(1, 2))
+    keep(folder, SECOND, *verified(3))
+    keep(folder, FIRST, *verified(4, 5))
+    assert found(folder).results == (*verified(1, 2), *verified(4, 5), *verified(3))
+    assert found(folder).skipped == 0
+
+
+def test_failed_attempt_is_kept_and_leaves_its_unit_undone(folder: RawFolder) -> None:
+    why = FailedAttempt(why="RuntimeError: the home does not start")
+    keep(folder, FIRST, why)
+    keep(folder, FIRST, why)
+    keep(folder, SECOND, *verified(1))
+    assert [*found(folder).units] == [SECOND]
+    assert found(folder).failed == [(FIRST, why)] * 2
+    assert found(folder).results == (*verified(1),)
+
+
+def line(**changed: str) -> bytes:
+    """A line of one result, with members in the words given."""
+    usual = {"key": '["a"]', "part": "0", "parts": "1", "at": "1", "load": "0.5", "jobs": "2", "result": "null"}
+    return "{{{}}}".format(",".join(f'"{name}":{text}' for name, text in (usual | changed).items())).encode()
+
+
+@rows(
+    "written",
+    [
+        b"\xff\xfe", b'{"key":["\xff"]}', b'{"more":' + b"[" * 200_000,
+        line(result='{"result":"flight","x":' + "[" * 200_000), line(result='{"result":"success"}'),
+        line(parts="1" + "0" * 30), line(parts=str(10**12)), line(at="9" * 12), line(at="-1"), line(load="1e999"),
+        line(load="-1"), line(load='"much"'), line(key='["\\ud800"]'), line(part="9" * 6000),
+        line(result='{"result":"verification","way":"default","records":1000,"repetition":1,"took_ns":-5}'),
+        line(result='{"result":"verification","way":"default","records":1000,"repetition":1,"took_ns":1e400}'),
+        line(result=f'{{"result":"verification","way":"default","records":1000,"repetition":1,"took_ns":{10**400}}}'),
+        line() + b" " * 5000,
+    ],
+)  # fmt: skip
+def test_line_of_others_is_skipped_and_counted(written: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever stands in a line, the lines around it are read, and none is held whole in memory if it is too long."""
+    monkeypatch.setattr(raw_data, "_LONGEST", 4096)
+    made = RawFolder(tmp_path)
+    with made.held():
+        assert made.begin(HEADER) is None
+        keep(made, FIRST, *verified(1))
+        path = tmp_path / "X6.jsonl"
+        path.write_bytes(path.read_bytes() + written + b"\n")
+        keep(made, SECOND, *verified(2))
+    read = found(made)
+    assert (read.results, read.skipped) == ((*verified(1), *verified(2)), 1)
+    path.unlink()
+
+
+def test_lines_of_another_program_do_not_make_a_unit(folder: RawFolder) -> None:
+    path = folder.path / "X6.jsonl"
+    for parts in ([(1, 2), (0, 2)], [(0, 2), (0, 2)], [(0, 2), (1, 3)], [(0, 0)], [(0, 1), (1, 1)], [(0, 2), (2, 2)]):
+        lines = [line(part=str(part), parts=str(of)) for part, of in parts]
+        before = path.read_bytes()
+        path.write_bytes(before + b"\n".join(lines) + b"\n")
+        assert (found(folder).units, found(folder).skipped) == ({}, len(parts)), parts
+        path.write_bytes(before)
 
 
 def test_second_process_cannot_write(folder: RawFolder) -> None:
@@ -83,12 +150,13 @@ def test_second_process_cannot_write(folder: RawFolder) -> None:
 
 
 def test_files_of_a_killed_run_are_removed(tmp_path: Path) -> None:
-    left = tmp_path / ".work-abc" / "log"
+    left, of_others = tmp_path / ".rtshcua-work-abc" / "log", tmp_path / ".work-of-others"
     left.mkdir(parents=True)
+    of_others.mkdir()
     with RawFolder(tmp_path).held() as scratch:
         assert not left.exists()
         assert Path(scratch).parent == tmp_path
-    assert sorted(path.name for path in tmp_path.iterdir()) == [".lock"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [".lock", ".work-of-others"]
 
 
 @rows(
@@ -98,13 +166,16 @@ def test_files_of_a_killed_run_are_removed(tmp_path: Path) -> None:
         ({"commit": "e"}, "commit of this program"),
         ({"design": "e"}, "design of the measurements"),
         ({"quick": True}, "extent (`--quick`)"),
+        ({"computer": replace(COMPUTER, processor="a faster one")}, f"computer ({PARTS})"),
+        ({"computer": replace(COMPUTER, python="CPython 3.14")}, f"computer ({PARTS})"),
     ],
 )
 def test_other_measurements_are_not_continued(change: dict[str, Any], said: str, tmp_path: Path) -> None:
     made = RawFolder(tmp_path)
     with made.held():
         assert made.begin(HEADER) is None
-        keep(made, FIRST, *verified(1))
+        if found(made).results == ():
+            keep(made, FIRST, *verified(1))
         refused = made.begin(replace(HEADER, **change))
     assert isinstance(refused, Refusal)
     assert refused.text == f"`{tmp_path}/X6.jsonl` was measured with another {said}"
@@ -118,7 +189,10 @@ def test_another_time_and_load_are_continued(folder: RawFolder) -> None:
     assert found(folder).header == HEADER
 
 
-@rows("first", [b"", b"{}\n", b"[1]\n", b'{"format":1'])
+@rows(
+    "first",
+    [b"", b"{}\n", b"[1]\n", b'{"format":1', b'{"format":1,"experiment":"\xff"}\n', DEEP, b'{"format":1e999}\n'],
+)
 def test_foreign_file_is_refused(first: bytes, tmp_path: Path) -> None:
     path = tmp_path / "X6.jsonl"
     path.write_bytes(first)

@@ -6,14 +6,23 @@ from hashlib import sha256
 from html import unescape
 from itertools import pairwise
 from pathlib import Path
+from random import Random
+from types import NoneType, UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
 
+import msgspec
 import pytest
+from hypothesis import given, settings
+from markdown_it import MarkdownIt
+from msgspec import Meta
 from msgspec.structs import replace
 
+from reference import worlds
 from reference.evaluation_results import COMPUTER, campaign, case_flights, checks, everything
 from reference.html_outline import Outline
 from rtshcua.evaluation import report_page, report_text
-from rtshcua.evaluation.published import CHOICES
+from rtshcua.evaluation.design import MODES, POINTS
+from rtshcua.evaluation.published import CASES, CHOICES
 from rtshcua.evaluation.report_content import evaluation_report
 from rtshcua.evaluation.report_parts import EvaluationReport, ReportTable, digits
 from rtshcua.evaluation.results import Result, UnavailableMode
@@ -106,6 +115,61 @@ def test_hostile_texts_are_escaped(hostile: str) -> None:
     assert len(re.findall(r"(?<!\\)\|", row)) == 5
     assert "](http" not in re.sub(r"\\.", "", row)
     assert "<" not in re.sub(r"\\<|`[^`]*`", "", row)
+
+
+@pytest.mark.parametrize(
+    "hostile",
+    [
+        "``` <img src=x onerror=1> `` x `", "`` ` <img src=x> ` ``", "` <img src=x>", "`a``<img src=x>`b`",
+        "\\` <img src=x> \\`",
+        "x` <img src=x> `y", "<img src=x>", "`|` <img src=x>", "&lt;img src=x&gt; ``` <script>", "[a]: http://x <b>",
+        "a\n\n# <h1>", "\n- <img src=x>",
+    ],
+)  # fmt: skip
+def test_markdown_makes_no_markup_of_hostile_texts(hostile: str) -> None:
+    """As a reader of Markdown understands it: no element but those of our own words."""
+    shown = made([UnavailableMode(mode="process", why=hostile)], processor=hostile, commit=hostile)
+    summary = replace(campaign(), mission=hostile)
+    text = report_text.render(evaluation_report([], replace(COMPUTER, commit=hostile), "x", (), (summary,)))
+    for written in (text, report_text.render(shown)):
+        page = MarkdownIt("commonmark", {"html": True}).enable("table").render(written)
+        tags = {each.lower() for each in re.findall(r"<\s*/?(\w+)", page)}
+        assert tags <= {"h1", "h2", "p", "em", "strong", "code", "table", "thead", "tbody", "tr", "th", "td", "a"}
+        assert not re.search(r"<a href=\"http://x", page)
+        assert page.count("<h1") == 1
+
+
+WORDS = (*MODES, *(point.mission for point in POINTS[::7]), *(case.name for case in CASES[:3]), "allow", "written", "")
+
+
+def drawn(kind: Any, of: Random) -> Any:
+    """Any value of a type that raw data may hold."""
+    match getattr(kind, "__metadata__", None), get_origin(kind):
+        case (Meta() as bounds,), _:
+            return of.choice([bounds.ge, 1, 1000, of.randrange(1 << 40), bounds.le])
+        case _, origin if origin is tuple:
+            return tuple(drawn(get_args(kind)[0], of) for _ in range(of.choice([0, 1, 1000])))
+        case _, origin if origin is UnionType or origin is Union:
+            return drawn(of.choice(get_args(kind)), of)
+    if kind is str:
+        return of.choice((*WORDS, *HOSTILE))
+    if kind in (bool, NoneType):
+        return of.random() < 0.5 if kind is bool else None
+    return kind(**{name: drawn(each, of) for name, each in get_type_hints(kind, include_extras=True).items()})
+
+
+@given(worlds.CHANCES)
+@settings(max_examples=20)
+def test_report_is_made_of_any_results(of: Random) -> None:
+    """Whatever raw data say, with zeros and the greatest numbers, the report is well formed."""
+    results = [drawn(Result, of) for _ in range(of.choice([1, 5, 40]))]
+    made_of = msgspec.json.decode(msgspec.json.encode(results), type=list[Result])
+    assert made_of == results
+    shown = made(made_of)
+    outline = Outline(report_page.render(shown))
+    assert (outline.wrong, outline.open) == ([], [])
+    assert not {"script", "b"} & {tag for tag, _ in outline.elements}
+    assert report_text.render(shown)
 
 
 def test_every_choice_of_a_table_is_explained(report: EvaluationReport, text: str) -> None:

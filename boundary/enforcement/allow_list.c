@@ -44,6 +44,7 @@ bool rt_is_housekeeping(const rt_frame *frame) {
     case RT_MSG_MISSION_REQUEST_INT:
     case RT_MSG_MISSION_ACK:
     case RT_MSG_TIMESYNC:
+    case RT_MSG_LOG_REQUEST_LIST:
     case RT_MSG_STATUSTEXT:
         return true;
     default:

@@ -5,8 +5,10 @@ cannot block a recall: it accepts only its owner, by the kernel's information ab
 never occupies all places of a socket.
 
 Every record of the log is sent as its line, together with `hello`, `mission` and `answer`; documents come in as JSON
-lines. No call here waits: unsent data stays in a bounded buffer, and a reader that fills it is dropped, as is one that
-sends malformed lines. A document is only bytes here; the enforcement boundary decides whether it can be trusted.
+lines. A gateway hands in two further kinds of lines: what it says of one of its clients, for the log, and a client's
+request to the vehicle, as a frame. No call here waits: unsent data stays in a bounded buffer, and a reader that fills
+it is dropped, as is one that sends malformed lines. A document is only bytes here; the enforcement boundary decides
+whether it can be trusted.
 """
 
 import errno
@@ -54,6 +56,16 @@ LONGEST_PATH: Final = 107
 WORK_RATE: Final = 1 << 17
 WORK_AT_ONCE: Final = 1 << 19
 SHORT: Final = MAX_WITHOUT_MISSION * 4 // 3 + 64
+#: the lines about clients of one user: the interval in us that each takes, and how many may come at once
+CLIENT_LINES: Final = (200_000, 50)
+#: the same for requests to the vehicle
+REQUESTS: Final = (50_000, 40)
+#: the longest frame in a request, in bytes; a frame with a full payload
+MOST_FRAME: Final = 267
+#: the most bytes of a text about a client
+CLIENT_BYTES: Final = 200
+#: the least interval after a line that is not a document, in us: nothing of it is verified
+LIGHT_GAP_US: Final = 2_000
 _CHUNK: Final = 1 << 16
 _CREDENTIALS: Final = struct.Struct("iII")
 _TIME: Final = struct.Struct("ll")  # timeval
@@ -67,14 +79,20 @@ class SocketTaken(OSError):
 
 
 class _Handed(msgspec.Struct, forbid_unknown_fields=True):
-    """An inbound line: a document in base64, and the sender's number for it."""
+    """An inbound line: a document in base64, or a text about a client, or a frame in base64; and the sender's number
+    for it.
+    """
 
-    document: str
+    document: str | None = None
+    client: str = ""
+    request: str = ""
     id: int = 0
 
 
 #: the answer to a line without a document
 NO_LINE: Final = ("malformed", "expected a line `{id, document}` with the document in base64")
+_NO_CLIENT: Final = ("malformed", f"the text about a client is not a JSON object of at most {CLIENT_BYTES} bytes")
+_NO_REQUEST: Final = ("malformed", "the request is not one frame in base64")
 
 
 class Encoded(NamedTuple):
@@ -92,6 +110,26 @@ class Encoded(NamedTuple):
             return Presented(self.at_us, b"", self.sender, NO_LINE)
 
 
+class ClientLine(NamedTuple):
+    """What a gateway says of one of its clients: a small JSON object."""
+
+    at_us: int
+    text: str
+    sender: int
+
+
+class FrameRequest(NamedTuple):
+    """A client's request to the vehicle: one unsigned frame, not checked yet."""
+
+    at_us: int
+    frame: bytes
+    sender: int
+
+
+#: an inbound line
+Handed = Presented | Encoded | ClientLine | FrameRequest
+
+
 class _Numbered(msgspec.Struct):
     """The readable part of an otherwise malformed line: its number, for the answer."""
 
@@ -99,6 +137,7 @@ class _Numbered(msgspec.Struct):
 
 
 _read = msgspec.json.Decoder(_Handed).decode
+_read_object = msgspec.json.Decoder(dict[str, msgspec.Raw]).decode
 _read_number = msgspec.json.Decoder(_Numbered).decode
 _encode = msgspec.json.Encoder().encode
 
@@ -208,12 +247,16 @@ class AgentSocket:
         self._next_us = 0
         # by user: the time of the last count, and the remaining budget
         self._budgets: dict[int | None, tuple[int, int]] = {}
+        # by user and kind of line: until when its share is used
+        self._used: dict[tuple[int | None, tuple[int, int]], int] = {}
         self._welcomed: dict[int, int] = {}  # by process: until when it has used its share of connections
         self._listener = _listen(path, group)
         self._place = _place(path)
 
-    def poll(self, now_us: int) -> Presented | Encoded | None:
-        """The next document, if any: one of each reader in turn, and at most one in `GAP_US`."""
+    def poll(self, now_us: int) -> Handed | None:
+        """The next line, if any: one of each reader in turn. After a document the next line is taken `GAP_US` later,
+        after another line `LIGHT_GAP_US` later.
+        """
         self._welcome(now_us)
         for reader in list(self.readers):
             if not reader.flush():
@@ -312,13 +355,48 @@ class AgentSocket:
         self._budgets[user] = now_us, left - octets if may else left
         return may
 
-    def _taken(self, reader: _Reader, line: bytes, now_us: int) -> Presented | Encoded | None:
+    def _may_take(self, user: int | None, kind: tuple[int, int], now_us: int) -> bool:
+        """Whether another line of this kind of a user may be taken now, which is then counted."""
+        each_us, at_once = kind
+        earliest_us = now_us - each_us * at_once
+        used_us = max(self._used.get((user, kind), earliest_us), earliest_us) + each_us
+        if used_us > now_us:
+            return False
+        self._used[user, kind] = used_us
+        return True
+
+    def _light(self, reader: _Reader, handed: _Handed, now_us: int) -> ClientLine | FrameRequest | None:
+        """Take a line that is not a document."""
+        self._next_us = now_us + LIGHT_GAP_US
+        kind = CLIENT_LINES if handed.client else REQUESTS
+        if not self._may_take(reader.peer.user, kind, now_us):
+            text = f"of one user {1_000_000 // kind[0]} such lines a second are taken: hand it in again later"
+            self._send(reader, _answer(handed.id, "busy", text))
+            return None
+        frame = b"" if handed.client else _frame_in(handed.request)
+        wrong = NO_LINE if handed.document is not None or (handed.client and handed.request) else None
+        if wrong is None and handed.client:
+            wrong = None if _is_small_object(handed.client) else _NO_CLIENT
+        elif wrong is None:
+            wrong = None if frame else _NO_REQUEST
+        if wrong is not None:
+            self._send(reader, _answer(handed.id, *wrong))
+            return None
+        number = next(self._numbers)
+        self._senders[number] = (reader, handed.id)
+        return ClientLine(now_us, handed.client, number) if handed.client else FrameRequest(now_us, frame, number)
+
+    def _taken(self, reader: _Reader, line: bytes, now_us: int) -> Handed | None:
         if len(line) > SHORT and not self._has_budget(reader.peer.user, len(line), now_us):
             text = f"of one user {WORK_RATE >> 10} KiB a second are looked at: hand it in again later"
             self._send(reader, _answer(_number(line), "busy", text))
             return None
         try:
             handed = _read(line)
+            if handed.client or handed.request:
+                return self._light(reader, handed, now_us)
+            if handed.document is None:
+                raise ValueError
             later = self._encoded and len(line) > SHORT
             document = b"" if later else b64decode(handed.document, validate=True)
         except (ValueError, msgspec.DecodeError):
@@ -337,6 +415,26 @@ class AgentSocket:
             self.readers.remove(reader)
             self._senders = {key: value for key, value in self._senders.items() if value[0] is not reader}
             reader.link.close()
+
+
+def _is_small_object(text: str) -> bool:
+    """Whether a text is a JSON object of at most `CLIENT_BYTES`."""
+    try:
+        if len(text) > CLIENT_BYTES or len(text.encode()) > CLIENT_BYTES:
+            return False
+        _read_object(text)
+    except (ValueError, msgspec.DecodeError, RecursionError):
+        return False
+    return True
+
+
+def _frame_in(text: str) -> bytes:
+    """The octets in base64, if one frame can have so many; else none."""
+    try:
+        frame = b64decode(text, validate=True) if len(text) <= 2 * MOST_FRAME else b""
+    except ValueError:
+        return b""
+    return frame if len(frame) <= MOST_FRAME else b""
 
 
 def _number(line: bytes) -> int:

@@ -29,6 +29,7 @@ COMMAND_INT: Final = 75
 COMMAND_LONG: Final = 76
 SET_POSITION_TARGET_GLOBAL_INT: Final = 86
 TIMESYNC: Final = 111
+LOG_REQUEST_LIST: Final = 117
 EXTENDED_SYS_STATE: Final = 245
 STATUSTEXT: Final = 253
 
@@ -92,6 +93,7 @@ LAYOUTS: Final = {
         f"time_boot_ms lat_int lon_int alt vx vy vz afx afy afz yaw yaw_rate type_mask {_TARGET} coordinate_frame",
     ),
     TIMESYNC: _layout(34, "<qq", "tc1 ts1"),
+    LOG_REQUEST_LIST: _layout(128, "<HHBB", f"start end {_TARGET}"),
     EXTENDED_SYS_STATE: _layout(130, "<BB", "vtol_state landed_state"),
     STATUSTEXT: _layout(83, f"<B{TEXT_OCTETS}sHB", "severity text id chunk_seq"),
 }  # fmt: skip

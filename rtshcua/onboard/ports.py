@@ -194,6 +194,14 @@ class Presented(Event, frozen=True):
     envelope: str = ""
 
 
+class ClientRecord(Event, frozen=True):
+    """What a gateway refused to one of its clients, or did in its place: a small JSON object, untrusted. It is recorded
+    and decides nothing.
+    """
+
+    text: str
+
+
 class Anchored(Event, frozen=True):
     """A witness cosigned a checkpoint of the log; `note` is the checkpoint with its signature, which was verified."""
 

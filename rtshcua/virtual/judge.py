@@ -210,8 +210,8 @@ def _faults(flown: ScenarioFlown) -> list[JudgedFailure]:
 # ---------------------------------------------------------------- frames
 
 #: HEARTBEAT, PARAM_REQUEST_READ, PARAM_REQUEST_LIST, MISSION_REQUEST, MISSION_REQUEST_LIST, MISSION_ACK,
-#: MISSION_REQUEST_INT, TIMESYNC, STATUSTEXT
-_QUIET: Final = frozenset({0, 20, 21, 40, 43, 47, 51, 111, 253})
+#: MISSION_REQUEST_INT, TIMESYNC, LOG_REQUEST_LIST, STATUSTEXT
+_QUIET: Final = frozenset({0, 20, 21, 40, 43, 47, 51, 111, 117, 253})
 #: messages about a fence or a parameter: they cause no motion by themselves
 _SETTINGS: Final = frozenset({"PARAM_SET", "MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_CLEAR_ALL"})
 _FENCE: Final = 1

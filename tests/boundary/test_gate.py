@@ -119,6 +119,8 @@ def drawn_frame(random: Random, of: Command) -> bytes:
                 random.choice((0, 1)),
             ),
             m.MAVLink_statustext_message(6, b"text"), m.MAVLink_timesync_message(0, 5),
+            m.MAVLink_log_request_list_message(SYSTEM, random.choice((1, 0)), 0, 0xFFFF),
+            m.MAVLink_log_request_data_message(SYSTEM, 1, 1, 0, 90),
             m.MAVLink_manual_control_message(SYSTEM, 0, 0, 500, 0, 0),
         )
     )  # fmt: skip

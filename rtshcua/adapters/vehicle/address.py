@@ -7,6 +7,7 @@
 | `tcp:HOST:PORT` | connects to that address |
 | `tcpin:HOST:PORT` | waits for a connection to this address |
 | `serial:DEVICE:BAUD` | opens a serial device, at so many bits a second |
+| `fd:N` | uses an inherited descriptor: one end of a pair of datagram sockets (`socketpair`), for programs |
 """
 
 import re
@@ -27,6 +28,7 @@ class LinkCarrier(StrEnum):
     TCP = "tcp"
     TCP_IN = "tcpin"
     SERIAL = "serial"
+    INHERITED = "fd"
 
 
 #: baud rates of the system's serial driver, as far as telemetry uses them
@@ -47,7 +49,10 @@ _EXAMPLES: Final = {
     LinkCarrier.TCP: "tcp:192.168.1.10:5760",
     LinkCarrier.TCP_IN: "tcpin:0.0.0.0:5760",
     LinkCarrier.SERIAL: "serial:/dev/ttyAMA0:921600",
+    LinkCarrier.INHERITED: "fd:3",
 }
+#: the descriptors that a program may have inherited besides its standard streams
+_DESCRIPTORS: Final = range(3, 1 << 20)
 _HOST: Final = re.compile(r"[^:\[\]\s]+", re.ASCII)
 _NUMBER: Final = re.compile(r"\d{1,9}", re.ASCII)
 
@@ -61,7 +66,9 @@ class AddressError(ValueError):
 
 
 class Address(NamedTuple):
-    """The address of a link: its carrier, then host and port or serial device and baud rate."""
+    """The address of a link: its carrier, then host and port, or serial device and baud rate, or nothing and an
+    inherited descriptor.
+    """
 
     way: LinkCarrier
     host: str
@@ -69,8 +76,10 @@ class Address(NamedTuple):
 
     @property
     def is_loopback(self) -> bool:
-        """Whether the other end is on this machine, over its loopback interface."""
-        if self.way is LinkCarrier.SERIAL:
+        """Whether the other end is on this machine, over its loopback interface. Unknown, so False, for an inherited
+        descriptor: the program at its other end may have any link to the vehicle.
+        """
+        if self.way in (LinkCarrier.SERIAL, LinkCarrier.INHERITED):
             return False
         try:
             return ip_address(self.host).is_loopback
@@ -83,7 +92,7 @@ class Address(NamedTuple):
         return self.port // BITS_OF_AN_OCTET if self.way is LinkCarrier.SERIAL else None
 
     def __str__(self) -> str:
-        return f"{self.way}:{self.host}:{self.port}"
+        return f"{self.way}:{self.port}" if self.way is LinkCarrier.INHERITED else f"{self.way}:{self.host}:{self.port}"
 
 
 def parse(text: str, ways: Collection[LinkCarrier] = tuple(LinkCarrier)) -> Address:
@@ -91,6 +100,8 @@ def parse(text: str, ways: Collection[LinkCarrier] = tuple(LinkCarrier)) -> Addr
     word, _, rest = text.partition(":")
     host, colon, number = rest.rpartition(":")
     way = _carrier(text, word, ways)
+    if way is LinkCarrier.INHERITED:
+        return _inherited(text, rest)
     place, value = ("device", "baud rate") if way is LinkCarrier.SERIAL else ("host", "port")
     example, begin, end = f"write it as `{_EXAMPLES[way]}`", len(word) + 1, len(word) + 1 + len(host)
     if not colon:
@@ -108,6 +119,15 @@ def parse(text: str, ways: Collection[LinkCarrier] = tuple(LinkCarrier)) -> Addr
     if fault is not None:
         raise AddressError(f"`{number}` {fault[0]}", text, end + 1, len(text), fault[1])
     return Address(way, host, int(number))
+
+
+def _inherited(text: str, number: str) -> Address:
+    begin, help = len("fd:"), f"a descriptor is a number from 3 on: write it as `{_EXAMPLES[LinkCarrier.INHERITED]}`"
+    if not number:
+        raise AddressError("the descriptor of the link is missing", text, len(text), len(text), help)
+    if _NUMBER.fullmatch(number) is None or int(number) not in _DESCRIPTORS:
+        raise AddressError(f"`{number}` is not an inherited descriptor", text, begin, len(text), help)
+    return Address(LinkCarrier.INHERITED, "", int(number))
 
 
 def _carrier(text: str, word: str, ways: Collection[LinkCarrier]) -> LinkCarrier:

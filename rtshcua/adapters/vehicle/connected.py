@@ -7,6 +7,7 @@ from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.vehicle.driver import HEARTBEAT_US, Driver
 from rtshcua.adapters.vehicle.transport import Transport
 from rtshcua.codec.stream import FrameStream, StreamCounts
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.mission import Invocation
 from rtshcua.onboard.ports import Command, Event, Noted
 
@@ -100,6 +101,14 @@ class ConnectedVehicle:
     def release(self) -> None:
         """Send nothing more that moves the vehicle."""
         self.driver.release()
+
+    def pass_on(self, frame: bytes) -> Refusal | None:
+        """Send the request of a gateway's client, or say why it must not leave."""
+        sealed = self.driver.pass_on(frame, self._clock.now().monotonic_us)
+        if isinstance(sealed, Refusal):
+            return sealed
+        self._send([sealed])
+        return None
 
     def announce(self, severity: int, text: str) -> None:
         """Send a text to every ground station on the link."""

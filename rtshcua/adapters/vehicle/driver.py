@@ -12,12 +12,15 @@ from rtshcua.adapters.vehicle.ardupilot import ARDUPILOT
 from rtshcua.adapters.vehicle.drain import Consumption
 from rtshcua.adapters.vehicle.flavour import AutopilotFlavour, Stage, Stages
 from rtshcua.adapters.vehicle.link import (
+    NO_VEHICLE,
     SILENT,
     UNANSWERED,
     DatagramContents,
     LinkWatch,
     VehicleLink,
+    command_of,
     is_radio,
+    refusal_of,
     two_speak,
 )
 from rtshcua.adapters.vehicle.manoeuvre import Aids, Commander, Manoeuvre, sendings
@@ -41,6 +44,7 @@ from rtshcua.adapters.vehicle.supervision import Brakes, CrashWatch
 from rtshcua.adapters.vehicle.telemetry import Batteries, Telemetry
 from rtshcua.codec.frames import ReceivedFrame, is_addressed
 from rtshcua.decision.rates import AT_LEAST, SUFFICES, Rate
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.enums import MAV_MODE_FLAG_SAFETY_ARMED as ARMED
 from rtshcua.mavlink.enums import MULTIROTORS
@@ -460,6 +464,19 @@ class Driver:
     def announce(self, severity: int, text: str) -> None:
         """Send a text to every ground station; it leaves with a later `tick`, when the link is idle."""
         self._announcer.add(severity, text)
+
+    def pass_on(self, frame: bytes, now_us: int) -> bytes | Refusal:
+        """The request of a gateway's client, as it may leave, or why it must not. The boundary's gate judges it as any
+        frame. Its answer comes to us and is not taken for the answer to a question of ours.
+        """
+        refused = NO_VEHICLE if self.flavour is None else refusal_of(frame, self.stream_requests)
+        sealed = self.link.pass_on(frame, now_us) if refused is None else refused
+        number = None if isinstance(sealed, Refusal) else command_of(frame)
+        if number == messages.REQUEST_MESSAGE:
+            self._aids.query.asked += 1
+        elif number == messages.SET_INTERVAL:
+            self.stream_requests.passed_on(now_us)
+        return sealed
 
     def _choose(self, frame: ReceivedFrame) -> None:
         if frame.name != "HEARTBEAT" or frame.component != AUTOPILOT:

@@ -3,17 +3,22 @@ whether the link is up.
 """
 
 from collections.abc import Callable, Iterable, Sequence
+from math import isfinite
 from typing import Final, NamedTuple
 
 from rtshcua.adapters.vehicle import messages
 from rtshcua.adapters.vehicle.messages import Message
+from rtshcua.adapters.vehicle.streams import StreamRequests
 from rtshcua.codec.frames import Codec, ReceivedFrame
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.mavlink import enums, layouts
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.framing import unsigned
+from rtshcua.mavlink.layouts import COMMAND_LONG, LAYOUTS
 from rtshcua.mavlink.modes import is_another
 from rtshcua.mavlink.radio import RADIO, RADIO_SYSTEM, UnsignedRadio
 from rtshcua.mavlink.signing import FrameVerifier
+from rtshcua.onboard.enforcement.allow_list import Frame, is_housekeeping, read_frame
 from rtshcua.onboard.enforcement.frames import OURS, UNSIGNED, Gate
 from rtshcua.onboard.ports import Command, Event
 
@@ -152,6 +157,10 @@ class VehicleLink:
                 refused.append(sealed)
         return frames, refused
 
+    def pass_on(self, frame: bytes, now_us: int) -> bytes | Refusal:
+        """The frame of another program, as the boundary lets it leave, or why it does not."""
+        return self._frames.seal(frame, now_us)
+
     @property
     def is_mute(self) -> bool:
         """Whether nothing can be asked any more."""
@@ -167,6 +176,62 @@ class VehicleLink:
         return self._frames.renew_ahead(
             lambda command: [codec.pack(each) for each in encode(command)], now_us, begins=begins
         )
+
+
+# ---------------------------------------------------------------- requests of a gateway's clients
+# They are a part of what the boundary's gate lets out at any time. Our heartbeat, texts and the dialogue about missions
+# are not among them, and no report becomes rarer than this program needs it, or so frequent that it crowds out others.
+
+NO_VEHICLE: Final = Refusal("no-vehicle", "no vehicle was heard yet")
+NOT_A_REQUEST: Final = Refusal("not-a-request", "the frame is not a request that is passed on")
+BUSY: Final = Refusal("busy", "the vehicle is being asked for the reports of this flight: ask again later")
+ON_A_LINE: Final = Refusal("rate", "the rates on this link are planned within its capacity, and are not changed")
+
+#: the shortest interval that a client may request, in us: 50 a second
+SHORTEST_US: Final = 20_000
+_MESSAGES: Final = frozenset(
+    {layouts.PARAM_REQUEST_READ, layouts.PARAM_REQUEST_LIST, layouts.LOG_REQUEST_LIST, layouts.TIMESYNC}
+)
+_command: Final = LAYOUTS[COMMAND_LONG].getter("command")
+_interval: Final = LAYOUTS[COMMAND_LONG].getter("param1 param2")
+
+
+def command_of(frame: bytes) -> int | None:
+    """The number of the command in a frame; None if it is not a COMMAND_LONG."""
+    found = read_frame(frame)
+    return None if found is None or found.message != COMMAND_LONG else int(_command(found.fields))
+
+
+def refusal_of(frame: bytes, streams: StreamRequests) -> Refusal | None:
+    """Why a request must not be passed on; None if it may."""
+    found = read_frame(frame)
+    if found is None or not is_housekeeping(found):
+        return NOT_A_REQUEST
+    if found.message in _MESSAGES:
+        return None
+    number = _command(found.fields) if found.message == COMMAND_LONG else 0
+    if number == enums.MAV_CMD_REQUEST_MESSAGE:
+        return None
+    return _rate(found, streams) if number == enums.MAV_CMD_SET_MESSAGE_INTERVAL else NOT_A_REQUEST
+
+
+def _rate(frame: Frame, streams: StreamRequests) -> Refusal | None:
+    """Why a requested rate is refused; None if it is not."""
+    if streams.plan.capacity is not None:
+        return ON_A_LINE
+    if streams.waits:
+        return BUSY
+    message, interval_us = _interval(frame.fields)
+    if not (isfinite(message) and isfinite(interval_us)):
+        return NOT_A_REQUEST
+    slowest_us = streams.slowest_us(int(message))
+    if slowest_us == 0:
+        return Refusal("rate", f"the rate of message {int(message)} is not changed")
+    if slowest_us is not None and not 0 < interval_us <= slowest_us:
+        return Refusal("rate", f"this flight needs message {int(message)} every {slowest_us // 1_000} ms or sooner")
+    if 0 < interval_us < SHORTEST_US:
+        return Refusal("rate", f"at most every {SHORTEST_US // 1_000} ms")
+    return None
 
 
 # ---------------------------------------------------------------- link state

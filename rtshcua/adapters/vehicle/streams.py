@@ -175,6 +175,24 @@ class StreamRequests:
                 self._refused.add(self._asking)
             self._asking, self.due_us = None, 0
 
+    @property
+    def waits(self) -> bool:
+        """Whether a request waits for its acknowledgement."""
+        return self._asking is not None
+
+    def passed_on(self, now_us: int) -> None:
+        """Note that somebody else's request was sent: the next acknowledgement is its own."""
+        self._late_us.append(now_us)
+
+    def slowest_us(self, message: int) -> int | None:
+        """The longest interval of a message, by its number, that is still enough here; None where any is. 0 for answers
+        and events, whose rates are not changed.
+        """
+        for name in _ANSWERS:
+            if messages.number_of(name) == message:
+                return 0
+        return next((us for name, us in self.plan.intervals.items() if messages.number_of(name) == message), None)
+
     def due(self, system: int, now_us: int) -> list[Message]:
         """The request to send now, if due. A request without an answer goes to the end of the queue."""
         if self._since_us is None:

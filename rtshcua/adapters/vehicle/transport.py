@@ -1,7 +1,8 @@
-"""Carry octets to and from a vehicle: UDP datagrams, a TCP connection, a serial line.
+"""Carry octets to and from a vehicle: UDP datagrams, a TCP connection, a serial line, an inherited pair of sockets.
 
 A transport never raises once it is made: senders repeat what is lost, and a line or connection that is lost is reopened
-until it is back. UDP keeps the boundaries of datagrams; from a stream, whole frames are returned.
+until it is back. An inherited socket cannot be reopened: once its other end is gone, nothing is heard any more. UDP
+keeps the boundaries of datagrams; from a stream, whole frames are returned.
 """
 
 import errno
@@ -26,6 +27,9 @@ _UNSENT: Final = 4_096
 _AGAIN_US: Final = 500_000
 #: a connection without any answer is given up after so many seconds
 _DEAD_S: Final = 3
+#: errors of a socket whose other end is gone for good
+_ENDED: Final = (errno.ECONNREFUSED, errno.ECONNRESET, errno.EPIPE, errno.ENOTCONN)
+_CLOSED: Final = "closed by the other end"
 #: connections at once: the vehicle's, and others that are kept apart from it
 _MOST: Final = 4
 
@@ -83,6 +87,8 @@ def open_transport(address: Address) -> Transport:
             return TcpListener(address)
         case LinkCarrier.SERIAL:
             return SerialTransport(address)
+        case LinkCarrier.INHERITED:
+            return InheritedTransport(address)
 
 
 # ---------------------------------------------------------------- datagrams
@@ -150,6 +156,78 @@ class UdpTransport:
         self._socket.close()
 
 
+class InheritedTransport:
+    """One end of a pair of datagram sockets, inherited from the program that has the other end and the link to the
+    vehicle. Each datagram has one or more whole frames. Raises OSError where the descriptor is not such a socket.
+    """
+
+    begins = True  # what the other end forwards may have to be greeted first
+    capacity: int | None = None
+
+    def __init__(self, address: Address) -> None:
+        self.trouble: str | None = None
+        self._address = address
+        self._octets = 0
+        self._buffer = memoryview(bytearray(_LARGEST))
+        self._notes: list[str] = []
+        self._gone = False
+        self._socket = socket.socket(fileno=address.port)
+        datagrams = self._socket.type in (socket.SOCK_DGRAM, socket.SOCK_SEQPACKET)
+        if self._socket.family != socket.AF_UNIX or not datagrams:
+            self._socket.detach()  # it is another part's
+            raise OSError(errno.EPROTOTYPE, "not one end of a pair of datagram sockets")
+        self._socket.set_inheritable(False)  # the other end must notice the end of this process
+        self._socket.setblocking(False)
+
+    @property
+    def counts(self) -> StreamCounts:
+        return StreamCounts(octets=self._octets)
+
+    def readable(self) -> Sequence[int]:
+        return () if self._gone else (self._socket.fileno(),)
+
+    def receive(self) -> tuple[bytes, Hashable] | None:
+        if self._gone:
+            return None
+        try:
+            octets = self._socket.recv_into(self._buffer)
+        except BlockingIOError:
+            return None
+        except OSError as error:
+            self._lost(_reason(error))
+            return None
+        if octets == 0 and self._socket.type == socket.SOCK_SEQPACKET:  # the end, or an empty message: nobody sends one
+            self._lost(_CLOSED)
+            return None
+        self._octets += octets
+        return bytes(self._buffer[:octets]), self._address.port
+
+    def is_open(self, sender: Hashable) -> bool:
+        return not self._gone
+
+    def send(self, frame: bytes, to: Hashable) -> None:
+        if self._gone:
+            return
+        try:
+            self._socket.send(frame)
+        except OSError as error:
+            if error.errno in _ENDED:
+                self._lost(_CLOSED)
+            # else it is lost, as any datagram may be: the other end may be slow
+
+    def tend(self, now_us: int) -> list[str]:
+        notes, self._notes = self._notes, []
+        return notes
+
+    def close(self) -> None:
+        self._gone = True
+        self._socket.close()
+
+    def _lost(self, why: str) -> None:
+        self._gone, self.trouble = True, why
+        self._notes.append(f"`{self._address}` was lost ({why}): it cannot be opened again")
+
+
 # ---------------------------------------------------------------- streams
 
 
@@ -173,7 +251,7 @@ class _Line:
             self.gone = _reason(error)
             return None
         if not octets:
-            self.gone = "closed by the other end"
+            self.gone = _CLOSED
             return None
         return b"".join(self.frames.feed(octets))
 

@@ -3,7 +3,7 @@
 import os
 import sys
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from hashlib import sha256
 from itertools import count
@@ -14,13 +14,14 @@ from typing import Final, Self
 import msgspec
 from msgspec.structs import replace
 
-from rtshcua.adapters.agent_socket import NO_LINE, AgentSocket, Encoded
+from rtshcua.adapters.agent_socket import NO_LINE, AgentSocket, ClientLine, Encoded, FrameRequest
+from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.step_number import number_of
 from rtshcua.onboard.calls import call
 from rtshcua.onboard.enforcement.load import Loaded
-from rtshcua.onboard.ports import Action, Append, Event, Presented, Reply
+from rtshcua.onboard.ports import Action, Append, ClientRecord, Event, Presented, Reply
 from rtshcua.wire import names
 from rtshcua.wire.document import kind_of
 from rtshcua.wire.untrusted import Untrusted
@@ -52,6 +53,10 @@ _LASTING: Final = frozenset(
 )  # fmt: skip
 _TAKEN_IN: Final = ("superseded", "the replacement was accepted before")
 _FAILED: Final = ("failed", "the document could not be examined")
+_RECORDED: Final = ("accepted", "it is recorded")
+_NO_LOG: Final = ("not-flying", "no log is open: hand it in again once the flight began")
+_PASSED_ON: Final = ("accepted", "it was sent to the vehicle")
+_OVER: Final = ("falling-back", "the mission is over")
 
 _encode = msgspec.json.Encoder().encode
 
@@ -87,6 +92,7 @@ class Agents:
         self._switch_s = sys.getswitchinterval()
         self._notes: list[str] = []
         self._left: Sequence[Event] = ()
+        self._requests: list[FrameRequest] = []
         self._sockets: list[_SocketQueue] = []
         numbers = count(1)
         try:
@@ -118,7 +124,11 @@ class Agents:
         self._left = ()
         for queue in self._sockets:
             event = queue.socket.poll(now.monotonic_us)
-            if event is not None:
+            if isinstance(event, FrameRequest):
+                self._requests.append(event)
+            elif isinstance(event, ClientLine):
+                found += self._of_client(queue, event)
+            elif event is not None:
                 found += self._dispatch(queue, event, now)
             while queue.ahead and queue.ahead[0][0].done():
                 future, came = queue.ahead.pop(0)
@@ -134,6 +144,21 @@ class Agents:
             self._watches = False
             self._notes.append(SAME_USER)
         return found
+
+    def _of_client(self, queue: _SocketQueue, line: ClientLine) -> Sequence[Event]:
+        """What a gateway says of a client, for the log; before the log is open, and once its last epoch may be sealed,
+        it is refused.
+        """
+        answer = _NO_LOG if self._waits else _OVER if self._over else _RECORDED
+        queue.socket.answer(line.sender, *answer)
+        return (ClientRecord(line.at_us, line.text),) if answer is _RECORDED else ()
+
+    def pass_on(self, send: Callable[[bytes], Refusal | None]) -> None:
+        """Hand the received requests to `send`, which refuses those that must not leave, and answer them."""
+        requests, self._requests = self._requests, []
+        for each in requests:
+            refused = send(each.frame)
+            self.answer(each.sender, *(_PASSED_ON if refused is None else (refused.slug, refused.text)))
 
     def _dispatch(self, queue: _SocketQueue, event: Presented | Encoded, now: Now) -> Sequence[Event]:
         """Return a document at once, or pass it to the worker thread."""
@@ -216,7 +241,8 @@ class Agents:
         self._over = True
         for event in self.events(now):
             if isinstance(event, Presented):
-                self.watch([Reply(event.sender, "falling-back", "the mission is over")])
+                self.watch([Reply(event.sender, *_OVER)])
+        self.pass_on(lambda _: Refusal(*_OVER))
 
     def notes(self) -> Sequence[str]:
         """Notes for the user about the connected users, each once."""

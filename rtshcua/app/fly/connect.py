@@ -56,6 +56,7 @@ PORT_HELP: Final = {
     LinkCarrier.TCP_IN: "another program may listen there; a vehicle can be told to connect to another port",
     LinkCarrier.SERIAL: "end the program that has it open (ModemManager, a ground station, a shell on the console); "
     "the group `dialout` may open serial devices; `ls /dev/serial/by-id` shows which there are",
+    LinkCarrier.INHERITED: "the program that starts this one passes one end of a `socketpair` of datagrams",
 }
 
 _NO_DEVICE: Final = "check that the device is plugged in; `ls /dev/serial/by-id` lists the devices"

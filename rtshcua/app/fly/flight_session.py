@@ -304,6 +304,7 @@ class FlightSession:
         if self._agents is None:
             return ()
         found = self._agents.events(self._clock.now())
+        self._agents.pass_on(self._vehicle.pass_on)
         for text in self._agents.notes():
             self._feed.post(Note(text))
         return found

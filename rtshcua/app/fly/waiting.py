@@ -137,6 +137,7 @@ class MissionWait:
 
     def _handed_in(self) -> Admitted | Refusal | None:
         found = self._agents.events(self._clock.now())
+        self._agents.pass_on(self._vehicle.pass_on)
         for text in self._agents.notes():
             self._console.say(f"note: {text}")
         for number, event in enumerate(found):

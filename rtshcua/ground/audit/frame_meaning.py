@@ -38,7 +38,8 @@ from rtshcua.model.flat.zone import unproject
 
 _QUESTIONS: Final = frozenset((
     layouts.PARAM_REQUEST_READ, layouts.PARAM_REQUEST_LIST, layouts.MISSION_REQUEST, layouts.MISSION_REQUEST_LIST,
-    layouts.MISSION_REQUEST_INT, layouts.MISSION_ACK, layouts.TIMESYNC, layouts.STATUSTEXT,
+    layouts.MISSION_REQUEST_INT, layouts.MISSION_ACK, layouts.TIMESYNC, layouts.LOG_REQUEST_LIST,
+    layouts.STATUSTEXT,
 ))  # fmt: skip
 #: commands that only request information
 _ASKS: Final = frozenset(

@@ -1,9 +1,9 @@
 """The allow-list of frames: which ones may be sent without a permit, and which carry out the permitted command.
 
-Housekeeping moves nothing. Requests, telemetry rates, texts and our own heartbeat always pass. A geofence may be
-uploaded before the flight, never during it; the same applies to the two parameters that switch ArduCopter's fence
-on. Nothing else is housekeeping: no mission upload, signing key, file access or manual control. Other parameters
-are set only as listed in a preparation (`written`, `frames.py`).
+Housekeeping moves nothing. Requests (also for the list of logs, not for their data), telemetry rates, texts and our
+own heartbeat always pass. A geofence may be uploaded before the flight, never during it; the same applies to the two
+parameters that switch ArduCopter's fence on. Nothing else is housekeeping: no mission upload, signing key, file access
+or manual control. Other parameters are set only as listed in a preparation (`written`, `frames.py`).
 
 A frame carries out a command if every field that the autopilot acts on has the value in the command: the number,
 each parameter, the frame of reference, the point, the height, the speed, the mode. Values must be equal except for
@@ -175,6 +175,7 @@ _AT_ANY_TIME: Final[dict[int, Callable[[_Fields], bool]]] = {
     layouts.MISSION_REQUEST_INT: _any,
     layouts.MISSION_ACK: _any,
     layouts.TIMESYNC: _any,
+    layouts.LOG_REQUEST_LIST: _any,
     layouts.STATUSTEXT: _any,
 }
 _BEFORE_FLIGHT: Final[dict[int, Callable[[_Fields], bool]]] = {

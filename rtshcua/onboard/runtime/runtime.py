@@ -28,6 +28,8 @@ from rtshcua.wire.untrusted import Untrusted
 
 #: how much of a vehicle's text is recorded, in letters
 MOST_SAID: Final = 200
+#: the effect that records what a gateway says of one of its clients
+CLIENT: Final = "client"
 #: the least interval between records of refused documents, in us: a flood must not fill the disk
 REFUSED_EVERY_US: Final = 1_000_000
 
@@ -222,6 +224,8 @@ class EventHandler:
                 self._journal.effect(now, "said", detail=f"{event.severity}: {event.text[:MOST_SAID]}")
             case ports.Noted():
                 self._journal.note(now, event.text)
+            case ports.ClientRecord():
+                self._journal.effect(now, CLIENT, detail=event.text)
             case ports.Obeyed():
                 self._controller.dispatcher.obeyed(now, event)
             case ports.Hindered():

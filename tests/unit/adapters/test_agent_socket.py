@@ -15,14 +15,21 @@ import pytest
 
 from rtshcua.adapters import agent_socket
 from rtshcua.adapters.agent_socket import (
+    CLIENT_BYTES,
+    CLIENT_LINES,
     GAP_US,
+    LIGHT_GAP_US,
     LONGEST,
+    MOST_FRAME,
     MOST_OF_A_PEER,
     MOST_READERS,
     MOST_WAITING,
+    REQUESTS,
     AgentSocket,
+    ClientLine,
     FlightFollower,
     FlightReply,
+    FrameRequest,
     Peer,
     SocketTaken,
     flight_at,
@@ -489,3 +496,62 @@ def test_a_socket_in_no_folder_is_named(folder: Path) -> None:
             flight_at(path)
     with pytest.raises(OSError, match="too long for a socket"):
         hand_in(folder / ("x" * 120), b"")
+
+
+# ---------------------------------------------------------------- lines of a gateway
+
+
+def line_of(**parts: object) -> bytes:
+    return json.dumps(parts).encode() + b"\n"
+
+
+def test_lines_about_clients_and_requests_come_in_beside_documents(agents: AgentSocket) -> None:
+    with reader(agents) as link:
+        link.sendall(line_of(id=3, client='{"refused":"FTP"}') + line_of(id=4, request=b64encode(b"frame").decode()))
+        link.sendall(handed(b"paper", 5))
+        found = [agents.poll(1), agents.poll(1), agents.poll(1 + LIGHT_GAP_US), agents.poll(1 + 2 * LIGHT_GAP_US)]
+        said, early, asked, document = found
+        assert early is None
+        assert isinstance(said, ClientLine)
+        assert (said.at_us, said.text) == (1, '{"refused":"FTP"}')
+        assert isinstance(asked, FrameRequest)
+        assert asked.frame == b"frame"
+        assert isinstance(document, Presented)
+        assert len({said.sender, asked.sender, document.sender}) == 3
+        agents.answer(asked.sender, "accepted", "sent")
+        assert json.loads(heard(link)[-1])["id"] == 4
+
+
+@pytest.mark.parametrize("parts", [
+    {"client": "no JSON"}, {"client": "[1]"}, {"client": json.dumps({"a": "x" * CLIENT_BYTES})},
+    {"client": json.dumps({"a": "é" * (CLIENT_BYTES // 2)}, ensure_ascii=False)}, {"client": "[" * 100},
+    {"client": "{}", "document": "aGk="}, {"client": "{}", "request": "aGk="}, {"request": "aGk=", "document": "aGk="},
+    {"request": "!!"}, {"request": b64encode(bytes(MOST_FRAME + 1)).decode()}, {"request": "a" * 5_000},
+    {"client": 7}, {"request": None}, {"client": ""},
+])  # fmt: skip
+def test_malformed_line_of_a_gateway_is_answered_with_its_number(agents: AgentSocket, parts: dict[str, object]) -> None:
+    with reader(agents) as link:
+        link.sendall(line_of(id=9, **parts))
+        assert agents.poll(0) is None
+        answer = json.loads(heard(link)[-1])
+        assert (answer["id"], answer["slug"]) == (9, "malformed")
+
+
+@pytest.mark.parametrize(("parts", "kind"), [({"client": "{}"}, CLIENT_LINES), ({"request": "aGk="}, REQUESTS)])
+def test_lines_of_a_gateway_are_limited_by_user_and_answered_busy(
+    agents: AgentSocket, parts: dict[str, str], kind: tuple[int, int]
+) -> None:
+    each_us, at_once = kind
+    start_us = 10_000_000
+    with reader(agents) as link:
+        link.sendall(line_of(id=1, **parts) * (at_once + 30))
+        taken = [agents.poll(start_us + number * LIGHT_GAP_US) for number in range(at_once + 30)]
+        more = (at_once + 30) * LIGHT_GAP_US // each_us
+        assert [each is not None for each in taken[:at_once]] == [True] * at_once
+        assert sum(each is not None for each in taken) <= at_once + more
+        assert json.loads(heard(link)[-1])["slug"] == "busy"
+        later_us = start_us + 3_600_000_000
+        link.sendall(line_of(**parts) * (at_once + 5))
+        taken = [agents.poll(later_us + number * LIGHT_GAP_US) for number in range(at_once + 5)]
+        assert None not in taken[:at_once], "the whole share again, and no more"
+        assert None in taken

@@ -144,6 +144,7 @@ ALWAYS: list[Any] = [
     m.MAVLink_param_request_list_message(SYSTEM, 1),
     m.MAVLink_statustext_message(6, b"going home"),
     m.MAVLink_timesync_message(0, 5),
+    m.MAVLink_log_request_list_message(SYSTEM, 1, 0, 0xFFFF),
     m.MAVLink_mission_request_list_message(SYSTEM, 1, 1),
     m.MAVLink_mission_request_int_message(SYSTEM, 1, 0, 1),
     m.MAVLink_mission_request_message(SYSTEM, 1, 0, 1),

@@ -171,7 +171,8 @@ def _incidents(text: str, flavour: "AutopilotKind | None", seed: int | None) -> 
 
 def _too_fast(link: Address | None, speed: float, *, sets: bool) -> tuple[str, str] | None:
     """Return the message and the help if the vehicle cannot fly at this speed; None if it can."""
-    if link is not None and speed != 1 and not link.is_loopback:
+    inherited = link is not None and link.way is LinkCarrier.INHERITED  # whether it is simulated, the vehicle reports
+    if link is not None and speed != 1 and not link.is_loopback and not inherited:
         text = f"`--speed` requires a simulated vehicle on this machine, not one at `{link}`"
         return text, "start `rtshcua sim --speed N` and use `--connect udpin:127.0.0.1:14550`"
     if sets and speed > _FASTEST_SET:

@@ -10,6 +10,7 @@ from rtshcua.adapters.vehicle.address import Address, AddressError, LinkCarrier,
     ("udpin:drone.example:65535", False, None), ("tcp:10.0.0.7:5760", False, None),
     ("tcpin:127.0.0.1:5760", True, None),
     ("serial:/dev/ttyAMA0:921600", False, 92_160), ("serial:/dev/serial/by-id/usb-a:b-if00:57600", False, 5_760),
+    ("fd:3", False, None), ("fd:1048575", False, None),
 ])  # fmt: skip
 def test_good_ones(text: str, loopback: bool, capacity: int | None) -> None:
     made = parse(text)
@@ -21,6 +22,7 @@ def test_good_ones(text: str, loopback: bool, capacity: int | None) -> None:
 def test_parts() -> None:
     assert parse("udpin:10.0.0.7:14551") == Address(LinkCarrier.UDP_IN, "10.0.0.7", 14551)
     assert parse("serial:/dev/ttyUSB0:57600") == Address(LinkCarrier.SERIAL, "/dev/ttyUSB0", 57_600)
+    assert parse("fd:7") == Address(LinkCarrier.INHERITED, "", 7)
 
 
 @pytest.mark.parametrize(("text", "marked", "says", "accepted"), [
@@ -43,6 +45,11 @@ def test_parts() -> None:
     ("serial:/dev/ttyAMA0", "", "baud rate of the link is missing", "serial:/dev/ttyAMA0:921600"),
     ("serial:ttyAMA0:57600", "ttyAMA0", "not the path of a device", "absolute path"),
     ("serial:/dev/ttyAMA0:fast", "fast", "is not a baud rate", "is a number"),
+    ("fd", "", "descriptor of the link is missing", "fd:3"),
+    ("fd:", "", "descriptor of the link is missing", "from 3 on"),
+    ("fd:2", "2", "is not an inherited descriptor", "from 3 on"),
+    ("fd:1048576", "1048576", "is not an inherited descriptor", "from 3 on"),
+    ("fd:x:3", "x:3", "is not an inherited descriptor", "from 3 on"),
     ("serial:/dev/ttyAMA0:57601", "57601", "not a baud rate of this system", "the nearest is 57600"),
 ])  # fmt: skip
 def test_bad_address_is_marked_and_explained(text: str, marked: str, says: str, accepted: str) -> None:

@@ -11,7 +11,14 @@ from random import Random
 import pytest
 
 from rtshcua.adapters.vehicle.address import Address, LinkCarrier
-from rtshcua.adapters.vehicle.transport import SerialTransport, TcpListener, TcpTransport, UdpTransport, open_transport
+from rtshcua.adapters.vehicle.transport import (
+    InheritedTransport,
+    SerialTransport,
+    TcpListener,
+    TcpTransport,
+    UdpTransport,
+    open_transport,
+)
 from rtshcua.onboard.ports import Event, LinkBack, LinkLost, Noted
 from rtshcua.simulation.config import AutopilotKind, Boot, SimulationConfig
 from virtual.line import Connection, LinedVehicle, Terminal
@@ -272,3 +279,101 @@ def test_each_way_has_its_transport(terminal: Terminal) -> None:
     assert [each.capacity for each in made] == [None, None, None, None, 5_760]
     for each in made:
         each.close()
+
+
+# ---------------------------------------------------------------- an inherited socket
+
+
+class Datagrams(Connection):
+    """The vehicle's end of a pair: it sends no empty datagrams."""
+
+    def write(self, octets: bytes) -> int:
+        return super().write(octets) if octets else 0
+
+
+def inherited(kind: int) -> tuple[InheritedTransport, socket.socket]:
+    """The transport over one end of a pair, and the other end."""
+    near, far = socket.socketpair(socket.AF_UNIX, kind)
+    transport = open_transport(Address(LinkCarrier.INHERITED, "", near.detach()))
+    assert isinstance(transport, InheritedTransport)
+    far.setblocking(False)
+    return transport, far
+
+
+@pytest.mark.parametrize("kind", [socket.SOCK_DGRAM, socket.SOCK_SEQPACKET])
+def test_inherited_pair_keeps_datagrams_apart_and_is_not_passed_on(kind: int) -> None:
+    transport, far = inherited(kind)
+    (number,) = transport.readable()
+    assert not os.get_inheritable(number)
+    assert transport.receive() is None
+    far.send(b"one")
+    far.send(b"another")
+    assert transport.receive() == (b"one", number)
+    assert transport.receive() == (b"another", number)
+    assert transport.counts.octets == 10
+    transport.send(b"frame", None)
+    transport.send(b"later", number)
+    assert [far.recv(100), far.recv(100)] == [b"frame", b"later"]
+    transport.close()
+    assert transport.readable() == ()
+    transport.send(b"to nobody", number)
+    far.close()
+
+
+@pytest.mark.parametrize("kind", [socket.SOCK_DGRAM, socket.SOCK_SEQPACKET])
+def test_slow_other_end_loses_datagrams_and_blocks_nothing(kind: int) -> None:
+    transport, far = inherited(kind)
+    for _ in range(5_000):
+        transport.send(bytes(200), None)
+    assert transport.tend(0) == []
+    assert transport.is_open(None)
+    assert far.recv(1_000) == bytes(200)
+    transport.close()
+    far.close()
+
+
+@pytest.mark.parametrize("kind", [socket.SOCK_DGRAM, socket.SOCK_SEQPACKET])
+def test_closed_other_end_is_noted_once_and_waited_for_without_spinning(kind: int) -> None:
+    transport, far = inherited(kind)
+    far.send(b"last")
+    far.close()
+    received = transport.receive()
+    assert received is not None
+    assert received[0] == b"last"
+    assert transport.receive() is None
+    transport.send(b"heartbeat", None)
+    (note,) = transport.tend(0)
+    assert "lost (closed by the other end): it cannot be opened again" in note
+    assert transport.trouble == "closed by the other end"
+    assert not transport.is_open(None)
+    assert transport.readable() == ()
+    assert transport.receive() is None
+    assert transport.tend(1) == []
+    transport.close()
+
+
+@pytest.mark.parametrize("kind", [socket.SOCK_DGRAM, socket.SOCK_SEQPACKET])
+def test_vehicle_behind_an_inherited_pair_is_heard_and_its_loss_is_a_link_loss(kind: int) -> None:
+    near, far = socket.socketpair(socket.AF_UNIX, kind)
+    vehicle = LinedVehicle(
+        POLICY, CONFIG, Address(LinkCarrier.INHERITED, "", near.detach()), Datagrams(far), 10_000_000
+    )
+    live(vehicle, 10, lambda: vehicle.driver._watch.answers)
+    assert vehicle.driver.flavour is not None
+    assert vehicle.driver._watch.answers
+    far.close()
+    vehicle.end = None
+    said = live(vehicle, 4)
+    assert [text for text in notes(said) if "cannot be opened again" in text]
+    assert [event for event in said if isinstance(event, LinkLost)]
+    vehicle.close()
+
+
+def test_descriptor_of_another_kind_is_an_error_and_stays_open(tmp_path: Path) -> None:
+    with (tmp_path / "file").open("w") as file, pytest.raises(OSError, match="non-socket"):
+        open_transport(Address(LinkCarrier.INHERITED, "", file.fileno()))
+    for family, kind in ((socket.AF_INET, socket.SOCK_DGRAM), (socket.AF_UNIX, socket.SOCK_STREAM)):
+        with socket.socket(family, kind) as made:
+            with pytest.raises(OSError, match="not one end of a pair"):
+                open_transport(Address(LinkCarrier.INHERITED, "", made.fileno()))
+            assert made.getsockopt(socket.SOL_SOCKET, socket.SO_TYPE) == kind

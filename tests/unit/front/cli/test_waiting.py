@@ -54,6 +54,7 @@ class Vehicle:
     def __init__(self, base: Loaded) -> None:
         self.polls = 0
         self.announced: list[str] = []
+        self.passed: list[bytes] = []
         self.slot = next(each.slot for each in base.bundle.policy.signals if each.name == "battery")
         self.driver = SimpleNamespace(unready="GPS", seen=SimpleNamespace(armed=False, airborne=None))
 
@@ -62,6 +63,10 @@ class Vehicle:
         self.polls += 1
         self.driver.unready = "GPS" if self.polls < 4 else None
         return [Readings(now_us, ((self.slot, 8_000),))]
+
+    def pass_on(self, frame: bytes) -> Refusal | None:
+        self.passed.append(frame)
+        return None if frame == b"frame" else Refusal("not-a-request", "no")
 
     def announce(self, severity: int, text: str) -> None:
         self.announced.append(text)
@@ -218,3 +223,21 @@ def test_once_the_vehicle_has_another_root_the_wait_is_over(begin: Callable[...,
     world.newer = Refusal("root-superseded", "the trust root changed meanwhile")
     assert world.end() is world.newer
     assert world.tried == []
+
+
+def test_requests_reach_the_vehicle_during_the_wait_and_lines_about_clients_have_no_log_yet(
+    begin: Callable[..., World],
+) -> None:
+    world = begin()
+    with socket.socket(socket.AF_UNIX) as link:
+        link.connect(str(world.path))
+        for number, text in enumerate((b"frame", b"other")):
+            link.sendall(json.dumps({"id": number, "request": b64encode(text).decode()}).encode() + b"\n")
+        link.sendall(b'{"id":2,"client":"{}"}\n')
+        file, answers = link.makefile("rb"), dict[int, str]()
+        while len(answers) < 3:
+            line = json.loads(file.readline())
+            if line["type"] == "answer":
+                answers[line["id"]] = line["slug"]
+    assert answers == {0: "accepted", 1: "not-a-request", 2: "not-flying"}
+    assert world.vehicle.passed == [b"frame", b"other"]

@@ -108,13 +108,16 @@ class TakenOver:
                 case "again" if self.papers:
                     self.hand(self.of.choice(self.papers))
                 case "wait":
-                    us = self.of.choice([50_000, S, 11 * S, 11 * MIN])
-                    self.now = replace(self.now, monotonic_us=self.now.monotonic_us + us, utc_us=self.now.utc_us + us)
+                    self.wait(self.of.choice([50_000, S, 11 * S, 11 * MIN]))
                 case "fly":
                     self.fly()
         return self.broken
 
     # ------------------------------------------------------------------------------------------------ actions
+
+    def wait(self, us: int) -> None:
+        """Let the time pass."""
+        self.now = replace(self.now, monotonic_us=self.now.monotonic_us + us, utc_us=self.now.utc_us + us)
 
     def fly(self) -> None:
         """The actions of an honest runtime, to reach the rest of the mission; one in four requests has a single fault,
@@ -125,10 +128,14 @@ class TakenOver:
             return
         meant, at = steps[self.step], self.now.monotonic_us
         state = self.told(meant, strange=0.25)
-        asked = Request(STEP, meant.step, -1, meant.binding, self.now, state, at, meant.phase, 5_000)
+        slow = self.of.random() < 0.1  # it asks late, and sends after the deadline
+        released_us = max(at - 9 * S, START.monotonic_us) if slow else at
+        asked = Request(STEP, meant.step, -1, meant.binding, self.now, state, released_us, meant.phase, 5_000)
         self.enforce(self.spoiled(asked) if self.of.random() < 0.25 else asked, meant)
         if self.permits and self.permits[-1] in self.admitted and self.admitted[self.permits[-1]][0] is meant:
             self.loaded.executor.ended()
+            if slow:
+                self.wait(1_200_000)
             self.send(self.permits[-1])
             self.loaded.executor.ended()
             self.step += 1
@@ -141,7 +148,7 @@ class TakenOver:
             case 1:
                 return replace(asked, phase=(asked.phase + self.of.choice([1, 2])) % 3)
             case 2:
-                return replace(asked, released_us=max(asked.released_us - 9 * S, 0))
+                return replace(asked, released_us=max(asked.released_us + self.of.choice([-9, 9]) * S, 0))
             case _:
                 return replace(asked, remaining_us=20 * S)
 
@@ -210,7 +217,7 @@ class TakenOver:
         match of.randrange(8):
             case 0:
                 called_off = of.choice([recall, cancellation])
-                return called_off(self.loaded, now=now, expires_at_us=now.utc_us + MIN) if of.random() < 0.2 else b""
+                return called_off(self.loaded, now=now, expires_at_us=now.utc_us + MIN) if of.random() < 0.5 else b""
             case 1:
                 kept = min(2, steps - 1)
                 return replacement(self.loaded, kept) if steps == 4 and of.random() < 0.3 else b""

@@ -37,7 +37,7 @@ from rtshcua.wire.trust import open_root
 NAME: Final = "X6"
 #: records of a log: as published, and of long ones
 RECORDS: Final = 1_000
-LONG, LONG_QUICK = 262_144, 20_000
+LONG, LONG_QUICK = 262_144, 5_000
 #: how often a long log is verified each way
 LONG_RUNS: Final = 3
 DURABILITIES: Final = {"buffered": BUFFERED, "written": WRITTEN, "synced-first": SYNCED_FIRST}

@@ -1,5 +1,6 @@
 """X4: what an answer to trouble costs on board, without vehicle and network: for each case that is not allowed, from
-the encoding of the request to the line of evidence, and on to the file and the disk.
+the encoding of the request to the line of evidence, and on to the file and the disk. `fallback_flights` has the
+way from frame to frame.
 
 `local` is the request, the decision with the link that it selects, the answer, and the record of both with its place in
 chain and tree. Each boundary is asked by the octets of a request, and the cases take turns. The runs that are synced
@@ -20,6 +21,7 @@ from rtshcua.evaluation import cases
 from rtshcua.evaluation.case_checks import SLOW, StruckBundle
 from rtshcua.evaluation.cases import CASES, EvaluationCase
 from rtshcua.evaluation.design import EvaluationPlan, EvaluationPoint, WorkUnit
+from rtshcua.evaluation.fallback_flights import FLOWN, reactions
 from rtshcua.evaluation.results import FallbackTiming, Result
 from rtshcua.evaluation.worlds import RECEIVED, World, not_here, program_at, root_of, world
 from rtshcua.evidence.log_writer import Recorder
@@ -32,6 +34,8 @@ from rtshcua.wire.keys import Duty
 from rtshcua.wire.request import Request, encode
 
 NAME: Final = "X4"
+#: the first part of the key of a unit of flights
+REACTION: Final = "reaction"
 #: modes in which all is enforced
 ENFORCED: Final = ("software", "process", "trustzone-m", "optee")
 #: every case that is not allowed
@@ -42,17 +46,26 @@ _WARM: Final = 20
 
 
 def units(plan: EvaluationPlan) -> list[WorkUnit]:
-    """One unit for each mode, with all conditions."""
+    """One unit for each mode, with all conditions; then the flights, one unit for each mode (`quick`: of one only) and
+    condition.
+    """
     modes = [mode for mode in plan.modes if mode in ENFORCED and not (plan.quick and mode in SLOW)]
-    return [WorkUnit(NAME, (mode, plan.runs)) for mode in modes]
+    flown = [
+        WorkUnit(NAME, (REACTION, case, mode, plan.runs))
+        for mode in modes[: 1 if plan.quick else None]
+        for case in FLOWN
+    ]
+    return [*(WorkUnit(NAME, (mode, plan.runs)) for mode in modes), *flown]
 
 
 def run(unit: WorkUnit) -> Sequence[Result]:
     """Measure a unit. Raises RuntimeError for an unexpected outcome."""
-    mode, runs = unit.key
+    *flown, mode, runs = unit.key
     missing = not_here(str(mode))
     if missing:
         return missing
+    if flown:
+        return reactions(str(flown[1]), str(mode), int(runs))
     program, found = program_at(_POINT), list[Result]()
     own = (cases.OUT_OF_SCOPE, cases.NOT_PERMITTED)
     groups = ([each for each in TRIGGERED if each not in own], *([each] for each in own))

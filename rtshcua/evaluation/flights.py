@@ -11,7 +11,7 @@ import gc
 import os
 import socket
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -51,9 +51,9 @@ from rtshcua.wire.response import decode as decode_response
 ABSENT: Final = "unavailable"
 #: the modes in an emulator, whose flights take minutes
 EMULATED: Final = ("trustzone-m", "optee")
-_QUICK_POINTS: Final = (
-    EvaluationPoint("short", 1_500_000), EvaluationPoint("short", 100_000), EvaluationPoint("standard", 500_000),
-)  # fmt: skip
+#: of a sample: the point of all modes, and one of a longer mission, which takes five times as long, of one mode
+_QUICK_POINT: Final = EvaluationPoint("short", 1_500_000)
+_QUICK_LONGER: Final = (EvaluationPoint("standard", 500_000), "software")
 #: the loop's longest wait, and how often it reads the vehicle's frames, in us of the flight
 _WAIT_US: Final = 100_000
 _TICK_US: Final = 50_000
@@ -116,7 +116,7 @@ class _Begun(NamedTuple):
     sent_ns: int
 
 
-class _TimedVehicle(VirtualVehicle):
+class TimedVehicle(VirtualVehicle):
     """Time-stamps the frames that release steps, and sends commands to a socket."""
 
     def begin_timing(self, link: socket.socket) -> None:
@@ -125,6 +125,11 @@ class _TimedVehicle(VirtualVehicle):
         self._released = (0, 0)  # on the flight's clock in us, and on the computer's in ns
         self._turned = (0, 0)  # the same for the last advance of the flight's clock
         self.begun: list[_Begun] = []
+
+    @property
+    def over(self) -> bool:
+        """Whether the flight can be left: never before the end of the mission."""
+        return False
 
     def poll(self, now_us: int, timeout_us: int) -> Sequence[Event]:
         """Wait in real time for a record."""
@@ -172,8 +177,13 @@ class _Flown(NamedTuple):
     begun: Sequence[_Begun]
 
 
-def fly(point: CompiledPoint, mode: str, seed: int, link: socket.socket, folder: Path) -> _Flown:
-    """Fly a mission once. Raises RuntimeError for a refused bundle, BoundaryError and OSError."""
+def fly(
+    point: CompiledPoint, mode: str, seed: int, link: socket.socket, folder: Path,
+    making: Callable[..., TimedVehicle] = TimedVehicle,
+) -> _Flown:  # fmt: skip
+    """Fly a mission once, with the vehicle that `making` makes. Raises RuntimeError for a refused bundle, BoundaryError
+    and OSError.
+    """
     policy, mission = point.policy, point.mission
     clock = VirtualClock(Now(START.monotonic_us, mission.issued_at_us + LATER_US, START.utc_error_us))
     with ExitStack() as stack:
@@ -186,9 +196,7 @@ def fly(point: CompiledPoint, mode: str, seed: int, link: socket.socket, folder:
         boundary = _TimedBoundary(loaded.boundary)
         loaded = replace(loaded, boundary=boundary)
         config = sources.fitted(policy, seed=seed, land_mm_s=_LAND_MM_S)
-        vehicle = _TimedVehicle(
-            policy, config, clock, loaded.executor.frames, tick_us=_TICK_US, steps=mission.invocations
-        )
+        vehicle = making(policy, config, clock, loaded.executor.frames, tick_us=_TICK_US, steps=mission.invocations)
         vehicle.begin_timing(link)
         recorder, sink = _evidence(mode, folder)
         stack.callback(sink.close)
@@ -198,7 +206,7 @@ def fly(point: CompiledPoint, mode: str, seed: int, link: socket.socket, folder:
         gc.freeze()
         stack.callback(gc.unfreeze)
         ending = None
-        while ending is None and clock.elapsed_us < _LONGEST_US:
+        while ending is None and not vehicle.over and clock.elapsed_us < _LONGEST_US:
             ending = loop.turn()
         closing = recorder.closing(clock.now(), ending=ending or "none", tlog=None)
         append_all(sink, closing, SYNCED_FIRST)
@@ -231,15 +239,18 @@ def units(plan: EvaluationPlan) -> Sequence[WorkUnit]:
     """
     absent = [mode for mode in plan.modes if unavailable(mode) is not None]
     here = [mode for mode in plan.modes if mode not in absent]
-    points = _QUICK_POINTS if plan.quick else POINTS
+    points = (_QUICK_POINT,) if plan.quick else POINTS
     found = [
         WorkUnit("X1", (*point, seed, mode))
         for emulated in (False, True)
         for seed in range(1, plan.runs + 1)
-        for point in (points[:1] if plan.quick and emulated else points)
+        for point in points
         for mode in here
         if (mode in EMULATED) is emulated
     ]
+    longer, mode = _QUICK_LONGER
+    if plan.quick and mode in here:
+        found += [WorkUnit("X1", (*longer, seed, mode)) for seed in range(1, plan.runs + 1)]
     return [*(WorkUnit("X1", (ABSENT, mode)) for mode in absent), *found]
 
 
@@ -251,7 +262,7 @@ def run(unit: WorkUnit) -> Sequence[Result]:
         return (UnavailableMode(mode=str(unit.key[1]), why=why),)
     mission, deadline_us, seed, mode = str(unit.key[0]), int(unit.key[1]), int(unit.key[2]), str(unit.key[3])
     began_ns = perf_counter_ns()
-    point = compiled(mission, deadline_us, _issued_us(seed, mode))
+    point = compiled(mission, deadline_us, issued_us(seed, mode))
     compiled_ns = perf_counter_ns() - began_ns
     flown = _flown(point, mode, seed)
     first_ns = next((each.took_ns for each in flown.begun), 0)
@@ -270,8 +281,8 @@ def run(unit: WorkUnit) -> Sequence[Result]:
     )  # fmt: skip
 
 
-def _issued_us(seed: int, mode: str) -> int:
-    """When the mission of a flight is issued: that of each seed one second later, so that ids differ."""
+def issued_us(seed: int, mode: str) -> int:
+    """UTC in us at which the mission of a flight is issued: that of each seed one second later, so that ids differ."""
     return ISSUED_US + seed * SECOND + MODES.index(mode)
 
 

@@ -142,8 +142,14 @@ def code_lines(source: bytes) -> int:
     return len(lines.difference(*_docstrings(ast.parse(source))))
 
 
+_STATEMENTS: Final = (ast.stmt, ast.excepthandler, ast.match_case)
+
+
 def _docstrings(tree: ast.Module) -> Iterator[range]:
-    for node in ast.walk(tree):
+    waiting: list[ast.AST] = [tree]
+    while waiting:
+        node = waiting.pop()  # expressions, most of a tree, have none
+        waiting += [each for each in ast.iter_child_nodes(node) if isinstance(each, _STATEMENTS)]
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and node.body:
             first = node.body[0]
             if (

@@ -7,6 +7,7 @@ from statistics import median
 from typing import Final, NamedTuple
 
 from rtshcua.evaluation.design import DEADLINES_US, MISSIONS, MODES, POINTS
+from rtshcua.evaluation.fallback_flights import revealed_by
 from rtshcua.evaluation.headline_claims import is_undisturbed
 from rtshcua.evaluation.measures import (
     PAIRED,
@@ -22,11 +23,12 @@ from rtshcua.evaluation.measures import (
     remaining,
     validation,
 )
-from rtshcua.evaluation.published import FIGURES, PUBLISHED_MODES, PublishedFigure
+from rtshcua.evaluation.published import CASES, FIGURES, PUBLISHED_MODES, PublishedFigure
 from rtshcua.evaluation.report_parts import (
     NONE,
     Measured,
     ReportChart,
+    ReportRow,
     ReportSection,
     ReportTable,
     case_order,
@@ -36,7 +38,7 @@ from rtshcua.evaluation.report_parts import (
     ordered_modes,
     span,
 )
-from rtshcua.evaluation.results import FallbackTiming, PointFlight
+from rtshcua.evaluation.results import FallbackReaction, FallbackTiming, PointFlight
 from rtshcua.ground.report.drawing.bar_chart import ChartBar, ChartGroup, bar_chart
 
 #: the isolated modes, with the median that this project wants to add at most, in ms
@@ -266,8 +268,39 @@ def fallback_section(measured: Measured) -> ReportSection:
     title = "Fallback latency in ms, by condition"
     chart = bar_chart(title, "The figures are those of the table above.", groups, logarithmic=True)
     caption = f"{title}; logarithmic axis. Hatched: published. Bars are medians, whiskers reach to the P95."
-    lead = ("No vehicle and no network: a condition strikes, and the decision, the fallback and its record are timed.",)
-    return ReportSection("x4", "X4: fallback", lead, (table, *([ReportChart(chart, caption)] if found else ())))
+    lead = (
+        "No vehicle and no network: a condition strikes, and the decision, the fallback and its record are timed. The "
+        "last table has the whole way from frame to frame, in flight.",
+    )
+    charts = [ReportChart(chart, caption)] if found else []
+    return ReportSection("x4", "X4: fallback", lead, (table, *charts, _reactions(measured)))
+
+
+def _reactions(measured: Measured) -> ReportTable:
+    """From telemetry frame to command frame, by condition; of a condition that no frame reveals, why not."""
+    took: defaultdict[tuple[str, str], list[int]] = defaultdict(list)
+    for each in measured.results:
+        if isinstance(each, FallbackReaction):
+            took[each.case, each.mode].append(each.took_ns)
+    modes, middle, high = ("software", *ISOLATED), FIGURES["x4/median"], FIGURES["x4/p95"]
+    rows: list[ReportRow] = [
+        ("paper [P], each condition, without frames", NONE, middle.text, f"below {high.text}", NONE, NONE, "30")
+    ]
+    for case in (each.name for each in CASES if each.outcome != "allow" and not each.extra):
+        revealed, why_not = revealed_by(case)
+        if not revealed:
+            rows.append((case, why_not, *[NONE] * 4, NONE))
+            continue
+        for mode in modes:
+            found = took[case, mode]
+            told = _told(distribution(found)) if found else (measured.missing(mode), NONE, NONE, NONE)
+            rows.append((f"{case}, `{mode}`", revealed, *told, str(len(found))))
+    return ReportTable(
+        "Telemetry frame in to command frame out, in ms: the fallback of a flight",
+        columns("Condition, mode", "Revealed by", "#Median", "#P95", "#P99", "#Greatest", "#Runs"),
+        tuple(rows),
+        ("reaction", "conditions", "percentile"),
+    )
 
 
 def _condition(mode: str, case: str, runs: Sequence[FallbackTiming]) -> tuple[str, ...]:

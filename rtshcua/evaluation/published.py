@@ -304,6 +304,12 @@ CHOICES: Final = (
     ),
     OpenChoice("conditions", "X4", "the triggered conditions", "each case whose outcome is not allow"),
     OpenChoice(
+        "reaction", "X4", "how long a fallback takes with vehicle and network; the published figures are without them",
+        "a further table: in a flight of `short`, from the telemetry frame that reveals the trouble during `hover`, or "
+        "that releases it when its slack has expired, to the first frame of the fallback handed to the socket. For a "
+        "return that frame requests the vehicle's mode. A fallback does not wait for its record",
+    ),
+    OpenChoice(
         "durability", "X6", "whether an append includes its write to the disk",
         "three appends: buffered, written to the file, and synced to the disk; `written` is compared",
     ),

@@ -102,6 +102,17 @@ class FallbackTiming(msgspec.Struct, frozen=True, kw_only=True, tag_field="resul
     synced_ns: Natural
 
 
+class FallbackReaction(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="reaction"):
+    """X4: one flight in which a condition strikes. `took_ns` counts from the telemetry frame that reveals it, or that
+    releases the step that is refused, to the first frame of the fallback's command handed to the socket.
+    """
+
+    case: str
+    mode: str
+    repetition: Natural
+    took_ns: Natural
+
+
 class AppendTiming(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="append"):
     """X6: the appends of one log, by durability (`buffered`, `written`, `synced-first`), one duration a record."""
 
@@ -149,6 +160,6 @@ class FailedAttempt(msgspec.Struct, frozen=True, kw_only=True, tag_field="result
 
 
 Result = (
-    PointFlight | EnforceCheck | CaseFlight | FallbackTiming | AppendTiming | VerificationTiming
-    | ComponentSize | UnavailableMode | FailedAttempt
+    PointFlight | EnforceCheck | CaseFlight | FallbackTiming | FallbackReaction | AppendTiming
+    | VerificationTiming | ComponentSize | UnavailableMode | FailedAttempt
 )  # fmt: skip

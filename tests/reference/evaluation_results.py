@@ -8,12 +8,14 @@ from rtshcua.campaign.campaign_report import CampaignSummary, summarise
 from rtshcua.campaign.rounds import CampaignResult, JudgeFinding
 from rtshcua.evaluation.computer import Computer
 from rtshcua.evaluation.design import MODES, POINTS, RUNS, UNENFORCED, EvaluationPoint
+from rtshcua.evaluation.fallback_flights import FLOWN
 from rtshcua.evaluation.published import CASES
 from rtshcua.evaluation.results import (
     AppendTiming,
     CaseFlight,
     ComponentSize,
     EnforceCheck,
+    FallbackReaction,
     FallbackTiming,
     PointFlight,
     Result,
@@ -104,6 +106,10 @@ def timings(runs: int = RUNS) -> Iterator[Result]:
                     case=case.name, mode="software", repetition=repetition, local_ns=local, written_ns=local + 5_000,
                     synced_ns=local + 900_000,
                 )  # fmt: skip
+    for case in FLOWN:
+        for repetition in range(1, runs + 1):
+            took = round(600_000 * chance.uniform(0.9, 1.4))
+            yield FallbackReaction(case=case, mode="software", repetition=repetition, took_ns=took)
     for durability, most in (("buffered", 2_000), ("written", 4_000), ("synced-first", 700_000)):
         appended = tuple(round(most * chance.uniform(0.8, 1.6)) for _ in range(1000))
         yield AppendTiming(durability=durability, repetition=1, octets=570_000, appended_ns=appended)

@@ -65,4 +65,4 @@ def test_units_are_those_of_the_paper_and_a_long_log() -> None:
     found = evidence_costs.units(EvaluationPlan())
     assert len(found) == 3 * 30 + 2 + 2
     assert {unit.key[2] for unit in found} == {1_000, 262_144}
-    assert {unit.key[2] for unit in evidence_costs.units(EvaluationPlan(runs=1, quick=True))} == {1_000, 20_000}
+    assert {unit.key[2] for unit in evidence_costs.units(EvaluationPlan(runs=1, quick=True))} == {1_000, 5_000}

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,15 +33,25 @@ def flights(folder: Path) -> RawExperiment:
     return read
 
 
-@pytest.mark.slow
-def test_sample_measures_each_experiment_in_each_mode(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    code, told = ran(capsys, "--quick", "-o", str(tmp_path))
+#: by marker: the modes of which a sample is measured
+SAMPLES = [
+    pytest.param(("none", "software", "process"), id="here"),
+    pytest.param(MODES, id="all", marks=pytest.mark.slow),
+]
+
+
+@pytest.mark.parametrize("modes", SAMPLES)
+def test_sample_measures_each_experiment_in_each_mode(
+    modes: Sequence[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--quick", "--modes", ",".join(modes), "-o", str(tmp_path)]
+    code, told = ran(capsys, *words)
     assert code in (ExitCode.OK, ExitCode.DIAGNOSTICS), told
     assert told["done"] == told["asked"] > 0
     assert told["not_measured"] == []
     assert {path.stem for path in tmp_path.glob("*.jsonl")} == set(EXPERIMENTS)
     results = flights(tmp_path).results
-    assert {each.mode for each in results if isinstance(each, PointFlight | UnavailableMode)} == set(MODES)
+    assert {each.mode for each in results if isinstance(each, PointFlight | UnavailableMode)} == set(modes)
     flown = [each for each in results if isinstance(each, PointFlight)]
     assert {each.ending for each in flown} == {"completed"}
     assert all(each.fallbacks == 0 and each.proposal_ns > 0 for each in flown)
@@ -55,7 +66,7 @@ def test_sample_measures_each_experiment_in_each_mode(tmp_path: Path, capsys: py
     assert all(mode in page for mode in MODES)
     assert (tmp_path / "report.md").stat().st_size > 1_000
     before = {path.name: path.read_bytes() for path in tmp_path.glob("*.jsonl")}
-    again, repeated = ran(capsys, "--quick", "-o", str(tmp_path))
+    again, repeated = ran(capsys, *words)
     assert (again, repeated["done"]) == (code, told["done"])
     assert {path.name: path.read_bytes() for path in tmp_path.glob("*.jsonl")} == before, "nothing is measured twice"
 

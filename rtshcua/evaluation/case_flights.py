@@ -9,6 +9,7 @@ is replayed, between the runtime and the boundary. The remaining two cases are b
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
+from re import findall
 from typing import Any, Final, NamedTuple
 
 from msgspec.structs import replace
@@ -263,7 +264,8 @@ def _expected(case: EvaluationCase, *, aloft: bool) -> str:
         return "nothing"
     return {
         Outcome.FALLBACK: "the first admissible link of the step's fallback, down to a landing",
-        Outcome.DEFER: "nothing until the deadline, then the first admissible link, down to a landing",
+        Outcome.DEFER: "nothing until the deadline, or sooner the end of the grace of what the step maintains; then "
+        "the first admissible link, down to a landing",
         Outcome.DENY: "the contingency, down to a landing",
     }[case.outcome]
 
@@ -285,9 +287,9 @@ def _judge(flown: Flown, step: Invocation, case: EvaluationCase, *, aloft: bool)
 def _judge_links(flown: Flown, step: Invocation, case: EvaluationCase) -> list[str]:
     """Whether the links that must follow in the air were dispatched, and in time."""
     found = []
-    deadline_us = step.contract.deadline_us if case.outcome is Outcome.DEFER else 0
+    waits_us = _waits_us(step, case)
     # while a step waits the vehicle is held, where it can be
-    after = [each for each in flown.dispatched if each.at_us >= flown.struck_us + deadline_us]
+    after = [each for each in flown.dispatched if each.at_us >= flown.struck_us + waits_us]
     held = flown.dispatched[: len(flown.dispatched) - len(after)]
     found += [f"dispatched while the step was deferred: `{each.text}`" for each in held if each.text != "hover"]
     denied = case.outcome is Outcome.DENY
@@ -296,10 +298,24 @@ def _judge_links(flown: Flown, step: Invocation, case: EvaluationCase) -> list[s
         return [*found, f"dispatched first: {after[:1]}, not {expected}"]
     if any(each.kind == STEP for each in after):
         found.append("a step was dispatched")
-    late_us = after[0].at_us - flown.struck_us - deadline_us
+    late_us = after[0].at_us - flown.struck_us - waits_us
     if late_us > _LATE_US:
         found.append(f"the link was dispatched {late_us} us after it had to be")
     return [*found, *_judge_descent(flown, after, case)]
+
+
+def _waits_us(step: Invocation, case: EvaluationCase) -> int:
+    """For how long a step waits in the air: while it is deferred until its deadline. What it maintains holds for the
+    wait too, so that a signal of it that stays unknown ends the wait after the step's grace.
+    """
+    if case.outcome is not Outcome.DEFER:
+        return 0
+    contract = step.contract
+    unknown = (*case.values, case.stale)
+    maintained = any(
+        name and name in findall(r"[\w.]+", clause.text) for clause in contract.maintain for name in unknown
+    )
+    return min(contract.deadline_us, contract.grace_us) if maintained else contract.deadline_us
 
 
 def _link(step: Invocation, case: EvaluationCase) -> int:

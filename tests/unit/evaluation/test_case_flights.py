@@ -54,6 +54,22 @@ def test_case_in_the_air(name: str, flavour: str) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("flavour", FLAVOURS)
+def test_what_a_step_maintains_ends_its_wait_before_a_longer_deadline(flavour: str) -> None:
+    """The survey maintains its place, with a grace of 1 s: a position that stays stale ends the wait then."""
+    found = flown("stale state", "standard", 1_500_000, flavour=flavour)
+    assert (found.holds, found.differs, found.dispatched) == (True, "", ("hover", "hover", "emergency_land"))
+
+
+@pytest.mark.slow
+def test_wait_that_ends_at_another_time_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(case_flights, "_waits_us", lambda *_: 500_000)
+    assert "us after it had to be" in flown("stale state", "standard", 1_500_000).differs
+    monkeypatch.setattr(case_flights, "_waits_us", lambda *_: 1_500_000)
+    assert "not (1, 2, 0)" in flown("stale state", "standard", 1_500_000).differs
+
+
+@pytest.mark.slow
 def test_other_reason_or_link_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     cases = {each.name: each for each in CASES}
     other = cases["low battery"]._replace(reason=Reason.ENERGY)

@@ -139,5 +139,5 @@ class ClientProposal:
         elif event in _ENDS and at == self.flies:
             self.done = at + 1 if event == "succeeded" else self.done
             self.ended = event != "succeeded" or at + 1 == len(self.steps)
-        elif event in ("refused", "refused-live", "skipped") and at > self.flies:
+        elif event in ("refused", "declined", "skipped") and at > self.flies:
             self.refuse(TEMPORARILY_REJECTED, f"{self.steps[at].skill} rejected: the flight goes on without it", now_us)

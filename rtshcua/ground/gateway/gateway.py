@@ -192,8 +192,8 @@ class Gateway:
                     self._clients[client] = _Client(link, ShownState(link, self._seen, self._actions), transfer)
             case ClientDown(client):
                 self._down(client, now.monotonic_us)
-            case ProposalChecked(number, refusal, first):
-                self._checked(number, refusal, first, now.monotonic_us)
+            case ProposalChecked():
+                self._checked(event, now.monotonic_us)
             case ProposalAnswered(number, slug, text):
                 self._answered(number, slug, text, now.monotonic_us)
             case FlightEnded():
@@ -471,7 +471,8 @@ class Gateway:
         holder = self._holder(now_us)
         return "nobody" if holder is None else holder.link.name
 
-    def _checked(self, number: int, refusal: str | None, first: int, now_us: int) -> None:
+    def _checked(self, event: ProposalChecked, now_us: int) -> None:
+        number, refusal, first, for_now = event
         upload = self._uploads.pop(number, None)
         if upload is not None:
             upload.transfer.checked(refusal, now_us)
@@ -481,7 +482,8 @@ class Gateway:
         if proposal is None:
             return
         if refusal is not None:
-            proposal.refuse(DENIED, f"{proposal.steps[0].skill} refused: {refusal}", now_us)
+            result = TEMPORARILY_REJECTED if for_now else DENIED
+            proposal.refuse(result, f"{proposal.steps[0].skill} refused: {refusal}", now_us)
         else:
             proposal.first = first
         self._tidy(now_us)

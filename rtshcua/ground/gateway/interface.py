@@ -103,12 +103,13 @@ class FlightEnded(NamedTuple):
 
 class ProposalChecked(NamedTuple):
     """The worker compiled a proposal. `refusal` is None if it was signed and handed in; its first step is then the step
-    with the index `first_step` in the mission of the flight.
+    with the index `first_step` in the mission of the flight. `for_now`: the same may be accepted later.
     """
 
     number: int
     refusal: str | None
     first_step: int = 0
+    for_now: bool = False
 
 
 class ProposalAnswered(NamedTuple):

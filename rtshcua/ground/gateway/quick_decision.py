@@ -199,27 +199,23 @@ def _found(near: Nearest, invocation: PreparedInvocation, state: State, policy: 
     flat = invocation.invocation
     for parameter in flat.contract.parameters:
         if parameter.name == near.subject:
-            return f"{near.subject} {_shown(flat.arguments[parameter.cell], near.dimension, parameter.labels)}"
+            return f"{near.subject} {_shown(flat.arguments[parameter.cell], near.dimension)}"
     if near.subject == LOCAL_TIME:
         moment = now.utc_us + local_time(policy.policy.vehicle).offset(now.utc_us)
         return f"time {_shown(moment % DAY, DAYTIME)}"
-    signal = next((each for each in policy.policy.signals if each.name == near.subject), None)
-    if signal is None or state.values[signal.slot] is None:
-        return f"{near.subject} unknown"
-    labels = dict(signal.labels)
+    signal = next(each for each in policy.policy.signals if each.name == near.subject)
     value = state.values[signal.slot]
-    assert value is not None
-    return f"{near.subject} {labels.get(value) or _shown(value, near.dimension)}"
+    if value is None:
+        return f"{near.subject} unknown"
+    return f"{near.subject} {dict(signal.labels).get(value) or _shown(value, near.dimension)}"
 
 
 def _value(near: Nearest) -> str:
     return " or ".join(near.choices) if near.choices else _shown(near.value, near.dimension)
 
 
-def _shown(value: int, dimension: str, labels: tuple[str, ...] = ()) -> str:
+def _shown(value: int, dimension: str) -> str:
     if dimension == DAYTIME:
         return f"{value // _MINUTE // 60:02}:{value // _MINUTE % 60:02}"
     known = _DIMENSIONS.get(dimension)
-    if known is not None:
-        return display(value, known)
-    return labels[value] if 0 <= value < len(labels) else str(value)
+    return str(value) if known is None else display(value, known)

@@ -229,15 +229,18 @@ class Translation:
         return _quantity(parameter, int(here.fields["relative_alt"]))
 
     def _datum(self, datum: str, message: Received) -> int | Untranslated:
-        """The height of home above the datum of a height, mm; 0 for what has no datum."""
-        if datum == "frame":
-            frame = _frame(message)
-            if frame is None and self._autopilot != PX4:
-                return Untranslated(DENIED, "COMMAND_LONG does not say above what: use COMMAND_INT")
-            if frame not in (*SEA_FRAMES, *HOME_FRAMES, None):
-                return Untranslated(DENIED, f"heights in frame {frame} are not accepted: use above sea or home")
-            datum = "home" if frame in HOME_FRAMES else "sea"
-        return self._above(datum)
+        """The height of home above the datum of a height, mm; 0 for what has no datum. A frame of reference that
+        contradicts the datum of the table is refused.
+        """
+        frame = _frame(message)
+        if datum == "frame" and frame is None and self._autopilot != PX4:
+            return Untranslated(DENIED, "COMMAND_LONG does not say above what: use COMMAND_INT")
+        if datum and frame is not None:
+            said = "home" if frame in HOME_FRAMES else "sea" if frame in SEA_FRAMES else ""
+            if not said or datum not in (said, "frame"):
+                return Untranslated(DENIED, f"heights in frame {frame} are not accepted here")
+            datum = said
+        return self._above("sea" if datum == "frame" else datum)
 
     def _above(self, datum: str) -> int | Untranslated:
         """The height of home above a datum, mm."""

@@ -140,6 +140,10 @@ def test_refusals_of_the_worker_and_of_the_flight_are_answers() -> None:
         assert texts(actions) == [f"takeoff refused: {checked or f'{slug}: no'}"]
         assert proposals(world.send(TAKEOFF)) != [], "it may be asked for again"
     world = GatewayWorld()
+    world.ready()
+    actions = world.take(ProposalChecked(number(world.send(TAKEOFF)), "too many commands at once", for_now=True))
+    assert acks(actions) == [(22, 1)]
+    world = GatewayWorld()
     assert world.take(ProposalChecked(9, None)) == []
     assert world.take(ProposalAnswered(9, "accepted")) == []
     world.ready()
@@ -199,7 +203,7 @@ def test_a_step_refused_while_another_flies_leaves_that_one() -> None:
     world.accept(world.send(reposition()))
     world.dispatch(0)
     world.accept(world.send(reposition(z=509)), first=1)
-    assert acks(world.line(type="effect", event="refused-live", kind=0, step=1)) == [(192, 1)]
+    assert acks(world.line(type="effect", event="declined", kind=0, step=1)) == [(192, 1)]
     world.line(type="effect", event="succeeded", kind=0, step=0)
 
 
@@ -439,3 +443,17 @@ def test_the_number_of_clients_is_bounded() -> None:
     for client in range(2, 400):
         world.client(client, "crowd")
     assert len(world.gateway._clients) == 256
+
+
+def test_what_is_kept_of_the_vehicle_is_bounded() -> None:
+    world = GatewayWorld()
+    sender = mavlink.MAVLink(None, SYSTEM, 1)
+    value = mavlink.MAVLink_param_value_message(b"P", 1, 9, 1, 0).pack(sender)
+    for kind in range(3_000):
+        world.take(FromVehicle(value[:7] + (1_000 + kind).to_bytes(3, "little") + value[10:]))
+    for index in range(5_000):
+        world.vehicle(mavlink.MAVLink_param_value_message(f"P{index}".encode(), 1, 9, 5_000, index))
+    seen = world.gateway._seen
+    assert (len(seen._frames), len(seen.parameters)) == (512, 4_096)
+    world.take(FromVehicle(value[:-1] + bytes([value[-1] ^ 1])))
+    assert "P" not in seen.parameters, "a damaged frame"

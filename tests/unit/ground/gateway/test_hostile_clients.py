@@ -8,7 +8,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from reference.gateway_world import ROWS, SYSTEM, GatewayWorld
+from reference.gateway_world import (
+    NORTH,
+    ROWS,
+    SYSTEM,
+    GatewayWorld,
+    command_long,
+    item,
+    reposition,
+    setpoint,
+)
 from rtshcua.ground.gateway.client_frames import LAYOUTS_OF_CLIENTS, LOG_REQUEST_LIST, made
 from rtshcua.ground.gateway.interface import (
     Action,
@@ -112,8 +121,26 @@ def _expanded(format: str) -> list[str]:
     return found
 
 
+def _upload(heights: list[int]) -> list[Any]:
+    items = [item(0, 22, z=heights[0]), *(item(at, 16, x=N, y=E, z=z) for at, z in enumerate(heights, start=1))]
+    return [mavlink.MAVLink_mission_count_message(SYSTEM, 1, len(items), 0), *items, command_long(300)]
+
+
+N, E = NORTH
+#: messages that may well be accepted, of which many are
+PLAUSIBLE = st.one_of(
+    st.builds(lambda z: [command_long(22, 0, 0, 0, 0, 0, 0, z)], st.integers(488, 530)),
+    st.builds(lambda x, z: [reposition(N + x, E, z)], st.integers(-9_000, 9_000), st.integers(490, 530)),
+    st.builds(lambda x, z: [setpoint(N + x, E, z)], st.integers(-9_000, 9_000), st.integers(0, 45)),
+    st.builds(lambda main, sub: [command_long(176, 1, main, sub)], st.integers(0, 9), st.integers(0, 7)),
+    st.builds(lambda number: [command_long(number)], st.sampled_from([20, 21, 193, 300, 400])),
+    st.builds(_upload, st.lists(st.integers(5, 45), min_size=1, max_size=4)),
+)
+
 EVENTS = st.one_of(
     st.tuples(st.just("frame"), frames()),
+    st.tuples(st.just("plausible"), PLAUSIBLE),
+    st.tuples(st.just("plausible"), PLAUSIBLE),
     st.tuples(st.just("octets"), st.binary(max_size=80)),
     st.tuples(st.just("wait"), st.integers(1, 6_000_000)),
     st.tuples(
@@ -129,6 +156,8 @@ EVENTS = st.one_of(
 def happens(world: GatewayWorld, kind: str, what: Any) -> list[Action]:
     if kind == "frame":
         return world.take(FromClient(1 + world.now_us % 2, what))
+    if kind == "plausible":
+        return [action for message in what for action in world.send(message, client=1 + world.now_us % 2)]
     if kind == "octets":
         return world.take(FromClient(1, b"\xfd" + what)) + world.take(FromVehicle(b"\xfe" + what))
     if kind == "cut":
@@ -147,12 +176,18 @@ def happens(world: GatewayWorld, kind: str, what: Any) -> list[Action]:
 
 
 @pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT])
-@given(events=st.lists(EVENTS, max_size=60))
-@settings(deadline=None, max_examples=40, suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
-def test_no_sequence_of_frames_leaves_the_table(autopilot: int, events: list[tuple[str, Any]]) -> None:
+@given(events=st.lists(EVENTS, min_size=10, max_size=60), flies=st.booleans())
+@settings(
+    deadline=None,
+    max_examples=settings().max_examples * 2,
+    suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example],
+)
+def test_no_sequence_of_frames_leaves_the_table(autopilot: int, events: list[tuple[str, Any]], flies: bool) -> None:
     world = GatewayWorld(autopilot)
     world.client(2, "other", rank=1)
     world.ready()
+    if flies:
+        world.fly()
     for kind, what in events:
         world.now_us += 1
         checked(world, happens(world, kind, what))

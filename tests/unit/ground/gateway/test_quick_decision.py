@@ -94,6 +94,12 @@ def test_a_place_beyond_any_plan_is_malformed() -> None:
     assert said.startswith("goto denied: plan: altitude ")
 
 
+def test_an_unknown_charge_is_named_where_the_way_home_needs_it() -> None:
+    world = aloft()
+    del world.signals["battery"]
+    assert texts(world.send(command_long(193, 0))) == ["hover rejected: battery unknown (safety/unknown)"]
+
+
 def test_an_unknown_place_is_named_where_no_clause_is() -> None:
     world = aloft()
     del world.signals["position"]

@@ -55,6 +55,22 @@ def test_heights_are_above_home_whatever_the_client_says() -> None:
         assert one(aloft(), reposition(z=20, frame=frame))[0] == (192, 2), frame
 
 
+def test_a_frame_that_contradicts_the_datum_of_the_table_is_refused() -> None:
+    """PX4 reads the height of a take-off above sea whatever its frame, ArduPilot only above home."""
+    for autopilot, frame, z, height in (
+        (PX4, 5, 503.0, "15 m"), (PX4, 0, 503.0, "15 m"), (PX4, 6, 15.0, None), (PX4, 2, 503.0, None),
+        (ARDUPILOT, 6, 15.0, "15 m"), (ARDUPILOT, 3, 15.0, "15 m"), (ARDUPILOT, 5, 15.0, None),
+        (ARDUPILOT, 11, 15.0, None),
+    ):  # fmt: skip
+        world = GatewayWorld(autopilot)
+        world.ready()
+        found = one(world, command_int(22, frame, x=0, y=0, z=z))
+        wanted: Any = ("takeoff", {"altitude": height})
+        if height is None:
+            wanted = [(22, 2), f"takeoff: heights in frame {frame} are not accepted here"]
+        assert found == wanted, (autopilot, frame)
+
+
 def test_a_height_in_a_command_long_is_above_sea_on_px4_and_refused_on_ardupilot() -> None:
     message = command_long(192, -1, 1, 0, nan, 47.3983, 8.54559, 508.0)
     skill, arguments = one(aloft(), message)

@@ -5,7 +5,10 @@ unnoticed.
 """
 
 import json
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 from pymavlink.dialects.v20 import ardupilotmega
 
@@ -15,17 +18,42 @@ COMMAND = "python -m rtshcua.codec.build_dialect"
 
 
 def build_table() -> dict[str, dict[str, Any]]:
-    """The table, by introspection of the generated module.
+    """The table, by introspection of the generated module; of commands, whose units it lacks, from the XML beside it.
 
     `messages`: name -> [number, {field: [type, array length, unit, enumeration]}]; `enums`: name -> {entry:
-    value}.
+    value}; `commands`: name -> {parameter with a meaning: [label, unit, enumeration]}.
     """
     messages = {kind.msgname: [number, _fields(kind)] for number, kind in sorted(ardupilotmega.mavlink_map.items())}
     enums = {
         name: {entry.name: value for value, entry in sorted(entries.items()) if not _is_end(name, entry.name)}
         for name, entries in sorted(ardupilotmega.enums.items())
     }
-    return {"messages": messages, "enums": enums}
+    names = enums["MAV_CMD"]
+    parameters = dict(_commands(Path(ardupilotmega.__file__).with_suffix(".xml")))
+    commands = {name: found for name in names if (found := parameters.get(name)) is not None}
+    return {"messages": messages, "enums": enums, "commands": commands}
+
+
+def _commands(dialect: Path) -> Iterator[tuple[str, dict[str, list[Any]]]]:
+    """The parameters of each command of a dialect in XML, and of those that it includes."""
+    tree = ElementTree.parse(dialect)
+    for included in tree.iter("include"):
+        yield from _commands(dialect.with_name((included.text or "").strip()))
+    for entry in tree.iterfind("./enums/enum[@name='MAV_CMD']/entry"):
+        yield (
+            entry.attrib["name"],
+            {
+                f"param{each.attrib['index']}": [each.attrib["label"], _unit_of(each.attrib), each.get("enum")]
+                for each in entry.iterfind("param")
+                if each.get("label")
+            },
+        )
+
+
+def _unit_of(parameter: dict[str, str]) -> str:
+    """The unit of a command's parameter. Of a place only the label shows it: `Latitude`, `Latitude/X`."""
+    of_place = {"Latitude": "deg", "Longitude": "deg", "Altitude": "m"}
+    return parameter.get("units") or of_place.get(parameter["label"].partition("/")[0], "")
 
 
 def _fields(kind: Any) -> dict[str, list[Any]]:

@@ -97,12 +97,12 @@ BEYOND_RANGE = _code("E0325", "beyond-range", "a value is outside the range of i
 # E04: signals and the dialect
 UNKNOWN_MESSAGE = _code("E0401", "unknown-message", "unknown MAVLink message")
 UNKNOWN_FIELD = _code("E0402", "unknown-field", "unknown field of the MAVLink message")
-FIELD_UNIT = _code("E0403", "field-unit", "the field's unit does not match the signal's dimension")
+FIELD_UNIT = _code("E0403", "field-unit", "the field's unit does not match the dimension of the signal or the argument")
 FIELD_DATUM = _code("E0404", "field-datum", "the datum of the field's altitude is unknown, or differs between sources")
 ENUM_VALUE = _code("E0405", "enum-value", "an enumerator's value is not in the dialect's enumeration")
-FIELD_COUNT = _code("E0406", "field-count", "wrong number of fields for a signal of this type")
-FIELD_TYPE = _code("E0407", "field-type", "the field is an array or text; a signal needs a number")
-UNKNOWN_AT = _code("E0408", "unknown-at", "the value for `unknown` is outside the field's range")
+FIELD_COUNT = _code("E0406", "field-count", "wrong number of fields for a signal or an argument of this type")
+FIELD_TYPE = _code("E0407", "field-type", "the field is an array, text, or not the number that is needed")
+UNKNOWN_AT = _code("E0408", "unknown-at", "the value for `unknown` or `where` is outside the field's range")
 SIGNAL_TYPE = _code("E0409", "signal-type", "invalid signal type")
 WELL_KNOWN_SIGNAL = _code("E0410", "well-known-signal", "a required signal is missing or has the wrong type")
 UNKNOWN_ENUM = _code("E0411", "unknown-enum", "unknown MAVLink enumeration")
@@ -110,6 +110,10 @@ FIELD_ENUM = _code("E0412", "field-enum", "the field belongs to another enumerat
 NOT_FITTED = _code("E0413", "not-fitted", "a condition reads a signal that the vehicle lacks")
 NEEDED_SIGNAL = _code("E0414", "needed-signal", "a required signal is declared absent")
 UNSELECTED = _code("E0415", "unselected", "the sensor instance of a signal is missing or repeated")
+UNKNOWN_COMMAND = _code("E0416", "unknown-command", "unknown MAVLink command")
+UNKNOWN_MODE = _code("E0417", "unknown-mode", "unknown autopilot, or a flight mode that it does not have")
+ACCEPTED_TWICE = _code("E0418", "accepted-twice", "a MAVLink command, message or mode stands for two skills")
+OTHER_MOTION = _code("E0419", "other-motion", "a skill accepts what means another motion", Severity.WARNING)
 
 # E05: zones and geometry
 BAD_POLYGON = _code("E0501", "bad-polygon", "the corners do not form a simple polygon")

@@ -47,6 +47,8 @@ class Field:
     """The unit as in the XML: `mm`, `cm/s`, `degE7`, `%`, ...; empty if it has none."""
     enum: str | None
     "The enumeration of the field's values, if there is one."
+    label: str = ""
+    "What a parameter of a command is: `Altitude`; empty for fields of messages."
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,10 +61,15 @@ class Message:
 
 @dataclass(frozen=True, slots=True)
 class Dialect:
-    """The messages by name (`GPS_RAW_INT`), and the enumerations: by name, each entry's name and value."""
+    """The messages by name (`GPS_RAW_INT`), the enumerations: by name, each entry's name and value, and the commands.
+
+    Of a command (MAV_CMD) it has the parameters with a meaning: `param1` .. `param7`, floats with a unit as in
+    COMMAND_LONG, latitude and longitude in degrees. The commands' numbers are in the enumeration.
+    """
 
     messages: Mapping[str, Message]
     enums: Mapping[str, Mapping[str, int]]
+    commands: Mapping[str, Mapping[str, Field]]
 
 
 def from_table(table: Mapping[str, Any]) -> Dialect:
@@ -72,7 +79,11 @@ def from_table(table: Mapping[str, Any]) -> Dialect:
         for name, (number, fields) in table["messages"].items()
     }
     enums = {name: MappingProxyType(entries) for name, entries in table["enums"].items()}
-    return Dialect(MappingProxyType(messages), MappingProxyType(enums))
+    commands = {
+        name: {each: Field("float", 0, unit, enum, label) for each, (label, unit, enum) in parameters.items()}
+        for name, parameters in table["commands"].items()
+    }
+    return Dialect(MappingProxyType(messages), MappingProxyType(enums), MappingProxyType(commands))
 
 
 @cache

@@ -48,6 +48,7 @@ ITEMS = {
     "unit": lsp.CompletionItemKind.Unit, "file": lsp.CompletionItemKind.File, "field": lsp.CompletionItemKind.Field,
     "type": lsp.CompletionItemKind.TypeParameter, "policy": lsp.CompletionItemKind.Module,
     "template": lsp.CompletionItemKind.Interface, "vehicle": lsp.CompletionItemKind.Struct,
+    "command": lsp.CompletionItemKind.Event, "flight mode": lsp.CompletionItemKind.EnumMember,
 }  # fmt: skip
 
 

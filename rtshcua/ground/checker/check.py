@@ -1,5 +1,6 @@
 """Runs all checks of declarations, in the order in which findings are most useful."""
 
+from rtshcua.ground.checker.checks.accepts import check_accepts
 from rtshcua.ground.checker.checks.contracts import check_contracts, check_durability, check_fallbacks, check_records
 from rtshcua.ground.checker.checks.missions import check_missions
 from rtshcua.ground.checker.checks.names import check_names
@@ -30,6 +31,7 @@ CHECKS = (
     check_times,
     check_records,
     check_durability,
+    check_accepts,
     check_nominals,
     check_tests,
     check_scenarios,

@@ -4,6 +4,7 @@ import posixpath
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
+from rtshcua.ground.checker.checks.accepts import MODES
 from rtshcua.ground.checker.checks.contracts import CLASSES, RECORDS
 from rtshcua.ground.checker.checks.policies import SOURCES
 from rtshcua.ground.checker.checks.roles import OPERATOR
@@ -16,6 +17,7 @@ from rtshcua.ground.editor.cursor_context import (
     NameUse,
     OpenCall,
     accepted_symbols,
+    accepts_before,
     in_sizes,
     last_declaration_start,
     name_use,
@@ -209,17 +211,37 @@ class _Proposals:
                 yield from self._values()
             case NameUse.ARGUMENT:
                 yield from self._arguments(call)
+            case NameUse.COMMAND | NameUse.MODE | NameUse.FIELD:
+                yield from self._accepted(use)
             case NameUse.PARAMETER:
-                yield from (CompletionItem(each.name, "parameter", each.kind) for each in self._own())
+                yield from self._parameters()
             case _:
                 yield from (CompletionItem(name, use.value, KEYWORDS.get(name, "")) for name in tables[use])
                 if use is NameUse.ZONE:
                     zones = (each for each in self._own() if each.kind == "zone")
                     yield from (CompletionItem(each.name, "parameter", "zone") for each in zones)
 
+    def _accepted(self, use: NameUse) -> Iterator[CompletionItem]:
+        """The names of MAVLink in an `accepts`: commands, modes, and fields of its command or message."""
+        if use is NameUse.COMMAND:
+            yield from (CompletionItem(name, use.value) for name in self.dialect.commands)
+            return
+        if use is NameUse.MODE:
+            modes = ((name, autopilot) for autopilot, all in MODES.items() for name in all.__members__)
+            yield from (CompletionItem(name, use.value, autopilot) for name, autopilot in modes)
+            return
+        names = [token.text for token in accepts_before(self.written)]
+        command = next((self.dialect.commands[name] for name in names if name in self.dialect.commands), {})
+        message = next((self.dialect.messages[name] for name in names if name in self.dialect.messages), None)
+        for name, field in command.items() if message is None else message.fields.items():
+            yield CompletionItem(name, "field", " ".join(filter(None, (field.label, field.unit))))
+
+    def _parameters(self) -> Iterator[CompletionItem]:
+        """The visible parameters."""
+        yield from (CompletionItem(each.name, "parameter", each.kind) for each in self._own())
+
     def _values(self) -> Iterator[CompletionItem]:
-        for each in self._own():
-            yield CompletionItem(each.name, "parameter", each.kind)
+        yield from self._parameters()
         for name, signal in self.symbols.signals.items():
             yield CompletionItem(name, "signal", signal.type.text)
         for name, zone in self.symbols.zones.items():

@@ -47,6 +47,9 @@ class NameUse(Enum):
     AUTOPILOT = "autopilot"
     ENDING = "ending"
     DAY = "day of the week"
+    COMMAND = "command"
+    MODE = "flight mode"
+    FIELD = "field"
 
 
 class AcceptedSymbols(NamedTuple):
@@ -132,6 +135,9 @@ def name_use(written: list[Token]) -> NameUse:
         return NameUse.COMPARED
     if head in ("signal", "enum"):
         return _of_signal(written, head)
+    accepts = accepts_before(written)
+    if accepts:
+        return _in_accepts(accepts)
     call = open_call(written)
     if call is not None:
         return _in_call(written, call, last)
@@ -141,6 +147,37 @@ def name_use(written: list[Token]) -> NameUse:
         if token.kind == "word" and token.text in _BEHIND:
             return _behind_word(written, at)
     return NameUse.VALUE
+
+
+#: the keywords at which an `accepts` before the cursor has ended
+_OTHER_PARTS = frozenset(
+    ("motion", "class", "deadline", "valid", "lasts", "grace", "require", "assume", "maintain", "fallback", "energy",
+     "record", "{", "}")
+)  # fmt: skip
+
+
+def accepts_before(written: list[Token]) -> list[Token]:
+    """The tokens of the `accepts` that contains the cursor; empty if there is none."""
+    for at in range(len(written) - 1, -1, -1):
+        if written[at].text == "accepts":
+            return written[at:]
+        if written[at].text in _OTHER_PARTS:
+            break
+    return []
+
+
+def _in_accepts(written: list[Token]) -> NameUse:
+    """Return the use of a name in an `accepts`: of a command, a parameter of the skill, or a field."""
+    texts = [token.text for token in written]
+    last = texts[-1]
+    after = {"accepts": NameUse.COMMAND, "item": NameUse.COMMAND, "message": NameUse.MESSAGE, "mode": NameUse.MODE,
+             "on": NameUse.AUTOPILOT, "where": NameUse.FIELD, "and": NameUse.FIELD, "with": NameUse.PARAMETER,
+             "(": NameUse.FIELD}  # fmt: skip
+    if last == ",":
+        return NameUse.FIELD if texts.count("(") > texts.count(")") else NameUse.PARAMETER
+    if last == "=":
+        return NameUse.FIELD if "with" in texts else NameUse.NOTHING
+    return after.get(last, NameUse.NOTHING)
 
 
 def _unclosed(written: list[Token]) -> Iterator[tuple[int, Token]]:

@@ -129,6 +129,7 @@ _BY_NAME_KIND: Final = {
     NameKind.ROLE: "type", NameKind.SOURCE: "enumMember", NameKind.CLASS: "enumMember", NameKind.RECORD: "enumMember",
     NameKind.TYPE: "type", NameKind.MESSAGE: "struct", NameKind.FIELD: "property", NameKind.DIALECT_ENUM: "enum",
     NameKind.REASON: "enumMember", NameKind.WORD: "keyword", NameKind.FAULT: "function",
+    NameKind.COMMAND: "struct", NameKind.MODE: "enumMember",
 }  # fmt: skip
 
 

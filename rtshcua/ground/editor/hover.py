@@ -6,6 +6,7 @@ from inspect import getdoc
 from typing import NamedTuple
 
 from rtshcua.diagnostics.span import Span
+from rtshcua.ground.checker.checks.accepts import MODES
 from rtshcua.ground.checker.faults import NAMED, example
 from rtshcua.ground.checker.geojson import DataFiles
 from rtshcua.ground.checker.report import Report
@@ -19,7 +20,7 @@ from rtshcua.ground.geometry.projection import projection_at
 from rtshcua.ground.geometry.shapes import RoundArea, Shape, bounds
 from rtshcua.ground.language.exact_values import CANONICAL
 from rtshcua.ground.lower.ground_plan import GroundPlans
-from rtshcua.mavlink.dialect import DATUM, Dialect
+from rtshcua.mavlink.dialect import DATUM, Dialect, Field
 from rtshcua.model.faults import parameters
 from rtshcua.model.ir.expression import Coordinates, Quantity, Reference
 from rtshcua.model.ir.places import ZoneDecl
@@ -157,7 +158,7 @@ def describe(view: ProgramView, target: NameTarget, dialect: Dialect) -> str | N
             return _explained(f"`{target.name}`", REASONS.get(target.name))
         case NameKind.TYPE:
             return f"`{target.name}`: {TYPES[target.name]}" if target.name in TYPES else None
-        case NameKind.FIELD | NameKind.MESSAGE | NameKind.DIALECT_ENUM:
+        case NameKind.FIELD | NameKind.MESSAGE | NameKind.DIALECT_ENUM | NameKind.COMMAND | NameKind.MODE:
             return _dialect(target, dialect)
         case NameKind.SOURCE | NameKind.CLASS | NameKind.RECORD | NameKind.WORD:
             return _explained(f"{target.kind.value} `{target.name}`", KEYWORDS.get(target.name))
@@ -273,6 +274,15 @@ def _dialect(target: NameTarget, dialect: Dialect) -> str:
         message = dialect.messages.get(target.name)
         listed = "" if message is None else ": " + ", ".join(f"`{name}`" for name in message.fields)
         return f"MAVLink message `{target.name}`{listed}"
+    if target.kind is NameKind.MODE:
+        return _mode(target)
+    if target.kind is NameKind.COMMAND:
+        parameters = dialect.commands.get(target.name, {})
+        listed = "".join(f"\n- {_command_field(name, each)}" for name, each in parameters.items())
+        return f"MAVLink command `{target.name}`{listed}"
+    field = dialect.commands.get(target.owner, {}).get(target.name)
+    if field is not None:
+        return f"MAVLink command `{target.owner}`, {_command_field(target.name, field)}"
     message = dialect.messages.get(target.owner)
     field = None if message is None else message.fields.get(target.name)
     if field is None:
@@ -280,6 +290,19 @@ def _dialect(target: NameTarget, dialect: Dialect) -> str:
     unit = f", in `{field.unit}`" if field.unit else ""
     values_of = f", values of `{field.enum}`" if field.enum else ""
     return f"MAVLink field `{target.owner}.{target.name}`: `{field.type}`{unit}{values_of}"
+
+
+def _command_field(name: str, field: Field) -> str:
+    """Describe a parameter of a command."""
+    return f"`{name}`: {field.label}" + (f", in `{field.unit}`" if field.unit else "")
+
+
+def _mode(target: NameTarget) -> str:
+    """Describe a flight mode, whose owner is its autopilot."""
+    modes = MODES.get(target.owner)
+    number = None if modes is None else modes.__members__.get(target.name)
+    shown = "" if number is None else f" of {target.owner}: `custom_mode` {int(number)}"
+    return f"flight mode `{target.name}`{shown}"
 
 
 def _fault(name: str) -> str | None:

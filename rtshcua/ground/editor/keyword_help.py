@@ -37,6 +37,10 @@ KEYWORDS: Mapping[str, str] = {
     "fallback": "The chain that flies if the step cannot go on: the first admissible link, then the next.",
     "energy": "The greatest share of the battery's charge that the step may use.",
     "record": "The kinds of evidence that are written, and their durability before the command is sent.",
+    "accepts": "A command, mission `item`, `message` or flight `mode` of MAVLink by which a client of a gateway means "
+    "this skill; `with` names the fields of the arguments, `where` the fields that must have a value.",
+    "where": "Only if these fields have these values; after a clause, `where fitted`.",
+    "here": "Where the vehicle is, or its height.",
     "policy": "Who may request what, where and when. Its version only increases.",
     "permit": "Allows a request. A request that no permit allows is denied.",
     "forbid": "Denies a request and overrides every permit; if its condition is unknown, the step waits.",

@@ -28,7 +28,7 @@ from rtshcua.model.ir.scenarios import (
     ScenarioDecl,
 )
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl
-from rtshcua.model.ir.skills import ArgumentValue, LinkDecl, ParameterDecl, SizesDecl, SkillDecl
+from rtshcua.model.ir.skills import AcceptsDecl, ArgumentValue, LinkDecl, ParameterDecl, SizesDecl, SkillDecl
 from rtshcua.model.ir.tests import (
     Asker,
     Assignment,
@@ -59,6 +59,8 @@ class NameKind(Enum):
     MESSAGE = "message of the dialect"
     FIELD = "field of the dialect"
     DIALECT_ENUM = "enumeration of the dialect"
+    COMMAND = "command of the dialect"
+    MODE = "flight mode"
     REASON = "reason"
     FAULT = "fault"
     WORD = "keyword"
@@ -353,6 +355,21 @@ class _OccurrenceFinder:
             yield Occurrence(skill.timing_class.span, NameTarget(NameKind.CLASS, skill.timing_class.text))
         for link in skill.fallback:
             yield from self._link(link, scope)
+        for accepts in skill.accepts:
+            yield from self._accepts(accepts, owner)
+
+    def _accepts(self, accepts: AcceptsDecl, owner: str) -> Iterator[Occurrence]:
+        """The names of MAVLink, and the parameters that are read from their fields."""
+        autopilot = "" if accepts.autopilot is None else accepts.autopilot.text
+        kind = {"message": NameKind.MESSAGE, "mode": NameKind.MODE}.get(accepts.kind, NameKind.COMMAND)
+        owned_by = autopilot if accepts.kind == "mode" else ""
+        yield Occurrence(accepts.name.span, NameTarget(kind, accepts.name.text, owned_by))
+        fields = [each.field for each in accepts.where]
+        for each in accepts.arguments:
+            yield Occurrence(each.parameter.span, NameTarget(NameKind.PARAMETER, each.parameter.text, owner))
+            fields += each.fields
+        for field in fields:
+            yield Occurrence(field.span, NameTarget(NameKind.FIELD, field.text, accepts.name.text))
 
     def _sizes(self, sizes: SizesDecl) -> Iterator[Occurrence]:
         yield from self.names((sizes.skill,), NameKind.DECLARED)

@@ -68,6 +68,7 @@ ITEMS = dict.fromkeys(_PLAIN_ITEMS, Style()) | {
     "zone": _style("feature", "hole", cuts=("=", "from")),
     "validity": _style("during"),
     "sized": _style("during"),
+    "accepts": _style("where", "with"),
     "airspace": _style("inside", "outside", aligned=False),
     "phase": _style(aligned=False, cuts=("{",)),
     "asked": _style("by", "through"),

@@ -17,6 +17,7 @@ from rtshcua.ground.report.prose.mission_steps import (
 from rtshcua.ground.report.prose.phrases import degrees
 from rtshcua.ground.report.prose.rules_and_skills import (
     AS_LINK,
+    describe_accepted,
     describe_airspace,
     describe_chain,
     describe_clause,
@@ -311,6 +312,7 @@ def _skill(subject: ReportedPolicy, skill: SkillDecl, changed: bool) -> SkillVie
         fallback=describe_chain(skill.fallback, names),
         as_link=AS_LINK if skill.name.text in _last_links(subject) else "",
         record=describe_record(skill),
+        accepted=tuple(describe_accepted(skill)),
         place=subject.place(skill.span),
         changed=changed,
     )

@@ -108,7 +108,7 @@ class SkillView:
     """A skill and its contract. `as_link` describes the difference at the end of a chain, empty if there is none.
 
     `patterns` are the patterns of a survey. `left_out` are the clauses that do not apply because the vehicle lacks a
-    sensor.
+    sensor. `accepted` is what a client of a gateway sends for the skill.
     """
 
     name: str
@@ -124,6 +124,7 @@ class SkillView:
     fallback: tuple[str, ...]
     as_link: str
     record: str
+    accepted: tuple[str, ...]
     place: str
     changed: bool
 

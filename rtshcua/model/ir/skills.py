@@ -59,6 +59,44 @@ class ClauseDecl(Node):
     where_fitted: bool = False
 
 
+class FixedFieldDecl(Node):
+    """`param1 = 0`, `type_mask has 504`, `param7 = unset`: a condition on a field of what a skill accepts."""
+
+    field: Name
+    relation: Literal["=", "has", "lacks"]
+    value: Name  # a number, an enumerator of the dialect, or `unset`
+
+
+class Substitute(Node):
+    """The value of an argument whose field is unset: `default`, `here`, `parameter MIS_TAKEOFF_ALT above home`."""
+
+    kind: Literal["default", "here", "parameter"]
+    parameter: Name | None = None  # of the autopilot
+    datum: Literal["home", "sea"] | None = None
+
+
+class SourcedArgument(Node):
+    """`altitude = param7 above sea or parameter MIS_TAKEOFF_ALT above home`, `target = (param5, param6)`."""
+
+    parameter: Name
+    fields: tuple[Name, ...]  # latitude and longitude of a position; none: always the substitute
+    datum: Literal["home", "sea", "frame"] | None  # `frame`: that of the message
+    substitute: Substitute | None
+
+
+class AcceptsDecl(Node):
+    """`accepts MAV_CMD_NAV_TAKEOFF on ardupilot with altitude = param7 above home`.
+
+    What a MAVLink client sends to a gateway, and the skill stands for. It is used on the ground alone.
+    """
+
+    kind: Literal["command", "item", "message", "mode"]
+    name: Name
+    autopilot: Name | None  # None: any
+    where: tuple[FixedFieldDecl, ...]
+    arguments: tuple[SourcedArgument, ...]
+
+
 class Sized(Node):
     """`lasts at most longest`: a part of a contract whose value is one of the skill's sizes."""
 
@@ -70,7 +108,7 @@ class SkillDecl(Node, kw_only=True):
     """A skill contract. None or an empty tuple means: not written (the checker reports the required fields).
 
     `sizes` are numbers that a program may set (`SizesDecl`), each with a default; `sized` are the parts that name
-    one. `checker/symbols.py` substitutes the values, and `sized` is then empty.
+    one. `checker/symbols.py` substitutes the values, and `sized` is then empty. `accepts` is no part of the contract.
     """
 
     name: Name
@@ -90,6 +128,7 @@ class SkillDecl(Node, kw_only=True):
     record: tuple[Name, ...]
     sizes: tuple[ParameterDecl, ...] = ()
     sized: tuple[Sized, ...] = ()
+    accepts: tuple[AcceptsDecl, ...] = ()
 
 
 class GivenSize(Node):

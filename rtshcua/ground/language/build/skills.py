@@ -1,7 +1,8 @@
 """Actions for skills: parameters, contract, motion and fallback chain."""
 
+import re
 from itertools import chain
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from rtshcua.diagnostics.codes import SYNTAX
 from rtshcua.diagnostics.excerpt import short
@@ -10,7 +11,9 @@ from rtshcua.ground.language.build.reader import Action, Part, Reader, node, par
 from rtshcua.model.ir.expression import Condition, Junction, Quantity, Range, Reference, Value
 from rtshcua.model.ir.node import Name
 from rtshcua.model.ir.skills import (
+    AcceptsDecl,
     ClauseDecl,
+    FixedFieldDecl,
     GivenSize,
     LinkDecl,
     MotionDecl,
@@ -18,6 +21,8 @@ from rtshcua.model.ir.skills import (
     Sized,
     SizesDecl,
     SkillDecl,
+    SourcedArgument,
+    Substitute,
 )
 
 
@@ -32,7 +37,9 @@ class FurtherName(NamedTuple):
 #: the parts of a skill that may be a size, by their first keyword
 _SIZED: Final = {"deadline": "deadline", "valid": "validity", "lasts": "duration", "grace": "grace", "energy": "energy"}
 #: parts of a skill that may repeat: all of them apply
-_CLAUSES = ("require", "assume", "maintain")
+_REPEATED = ("require", "assume", "maintain", "accepts")
+#: the form of a parameter's name on both autopilots; MAVLink has 16 characters for it
+_AUTOPILOT_PARAMETER: Final = re.compile(r"[A-Z][A-Z0-9_]{0,15}")
 
 
 def _clauses(condition: Condition, where_fitted: bool) -> tuple[ClauseDecl, ...]:
@@ -66,7 +73,84 @@ FORMS: dict[str, Action] = {
     "links": several,
     "link": node(LinkDecl, "skill", "arguments", "limit", arguments=()),
     "given_size": node(GivenSize, "name", "value"),
+    "fixed_fields": several,
+    "sourced_arguments": several,
+    "substitute": node(Substitute, "kind"),
 }
+
+
+class FieldSource(NamedTuple):
+    """The fields of an argument, and the datum of an altitude."""
+
+    fields: tuple[Name, ...]
+    datum: Any = None
+
+
+def fixed_field(reader: Reader, span: Span, field: Name, relation: Any, value: Name) -> FixedFieldDecl:
+    """`param1 = 0`."""
+    reader.undotted(field, "field")
+    return FixedFieldDecl(span=span, field=field, relation=relation, value=value)
+
+
+def reference_datum(reader: Reader, span: Span, word: str) -> str:
+    """`above home`, `in frame`."""
+    return word
+
+
+def field_source(reader: Reader, span: Span, field: Name, datum: str | None) -> FieldSource:
+    """`param7 above home`."""
+    reader.undotted(field, "field")
+    return FieldSource((field,), datum)
+
+
+def field_pair(reader: Reader, span: Span, *fields: Name) -> FieldSource:
+    """`(param5, param6)`."""
+    for field in fields:
+        reader.undotted(field, "field")
+    return FieldSource(fields)
+
+
+def parameter_substitute(reader: Reader, span: Span, parameter: Name, datum: Any) -> Substitute:
+    """`parameter MIS_TAKEOFF_ALT above home`."""
+    if _AUTOPILOT_PARAMETER.fullmatch(parameter.text) is None:
+        found = f"`{short(parameter.text)}` is not a parameter of an autopilot"
+        help = "write at most 16 capital letters, digits and `_`, as in `MIS_TAKEOFF_ALT`"
+        reader.report(SYNTAX, found, parameter.span, help)
+    return Substitute(span=span, kind="parameter", parameter=parameter, datum=datum)
+
+
+def sourced_argument(
+    reader: Reader, span: Span, parameter: Name, source: FieldSource, substitute: Substitute | None
+) -> SourcedArgument:
+    """`altitude = param7 above home or here`."""
+    reader.undotted(parameter, "parameter")
+    fields, datum = source
+    return SourcedArgument(span=span, parameter=parameter, fields=fields, datum=datum, substitute=substitute)
+
+
+def substituted_argument(reader: Reader, span: Span, parameter: Name, substitute: Substitute) -> SourcedArgument:
+    """`target = here`, from no field."""
+    reader.undotted(parameter, "parameter")
+    return SourcedArgument(span=span, parameter=parameter, fields=(), datum=None, substitute=substitute)
+
+
+def accepts(
+    reader: Reader,
+    span: Span,
+    kind: Any,
+    name: Name,
+    autopilot: Name | None,
+    where: tuple[FixedFieldDecl, ...] | None,
+    arguments: tuple[SourcedArgument, ...] | None,
+) -> Part:
+    """`accepts mode RTL on ardupilot`."""
+    for each in filter(None, (name, autopilot)):
+        reader.undotted(each, "command")
+    kind = kind or "command"
+    made = AcceptsDecl(
+        span=span, kind=kind, name=name, autopilot=autopilot, where=where or (), arguments=arguments or ()
+    )
+    return Part("accepts", span, made)
 
 
 def parameter(
@@ -151,7 +235,7 @@ def skill(
 ) -> None:
     """`skill hover() { ... }`."""
     reader.undotted(name, "skill")
-    found = reader.parts("skill", name, given, listed=_CLAUSES)
+    found = reader.parts("skill", name, given, listed=_REPEATED)
     validity, phases = found.get("valid", (None, ()))
     amounts = {"validity": validity} | {part: found.get(word) for word, part in _SIZED.items() if word != "valid"}
     plain = {part: None if isinstance(amount, Sized) else amount for part, amount in amounts.items()}
@@ -175,6 +259,7 @@ def skill(
             record=found.get("record", ()),
             sizes=sizes or (),
             sized=tuple(amount for amount in amounts.values() if isinstance(amount, Sized)),
+            accepts=tuple(found["accepts"]),
         ),
         name,
     )

@@ -10,7 +10,18 @@ from rtshcua.model.durability import WORDS as DURABILITIES
 from rtshcua.model.ir.node import Name, Node
 from rtshcua.model.ir.policies import AirspaceDecl, Delegation, RuleDecl, Use
 from rtshcua.model.ir.signals import EnumDecl, SignalDecl, SourceDecl
-from rtshcua.model.ir.skills import ArgumentValue, ClauseDecl, LinkDecl, MotionDecl, ParameterDecl, SkillDecl
+from rtshcua.model.ir.skills import (
+    AcceptsDecl,
+    ArgumentValue,
+    ClauseDecl,
+    FixedFieldDecl,
+    LinkDecl,
+    MotionDecl,
+    ParameterDecl,
+    SkillDecl,
+    SourcedArgument,
+    Substitute,
+)
 from rtshcua.model.quantity import Dimension, display
 
 _TYPES: Final = {
@@ -175,6 +186,49 @@ def describe_chain(links: tuple[LinkDecl, ...], names: Vocabulary) -> tuple[str,
         last = "; this needs nothing and always ends" if number == len(links) - 1 and number else ""
         sentences.append(f"{before}: {words}{last}.")
     return tuple(sentences)
+
+
+_ACCEPTED: Final = {
+    "command": "the command", "item": "the mission item", "message": "the message", "mode": "the flight mode",
+}  # fmt: skip
+_DATUM: Final = {"home": " above home", "sea": " above sea", "frame": " in the frame that it names"}
+
+
+def describe_accepted(skill: SkillDecl) -> Iterator[str]:
+    """Describe what a MAVLink client sends for a skill, one item each."""
+    yield from map(_accepted, skill.accepts)
+
+
+def _accepted(accepts: AcceptsDecl) -> str:
+    autopilot = "" if accepts.autopilot is None else f" on {name(accepts.autopilot.text)}"
+    where = [_fixed(each) for each in accepts.where]
+    when = f", if {listed(where)}" if where else ""
+    arguments = [_sourced(each) for each in accepts.arguments]
+    given = f": {'; '.join(arguments)}" if arguments else ""
+    return sentence(f"{_ACCEPTED[accepts.kind]} {name(accepts.name.text)}{autopilot}{when}{given}")
+
+
+def _fixed(fixed: FixedFieldDecl) -> str:
+    value = fixed.value.text
+    if fixed.relation == "=":
+        return f"{name(fixed.field.text)} is " + ("not given" if value == "unset" else name(value))
+    bits = "has all bits of" if fixed.relation == "has" else "has no bit of"
+    return f"{name(fixed.field.text)} {bits} {name(value)}"
+
+
+def _sourced(source: SourcedArgument) -> str:
+    datum = "" if source.datum is None else _DATUM[source.datum]
+    values = [f"{listed([name(field.text) for field in source.fields])}{datum}"] if source.fields else []
+    if source.substitute is not None:
+        values.append(_substitute(source.substitute))
+    return f"{name(source.parameter.text)} is {', or if that is not given '.join(values)}"
+
+
+def _substitute(substitute: Substitute) -> str:
+    if substitute.parameter is None:
+        return "its default" if substitute.kind == "default" else "that at which the vehicle is"
+    datum = "" if substitute.datum is None else _DATUM[substitute.datum]
+    return f"the autopilot's {name(substitute.parameter.text)}{datum}"
 
 
 def _duration(us: int) -> str:

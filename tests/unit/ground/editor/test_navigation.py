@@ -173,6 +173,8 @@ def test_every_name_of_the_library_has_a_target() -> None:
         "MESSAGE",
         "FIELD",
         "DIALECT_ENUM",
+        "COMMAND",
+        "MODE",
         "WORD",
         "IMPORT",
     }

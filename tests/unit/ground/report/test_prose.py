@@ -16,6 +16,7 @@ from rtshcua.ground.report.prose.cases_and_scenarios import describe_nominal, de
 from rtshcua.ground.report.prose.condition_phrases import describe_condition
 from rtshcua.ground.report.prose.phrases import Vocabulary
 from rtshcua.ground.report.prose.rules_and_skills import (
+    describe_accepted,
     describe_airspace,
     describe_chain,
     describe_clause,
@@ -193,6 +194,7 @@ def tell_skill(skill: SkillDecl, names: Vocabulary) -> object:
         [[describe_clause(each, names) for each in some] for some in (skill.require, skill.assume, skill.maintain)],
         describe_chain(skill.fallback, names),
         describe_record(skill),
+        list(describe_accepted(skill)),
     )
 
 

@@ -83,7 +83,8 @@ rt_status rt_turn_of(const rt_session *session, int64_t kind, int64_t step, int6
         rt_invocation_at(mission, (uint32_t)step, &invocation);
         if (link < RT_DEGRADE_LINK || link >= (int64_t)invocation.contract.fallback.count)
             return RT_UNKNOWN_STEP;
-        return step == session->latest ? RT_DECIDED : RT_NOT_CURRENT;
+        /* the step that may fly keeps its chain while a later one is requested and not admitted */
+        return step == session->latest || step == session->allowed ? RT_DECIDED : RT_NOT_CURRENT;
     }
     if (kind != RT_STEP || link != -1)
         return RT_UNKNOWN_STEP;

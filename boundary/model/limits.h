@@ -82,7 +82,7 @@
 #define RT_MAX_ROOT 1048576
 #endif
 #ifndef RT_MAX_REPLACEMENTS
-#define RT_MAX_REPLACEMENTS 64
+#define RT_MAX_REPLACEMENTS 256
 #endif
 #ifndef RT_MAX_PART
 #define RT_MAX_PART 60000

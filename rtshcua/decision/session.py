@@ -319,7 +319,8 @@ class Session:
         if kind == FALLBACK_LINK:
             if not DEGRADE <= link < len(invocations[step].chain):
                 return Status.UNKNOWN_STEP
-            return None if step == self._latest else Status.NOT_CURRENT
+            # the step that may fly keeps its chain while a later one is requested and not admitted
+            return None if step in (self._latest, self._allowed) else Status.NOT_CURRENT
         if kind != STEP or link != -1:
             return Status.UNKNOWN_STEP
         passed_over = step < self._latest and step not in self._consumed

@@ -148,6 +148,7 @@ class VirtualFlight:
     - `tick_us`: how often the vehicle's frames are read. A longer tick makes a flight cheaper and reactions later.
     - `before`: the hash of the last line of the vehicle's previous log.
     - `settings`: parameters to set before the flight; `owed`: parameters to restore, updated in place.
+    - `idle_us`: the mission is live, and waits so long in the air for its next step.
     - `boundary`: the key of the boundary's own evidence, with its session; required if the root names such a key.
 
     Raise ValueError for a refused bundle, and whatever `open_root` raises.
@@ -163,7 +164,7 @@ class VirtualFlight:
         wait_us: int = 100_000, resumed: bool = False, vehicle: VirtualVehicle | None = None, fence: bool = True,
         sink: Callable[[VirtualClock], ReadableSink] | None = None, tick_us: int = TICK_US, before: str | None = None,
         settings: Mapping[str, int] = MappingProxyType({}), owed: dict[str, Owed] | None = None,
-        boundary: BoundaryKey | SigningKey | None = None,
+        boundary: BoundaryKey | SigningKey | None = None, idle_us: int | None = None,
     ) -> None:  # fmt: skip
         policy, mission = claimed(bundle)
         utc_us = mission.issued_at_us + LATER_US if utc_us is None else utc_us
@@ -192,7 +193,7 @@ class VirtualFlight:
         self.vehicle = vehicle
         loaded.executor.frames = vehicle.frames
         self.recorder = Recorder(lambda text: log_key.sign(text, duty=Duty.LOG), log_key.public, _Seeds())
-        self.runtime = Runtime(loaded, self.recorder, resumed=resumed)
+        self.runtime = Runtime(loaded, self.recorder, resumed=resumed, idle_us=idle_us)
         self.vehicle.driver.resumes = resumed
         self.sink: ReadableSink = MemorySink() if sink is None else sink(self.clock)
         genesis = self.recorder.genesis(

@@ -25,7 +25,7 @@ from rtshcua.wire.keys import Duty, SigningKey, VerificationKey
 from rtshcua.wire.trust import HUMAN, TrustRoot
 
 #: the most replacements of one flight
-MAX_REPLACEMENTS: Final = 64
+MAX_REPLACEMENTS: Final = 256
 
 
 class ReplacementDocument(Flat, frozen=True):

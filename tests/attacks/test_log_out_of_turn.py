@@ -5,7 +5,10 @@ well-formed, but the order is wrong or records are missing.
 from functools import cache
 
 import pytest
+from msgspec.structs import replace
 
+from reference.documents import hand, replacement
+from reference.flat_case import MISSION, S
 from reference.forgery import edit, expect, read, signed
 from reference.world import LOG_KEY, ROOT_KEY, Run, loaded
 from virtual.rows import rows
@@ -102,3 +105,47 @@ def test_step_under_another_name_is_detected() -> None:
     at = number("dispatched", 1)
     lines = [edit(line, detail="hover") if each == at else line for each, line in enumerate(flight())]
     assert found(lines) == ("dispatch/other-skill", at)
+
+
+# ---------------------------------------------------------------- live missions
+
+
+@cache
+def live() -> tuple[bytes, ...]:
+    """A leg supersedes another one in mid-flight."""
+    go = loaded().bundle.mission.invocations[1]
+    base = replace(MISSION, invocations=MISSION.invocations[:2])
+    run = Run(loaded(mission=base), idle_us=S).until_flies("goto")
+    mission = replace(base, issued_at_us=base.issued_at_us + 1, invocations=(*base.invocations, replace(go, step=2)))
+    assert hand(run, replacement(run.loaded, 2, mission)) == "accepted"
+    run.until_over()
+    assert run.events.count("superseded") == 1
+    return (*run.lines, run.recorder.close(run.clock.now(), ending=str(run.ending), tlog=None))
+
+
+def live_number(event: str, step: int) -> int:
+    return next(
+        at for at, each in enumerate(map(read, live())) if (each.get("event"), each.get("step")) == (event, step)
+    )
+
+
+def test_step_that_supersedes_without_the_end_of_the_other_is_detected() -> None:
+    at = live_number("superseded", 1)
+    without = [line for number, line in enumerate(live()) if number != at]
+    assert found(without) == ("dispatch/out-of-turn", live_number("dispatched", 2) - 1)
+    replaced = edit(live()[at], event="replaced")
+    assert found([replaced if number == at else line for number, line in enumerate(live())]) == (
+        "dispatch/out-of-turn", live_number("dispatched", 2)
+    )  # fmt: skip
+
+
+def test_superseding_step_without_its_decision_is_detected() -> None:
+    lines = [line for line in live() if (read(line).get("type"), read(line).get("step")) != ("decision", 2)]
+    assert found(lines) == ("dispatch/not-permitted", live_number("dispatched", 2) - 1)
+
+
+def test_chain_of_a_superseded_step_is_detected() -> None:
+    at = live_number("dispatched", 2)
+    moment = {key: read(live()[at])[key] for key in ("at_us", "utc_us")}
+    link = edit(live()[at], kind=FALLBACK, step=1, link=0, detail="hover", token=900, **moment)
+    assert found([*live()[: at + 1], link, *live()[at + 1 :]]) == ("dispatch/lapsed", at + 1)

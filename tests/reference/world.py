@@ -263,6 +263,7 @@ class Run:
         limits: Limits | None = None,
         resumed: bool = False,
         ready: bool = True,
+        idle_us: int | None = None,
     ) -> None:
         self.loaded = of or loaded()
         self.vehicle = vehicle or FakeVehicle()
@@ -280,7 +281,7 @@ class Run:
             )
         ]
         self.recorder = recorder
-        self.runtime = Runtime(self.loaded, recorder, limits=limits, resumed=resumed)
+        self.runtime = Runtime(self.loaded, recorder, limits=limits, resumed=resumed, idle_us=idle_us)
         self.actions: list[Action] = []
         if ready:
             self.step(AirState(0, False, self.vehicle.airborne), *self.vehicle.poll(START.monotonic_us), Ready(0))

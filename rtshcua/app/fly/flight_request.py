@@ -59,9 +59,9 @@ class FlightRequest:
     False: do not change the vehicle's fence. `system`: the vehicle's MAVLink id. `utc_error_us`: the greatest error of
     UTC by the operator's statement. `sortie`: the hooks of a qualification. `settings`: parameters that are set before
     the flight and restored after it. `wait_s`: wait so long at most for the bundle that flies; `bundle` only gives the
-    policy. `boundary_user`: the user and group of the boundary process. `unbuilt`: there is no boundary process only
-    because its program is missing. `boundary_socket`: the socket of a listening boundary, which has the keys of the
-    log, the link and itself.
+    policy. `idle_us`: the mission is live, and waits so long in the air for its next step. `boundary_user`: the user
+    and group of the boundary process. `unbuilt`: there is no boundary process only because its program is missing.
+    `boundary_socket`: the socket of a listening boundary, which has the keys of the log, the link and itself.
     """
 
     bundle: Path
@@ -89,6 +89,7 @@ class FlightRequest:
     sortie: SortieHooks | None = None
     settings: Mapping[str, int] = field(default_factory=dict)
     wait_s: float | None = None
+    idle_us: int | None = None
     boundary_user: tuple[int, int] | None = None
     unbuilt: bool = False
     boundary_key: Path | None = None

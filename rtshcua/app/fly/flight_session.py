@@ -132,7 +132,9 @@ class FlightSession:
         if debts.trouble is not None:
             self._feed.post(Note(debts.trouble))
         limits = Limits(stalled_us=Limits().stalled_us * self._context.slack)
-        self._runtime = Runtime(loaded, self._recorder, limits=limits, resumed=resumed)
+        self._runtime = Runtime(
+            loaded, self._recorder, limits=limits, resumed=resumed, idle_us=self._context.request.idle_us
+        )
         self._vehicle.driver.resumes = resumed
         self._feed.post(self._plan())
         self._watch = Watching(

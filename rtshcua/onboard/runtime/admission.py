@@ -37,27 +37,35 @@ class InvocationQueue:
     def __init__(self, mission: Mission) -> None:
         self._steps = mission.invocations
         self._index = 0
+        self._end = len(self._steps)  # the steps from here on were declined, or do not exist
         self.released_us: int | None = None  # when the current step was released; None before the vehicle was ready
+        #: the step that is requested while the current one runs, and when it was released (None: not yet)
+        self.ahead: Invocation | None = None
+        self.ahead_us: int | None = None
 
     @property
     def current(self) -> Invocation | None:
         """The step that is to be admitted or is running; None once all are done."""
-        return self._steps[self._index] if self._index < len(self._steps) else None
+        return self._steps[self._index] if self._index < self._end else None
 
     @property
     def at_last(self) -> bool:
         """Whether no step follows the current one."""
-        return self._index + 1 >= len(self._steps)
+        return self._index + 1 >= self._end
 
     @property
     def released(self) -> int:
         """How many steps were released; these do not change any more."""
-        return 0 if self.released_us is None else min(self._index + 1, len(self._steps))
+        return 0 if self.released_us is None else self._index + (self._index < self._end)
 
     @property
     def phase(self) -> int:
         """The index of the current mission phase; the last step's once all are done."""
         return self._steps[min(self._index, len(self._steps) - 1)].phase
+
+    def step(self, number: int) -> Invocation:
+        """The step of this index."""
+        return self._steps[number]
 
     def release(self, now_us: int) -> None:
         """Release the first step. Later calls have no effect, because a vehicle becomes ready once."""
@@ -66,14 +74,51 @@ class InvocationQueue:
 
     def replace(self, mission: Mission, first: int, now_us: int) -> None:
         """Set the steps, which differ from `first` on. If the current one is among these, it is released now."""
-        self._steps = mission.invocations
+        self._steps, self._end = mission.invocations, len(mission.invocations)
+        self.ahead = self.ahead_us = None
         if first <= self._index and self.released_us is not None:
             self.released_us = now_us
 
+    def follows(self, first: int) -> bool:
+        """Whether no step that may still be flown lies between the current one, or the one ahead, and `first`."""
+        latest = self._index if self.ahead is None else self.ahead.step
+        return first <= latest + 1 or self._end <= latest + 1
+
+    def put_ahead(self, step: int) -> None:
+        """Request this step while the current one runs."""
+        self.ahead, self.ahead_us = self._steps[step], None
+
+    def skip_to(self, step: int, now_us: int) -> None:
+        """Make this step the current one; it is released now."""
+        self._index, self.released_us = step, now_us
+
+    def release_ahead(self, now_us: int) -> None:
+        """Release the step ahead, unless it was before."""
+        self.ahead_us = now_us if self.ahead_us is None else self.ahead_us
+
+    def release_of(self, ref: Ref) -> tuple[int, int]:
+        """When the subject of a request was released, and its phase. 0: nothing was released yet, and only the
+        contingency may fly.
+        """
+        ahead = self.ahead
+        if ref.kind == STEP and ahead is not None and ref.step == ahead.step:
+            return self.ahead_us or 0, ahead.phase
+        return self.released_us or 0, self.phase
+
+    def decline(self, step: int) -> None:
+        """This step, and those after it, are requested no more."""
+        self._end = min(self._end, step)
+        self.ahead = self.ahead_us = None
+
     def advance(self, now_us: int) -> None:
-        """The current step ended, or is skipped: release the next."""
-        self._index += 1
-        self.released_us = now_us
+        """The current step ended, or is skipped: release the next. One that was ahead keeps its release."""
+        if self.ahead is None:
+            self._index += 1
+            self.released_us = now_us
+        else:
+            self._index = self.ahead.step
+            self.released_us = now_us if self.ahead_us is None else self.ahead_us
+            self.ahead = self.ahead_us = None
 
 
 class Admission:
@@ -97,8 +142,7 @@ class Admission:
     def ask(self, now: Now, state: State, ref: Ref) -> Decision | None:
         """The boundary's answer about a step or link; None if it did not decide."""
         kind, step, link = ref
-        released_us = self._queue.released_us or 0  # 0: nothing was released yet, and only the contingency may fly
-        phase, remaining_us = self._queue.phase, self._remaining.us
+        remaining_us, (released_us, phase) = self._remaining.us, self._queue.release_of(ref)
         invocation = None if kind == CONTINGENCY_LINK else self._in_force.invocations[step].invocation
         binding = self._in_force.bundle.policy_digest if invocation is None else invocation.binding
         request = Request(kind, step, link, binding, now, state, released_us, phase, remaining_us)

@@ -6,6 +6,11 @@ applies: `skip` continues with the next step, `hold` waits as for a deferral, `r
 replacement of the step, and `abort` flies the step's fallback and, when that is used up, the contingency. On the
 ground nothing is sent, and the run ends.
 
+In a live mission (`idle_us`) a replacement that begins directly after the running step is requested at once. If it is
+admitted, its first step supersedes the running one; if it is refused, the step is declined, and what flew goes on.
+After the last step the vehicle holds and waits for the next replacement, for `idle_us` at most; then the contingency
+flies.
+
 While the link is down, or after this computer stood still, no turn is taken until fresh state has arrived or the
 time for that is over (`link`).
 """
@@ -23,13 +28,13 @@ from rtshcua.onboard.enforcement import frames
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import WITHHELD, AirState, CommandFailed, End, Ending, Expect, LinkLost
 from rtshcua.onboard.runtime.admission import Admission, InvocationQueue
-from rtshcua.onboard.runtime.dispatcher import Dispatcher, RemainingLatency
+from rtshcua.onboard.runtime.dispatcher import SUPERSEDED, Dispatcher, RemainingLatency
 from rtshcua.onboard.runtime.fallback_flight import Fallback
 from rtshcua.onboard.runtime.journal import Detail, Journal
 from rtshcua.onboard.runtime.limits import Limits
 from rtshcua.onboard.runtime.link import STOOD_STILL, EndedSilence, LinkState, LinkSupervision
 from rtshcua.onboard.runtime.monitor import StateMonitor, VehicleStatus
-from rtshcua.onboard.runtime.supervisor import RetryPolicy, Supervisor
+from rtshcua.onboard.runtime.supervisor import IdleTime, RetryPolicy, Supervisor
 from rtshcua.onboard.runtime.view import RunStage, RuntimeView
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP, Ref
 
@@ -75,6 +80,11 @@ def may_fly(
 
 #: the effect that records the request to replace a step that is not admitted
 REPLAN: Final = "replan"
+#: the effect that records that a step of a live mission was refused, and that what flew before goes on
+DECLINED: Final = "declined"
+#: the effects that record the begin and the end of the wait for the next step of a live mission
+IDLE: Final = "idle"
+IDLE_OVER: Final = "idle-over"
 #: why a command was `late`
 LATE: Final = (
     "nothing was sent: this computer was too busy, or its disk too slow, to send the command within its permit's time"
@@ -91,7 +101,9 @@ class MissionController:
     `stage` and `ending` are for reading; `ending` is None until the run ends.
     """
 
-    def __init__(self, loaded: Loaded, journal: Journal, limits: Limits, *, resumed: bool) -> None:
+    def __init__(
+        self, loaded: Loaded, journal: Journal, limits: Limits, *, resumed: bool, idle_us: int | None = None
+    ) -> None:
         self._loaded = loaded
         self._policy = loaded.bundle.policy
         self._journal = journal
@@ -116,6 +128,9 @@ class MissionController:
         self.admission = Admission(loaded, journal, self.queue, remaining)
         self.dispatcher = Dispatcher(loaded.executor, journal, remaining)
         self.retry = RetryPolicy(limits)
+        self._idle = IdleTime(idle_us)
+        self._live = -1  # the step that was handed in live, and whose refusal leaves what flies as it is
+        self._flown = -1  # the last step that was sent
         self._supervisor: Supervisor | None = None  # of the running step
         self._fallback = Fallback(loaded, self.admission, self.dispatcher, limits)
 
@@ -171,6 +186,7 @@ class MissionController:
         stood_us, silence = link.judged(now.monotonic_us)
         if stood_us:
             self.retry.grace.stood(stood_us)
+            self._idle.stood(stood_us)
             if self._supervisor is not None:
                 self._supervisor.grace.stood(stood_us)
         if silence is not None:
@@ -248,10 +264,18 @@ class MissionController:
             if not self.dispatcher.withdraw(now):
                 return self._inadmissible(now, invocation)
         answer = self.admission.ask(now, state, Ref(STEP, invocation.step, -1))
-        if answer is None or (answer.outcome is Outcome.DENY and not answer.permit):
-            return self._come_down(now)
-        if answer.permit:
+        if answer is not None and answer.permit:
             return self._start(now, invocation, answer)
+        return self._refused(now, invocation, answer, state)
+
+    def _refused(self, now: Now, invocation: Invocation, answer: Decision | None, state: State) -> bool:
+        """The current step was not admitted: wait for it, or go on without it."""
+        if self._is_live(invocation):
+            waits = answer is not None and answer.outcome is Outcome.DEFER
+            return self._bide(now, invocation, state) if waits else self._decline(now, invocation)
+        if answer is None or answer.outcome is Outcome.DENY:
+            return self._come_down(now)
+        released_us = self.queue.released_us or 0
         if self.retry.may_wait(invocation, answer, released_us, now.monotonic_us):
             if self.retry.may_call(invocation, answer):
                 left_us = released_us + invocation.contract.deadline_us - now.monotonic_us
@@ -265,9 +289,52 @@ class MissionController:
         if not self.aloft:
             self._end(now, Ending.COMPLETED)
             return False
+        if self._idle.is_live and self._flown >= 0 and not self._alone:
+            return self._wait_for_step(now)
         self._journal.effect(now, "not-landed")
         self.fall_back(CONTINGENCY_LINK)
         return True
+
+    def _wait_for_step(self, now: Now) -> bool:
+        """A live mission has no step left: the vehicle holds as it would for a step, under the conditions of the last
+        one, until a replacement brings the next.
+        """
+        idle, flown = self._idle, self.queue.step(self._flown)
+        if idle.begins(now.monotonic_us):
+            self._journal.effect(now, IDLE, detail=f"for at most {(idle.idle_us or 0) // 1_000} ms")
+        if idle.over(now.monotonic_us):
+            self._journal.effect(now, IDLE_OVER)
+            return self._come_down(now)
+        if not self.retry.is_due(now.monotonic_us):
+            return False
+        return self._bide(now, flown, self.monitor.state(now.monotonic_us))
+
+    def _is_live(self, invocation: Invocation) -> bool:
+        return invocation.step == self._live and self.aloft
+
+    def _decline(self, now: Now, invocation: Invocation) -> bool:
+        """A step that was handed in live is refused: it is requested no more, and what flew before goes on."""
+        self.admission.flush(now)
+        self._journal.effect(now, DECLINED, Ref(STEP, invocation.step, -1))
+        self.queue.decline(invocation.step)
+        return True
+
+    def _request_ahead(self, now: Now) -> bool:
+        """Request the step that would supersede the running one. Before a take-off is seen in the air, and while no
+        records are kept, it waits.
+        """
+        ahead, at_us = self.queue.ahead, now.monotonic_us
+        if ahead is None or self._cause is not None or not self._recording or self.vehicle.airborne is not True:
+            return False
+        if not self.retry.is_due(at_us):
+            return False
+        self.queue.release_ahead(at_us)
+        answer = self.admission.ask(now, self.monitor.state(at_us), Ref(STEP, ahead.step, -1))
+        if answer is None or not answer.permit:
+            return (answer is None or answer.outcome is not Outcome.DEFER) and self._decline(now, ahead)
+        self.dispatcher.end(now, SUPERSEDED)
+        self._advance(now)
+        return self._start(now, ahead, answer)
 
     def _bide(self, now: Now, invocation: Invocation, state: State) -> bool:
         """The step has not begun: in the air the vehicle holds meanwhile, as long as its conditions hold."""
@@ -284,6 +351,7 @@ class MissionController:
         if not self.dispatcher.fly(now, answer.permit, Ref(STEP, invocation.step, -1), None):
             self._overdue = self.dispatcher.overdue
             return not self._overdue and self._inadmissible(now, invocation)
+        self._flown = invocation.step
         prepared = self._loaded.invocations[invocation.step]
         self._supervisor = Supervisor(
             prepared, self._loaded.policy, now.monotonic_us, self.link.away_us(now.monotonic_us)
@@ -292,6 +360,8 @@ class MissionController:
         return False
 
     def _inadmissible(self, now: Now, invocation: Invocation) -> bool:
+        if self._is_live(invocation):
+            return self._decline(now, invocation)
         if invocation.on_inadmissible == OnInadmissible.SKIP:
             self._journal.effect(now, "skipped", Ref(STEP, invocation.step, -1))
             self._advance(now)
@@ -304,15 +374,16 @@ class MissionController:
         if supervisor is not None:
             away_us = self.link.away_us(at_us)
             violated = supervisor.violated(self.monitor.state(at_us), now, away_us, self.dispatcher.hindrance)
-        return violated is not None and self._violated(now, violated)
+        return self._request_ahead(now) if violated is None else self._violated(now, violated)
 
     def _violated(self, now: Now, what: Detail) -> bool:
-        """A condition of the current step does not hold."""
+        """A condition of the current step does not hold; in a live mission without one, of the last step."""
         current = self.queue.current
         if self.dispatcher.active is not None:
             self.dispatcher.end(now, "violated", what)
-        elif current is not None:  # it waits for its step, so this ends no flight
-            self._journal.effect(now, "violated", Ref(STEP, current.step, -1), detail=what)
+        else:  # it waits for its step, so this ends no flight
+            step = self._flown if current is None else current.step
+            self._journal.effect(now, "violated", Ref(STEP, step, -1), detail=what)
         self.fall_back(FALLBACK_LINK)
         return True
 
@@ -365,6 +436,8 @@ class MissionController:
         if self.stage is RunStage.RUNNING:
             if active.homeward:
                 self._landed()
+                if self.queue.ahead is not None:  # on the ground nothing supersedes: the mission is over
+                    self._decline(now, self.queue.ahead)
             self._advance(now)
         elif active.homeward:
             self.down(now)
@@ -504,10 +577,24 @@ class MissionController:
 
     def replaced(self, now: Now, first: int) -> None:
         """A replacement is in force: the steps from `first` on are new."""
-        mission, current = self._loaded.bundle.mission, self.queue.current
-        self.queue.replace(mission, first, now.monotonic_us)
-        if current is not None and first <= current.step and self.stage is RunStage.DECIDING:
-            self.retry.renew(now.monotonic_us, at_once=True)
+        mission, current, at_us = self._loaded.bundle.mission, self.queue.current, now.monotonic_us
+        live = self._idle.is_live and self.aloft and self.queue.follows(first)
+        self.queue.replace(mission, first, at_us)
+        if first <= self._live:
+            self._live = -1
+        if live and self.stage is RunStage.RUNNING:
+            self._live = first
+            self.queue.put_ahead(first)
+            self.retry.renew(at_us, at_once=True)
+        elif live and self.stage is RunStage.DECIDING:
+            self._live = first
+            if current is not None and current.step < first:
+                self._journal.effect(now, SUPERSEDED, Ref(STEP, current.step, -1))
+            self.queue.skip_to(first, at_us)
+            self._idle.stop()
+            self.retry.renew(at_us, at_once=True)
+        elif current is not None and first <= current.step and self.stage is RunStage.DECIDING:
+            self.retry.renew(at_us, at_once=True)
         self._journal.add(Expect(mission.invocations))
 
     def fall_back(self, kind: int, cause: Ending = Ending.ABORTED, *, holds: bool = True) -> None:
@@ -522,7 +609,9 @@ class MissionController:
         if self.vehicle.airborne is False:
             self._fallback.land()
         else:
-            step = current.step if current is not None and kind == FALLBACK_LINK else -1
+            step = self._flown if current is None else current.step
+            if kind != FALLBACK_LINK or step < 0:
+                kind, step = CONTINGENCY_LINK, -1
             self._fallback.begin(kind, step, holds=holds)
         self.stage = RunStage.FALLING
 

@@ -20,6 +20,8 @@ WINDOW = 128
 _ENOUGH = 8
 #: the vehicle was observed to obey the dispatched command; the detail is its reported target, if any
 OBEYED: Final = "obeyed"
+#: the effect that ends a running step because another step of the mission was admitted in its place
+SUPERSEDED: Final = "superseded"
 #: the record of a fallback that was sent to fly home or land, and ended without a report of a landing
 UNCONFIRMED: Final = "sent but not confirmed: no landing was observed"
 _UNCONFIRMED = ("time-over", "released")

@@ -43,15 +43,17 @@ class Runtime:
     The caller has made the log's genesis with `recorder` before, and makes its close after `End`. `resumed` says
     that an earlier run of this bundle was interrupted: in the air the contingency brings the vehicle down; armed
     on the ground it is told to land, because it may have been commanded to take off; at rest nothing flies.
+    `idle_us`: the mission is live, and waits so long in the air for its next step; None: it ends with its last one.
     """
 
     def __init__(
-        self, loaded: Loaded, recorder: Recorder, *, limits: Limits | None = None, resumed: bool = False
-    ) -> None:
+        self, loaded: Loaded, recorder: Recorder, *, limits: Limits | None = None, resumed: bool = False,
+        idle_us: int | None = None,
+    ) -> None:  # fmt: skip
         recorder.lost = lambda: loaded.boundary.lost
         self._journal = Journal(recorder)
         limits = limits or Limits()
-        self._controller = MissionController(loaded, self._journal, limits, resumed=resumed)
+        self._controller = MissionController(loaded, self._journal, limits, resumed=resumed, idle_us=idle_us)
         self._handler = EventHandler(self._controller, self._journal, loaded.boundary)
         self._stalled_us = limits.stalled_us
         self._stepped_us: int | None = None  # time of the last step

@@ -83,6 +83,37 @@ def _with_values(text: str, prepared: PreparedInvocation, policy: PreparedPolicy
     return f"{text}: {values}" if values else text
 
 
+class IdleTime:
+    """How long a live mission waits in the air for its next step, after the last one (`idle_us`; None: not at all)."""
+
+    def __init__(self, idle_us: int | None) -> None:
+        self.idle_us = idle_us
+        self._since_us: int | None = None
+
+    @property
+    def is_live(self) -> bool:
+        """Whether the mission is live: it waits for further steps, and a new step may supersede the running one."""
+        return self.idle_us is not None
+
+    def begins(self, now_us: int) -> bool:
+        """Count the time from now on; False if it is counted already."""
+        began, self._since_us = self._since_us is None, now_us if self._since_us is None else self._since_us
+        return began
+
+    def stood(self, us: int) -> None:
+        """Nothing was judged for this time, which does not count."""
+        if self._since_us is not None:
+            self._since_us += us
+
+    def stop(self) -> None:
+        """A step was handed in."""
+        self._since_us = None
+
+    def over(self, now_us: int) -> bool:
+        """Whether the time is over."""
+        return self._since_us is not None and self.idle_us is not None and now_us - self._since_us >= self.idle_us
+
+
 class RetryPolicy:
     """Whether and when a step that was not admitted is requested again, and how long it is awaited.
 

@@ -215,6 +215,19 @@ def test_requests_allowed_before_during_and_after_step(
     assert of.session.refusal(ref) is after
 
 
+@pytest.mark.parametrize("outcome", [DEFER, FALLBACK, DENY, ALLOW])
+def test_running_step_keeps_its_links_until_a_later_one_is_admitted(outcome: Outcome) -> None:
+    of = Asked()
+    of.step(0)
+    assert of.step(1) is ALLOW
+    values = {DEFER: {flat.OBSTACLE: None}, FALLBACK: {flat.OBSTACLE: 1}}.get(outcome, {})
+    assert of.step(2, values, **(BINDING if outcome is DENY else {})) is outcome
+    for link in (DEGRADE, 0):
+        assert of.session.refusal(Ref(FALLBACK_LINK, 0, link)) is NOT_CURRENT, "it is over"
+        assert of.session.refusal(Ref(FALLBACK_LINK, 1, link)) is (NOT_CURRENT if outcome is ALLOW else None)
+        assert of.session.refusal(Ref(FALLBACK_LINK, 2, link)) is (NOT_CURRENT if outcome is DENY else None)
+
+
 @rows(
     ("ref", "values", "skill"),
     [

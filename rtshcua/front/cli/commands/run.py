@@ -35,8 +35,9 @@ app = typer.Typer(add_completion=False)
 
 #: up to this speed-up, the validity of a permit for parameters leaves the machine enough time
 _FASTEST_SET = 5
-#: the default of `--wait-for`
+#: the defaults of `--wait-for` and `--idle`
 _WAIT_US = 3_600_000_000
+_IDLE_US = 300_000_000
 
 
 @app.command()
@@ -49,11 +50,11 @@ def run(
     log_key: options.LogKey = None, boundary_key: options.BoundaryKeyFile = None,
     passphrase_file: options.PassphraseFile = None, signing_key: options.LinkKey = None,
     unsigned_radio: options.UnsignedRadio = False, system: options.System = None, runs: options.Runs = Path("runs"),
-    state_dir: options.StateFolder = None, fresh_state: options.FreshState = False,
-    no_fence: options.NoFence = False, set_: options.Settings = None, utc_error: options.UtcError = None,
-    agent_socket: options.AgentSocketPath = None, operator_socket: options.OperatorSocket = None,
-    agent_group: options.AgentGroup = None, witness: options.Witnesses = None,
-    scenario: options.ScenarioName = None, wait: options.Wait = False, wait_for: options.WaitFor = None,
+    state_dir: options.StateFolder = None, fresh_state: options.FreshState = False, no_fence: options.NoFence = False,
+    set_: options.Settings = None, utc_error: options.UtcError = None, agent_socket: options.AgentSocketPath = None,
+    operator_socket: options.OperatorSocket = None, agent_group: options.AgentGroup = None,
+    witness: options.Witnesses = None, scenario: options.ScenarioName = None, wait: options.Wait = False,
+    wait_for: options.WaitFor = None, live: options.Live = False, idle: options.Idle = None,
     rehearsal: options.DryRun = False, plain: options.Plain = False, as_json: options.AsJson = False,
 ) -> ExitCode:  # fmt: skip
     """Fly a bundle, once. Each step is decided before it is sent, monitored while it flies, and recorded.
@@ -95,7 +96,7 @@ def run(
             witnesses=witnesses, incidents=incidents, utc_error_us=duration_us(utc_error), settings=settings_of(set_),
             wait_s=(duration_us(wait_for) or _WAIT_US) / 1_000_000 if wait else None,
             boundary_user=user if isinstance(user, tuple) else None, unbuilt=unbuilt, boundary_key=boundary_key,
-            boundary_socket=boundary_socket,
+            boundary_socket=boundary_socket, idle_us=(duration_us(idle) or _IDLE_US) if live else None,
         )  # fmt: skip
         console = TerminalConsole(_style(plain=plain, as_json=as_json), request.data, passphrase_file)
         ended = fly(request, console, transport)

@@ -76,6 +76,12 @@ CONFLICTS: Final = (
         "run", ("--wait",), "`--wait` conflicts with `--dry-run` and `--scenario`, which need the mission at the start",
         among=("--dry-run", "--scenario"),
     ),
+    Conflict("run", ("--idle",), "`--idle` requires `--live`", without=("--live",)),
+    Conflict(
+        "run", ("--live",), "`--live` requires `--agent-socket PATH`, where replacements are submitted",
+        without=("--agent-socket",),
+    ),
+    Conflict("run", ("--live",), "`--live` conflicts with `--dry-run`, which flies nothing", among=("--dry-run",)),
     Conflict("run", _LISTENS, "`--boundary-socket` requires `--connect`", without=_CONNECT),
     *_other_modes("run"),
     *(

@@ -290,6 +290,16 @@ WaitFor = Annotated[
     str | None,
     typer.Option(metavar="TIME", callback=duration_text, help="with --wait: longest wait [default: 60min]"),
 ]
+Live = Annotated[
+    bool,
+    typer.Option(
+        "--live", help="hold after the last step and wait for replacements, which may supersede the running step"
+    ),
+]
+Idle = Annotated[
+    str | None,
+    typer.Option(metavar="TIME", callback=duration_text, help="with --live: longest wait in the air [default: 5min]"),
+]
 DryRun = Annotated[
     bool, typer.Option("--dry-run", help="decide each step on the present state; send no motion command")
 ]

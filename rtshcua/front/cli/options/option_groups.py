@@ -13,7 +13,7 @@ OPTION_GROUPS: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
         "The simulated vehicle (without --connect)": (
             "--speed", "--flavour", "--battery", "--wind", "--fault", "--seed", "--scenario", "--fresh-state",
         ),
-        "The flight": ("--dry-run", "--wait", "--wait-for"),
+        "The flight": ("--dry-run", "--wait", "--wait-for", "--live", "--idle"),
         "Agents, operators, witnesses": ("--agent-socket", "--agent-group", "--operator-socket", "--witness"),
         "The enforcement boundary": ("--mode", "--boundary-user", "--boundary-socket"),
         "Keys and trust": ("--root", "--log-key", "--boundary-key", "--passphrase-file"),

@@ -14,7 +14,7 @@ _DIMENSIONS = {dimension.value: dimension for dimension in Dimension}
 
 #: the step state after each event
 _STATES = {"dispatched": "running", "succeeded": "done", "skipped": "skipped"} | dict.fromkeys(
-    ("failed", "violated", "replaced", "released", "time-over", "landed"), "failed"
+    ("failed", "violated", "replaced", "superseded", "released", "time-over", "landed"), "failed"
 )
 
 

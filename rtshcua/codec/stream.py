@@ -36,12 +36,19 @@ class FrameStream:
     """Splits a stream into frames. An incomplete frame is kept for the next call.
 
     A frame is valid if its checksum is right. The checksum of a message that is not in the dialect cannot be
-    verified; it is skipped as a whole if another frame follows immediately.
+    verified; it is skipped as a whole if another frame follows immediately. With `every`, such frames are returned too,
+    as are those of MAVLink 1.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, every: bool = False) -> None:
         self.counts = StreamCounts()
+        self._every = every
         self._kept = b""
+
+    @property
+    def pending(self) -> bool:
+        """Whether octets are kept that may be the beginning of a frame."""
+        return bool(self._kept)
 
     def feed(self, octets: bytes) -> list[bytes]:
         """The frames that are now complete, in order."""
@@ -67,7 +74,7 @@ class FrameStream:
                 continue
             start += length
             old += frame[0] == _OLD_MARKER
-            if frame[0] == MARKER and not _is_unknown(frame):
+            if self._every or (frame[0] == MARKER and not _is_unknown(frame)):
                 frames.append(frame)
         self._kept = data[start:]
         counts = self.counts

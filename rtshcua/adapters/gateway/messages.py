@@ -7,7 +7,7 @@ That process makes two pairs of `AF_UNIX`, `SOCK_SEQPACKET` sockets, keeps one e
 - the *telemetry* socket carries the vehicle's frames to the starter: one or more whole frames a datagram, no header. It
   is lossy: what the reader does not take in time is dropped (and counted).
 
-The relay ends with its starter: at the end of the control socket, at SIGTERM, or with the parent process. Each session
+The relay ends with its starter: at the end of the control socket, or at SIGTERM; it ignores SIGINT. Each session
 of FLIGHT has its own pair of `SOCK_SEQPACKET` sockets: the starter sends one end with a message `FLIGHT`
 (`send_flight`), gives the other one to FLIGHT (`--connect fd:N`), and closes its own copies of both. The end of that
 socket is the end of FLIGHT, and the relay reports it. Both ways a datagram has one or more whole frames.
@@ -35,12 +35,13 @@ class RelayKind(IntEnum):
     FAILED = 2
     "The relay ends, because it could not open an address. Payload: JSON, a `SetupFailure`."
     UP = 3
-    "A client was heard for the first time, or connected. `client` is its number from now on. Payload: JSON, an `Up`."
+    "The first whole frame of a client came. `client` is its number from now on. Payload: JSON, an `Up`."
     DOWN = 4
-    "A client is gone: disconnected, or silent for longer than `silence_s`. Payload: the reason, as text."
+    "A client is gone: it disconnected, lost its place, or was silent for a minute. Payload: the reason, as text."
     CLIENT = 5
-    """Frames of a client, within its limits, of which nothing went to the vehicle. Payload: one or more whole frames,
-    whose checksums and signatures were not verified."""
+    """Frames of a client, within its limits, of which nothing went to the vehicle. Payload: one or more whole frames of
+    MAVLink 2 (those of MAVLink 1 are converted), with a right checksum where the dialect has the message; their
+    signatures were not verified."""
     PILOT = 6
     "Frames of a pilot, which went to the vehicle. Payload: one or more whole frames."
     FLIGHT_ENDED = 7
@@ -83,9 +84,9 @@ DIALOGUES: Final = frozenset(
 class ClientSetup(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A client's own address, as `adapters/vehicle/address.py` reads it, and its limits.
 
-    `peers`: how many senders (UDP) or connections (TCP) at once; each is a client with a number of its own. `rate`:
-    frames a second that are passed on, and as many at once. A sender of UDP keeps its place until it was silent for
-    `silence_s`.
+    `peers`: how many senders (`udpin`) or connections (`tcpin`) at once; each is a client with a number of its own.
+    `rate`: frames a second that are passed on, and as many at once. A sender keeps its place until it was silent for
+    `silence_s`, a connection too if it never sent a frame; then another one may take it.
     """
 
     name: str

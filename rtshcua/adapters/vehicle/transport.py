@@ -74,19 +74,21 @@ class Transport(Protocol):
         ...
 
 
-def open_transport(address: Address) -> Transport:
-    """Open the transport of an address. Raises OSError for a reason that waiting does not remove."""
+def open_transport(address: Address, *, every: bool = False) -> Transport:
+    """Open the transport of an address. With `every`, frames of MAVLink 1 and of messages that are not in the dialect
+    are returned too. Raises OSError for a reason that waiting does not remove.
+    """
     match address.way:
         case LinkCarrier.UDP_IN:
             return UdpTransport(address.host, address.port, begins=False)
         case LinkCarrier.UDP_OUT:
             return UdpTransport(address.host, address.port, begins=True)
         case LinkCarrier.TCP:
-            return TcpTransport(address)
+            return TcpTransport(address, every=every)
         case LinkCarrier.TCP_IN:
-            return TcpListener(address)
+            return TcpListener(address, every=every)
         case LinkCarrier.SERIAL:
-            return SerialTransport(address)
+            return SerialTransport(address, every=every)
         case LinkCarrier.INHERITED:
             return InheritedTransport(address)
 
@@ -234,9 +236,10 @@ class InheritedTransport:
 class _Line:
     """One open stream: its frames and its unsent octets. `write` and `read` raise OSError once it is lost."""
 
-    def __init__(self, number: int, read: Callable[[], bytes], write: Callable[[bytes], int]) -> None:
-        self.number = number
-        self.frames = FrameStream()
+    def __init__(
+        self, number: int, frames: FrameStream, read: Callable[[], bytes], write: Callable[[bytes], int]
+    ) -> None:
+        self.number, self.frames = number, frames
         self.gone: str | None = None
         self._read, self._write = read, write
         self._unsent = b""
@@ -279,8 +282,8 @@ class _Streams:
     begins = True
     capacity: int | None = None
 
-    def __init__(self, address: Address) -> None:
-        self.address = address
+    def __init__(self, address: Address, *, every: bool = False) -> None:
+        self.address, self._every = address, every
         self.trouble: str | None = None
         self.lines: dict[int, tuple[_Line, Callable[[], None], int]] = {}  # with its close function and descriptor
         self._past = StreamCounts()  # counts of closed lines
@@ -325,7 +328,8 @@ class _Streams:
     ) -> None:
         """Add an open line."""
         self._made += 1
-        self.lines[self._made] = _Line(self._made, read, write), close, descriptor
+        frames = FrameStream(every=self._every)
+        self.lines[self._made] = _Line(self._made, frames, read, write), close, descriptor
         self.trouble = None
         if self._had:
             self._notes.append(f"`{self.address}` is open again")
@@ -350,8 +354,8 @@ class _Streams:
 class TcpTransport(_Streams):
     """Connects to an address, and reconnects whenever the connection is lost."""
 
-    def __init__(self, address: Address) -> None:
-        super().__init__(address)
+    def __init__(self, address: Address, *, every: bool = False) -> None:
+        super().__init__(address, every=every)
         found = socket.getaddrinfo(address.host, address.port, socket.AF_INET, socket.SOCK_STREAM)
         self._peer = found[0][4]
         self._pending: socket.socket | None = None
@@ -389,8 +393,8 @@ class TcpListener(_Streams):
 
     begins = False
 
-    def __init__(self, address: Address) -> None:
-        super().__init__(address)
+    def __init__(self, address: Address, *, every: bool = False) -> None:
+        super().__init__(address, every=every)
         self.trouble = "nobody has connected"
         self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
@@ -433,6 +437,12 @@ class TcpListener(_Streams):
 
 
 def _add_connection(streams: _Streams, made: socket.socket) -> None:
+    prepare_connection(made)
+    streams.add(made.fileno(), lambda: made.recv(_CHUNK), made.send, made.close)
+
+
+def prepare_connection(made: socket.socket) -> None:
+    """Make a connection send at once, and notice a lost peer."""
     made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     made.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     # an unplugged cable does not end a connection; options that a system lacks are left out
@@ -441,7 +451,6 @@ def _add_connection(streams: _Streams, made: socket.socket) -> None:
     ):  # fmt: skip
         if hasattr(socket, name):
             made.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
-    streams.add(made.fileno(), lambda: made.recv(_CHUNK), made.send, made.close)
 
 
 class SerialTransport(_Streams):
@@ -449,8 +458,8 @@ class SerialTransport(_Streams):
     is not a serial device, cannot be opened, or does not support the baud rate.
     """
 
-    def __init__(self, address: Address) -> None:
-        super().__init__(address)
+    def __init__(self, address: Address, *, every: bool = False) -> None:
+        super().__init__(address, every=every)
         self.capacity = address.capacity
         self._tried_us: int | None = None
         self._open()

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from msgspec.structs import replace
 
+from rtshcua.decision.contracts import first_cell
 from rtshcua.decision.tree import slots_read
 from rtshcua.diagnostics import codes
 from rtshcua.diagnostics.span import Span
@@ -24,7 +25,7 @@ from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.ground.lower.policy_checks import check_step_fitted
 from rtshcua.ground.lower.tables import JointSourceTable, SourceTable
 from rtshcua.model.flat.code import Clause
-from rtshcua.model.flat.contract import Contract, MotionKind, SourceKind
+from rtshcua.model.flat.contract import PLACE, Contract, MotionKind, SourceKind
 from rtshcua.model.flat.limits import MAX_CLAUSES, MAX_INVOCATIONS, MAX_PATH, MAX_PHASES
 from rtshcua.model.flat.mission import Invocation, Mission, OnInadmissible, Plan
 from rtshcua.model.ir.missions import MissionDecl, Overrides, Phase, Step
@@ -108,6 +109,23 @@ def argument_span(context: CheckContext, step: Step, parameter: str) -> Span:
         if name == parameter:
             return argument.value.span
     return step.span
+
+
+def straight_plan(contract: Contract, arguments: Sequence[int]) -> Plan:
+    """Return the plan of a step with these argument cells; that of a `cover` motion is without its survey path."""
+    motion = contract.motion
+    path: tuple[int, ...] = ()
+    if motion.kind == MotionKind.HOME:
+        path = (0, 0)
+    elif motion.kind == MotionKind.FLY:
+        cell = first_cell(contract, PLACE)
+        path = tuple(arguments[cell : cell + 2])
+    return Plan(
+        kind=motion.kind,
+        path=path,
+        altitude=0 if motion.altitude < 0 else arguments[motion.altitude],
+        speed=0 if motion.speed < 0 else arguments[motion.speed],
+    )
 
 
 class StepLowering:
@@ -283,18 +301,11 @@ class StepLowering:
         arguments = self._under.contracts.cells(bound)
         skill = self._context.symbols.skills[step.skill.text]
         contract = self._under.policy.contracts[self._under.skills[step.skill.text]]
-        motion = contract.motion
-        altitude = 0 if motion.altitude < 0 else arguments[motion.altitude]
-        speed = 0 if motion.speed < 0 else arguments[motion.speed]
-        path: tuple[int, ...] | None = ()
-        if motion.kind == MotionKind.HOME:
-            path = (0, 0)
-        elif motion.kind == MotionKind.FLY:
-            cell = next(each.cell for each in contract.parameters if each.name == _target(skill))
-            path = tuple(arguments[cell : cell + 2])
-        elif motion.kind == MotionKind.COVER:
-            path = self._survey_path(step, skill, bound, altitude)
-        return None if path is None else Plan(kind=motion.kind, path=path, altitude=altitude, speed=speed)
+        plan = straight_plan(contract, arguments)
+        if plan.kind != MotionKind.COVER:
+            return plan
+        path = self._survey_path(step, skill, bound, plan.altitude)
+        return None if path is None else replace(plan, path=path)
 
     def _survey_path(
         self, step: Step, skill: SkillDecl, bound: Sequence[Bound], altitude: int

@@ -1,0 +1,135 @@
+"""Frames in datagrams, as the relay needs them: whole or not, their message numbers, and frames of MAVLink 1."""
+
+from collections.abc import Collection, Iterator, Sequence
+from typing import Final
+
+from rtshcua.codec.frames import kind_of
+from rtshcua.mavlink.framing import (
+    CHECKSUM,
+    FLAG_SIGNED,
+    FLAGS,
+    HEAD,
+    HEADER,
+    MARKER,
+    SIGNATURE,
+    message_id,
+    octets_of_checksum,
+)
+
+#: a frame of MAVLink 1: marker, length, sequence, system, component, message; then payload and checksum
+OLD_MARKER: Final = 0xFE
+_OLD_HEADER: Final = 6
+#: the most octets of a datagram that several frames share: none is fragmented on Ethernet or Wi-Fi
+MOST_SHARED: Final = 1_400
+
+
+def numbers_in(datagram: bytes) -> Sequence[int] | None:
+    """The message number of each frame in a datagram that consists of whole frames; None for any other datagram."""
+    size = len(datagram)
+    if size < HEADER + CHECKSUM or datagram[0] != MARKER:
+        return _walked(datagram)
+    length = datagram[1] + (HEADER + CHECKSUM + SIGNATURE if datagram[FLAGS] & FLAG_SIGNED else HEADER + CHECKSUM)
+    if length == size:  # nearly always
+        return (datagram[7] | datagram[8] << 8 | datagram[9] << 16,)
+    return _walked(datagram)
+
+
+def _walked(datagram: bytes) -> Sequence[int] | None:
+    numbers, start = [], 0
+    while start < len(datagram):
+        length = _length(datagram, start)
+        if length is None:
+            return None
+        numbers.append(_number(datagram, start))
+        start += length
+    return numbers or None
+
+
+def _length(data: bytes, start: int) -> int | None:
+    """The length of the frame that begins here; None if it does not end within the data, or there is none."""
+    left = len(data) - start
+    if data[start] == MARKER and left >= HEADER + CHECKSUM:
+        length = HEADER + data[start + 1] + CHECKSUM + (SIGNATURE if data[start + FLAGS] & FLAG_SIGNED else 0)
+    elif data[start] == OLD_MARKER and left >= _OLD_HEADER + CHECKSUM:
+        length = _OLD_HEADER + data[start + 1] + CHECKSUM
+    else:
+        return None
+    return length if length <= left else None
+
+
+def _number(data: bytes, start: int) -> int:
+    return message_id(data, start) if data[start] == MARKER else data[start + 5]
+
+
+def frames_in(datagram: bytes) -> Iterator[bytes]:
+    """Each frame of a datagram of whole frames."""
+    start = 0
+    while start < len(datagram):
+        length = _length(datagram, start) or len(datagram)
+        yield datagram[start : start + length]
+        start += length
+
+
+def without(datagram: bytes, numbers: Collection[int]) -> bytes:
+    """A datagram of whole frames without those of these messages. It may be empty."""
+    return b"".join(frame for frame in frames_in(datagram) if _number(frame, 0) not in numbers)
+
+
+def parcels(datagrams: Sequence[bytes]) -> Sequence[bytes]:
+    """The same frames in as few datagrams as they fit into, in order. One that is small enough stays as it is."""
+    if len(datagrams) == 1 and len(datagrams[0]) <= MOST_SHARED:
+        return datagrams
+    shared: list[bytes] = []
+    waiting: list[bytes] = []
+    size = 0
+    for datagram in datagrams:
+        for piece in (datagram,) if len(datagram) <= MOST_SHARED else frames_in(datagram):
+            size += len(piece)
+            if size > MOST_SHARED and waiting:
+                shared.append(b"".join(waiting))
+                waiting, size = [], len(piece)
+            waiting.append(piece)
+    if waiting:
+        shared.append(b"".join(waiting))
+    return shared
+
+
+def good_frames(datagram: bytes) -> tuple[list[bytes], int]:
+    """The frames of a client's datagram before the first one with a wrong checksum, and how many octets remain: all of
+    them, if it does not consist of whole frames. The checksum of a message that is not in the dialect cannot be
+    verified: such a frame is returned.
+    """
+    if numbers_in(datagram) is None:
+        return [], len(datagram)
+    good: list[bytes] = []
+    end = 0
+    for frame in frames_in(datagram):
+        if not _is_good(frame):
+            break
+        good.append(upgraded(frame))
+        end += len(frame)
+    return good, len(datagram) - end
+
+
+def _is_good(frame: bytes) -> bool:
+    old = frame[0] == OLD_MARKER
+    if not old and frame[FLAGS] & ~FLAG_SIGNED:
+        return False  # nobody could decode it
+    kind, header = (kind_of(frame[5]), _OLD_HEADER) if old else (kind_of(message_id(frame, 0)), HEADER)
+    if kind is None:
+        return not old
+    end = header + frame[1]
+    return octets_of_checksum(frame[1:end] + kind.extra) == frame[end : end + CHECKSUM]
+
+
+def upgraded(frame: bytes) -> bytes:
+    """A frame of MAVLink 1, of a message in the dialect, as one of MAVLink 2; any other frame as it is.
+
+    A client begins with MAVLink 1 until it hears MAVLink 2 (pymavlink does).
+    """
+    kind = kind_of(frame[5]) if frame[0] == OLD_MARKER else None
+    if kind is None:
+        return frame
+    payload = frame[_OLD_HEADER : _OLD_HEADER + frame[1]].rstrip(b"\0") or b"\0"
+    head = HEAD.pack(MARKER, len(payload), 0, 0, frame[2], frame[3], frame[4], frame[5], 0)
+    return head + payload + octets_of_checksum(head[1:] + payload + kind.extra)

@@ -1,0 +1,178 @@
+"""Read the frames of clients, and make frames for them: MAVLink 1 and 2 in, MAVLink 2 out.
+
+The layouts are those of `mavlink.layouts` and of the further messages that clients send or get. A frame of another
+message cannot be verified, and nothing of it is read but its number.
+"""
+
+from math import isnan
+from struct import Struct
+from struct import error as struct_error
+from typing import Any, Final, NamedTuple
+
+from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1
+from rtshcua.mavlink.framing import (
+    CHECKSUM,
+    FLAG_SIGNED,
+    HEAD,
+    HEADER,
+    MARKER,
+    SIGNATURE,
+    checksum,
+    octets_of_checksum,
+)
+from rtshcua.mavlink.layouts import LAYOUTS, Layout
+
+#: MAVLink 1: its marker, and its header (marker, length, sequence, system, component, message)
+MARKER_1: Final = 0xFE
+HEADER_1: Final = 6
+
+SET_MODE: Final = 11
+MISSION_WRITE_PARTIAL_LIST: Final = 38
+MISSION_ITEM: Final = 39
+MISSION_SET_CURRENT: Final = 41
+MISSION_CURRENT: Final = 42
+MISSION_ITEM_REACHED: Final = 46
+REQUEST_DATA_STREAM: Final = 66
+MANUAL_CONTROL: Final = 69
+RC_CHANNELS_OVERRIDE: Final = 70
+COMMAND_ACK: Final = 77
+SET_ATTITUDE_TARGET: Final = 82
+SET_POSITION_TARGET_LOCAL_NED: Final = 84
+FILE_TRANSFER_PROTOCOL: Final = 110
+LOG_REQUEST_LIST: Final = 117
+AUTOPILOT_VERSION: Final = 148
+AUTOPILOT_VERSION_REQUEST: Final = 183
+HOME_POSITION: Final = 242
+SETUP_SIGNING: Final = 256
+CONTROL_STATUS: Final = 512
+
+_TARGET: Final = "target_system target_component"
+_MOTION: Final = "vx vy vz afx afy afz yaw yaw_rate type_mask"
+
+
+def _layout(extra: int, fields: str, names: str) -> Layout:
+    return Layout(extra, Struct(fields), tuple(names.split()))
+
+
+#: Of an array only the first element has the field's name. The layouts without all fields end before the others.
+LAYOUTS_OF_CLIENTS: Final = LAYOUTS | {
+    SET_MODE: _layout(89, "<IBB", "custom_mode target_system base_mode"),
+    MISSION_WRITE_PARTIAL_LIST: _layout(9, "<hhBBB", f"start_index end_index {_TARGET} mission_type"),
+    MISSION_ITEM: _layout(
+        254, "<4f3fHHBBBBBB",
+        f"param1 param2 param3 param4 x y z seq command {_TARGET} frame current autocontinue mission_type",
+    ),
+    MISSION_SET_CURRENT: _layout(28, "<HBB", f"seq {_TARGET}"),
+    MISSION_CURRENT: _layout(28, "<HHBB", "seq total mission_state mission_mode"),
+    MISSION_ITEM_REACHED: _layout(11, "<H", "seq"),
+    REQUEST_DATA_STREAM: _layout(148, "<HBBBB", f"req_message_rate {_TARGET} req_stream_id start_stop"),
+    MANUAL_CONTROL: _layout(243, "<hhhhHB", "x y z r buttons target_system"),
+    RC_CHANNELS_OVERRIDE: _layout(124, "<16xBB", _TARGET),
+    COMMAND_ACK: _layout(143, "<HBBiBB", f"command result progress result_param2 {_TARGET}"),
+    SET_ATTITUDE_TARGET: _layout(49, "<36xBBB", f"{_TARGET} type_mask"),
+    SET_POSITION_TARGET_LOCAL_NED: _layout(
+        143, "<I11fHBBB", f"time_boot_ms x y z {_MOTION} {_TARGET} coordinate_frame"
+    ),
+    FILE_TRANSFER_PROTOCOL: _layout(84, "<BBB251s", f"target_network {_TARGET} payload"),
+    LOG_REQUEST_LIST: _layout(128, "<HHBB", f"start end {_TARGET}"),
+    AUTOPILOT_VERSION_REQUEST: _layout(85, "<BB", _TARGET),
+    HOME_POSITION: _layout(104, "<iii", "latitude longitude altitude"),
+    SETUP_SIGNING: _layout(71, "<Q", "initial_timestamp"),
+    CONTROL_STATUS: _layout(184, "<BB", "sysid_in_control flags"),
+}  # fmt: skip
+
+
+class Received(NamedTuple):
+    """A frame of a client: its sender, its message, and its fields by name; without fields if the layout is unknown."""
+
+    system: int
+    component: int
+    message: int
+    fields: dict[str, Any]
+
+    @property
+    def sender(self) -> tuple[int, int]:
+        """System and component of the sender."""
+        return self.system, self.component
+
+    def number(self, name: str) -> float:
+        """A numeric field; NaN if the message has none of this name."""
+        value = self.fields.get(name)
+        return value if isinstance(value, int | float) else float("nan")
+
+    def whole(self, name: str) -> int:
+        """A numeric field as an integer; -1 for one that is none."""
+        value = self.number(name)
+        return -1 if isnan(value) or value in (float("inf"), float("-inf")) or value != int(value) else int(value)
+
+    def is_for(self, system: int) -> bool:
+        """Whether the frame is for the autopilot of this system, for all, or names no target."""
+        systems, components = (0, system), (0, MAV_COMP_ID_AUTOPILOT1)
+        return self.fields.get("target_system", 0) in systems and self.fields.get("target_component", 0) in components
+
+
+class _Envelope(NamedTuple):
+    """What a frame's header says: its sender, its message, and where its payload is."""
+
+    system: int
+    component: int
+    message: int
+    start: int
+    end: int
+
+
+def _envelope(frame: bytes) -> _Envelope | None:
+    """The header of one complete frame, of either version; None for anything else."""
+    if len(frame) >= HEADER + CHECKSUM and frame[0] == MARKER:
+        _, length, flags, compatible, _, system, component, low, high = HEAD.unpack_from(frame)
+        if flags & ~FLAG_SIGNED or compatible:
+            return None
+        found = _Envelope(system, component, low | high << 16, HEADER, HEADER + length)
+        tail = SIGNATURE if flags else 0
+    elif len(frame) >= HEADER_1 + CHECKSUM and frame[0] == MARKER_1:
+        found, tail = _Envelope(frame[3], frame[4], frame[5], HEADER_1, HEADER_1 + frame[1]), 0
+    else:
+        return None
+    return found if len(frame) == found.end + CHECKSUM + tail else None
+
+
+def received(frame: bytes) -> Received | None:
+    """The fields of one complete frame, signed or not; None for damaged or incomplete octets.
+
+    The checksum is verified where the layout is known.
+    """
+    found = _envelope(frame)
+    if found is None:
+        return None
+    system, component, number, start, end = found
+    layout = LAYOUTS_OF_CLIENTS.get(number)
+    if layout is None:
+        return Received(system, component, number, {})
+    if checksum(frame[1:end] + bytes([layout.extra])) != int.from_bytes(frame[end : end + CHECKSUM], "little"):
+        return None
+    size = layout.fields.size
+    payload = frame[start : min(end, start + size)].ljust(size, b"\0")  # trailing zeros are not sent
+    return Received(system, component, number, dict(zip(layout.names, layout.fields.unpack(payload), strict=True)))
+
+
+def made(number: int, values: dict[str, Any], sender: tuple[int, int], sequence: int) -> bytes:
+    """An unsigned MAVLink 2 frame of a message in `LAYOUTS_OF_CLIENTS`; fields that are not given are 0.
+
+    Raises ValueError for a value that does not fit its field.
+    """
+    layout = LAYOUTS_OF_CLIENTS[number]
+    texts = ("text", "param_id", "payload")
+    try:
+        payload = layout.fields.pack(*[values.get(name, b"" if name in texts else 0) for name in layout.names])
+    except (struct_error, OverflowError) as error:
+        raise ValueError(str(error)) from None
+    payload = payload.rstrip(b"\0") or b"\0"
+    head = HEAD.pack(MARKER, len(payload), 0, 0, sequence % 256, *sender, number & 0xFFFF, number >> 16)
+    return head + payload + octets_of_checksum(head[1:] + payload + bytes([layout.extra]))
+
+
+def message_of(frame: bytes) -> int:
+    """The message number of a frame of the vehicle, of either version; -1 for octets that are too short."""
+    if len(frame) >= HEADER and frame[0] == MARKER:
+        return frame[7] | frame[8] << 8 | frame[9] << 16
+    return frame[5] if len(frame) >= HEADER_1 and frame[0] == MARKER_1 else -1

@@ -1,0 +1,119 @@
+"""One client: what it is, and what is sent to it and recorded about it."""
+
+import json
+from collections import deque
+from typing import Any, Final
+
+from rtshcua.ground.gateway.client_frames import COMMAND_ACK, made
+from rtshcua.ground.gateway.interface import Action, ClientNote, ClientSettings, ToClient
+from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink.layouts import TEXT_OCTETS
+
+#: a text with the same key is sent once in this time, us
+TEXT_EVERY_US: Final = 5_000_000
+#: the most octets of one text: four chunks
+_LONGEST_TEXT: Final = 4 * TEXT_OCTETS
+_MOST_KEYS: Final = 64
+#: a `client` record: its most octets; how many at once, and the interval after that, us
+LONGEST_RECORD: Final = 200
+_RECORDS: Final = 20
+_RECORD_EVERY_US: Final = 200_000
+#: MAV_SEVERITY
+WARNING: Final = 4
+NOTICE: Final = 5
+#: a client that sent heartbeats is dead after this silence, us
+DEAD_US: Final = 5_000_000
+
+
+class ClientLink:
+    """A client's identity and its way back. `actions` is the list that all clients of a gateway share."""
+
+    def __init__(self, client: int, settings: ClientSettings, system: int, actions: list[Action], now_us: int) -> None:
+        self.client = client
+        self.settings = settings
+        #: when a frame came last, monotonic us
+        self.heard_us = now_us
+        #: whether it sent a heartbeat: only then does silence mean that it is dead
+        self.beats = False
+        self.is_dead = False
+        #: the system id of its last frame
+        self.system_id = 0
+        #: its values of parameters that only give defaults
+        self.shadows: dict[str, float] = {}
+        self._autopilot = system, enums.MAV_COMP_ID_AUTOPILOT1
+        self._actions = actions
+        self._sequence = 0
+        self._texts = 0
+        self._told: dict[str, int] = {}
+        self._recorded: deque[int] = deque(maxlen=_RECORDS)
+        self._left_out = 0
+
+    @property
+    def name(self) -> str:
+        """Its configured name."""
+        return self.settings.name
+
+    def hear(self, system: int, now_us: int, *, beats: bool) -> None:
+        """A frame came."""
+        self.heard_us, self.system_id, self.is_dead = now_us, system, False
+        self.beats = self.beats or beats
+
+    def silent(self, now_us: int) -> bool:
+        """Whether it sent heartbeats and is silent for too long."""
+        return self.beats and now_us - self.heard_us > DEAD_US
+
+    def send(self, number: int, **values: Any) -> None:
+        """Send a message as the autopilot."""
+        self._actions.append(ToClient(self.client, made(number, values, self._autopilot, self._sequence)))
+        self._sequence = (self._sequence + 1) % 256
+
+    def forward(self, frame: bytes) -> None:
+        """Send a frame of the vehicle again."""
+        self._actions.append(ToClient(self.client, frame))
+
+    def ack(self, to: tuple[int, int], command: int, result: int) -> None:
+        """Answer a command with a MAV_RESULT."""
+        system, component = to
+        self.send(
+            COMMAND_ACK, command=command, result=result, progress=255, target_system=system, target_component=component
+        )
+
+    def text(self, text: str, now_us: int, key: str = "", severity: int = WARNING) -> None:
+        """Send a STATUSTEXT, in chunks. With a key it is sent once in `TEXT_EVERY_US`."""
+        if key:
+            if now_us - self._told.get(key, -TEXT_EVERY_US) < TEXT_EVERY_US:
+                return
+            if len(self._told) >= _MOST_KEYS:
+                self._told.clear()
+            self._told[key] = now_us
+        octets = text.encode("ascii", "replace")[:_LONGEST_TEXT]
+        chunks = [octets[at : at + TEXT_OCTETS] for at in range(0, len(octets), TEXT_OCTETS)]
+        if len(chunks) > 1 and len(chunks[-1]) == TEXT_OCTETS:
+            chunks.append(b"")  # a text ends with a chunk that is not full
+        self._texts = self._texts % 0xFFFF + 1
+        number = self._texts if len(chunks) > 1 else 0
+        for at, chunk in enumerate(chunks):
+            self.send(layouts.STATUSTEXT, severity=severity, text=chunk, id=number, chunk_seq=at)
+
+    def record(self, effect: str, now_us: int, **detail: Any) -> None:
+        """Record what happened to a frame of the client: `refused`, `absorbed`, `passed`, `accepted`. Beyond a rate,
+        records are counted, and the count is in the next one.
+        """
+        full = len(self._recorded) == _RECORDS
+        if full and now_us - self._recorded[0] < _RECORDS * _RECORD_EVERY_US:
+            self._left_out += 1
+            return
+        self._recorded.append(now_us)
+        said: dict[str, Any] = {"client": self.name[:32], "effect": effect}
+        if self._left_out:
+            said["left_out"] = self._left_out
+            self._left_out = 0
+        for key, value in detail.items():
+            more = said | {key: value[:80] if isinstance(value, str) else value}
+            if len(_compact(more)) <= LONGEST_RECORD:
+                said = more
+        self._actions.append(ClientNote(_compact(said)))
+
+
+def _compact(said: dict[str, Any]) -> str:
+    return json.dumps(said, separators=(",", ":"), ensure_ascii=True)

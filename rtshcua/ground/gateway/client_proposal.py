@@ -1,0 +1,143 @@
+"""Proposals under way: from a client's command to the flown step, and what the client is told meanwhile.
+
+A command is acknowledged when its step is dispatched, or refused. Until then it is in progress: after `QUICK_US` the
+client is told so, and again every `AGAIN_US`, because clients give up after some silence.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from rtshcua.ground.gateway.client_link import NOTICE, ClientLink
+from rtshcua.ground.gateway.interface import ProposedStep
+from rtshcua.ground.gateway.plan_transfer import MISSION_ACCEPTED, MISSION_DENIED
+from rtshcua.ground.gateway.translation import ACCEPTED, CANCELLED, DENIED, IN_PROGRESS, TEMPORARILY_REJECTED
+from rtshcua.mavlink import layouts
+from rtshcua.wire.request import STEP
+
+#: from when on a waiting command is in progress, and how often that is repeated, us
+QUICK_US: Final = 250_000
+AGAIN_US: Final = 4_000_000
+#: how long the worker and the flight may take to answer a proposal, us
+PATIENCE_US: Final = 30_000_000
+#: the events that end a step that was dispatched
+_ENDS: Final = frozenset({"succeeded", "failed", "time-over", "superseded"})
+
+
+@dataclass(slots=True)
+class ClientProposal:
+    """A proposal of one client. `command` is the command to acknowledge, -1 for a message that is not acknowledged, and
+    `guided` whether it came as a mission item, which MISSION_ACK answers.
+    """
+
+    number: int
+    link: ClientLink
+    sender: tuple[int, int]
+    command: int
+    steps: tuple[ProposedStep, ...]
+    began_us: int
+    guided: bool = False
+    #: for the mission of a client: the item of each step
+    item_of: tuple[int, ...] = ()
+    #: the first step in the mission of the flight; -1 until the proposal is signed
+    first: int = -1
+    #: whether the flight took the document
+    taken: bool = False
+    #: the index among its steps of the one that was dispatched last; -1 before
+    flies: int = -1
+    #: whether the client was answered for good
+    answered: bool = False
+    ended: bool = False
+    #: how many of its steps succeeded
+    done: int = 0
+    told_us: int = 0
+    #: notes of decisions that wait, each told once
+    waits: set[str] = field(default_factory=set)
+
+    def answer(self, result: int) -> None:
+        """Answer the client for good, once."""
+        if self.answered:
+            return
+        self.answered = True
+        if self.guided:
+            accepted = MISSION_ACCEPTED if result == ACCEPTED else MISSION_DENIED
+            system, component = self.sender
+            self.link.send(layouts.MISSION_ACK, type=accepted, target_system=system, target_component=component)
+        elif self.command >= 0:
+            self.link.ack(self.sender, self.command, result)
+
+    def refuse(self, result: int, text: str, now_us: int) -> None:
+        """End it with a reason. A step that was acknowledged before is only told about."""
+        if not self.ended:
+            self.ended = True
+            self.link.text(text, now_us, "" if self.command >= 0 else "setpoint refused")
+            self.link.record("refused", now_us, command=self.command, skill=self.steps[0].skill, reason=text)
+            self.answer(result)
+
+    def supersede(self) -> None:
+        """Another proposal takes its place."""
+        self.ended = True
+        self.answer(CANCELLED)
+
+    def again(self, sender: tuple[int, int], command: int) -> None:
+        """The same command came again before its answer: it is the one to be answered."""
+        self.sender, self.command = sender, command
+        if self.told_us and command >= 0 and not self.guided:
+            self.link.ack(sender, command, IN_PROGRESS)
+
+    def tick(self, now_us: int) -> None:
+        """Tell the client that it is in progress; give up when nobody answers."""
+        if self.ended or self.answered:
+            return
+        if not self.taken and now_us - self.began_us > PATIENCE_US:
+            self.refuse(TEMPORARILY_REJECTED, f"{self.steps[0].skill} rejected: nothing answered in time", now_us)
+        elif now_us - (self.told_us or self.began_us - AGAIN_US + QUICK_US) >= AGAIN_US:
+            self.told_us = now_us
+            if self.command >= 0 and not self.guided:
+                self.link.ack(self.sender, self.command, IN_PROGRESS)
+
+    def keep_before(self, first: int) -> None:
+        """Another proposal replaced the mission of the flight from this step on."""
+        if self.ended or self.first < 0 or self.first + len(self.steps) <= first:
+            return
+        if first <= self.first:
+            self.supersede()
+        else:
+            self.steps = self.steps[: first - self.first]
+            self.ended = self.done == len(self.steps)
+
+    # ---------------------------------------------------------------- lines of the flight
+
+    def line(self, line: Mapping[str, Any], now_us: int) -> bool:
+        """A decision or effect of the flight; return whether it concerns one of its steps."""
+        step = line.get("step", -1)
+        at = step - self.first if isinstance(step, int) and self.first >= 0 else -1
+        if self.ended or not 0 <= at < len(self.steps) or line.get("kind", STEP) != STEP:
+            return False
+        if line.get("type") == "decision":
+            self._decided(line, at, now_us)
+        else:
+            self._happened(str(line.get("event")), at, now_us)
+        return True
+
+    def _decided(self, line: Mapping[str, Any], at: int, now_us: int) -> None:
+        outcome, reason = str(line.get("outcome")), str(line.get("reason"))
+        clause = line.get("clause")
+        text = f"{self.steps[at].skill} {outcome}: {reason}" + (f" ({clause})" if isinstance(clause, str) else "")
+        if outcome == "deny":
+            self.refuse(DENIED, text, now_us)
+        elif outcome == "fallback":
+            self.refuse(TEMPORARILY_REJECTED, text, now_us)
+        elif outcome == "defer" and reason not in self.waits:
+            self.waits.add(reason)
+            self.link.text(text, now_us, severity=NOTICE)
+
+    def _happened(self, event: str, at: int, now_us: int) -> None:
+        if event == "dispatched":
+            self.flies = at
+            self.answer(ACCEPTED)
+        elif event in _ENDS and at == self.flies:
+            self.done = at + 1 if event == "succeeded" else self.done
+            self.ended = event != "succeeded" or at + 1 == len(self.steps)
+        elif event in ("refused", "declined", "skipped") and at > self.flies:
+            self.refuse(TEMPORARILY_REJECTED, f"{self.steps[at].skill} rejected: the flight goes on without it", now_us)

@@ -1,0 +1,735 @@
+"""The pure part of the gateway: from frames of clients, frames of the vehicle, lines of the flight and time to answers
+and proposals. It never passes a client's frame on.
+
+Two clients that contradict each other are decided by rank and policy, never by who sent last. The client whose step
+flies or waits is in control, and for `KEEPS_US` after its last step. Another client's command is taken if its rank in
+the configuration is higher, or if its skill is one of the policy's `contingency`, which stops, returns or lands;
+otherwise it is rejected. The policy decides on every step besides. A pilot who requests control keeps it until he
+releases it.
+"""
+
+from collections.abc import Callable
+from typing import Any, Final, TypeAlias
+
+from rtshcua.ground.gateway.accepted import COMMAND, ITEM, MESSAGE, MODE
+from rtshcua.ground.gateway.client_frames import (
+    AUTOPILOT_VERSION,
+    AUTOPILOT_VERSION_REQUEST,
+    COMMAND_ACK,
+    CONTROL_STATUS,
+    FILE_TRANSFER_PROTOCOL,
+    LOG_REQUEST_LIST,
+    MANUAL_CONTROL,
+    MISSION_CURRENT,
+    MISSION_ITEM,
+    MISSION_ITEM_REACHED,
+    MISSION_SET_CURRENT,
+    MISSION_WRITE_PARTIAL_LIST,
+    RC_CHANNELS_OVERRIDE,
+    REQUEST_DATA_STREAM,
+    SET_ATTITUDE_TARGET,
+    SET_MODE,
+    SET_POSITION_TARGET_LOCAL_NED,
+    SETUP_SIGNING,
+    Received,
+    received,
+)
+from rtshcua.ground.gateway.client_link import NOTICE, ClientLink
+from rtshcua.ground.gateway.client_proposal import ClientProposal
+from rtshcua.ground.gateway.habits import ShownState, set_parameter
+from rtshcua.ground.gateway.harmless_requests import COMMANDS as REQUESTING
+from rtshcua.ground.gateway.harmless_requests import HarmlessRequests
+from rtshcua.ground.gateway.interface import (
+    Action,
+    Cancel,
+    ClientDown,
+    ClientUp,
+    Event,
+    FlightEnded,
+    FlightLine,
+    FromClient,
+    FromPilot,
+    FromVehicle,
+    GatewaySettings,
+    ProposalAnswered,
+    ProposalChecked,
+    Propose,
+    ProposedStep,
+    Tick,
+)
+from rtshcua.ground.gateway.plan_transfer import PlanTransfer, UploadedPlan
+from rtshcua.ground.gateway.quick_decision import QuickDecision
+from rtshcua.ground.gateway.translation import (
+    ACCEPTED,
+    DENIED,
+    TEMPORARILY_REJECTED,
+    UNSUPPORTED,
+    Translation,
+    Untranslated,
+    shadowed_parameters,
+)
+from rtshcua.ground.gateway.vehicle_seen import VehicleSeen, parameter_name
+from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink.modes import COPTER_NAMES, PX4, PX4_NAMES, CopterMode, Px4Mode
+from rtshcua.mavlink.parameters import is_bytewise
+from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.situation import Now
+
+#: how long a client keeps control after its last step, us
+KEEPS_US: Final = 10_000_000
+#: the least interval of proposals that come from setpoints of one client, us
+SETPOINT_US: Final = 500_000
+#: the most proposals of one client that are neither taken nor refused
+MOST_OPEN: Final = 4
+_SECOND_US: Final = 1_000_000
+_MOST_CLIENTS: Final = 256
+
+REQUEST_OPERATOR_CONTROL: Final = 32_100
+_SET_MISSION_CURRENT: Final = 224
+_GUIDED_ITEM: Final = 2  # `current` of a mission item that is flown to at once (ArduPilot)
+#: commands that would change the vehicle itself: denied; other commands without a mapping are not supported
+_DANGEROUS: Final = frozenset({179, 181, 183, 184, 185, 187, 207, 209, 241, 242, 245, 246, 420, 42_428})
+#: frames that say something about the client, and request nothing
+_SAYS_NOTHING: Final = frozenset(
+    {
+        layouts.HEARTBEAT, layouts.SYSTEM_TIME, 4, layouts.PARAM_VALUE, COMMAND_ACK, 109, 141, 148, layouts.STATUSTEXT,
+        300, MISSION_CURRENT, layouts.GLOBAL_POSITION_INT,
+    }
+)  # fmt: skip
+_SETPOINTS: Final = {
+    SET_POSITION_TARGET_LOCAL_NED: "local setpoints",
+    SET_ATTITUDE_TARGET: "attitude and thrust setpoints",
+    RC_CHANNELS_OVERRIDE: "RC override",
+    MANUAL_CONTROL: "manual control",
+    layouts.SET_POSITION_TARGET_GLOBAL_INT: "setpoints other than a position",
+}
+#: what an absorbed mode is: clients ask for it before they send targets
+_WITHOUT_EFFECT: Final = (CopterMode.GUIDED, Px4Mode.OFFBOARD)
+_MISSION_MODES: Final = (CopterMode.AUTO, Px4Mode.MISSION)
+#: the flight's answers to a document that a later one may not get
+_FOR_NOW: Final = frozenset({"busy", "already-released", "superseded", "not-flying", "falling-back"})
+#: what of a pilot's frames is recorded
+_PILOTS: Final = frozenset(
+    {
+        layouts.COMMAND_LONG, layouts.COMMAND_INT, SET_MODE, layouts.PARAM_SET, layouts.MISSION_COUNT,
+        layouts.MISSION_CLEAR_ALL, layouts.SET_POSITION_TARGET_GLOBAL_INT, *_SETPOINTS, SETUP_SIGNING,
+    }
+)  # fmt: skip
+# MISSION_STATE
+_NOT_STARTED, _ACTIVE, _PAUSED, _COMPLETE = 2, 3, 4, 5
+
+
+class _Client:
+    """One ordinary client with everything that is kept about it."""
+
+    def __init__(self, link: ClientLink, shown: ShownState, transfer: PlanTransfer) -> None:
+        self.link = link
+        self.shown = shown
+        self.transfer = transfer
+        self.latest: ClientProposal | None = None
+        self.setpoint_us = -SETPOINT_US
+        #: the mission that it started last, and the plan of that
+        self.mission: tuple[ClientProposal, UploadedPlan] | None = None
+        self.reported: tuple[int, int] | None = None  # the last MISSION_CURRENT: item and state
+
+
+_Handler: TypeAlias = Callable[[_Client, Received, Now], None]
+
+
+class Gateway:
+    """All clients of one vehicle. `take` is called with each event, in order, by one caller."""
+
+    def __init__(self, settings: GatewaySettings) -> None:
+        self._settings = settings
+        self._actions: list[Action] = []
+        self._seen = VehicleSeen(settings.system)
+        self._translation = Translation(settings, self._seen)
+        self._quick = QuickDecision(settings)
+        self._requests = HarmlessRequests(settings, self._seen, self._actions)
+        self._shadowed = shadowed_parameters(settings.accepted)
+        policy = settings.policy.policy
+        self._safe = {policy.contracts[link.skill].name for link in policy.contingency}
+        self._clients: dict[int, _Client] = {}
+        self._pilots: dict[int, ClientLink] = {}
+        self._proposals: dict[int, ClientProposal] = {}
+        self._uploads: dict[int, _Client] = {}
+        self._number = 0
+        self._flown: ClientProposal | None = None  # the proposal whose step was dispatched last
+        self._kept: tuple[_Client, int] | None = None  # who was in control last, and until when
+        self._pilot_holds = 0  # the system id of the pilot who requested control
+        self._stage = ""  # of the flight: "", "waiting", "flying"
+        self._unready: str | None = None
+        self._second_us = 0
+        self._handlers = self._by_message()
+
+    def take(self, event: Event, now: Now) -> list[Action]:
+        """What is to be done after an event."""
+        match event:
+            case FromVehicle(frame):
+                self._from_vehicle(frame, now.monotonic_us)
+            case FromClient(client, frame):
+                self._from_client(client, frame, now)
+            case FromPilot(client, frame):
+                self._from_pilot(client, frame, now.monotonic_us)
+            case FlightLine(line):
+                self._flight_line(dict(line), now.monotonic_us)
+            case Tick():
+                self._tick(now.monotonic_us)
+            case _:
+                self._rare(event, now)
+        actions = self._actions[:]
+        self._actions.clear()
+        return actions
+
+    def _rare(self, event: Event, now: Now) -> None:
+        match event:
+            case ClientUp(client, of):
+                link = ClientLink(client, of, self._settings.system, self._actions, now.monotonic_us)
+                if of.pilot:
+                    self._pilots[client] = link
+                elif len(self._clients) < _MOST_CLIENTS:
+                    transfer = PlanTransfer(link, self._translation, self._settings.autopilot)
+                    self._clients[client] = _Client(link, ShownState(link, self._seen, self._actions), transfer)
+            case ClientDown(client):
+                self._down(client, now.monotonic_us)
+            case ProposalChecked():
+                self._checked(event, now.monotonic_us)
+            case ProposalAnswered(number, slug, text):
+                self._answered(number, slug, text, now.monotonic_us)
+            case FlightEnded():
+                self._ended("", now.monotonic_us)
+
+    # ---------------------------------------------------------------- the vehicle and the pilot
+
+    def _from_vehicle(self, frame: bytes, now_us: int) -> None:
+        number = self._seen.take(frame, now_us)
+        if number == layouts.HEARTBEAT:
+            for client in self._clients.values():
+                client.shown.update(now_us)
+                client.shown.heartbeat(now_us)
+        self._requests.seen(number)
+
+    def _from_pilot(self, client: int, frame: bytes, now_us: int) -> None:
+        """A pilot's frame: it went to the vehicle. It is recorded, and whether he takes or releases control."""
+        link, message = self._pilots.get(client), received(frame)
+        if link is None or message is None:
+            return
+        link.hear(message.system, now_us, beats=message.message == layouts.HEARTBEAT)
+        if message.message not in _PILOTS:
+            return
+        command = message.fields.get("command")
+        if command is not None:
+            link.record("passed", now_us, message=message.message, command=command)
+        else:
+            link.record("passed", now_us, message=message.message)
+        if command == REQUEST_OPERATOR_CONTROL:
+            self._pilot_holds = message.system if message.number("param2") == 1 else 0
+            for each in self._clients.values():
+                self._control_status(each, now_us)
+
+    # ---------------------------------------------------------------- frames of clients
+
+    def _by_message(self) -> dict[int, _Handler]:
+        def transfer(function: Callable[[PlanTransfer, Received, int], None]) -> _Handler:
+            return lambda client, message, now: self._transferred(function, client, message, now)
+
+        def asks(function: Callable[[ClientLink, Received, int], None]) -> _Handler:
+            return lambda client, message, now: function(client.link, message, now.monotonic_us)
+
+        return {
+            layouts.COMMAND_LONG: self._command,
+            layouts.COMMAND_INT: self._command,
+            SET_MODE: self._set_mode,
+            **dict.fromkeys(_SETPOINTS, self._setpoint),
+            layouts.PARAM_SET: self._param_set,
+            layouts.PARAM_REQUEST_READ: self._param_read,
+            layouts.PARAM_REQUEST_LIST: asks(lambda link, _, now_us: self._requests.list_parameters(link, now_us)),
+            layouts.MISSION_COUNT: transfer(PlanTransfer.count),
+            layouts.MISSION_CLEAR_ALL: transfer(PlanTransfer.clear),
+            MISSION_WRITE_PARTIAL_LIST: transfer(PlanTransfer.unsupported),
+            layouts.MISSION_ITEM_INT: self._item,
+            MISSION_ITEM: self._item,
+            layouts.MISSION_REQUEST_LIST: lambda client, message, now: client.transfer.request_list(message),
+            layouts.MISSION_REQUEST: lambda client, message, now: client.transfer.request(message),
+            layouts.MISSION_REQUEST_INT: lambda client, message, now: client.transfer.request(message),
+            layouts.MISSION_ACK: lambda client, message, now: client.transfer.acknowledged(message),
+            MISSION_SET_CURRENT: self._set_current,
+            REQUEST_DATA_STREAM: asks(self._requests.data_stream),
+            layouts.TIMESYNC: asks(self._requests.time),
+            LOG_REQUEST_LIST: asks(self._requests.logs),
+            AUTOPILOT_VERSION_REQUEST: self._version,
+            FILE_TRANSFER_PROTOCOL: self._files,
+        }
+
+    def _from_client(self, number: int, frame: bytes, now: Now) -> None:
+        client, message = self._clients.get(number), received(frame)
+        if client is None or message is None:
+            return
+        client.link.hear(message.system, now.monotonic_us, beats=message.message == layouts.HEARTBEAT)
+        if message.message in _SAYS_NOTHING or not message.is_for(self._settings.system):
+            return
+        handler = self._handlers.get(message.message)
+        if handler is not None:
+            handler(client, message, now)
+        else:
+            what = "signing set-up" if message.message == SETUP_SIGNING else f"message {message.message}"
+            client.link.text(f"{what} is refused", now.monotonic_us, what)
+            client.link.record("refused", now.monotonic_us, message=message.message)
+
+    def _command(self, client: _Client, message: Received, now: Now) -> None:
+        command, now_us = message.fields["command"], now.monotonic_us
+        result: int | None
+        if command == enums.MAV_CMD_COMPONENT_ARM_DISARM:
+            result = client.shown.arm(message, now_us, self._unready if self._stage == "waiting" else None)
+        elif command in REQUESTING:
+            result = self._requests.command(client.link, message, now_us)
+        elif command == enums.MAV_CMD_DO_SET_MODE:
+            result = self._do_set_mode(client, message, now)
+        elif command == enums.MAV_CMD_MISSION_START:
+            result = self._start(client, message, command, now)
+        elif command == REQUEST_OPERATOR_CONTROL:
+            self._reject(client, f"{self._controller(now_us)} is in control", command, now_us)
+            result = DENIED
+        elif command == _SET_MISSION_CURRENT:
+            result = self._jump(client, message.number("param1"), now_us)
+        else:
+            result = self._mapped(client, message, command, now)
+        if result is not None:
+            client.link.ack(message.sender, command, result)
+
+    def _mapped(self, client: _Client, message: Received, command: int, now: Now) -> int | None:
+        """A command that the table may have; its result, None if the answer comes later."""
+        row, now_us = self._translation.row(COMMAND, command, message), now.monotonic_us
+        if row is not None:
+            return self._propose(client, message, self._step(client, row, message, now_us), command, now)
+        known = self._translation.knows(COMMAND, command)
+        why = "with these parameters is refused" if known else "has no mapping"
+        self._reject(client, f"command {command} {why}", command, now_us)
+        return DENIED if known or command in _DANGEROUS else UNSUPPORTED
+
+    def _step(self, client: _Client, row: Any, message: Received, now_us: int) -> ProposedStep | Untranslated:
+        step = self._translation.step(row, message, client.link.shadows, now_us)
+        if isinstance(step, Untranslated) and step.wanted:
+            self._requests.want_parameter(client.link, step.wanted)
+        return step
+
+    def _setpoint(self, client: _Client, message: Received, now: Now) -> None:
+        row, now_us = self._translation.row(MESSAGE, message.message, message), now.monotonic_us
+        if row is None:
+            what = _SETPOINTS[message.message]
+            client.link.text(f"{what} refused: send positions", now_us, what)
+            client.link.record("refused", now_us, message=message.message)
+            return
+        self._propose(client, message, self._step(client, row, message, now_us), -1, now)
+
+    def _reject(self, client: _Client, text: str, command: int, now_us: int) -> None:
+        client.link.text(text, now_us, text)
+        client.link.record("refused", now_us, command=command, reason=text)
+
+    # ---------------------------------------------------------------- modes
+
+    def _set_mode(self, client: _Client, message: Received, now: Now) -> None:
+        """SET_MODE: ArduPilot acknowledges it as a command of the same number, PX4 does not."""
+        command = SET_MODE if self._settings.autopilot != PX4 else -1
+        if message.fields["base_mode"] & enums.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+            result = self._mode(client, message, message.fields["custom_mode"], command, now)
+        else:
+            self._reject(client, "modes without a custom mode are refused", SET_MODE, now.monotonic_us)
+            result = DENIED
+        if result is not None and command >= 0:
+            client.link.ack(message.sender, command, result)
+
+    def _do_set_mode(self, client: _Client, message: Received, now: Now) -> int | None:
+        base, main, sub = (message.whole(f"param{number}") for number in (1, 2, 3))
+        if base < 0 or not base & enums.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED or not 0 <= main <= 0xFF:
+            self._reject(client, "modes without a custom mode are refused", SET_MODE, now.monotonic_us)
+            return DENIED
+        mode = main
+        if self._settings.autopilot == PX4:
+            mode = main << 16 | (sub << 24 if 0 <= sub <= 0xFF else 0)
+        return self._mode(client, message, mode, enums.MAV_CMD_DO_SET_MODE, now)
+
+    def _mode(self, client: _Client, message: Received, mode: int, command: int, now: Now) -> int | None:
+        """A request for a mode: shown without effect, a mission's start, or a step. Return its result, None if that
+        comes later.
+        """
+        guided, auto = (each[self._settings.autopilot == PX4] for each in (_WITHOUT_EFFECT, _MISSION_MODES))
+        now_us = now.monotonic_us
+        if mode == guided:
+            if self._seen.mode != mode:
+                client.shown.show_mode(mode, now_us)
+            return ACCEPTED
+        if mode == auto:
+            return self._start(client, message, command, now)
+        row = self._translation.row(MODE, mode, message)
+        if row is None:
+            names = PX4_NAMES if self._settings.autopilot == PX4 else COPTER_NAMES
+            self._reject(client, f"mode {names.get(mode, str(mode))} has no mapping", command, now_us)
+            return DENIED
+        contract = self._translation.contract(row.skill)
+        if contract is not None and contract.motion.kind != MotionKind.CLIMB and self._rests:
+            client.shown.show_mode(mode, now_us)
+            return ACCEPTED
+        return self._propose(client, message, self._step(client, row, message, now_us), command, now)
+
+    @property
+    def _rests(self) -> bool:
+        """Whether the vehicle is on the ground and no mission flies."""
+        return self._stage != "flying" and self._seen.on_ground
+
+    # ---------------------------------------------------------------- proposals
+
+    def _propose(
+        self, client: _Client, message: Received, step: ProposedStep | Untranslated, command: int, now: Now
+    ) -> int | None:
+        """Propose one step; the result for the client, None if the answer comes later."""
+        if isinstance(step, Untranslated):
+            now_us = now.monotonic_us
+            client.link.text(step.text, now_us, step.text if command < 0 else "")
+            client.link.record("refused", now_us, command=command, reason=step.text)
+            return step.result
+        return self._offer(client, (step,), message, command, now)
+
+    def _offer(
+        self, client: _Client, steps: tuple[ProposedStep, ...], message: Received, command: int, now: Now
+    ) -> int | None:
+        now_us, latest = now.monotonic_us, client.latest
+        if latest is not None and latest.steps == steps and self._stands(latest):
+            if not latest.answered:
+                latest.again(message.sender, command)
+            return ACCEPTED if latest.answered else None
+        refused = self._refused(client, steps[0], command, now)
+        if refused is not None:
+            return refused
+        waiting = [each for each in self._proposals.values() if each.link is client.link and not each.taken]
+        if command < 0:
+            if waiting or now_us - client.setpoint_us < SETPOINT_US:
+                return None  # it comes again
+            client.setpoint_us = now_us
+        if len(waiting) >= MOST_OPEN:
+            return TEMPORARILY_REJECTED
+        guided = message.message in (layouts.MISSION_ITEM_INT, MISSION_ITEM)
+        self._number += 1
+        proposal = ClientProposal(self._number, client.link, message.sender, command, steps, now_us, guided)
+        self._proposals[self._number] = client.latest = proposal
+        self._actions.append(Propose(self._number, client.link.client, client.link.settings.role, steps))
+        return None
+
+    def _refused(self, client: _Client, step: ProposedStep, command: int, now: Now) -> int | None:
+        """Refuse at once what is certainly refused by the policy, or cannot be taken now; return the result."""
+        now_us = now.monotonic_us
+        refusal = self._quick.refusal(step, client.link.settings.role, now)
+        if refusal is not None:
+            result, reason, text = refusal
+        else:
+            hindrance = self._hindrance(client, step, now_us)
+            if hindrance is None:
+                return None
+            result, reason, text = TEMPORARILY_REJECTED, hindrance, f"{step.skill} rejected: {hindrance}"
+        client.link.text(text, now_us, f"{step.skill} {reason}" if command < 0 else "")
+        client.link.record("refused", now_us, skill=step.skill, reason=reason, answer=text)
+        return result
+
+    def _stands(self, proposal: ClientProposal) -> bool:
+        """Whether a proposal still says what the vehicle does: it is under way, or nothing was flown after it."""
+        return not proposal.ended or (self._stage == "flying" and self._flown is proposal and proposal.done > 0)
+
+    def _hindrance(self, client: _Client, step: ProposedStep, now_us: int) -> str | None:
+        """Why a step cannot be taken now, although the policy may permit it."""
+        if self._pilot_holds:
+            return "the pilot is in control"
+        holder = self._holder(now_us)
+        contradicts = holder is not None and holder is not client and step.skill not in self._safe
+        if contradicts and holder is not None and client.link.settings.rank <= holder.link.settings.rank:
+            return f"{holder.link.name} is in control"
+        contract = self._translation.contract(step.skill)
+        climbs = contract is not None and contract.motion.kind == MotionKind.CLIMB
+        if self._stage == "flying":
+            return None
+        if not self._seen.on_ground:
+            return "the vehicle flies under another control"
+        if not climbs:
+            return "the vehicle is on the ground: take off first"
+        if self._stage == "":
+            return "no flight is ready yet"
+        return self._unready
+
+    def _holder(self, now_us: int) -> _Client | None:
+        """The client in control: that of the last proposal under way, or for some time after its end."""
+        for proposal in reversed(self._proposals.values()):
+            client = self._clients.get(proposal.link.client)
+            if not proposal.ended and client is not None:
+                self._kept = client, now_us + KEEPS_US
+                return client
+        if self._kept is not None and now_us < self._kept[1] and self._stage == "flying":
+            return self._kept[0] if self._kept[0].link.client in self._clients else None
+        return None
+
+    def _controller(self, now_us: int) -> str:
+        if self._pilot_holds:
+            return "the pilot"
+        holder = self._holder(now_us)
+        return "nobody" if holder is None else holder.link.name
+
+    def _checked(self, event: ProposalChecked, now_us: int) -> None:
+        number, refusal, first, for_now = event
+        upload = self._uploads.pop(number, None)
+        if upload is not None:
+            upload.transfer.checked(refusal, now_us)
+            self._of_mission(upload, now_us)
+            return
+        proposal = self._proposals.get(number)
+        if proposal is None:
+            return
+        if refusal is not None:
+            result = TEMPORARILY_REJECTED if for_now else DENIED
+            proposal.refuse(result, f"{proposal.steps[0].skill} refused: {refusal}", now_us)
+        else:
+            proposal.first = first
+        self._tidy(now_us)
+
+    def _answered(self, number: int, slug: str, text: str, now_us: int) -> None:
+        proposal = self._proposals.get(number)
+        if proposal is None:
+            return
+        if slug == "accepted":
+            proposal.taken = True
+            if proposal.link.is_dead:
+                self._actions.append(Cancel(proposal.link.client, f"{proposal.link.name} is silent"))
+            for each in self._proposals.values():
+                if each is not proposal and each.number < number:
+                    each.keep_before(proposal.first)
+        else:
+            words = f"{proposal.steps[0].skill} refused: {slug}" + (f": {text}" if text else "")
+            proposal.refuse(TEMPORARILY_REJECTED if slug in _FOR_NOW else DENIED, words, now_us)
+        self._tidy(now_us)
+
+    def _tidy(self, now_us: int) -> None:
+        """Forget proposals that ended; who was in control last is kept."""
+        self._holder(now_us)
+        for number in [number for number, each in self._proposals.items() if each.ended]:
+            del self._proposals[number]
+
+    # ---------------------------------------------------------------- the flight
+
+    def _flight_line(self, line: dict[str, Any], now_us: int) -> None:
+        match line.get("type"):
+            case "hello":
+                self._stage, self._unready = "", None
+            case "waiting":
+                self._stage = "waiting"
+            case "vehicle":
+                unready = line.get("unready")
+                self._unready = None if line.get("ready") else str(unready or "the vehicle is not ready")
+            case "mission":
+                self._stage = "flying"
+            case "decision" | "effect":
+                self._step_line(line, now_us)
+            case "close":
+                self._ended(str(line.get("ending", "")), now_us)
+
+    def _step_line(self, line: dict[str, Any], now_us: int) -> None:
+        if line.get("event") == "taken-over":
+            for client in self._clients.values():
+                client.link.text("the pilot took over: the flight of your steps ended", now_us, "taken over")
+        for proposal in list(self._proposals.values()):
+            flies, done = proposal.flies, proposal.done
+            if not proposal.line(line, now_us):
+                continue
+            if proposal.flies != flies:
+                self._flown = proposal
+            if (proposal.flies, proposal.done) != (flies, done):
+                self._progress(proposal, now_us)
+        self._tidy(now_us)
+
+    def _ended(self, ending: str, now_us: int) -> None:
+        """The flight ended: so did every proposal."""
+        if self._stage:
+            for proposal in self._proposals.values():
+                words = f"{proposal.steps[0].skill} ended with the flight" + (f": {ending}" if ending else "")
+                proposal.refuse(TEMPORARILY_REJECTED, words, now_us)
+        self._stage, self._flown, self._kept = "", None, None
+        self._proposals.clear()
+
+    # ---------------------------------------------------------------- missions of clients
+
+    def _item(self, client: _Client, message: Received, now: Now) -> None:
+        """A mission item: of an upload, or flown to at once (`current` 2)."""
+        now_us = now.monotonic_us
+        if message.fields["current"] == _GUIDED_ITEM and client.transfer.plan_is_idle:
+            command = message.fields["command"]
+            row = self._translation.row(ITEM, command, message)
+            if row is None:
+                self._reject(client, f"item {command} has no mapping", command, now_us)
+                result: int | None = UNSUPPORTED
+            else:
+                result = self._propose(client, message, self._step(client, row, message, now_us), command, now)
+            if result is not None:
+                client.transfer.answer_guided(message.sender, result)
+            return
+        plan = client.transfer.item(message, client.link.shadows, now_us)
+        if plan is not None:
+            self._number += 1
+            self._uploads = {at: each for at, each in self._uploads.items() if each is not client}
+            self._uploads[self._number] = client
+            steps = self._from_ground(plan.steps)[0]
+            role = client.link.settings.role
+            self._actions.append(Propose(self._number, client.link.client, role, steps, fly=False))
+
+    def _from_ground(self, steps: tuple[ProposedStep, ...]) -> tuple[tuple[ProposedStep, ...], int]:
+        """The steps of a mission, preceded on the ground by a take-off to the first height, as PX4 does; and the number
+        of steps before its own.
+        """
+        first = self._translation.contract(steps[0].skill)
+        if first is None or first.motion.kind == MotionKind.CLIMB or first.motion.altitude < 0 or not self._rests:
+            return steps, 0
+        takeoff = self._translation.takeoff_to(steps[0].values[first.motion.altitude])
+        return (steps, 0) if takeoff is None else ((takeoff, *steps), 1)
+
+    def _start(self, client: _Client, message: Received, command: int, now: Now) -> int | None:
+        """Fly the client's mission, from the step that it did not finish."""
+        plan, now_us = client.transfer.plan, now.monotonic_us
+        if plan is None:
+            self._reject(client, "there is no mission to start", command, now_us)
+            return TEMPORARILY_REJECTED
+        before = 0
+        if client.mission is not None and client.mission[1] is plan and self._stage == "flying":
+            last = client.mission[0]
+            if not last.ended:
+                last.again(message.sender, command)
+                return ACCEPTED if last.answered else None
+            before = 0 if last.done >= len(last.item_of) else last.done + len(plan.steps) - len(last.item_of)
+        steps, more = self._from_ground(plan.steps[max(before, 0) :])
+        result = self._offer(client, steps, message, command, now)
+        proposal = client.latest
+        if result is None and proposal is not None and proposal.steps == steps:
+            items = plan.item_of[max(before, 0) :]
+            proposal.item_of = (*items[:1] * more, *items)
+            client.mission = proposal, plan
+        return result
+
+    def _jump(self, client: _Client, item: float, now_us: int) -> int:
+        """DO_SET_MISSION_CURRENT, MISSION_SET_CURRENT: only back to the beginning, before the start."""
+        if item == 0 and client.transfer.plan is not None:
+            client.mission = None if client.mission is None or client.mission[0].ended else client.mission
+            return ACCEPTED
+        self._reject(client, "a mission starts at its first item", _SET_MISSION_CURRENT, now_us)
+        return DENIED
+
+    def _set_current(self, client: _Client, message: Received, now: Now) -> None:
+        self._jump(client, message.fields["seq"], now.monotonic_us)
+        self._mission_current(client, always=True)
+
+    def _progress(self, proposal: ClientProposal, now_us: int) -> None:
+        """A step of a client's mission began or ended: report items as an autopilot does."""
+        client = self._clients.get(proposal.link.client)
+        if client is None or client.mission is None or client.mission[0] is not proposal or not proposal.item_of:
+            return
+        done, items = proposal.done, proposal.item_of
+        if done and (done == len(items) or items[done] != items[done - 1]) and proposal.flies == done - 1:
+            client.link.send(MISSION_ITEM_REACHED, seq=items[done - 1])
+        self._mission_current(client)
+
+    def _mission_current(self, client: _Client, *, always: bool = False) -> None:
+        plan = client.transfer.plan
+        if plan is None:
+            return
+        item, state = 0, _NOT_STARTED
+        if client.mission is not None and client.mission[1] is plan:
+            proposal = client.mission[0]
+            items = proposal.item_of
+            if items and proposal.done >= len(items):
+                item, state = items[-1], _COMPLETE
+            elif items:
+                item = items[max(proposal.flies, proposal.done)]
+                state = _PAUSED if proposal.ended else _ACTIVE
+        if always or (item, state) != client.reported:
+            client.reported = item, state
+            client.link.send(MISSION_CURRENT, seq=item, total=len(plan.items), mission_state=state, mission_mode=1)
+
+    def _transferred(
+        self, function: Callable[[PlanTransfer, Received, int], None], client: _Client, message: Received, now: Now
+    ) -> None:
+        function(client.transfer, message, now.monotonic_us)
+        self._of_mission(client, now.monotonic_us)
+
+    def _of_mission(self, client: _Client, now_us: int) -> None:
+        """Withhold the vehicle's own reports of a mission from a client that has one here."""
+        has = client.transfer.plan is not None
+        client.shown.of_mission = frozenset({MISSION_CURRENT, MISSION_ITEM_REACHED}) if has else frozenset()
+        client.shown.update(now_us)
+
+    # ---------------------------------------------------------------- parameters, files, others
+
+    def _param_set(self, client: _Client, message: Received, now: Now) -> None:
+        bytewise = is_bytewise(self._settings.autopilot)
+        set_parameter(client.link, self._seen, message, self._shadowed, now.monotonic_us, bytewise=bytewise)
+
+    def _param_read(self, client: _Client, message: Received, now: Now) -> None:
+        self._requests.read_parameter(client.link, message, parameter_name(message), now.monotonic_us)
+
+    def _version(self, client: _Client, message: Received, now: Now) -> None:
+        self._requests.message(
+            client.link, message.sender, enums.MAV_CMD_REQUEST_MESSAGE, AUTOPILOT_VERSION, now.monotonic_us
+        )
+
+    def _files(self, client: _Client, message: Received, now: Now) -> None:
+        """FTP is refused, with the protocol's own answer, so that no client waits for it."""
+        payload = message.fields["payload"]
+        sequence = int.from_bytes(payload[:2], "little") + 1 & 0xFFFF
+        refusal, unknown_command = 129, 7
+        answer = sequence.to_bytes(2, "little") + bytes(
+            [payload[2], refusal, 1, payload[3], 0, 0, *bytes(4), unknown_command]
+        )
+        system, component = message.sender
+        client.link.send(FILE_TRANSFER_PROTOCOL, target_system=system, target_component=component, payload=answer)
+        client.link.record("refused", now.monotonic_us, message=FILE_TRANSFER_PROTOCOL)
+
+    # ---------------------------------------------------------------- time
+
+    def _tick(self, now_us: int) -> None:
+        self._requests.tick(now_us)
+        for proposal in list(self._proposals.values()):
+            proposal.tick(now_us)
+        every_second = now_us - self._second_us >= _SECOND_US
+        for client in list(self._clients.values()):
+            client.transfer.tick(now_us)
+            client.shown.update(now_us)
+            if client.link.silent(now_us) and not client.link.is_dead:
+                client.link.is_dead = True
+                self._dead(client, now_us)
+            if every_second:
+                self._control_status(client, now_us)
+                self._mission_current(client, always=True)
+        if every_second:
+            self._second_us = now_us
+        self._tidy(now_us)
+
+    def _control_status(self, client: _Client, now_us: int) -> None:
+        """CONTROL_STATUS: who is in control, for the whole system."""
+        holder = self._holder(now_us)
+        system = self._pilot_holds or (0 if holder is None else holder.link.system_id)
+        client.link.send(CONTROL_STATUS, sysid_in_control=system, flags=1)
+
+    def _down(self, number: int, now_us: int) -> None:
+        link = self._pilots.pop(number, None)
+        if link is not None and link.system_id == self._pilot_holds:
+            self._pilot_holds = 0
+        client = self._clients.pop(number, None)
+        if client is None:
+            return
+        self._requests.forget(number)
+        self._uploads = {at: each for at, each in self._uploads.items() if each is not client}
+        if client.link.beats and not client.link.is_dead:
+            client.link.is_dead = True
+            self._dead(client, now_us)
+
+    def _dead(self, client: _Client, now_us: int) -> None:
+        """A client is dead: if its step flies or waits, the mission is cancelled, and the contingency flies."""
+        client.link.record("dead", now_us)
+        own = [each for each in self._proposals.values() if each.link is client.link and not each.ended]
+        if own and self._stage == "flying":
+            self._actions.append(Cancel(client.link.client, f"{client.link.name} is silent"))
+            for other in self._clients.values():
+                if other is not client:
+                    other.link.text(f"{client.link.name} is silent: its flight is cancelled", now_us, severity=NOTICE)

@@ -1,0 +1,255 @@
+"""Requests of clients that move nothing: values of parameters, single messages, rates, clocks, the list of logs.
+
+What was seen of the vehicle is answered at once. The rest becomes a frame of our own making, which is handed to the
+flight and passes its gate as housekeeping, or not at all; never is a client's frame passed on. A rate is never lowered:
+a client that asks for less gets what is there.
+"""
+
+from collections import deque
+from dataclasses import dataclass
+from math import isnan
+from typing import Any, Final
+
+from rtshcua.ground.gateway.client_frames import (
+    AUTOPILOT_VERSION,
+    COMMAND_ACK,
+    HOME_POSITION,
+    LOG_REQUEST_LIST,
+    Received,
+    made,
+)
+from rtshcua.ground.gateway.client_link import ClientLink
+from rtshcua.ground.gateway.habits import tell_parameter
+from rtshcua.ground.gateway.interface import Action, GatewaySettings, RequestFrame
+from rtshcua.ground.gateway.translation import ACCEPTED, DENIED, FAILED, TEMPORARILY_REJECTED, UNSUPPORTED
+from rtshcua.ground.gateway.vehicle_seen import FRESH_US, VehicleSeen
+from rtshcua.mavlink import enums, layouts
+
+#: the interval of request frames to the flight, us, and how many may wait
+REQUEST_EVERY_US: Final = 50_000
+_MOST_WAITING: Final = 64
+#: how long an answer of the vehicle is waited for, us
+_PATIENCE_US: Final = 1_000_000
+#: the interval of requests for all parameters, and of the parameters that are sent to a client at once, us
+_LIST_EVERY_US: Final = 10_000_000
+_PARAMETERS_AT_ONCE: Final = 25
+#: the shortest interval of a message that a client can ask for, us
+SHORTEST_US: Final = 20_000
+
+_GET_HOME_POSITION: Final = 410
+_REQUEST_PROTOCOL_VERSION: Final = 519
+_REQUEST_AUTOPILOT_CAPABILITIES: Final = 520
+_REQUESTS: Final = {_GET_HOME_POSITION: HOME_POSITION, _REQUEST_AUTOPILOT_CAPABILITIES: AUTOPILOT_VERSION}
+#: the commands that are answered here
+COMMANDS: Final = frozenset(
+    {*_REQUESTS, enums.MAV_CMD_REQUEST_MESSAGE, enums.MAV_CMD_SET_MESSAGE_INTERVAL, _REQUEST_PROTOCOL_VERSION}
+)
+#: the messages of each MAV_DATA_STREAM, as ArduCopter groups them (GCS_MAVLink of its source), by message number
+_STREAMS: Final = {
+    1: (27, 29, 116, 129),  # raw sensors
+    2: (1, 24, 62, 125, 152),  # extended status
+    3: (36, 65),  # RC channels
+    6: (32, 33),  # position
+    10: (30, 178, 163),  # extra 1
+    11: (74,),  # extra 2
+    12: (2, 168, 132, 147, 241, 242, 193),  # extra 3
+}
+_ALL_STREAMS: Final = 0
+#: messages that stay true, however old they are
+_LASTING: Final = frozenset({AUTOPILOT_VERSION, HOME_POSITION})
+
+
+@dataclass(slots=True)
+class _Awaited:
+    """A single message that a client requested, until it comes."""
+
+    link: ClientLink
+    to: tuple[int, int]
+    command: int
+    message: int
+    until_us: int
+
+
+class HarmlessRequests:
+    """The requests of all clients of a gateway."""
+
+    def __init__(self, settings: GatewaySettings, seen: VehicleSeen, actions: list[Action]) -> None:
+        self._own = settings.system, enums.MAV_COMP_ID_ONBOARD_COMPUTER
+        self._target = {"target_system": settings.system, "target_component": enums.MAV_COMP_ID_AUTOPILOT1}
+        self._seen = seen
+        self._actions = actions
+        self._number = 0
+        self._sequence = 0
+        self._waiting: deque[tuple[int, bytes]] = deque()
+        self._next_us = 0
+        self._awaited: list[_Awaited] = []
+        self._listed_us = -_LIST_EVERY_US
+        self._lists: dict[int, tuple[ClientLink, deque[Received]]] = {}
+        #: the shortest interval that was asked for, by message, us
+        self._intervals: dict[int, int] = dict(settings.needed_us)
+
+    # ---------------------------------------------------------------- commands
+
+    def command(self, link: ClientLink, message: Received, now_us: int) -> int | None:
+        """Answer a command in `COMMANDS`: its MAV_RESULT, None if that comes later."""
+        command = message.fields["command"]
+        if command == _REQUEST_PROTOCOL_VERSION:
+            return UNSUPPORTED
+        number = message.whole("param1") if command not in _REQUESTS else _REQUESTS[command]
+        if not 0 <= number < 1 << 24:
+            return DENIED
+        if command == enums.MAV_CMD_SET_MESSAGE_INTERVAL:
+            return self._set_interval(link, number, message.number("param2"), now_us)
+        return self.message(link, message.sender, command, number, now_us)
+
+    def message(self, link: ClientLink, to: tuple[int, int], command: int, number: int, now_us: int) -> int | None:
+        """Send a message as it was seen, or request it; `command` is acknowledged then."""
+        known = self._seen.frame(number)
+        if known is not None and (number in _LASTING or self._seen.message(number, FRESH_US, now_us) is not None):
+            link.forward(known)
+            return ACCEPTED
+        if not self._may(link, "messages", now_us):
+            return DENIED
+        if len(self._awaited) >= _MOST_WAITING:
+            return TEMPORARILY_REJECTED
+        if not any(each.message == number for each in self._awaited) and not self._request_message(link, number):
+            return TEMPORARILY_REJECTED
+        self._awaited.append(_Awaited(link, to, command, number, now_us + _PATIENCE_US))
+        return None
+
+    def _request_message(self, link: ClientLink, number: int) -> bool:
+        return self._hand_in(
+            link, layouts.COMMAND_LONG, command=enums.MAV_CMD_REQUEST_MESSAGE, param1=float(number), **self._target
+        )
+
+    def _set_interval(self, link: ClientLink, number: int, interval: float, now_us: int) -> int:
+        if not self._may(link, "rates", now_us):
+            return DENIED
+        if isnan(interval) or interval <= 0 or interval > 1e9:
+            return ACCEPTED  # the default rate, or none: what others need goes on
+        return ACCEPTED if self._faster(link, number, max(int(interval), SHORTEST_US)) else TEMPORARILY_REJECTED
+
+    def _faster(self, link: ClientLink, number: int, interval_us: int) -> bool:
+        """Request a message at an interval, if it is not requested as often already."""
+        asked = self._intervals.get(number)
+        if asked is not None and asked <= interval_us:
+            return True
+        handed = self._hand_in(
+            link,
+            layouts.COMMAND_LONG,
+            command=enums.MAV_CMD_SET_MESSAGE_INTERVAL,
+            param1=float(number),
+            param2=float(interval_us),
+            **self._target,
+        )
+        if handed:
+            self._intervals[number] = interval_us
+        return handed
+
+    # ---------------------------------------------------------------- messages
+
+    def data_stream(self, link: ClientLink, message: Received, now_us: int) -> None:
+        """REQUEST_DATA_STREAM: intervals of the messages of a stream. The message itself would undo others' rates."""
+        rate, stream = message.fields["req_message_rate"], message.fields["req_stream_id"]
+        if not message.fields["start_stop"] or not rate or not self._may(link, "rates", now_us):
+            return
+        numbers = _STREAMS.get(stream, ())
+        if stream == _ALL_STREAMS:
+            numbers = tuple(number for each in _STREAMS.values() for number in each)
+        for number in numbers:
+            self._faster(link, number, max(1_000_000 // rate, SHORTEST_US))
+
+    def read_parameter(self, link: ClientLink, message: Received, name: str, now_us: int) -> None:
+        """PARAM_REQUEST_READ, by name or index."""
+        index = message.fields["param_index"]
+        known = self._seen.parameters.get(name)
+        if index >= 0:
+            every = self._seen.parameters.values()
+            known = next((each for each in every if each.fields["param_index"] == index), None)
+        if known is not None:
+            tell_parameter(link, known)
+        elif self._may(link, "parameters", now_us):
+            self._hand_in(
+                link,
+                layouts.PARAM_REQUEST_READ,
+                param_index=index,
+                param_id=message.fields["param_id"],
+                **self._target,
+            )
+
+    def want_parameter(self, link: ClientLink, name: str) -> None:
+        """Request a parameter that a translation needs."""
+        self._hand_in(link, layouts.PARAM_REQUEST_READ, param_index=-1, param_id=name.encode("latin-1"), **self._target)
+
+    def list_parameters(self, link: ClientLink, now_us: int) -> None:
+        """PARAM_REQUEST_LIST: from what was seen if that is everything, else requested. All clients see the answers."""
+        every = self._seen.parameters
+        counts = [each.fields["param_count"] for each in every.values()]
+        if every and len(every) >= max(counts):
+            self._lists[link.client] = link, deque(every.values())
+        elif self._may(link, "parameters", now_us) and now_us - self._listed_us >= _LIST_EVERY_US:
+            self._listed_us = now_us
+            self._hand_in(link, layouts.PARAM_REQUEST_LIST, **self._target)
+
+    def time(self, link: ClientLink, message: Received, now_us: int) -> None:
+        """TIMESYNC: the vehicle answers to all."""
+        if message.fields["tc1"] == 0 and self._may(link, "time", now_us):
+            self._hand_in(link, layouts.TIMESYNC, tc1=0, ts1=message.fields["ts1"])
+
+    def logs(self, link: ClientLink, message: Received, now_us: int) -> None:
+        """LOG_REQUEST_LIST."""
+        if self._may(link, "logs", now_us):
+            start, end = message.fields["start"], message.fields["end"]
+            self._hand_in(link, LOG_REQUEST_LIST, start=start, end=end, **self._target)
+
+    def _may(self, link: ClientLink, kind: str, now_us: int) -> bool:
+        if kind in link.settings.requests:
+            return True
+        link.text(f"requests of {kind} are not open to {link.name}", now_us, f"request {kind}")
+        link.record("refused", now_us, request=kind)
+        return False
+
+    # ---------------------------------------------------------------- time and answers
+
+    def seen(self, number: int) -> None:
+        """A message of the vehicle came, which went to all clients: answer those who requested it. If it refuses a
+        message, that is the oldest that is awaited: the flight itself requests only messages that it has.
+        """
+        if not self._awaited:
+            return
+        for each in [one for one in self._awaited if one.message == number]:
+            self._awaited.remove(each)
+            each.link.ack(each.to, each.command, ACCEPTED)
+        answer = self._seen.message(COMMAND_ACK) if number == COMMAND_ACK and self._awaited else None
+        if answer is not None and answer.fields["command"] == enums.MAV_CMD_REQUEST_MESSAGE and answer.fields["result"]:
+            refused = self._awaited.pop(0)
+            refused.link.ack(refused.to, refused.command, answer.fields["result"])
+
+    def tick(self, now_us: int) -> None:
+        """Hand in the next request, send parts of lists, and end requests that the vehicle did not answer."""
+        if self._waiting and now_us >= self._next_us:
+            self._next_us = now_us + REQUEST_EVERY_US
+            self._number += 1
+            self._actions.append(RequestFrame(self._number, *self._waiting.popleft()))
+        for each in [one for one in self._awaited if now_us >= one.until_us]:
+            self._awaited.remove(each)
+            each.link.ack(each.to, each.command, FAILED)
+        for client, (link, rest) in list(self._lists.items()):
+            for _ in range(min(_PARAMETERS_AT_ONCE, len(rest))):
+                tell_parameter(link, rest.popleft())
+            if not rest:
+                del self._lists[client]
+
+    def forget(self, client: int) -> None:
+        """A client is gone."""
+        self._awaited = [each for each in self._awaited if each.link.client != client]
+        self._waiting = deque(each for each in self._waiting if each[0] != client)
+        self._lists.pop(client, None)
+
+    def _hand_in(self, link: ClientLink, number: int, **values: Any) -> bool:
+        """Queue a frame of our own for the flight; False if too many wait."""
+        if len(self._waiting) >= _MOST_WAITING:
+            return False
+        self._waiting.append((link.client, made(number, values, self._own, self._sequence)))
+        self._sequence = (self._sequence + 1) % 256
+        return True

@@ -1,0 +1,221 @@
+"""Decide at once on a step that a client asks for: by `decide` itself, in the state that was seen last.
+
+Only a certain refusal is answered here. What would be allowed, or waits for a person, is compiled and signed, and
+decided on board. A temporal monitor needs the history of the state, which is not kept here: a step that one of its
+truths would let pass is not refused. The time that is left before the deadline is not counted either.
+"""
+
+from collections.abc import Iterator
+from typing import Final, NamedTuple
+
+from rtshcua.decision.decide import decide, possible
+from rtshcua.decision.nearest import DAYTIME, LOCAL_TIME, Nearest, nearest
+from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare_invocation
+from rtshcua.decision.situation import environment, situation
+from rtshcua.decision.times import local_time
+from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.ground.gateway.interface import GatewaySettings, ProposedStep
+from rtshcua.ground.gateway.translation import DENIED, TEMPORARILY_REJECTED
+from rtshcua.ground.lower.mission import straight_plan
+from rtshcua.ground.why.trace import read_values
+from rtshcua.model.decision import Decision
+from rtshcua.model.flat.contract import SourceKind
+from rtshcua.model.flat.limits import DAY
+from rtshcua.model.flat.mission import Invocation, OnInadmissible
+from rtshcua.model.flat.policy import Airspace
+from rtshcua.model.flat.situation import Context, Now, State
+from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.model.quantity import Dimension, display
+
+#: reasons that only time or a person resolves: these steps are decided on board
+_NOT_HERE: Final = frozenset(
+    {Reason.AWAITING_APPROVAL, Reason.CLOCK_UNCERTAIN, Reason.PHASE_NOT_REACHED, Reason.NO_SLACK}
+)
+_DIMENSIONS: Final = {each.value: each for each in Dimension}
+_MINUTE: Final = 60_000_000
+#: the phase of a step whose contract names none; a name that no policy needs to know
+_PHASE: Final = "flight"
+#: how many rules may move a nearest value on
+_ROUNDS: Final = 3
+#: the most characters of a clause in an answer
+_CLAUSE: Final = 100
+
+
+class QuickRefusal(NamedTuple):
+    """A MAV_RESULT, the slug of the reason, and the answer in words."""
+
+    result: int
+    reason: str
+    text: str
+
+
+class QuickDecision:
+    """Decides under the policy of one gateway."""
+
+    def __init__(self, settings: GatewaySettings) -> None:
+        self._policy = settings.policy
+        self._state_of = settings.state_of
+        policy = settings.policy.policy
+        self._skills = {contract.name: number for number, contract in enumerate(policy.contracts)}
+        self._roles = {role: number for number, role in enumerate(policy.roles)}
+
+    def refusal(self, step: ProposedStep, role: str, now: Now) -> QuickRefusal | None:
+        """Why a step is certainly refused now; None if it may pass, or is not decided here."""
+        flat = self._policy.policy
+        if role not in self._roles:
+            text = f"{step.skill} denied: no rule of {flat.name} names the role {role}"
+            return QuickRefusal(DENIED, Reason.NOT_PERMITTED, text)
+        invocation = self._prepared(step, role, now)
+        if isinstance(invocation, Refusal):
+            return QuickRefusal(DENIED, Reason.ARGUMENT_RANGE, f"{step.skill} denied: {invocation.text}")
+        context = Context(b"", flat.vehicle.identity, flat.version, 0, now.monotonic_us, 0, 0, ())
+        state = self._state_of(now)
+        decision = decide(invocation, state, self._policy, context, now)
+        if decision.outcome is Outcome.ALLOW or decision.reason in _NOT_HERE:
+            return None
+        if flat.monitors and not self._is_certain(invocation, state, context, now):
+            return None
+        denied = decision.outcome is Outcome.DENY
+        near = nearest(decision, invocation, state, self._policy, now)
+        near = self._accepted(near, step, role, context, state, now)
+        words = _words(decision, near, invocation, state, self._policy, now)
+        text = f"{step.skill} {'denied' if denied else 'rejected'}: {words}"
+        return QuickRefusal(DENIED if denied else TEMPORARILY_REJECTED, decision.reason, text)
+
+    def _accepted(
+        self, near: tuple[Nearest, ...], step: ProposedStep, role: str, context: Context, state: State, now: Now
+    ) -> tuple[Nearest, ...]:
+        """The nearest value of one argument, moved on while another rule refuses that value too."""
+        contract = self._policy.policy.contracts[self._skills[step.skill]]
+        cells = {each.name: each.cell for each in contract.parameters}
+        tried = near
+        for _ in range(_ROUNDS):
+            if len(tried) != 1 or tried[0].subject not in cells or tried[0].choices:
+                return near
+            near, values = tried, list(step.values)
+            values[cells[near[0].subject]] = near[0].value
+            moved = self._prepared(step._replace(values=tuple(values)), role, now)
+            if isinstance(moved, Refusal):
+                return near
+            decision = decide(moved, state, self._policy, context, now)
+            tried = nearest(decision, moved, state, self._policy, now)
+            if [each.subject for each in tried] != [each.subject for each in near]:
+                return near
+        return near
+
+    def _is_certain(self, invocation: PreparedInvocation, state: State, context: Context, now: Now) -> bool:
+        """Whether it is refused whatever the temporal monitors remember."""
+        sets = situation(state, self._policy, now)
+        anything = sets._replace(monitors=(TRUE | FALSE | UNKNOWN,) * len(self._policy.monitors))
+        found = possible(invocation, anything, self._policy, context)
+        return all(each.outcome is not Outcome.ALLOW and each.reason not in _NOT_HERE for each in found)
+
+    def _prepared(self, step: ProposedStep, role: str, now: Now) -> PreparedInvocation | Refusal:
+        skill = self._skills[step.skill]
+        contract = self._policy.policy.contracts[skill]
+        phases = (contract.phases[0] if contract.phases else _PHASE,)
+        invocation = Invocation(
+            invocation_id=b"",
+            step=0,
+            phase=0,
+            skill=skill,
+            source=SourceKind.AGENT,
+            role=self._roles[role],
+            arguments=step.values,
+            issued_at_us=now.utc_us,
+            phases=1,
+            on_inadmissible=OnInadmissible.ABORT,
+            contract=contract,
+            plan=straight_plan(contract, step.values),
+            text="",
+            file=0,
+            start=0,
+            end=0,
+            binding=b"",
+        )
+        return prepare_invocation(invocation, self._policy, phases)
+
+
+def _words(
+    decision: Decision,
+    near: tuple[Nearest, ...],
+    invocation: PreparedInvocation,
+    state: State,
+    policy: PreparedPolicy,
+    now: Now,
+) -> str:
+    """What decided: what was found and what would be accepted, then the reason."""
+    if near:
+        found = [f"{_found(each, invocation, state, policy, now)}, accepted {_value(each)}" for each in near]
+    else:
+        found = list(_without_nearest(decision, invocation, state, policy, now))
+    return f"{'; '.join(found)} ({decision.reason})"
+
+
+def _without_nearest(
+    decision: Decision, invocation: PreparedInvocation, state: State, policy: PreparedPolicy, now: Now
+) -> Iterator[str]:
+    flat, clause = policy.policy, decision.clause
+    if isinstance(clause, Airspace):
+        yield from _left_zones(invocation, state, policy, now)
+    if decision.reason is Reason.NOT_PERMITTED:
+        yield f"the role {flat.roles[invocation.invocation.role]} may not"
+    if decision.outcome is Outcome.DEFER:
+        yield from _unknown(decision, invocation, state, policy)
+    if clause is not None:
+        text = " ".join(clause.text.split())
+        yield text if len(text) <= _CLAUSE else f"{text[: _CLAUSE - 3]}..."
+
+
+def _left_zones(invocation: PreparedInvocation, state: State, policy: PreparedPolicy, now: Now) -> Iterator[str]:
+    """The zones of the airspace that the planned path leaves or enters."""
+    sets = situation(state, policy, now)
+    at = environment(sets, policy, invocation.arguments, invocation.phase)
+    place = invocation.planner.volume(at.slots, policy.tables.known).place
+    airspace = policy.airspace
+    if airspace is not None:
+        names = [zone.name for zone in policy.policy.zones]
+        yield from (f"leaves {names[each.number]}" for each in airspace.inside if place.inside(each) & FALSE)
+        yield from (f"enters {names[each.number]}" for each in airspace.outside if place.inside(each) & TRUE)
+
+
+def _unknown(decision: Decision, invocation: PreparedInvocation, state: State, policy: PreparedPolicy) -> Iterator[str]:
+    """The signals without a fresh value that the deciding clause reads; without one, those that any step needs."""
+    flat, contract = policy.policy, invocation.invocation.contract
+    if decision.clause is None:
+        stale = {slot for slot, (most, _) in enumerate(policy.limits) if state.ages[slot] > most}
+        reads = {slot for slot, _ in invocation.reads if state.values[slot] is None or slot in stale}
+        names = [each.name for each in flat.signals if not reads.isdisjoint(each.slots)]
+    else:
+        read = read_values(decision.clause, flat, contract, invocation.invocation.arguments, state)
+        names = [each.name for each in read if each.signal is not None and (None in each.values or each.stale)]
+    if names:
+        yield f"{', '.join(names)} unknown"
+
+
+def _found(near: Nearest, invocation: PreparedInvocation, state: State, policy: PreparedPolicy, now: Now) -> str:
+    """The present value of what would have to change."""
+    flat = invocation.invocation
+    for parameter in flat.contract.parameters:
+        if parameter.name == near.subject:
+            return f"{near.subject} {_shown(flat.arguments[parameter.cell], near.dimension)}"
+    if near.subject == LOCAL_TIME:
+        moment = now.utc_us + local_time(policy.policy.vehicle).offset(now.utc_us)
+        return f"time {_shown(moment % DAY, DAYTIME)}"
+    signal = next(each for each in policy.policy.signals if each.name == near.subject)
+    value = state.values[signal.slot]
+    if value is None:
+        return f"{near.subject} unknown"
+    return f"{near.subject} {dict(signal.labels).get(value) or _shown(value, near.dimension)}"
+
+
+def _value(near: Nearest) -> str:
+    return " or ".join(near.choices) if near.choices else _shown(near.value, near.dimension)
+
+
+def _shown(value: int, dimension: str) -> str:
+    if dimension == DAYTIME:
+        return f"{value // _MINUTE // 60:02}:{value // _MINUTE % 60:02}"
+    known = _DIMENSIONS.get(dimension)
+    return str(value) if known is None else display(value, known)

@@ -1,0 +1,459 @@
+import json
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from reference.gateway_world import (
+    SYSTEM,
+    GatewayWorld,
+    acks,
+    command_long,
+    proposals,
+    reposition,
+    setpoint,
+    texts,
+    told,
+)
+from rtshcua.ground.gateway.interface import (
+    Action,
+    Cancel,
+    ClientDown,
+    ClientNote,
+    FlightEnded,
+    FromClient,
+    FromVehicle,
+    ProposalAnswered,
+    ProposalChecked,
+    Propose,
+    Tick,
+    ToClient,
+)
+
+TAKEOFF = command_long(22, 0, 0, 0, 0, 0, 0, 503)
+LATE_TAKEOFF = command_long(22, 0, 0, 0, 0, 0, 0, 503, confirmation=1)
+BEAT = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+
+
+def number(actions: list[Action]) -> int:
+    (found,) = (each.number for each in actions if isinstance(each, Propose))
+    return found
+
+
+def controls(actions: list[Action], client: int = 1) -> list[int]:
+    """`sysid_in_control` of each CONTROL_STATUS to a client."""
+    frames = [each.frame for each in actions if isinstance(each, ToClient) and each.client == client]
+    return [frame[10] if frame[1] > 1 else 0 for frame in frames if frame[7:10] == b"\x00\x02\x00"]
+
+
+def records(actions: list[Action]) -> list[Any]:
+    return [json.loads(each.text) for each in actions if isinstance(each, ClientNote)]
+
+
+# ---------------------------------------------------------------- answers to a command
+
+
+def test_a_command_is_acknowledged_when_its_step_is_dispatched() -> None:
+    world = GatewayWorld()
+    world.ready()
+    actions = world.send(TAKEOFF)
+    assert acks(actions) == []
+    world.accept(actions)
+    assert acks(world.dispatch(0)) == [(22, 0)]
+    assert acks(world.line(type="effect", event="dispatched", kind=0, step=0)) == []
+
+
+def test_a_slow_command_is_in_progress_and_told_again() -> None:
+    world = GatewayWorld()
+    world.ready()
+    actions = world.send(TAKEOFF)
+    answers = [acks(world.wait(50_000)) for _ in range(190)]
+    assert [50 * (at + 1) for at, answer in enumerate(answers) if answer == [(22, 5)]] == [250, 4_250, 8_250]  # ms
+    world.accept(actions)
+    assert acks(world.dispatch(0)) == [(22, 0)]
+    assert acks(world.wait(9_000_000)) == []
+
+
+def test_a_quick_command_is_never_in_progress() -> None:
+    world = GatewayWorld()
+    world.ready()
+    actions = world.send(TAKEOFF)
+    assert acks(world.wait(200_000)) == []
+    world.accept(actions)
+    assert acks(world.dispatch(0) + world.wait(5_000_000)) == [(22, 0)]
+
+
+def test_a_repeated_command_is_one_proposal() -> None:
+    world = GatewayWorld()
+    world.ready()
+    actions = world.send(TAKEOFF)
+    assert world.send(LATE_TAKEOFF) == []
+    world.wait(300_000)
+    assert acks(world.send(LATE_TAKEOFF)) == [(22, 5)]
+    world.accept(actions)
+    world.dispatch(0)
+    again = world.send(LATE_TAKEOFF)
+    assert (acks(again), proposals(again)) == ([(22, 0)], [])
+
+
+def test_decisions_of_the_flight_are_answers() -> None:
+    """By hand: outcome, reason, and the result."""
+    for outcome, reason, result in (
+        ("deny", "authority/forbidden", 2), ("fallback", "state/violated", 1), ("defer", "approval/awaited", None),
+    ):  # fmt: skip
+        world = GatewayWorld()
+        world.ready()
+        world.accept(world.send(TAKEOFF))
+        decided = {
+            "type": "decision",
+            "kind": 0,
+            "step": 0,
+            "outcome": outcome,
+            "reason": reason,
+            "clause": "battery > 30 %",
+        }
+        actions = world.line(**decided)
+        assert acks(actions) == ([] if result is None else [(22, result)])
+        assert texts(actions) == [f"takeoff {outcome}: {reason} (battery > 30 %)"]
+        assert texts(world.line(**decided)) == [], "once"
+        if result is None:
+            assert acks(world.dispatch(0)) == [(22, 0)]
+    world = GatewayWorld()
+    world.ready()
+    world.accept(world.send(TAKEOFF))
+    assert world.line(type="decision", kind=0, step=0, outcome="allow", reason="admitted", clause=None) == []
+    assert world.line(type="decision", kind=2, step=0, outcome="deny", reason="x", clause=None) == [], "a link"
+    assert world.line(type="decision", kind=0, step=5, outcome="deny", reason="x", clause=None) == [], "another step"
+    assert world.line(type="effect", event="noted", kind=0) == []
+    actions = world.line(type="effect", event="refused", kind=0, step=0)
+    assert acks(actions) == [(22, 1)]
+
+
+def test_refusals_of_the_worker_and_of_the_flight_are_answers() -> None:
+    for checked, slug, result in ((None, "busy", 1), (None, "other-policy", 2), ("it ends in the school", "", 2)):
+        world = GatewayWorld()
+        world.ready()
+        proposed = number(world.send(TAKEOFF))
+        actions = world.take(ProposalChecked(proposed, checked))
+        if checked is None:
+            actions = world.take(ProposalAnswered(proposed, slug, "no"))
+        assert acks(actions) == [(22, result)]
+        assert texts(actions) == [f"takeoff refused: {checked or f'{slug}: no'}"]
+        assert proposals(world.send(TAKEOFF)) != [], "it may be asked for again"
+    world = GatewayWorld()
+    world.ready()
+    actions = world.take(ProposalChecked(number(world.send(TAKEOFF)), "too many commands at once", for_now=True))
+    assert acks(actions) == [(22, 1)]
+    world = GatewayWorld()
+    assert world.take(ProposalChecked(9, None)) == []
+    assert world.take(ProposalAnswered(9, "accepted")) == []
+    world.ready()
+    proposed = number(world.send(TAKEOFF))
+    assert texts(world.take(ProposalAnswered(proposed, "replayed"))) == ["takeoff refused: replayed"]
+
+
+def test_nobody_waits_for_ever() -> None:
+    world = GatewayWorld()
+    world.ready()
+    world.send(TAKEOFF)
+    actions = world.wait(31_000_000, step_us=500_000)
+    assert acks(actions)[-1] == (22, 1)
+    assert texts(actions) == ["takeoff rejected: nothing answered in time"]
+    world = GatewayWorld()
+    world.ready()
+    world.accept(world.send(TAKEOFF))
+    assert (22, 1) not in acks(world.wait(60_000_000, step_us=500_000)), "an approval may take longer"
+
+
+def test_a_new_target_supersedes_the_one_before() -> None:
+    world = GatewayWorld()
+    world.fly()
+    first = world.send(reposition())
+    world.accept(first)
+    world.dispatch(0)
+    second = world.send(reposition(z=509))
+    assert len(proposals(second)) == 1
+    world.accept(second, first=1)
+    assert acks(world.line(type="effect", event="superseded", kind=0, step=0)) == []
+    assert acks(world.dispatch(1)) == [(192, 0)]
+    assert len(proposals(world.send(reposition()))) == 1, "the first one is a new target now"
+
+
+def test_a_proposal_that_was_not_dispatched_is_cancelled_by_a_later_one() -> None:
+    world = GatewayWorld()
+    world.fly()
+    first, second = world.send(reposition()), world.send(reposition(z=509))
+    world.accept(first)
+    actions = world.take(ProposalChecked(number(second), None, 0)) + world.take(
+        ProposalAnswered(number(second), "accepted")
+    )
+    assert acks(actions) == [(192, 6)]
+    assert acks(world.dispatch(0)) == [(192, 0)]
+
+
+def test_open_proposals_of_a_client_are_bounded() -> None:
+    world = GatewayWorld()
+    world.fly()
+    found = [acks(world.send(reposition(z=505 + at))) for at in range(6)]
+    assert found == [[], [], [], [], [(192, 1)], [(192, 1)]]
+
+
+def test_a_step_refused_while_another_flies_leaves_that_one() -> None:
+    world = GatewayWorld()
+    world.fly()
+    world.accept(world.send(reposition()))
+    world.dispatch(0)
+    world.accept(world.send(reposition(z=509)), first=1)
+    assert acks(world.line(type="effect", event="declined", kind=0, step=1)) == [(192, 1)]
+    world.line(type="effect", event="succeeded", kind=0, step=0)
+
+
+# ---------------------------------------------------------------- repeated setpoints
+
+
+def test_a_stream_of_one_target_is_one_proposal() -> None:
+    world = GatewayWorld()
+    world.fly()
+    found = []
+    for at in range(100):  # 10 s at 10 Hz
+        world.now_us += 100_000
+        actions = world.send(setpoint())
+        found += proposals(actions)
+        if at == 3:
+            world.take(ProposalChecked(1, None, 0))
+            world.take(ProposalAnswered(1, "accepted"))
+            world.dispatch(0)
+        if at == 50:
+            world.line(type="effect", event="succeeded", kind=0, step=0)
+    assert len(found) == 1, "also after it was reached"
+    assert acks(world.done) == []
+
+
+def test_a_moving_target_is_proposed_at_most_twice_a_second() -> None:
+    world = GatewayWorld()
+    world.fly()
+    found = 0
+    for at in range(100):
+        world.now_us += 100_000
+        actions = world.send(setpoint(z=10 + at / 10))
+        if proposals(actions):
+            world.accept(actions, first=found)
+            world.dispatch(found)
+            found += 1
+    assert found == 20
+
+
+def test_setpoints_wait_for_the_answer_to_the_one_before() -> None:
+    world = GatewayWorld()
+    world.fly()
+    assert len(proposals(world.send(setpoint()))) == 1
+    world.now_us += 600_000
+    assert proposals(world.send(setpoint(z=21))) == []
+
+
+# ---------------------------------------------------------------- where a step makes no sense
+
+
+def test_on_the_ground_only_a_take_off_is_taken() -> None:
+    world = GatewayWorld()
+    for message, text in (
+        (TAKEOFF, "takeoff rejected: no flight is ready yet"),
+        (reposition(), "goto rejected: the vehicle is on the ground: take off first"),
+    ):
+        actions = world.send(message)
+        assert (acks(actions), texts(actions)) == ([(message.command, 1)], [text])
+    world.ready()
+    world.line(type="vehicle", ready=False, unready="no position")
+    assert texts(world.send(TAKEOFF)) == ["takeoff rejected: no position"]
+    world.report(airborne=True, armed=True)
+    assert texts(world.send(TAKEOFF)) == ["takeoff rejected: the vehicle flies under another control"]
+
+
+# ---------------------------------------------------------------- two clients
+
+
+def two(rank: int = 0) -> GatewayWorld:
+    world = GatewayWorld()
+    world.client(2, "other", rank=rank)
+    world.fly()
+    world.accept(world.send(reposition()))
+    world.dispatch(0)
+    return world
+
+
+def test_who_sends_last_does_not_win() -> None:
+    world = two()
+    actions = world.send(reposition(z=509), client=2)
+    assert acks(actions, 2) == [(192, 1)]
+    assert texts(actions, 2) == ["goto rejected: script is in control"]
+    assert proposals(actions) == []
+
+
+def test_a_higher_rank_supersedes() -> None:
+    assert len(proposals(two(rank=1).send(reposition(z=509), client=2))) == 1
+    lower = two(rank=-1)
+    assert proposals(lower.send(reposition(z=509), client=2)) == []
+
+
+def test_what_stops_or_lands_is_anybodys_that_the_policy_permits() -> None:
+    for message, skill in (
+        (command_long(20), "return_home"),
+        (command_long(21), "emergency_land"),
+        (command_long(193), "hover"),
+    ):
+        assert [each for each, *_ in proposals(two().send(message, client=2))] == [skill]
+
+
+def test_control_is_kept_for_a_time_after_the_last_step() -> None:
+    world = two()
+    world.line(type="effect", event="succeeded", kind=0, step=0)
+    world.wait(9_000_000, step_us=500_000)
+    assert proposals(world.send(reposition(z=509), client=2)) == []
+    world.wait(1_500_000)
+    assert len(proposals(world.send(reposition(z=509), client=2))) == 1
+
+
+def test_control_status_says_who_is_in_control() -> None:
+    world = GatewayWorld()
+    world.client(2, "other")
+    world.fly()
+    assert set(controls(world.wait(1_100_000))) == {0}
+    world.send(BEAT, sender=(44, 1))
+    world.accept(world.send(reposition(), sender=(44, 1)))
+    world.dispatch(0)
+    assert controls(world.wait(1_000_000), client=2) == [44]
+    assert len(controls(world.wait(5_000_000))) == 5
+
+
+def test_a_client_that_requests_control_is_told_who_has_it() -> None:
+    world = GatewayWorld()
+    actions = world.send(command_long(32100, 0, 1))
+    assert (acks(actions), texts(actions)) == ([(32100, 2)], ["nobody is in control"])
+    world = two()
+    assert texts(world.send(command_long(32100, 0, 1), client=2), 2) == ["script is in control"]
+
+
+def test_a_pilot_in_control_keeps_every_client_out_until_he_releases() -> None:
+    world = GatewayWorld()
+    world.client(9, "tower", pilot=True)
+    world.fly()
+    actions = world.send(command_long(32100, 0, 1), client=9, sender=(250, 1), pilot=True)
+    assert controls(actions) == [250]
+    assert records(actions) == [{"client": "tower", "effect": "passed", "message": 76, "command": 32100}]
+    actions = world.send(reposition())
+    assert (acks(actions), texts(actions)) == ([(192, 1)], ["goto rejected: the pilot is in control"])
+    assert texts(world.send(command_long(32100, 0, 1))) == ["the pilot is in control"]
+    world.send(command_long(32100, 0, 0), client=9, sender=(250, 1), pilot=True)
+    assert len(proposals(world.send(reposition()))) == 1
+    world.send(command_long(32100, 0, 1), client=9, sender=(250, 1), pilot=True)
+    world.take(ClientDown(9))
+    assert controls(world.wait(1_100_000)) != [250], "a pilot who is gone holds nothing"
+
+
+def test_what_a_pilot_commands_is_recorded_and_his_telemetry_is_not() -> None:
+    world = GatewayWorld()
+    world.client(9, "tower", pilot=True)
+    assert world.send(BEAT, client=9, pilot=True) == []
+    assert records(world.send(mavlink.MAVLink_set_mode_message(1, 1, 5), client=9, pilot=True)) == [
+        {"client": "tower", "effect": "passed", "message": 11}
+    ]
+    assert world.send(BEAT, client=8, pilot=True) == [], "an unknown pilot"
+    assert world.send(TAKEOFF, client=9) == [], "a pilot's frame goes to the vehicle, and nowhere else"
+
+
+def test_a_takeover_is_told_to_every_client() -> None:
+    world = two()
+    actions = world.line(type="effect", event="taken-over", step=0, kind=0)
+    for client in (1, 2):
+        assert texts(actions, client) == ["the pilot took over: the flight of your steps ended"]
+
+
+# ---------------------------------------------------------------- the end of flights and clients
+
+
+def test_the_end_of_the_flight_ends_what_waits() -> None:
+    world = GatewayWorld()
+    world.ready()
+    world.accept(world.send(TAKEOFF))
+    actions = world.line(type="close", ending="aborted")
+    assert (acks(actions), texts(actions)) == ([(22, 1)], ["takeoff ended with the flight: aborted"])
+    world.ready()
+    world.accept(world.send(TAKEOFF))
+    actions = world.take(FlightEnded())
+    assert texts(actions) == ["takeoff ended with the flight"]
+    assert world.take(FlightEnded()) == []
+    assert world.line(type="other") == []
+
+
+def test_a_dead_client_ends_its_flight_and_a_living_one_does_not() -> None:
+    world = two()
+    world.send(BEAT)
+    world.send(BEAT, client=2)
+    for _ in range(10):
+        world.send(BEAT)
+        assert not [each for each in world.wait(1_000_000) if isinstance(each, Cancel)]
+    world.send(BEAT, client=2)
+    actions = world.wait(5_500_000)
+    assert [each for each in actions if isinstance(each, Cancel)] == [Cancel(1, "script is silent")]
+    assert texts(actions, 2) == ["script is silent: its flight is cancelled"]
+    assert not [each for each in world.wait(5_000_000) if isinstance(each, Cancel)], "once"
+
+
+def test_a_dead_client_without_a_step_ends_nothing() -> None:
+    world = two()
+    world.send(BEAT, client=2)
+    assert not [each for each in world.wait(6_000_000) if isinstance(each, Cancel)]
+    assert not [each for each in world.take(ClientDown(2)) if isinstance(each, Cancel)]
+
+
+def test_a_script_without_heartbeats_may_be_silent() -> None:
+    world = two()
+    assert not [each for each in world.wait(20_000_000, step_us=500_000) if isinstance(each, Cancel)]
+    assert not [each for each in world.take(ClientDown(1)) if isinstance(each, Cancel)]
+
+
+def test_a_client_that_disconnects_ends_its_flight() -> None:
+    world = two()
+    world.send(BEAT)
+    assert Cancel(1, "script is silent") in world.take(ClientDown(1))
+    assert world.take(ClientDown(1)) == []
+
+
+def test_a_mission_taken_after_the_death_of_its_client_is_cancelled() -> None:
+    world = GatewayWorld()
+    world.ready()
+    world.send(BEAT)
+    proposed = number(world.send(TAKEOFF))
+    world.take(ClientDown(1))
+    world.take(ProposalChecked(proposed, None))
+    assert world.take(ProposalAnswered(proposed, "accepted")) == [Cancel(1, "script is silent")]
+
+
+def test_unknown_clients_and_frames_of_other_systems_are_passed_over() -> None:
+    world = GatewayWorld()
+    frame = TAKEOFF.pack(mavlink.MAVLink(None, 255, 190))
+    assert world.take(FromClient(77, frame)) == []
+    assert world.take(FromVehicle(BEAT.pack(mavlink.MAVLink(None, 9, 1)))) == []
+    assert world.take(FromVehicle(BEAT.pack(mavlink.MAVLink(None, SYSTEM, 191)))) == []
+    assert world.take(FromVehicle(b"")) == []
+    assert told(world.take(Tick())) == []
+
+
+def test_the_number_of_clients_is_bounded() -> None:
+    world = GatewayWorld()
+    for client in range(2, 400):
+        world.client(client, "crowd")
+    assert len(world.gateway._clients) == 256
+
+
+def test_what_is_kept_of_the_vehicle_is_bounded() -> None:
+    world = GatewayWorld()
+    sender = mavlink.MAVLink(None, SYSTEM, 1)
+    value = mavlink.MAVLink_param_value_message(b"P", 1, 9, 1, 0).pack(sender)
+    for kind in range(3_000):
+        world.take(FromVehicle(value[:7] + (1_000 + kind).to_bytes(3, "little") + value[10:]))
+    for index in range(5_000):
+        world.vehicle(mavlink.MAVLink_param_value_message(f"P{index}".encode(), 1, 9, 5_000, index))
+    seen = world.gateway._seen
+    assert (len(seen._frames), len(seen.parameters)) == (512, 4_096)
+    world.take(FromVehicle(value[:-1] + bytes([value[-1] ^ 1])))
+    assert "P" not in seen.parameters, "a damaged frame"

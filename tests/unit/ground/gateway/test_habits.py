@@ -1,0 +1,340 @@
+import json
+from math import nan
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from reference.gateway_world import (
+    SYSTEM,
+    GatewayWorld,
+    acks,
+    command_int,
+    command_long,
+    proposals,
+    reposition,
+    setpoint,
+    texts,
+    told,
+)
+from rtshcua.ground.gateway.interface import Action, ClientNote, Propose, Withhold
+from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode, Px4Mode
+
+BEAT = frozenset({0})
+
+
+def withheld(actions: list[Action]) -> list[frozenset[int]]:
+    return [each.messages for each in actions if isinstance(each, Withhold)]
+
+
+def beats(actions: list[Action]) -> list[tuple[int, int]]:
+    """The armed bit and the mode of each HEARTBEAT to the client."""
+    found = [message for message in told(actions) if message.get_type() == "HEARTBEAT"]
+    return [(message.base_mode >> 7, message.custom_mode) for message in found]
+
+
+def arm(wanted: float = 1, force: float = 0, *rest: float) -> Any:
+    return command_long(400, wanted, force, *rest)
+
+
+# ---------------------------------------------------------------- arming
+
+
+def test_arming_on_the_ground_is_absorbed_and_shown_for_a_bounded_time() -> None:
+    world = GatewayWorld()
+    world.ready()
+    actions = world.send(arm())
+    assert acks(actions) == [(400, 0)]
+    assert withheld(actions) == [BEAT]
+    assert beats(actions) == [(1, Px4Mode.HOLD)], "at once, and not only with the next HEARTBEAT"
+    assert texts(actions) == ["armed for you; a permitted take-off arms the vehicle"]
+    assert proposals(actions) == []
+    assert beats(world.report()) == [(1, Px4Mode.HOLD)]
+    world.wait(19_000_000, step_us=500_000)
+    assert beats(world.report()) == [(1, Px4Mode.HOLD)]
+    assert withheld(world.wait(1_500_000)) == [frozenset()], "after 20 s without a take-off"
+    assert beats(world.report()) == []
+
+
+def test_the_vehicles_own_arming_ends_what_is_shown() -> None:
+    world = GatewayWorld()
+    world.ready()
+    world.send(arm())
+    actions = world.report(armed=True)
+    assert withheld(actions) == [frozenset()]
+    assert beats(actions) == []
+
+
+def test_only_the_client_that_armed_sees_it() -> None:
+    world = GatewayWorld()
+    world.client(2, "other")
+    world.ready()
+    world.send(arm())
+    assert [message.get_type() for message in told(world.report(), client=2)] == []
+
+
+def test_mavsdk_arms_with_nan_in_the_other_parameters() -> None:
+    world = GatewayWorld()
+    world.ready()
+    assert acks(world.send(arm(1, nan, nan, nan, nan, nan, nan))) == [(400, 0)]
+    assert acks(world.send(command_int(400, 0, 1, x=0, y=0, z=0))) == [(400, 0)]
+
+
+def test_disarming_ends_an_absorbed_arming() -> None:
+    world = GatewayWorld()
+    world.ready()
+    world.send(arm())
+    actions = world.send(arm(0))
+    assert acks(actions) == [(400, 0)]
+    assert withheld(actions) == [frozenset()]
+    assert acks(world.send(arm(0))) == [(400, 0)], "nothing is armed"
+
+
+def test_arming_that_would_have_an_effect_is_refused() -> None:
+    """By hand: parameters 1 and 2, whether it is armed and in the air, and the result."""
+    table = (
+        (1, 21196, False, 2), (0, 21196, False, 2), (0, 21196, True, 2), (1, 1, False, 2), (0, 0, True, 1),
+        (2, 0, False, 2), (nan, 0, False, 2), (1, 0, True, 0),
+    )  # fmt: skip
+    for one, two, flies, result in table:
+        world = GatewayWorld()
+        world.ready()
+        if flies:
+            world.fly()
+        actions = world.send(arm(one, two))
+        assert acks(actions) == [(400, result)], (one, two, flies)
+        assert withheld(actions) == []
+
+
+def test_a_vehicle_that_is_not_ready_is_not_shown_as_armed() -> None:
+    world = GatewayWorld()
+    world.ready()
+    world.line(type="vehicle", ready=False, unready="no position yet")
+    actions = world.send(arm())
+    assert acks(actions) == [(400, 1)]
+    assert texts(actions) == ["not ready to arm: no position yet"]
+    world.line(type="vehicle", ready=False)
+    assert texts(world.send(arm())) == ["not ready to arm: the vehicle is not ready"]
+
+
+# ---------------------------------------------------------------- modes
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "command", "mode"),
+    [(ARDUPILOT, command_long(176, 1, 4), CopterMode.GUIDED), (PX4, command_long(176, 1, 6), Px4Mode.OFFBOARD)],
+)
+def test_a_mode_that_clients_ask_for_before_targets_is_shown_without_effect(
+    autopilot: int, command: Any, mode: int
+) -> None:
+    world = GatewayWorld(autopilot)
+    world.ready()
+    actions = world.send(command)
+    assert acks(actions) == [(176, 0)]
+    assert beats(actions) == [(0, mode)]
+    assert not [each for each in actions if isinstance(each, Propose)]
+    assert beats(world.report()) == [(0, mode)]
+    assert withheld(world.report(mode=Px4Mode.TAKEOFF if autopilot == PX4 else CopterMode.AUTO)) == [frozenset()]
+
+
+def test_a_shown_mode_ends_after_a_bounded_time_and_the_vehicles_own_is_not_withheld() -> None:
+    world = GatewayWorld(ARDUPILOT)
+    world.ready()
+    world.send(command_long(176, 1, 4))
+    assert withheld(world.wait(21_000_000, step_us=500_000)) == [frozenset()]
+    world.report(mode=CopterMode.GUIDED)
+    actions = world.send(command_long(176, 1, 4))
+    assert acks(actions) == [(176, 0)]
+    assert withheld(actions) == []
+
+
+def test_set_mode_is_acknowledged_as_the_autopilot_does() -> None:
+    for autopilot, mode, wanted in ((ARDUPILOT, 4, [(11, 0)]), (PX4, Px4Mode.OFFBOARD, []), (ARDUPILOT, 1, [(11, 2)])):
+        world = GatewayWorld(autopilot)
+        world.ready()
+        assert acks(world.send(mavlink.MAVLink_set_mode_message(SYSTEM, 1, mode))) == wanted
+    world = GatewayWorld(ARDUPILOT)
+    actions = world.send(mavlink.MAVLink_set_mode_message(SYSTEM, 128, 4))
+    assert acks(actions) == [(11, 2)]
+    assert texts(actions) == ["modes without a custom mode are refused"]
+    for parameters in ((0, 4), (1, nan), (1, 300), (nan, 4), (1, -1), (1, 4.5)):
+        assert acks(world.send(command_long(176, *parameters))) == [(176, 2)], parameters
+
+
+def test_modes_that_stop_or_land_fly_only_in_the_air() -> None:
+    for autopilot, main, sub, skill in (
+        (PX4, 4, 3, "hover"), (PX4, 4, 5, "return_home"), (PX4, 4, 6, "emergency_land"), (ARDUPILOT, 5, 0, "hover"),
+        (ARDUPILOT, 6, 0, "return_home"), (ARDUPILOT, 9, 0, "emergency_land"),
+    ):  # fmt: skip
+        world = GatewayWorld(autopilot)
+        world.ready()
+        actions = world.send(command_long(176, 1, main, sub))
+        assert (acks(actions), proposals(actions)) == ([(176, 0)], []), "on the ground it has no effect"
+        world.fly()
+        actions = world.send(command_long(176, 1, main, sub))
+        assert [each for each, *_ in proposals(actions)] == [skill]
+        assert acks(actions) == []
+
+
+# ---------------------------------------------------------------- parameters
+
+
+def values(actions: list[Action]) -> list[tuple[str, float, int]]:
+    found = [message for message in told(actions) if message.get_type() == "PARAM_VALUE"]
+    return [(message.param_id, message.param_value, message.param_type) for message in found]
+
+
+def test_a_parameter_that_only_gives_a_default_is_echoed_and_kept_for_this_client() -> None:
+    world = GatewayWorld()
+    world.client(2, "other")
+    world.vehicle(mavlink.MAVLink_param_value_message(b"MIS_TAKEOFF_ALT", 2.5, 9, 100, 7))
+    set_it = mavlink.MAVLink_param_set_message(SYSTEM, 1, b"MIS_TAKEOFF_ALT", 7.5, 9)
+    actions = world.send(set_it)
+    assert values(actions) == [("MIS_TAKEOFF_ALT", 7.5, 9)]
+    assert texts(actions) == []
+    read_it = mavlink.MAVLink_param_request_read_message(SYSTEM, 1, b"MIS_TAKEOFF_ALT", -1)
+    assert values(world.send(read_it)) == [("MIS_TAKEOFF_ALT", 7.5, 9)]
+    (other,) = told(world.send(read_it, client=2), client=2)
+    assert (other.param_id, other.param_value) == ("MIS_TAKEOFF_ALT", 2.5)
+
+
+def test_writes_of_other_parameters_are_answered_with_the_unchanged_value() -> None:
+    world = GatewayWorld()
+    world.vehicle(mavlink.MAVLink_param_value_message(b"RTL_ALT", 1500.0, 9, 100, 3))
+    actions = world.send(mavlink.MAVLink_param_set_message(SYSTEM, 1, b"RTL_ALT", 100.0, 9))
+    assert values(actions) == [("RTL_ALT", 1500.0, 9)]
+    assert texts(actions) == ["parameter RTL_ALT stays as it is: writes are refused"]
+    actions = world.send(mavlink.MAVLink_param_set_message(SYSTEM, 1, b"RTL_ALT", 1500.0, 9))
+    assert values(actions) == [("RTL_ALT", 1500.0, 9)]
+    assert texts(actions) == [], "nothing would change"
+    actions = world.send(mavlink.MAVLink_param_set_message(SYSTEM, 1, b"NO_SUCH_PARAM", 1, 9))
+    assert values(actions) == [], "the autopilots are silent"
+    assert texts(actions) == ["parameter NO_SUCH_PARAM is not set: writes are refused"]
+
+
+# ---------------------------------------------------------------- setpoints and others
+
+
+def test_setpoints_without_a_position_are_refused_with_a_text_once_in_five_seconds() -> None:
+    world = GatewayWorld()
+    world.fly()
+    local = mavlink.MAVLink_set_position_target_local_ned_message(0, SYSTEM, 1, 1, 0xDC7, *[0.0] * 11)
+    attitude = mavlink.MAVLink_set_attitude_target_message(0, SYSTEM, 1, 0, [1, 0, 0, 0], 0, 0, 0, 0.5)
+    override = mavlink.MAVLink_rc_channels_override_message(SYSTEM, 1, *[1500] * 8)
+    sticks = mavlink.MAVLink_manual_control_message(SYSTEM, 0, 0, 500, 0, 0)
+    table = (
+        (local, "local setpoints refused: send positions"),
+        (attitude, "attitude and thrust setpoints refused: send positions"),
+        (override, "RC override refused: send positions"),
+        (sticks, "manual control refused: send positions"),
+        (setpoint(mask=0xDC7), "setpoints other than a position refused: send positions"),
+    )
+    for message, text in table:
+        said: list[str] = []
+        for _ in range(120):  # 12 s at 10 Hz
+            world.now_us += 100_000
+            actions = world.send(message)
+            assert acks(actions) == []
+            said += texts(actions)
+        assert said == [text] * 3
+
+
+def test_a_refused_target_is_told_once_in_five_seconds_however_often_it_comes() -> None:
+    world = GatewayWorld()
+    world.fly()
+    said: list[str] = []
+    for _ in range(90):
+        world.now_us += 100_000
+        said += texts(world.send(setpoint(z=55)))
+    assert said == ["goto denied: altitude 55 m, accepted 40 m (authority/out-of-scope)"] * 2
+    home_unknown = GatewayWorld()
+    home_unknown.gateway._seen._frames.pop(242)
+    home_unknown.fly()
+    home_unknown.gateway._seen._frames.pop(242)
+    assert len(texts(home_unknown.send(setpoint(z=508, frame=5)))) == 1
+    assert texts(home_unknown.send(setpoint(z=508, frame=5))) == []
+
+
+def test_what_has_no_mapping_is_refused_and_recorded() -> None:
+    """Commands that would change the vehicle are denied; others are not supported, as the autopilots say."""
+    for command, result in ((246, 2), (185, 2), (179, 2), (241, 2), (420, 2), (2000, 3), (9999, 3), (115, 3), (519, 3)):
+        world = GatewayWorld()
+        actions = world.send(command_long(command, 1))
+        assert acks(actions) == [(command, result)], command
+        recorded = [json.loads(each.text) for each in actions if isinstance(each, ClientNote)]
+        if command != 519:
+            assert texts(actions) == [f"command {command} has no mapping"]
+            assert recorded == [
+                {
+                    "client": "script",
+                    "effect": "refused",
+                    "command": command,
+                    "reason": f"command {command} has no mapping",
+                }
+            ]
+    world = GatewayWorld()
+    assert acks(world.send(command_long(193, 1))) == [(193, 2)], "continue is not pause"
+    signing = mavlink.MAVLink_setup_signing_message(SYSTEM, 1, [0] * 32, 0)
+    assert texts(world.send(signing)) == ["signing set-up is refused"]
+    assert texts(world.send(mavlink.MAVLink_gps_rtcm_data_message(0, 1, [0] * 180))) == ["message 233 is refused"]
+
+
+def test_files_are_refused_with_the_protocols_own_answer() -> None:
+    world = GatewayWorld()
+    payload = [41, 0, 3, 4, 0, *[0] * 246]  # sequence 41, session 3, open file for reading
+    (answer,) = told(world.send(mavlink.MAVLink_file_transfer_protocol_message(0, SYSTEM, 1, payload)))
+    assert list(answer.payload[:13]) == [42, 0, 3, 129, 1, 4, 0, 0, 0, 0, 0, 0, 7]
+
+
+def test_what_says_something_about_the_client_is_passed_over() -> None:
+    world = GatewayWorld()
+    for message in (
+        mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3),
+        mavlink.MAVLink_system_time_message(1, 1),
+        mavlink.MAVLink_ping_message(1, 1, 0, 0),
+        mavlink.MAVLink_command_ack_message(22, 0),
+        mavlink.MAVLink_statustext_message(6, b"hello"),
+    ):
+        assert world.send(message) == []
+
+
+def test_frames_for_another_system_are_not_answered() -> None:
+    world = GatewayWorld()
+    assert world.send(mavlink.MAVLink_command_long_message(9, 1, 22, 0, 0, 0, 0, 0, 0, 0, 10)) == []
+    assert world.send(mavlink.MAVLink_command_long_message(1, 100, 2000, 0, 0, 0, 0, 0, 0, 0, 0)) == []
+
+
+def test_long_texts_come_in_chunks_and_records_stay_short() -> None:
+    world = GatewayWorld()
+    world.client(3, "a" * 90)
+    world.fly()
+    actions = world.send(reposition(latitude=473_990_000, longitude=85_700_000), client=3)
+    chunks = [message for message in told(actions, 3) if message.get_type() == "STATUSTEXT"]
+    assert [message.chunk_seq for message in chunks] == list(range(len(chunks)))
+    assert len({message.id for message in chunks}) == 1
+    assert chunks[0].id > 0
+    (recorded,) = (each.text for each in actions if isinstance(each, ClientNote))
+    assert len(recorded) <= 200
+    assert json.loads(recorded)["client"] == "a" * 32
+
+
+def test_a_text_of_whole_chunks_ends_with_an_empty_one() -> None:
+    world = GatewayWorld()
+    link = world.gateway._clients[1].link
+    link.text("x" * 100, world.now_us)
+    chunks = [message.text for message in told(world.wait())]
+    assert chunks == ["x" * 50, "x" * 50, ""]
+    for number in range(70):
+        link.text("y", world.now_us, key=str(number))
+    assert len(texts(world.wait())) == 70
+
+
+def test_records_beyond_the_rate_are_counted() -> None:
+    world = GatewayWorld()
+    recorded: list[Any] = []
+    for _ in range(100):
+        recorded += [json.loads(each.text) for each in world.send(command_long(246, 1)) if isinstance(each, ClientNote)]
+    assert len(recorded) == 20
+    world.now_us += 5_000_000
+    (next_one,) = (json.loads(each.text) for each in world.send(command_long(246)) if isinstance(each, ClientNote))
+    assert next_one["left_out"] == 80

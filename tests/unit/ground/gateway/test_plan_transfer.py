@@ -1,0 +1,443 @@
+from collections.abc import Sequence
+from math import inf, nan
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from reference.gateway_world import (
+    HOME_LATITUDE,
+    HOME_LONGITUDE,
+    NORTH,
+    SYSTEM,
+    GatewayWorld,
+    acks,
+    command_long,
+    item,
+    proposals,
+    texts,
+    told,
+)
+from rtshcua.ground.gateway.interface import Action, ClientDown, ProposalAnswered, ProposalChecked, Propose, Withhold
+from rtshcua.ground.gateway.plan_transfer import MOST_ITEMS
+from rtshcua.mavlink.modes import ARDUPILOT, PX4
+
+N, E = NORTH
+TAKEOFF, WAYPOINT, LOITER, RETURN, LAND, SPEED = 22, 16, 19, 20, 21, 178
+
+
+def count(number: int, kind: int = 0) -> Any:
+    return mavlink.MAVLink_mission_count_message(SYSTEM, 1, number, kind)
+
+
+def results(actions: list[Action], client: int = 1) -> list[tuple[int, int]]:
+    found = [message for message in told(actions, client) if message.get_type() == "MISSION_ACK"]
+    return [(message.type, message.mission_type) for message in found]
+
+
+def requested(actions: list[Action]) -> list[tuple[str, int]]:
+    names = ("MISSION_REQUEST", "MISSION_REQUEST_INT")
+    return [(message.get_type(), message.seq) for message in told(actions) if message.get_type() in names]
+
+
+def upload(world: GatewayWorld, items: Sequence[Any], client: int = 1) -> list[Action]:
+    """Upload items as asked for; return what the last one led to."""
+    actions = world.send(count(len(items)), client)
+    for number, each in enumerate(items):
+        assert [message.seq for message in told(actions, client) if "REQUEST" in message.get_type()] == [number]
+        each.seq = number
+        actions = world.send(each, client)
+    return actions
+
+
+def stored(world: GatewayWorld, items: Sequence[Any], client: int = 1) -> None:
+    """Upload items, which the worker accepts."""
+    (check,) = (each for each in upload(world, items, client) if isinstance(each, Propose))
+    assert not check.fly
+    assert results(world.take(ProposalChecked(check.number, None)), client) == [(0, 0)]
+
+
+def steps(actions: list[Action]) -> list[Any]:
+    return [each for one in actions if isinstance(one, Propose) for each in one.steps]
+
+
+def mission(start: int = 0) -> list[Any]:
+    """A take-off, two places with a change of speed between, and the return."""
+    return [
+        item(start, TAKEOFF, z=15),
+        item(start + 1, WAYPOINT, x=N, y=E, z=15),
+        item(start + 2, SPEED, 1, 3, -1, frame=2, z=nan),
+        item(start + 3, WAYPOINT, x=N + 1_000, y=E, z=20),
+        item(start + 4, RETURN, nan, nan, nan, nan, frame=2),
+    ]
+
+
+HOME_ITEM = item(0, WAYPOINT, x=HOME_LATITUDE, y=HOME_LONGITUDE, z=488, frame=0)
+
+# ---------------------------------------------------------------- the dialogue
+
+
+def test_an_upload_is_checked_as_a_whole_before_it_is_acknowledged() -> None:
+    world = GatewayWorld()
+    world.ready()
+    actions = upload(world, mission())
+    assert results(actions) == []
+    (check,) = (each for each in actions if isinstance(each, Propose))
+    assert [(step.skill, dict(step.arguments)) for step in check.steps] == [
+        ("takeoff", {"altitude": "15 m"}),
+        ("goto", {"target": "47.3983000 N, 8.5455900 E", "altitude": "15 m"}),
+        ("goto", {"target": "47.3984000 N, 8.5455900 E", "altitude": "20 m", "speed": "3 m/s"}),
+        ("return_home", {}),
+    ]
+    assert (check.fly, check.role) == (False, "operator")
+    actions = world.take(ProposalChecked(check.number, None))
+    assert results(actions) == [(0, 0)]
+    assert [each.messages for each in actions if isinstance(each, Withhold)] == [frozenset({42, 46})]
+
+
+def test_a_mission_that_is_refused_as_a_whole_is_not_stored() -> None:
+    world = GatewayWorld()
+    world.ready()
+    (check,) = (each for each in upload(world, mission()) if isinstance(each, Propose))
+    actions = world.take(ProposalChecked(check.number, "altitude 50 m is not permitted; nearest 40 m"))
+    assert results(actions) == [(14, 0)]
+    assert texts(actions) == ["mission refused: altitude 50 m is not permitted; nearest 40 m"]
+    actions = world.send(command_long(300))
+    assert (acks(actions), texts(actions)) == ([(300, 1)], ["there is no mission to start"])
+
+
+def test_px4_asks_with_the_integer_message_and_ardupilot_with_the_legacy_one() -> None:
+    for autopilot, name, again_us, patience_us in (
+        (PX4, "MISSION_REQUEST_INT", 250_000, 5_000_000),
+        (ARDUPILOT, "MISSION_REQUEST", 1_000_000, 8_000_000),
+    ):
+        world = GatewayWorld(autopilot)
+        assert requested(world.send(count(3))) == [(name, 0)]
+        assert requested(world.wait(again_us)) == []
+        assert requested(world.wait(100_000)) == [(name, 0)]
+        actions = world.wait(patience_us)
+        assert results(actions) == [(15, 0)]
+        assert len(requested(actions)) >= 4
+        assert requested(world.wait(2_000_000)) == []
+
+
+def test_a_repeated_item_changes_nothing_and_one_out_of_turn_is_passed_over() -> None:
+    world = GatewayWorld()
+    world.send(count(3))
+    first = item(0, TAKEOFF, z=15)
+    assert requested(world.send(first)) == [("MISSION_REQUEST_INT", 1)]
+    assert world.send(first) == []
+    assert world.send(item(2, RETURN)) == []
+    assert requested(world.send(item(1, WAYPOINT, x=N, y=E, z=15))) == [("MISSION_REQUEST_INT", 2)]
+
+
+def test_an_item_without_an_upload_is_out_of_sequence() -> None:
+    world = GatewayWorld()
+    assert results(world.send(item(0, TAKEOFF, z=15))) == [(13, 0)]
+    world.send(count(1))
+    actions = world.take(ClientDown(1))
+    assert actions == []
+    assert results(world.send(item(0, TAKEOFF, z=15))) == []
+
+
+def test_an_item_of_another_sender_is_no_part_of_the_upload() -> None:
+    world = GatewayWorld()
+    world.send(count(2))
+    assert results(world.send(item(0, TAKEOFF, z=15), sender=(7, 7))) == [(13, 0)]
+
+
+def test_a_client_may_give_up_its_upload() -> None:
+    world = GatewayWorld()
+    world.send(count(2))
+    world.send(mavlink.MAVLink_mission_ack_message(SYSTEM, 1, 0))
+    assert requested(world.wait(300_000)) == [("MISSION_REQUEST_INT", 0)]
+    world.send(mavlink.MAVLink_mission_ack_message(SYSTEM, 1, 15))
+    assert requested(world.wait(600_000)) == []
+
+
+def test_fences_rally_points_and_partial_uploads_are_refused() -> None:
+    world = GatewayWorld()
+    for kind, what in ((1, "fence"), (2, "rally points"), (255, "plan")):
+        for message in (count(4, kind), mavlink.MAVLink_mission_clear_all_message(SYSTEM, 1, kind)):
+            world.now_us += 6_000_000
+            actions = world.send(message)
+            assert results(actions) == [(14, kind)]
+            assert texts(actions) == [f"{what}: changes are refused"]
+    actions = world.send(mavlink.MAVLink_mission_write_partial_list_message(SYSTEM, 1, 0, 2, 0))
+    assert results(actions) == [(3, 0)]
+
+
+def test_the_number_of_items_is_bounded() -> None:
+    world = GatewayWorld()
+    assert results(world.send(count(MOST_ITEMS + 1))) == [(4, 0)]
+    assert requested(world.send(count(MOST_ITEMS))) == [("MISSION_REQUEST_INT", 0)]
+
+
+def test_a_mission_can_be_read_back_in_both_forms_and_cleared() -> None:
+    world = GatewayWorld()
+    world.ready()
+    stored(world, mission())
+    (answer,) = told(world.send(mavlink.MAVLink_mission_request_list_message(SYSTEM, 1, 0)))
+    assert (answer.get_type(), answer.count) == ("MISSION_COUNT", 5)
+    (answer,) = told(world.send(mavlink.MAVLink_mission_request_int_message(SYSTEM, 1, 1, 0)))
+    assert (answer.get_type(), answer.seq, answer.command, answer.x, answer.z) == ("MISSION_ITEM_INT", 1, 16, N, 15)
+    (answer,) = told(world.send(mavlink.MAVLink_mission_request_message(SYSTEM, 1, 1, 0)))
+    assert (answer.get_type(), answer.seq, round(answer.x * 1e4)) == ("MISSION_ITEM", 1, 473_983)
+    assert results(world.send(mavlink.MAVLink_mission_request_int_message(SYSTEM, 1, 9, 0))) == [(13, 0)]
+    (answer,) = told(world.send(mavlink.MAVLink_mission_request_list_message(SYSTEM, 1, 1)))
+    assert (answer.count, answer.mission_type) == (0, 1)
+    assert results(world.send(mavlink.MAVLink_mission_request_int_message(SYSTEM, 1, 0, 1))) == [(13, 1)]
+    world.send(mavlink.MAVLink_mission_ack_message(SYSTEM, 1, 0))
+    actions = world.send(mavlink.MAVLink_mission_clear_all_message(SYSTEM, 1, 0))
+    assert results(actions) == [(0, 0)]
+    assert [each.messages for each in actions if isinstance(each, Withhold)] == [frozenset()]
+    (answer,) = told(world.send(mavlink.MAVLink_mission_request_list_message(SYSTEM, 1, 0)))
+    assert answer.count == 0
+    assert results(world.send(count(0))) == [(0, 0)]
+
+
+def test_items_with_floats_are_read_back_as_integers() -> None:
+    world = GatewayWorld()
+    world.ready()
+    legacy = mavlink.MAVLink_mission_item_message(SYSTEM, 1, 0, 6, 22, 0, 1, 0, 0, 0, 0, nan, 8.5, 15, 0)
+    there = mavlink.MAVLink_mission_item_message(SYSTEM, 1, 1, 6, 16, 0, 1, 0, 0, 0, 0, 47.3983, 8.54559, 15, 0)
+    stored(world, [legacy, there])
+    (answer,) = told(world.send(mavlink.MAVLink_mission_request_int_message(SYSTEM, 1, 1, 0)))
+    assert abs(answer.x - N) < 20
+    (answer,) = told(world.send(mavlink.MAVLink_mission_request_int_message(SYSTEM, 1, 0, 0)))
+    assert (answer.x, answer.y) == (0x7FFFFFFF, 85_000_000)
+
+
+def test_the_check_of_an_upload_that_was_replaced_says_nothing_about_the_next() -> None:
+    world = GatewayWorld()
+    world.ready()
+    first, second = (
+        next(each.number for each in upload(world, items) if isinstance(each, Propose))
+        for items in (mission(), mission()[:2])
+    )
+    assert world.take(ProposalChecked(first, None)) == []
+    assert results(world.take(ProposalChecked(second, "no"))) == [(14, 0)]
+    third = next(each.number for each in upload(world, mission()) if isinstance(each, Propose))
+    world.send(count(1))
+    assert results(world.take(ProposalChecked(third, None))) == [], "another upload began"
+
+
+def test_an_item_after_the_last_one_is_passed_over_while_the_mission_is_checked() -> None:
+    world = GatewayWorld()
+    world.ready()
+    upload(world, mission())
+    assert world.send(item(4, RETURN)) == []
+
+
+# ---------------------------------------------------------------- what items mean
+
+
+def meaning(*items: Any, autopilot: int = PX4) -> Any:
+    """The steps of an upload, or its MISSION_ACK and text."""
+    world = GatewayWorld(autopilot)
+    world.fly()
+    actions = upload(world, [HOME_ITEM, *items] if autopilot == ARDUPILOT else items)
+    found = [(step.skill, dict(step.arguments)) for step in steps(actions)]
+    return found or (results(actions)[0][0], *texts(actions))
+
+
+THERE = {"target": "47.3983000 N, 8.5455900 E", "altitude": "15 m"}
+
+
+def test_items_that_stay_or_land_at_a_place_fly_there_first() -> None:
+    there = {"x": N, "y": E}
+    assert meaning(item(0, LOITER, 7, **there, z=15)) == [("goto", THERE), ("hover", {"time": "7 s"})]
+    assert meaning(item(0, LOITER, 7)) == [("hover", {"time": "7 s"})]
+    assert meaning(item(0, WAYPOINT, x=N - 9, y=E, z=15), item(1, LAND, **there))[1:] == [
+        ("goto", THERE),
+        ("emergency_land", {}),
+    ]
+    assert meaning(item(0, LAND)) == [("emergency_land", {})]
+
+
+def test_slot_0_of_ardupilot_is_home() -> None:
+    assert meaning(item(0, WAYPOINT, x=N, y=E, z=15), autopilot=ARDUPILOT) == [("goto", THERE)]
+    assert meaning(autopilot=ARDUPILOT) == (5, "mission refused: the mission has no item that flies")
+
+
+def test_what_cannot_be_a_step_is_refused_with_the_item() -> None:
+    """By hand: the result of MISSION_ACK, and the reason."""
+    table: tuple[tuple[Any, int, str], ...] = (
+        (item(0, 92, 1), 3, "item 0: command 92 has no mapping"),
+        (item(0, 2000), 3, "item 0: command 2000 has no mapping"),
+        (item(0, WAYPOINT, 5, x=N, y=E, z=15), 6, "item 0: waits at a waypoint are refused: use NAV_LOITER_TIME"),
+        (item(0, SPEED, 3, 5), 6, "item 0: only the speed over ground can be changed"),
+        (item(0, SPEED, 1, nan), 6, "item 0: only the speed over ground can be changed"),
+        (item(0, SPEED, 1, 5), 5, "the mission has no item that flies"),
+        (item(0, WAYPOINT, x=N, y=E, z=inf), 5, "item 0: goto: altitude is not a number in range"),
+        (item(0, WAYPOINT, x=N, y=E, z=15, frame=10), 5, "item 0: goto: its frame has no latitude and longitude"),
+        (item(0, WAYPOINT, x=0x7FFFFFFF, y=0x7FFFFFFF, z=15), 3, "item 0: command 16 has no mapping"),
+        (item(0, LAND, x=2_000_000_000, y=E), 5, "item 0: goto: the position is not on the globe"),
+    )
+    for each, result, text in table:
+        assert meaning(each) == (result, f"mission refused: {text}"), text
+
+
+def test_speeds_of_a_mission_hold_until_the_next_one() -> None:
+    there = {"x": N, "y": E, "z": 15}
+    found = meaning(
+        item(0, WAYPOINT, **there), item(1, SPEED, 1, 2.5), item(2, WAYPOINT, **there), item(3, SPEED, 0, -1),
+        item(4, WAYPOINT, **there), item(5, SPEED, 1, -2), item(6, WAYPOINT, **there),
+    )  # fmt: skip
+    assert [arguments.get("speed") for _, arguments in found] == [None, "2.5 m/s", "2.5 m/s", None]
+    found = meaning(item(0, SPEED, 1, 1e38), item(1, WAYPOINT, **there))
+    assert found == (5, "mission refused: item 1: goto: speed is not a number in range")
+
+
+# ---------------------------------------------------------------- flying it
+
+
+def states(actions: list[Action]) -> list[tuple[str, int, int]]:
+    found = []
+    for message in told(actions):
+        if message.get_type() == "MISSION_CURRENT":
+            found.append(("current", message.seq, message.mission_state))
+        elif message.get_type() == "MISSION_ITEM_REACHED":
+            found.append(("reached", message.seq, 0))
+    return found
+
+
+@pytest.mark.parametrize(
+    ("autopilot", "start"),
+    [(PX4, command_long(300)), (PX4, command_long(176, 1, 4, 4)), (ARDUPILOT, command_long(176, 1, 3))],
+)
+def test_a_started_mission_flies_and_reports_its_items(autopilot: int, start: Any) -> None:
+    world = GatewayWorld(autopilot)
+    world.ready()
+    before = [HOME_ITEM] if autopilot == ARDUPILOT else []
+    stored(world, [*before, *mission()])
+    first = len(before)
+    actions = world.send(start)
+    assert [skill for skill, *_ in proposals(actions)] == ["takeoff", "goto", "goto", "return_home"]
+    assert acks(actions) == []
+    world.accept(actions)
+    actions = world.dispatch(0)
+    assert acks(actions) == [(start.command, 0)]
+    assert states(actions) == [("current", first, 3)]
+    seen: list[Any] = []
+    for step in range(4):
+        seen += states(world.line(type="effect", event="succeeded", kind=0, step=step))
+        if step < 3:
+            seen += states(world.dispatch(step + 1))
+    assert seen == [
+        ("reached", first, 0), ("current", first + 1, 3), ("reached", first + 1, 0), ("current", first + 3, 3),
+        ("reached", first + 3, 0), ("current", first + 4, 3), ("reached", first + 4, 0), ("current", first + 4, 5),
+    ]  # fmt: skip
+    assert ("current", first + 4, 5) in states(world.wait(1_100_000)), "once a second"
+
+
+def test_a_mission_without_a_take_off_gets_one_on_the_ground() -> None:
+    world = GatewayWorld()
+    world.ready()
+    places = [item(0, WAYPOINT, x=N, y=E, z=15), item(1, RETURN)]
+    (check,) = (each for each in upload(world, places) if isinstance(each, Propose))
+    assert [step.skill for step in check.steps] == ["takeoff", "goto", "return_home"]
+    assert dict(check.steps[0].arguments) == {"altitude": "15 m"}
+    world.take(ProposalChecked(check.number, None))
+    actions = world.send(command_long(300))
+    assert [skill for skill, *_ in proposals(actions)] == ["takeoff", "goto", "return_home"]
+    world.accept(actions)
+    assert states(world.dispatch(0)) == [("current", 0, 3)]
+    assert states(world.line(type="effect", event="succeeded", kind=0, step=0)) == []
+
+
+def test_a_paused_mission_goes_on_where_it_was() -> None:
+    world = GatewayWorld()
+    world.ready()
+    stored(world, mission())
+    world.accept(world.send(command_long(300)))
+    world.dispatch(0)
+    world.line(type="effect", event="succeeded", kind=0, step=0)
+    world.fly()
+    world.dispatch(1)
+    assert acks(world.send(command_long(300))) == [(300, 0)], "it flies already"
+    pause = world.send(command_long(176, 1, 4, 3))
+    assert [skill for skill, *_ in proposals(pause)] == ["hover"]
+    world.accept(pause, first=2)
+    world.line(type="effect", event="superseded", kind=0, step=1)
+    assert states(world.dispatch(2)) == []
+    assert states(world.wait(1_100_000))[-1:] == [("current", 1, 4)]
+    actions = world.send(command_long(300))
+    assert [skill for skill, *_ in proposals(actions)] == ["goto", "goto", "return_home"]
+    world.accept(actions, first=3)
+    world.line(type="effect", event="superseded", kind=0, step=2)
+    assert states(world.dispatch(3)) == [("current", 1, 3)]
+    world.line(type="effect", event="succeeded", kind=0, step=3)
+    world.dispatch(4)
+    world.accept(world.send(command_long(193, 0)), first=5)
+    world.line(type="effect", event="superseded", kind=0, step=4)
+    world.dispatch(5)
+    assert [skill for skill, *_ in proposals(world.send(command_long(300)))] == ["goto", "return_home"]
+
+
+def test_a_repeated_start_before_the_answer_is_one_proposal() -> None:
+    world = GatewayWorld()
+    world.ready()
+    stored(world, mission())
+    assert len(proposals(world.send(command_long(300)))) == 4
+    assert world.send(command_long(300, confirmation=1)) == []
+    world.wait(300_000)
+    assert acks(world.send(command_long(300, confirmation=2))) == [(300, 5)]
+
+
+def test_a_refused_start_is_answered() -> None:
+    world = GatewayWorld()
+    world.ready()
+    stored(world, mission())
+    (propose,) = (each for each in world.send(command_long(300)) if isinstance(each, Propose))
+    actions = world.take(ProposalChecked(propose.number, "wind is too strong"))
+    assert acks(actions) == [(300, 2)]
+    assert texts(actions) == ["takeoff refused: wind is too strong"]
+    actions = world.send(command_long(300))
+    (propose,) = (each for each in actions if isinstance(each, Propose))
+    world.take(ProposalChecked(propose.number, None, 0))
+    assert acks(world.take(ProposalAnswered(propose.number, "replayed", "flown before"))) == [(300, 2)]
+
+
+def test_only_the_first_item_can_be_chosen() -> None:
+    world = GatewayWorld()
+    world.ready()
+    set_current = mavlink.MAVLink_mission_set_current_message(SYSTEM, 1, 0)
+    assert texts(world.send(set_current)) == ["a mission starts at its first item"], "there is no mission"
+    stored(world, mission())
+    assert states(world.send(set_current)) == [("current", 0, 2)]
+    assert states(world.send(mavlink.MAVLink_mission_set_current_message(SYSTEM, 1, 2))) == [("current", 0, 2)]
+    assert acks(world.send(command_long(224, 0))) == [(224, 0)]
+    assert acks(world.send(command_long(224, 3))) == [(224, 2)]
+    world.accept(world.send(command_long(300)))
+    world.dispatch(0)
+    assert acks(world.send(command_long(224, 0))) == [(224, 0)], "without effect while it flies"
+    world.line(type="effect", event="failed", kind=0, step=0)
+    world.line(type="mission")
+    assert acks(world.send(command_long(224, 0))) == [(224, 0)]
+    assert states(world.wait(1_100_000))[-1] == ("current", 0, 2)
+
+
+# ---------------------------------------------------------------- ArduPilot's guided item
+
+
+def guided(command: int = WAYPOINT, z: float = 15) -> Any:
+    message = item(0, command, x=N, y=E, z=z)
+    message.current = 2
+    return message
+
+
+def test_a_guided_item_is_flown_to_at_once_and_acknowledged_as_a_mission() -> None:
+    world = GatewayWorld(ARDUPILOT)
+    world.fly()
+    actions = world.send(guided())
+    assert [each[:2] for each in proposals(actions)] == [("goto", THERE)]
+    world.accept(actions)
+    assert results(world.dispatch(0)) == [(0, 0)]
+    assert results(world.send(guided())) == [(0, 0)], "the same target again"
+    assert results(world.send(guided(z=60))) == [(14, 0)]
+    actions = world.send(guided(command=2000))
+    assert (results(actions), texts(actions)) == ([(3, 0)], ["item 2000 has no mapping"])
+    actions = world.send(guided(z=16))
+    (propose,) = (each for each in actions if isinstance(each, Propose))
+    assert results(world.take(ProposalChecked(propose.number, "no"))) == [(14, 0)]

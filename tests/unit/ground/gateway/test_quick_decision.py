@@ -1,0 +1,171 @@
+import statistics
+import time
+
+import pytest
+
+from reference.gateway_world import (
+    MORNING,
+    GatewayWorld,
+    acks,
+    command_int,
+    command_long,
+    policy,
+    proposals,
+    reposition,
+    texts,
+)
+from reference.sources import CHECKOUT
+
+SCHOOL = {"latitude": 473_972_900, "longitude": 85_477_100}
+ABROAD = {"latitude": 473_990_000, "longitude": 85_700_000}
+
+
+def aloft(**settings: str) -> GatewayWorld:
+    world = GatewayWorld()
+    world.client(1, "script", **settings)
+    world.fly()
+    return world
+
+
+def test_each_refusal_has_a_result_and_a_text_with_the_limit() -> None:
+    """By hand: the result, and what the client's screen shows."""
+    low, dark, gone = aloft(), aloft(), aloft()
+    low.signals["battery"] = (2_000,)
+    dark.signals["battery.cell"] = (3_100,)
+    del gone.signals["gps.fix"]
+    nobody, stranger = aloft(role="trainee"), aloft(role="postman")
+    table = (
+        (aloft(), reposition(z=550), 2, "goto denied: altitude 62 m, accepted 40 m (integrity/argument-out-of-range)"),
+        (aloft(), reposition(z=533), 2, "goto denied: altitude 45 m, accepted 40 m (authority/out-of-scope)"),
+        (aloft(), reposition(z=490), 2, "goto denied: altitude 2 m, accepted 5 m (integrity/argument-out-of-range)"),
+        (aloft(), reposition(**ABROAD), 2, "when target inside city and altitude <= 40 m (authority/out-of-scope)"),
+        (aloft(), reposition(**SCHOOL), 2, "by any when target inside grow(school, 20 m) (authority/forbidden)"),
+        (low, reposition(), 1, "goto rejected: battery 20 %, accepted 30.01 % (state/violated)"),
+        (gone, reposition(), 1, "goto rejected: gps.fix unknown; gps.fix >= fix_3d (state/unknown)"),
+        (dark, reposition(), 1, "goto rejected: battery.cell 3.1 V, accepted 3.5 V (safety/degraded)"),
+        (nobody, reposition(), 2, "goto denied: no rule of bridge_inspection names the role trainee"),
+        (stranger, reposition(), 2, "goto denied: no rule of bridge_inspection names the role postman"),
+    )  # fmt: skip
+    for world, message, result, text in table:
+        actions = world.send(message)
+        assert proposals(actions) == [], text
+        assert acks(actions) == [(192, result)], text
+        (said,) = texts(actions)
+        assert said.endswith(text), said
+
+
+def test_a_role_that_may_not_is_named() -> None:
+    world = GatewayWorld(under=policy(CHECKOUT / "policies" / "training_field.rts"))
+    world.client(1, "script", role="supervisor")
+    world.fly()
+    (said,) = texts(world.send(reposition()))
+    assert said.startswith("goto denied: ")
+
+
+def test_a_path_out_of_the_airspace_names_the_zone() -> None:
+    world = aloft()
+    world.signals["position"] = (450_000, -150_000)
+    (said,) = texts(world.send(reposition()))
+    assert said == "goto rejected: leaves city; enters school; airspace inside city outside school (safety/airspace)"
+
+
+def test_the_height_of_the_vehicle_is_no_reason_to_climb() -> None:
+    world = GatewayWorld()
+    world.ready()
+    world.signals["landed"] = (2,)
+    (said,) = texts(world.send(command_long(22, 0, 0, 0, 0, 0, 0, 503)))
+    assert said == "takeoff rejected: landed in_air, accepted on_ground (state/violated)"
+
+
+def test_a_skill_that_the_role_may_not_use_is_denied() -> None:
+    world = GatewayWorld()
+    world.client(1, "script", role="supervisor")
+    world.fly()
+    (said,) = texts(world.send(reposition()))
+    assert said == "goto denied: the role supervisor may not (authority/not-permitted)"
+
+
+def test_a_place_beyond_any_plan_is_malformed() -> None:
+    world = GatewayWorld()
+    world.fly()
+    actions = world.send(command_int(192, 6, 0, 1, x=473_983_000, y=85_455_900, z=3e6))
+    assert acks(actions) == [(192, 2)]
+    (said,) = texts(actions)
+    assert said.startswith("goto denied: plan: altitude ")
+
+
+def test_an_unknown_charge_is_named_where_the_way_home_needs_it() -> None:
+    world = aloft()
+    del world.signals["battery"]
+    assert texts(world.send(command_long(193, 0))) == ["hover rejected: battery unknown (safety/unknown)"]
+
+
+def test_an_unknown_place_is_named_where_no_clause_is() -> None:
+    world = aloft()
+    del world.signals["position"]
+    (said,) = texts(world.send(command_long(20)))
+    assert said.endswith(("(safety/unknown)", "(state/unknown)"))
+    assert "unknown" in said
+
+
+TIMED = """import "lib:policies/site.rts"
+import "lib:skills/hover.rts"
+import "lib:skills/goto.rts"
+import "lib:skills/return_home.rts"
+import "lib:skills/emergency_land.rts"
+import "lib:skills/takeoff.rts"
+
+policy timed version 1 {
+  permit takeoff by role operator through agent when local time in 08:00 .. 18:00
+  permit goto by role operator through agent when height > 5 m for the last 2 s
+  permit hover, return_home, emergency_land by any
+  confirm takeoff by role supervisor within 30 s
+  contingency return_home, emergency_land
+}
+"""
+
+
+@pytest.fixture(scope="module")
+def timed(tmp_path_factory: pytest.TempPathFactory) -> GatewayWorld:
+    path = tmp_path_factory.mktemp("policies") / "timed.rts"
+    path.write_text(TIMED)
+    return GatewayWorld(under=policy(path))
+
+
+def test_the_time_of_day_is_told(timed: GatewayWorld) -> None:
+    timed.ready()
+    timed.utc_us = MORNING + 10 * 3_600_000_000
+    (said,) = texts(timed.send(command_long(22, 0, 0, 0, 0, 0, 0, 503)))
+    timed.utc_us = MORNING
+    assert said == "takeoff denied: time 22:00, accepted 18:00 (authority/out-of-scope)"
+
+
+def test_what_a_monitor_may_let_pass_is_decided_on_board(timed: GatewayWorld) -> None:
+    timed.fly()
+    assert proposals(timed.send(reposition())) != []
+    timed.signals["battery"] = (2_000,)
+    actions = timed.send(reposition(z=509))
+    timed.signals["battery"] = (9_000,)
+    assert acks(actions) == [(192, 2)], "refused whatever the monitor says"
+
+
+def test_a_step_that_needs_an_approval_is_proposed(timed: GatewayWorld) -> None:
+    timed.line(type="close", ending="completed")
+    timed.signals |= {"height": (0,), "landed": (1,)}
+    timed.report(armed=False, airborne=False)
+    timed.ready()
+    actions = timed.send(command_long(22, 0, 0, 0, 0, 0, 0, 503))
+    assert [skill for skill, *_ in proposals(actions)] == ["takeoff"]
+
+
+@pytest.mark.slow
+def test_a_refusal_takes_about_a_millisecond_or_less() -> None:
+    """The median, with a wide margin: figures are in bench/gateway.py."""
+    world = aloft()
+    times = []
+    for number in range(200):
+        world.now_us += 1_000
+        begun = time.perf_counter()
+        world.send(reposition(z=540 + number % 7))
+        times.append(time.perf_counter() - begun)
+    assert statistics.median(times) < 0.02

@@ -78,7 +78,7 @@ ROWS = (
     _row("takeoff", ITEM, "MAV_CMD_NAV_TAKEOFF", 22, _IN_FRAME),
     _row(
         "takeoff", MODE, "TAKEOFF", Px4Mode.TAKEOFF,
-        ArgumentSource("altitude", (), 1_000, "home", "MIS_TAKEOFF_ALT above home"), on="px4",
+        ArgumentSource("altitude", (), 1_000, "", "MIS_TAKEOFF_ALT above home"), on="px4",
     ),
     _row("goto", COMMAND, "MAV_CMD_DO_REPOSITION", 192, _TARGET, _OR_HERE, _SPEED),
     _row("goto", COMMAND, "MAV_CMD_DO_REPOSITION", 192, _TARGET_OR_HERE, _IN_FRAME, _SPEED),

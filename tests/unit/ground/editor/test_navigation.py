@@ -153,6 +153,34 @@ signal room : ratio = RADIO_STATUS.txbuf  every 100 ms  stale after 3 s
     assert [each for each in said if each not in found.text] == []
 
 
+@pytest.mark.parametrize(
+    ("around", "said"),
+    [
+        ("acc|epts MAV_CMD", ["by which a client of a gateway means"]),
+        ("MAV_CMD_NAV_TAKE|OFF", ["MAVLink command `MAV_CMD_NAV_TAKEOFF`", "- `param7`: Altitude, in `m`"]),
+        ("param|7 above", ["MAVLink command `MAV_CMD_NAV_TAKEOFF`, `param7`: Altitude, in `m`"]),
+        ("with hi|gh = param7", ["parameter of `rise`", "range 3 m .. 60 m"]),
+        ("SET_POSITION|_TARGET", ["MAVLink message `SET_POSITION_TARGET_GLOBAL_INT`: `time_boot_ms`"]),
+        ("type_|mask", ["`uint16_t`, values of `POSITION_TARGET_TYPEMASK`"]),
+        ("mode TAKE|OFF", ["flight mode `TAKEOFF` of px4: `custom_mode` 33816576"]),
+        ("mode NO|NE", ["flight mode `NONE`"]),
+    ],
+)
+def test_hover_describes_what_a_skill_accepts(desk: Workspace, around: str, said: list[str]) -> None:
+    text = """skill rise(high: altitude in 3 m .. 60 m) {
+  motion  climb to high
+  accepts MAV_CMD_NAV_TAKEOFF with high = param7 above home
+  accepts message SET_POSITION_TARGET_GLOBAL_INT where type_mask has 504 with high = alt in frame
+  accepts mode TAKEOFF on px4 with high = here
+  accepts mode NONE on px4 with high = here
+}
+"""
+    desk.put("/w/s.rts", text)
+    found = hover(desk.view("/w/s.rts"), "/w/s.rts", place(desk, "/w/s.rts", around), dialect.load())
+    assert found is not None
+    assert [each for each in said if each not in found.text] == []
+
+
 def test_hover_is_empty_without_a_name(desk: Workspace) -> None:
     text = desk.text(DIP) or ""
     assert hover(desk.view(DIP), DIP, text.index("\n\n") + 1, dialect.load()) is None

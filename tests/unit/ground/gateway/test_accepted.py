@@ -1,7 +1,8 @@
 """What the library accepts of MAVLink: the table by hand, and frames of clients that give the arguments that are meant.
 
 The frames are made by hand (`takeoff` .. `emergency_land`), as the documentation of MAVLink and of both autopilots has
-them; they know nothing of the table. They are read back by the table alone (`translated`).
+them; they know nothing of the table. They are read back twice: by a reader of the table that was written apart
+(`translated`), and by the gateway's own translation.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -16,6 +17,8 @@ from hypothesis import strategies as st
 from msgspec import structs
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from reference.gateway_world import DEFAULTS, ROWS
+from rtshcua.decision.prepare import PreparedPolicy, prepare
 from rtshcua.ground.checker.context import CheckContext
 from rtshcua.ground.checker.report import Report
 from rtshcua.ground.checker.symbols import collect
@@ -29,11 +32,18 @@ from rtshcua.ground.gateway.accepted import (
     FixedField,
     accepted_commands,
 )
+from rtshcua.ground.gateway.client_frames import received as decoded
+from rtshcua.ground.gateway.interface import GatewaySettings, ProposedStep
+from rtshcua.ground.gateway.translation import Translation
+from rtshcua.ground.gateway.vehicle_seen import VehicleSeen
 from rtshcua.ground.language.load import Program, load
 from rtshcua.ground.pipeline.program import compile_program
 from rtshcua.mavlink import dialect
+from rtshcua.mavlink.modes import ARDUPILOT, PX4
 from rtshcua.mavlink.quantise import quantise
 from rtshcua.model.flat.policy import Policy
+from rtshcua.model.flat.situation import State
+from rtshcua.model.flat.zone import project
 
 CHECKOUT = Path(__file__).resolve().parents[4]
 #: the height of home above sea, mm
@@ -126,6 +136,10 @@ def test_table_of_the_library_is_that_by_hand() -> None:
     for row in table():
         found.setdefault(row.skill, []).append(tuple(row[1:]))
     assert found == BY_HAND
+
+
+def test_rows_of_the_tests_of_the_gateway_are_those_of_the_library() -> None:
+    assert set(ROWS) <= set(table())
 
 
 def test_skills_that_the_policy_does_not_know_have_no_rows() -> None:
@@ -307,7 +321,47 @@ def ranges() -> Mapping[str, Mapping[str, tuple[int, int]]]:
     }
 
 
-PLACES = st.tuples(st.integers(-850_000_000, 850_000_000), st.integers(-1_800_000_000, 1_800_000_000))
+#: within 5 km of home or so, 1e-7 degree
+PLACES = st.tuples(st.integers(473_500_000, 474_400_000), st.integers(84_900_000, 86_000_000))
+
+
+@cache
+def translation(autopilot: int) -> Translation:
+    """The gateway's own, which has seen the height of home."""
+    prepared = prepare(policy())
+    assert isinstance(prepared, PreparedPolicy)
+    seen = VehicleSeen(1)
+    home = mavlink.MAVLink_home_position_message(473_977_400, 85_455_900, HOME, 0, 0, 0, [1, 0, 0, 0], 0, 0, 0)
+    seen.take(home.pack(mavlink.MAVLink(None, 1, 1)), 0)
+    return Translation(GatewaySettings(1, autopilot, prepared, DEFAULTS, table(), lambda now: no_state()), seen)
+
+
+def no_state() -> State:
+    raise AssertionError("a translation decides nothing")
+
+
+def by_gateway(client: Client) -> tuple[str, tuple[int, ...]]:
+    """The skill and the cells of its arguments, as the gateway translates the frame."""
+    message = decoded(client.message.pack(mavlink.MAVLink(None, 255, 190)))
+    assert message is not None
+    made = translation(PX4 if client.autopilot == "px4" else ARDUPILOT)
+    (row,) = {
+        row.skill: row for kind in (MODE, MESSAGE, ITEM, COMMAND)
+        if (row := made.row(kind, number_of(kind, client.message), message)) is not None
+    }.values()  # fmt: skip
+    step = made.step(row, message, {}, 0)
+    assert isinstance(step, ProposedStep), step
+    return step.skill, step.values
+
+
+def cells(skill: str, arguments: Mapping[str, Any]) -> tuple[int, ...]:
+    """The cells of arguments in the order of the library's parameters."""
+    if skill == "goto":
+        place = project(policy().projection, *arguments["target"])
+        return (*place, arguments["altitude"], arguments.get("speed", 6_000))
+    if skill == "hover":
+        return (arguments.get("time", 10_000_000),)
+    return tuple(arguments.values())
 
 
 @given(st.data())
@@ -328,6 +382,7 @@ def test_frames_of_clients_give_the_arguments_that_are_meant(data: st.DataObject
     for skill, clients, arguments in meant:
         for client in clients(**arguments):
             assert translated(client) == (skill, arguments), client.message
+            assert by_gateway(client) == (skill, cells(skill, arguments)), client.message
 
 
 def test_every_row_of_the_library_is_met_by_a_client_or_a_substitute() -> None:

@@ -235,7 +235,8 @@ def others(value: Any, annotation: Any) -> Iterator[tuple[str, Any]]:
     elif isinstance(value, int):
         yield "", value + 60_000_000
     elif isinstance(value, str):
-        choices = [each for each in get_args(annotation) if isinstance(each, str) and each != value]
+        written = [each for part in (annotation, *get_args(annotation)) for each in get_args(part)]
+        choices = [each for each in written if isinstance(each, str) and each != value]
         yield "", choices[0] if choices else value + "x"
     elif type(value) is tuple:
         for number, part in enumerate(value):

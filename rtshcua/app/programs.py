@@ -20,6 +20,7 @@ from rtshcua.ground.language.load import Program, load
 from rtshcua.ground.language.paths import shown
 from rtshcua.ground.pipeline.pins import PROPOSED, Pins, policies_of
 from rtshcua.ground.pipeline.program import Checked, Compiled, compile_program, examine_program
+from rtshcua.ground.prove.step_starts import FROM_HOME, MissionStart
 from rtshcua.mavlink import dialect
 from rtshcua.wire.names import BUNDLE
 
@@ -106,13 +107,15 @@ def compile_sources(
 
 
 def compile_reading(
-    reading: Reading, *, mission: str | None, issued_at_us: int, values: Sequence[str] = (), pins: Pins | None = None
-) -> Compiled:
-    """Compile a mission of the first file of a program that was read; see `compile_sources`."""
+    reading: Reading, *, mission: str | None, issued_at_us: int, values: Sequence[str] = (), pins: Pins | None = None,
+    start: MissionStart = FROM_HOME,
+) -> Compiled:  # fmt: skip
+    """Compile a mission of the first file of a program that was read; see `compile_sources`, proved from `start`."""
     settings = parse_settings(values)
     compiled = compile_program(
-        reading.program, dialect.load(), mission=mission, issued_at_us=issued_at_us, settings=settings, pins=pins
-    )
+        reading.program, dialect.load(), mission=mission, issued_at_us=issued_at_us, settings=settings, pins=pins,
+        start=start,
+    )  # fmt: skip
     return replace(compiled, diagnostics=reading.pointed(compiled.diagnostics))
 
 

@@ -12,6 +12,7 @@ from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.ground.agent.narrowed_schema import narrowed, permitted_skills
 from rtshcua.ground.agent.rejections import frame_of, rejections
 from rtshcua.ground.pipeline.pins import Pins
+from rtshcua.ground.prove.step_starts import FROM_HOME, MissionStart
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy
 
@@ -68,11 +69,11 @@ class Missions:
         """The policy, lowered for its vehicle."""
         return self.lowered.policy
 
-    def check(self, specification: Any, issued_at_us: int) -> ProposalAnswer:
-        """Compile a specification as `rtshcua compile --policy` does."""
+    def check(self, specification: Any, issued_at_us: int, start: MissionStart = FROM_HOME) -> ProposalAnswer:
+        """Compile a specification as `rtshcua compile --policy` does, for a mission that begins at `start`."""
         proposal = json.dumps(specification, ensure_ascii=False).encode("utf-8", "surrogatepass")
         reading = self._reader.program([PROPOSAL, *self._names], {PROPOSAL: proposal}, self._pins)
-        compiled = compile_reading(reading, mission=None, issued_at_us=issued_at_us, pins=self._pins)
+        compiled = compile_reading(reading, mission=None, issued_at_us=issued_at_us, pins=self._pins, start=start)
         if compiled.mission is None or compiled.policy is None:
             source = reading.program.sources[PROPOSAL]
             first, more = rejections(specification, compiled.diagnostics, source, self._frame)

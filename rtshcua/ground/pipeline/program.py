@@ -25,6 +25,7 @@ from rtshcua.ground.pipeline.pins import Pins, claims
 from rtshcua.ground.prove.mission_bounds import Bounds, bounds_of, greatest
 from rtshcua.ground.prove.proof_context import ProofContext
 from rtshcua.ground.prove.proofs import prove_mission, prove_policy, report_refused
+from rtshcua.ground.prove.step_starts import FROM_HOME, MissionStart
 from rtshcua.ground.testing.case import PolicyCase, PolicyUnderTest
 from rtshcua.ground.testing.case_lowering import cases_of
 from rtshcua.ground.testing.scenario_lowering import ScenarioFlight, ScenarioMission, scenarios_of
@@ -86,8 +87,9 @@ def compile_program(
     issued_at_us: int,
     settings: ParameterSettings | None = None,
     pins: Pins | None = None,
+    start: MissionStart = FROM_HOME,
 ) -> Compiled:
-    """Compile one mission (None: the only one of the first file) and its policy.
+    """Compile one mission (None: the only one of the first file) and its policy. The mission is proved from `start`.
 
     `settings` are values for that mission's parameters. A claim that contradicts `pins` is a finding. All declarations
     and all missions are checked. Errors in the sources become findings, never exceptions.
@@ -96,6 +98,7 @@ def compile_program(
     candidates = _candidates(program)
     name = mission if mission is not None or len(candidates) != 1 else candidates[0].name.text
     run = Compilation(program, dialect, issued_at_us, name, settings)
+    run.start = start
     run.check()
     chosen = run.choose(mission)
     if chosen is not None and pins is not None:
@@ -158,6 +161,8 @@ class Compilation:
         self.program = program
         self.issued_at_us = issued_at_us
         self.issues = issues or {}
+        self._chosen = chosen
+        self.start = FROM_HOME  # of the chosen mission
         settings = settings or ParameterSettings()
         options = {settings.source.file: settings.source} if settings.source.text else {}
         self.report = Report({**program.sources, **options}, program.data)
@@ -244,7 +249,8 @@ class Compilation:
         under = replace(under, lowered=replace(under.lowered, files=lowered.files))
         flat = lowered.mission
         self.planned.setdefault(mission.name.text, PlannedMission(under.lowered, flat, mission))
-        bounds = bounds_of(under, mission, flat, prove_mission(under, mission, flat))
+        start = self.start if mission.name.text == self._chosen else FROM_HOME
+        bounds = bounds_of(under, mission, flat, prove_mission(under, mission, flat, start))
         self.bounds[mission.name.text] = greatest(bounds, self.bounds.get(mission.name.text))
         tested = PolicyUnderTest(under.lowered, under.prepared)
         self._flown.setdefault(mission.name.text, ScenarioMission(tested, flat, mission))  # the first has the defaults

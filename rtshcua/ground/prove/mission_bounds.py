@@ -5,10 +5,10 @@ longest chain that may follow a step. The energy is the most that the contracts 
 step, plus the chain that then flies; a return needs at least the way home from the farthest planned place. A mission
 that may need more than a full charge is refused.
 
-For E0620 the flight begins with a full charge, and every earlier step used all that it may. A step that may be skipped
-counts as flown, but is not checked itself. A step needs the charge that step 7 of the decision requires (its own bound,
-the way home from the farthest planned place, and the reserve), and no clause about the battery and no rule may refuse
-it with the remaining charge.
+For E0620 a mission begins with a full charge, or with the present one if it begins in flight, and every earlier step
+used all that it may. A step that may be skipped counts as flown, but is not checked itself. A step needs the charge
+that step 7 of the decision requires (its own bound, the way home from the farthest planned place, and the reserve), and
+no clause about the battery and no rule may refuse it with the remaining charge.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -38,15 +38,20 @@ from rtshcua.model.quantity import Dimension, display
 _SHOWN_STEPS = 6
 
 
-def prove_charge(proof: ProofContext, steps: Sequence[MissionStep], starts: Sequence[Sequence[StartPlace]]) -> None:
-    """Report the first step that may lack charge. `starts` are the places where each step may begin."""
-    left = FULL
+def prove_charge(
+    proof: ProofContext, steps: Sequence[MissionStep], starts: Sequence[Sequence[StartPlace]], charge: int
+) -> None:
+    """Report the first step that may lack charge. `starts` are the places where each step may begin; the first begins
+    with this `charge`.
+    """
+    left = charge
     spent: list[tuple[str, int]] = []
     for step, places in zip(steps, starts, strict=True):
         if not may_be_skipped(step.prepared):
             reason = next(_shortages(proof, step.prepared, places, left), None)
             if reason is not None:
-                _report_short(proof, step, left, reason, spent)
+                at_first = "full at the start" if charge == FULL else f"{_percent_text(charge)} at the start"
+                _report_short(proof, step, left, reason, spent, at_first)
                 return
         left = max(left - step.contract.energy, 0)
         spent.append((step.contract.name, left))
@@ -103,10 +108,10 @@ def _refusals(
 
 
 def _report_short(
-    proof: ProofContext, step: MissionStep, left: int, reason: _Reason, spent: Sequence[tuple[str, int]]
+    proof: ProofContext, step: MissionStep, left: int, reason: _Reason, spent: Sequence[tuple[str, int]], at_first: str
 ) -> None:
     listed = [f"{_percent_text(charge)} after `{name}`" for name, charge in spent[-_SHOWN_STEPS:]]
-    from_ = ["..."] if len(spent) > _SHOWN_STEPS else ["full at the start"]
+    from_ = ["..."] if len(spent) > _SHOWN_STEPS else [at_first]
     proof.report.add(
         codes.SHORT_OF_ENERGY,
         step.span,

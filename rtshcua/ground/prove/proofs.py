@@ -25,8 +25,9 @@ from rtshcua.ground.prove.rule_checks import prove_delegations, prove_rules
 from rtshcua.ground.prove.step_paths import prove_home, prove_path
 from rtshcua.ground.prove.step_permissions import prove_authority
 from rtshcua.ground.prove.step_starts import (
-    AT_HOME,
+    FROM_HOME,
     MOST_PLACES,
+    MissionStart,
     StartPlace,
     may_be_skipped,
     places_after,
@@ -67,15 +68,19 @@ def _prepared(policy: Policy) -> tuple[PreparedPolicy, Questions] | Refusal:
     return prepared if isinstance(prepared, Refusal) else (prepared, Questions(prepared))
 
 
-def prove_mission(proof: ProofContext, declared: MissionDecl, mission: Mission) -> tuple[StepBound, ...]:
-    """Prove a mission under a policy. Returns the bounds of its steps, empty if the mission cannot be flown."""
+def prove_mission(
+    proof: ProofContext, declared: MissionDecl, mission: Mission, start: MissionStart = FROM_HOME
+) -> tuple[StepBound, ...]:
+    """Prove a mission under a policy, from where it begins. Returns the bounds of its steps; empty if it cannot be
+    flown.
+    """
     too_long = paths_fit(mission, proof.prepared)
     if too_long is not None:
         text = f"`{declared.name.text}` does not fit on board: {too_long.text}"
         proof.report.add(codes.TOO_MANY, declared.name.span, text, help=too_long.help)
         return ()
     prepared: list[PreparedInvocation] = []
-    slowest = 0
+    slowest = start.speed
     for invocation in mission.invocations:
         found = proof.prepare(invocation, mission.phases)
         if isinstance(found, Refusal):
@@ -87,7 +92,7 @@ def prove_mission(proof: ProofContext, declared: MissionDecl, mission: Mission) 
     steps = list(mission_steps(proof, declared_steps, prepared))
     permitted = [prove_authority(proof, declared, step) for step in steps]
     before = len(proof.report.found)
-    flown = prove_flight(proof, declared, steps, permitted)
+    flown = prove_flight(proof, declared, steps, permitted, start)
     if len(proof.report.found) == before:
         for step in compress(steps, permitted):
             prove_step_contract(proof, step)
@@ -114,16 +119,17 @@ def report_refused(context: CheckContext, lowered: LoweredPolicy, malformed: Ref
 
 
 def prove_flight(
-    proof: ProofContext, mission: MissionDecl, steps: Sequence[MissionStep], permitted: Sequence[bool]
-) -> tuple[StepBound, ...]:
+    proof: ProofContext, mission: MissionDecl, steps: Sequence[MissionStep], permitted: Sequence[bool],
+    start: MissionStart,
+) -> tuple[StepBound, ...]:  # fmt: skip
     """Prove the flight of a mission up to the first step that cannot be flown. Returns the bounds of the steps, or ().
 
     Steps after it are not proved: they would begin at a place that the vehicle never reaches.
     """
     ways = FallbackWays(proof)
     starts: list[tuple[StartPlace, ...]] = []
-    places: tuple[StartPlace, ...] = (AT_HOME,)
-    slowest, skipped = 0, list[MissionStep]()
+    places: tuple[StartPlace, ...] = (start.place,)
+    slowest, skipped = start.speed, list[MissionStep]()
     bounds: list[StepBound] = []
     followed = True
     for step, permits in zip(steps, permitted, strict=True):
@@ -148,7 +154,7 @@ def prove_flight(
             _too_many_places(proof, step)
         places = places[:MOST_PLACES]
     warn_not_landed(proof, mission, steps[-1], places)
-    prove_charge(proof, steps, starts)
+    prove_charge(proof, steps, starts, start.charge)
     prove_landing_height(proof, steps)
     return tuple(bounds) if len(bounds) == len(steps) else ()
 

@@ -23,6 +23,7 @@ from rtshcua.ground.prove.step_times import MissionStep
 from rtshcua.mavlink.enums import MAV_LANDED_STATE_IN_AIR, MAV_LANDED_STATE_ON_GROUND
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.limits import FULL
 from rtshcua.model.flat.mission import OnInadmissible
 from rtshcua.model.flat.signal import ENUMERATION
 from rtshcua.model.ir.missions import MissionDecl
@@ -42,6 +43,19 @@ class StartPlace(NamedTuple):
 
 
 AT_HOME = StartPlace(0, 0, 0, aloft=False)
+
+
+class MissionStart(NamedTuple):
+    """Where a mission begins, the charge then, in 1/10000, and the slowest speed of earlier steps in mm/s (0: none),
+    which an autopilot may keep on a return. A mission begins at home with a full charge, or in flight.
+    """
+
+    place: StartPlace = AT_HOME
+    charge: int = FULL
+    speed: int = 0
+
+
+FROM_HOME = MissionStart()
 
 
 def place_after(invocation: PreparedInvocation, start: StartPlace) -> StartPlace:

@@ -11,6 +11,7 @@ from rtshcua.app.programs import SourceReader, compile_reading, examine
 from rtshcua.diagnostics.diagnostic import has_errors
 from rtshcua.ground.agent.narrowed_schema import narrowed, permitted_skills
 from rtshcua.ground.agent.rejections import frame_of, rejections
+from rtshcua.ground.checker.arguments import bind_value
 from rtshcua.ground.pipeline.pins import Pins
 from rtshcua.ground.prove.step_starts import FROM_HOME, MissionStart
 from rtshcua.model.flat.mission import Mission
@@ -58,6 +59,8 @@ class Missions:
         if len(lowered) != 1:
             raise NoPolicy(f"the sources declare {len(own)} policies; exactly one is required")
         self.lowered = lowered[0]
+        self.program = program
+        self._context = next(each.context for each in checked.grounds if each.lowered is self.lowered)
         path = program.stable.get(program.units[0].file, "")
         self.schema = narrowed(self.lowered, program.units, path if path.startswith("lib:") else None)
         self.skills = permitted_skills(self.lowered, ())
@@ -68,6 +71,18 @@ class Missions:
     def policy(self) -> Policy:
         """The policy, lowered for its vehicle."""
         return self.lowered.policy
+
+    def defaults(self) -> dict[str, dict[str, tuple[int, ...]]]:
+        """The default of each parameter that has one, by skill and name, in the cells of an invocation."""
+        context, found = self._context, dict[str, dict[str, tuple[int, ...]]]()
+        for contract in self.policy.contracts:
+            skill = context.symbols.skills[contract.name]
+            own = found[contract.name] = {}
+            for name, argument in context.arguments(skill).items():
+                if argument.declaration.default is not None:
+                    bound = bind_value(context.scope_of(skill), argument, argument.declaration.default)
+                    own[name] = self.lowered.contracts.cells([] if bound is None else [bound])
+        return found
 
     def check(self, specification: Any, issued_at_us: int, start: MissionStart = FROM_HOME) -> ProposalAnswer:
         """Compile a specification as `rtshcua compile --policy` does, for a mission that begins at `start`."""

@@ -11,8 +11,8 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 
 #: the limits of the counts of `make size`: lower a limit in the commit that lowers the count
 HELD = {
-    "modules": 787,
-    "code lines": 94_249,  # rises with each feature: last the evaluation
+    "modules": 800,
+    "code lines": 96_456,  # rises with each feature: last the evaluation
     "shared class names": 0,
     "of them across packages": 0,
     "shared file names": 69,

@@ -22,7 +22,6 @@ from rtshcua.ground.gateway.accepted import (
     ArgumentSource,
     FixedField,
 )
-from rtshcua.ground.gateway.gateway import Gateway
 from rtshcua.ground.gateway.interface import (
     REQUESTS,
     Action,
@@ -40,6 +39,7 @@ from rtshcua.ground.gateway.interface import (
     Tick,
     ToClient,
 )
+from rtshcua.ground.gateway.translator import Gateway
 from rtshcua.mavlink.modes import PX4, CopterMode, Px4Mode
 from rtshcua.model.flat.situation import Now, State
 

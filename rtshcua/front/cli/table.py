@@ -68,6 +68,7 @@ COMMANDS = (
     Row("recall", "fly", "recall a flight with your signature", fast_path=True),
     Row("operator", "fly", "follow a flight in a terminal, and recall it at once if needed"),
     Row("replace", "fly", "send a replacement mission to a flight"),
+    Row("gateway", "fly", "let MAVLink clients reach a vehicle only through a policy", ends_in_order=True),
     Row("mcp", "fly", "run an MCP server through which agents propose missions"),
     Row("agent-bundle", "fly", "make a plug-in with that server for OpenClaw and Claude"),
     Row("doctor", "fly", "report what a vehicle supports and what would stop a mission"),

@@ -1,7 +1,7 @@
 """The interface of the gateway's pure part: what happens (events), and what is to be done (actions).
 
-`Gateway.take(event, now)` of `gateway.py` returns actions, in order. It does no I/O and reads no clock. Its caller, the
-service `app/gateway`, passes frames, lines of the flight and results of its worker in, and carries out the actions.
+`Gateway.take(event, now)` of `translator.py` returns actions, in order. It does no I/O and reads no clock. Its caller,
+the service `app/gateway`, passes frames, lines of the flight and results of its worker in, and carries out the actions.
 
 A client is a number, as the relay gives it; all frames are complete MAVLink frames, and those to clients are unsigned.
 """

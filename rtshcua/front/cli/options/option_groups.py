@@ -27,6 +27,17 @@ OPTION_GROUPS: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
         ),
         "Wind and faults": ("--wind", "--fault", "--seed"),
     },
+    "gateway": {
+        "The policy": ("--allow", "--below", "--inside", "--save", "--policy", "--bundle"),
+        "Clients": ("--client", "--pilot"),
+        "The vehicle": (
+            "--connect", "--vehicle", "--system", "--signing-key", "--unsigned-radio", "--set", "--utc-error",
+        ),
+        "The simulated vehicle (without --connect)": ("--flavour", "--battery", "--wind", "--fault", "--seed"),
+        "Sessions, operators, keys": (
+            "--sessions", "--operator-socket", "--passphrase-file", "--runs", "--state-dir",
+        ),
+    },
     "compile": {
         "The mission": ("--mission", "--set", "--with", "--at", "--output"),
         "Accepted claims": ("--source", "--role", "--policy"),

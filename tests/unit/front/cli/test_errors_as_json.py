@@ -49,7 +49,7 @@ MISSING: dict[str, str | None] = {
     "compile": "none.rts", "docs": "none.rts", "explain": None, "schema": None, "init": None, "lsp": None,
     "completion": None, "keys": "accept none.trust --vehicle x", "run": "none.bundle",
     "approve": "none --step 1 --to x",
-    "recall": "none --to x", "operator": None, "replace": "none --to x", "mcp": None,
+    "recall": "none --to x", "operator": None, "replace": "none --to x", "gateway": "none.toml", "mcp": None,
     "agent-bundle": "out --bundle none --with none.rts --to x", "doctor": "none --connect udpin:127.0.0.1:1",
     "qualify": "none.rts --connect udpin:127.0.0.1:1 --vehicle x --pilot x", "sim": None,
     "recover": "none", "witness": "none",

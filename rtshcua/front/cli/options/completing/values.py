@@ -18,6 +18,8 @@ FILES: Final[dict[str, Sequence[str]]] = {
     "check paths": ("*.rts", "*.json"),
     "check map_": ("*.html",),
     "check since": ("*.bundle", "*.rts"),
+    "gateway inside": ("*.kml", "*.geojson", "*.json"),
+    "gateway policy": _SOURCES,
     "compile source": ("*.rts", "*.json"),
     "compile replaces": _BUNDLE,
     "config": ("*.toml",),
@@ -33,7 +35,7 @@ FILES: Final[dict[str, Sequence[str]]] = {
 }
 
 #: parameters that take folders
-FOLDERS: Final = frozenset({"directory", "folder", "runs", "state_dir", "archive"})
+FOLDERS: Final = frozenset({"directory", "folder", "runs", "save", "state_dir", "archive"})
 
 
 def words(command: str, parameter: str) -> tuple[str, ...]:

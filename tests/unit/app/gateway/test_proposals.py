@@ -1,0 +1,303 @@
+"""Proposals become a bundle, then replacements that the vehicle's boundary accepts, whatever happens in between."""
+
+import time
+from pathlib import Path
+
+import pytest
+
+from rtshcua.adapters.store.keystore import KeyStore, read_key
+from rtshcua.app.gateway.policy_in_force import PolicyInForce, Unlock, development_keys, policy_in_force
+from rtshcua.app.gateway.proposals import FlightMission, ProposalMoment, Proposals, SignedProposal, arranged
+from rtshcua.app.gateway.quick_policy import GeoPoint, QuickRules, policy_text
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.ground.gateway.interface import Event, ProposalAnswered, ProposalChecked, Propose, ProposedStep
+from rtshcua.ground.prove.step_starts import FROM_HOME, MissionStart, StartPlace
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.situation import Now
+from rtshcua.wire.bundle import Bundle, open_bundle
+from rtshcua.wire.cancellation import open_cancellation
+from rtshcua.wire.keys import Duty
+from rtshcua.wire.replacement import fit_replacement, open_replacement
+from rtshcua.wire.trust import TrustRoot, open_root
+
+FLIGHT = bytes(range(16))
+ALOFT = MissionStart(StartPlace(0, 0, 10_000, aloft=True), 9_000)
+TAKEOFF = ProposedStep("takeoff", {"altitude": "10 m"}, ())
+LAND = ProposedStep("emergency_land", {}, ())
+
+
+def goto(longitude: str, altitude: str = "10 m") -> ProposedStep:
+    return ProposedStep("goto", {"target": f"47.3977000 N, {longitude} E", "altitude": altitude}, ())
+
+
+class Vehicle:
+    """The boundary's side: it opens what the gateway signs, with the trust root alone."""
+
+    def __init__(self, root: TrustRoot) -> None:
+        self.root = root
+        self.bundle: Bundle | None = None
+        self.released = 0
+
+    def now(self) -> Now:
+        return Now(0, time.time_ns() // 1_000, 1_000_000)
+
+    def take(self, document: bytes) -> None:
+        if self.bundle is None:
+            self.bundle = open_bundle(document, root=self.root, vehicle="gateway-01", now_us=self.now().utc_us)
+            return
+        found = open_replacement(
+            document, root=self.root, vehicle="gateway-01", flight=FLIGHT, bundle=self.bundle, now=self.now()
+        )
+        self.bundle = fit_replacement(found, self.bundle, self.released)
+
+    @property
+    def steps(self) -> list[str]:
+        assert self.bundle is not None
+        mission = self.bundle.mission
+        return [f"{mission.phases[each.phase]}: {each.contract.name}" for each in mission.invocations]
+
+    def in_force(self, mission: Mission) -> FlightMission:
+        assert self.bundle is not None
+        return FlightMission(mission, self.bundle.mission_digest)
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> KeyStore:
+    return development_keys(tmp_path_factory.mktemp("keys") / "data", ("gateway",))
+
+
+def unlocking(store: KeyStore) -> Unlock:
+    return lambda duty, whose: read_key(store.key_path(duty, whose=whose), duty, passphrase=None)
+
+
+@pytest.fixture(scope="module")
+def policy(store: KeyStore, tmp_path_factory: pytest.TempPathFactory) -> PolicyInForce:
+    folder = tmp_path_factory.mktemp("policy")
+    text = policy_text(
+        QuickRules(("takeoff", "goto"), 30_000, (), "gateway-01"), GeoPoint(473_977_400, 85_455_900), 30_000
+    )
+    assert isinstance(text, str)
+    source = folder / "policy.rts"
+    source.write_text(text)
+    found = policy_in_force([source], None, folder, ["operator"], store, unlocking(store))
+    assert isinstance(found, PolicyInForce)
+    return found
+
+
+@pytest.fixture
+def vehicle(store: KeyStore) -> Vehicle:
+    return Vehicle(open_root(store.root(), pinned=store.pin(), now_us=0))
+
+
+@pytest.fixture
+def proposals(policy: PolicyInForce) -> Proposals:
+    return Proposals(policy.missions, policy.signer, lambda: None)
+
+
+def moment(
+    in_force: FlightMission | None = None, released: int = 0, start: MissionStart | None = FROM_HOME
+) -> ProposalMoment:
+    return ProposalMoment(time.time_ns() // 1_000, start, FLIGHT, in_force, released)
+
+
+def signed(proposals: Proposals, at: ProposalMoment) -> tuple[list[Event], SignedProposal | None]:
+    """Wait for the worker."""
+    events: list[Event] = []
+    for _ in range(2_000):
+        more, document = proposals.advance(at, ready=True)
+        events += more
+        if document is not None or any(isinstance(each, ProposalChecked) for each in events):
+            return events, document
+        time.sleep(0.005)
+    raise AssertionError("the worker does not end")
+
+
+def propose(number: int, *steps: ProposedStep, fly: bool = True, role: str = "operator") -> Propose:
+    return Propose(number, 1, role, steps, fly)
+
+
+def test_a_session_is_a_bundle_and_replacements(proposals: Proposals, vehicle: Vehicle) -> None:
+    assert proposals.add(propose(1, TAKEOFF)) == []
+    events, first = signed(proposals, moment())
+    assert events == [ProposalChecked(1, None, 0)]
+    assert first is not None
+    vehicle.take(first.document)
+    told, mission = proposals.answered("accepted", "")
+    assert told == [ProposalAnswered(1, "accepted")]
+    assert mission is not None
+    assert vehicle.bundle is not None
+    vehicle.released = 1
+    for number, longitude in enumerate(("8.5458000", "8.5452000", "8.5460000"), 2):
+        proposals.add(propose(number, goto(longitude)))
+        at = moment(vehicle.in_force(mission), vehicle.released, ALOFT)
+        events, document = signed(proposals, at)
+        assert events == [ProposalChecked(number, None, number - 1)]
+        assert document is not None
+        vehicle.take(document.document)
+        _, mission = proposals.answered("accepted", "")
+        assert mission is not None
+        vehicle.released = number
+    assert vehicle.steps == ["departure: takeoff"] + ["departure: goto"] * 3
+
+
+def test_steps_that_were_not_released_are_replaced(proposals: Proposals, vehicle: Vehicle) -> None:
+    proposals.add(propose(1, TAKEOFF, goto("8.5458000"), goto("8.5452000"), LAND))
+    _, first = signed(proposals, moment())
+    assert first is not None
+    vehicle.take(first.document)
+    _, mission = proposals.answered("accepted", "")
+    assert mission is not None
+    vehicle.released = 2
+    proposals.add(propose(2, LAND))
+    events, second = signed(proposals, moment(vehicle.in_force(mission), 2, ALOFT))
+    assert events == [ProposalChecked(2, None, 2)]
+    assert second is not None
+    vehicle.take(second.document)
+    assert vehicle.steps == ["departure: takeoff", "departure: goto", "departure: emergency_land"]
+
+
+def test_a_step_that_was_released_meanwhile_is_kept(proposals: Proposals, vehicle: Vehicle) -> None:
+    proposals.add(propose(1, TAKEOFF, goto("8.5458000")))
+    _, first = signed(proposals, moment())
+    assert first is not None
+    vehicle.take(first.document)
+    _, mission = proposals.answered("accepted", "")
+    assert mission is not None
+    proposals.add(propose(2, LAND))
+    _, early = signed(proposals, moment(vehicle.in_force(mission), 1, ALOFT))
+    assert early is not None
+    vehicle.released = 2
+    assert proposals.answered("already-released", "the replacement changes step 2") == ([], None)
+    events, late = signed(proposals, moment(vehicle.in_force(mission), 2, ALOFT))
+    assert events == [ProposalChecked(2, None, 2)]
+    assert late is not None
+    vehicle.take(late.document)
+    assert vehicle.steps[-1] == "departure: emergency_land"
+
+
+def test_after_many_commands_only_a_way_down_is_taken(
+    proposals: Proposals, vehicle: Vehicle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rtshcua.app.gateway.proposals._MOST_REPLACED", 1)
+    mission: Mission | None = None
+    for number, step in enumerate((TAKEOFF, goto("8.5458000"), goto("8.5452000"), LAND)):
+        proposals.add(propose(number, step))
+        at = moment() if mission is None else moment(vehicle.in_force(mission), vehicle.released, ALOFT)
+        events, document = signed(proposals, at)
+        if number == 2:
+            assert document is None
+            assert "land, and take off again" in str(events)
+            continue
+        assert document is not None
+        vehicle.take(document.document)
+        _, mission = proposals.answered("accepted", "")
+        vehicle.released += 1
+    assert [each.split()[-1] for each in vehicle.steps] == ["takeoff", "goto", "emergency_land"]
+
+
+def test_refusals_are_in_words_for_people(proposals: Proposals) -> None:
+    proposals.add(propose(1, ProposedStep("takeoff", {"altitude": "40 m"}, ())))
+    events, document = signed(proposals, moment())
+    assert document is None
+    (refusal,) = events
+    assert isinstance(refusal, ProposalChecked)
+    assert "altitude" in str(refusal.refusal)
+    assert "nearest accepted: 30 m" in str(refusal.refusal)
+    assert "/phases/" not in str(refusal.refusal)
+
+
+def test_nothing_is_proposed_from_an_unknown_place(proposals: Proposals) -> None:
+    proposals.add(propose(1, TAKEOFF))
+    events, document = signed(proposals, moment(start=None))
+    assert events == [ProposalChecked(1, "the vehicle does not report its position", for_now=True)]
+    assert document is None
+
+
+def test_an_uploaded_mission_is_checked_and_not_signed(proposals: Proposals) -> None:
+    proposals.add(propose(1, TAKEOFF, goto("8.5458000"), LAND, fly=False))
+    events, document = signed(proposals, moment())
+    assert events == [ProposalChecked(1, None)]
+    assert document is None
+    assert not proposals.busy
+
+
+def test_too_many_proposals_and_the_end_of_a_flight(proposals: Proposals) -> None:
+    refused = [each for number in range(40) for each in proposals.add(propose(number, TAKEOFF))]
+    assert len(refused) == 40 - 16
+    told = proposals.forget()
+    assert len(told) == 16
+    proposals.close()
+
+
+def test_the_flight_ends_while_a_document_is_with_it(proposals: Proposals) -> None:
+    proposals.add(propose(1, TAKEOFF))
+    _, document = signed(proposals, moment())
+    assert document is not None
+    assert proposals.forget() == [ProposalAnswered(1, "unreachable", "the flight ended")]
+    assert proposals.answered("accepted", "") == ([], None)
+
+
+def test_a_cancellation_is_for_the_mission_in_force(proposals: Proposals, vehicle: Vehicle) -> None:
+    assert proposals.cancellation(moment()) is None
+    proposals.add(propose(1, TAKEOFF))
+    _, first = signed(proposals, moment())
+    assert first is not None
+    vehicle.take(first.document)
+    assert vehicle.bundle is not None
+    document = proposals.cancellation(moment(vehicle.in_force(first.mission), 1))
+    assert document is not None
+    open_cancellation(
+        document, root=vehicle.root, vehicle="gateway-01", flight=FLIGHT, bundle=vehicle.bundle, current=0,
+        missions=[vehicle.bundle.mission_digest], now=vehicle.now(),
+    )  # fmt: skip
+
+
+def test_phases_follow_the_contracts(policy: PolicyInForce) -> None:
+    contracts = {each.name: each for each in policy.missions.policy.contracts}
+
+    def names(last: str | None, *steps: ProposedStep) -> list[tuple[str, int]]:
+        return [(each["name"], len(each["steps"])) for each in arranged(steps, contracts, last)]
+
+    assert names(None, TAKEOFF, goto("8.5")) == [("departure", 2)]
+    assert names(None, goto("8.5")) == [("session", 1)]
+    assert names("inspection", goto("8.5"), TAKEOFF) == [("inspection", 1), ("departure", 1)]
+
+
+def test_a_policy_without_a_takeoff_for_agents_is_refused(store: KeyStore, tmp_path: Path) -> None:
+    source = tmp_path / "policy.rts"
+    text = policy_text(QuickRules(("goto",), 30_000, (), "gateway-01"), GeoPoint(473_977_400, 85_455_900), 30_000)
+    source.write_text(str(text))
+    found = policy_in_force([source], None, tmp_path, ["operator"], store, unlocking(store))
+    assert isinstance(found, Refusal)
+    assert found.slug == "no-takeoff"
+    source.write_text("policy gateway version 1 {")
+    broken = policy_in_force([source], None, tmp_path, ["operator"], store, unlocking(store))
+    assert isinstance(broken, Refusal)
+    assert broken.code is ExitCode.DIAGNOSTICS
+
+
+def test_a_role_that_the_policy_does_not_name(store: KeyStore, policy: PolicyInForce, tmp_path: Path) -> None:
+    source = policy.base.parent / "policy.rts"
+    found = policy_in_force([source], None, tmp_path, ["surveyor"], store, unlocking(store))
+    assert isinstance(found, Refusal)
+    assert "`operator`" in found.help
+
+
+def test_a_bundle_under_another_policy_is_refused(store: KeyStore, policy: PolicyInForce, tmp_path: Path) -> None:
+    source = policy.base.parent / "policy.rts"
+    same = policy_in_force([source], policy.base, tmp_path, ["operator"], store, unlocking(store))
+    assert isinstance(same, PolicyInForce)
+    assert same.base == policy.base
+    other = tmp_path / "other.rts"
+    other.write_text(source.read_text().replace("version 1", "version 2"))
+    found = policy_in_force([other], policy.base, tmp_path, ["operator"], store, unlocking(store))
+    assert isinstance(found, Refusal)
+    assert found.slug == "other-policy"
+
+
+def test_development_keys_are_private_and_say_so(store: KeyStore) -> None:
+    folder = store.folder.parent
+    assert folder.stat().st_mode & 0o077 == 0
+    assert "without a passphrase" in (folder / "DEVELOPMENT-KEYS.txt").read_text()
+    assert store.key_path(Duty.MISSION, whose="agent").stat().st_mode & 0o077 == 0

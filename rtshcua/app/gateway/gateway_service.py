@@ -6,7 +6,7 @@ decides.
 """
 
 import json
-import selectors
+import select
 import socket
 import time
 from collections import deque
@@ -41,8 +41,9 @@ from rtshcua.mavlink.framing import HEADER, message_id
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.situation import Now
 
-#: the longest wait of the loop, in seconds
-_TURN_S: Final = 0.05
+#: the longest wait of the loop, in ms, and the interval of ticks, in us
+_TURN_MS: Final = 50
+_TICK_US: Final = 50_000
 #: how long the vehicle may be silent at the start, in seconds
 HEARTBEAT_S: Final = 20.0
 #: the wait before a flight is started again: after one that flew, and after each one in a row that did not
@@ -174,6 +175,7 @@ class GatewayService:
         self._failed, self._next_s, self._relays = 0, 0.0, 0
         self._numbers = 0
         self._requests: dict[int, int] = {}
+        self._poll, self._polled, self._tick_us = select.poll(), list[int](), 0
         self._handed: int | None = None  # the number of the document that the flight has not answered
         self._journal = ClientJournal(runs / "gateway.jsonl")
         self._records: deque[str] = deque(maxlen=_MOST_RECORDS)
@@ -203,8 +205,7 @@ class GatewayService:
                     ending = True
                     self._console.tell({"event": "interrupted"})
                     self._session.process.interrupt()
-                self._wait()
-                if (refusal := self._turn()) is not None:
+                if (refusal := self._turn(self._wait())) is not None:
                     return refusal
                 if self._heard is None and time.monotonic() - began_s > HEARTBEAT_S:
                     return Refusal("link", "the vehicle sends no heartbeat", "check its address", ExitCode.LINK)
@@ -223,34 +224,41 @@ class GatewayService:
         self._wakes.close()
         self._wake.close()
 
-    def _wait(self) -> None:
-        """Wait until something arrives."""
-        with selectors.DefaultSelector() as selector:
-            for each in (self._relay.control, self._relay.telemetry, self._wakes):
-                selector.register(each, selectors.EVENT_READ)
-            if self._session is not None:
-                for descriptor in (*self._session.process.descriptors, self._session.link.descriptor):
-                    if descriptor is not None:
-                        selector.register(descriptor, selectors.EVENT_READ)
-            selector.select(_TURN_S)
-        with suppress(BlockingIOError):
-            self._wakes.recv(1 << 10)
+    def _wait(self) -> frozenset[int]:
+        """Wait until something arrives. Return the descriptors that have something, besides those of the relay."""
+        session = self._session
+        wanted = [self._relay.control.fileno(), self._relay.telemetry.fileno(), self._wakes.fileno()]
+        if session is not None:
+            wanted += [each for each in (*session.process.descriptors, session.link.descriptor) if each is not None]
+        if wanted != self._polled:
+            self._poll, self._polled = select.poll(), wanted
+            for descriptor in wanted:
+                self._poll.register(descriptor, select.POLLIN)
+        ready = frozenset(descriptor for descriptor, _ in self._poll.poll(_TURN_MS))
+        if self._wakes.fileno() in ready:
+            with suppress(BlockingIOError):
+                self._wakes.recv(1 << 10)
+        return ready
 
-    def _turn(self) -> Refusal | None:
-        """Take in everything that has arrived."""
+    def _turn(self, ready: frozenset[int]) -> Refusal | None:
+        """Take in everything that has arrived: clients first, who wait for answers."""
         now = self._now()
-        for datagram in self._relay.frames():
-            for frame in split(datagram):
-                self._from_vehicle(frame, now)
         try:
             for message in self._relay.messages():
                 self._from_relay(message, now)
         except (ConnectionError, ValueError):
             return self._relay_ended(now)
-        self._from_flight(now)
-        self._take(interface.Tick(), now)
+        for datagram in self._relay.frames():
+            for frame in split(datagram):
+                self._from_vehicle(frame, now)
+        ticks = now.monotonic_us - self._tick_us >= _TICK_US
+        if ticks or not ready.isdisjoint(self._polled[3:]):
+            self._from_flight(now)
+        if ticks:
+            self._tick_us = now.monotonic_us
+            self._take(interface.Tick(), now)
+            self._hand_in_records()
         self._advance(now)
-        self._hand_in_records()
         return None
 
     def _relay_ended(self, now: Now) -> Refusal | None:

@@ -47,7 +47,10 @@ HOSTILE = hostile(MISSION_KEY)
 class Flooded(Run):
     """A run with a client at its socket; counts what each thread decodes."""
 
-    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, of: Loaded, *, operators: bool = False) -> None:
+    def __init__(
+        self, folder: Path, monkeypatch: pytest.MonkeyPatch, of: Loaded, *, operators: bool = False,
+        idle_us: int | None = None,
+    ) -> None:  # fmt: skip
         path = folder / "s"
         self.agents = Agents(None if operators else path, of, operators=path if operators else None)
         self.link = socket.socket(socket.AF_UNIX)
@@ -73,7 +76,7 @@ class Flooded(Run):
         for where, name in LONG:
             self._watch(where, name, monkeypatch)
         monkeypatch.setattr(of.boundary, "consider", considered)
-        super().__init__(of)
+        super().__init__(of, idle_us=idle_us)
 
     def _watch(self, where: Any, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
         does = getattr(where, name)
@@ -117,9 +120,9 @@ class Flooded(Run):
 
 
 @contextmanager
-def flooded(of: Loaded, monkeypatch: pytest.MonkeyPatch, *, operators: bool = False) -> Iterator[Flooded]:
+def flooded(of: Loaded, monkeypatch: pytest.MonkeyPatch, **more: Any) -> Iterator[Flooded]:
     with tempfile.TemporaryDirectory(dir="/tmp") as name:
-        found = Flooded(Path(name), monkeypatch, of, operators=operators)
+        found = Flooded(Path(name), monkeypatch, of, **more)
         with found.agents:
             yield found
         found.link.close()
@@ -190,6 +193,23 @@ def test_misfitting_document_is_not_sent_to_other_boundary(monkeypatch: pytest.M
         assert PRESENT not in kinds
         assert [run.hand(document) for document in anew] == ["accepted", "superseded", "superseded"]
         assert kinds.count(PRESENT) == 1
+
+
+def test_live_flight_that_is_replanned_all_the_time_decodes_little_in_its_thread(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Each replacement supersedes the running step: its command and its standing permits are new every time."""
+    with flooded(loaded(mission=replace(low_mission(), invocations=low_mission().invocations[:2])), monkeypatch,
+                 idle_us=60_000_000) as run:  # fmt: skip
+        run.until_flies("goto")
+        for step in range(2, 32):
+            mission = run.loaded.bundle.mission
+            more = replace(mission.invocations[1], step=step, invocation_id=step.to_bytes(16))
+            anew = replace(mission, issued_at_us=mission.issued_at_us + 1, invocations=(*mission.invocations, more))
+            assert run.hand(replacement(run.loaded, step, anew)) == "accepted"
+        assert run.events.count("superseded") >= 15, "one in each interval of documents, as long as a step flies"
+        assert run.most <= ITEMS
+        assert not +run.busy
 
 
 @pytest.mark.parametrize("name", HOSTILE)

@@ -15,7 +15,7 @@ from rtshcua.onboard.enforcement.load import EnforcementMode
 from rtshcua.onboard.ports import Action, Ending, Event, Presented, Reply
 from rtshcua.virtual.flight import VirtualFlight
 from rtshcua.wire.keys import Duty
-from rtshcua.wire.replacement import MAX_REPLACEMENTS, sign_replacement
+from rtshcua.wire.replacement import sign_replacement
 from virtual import case
 from virtual.flight import Flight, Flown
 from virtual.shipped import simulated
@@ -25,6 +25,8 @@ HIGH = 15 * M
 UP = (case.short_steps()[0],)
 BASE = case.seal(case.mission(UP))
 IDLE_US = 60 * S
+#: the limit on replacements in these tests
+MOST = 40
 
 Play = Generator[None, None, None]
 
@@ -181,11 +183,14 @@ def flood(flight: Live) -> Play:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
-def test_agent_that_replans_all_the_time_is_stopped_at_the_limit_and_comes_home(flavour: str) -> None:
+def test_agent_that_replans_all_the_time_is_stopped_at_the_limit_and_comes_home(
+    flavour: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rtshcua.decision.session.MAX_REPLACEMENTS", MOST)
     flight = Live(flavour)
     found = flight.played(flood(flight), Ending.ABORTED)
-    assert flight.answers.count("accepted") == MAX_REPLACEMENTS
-    assert len(found.effects("superseded")) == MAX_REPLACEMENTS - 1
+    assert flight.answers.count("accepted") == MOST
+    assert len(found.effects("superseded")) == MOST - 1
     assert not found.effects("taken-over")
     assert found.effects("idle-over"), "no further step can come, so the contingency flies"
 

@@ -210,3 +210,31 @@ def test_hold_between_steps_is_left_when_the_charge_is_needed(flavour: str) -> N
     (violated,) = found.effects("violated")
     assert violated["detail"].startswith("degrade")
     assert found.dispatched()[-1] == "return_home"
+
+
+def hurried(flight: Live, ticks: int) -> Play:
+    """Steps that supersede others some turns after these were sent, before their modes can show."""
+    yield from flight.until('"hover"')
+    step = 1
+    for _ in range(3):
+        for new in (go(step, 40 * M, 0), come(step + 1), go(step + 2, 30 * M, 10 * M), come(step + 3)):
+            flight.give(new.step, new)
+            for _ in range(ticks):
+                yield
+        yield from flight.wait(3 * S)
+        step += 4
+        flight.give(step, go(step, 20 * M, 20 * M))
+        yield from flight.until('"idle"', step // 5 + 1)
+        yield from flight.until('"hover"', step // 5 + 1)
+        step += 1
+    flight.give(step, come(step))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ticks", [1, 4, 10])
+@pytest.mark.parametrize("flavour", ["px4", "ardupilot"])
+def test_mode_of_a_superseded_command_that_shows_late_is_no_takeover(flavour: str, ticks: int) -> None:
+    flight = Live(flavour, tick_us=10_000, wait_us=10_000)
+    found = flight.played(hurried(flight, ticks))
+    assert not found.effects("taken-over")
+    assert not found.effects("failed")

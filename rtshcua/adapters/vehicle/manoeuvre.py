@@ -330,6 +330,8 @@ MODE_UNKNOWN_US: Final = 5_000_000
 HOLDS_WITHIN: Final = 15_000
 #: us of link time; a mode shows this long after it was accepted, and after `MODE_BEATS` heartbeats
 TAKEN_BACK_US: Final = 1_500_000
+#: us of link time: a landing that an earlier manoeuvre began shows at most this late
+LANDS_US: Final = 1_000_000
 #: these stop the vehicle or bring it home or down: a recent mode report suffices for them
 _URGENT: Final = (MotionKind.HOLD, MotionKind.HOME, MotionKind.LAND)
 _HOMEWARD: Final = (MotionKind.HOME, MotionKind.LAND)
@@ -360,6 +362,11 @@ class Aids:
         self.contradictions = Contradictions()
         self.sent_us: int | None = None
         """When a frame that moves the vehicle last left, in link time."""
+        self.requested: tuple[frozenset[int], int] | None = None
+        """The modes that the last frame of ours requests and that have not shown since, and when it left, in link time.
+        """
+        self.homeward = False
+        """Whether the present manoeuvre brings the vehicle home or down."""
         self.granted_us: int | None = None
         """When somebody else was last told that the vehicle does what makes it fly otherwise, in link time."""
         self._clock = clock
@@ -371,6 +378,15 @@ class Aids:
         """
         within_us = CROSSED_US * self.commander.slack + min(self.trip_us, self.flavour.mode_within_us)
         return self.sent_us is not None and up_us - self.sent_us <= within_us
+
+    def due_modes(self, up_us: int) -> frozenset[int]:
+        """The modes that our last frame requests, as long as they may still show for the first time."""
+        if self.requested is None:
+            return frozenset()
+        modes, sent_us = self.requested
+        within_us = self.flavour.mode_within_us
+        patience_us = within_us * self.commander.slack + self.flavour.lag_us + min(self.trip_us, within_us)
+        return modes if up_us - sent_us <= patience_us else frozenset()
 
     @property
     def trip_us(self) -> int:
@@ -400,7 +416,9 @@ class Manoeuvre:
     """Runs the stages of `command`. It has succeeded after its last effect and, for HOLD, its duration. It watches who
     flies until another manoeuvre takes its place.
 
-    `before` holds the modes that may still show at the start, until the manoeuvre's own mode shows. `doubted` is an
+    `before` holds the modes that may still show at the start, until the manoeuvre's own mode shows. A mode that was
+    requested just before the start (`Aids.due_modes`) may show for the first time later; until it does, or had the time
+    to, no frame leaves, except one that stops the vehicle or brings it home or down. `doubted` is an
     observation in one report at the start that is neither confirmed nor contradicted yet (`Suspicion.kind`). Until its
     first frame leaves, this manoeuvre cannot be the cause of it.
     """
@@ -428,9 +446,12 @@ class Manoeuvre:
         if seen.mode is not None:
             before = before - {seen.mode} if self._suspected is not None else before | {seen.mode}
         self._before = before
+        self._awaits = aids.requested  # another manoeuvre's request whose mode has not shown
         self._began_in, self._began_us = seen.mode, seen.up_us
         self._modes: frozenset[int] = frozenset()
         self._was_landing = seen.landing and doubted != "landing"
+        self._may_land = aids.homeward  # as the manoeuvre before commanded, which may show late
+        aids.homeward = command.kind in _HOMEWARD
         self._taken = False
         self._aimed = False  # the frame that sets the destination, or none, has left
         self._named: ExpectedTarget | None = None  # the target of ours that the vehicle named after it
@@ -554,6 +575,9 @@ class Manoeuvre:
     def _may_send(self, seen: ObservedVehicle, now_us: int) -> bool:
         """Whether it is known well enough who flies to send a frame that moves the vehicle (docs/adr/0034)."""
         query, urgent = self._aids.query, self.command.kind in _URGENT
+        if not urgent and self._due_mode(seen):
+            query.is_newer(seen, now_us, target=False)  # this requests the mode
+            return False
         if self._aids.suspicion.stands or self._aids.contradictions.stand(now_us):
             return False
         if self._is_unnamed(seen, now_us):
@@ -600,6 +624,8 @@ class Manoeuvre:
         self._aids.query.sent()
         self._aids.sent_us = seen.up_us
         stage = self._left[0]
+        shows = seen.mode in stage.modes and not self._due_mode(seen)
+        self._aids.requested = None if shows else (stage.modes, seen.up_us)
         return self._commander.start(stage, seen.up_us, settled=seen.mode in stage.modes)
 
     def _again(self, seen: ObservedVehicle, now_us: int) -> list[Message]:
@@ -705,13 +731,19 @@ class Manoeuvre:
         homeward = self.command.kind in _HOMEWARD and self._doubted is None
         if homeward and seen.may_rest:  # it is done: no flight is left
             return None
+        due = self._due_mode(seen)
+        if seen.mode in due and seen.mode not in self._modes:  # it shows now, and is the mode before from here on
+            self._before, self._awaits = self._before | due, None
         if seen.mode in self._modes and seen.mode != self._suspected:
             self._before, self._accepted = frozenset(), None
+            if not due and self._aids.requested is not None and seen.mode in self._aids.requested[0]:
+                self._aids.requested = None
             self._aids.targets.obeyed()
         elif seen.mode not in self._before or self._was_taken_back(seen):
             assert seen.mode is not None
             return "mode", self._flavour.mode_name(seen.mode), seen.beats
-        self._was_landing = self._was_landing and seen.landing
+        self._may_land = self._may_land and seen.up_us - self._began_us <= LANDS_US * self._commander.slack
+        self._was_landing = (self._was_landing or self._may_land) and seen.landing
         if seen.landing and not homeward and not self._was_landing:
             return "landing", "landing", seen.landings
         if seen.critical and seen.airborne and not homeward and self._flavour.critical_acts:
@@ -719,6 +751,13 @@ class Manoeuvre:
         if self._aids.targets.is_foreign(seen):
             return "target", "another target", seen.targets
         return None
+
+    def _due_mode(self, seen: ObservedVehicle) -> frozenset[int]:
+        """The modes that an earlier manoeuvre requested, as long as they may still show for the first time."""
+        aids = self._aids
+        return (
+            aids.due_modes(seen.up_us) if self._awaits is not None and self._awaits is aids.requested else frozenset()
+        )
 
     def _flown_otherwise(self, seen: ObservedVehicle, now_us: int) -> str | None:
         """Evidence over time that somebody else flies, although our mode shows and no other target."""

@@ -34,6 +34,7 @@ SAMPLES: dict[str, dict[str, Any]] = {
     "fleet": {"VEHICLES": 1, "SPEED": 10},
     "flood": {"BLOCKS": 1, "BLOCK_S": 0.5, "STEPS": (4, 20), "TRIES": 1},
     "format": {"LINES": 100, "ROUNDS": 1},
+    "gateway": {"FRAMES": 50, "BLOCKS": 1, "BURST_S": 0.1, "TRIES": 1, "ROUNDS": 1, "MOST": 500, "REFUSALS": 5},
     "hostile_link": {"DATAGRAMS": 8_000, "BLOCK": 1_000, "GOOD": 100},
     "isolation": {"BLOCKS": 1, "ROUNDS": 2},
     "lint": {"ROUNDS": 1, "FEW": 10, "MANY": 20},

@@ -70,6 +70,10 @@ class RelayProcess:
         """The exit code of the process; None while it runs."""
         return self._process.poll()
 
+    def wait(self, patience_s: float) -> int:
+        """Wait for the end of the process, and return its exit code. Raises subprocess.TimeoutExpired."""
+        return self._process.wait(patience_s)
+
     def close(self) -> None:
         """End the process."""
         self.control.close()

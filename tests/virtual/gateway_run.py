@@ -4,12 +4,14 @@ import json
 import math
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -103,6 +105,11 @@ class GatewayRun:
         self._errors.close()
 
 
+#: how often a command is sent that nobody answers, and after how long again, in s
+_TRIES: Final = 5
+_AGAIN_S: Final = 5.0
+
+
 class ScriptClient:
     """A script that flies by COMMAND_LONG and COMMAND_INT, and reads acknowledgements and texts."""
 
@@ -157,10 +164,25 @@ class ScriptClient:
         return int(found.result)
 
     def command(self, command: int, *values: float) -> int:
-        """Send a COMMAND_LONG and return its result."""
+        """Send a COMMAND_LONG and return its result. It is sent again while nothing is answered, as clients do: a
+        datagram may be lost on a busy machine.
+        """
         values = (*values, *[0.0] * (7 - len(values)))
-        self.link.mav.command_long_send(self.link.target_system, 1, command, 0, *values)
-        return self.result(command)
+        answers: list[int] = []
+
+        def answered(message: Any) -> bool:
+            if message.get_type() == "COMMAND_ACK" and message.command == command:
+                answers.append(int(message.result))
+                return True
+            return bool(time.monotonic() >= again_s)
+
+        for confirmation in range(_TRIES):
+            again_s = time.monotonic() + _AGAIN_S
+            self.link.mav.command_long_send(self.link.target_system, 1, command, confirmation, *values)
+            self.until(answered)
+            if answers:
+                break
+        return self.result(command) if not answers or answers[0] == IN_PROGRESS else answers[0]
 
     def takeoff(self, height_m: float) -> int:
         """Ask for a take-off to a height above home, as the autopilot reads it."""
@@ -222,3 +244,33 @@ def verified(run: GatewayRun, commands: Sequence[str], folder: Path) -> subproce
         [sys.executable, "-m", "rtshcua", "verify-log", *commands, "--root", str(run.root)],
         cwd=folder, capture_output=True, text=True, check=False, timeout=PATIENCE_S,
     )  # fmt: skip
+
+
+def free_port() -> int:
+    """A UDP port that was free a moment ago."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@contextmanager
+def running(folder: Path, *words: str) -> Iterator[tuple[GatewayRun, ScriptClient]]:
+    """The gateway with the rules of a field, and a script at it."""
+    (folder / "field.kml").write_text(KML)
+    port = free_port()
+    quick = ("--allow", "takeoff,goto,land", "--below", "30", "m", "--inside", "field.kml")
+    run = GatewayRun(folder, *quick, "--client", f"script=udpin:127.0.0.1:{port}", *words)
+    client = ScriptClient(port)
+    try:
+        yield run, client
+    finally:
+        client.close()
+        run.stop()
+
+
+def taken_off(client: ScriptClient, height_m: float = 6.0) -> None:
+    """Let a script take off, once the vehicle is ready."""
+    client.meet()
+    client.retry(lambda: client.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1))
+    client.retry(lambda: client.takeoff(height_m))
+    client.until_higher(height_m - 1.2)

@@ -377,8 +377,12 @@ def stranded_signal(request: FlightRequest, loaded: Loaded, signing: LinkSigning
     )  # fmt: skip
 
 
-def make_driver(context: FlightContext, loaded: Loaded, signing: LinkSigning, *, fence: bool) -> Driver | Refusal:
-    """The driver of a vehicle under the policy of a bundle. `fence`: upload the airspace as the vehicle's fence."""
+def make_driver(
+    context: FlightContext, loaded: Loaded, signing: LinkSigning, *, fence: bool, waits: bool = False
+) -> Driver | Refusal:
+    """The driver of a vehicle under the policy of a bundle. `fence`: upload the airspace as the vehicle's fence.
+    `waits`: before a bundle is handed in, when the parameters of its flight are not set yet.
+    """
     request, policy = context.request, loaded.bundle.policy
     try:
         own = manoeuvres(packs_of(policy.sources))
@@ -395,7 +399,7 @@ def make_driver(context: FlightContext, loaded: Loaded, signing: LinkSigning, *,
             verifier=signing.verifier,
             system=request.system,
             steps=loaded.bundle.mission.invocations,
-            meant=request.settings if request.dry_run else None,
+            meant=request.settings if request.dry_run or waits else None,
         )
     except UnknownSource as error:
         return Refusal("unknown-source", str(error), "", ExitCode.REFUSED)

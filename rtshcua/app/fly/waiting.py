@@ -259,7 +259,7 @@ def _wait(
     context: FlightContext, begun: Begun, agents: Agents, signing: LinkSigning, previous: LogBefore | None
 ) -> Begun | Refusal:
     request, base, trusted, apart = context.request, begun.loaded, begun.trusted, begun.apart
-    driver = make_driver(context, base, signing, fence=False)
+    driver = make_driver(context, base, signing, fence=False, waits=True)
     if isinstance(driver, Refusal):
         return driver
     assert begun.transport is not None

@@ -21,8 +21,12 @@ _RECORD_EVERY_US: Final = 200_000
 #: MAV_SEVERITY
 WARNING: Final = 4
 NOTICE: Final = 5
-#: a client that sent heartbeats is dead after this silence, us
+#: a client that sent regular heartbeats is dead after this silence, us
 DEAD_US: Final = 5_000_000
+#: heartbeats are regular once so many came, none later than this after the one before, us: many scripts send one or two
+#: only to open a UDP link
+_REGULAR: Final = 3
+_REGULAR_US: Final = 3_000_000
 
 
 class ClientLink:
@@ -33,8 +37,10 @@ class ClientLink:
         self.settings = settings
         #: when a frame came last, monotonic us
         self.heard_us = now_us
-        #: whether it sent a heartbeat: only then does silence mean that it is dead
+        #: whether it sent a heartbeat: only then does a disconnection mean that it is dead
         self.beats = False
+        self._beat_us = now_us
+        self._in_a_row = 0
         self.is_dead = False
         #: the system id of its last frame
         self.system_id = 0
@@ -56,11 +62,13 @@ class ClientLink:
     def hear(self, system: int, now_us: int, *, beats: bool) -> None:
         """A frame came."""
         self.heard_us, self.system_id, self.is_dead = now_us, system, False
-        self.beats = self.beats or beats
+        if beats and self._in_a_row < _REGULAR:
+            self._in_a_row = self._in_a_row + 1 if now_us - self._beat_us <= _REGULAR_US else 1
+            self._beat_us, self.beats = now_us, True
 
     def silent(self, now_us: int) -> bool:
-        """Whether it sent heartbeats and is silent for too long."""
-        return self.beats and now_us - self.heard_us > DEAD_US
+        """Whether it sent regular heartbeats and is silent for too long."""
+        return self._in_a_row >= _REGULAR and now_us - self.heard_us > DEAD_US
 
     def send(self, number: int, **values: Any) -> None:
         """Send a message as the autopilot."""

@@ -1,6 +1,7 @@
 import json
 from typing import Any
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from reference.gateway_world import (
@@ -409,6 +410,15 @@ def test_a_script_without_heartbeats_may_be_silent() -> None:
     world = two()
     assert not [each for each in world.wait(20_000_000, step_us=500_000) if isinstance(each, Cancel)]
     assert not [each for each in world.take(ClientDown(1)) if isinstance(each, Cancel)]
+
+
+@pytest.mark.parametrize("times_us", [[0], [0, 500_000], [0, 4_000_000, 4_000_000, 4_000_000]])
+def test_a_script_that_beats_now_and_then_may_be_silent(times_us: list[int]) -> None:
+    world = two()
+    for each in times_us:
+        world.wait(each)
+        world.send(BEAT)
+    assert not [each for each in world.wait(20_000_000, step_us=500_000) if isinstance(each, Cancel)]
 
 
 def test_a_client_that_disconnects_ends_its_flight() -> None:

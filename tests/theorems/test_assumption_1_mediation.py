@@ -56,11 +56,12 @@ from rtshcua.model.flat.situation import State
 from rtshcua.onboard.enforcement import allow_list
 from rtshcua.onboard.enforcement import executor as executors
 from rtshcua.onboard.enforcement import frames as gates
+from rtshcua.onboard.enforcement.allow_list import Frame
 from rtshcua.onboard.ports import Command
 from rtshcua.wire.request import CONTINGENCY_LINK, FALLBACK_LINK, STEP
 
 TEMPLATE = loaded()
-ACTS = ("fly",) * 4 + ("use", "stand in", "end", "wait") + ("report",) * 4 + ("send",) * 20
+ACTS = ("fly",) * 4 + ("along",) * 4 + ("use", "stand in", "end", "wait") + ("report",) * 4 + ("send",) * 20
 #: mm: the reports of `drawn_report` about the height of home, above its usual one
 HOME = HomeHeights(HOME_AMSL, HOME_AMSL + 10_001)
 FORCED = long(400, 1, 21196)
@@ -94,6 +95,8 @@ class Adapter:
             match self.of.choice(ACTS):
                 case "fly":
                     self.fly()
+                case "along":
+                    self.along()
                 case "use" if self.issued:
                     self.use(self.of.choice([*self.issued]), altered=self.of.random() < 0.3)
                 case "stand in" if self.issued:
@@ -148,6 +151,8 @@ class Adapter:
             self.loaded.executor.ended()
             self.current = None
             self.use(answer.permit, until_us=answer.valid_until_us)
+            for _ in range(of.choice((0, 0, 6, 12))):
+                self.along()
 
     def use(self, permit: bytes, *, altered: bool = False, until_us: int = 1 << 60) -> None:
         octets = damaged(self.of, permit) if altered else permit
@@ -176,12 +181,30 @@ class Adapter:
         self.motions.append(command)
 
     def send(self) -> None:
-        """Hand the gate a frame, and judge it if it passes."""
+        """Draw a frame for the gate."""
         motion = self.some_motion()
         chance = self.of.random()
         frame = pack(FORCED) if chance < 0.03 else drawn_frame(self.of, motion)
         if chance > 0.6:
             frame = pack(self.of.choice(fitting(self.of, motion, self.autopilot)), self.of.choice((OURS,) * 9 + (1,)))
+        self.offer(frame, motion)
+
+    def along(self) -> None:
+        """Report the last point of the path that left as reached, and send the vehicle to the next one, or another."""
+        if not self.current or not self.motions[-1].geo:
+            return
+        motion = self.motions[-1]
+        path = [*zip(motion.geo[::2], motion.geo[1::2], strict=True)]
+        if self.leg >= 0:
+            x, y = path[self.leg]
+            self.hear(pack(mavlink.MAVLink_global_position_int_message(0, x, y, HOME_AMSL, 0, 0, 0, 0, 0), 1))
+        following = path[min(self.leg + 1, len(path) - 1)]
+        point = following if self.of.random() < 0.6 else self.of.choice(path)
+        for message in fitting(self.of, motion, self.autopilot, point):
+            self.offer(pack(message), motion)
+
+    def offer(self, frame: bytes, motion: Command) -> None:
+        """Hand the gate a frame, and judge it if it passes."""
         found = self.loaded.executor.frames.seal(frame, self.now.monotonic_us)
         if not isinstance(found, Refusal):
             self.hold(found == frame, "another frame than the one that was judged")
@@ -232,8 +255,8 @@ def state_at(step: int) -> State:
     return State(tuple(values[slot] for slot in range(len(values))), (0,) * len(values))
 
 
-def fitting(of: Random, command: Command, autopilot: int) -> list[Any]:
-    """Messages that fly a command."""
+def fitting(of: Random, command: Command, autopilot: int, point: tuple[int, int] | None = None) -> list[Any]:
+    """Messages that fly a command; to a point of its path, or to any of them."""
     px4, up, speed = autopilot == PX4, command.altitude / 1_000, command.speed / 1_000
     points = [*zip(command.geo[::2], command.geo[1::2], strict=True)]
     match command.kind:
@@ -246,7 +269,7 @@ def fitting(of: Random, command: Command, autopilot: int) -> list[Any]:
             return [set_mode(SYSTEM, Px4Mode.RETURN if px4 else CopterMode.RTL)]
         case MotionKind.LAND:
             return [set_mode(SYSTEM, Px4Mode.LAND if px4 else CopterMode.LAND)]
-    x, y = of.choice(points[:2] + points)
+    x, y = point or of.choice(points[:2] + points)
     if px4:
         return [mavlink.MAVLink_command_int_message(
             SYSTEM, 1, 0, 192, 0, 0, speed or -1, 1, 0, nan, x, y, HOME_AMSL / 1_000 + up
@@ -269,6 +292,7 @@ def point_of(message: int, fields: tuple[object, ...]) -> tuple[object, ...] | N
 
 
 @pytest.mark.claim("A1")
+@settings(max_examples=settings().max_examples * 2)
 @given(worlds.CHANCES)
 def test_no_history_moves_vehicle_past_the_executor(of: Random) -> None:
     assert Adapter(of).go(150) == []
@@ -313,6 +337,18 @@ def test_search_detects_gate_without_comparison(monkeypatch: pytest.MonkeyPatch)
 def test_search_detects_gate_without_what_is_never_allowed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(gates.FrameSession, "_refuse_always", lambda *_: None)
     assert breaks("a frame in the name of another sender")
+
+
+@pytest.mark.claim("A1", broken="a gate that lets the points of a path pass in any order")
+def test_search_detects_gate_without_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    refuse = gates.FrameSession._refuse_motion
+
+    def whenever(self: gates.FrameSession, frame: Frame, now_us: int) -> Refusal | None:
+        found = refuse(self, frame, now_us)
+        return None if found is gates.OUT_OF_ORDER else found
+
+    monkeypatch.setattr(gates.FrameSession, "_refuse_motion", whenever)
+    assert breaks("a point of the path before its turn")
 
 
 @pytest.mark.claim("A1", broken="an executor that forgets which permits were used")

@@ -17,6 +17,7 @@ Programs are compared with a reading of what was drawn, which uses nothing of th
 theorem 2.
 """
 
+from collections.abc import Callable
 from random import Random
 from typing import NamedTuple
 
@@ -31,6 +32,7 @@ from reference.sources import findings, policy, program, skill
 from reference.world import loaded
 from rtshcua.diagnostics import codes
 from rtshcua.ground.checker import chains
+from rtshcua.ground.checker.checks import contracts
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.policy import Policy
 from theorems.test_theorem_2_fallback import broken, flown
@@ -65,6 +67,17 @@ class Called(NamedTuple):
 
 
 DOWN = Drawn("down", "land", 60, "", "")
+#: skills of every program, so that each defect can be drawn
+STAYS, SITS, BACK = (
+    Drawn("stays", "hold", 0, "", ""),
+    Drawn("sits", "hold", 30, "", ""),
+    Drawn("back", "home", 0, "", ""),
+)
+NEEDY, ASSUMING = (
+    Drawn("needy", "land", 0, "gps.fix >= fix_3d", ""),
+    Drawn("assuming", "land", 0, "", "wind.speed < 12 m/s"),
+)
+SHIPPED = (STAYS, SITS, BACK, NEEDY, ASSUMING)
 HOLDS = ("hold",) * 4
 NEEDS = ("", "", "gps.fix >= fix_3d")
 
@@ -80,7 +93,7 @@ def drawn_skills(of: Random) -> list[Drawn]:
 
 
 def drawn_chain(of: Random, skills: list[Drawn]) -> list[Called]:
-    """Mostly a chain with one defect or none."""
+    """Mostly a bounded chain."""
     chain = []
     for _ in range(of.choice((0, 1, 1, 2, 2, 3, 3, MOST - 1)) + (of.random() < 0.05)):
         called = of.choice(skills if of.random() < 0.05 else skills[1:])
@@ -88,6 +101,39 @@ def drawn_chain(of: Random, skills: list[Drawn]) -> list[Called]:
         chain.append(Called(called, of.choice(limits if of.random() < 0.9 else (0, 0, 45))))
     last = DOWN if of.random() < 0.85 else of.choice(skills)
     return [*chain, Called(last, 9 if of.random() < 0.05 else 0)]
+
+
+def bounded_chain(of: Random, skills: list[Drawn]) -> list[Called]:
+    """A bounded chain that has room for a link more."""
+    links_of = [Called(each, of.choice((5, 20))) for each in of.choices(skills[1:], k=of.randrange(MOST - 1))]
+    return [*links_of, Called(DOWN, 0)]
+
+
+def inserted(of: Random, chain: list[Called], link: Called) -> list[Called]:
+    at = of.randrange(len(chain))
+    return [*chain[:at], link, *chain[at:]]
+
+
+def ended_by(chain: list[Called], last: Drawn, limit: int = 0) -> list[Called]:
+    return [*chain[:-1], Called(last, limit)]
+
+
+#: by defect: a chain that is bounded but for it, of a chain and the skill that has it
+DEFECTS: dict[str, Callable[[Random, list[Called], Drawn], list[Called]]] = {
+    "a link without an end": lambda of, chain, _: inserted(of, chain, Called(STAYS, 0)),
+    "a limit above the duration": lambda of, chain, _: inserted(of, chain, Called(SITS, 45)),
+    "a last link that holds": lambda _, chain, __: ended_by(chain, STAYS),
+    "a last link that holds for a while": lambda _, chain, __: ended_by(chain, SITS),
+    "a last link that flies home": lambda _, chain, __: ended_by(chain, BACK),
+    "a last link that requires something": lambda _, chain, __: ended_by(chain, NEEDY),
+    "a last link that assumes something": lambda _, chain, __: ended_by(chain, ASSUMING),
+    "a last link with a limit": lambda _, chain, __: ended_by(chain, DOWN, 9),
+    "too many links": lambda _, chain, __: [Called(BACK, 0)] * (MOST + 1 - len(chain)) + chain,
+    "the skill itself": lambda of, chain, owner: inserted(of, chain, Called(owner, 5)),
+    "the skill itself as the last link": lambda _, chain, owner: ended_by(chain, owner),
+}
+#: a chain of the policy has no skill of its own
+OWN = ("the skill itself", "the skill itself as the last link")
 
 
 def ends(call: Called) -> bool:
@@ -114,7 +160,7 @@ def source(skills: list[Drawn], chain: list[Called], contingency: list[Called], 
             require=each.require, assume=each.assume,
             fallback=", ".join(link.text for link in chain) if each.name == "one" else "emergency_land",
         )
-        for each in skills
+        for each in (*skills, *SHIPPED)
     ]  # fmt: skip
     down = skill("down()", motion="land", lasts="at most 60 s", fallback="")
     rule = f"degrade takeoff when battery < 30 % to {target.text}"
@@ -128,6 +174,11 @@ def disagreement(of: Random) -> str:
     if of.random() < 0.6:
         contingency = [Called(DOWN, 0)]
     target = Called(of.choice(skills), of.choice((0, 20)))
+    return compared(skills, chain, contingency, target)
+
+
+def compared(skills: list[Drawn], chain: list[Called], contingency: list[Called], target: Called) -> str:
+    """What the compiler says otherwise than the statement of a program; empty if nothing."""
     meant = bounded(chain, "one") and bounded(contingency) and ends(target) and coherent(target)
     text = source(skills, chain, contingency, target)
     refused = [f"{each.code.id} {each.message}" for each in findings(text) if each.code in OF_CHAINS]
@@ -150,6 +201,35 @@ def test_exactly_bounded_chains_compile(of: Random) -> None:
 def test_exactly_bounded_chains_compile_in_many_programs(of: Random) -> None:
     for _ in range(10):
         assert disagreement(of) == ""
+
+
+def with_defect(of: Random, defect: str) -> str:
+    """What `compared` finds in a program with one defect: in the chain of a skill, the contingency, or a target."""
+    owner = DOWN._replace(name="one")
+    skills = [owner, *drawn_skills(of)[1:]]
+    chain, contingency = bounded_chain(of, skills), bounded_chain(of, skills)
+    if defect in OWN or of.random() < 0.5:
+        chain = DEFECTS[defect](of, chain, owner)
+    else:
+        contingency = DEFECTS[defect](of, contingency, owner)
+    assert not (bounded(chain, "one") and bounded(contingency)), "the defect is none"
+    return compared(skills, chain, contingency, Called(BACK, 0))
+
+
+@pytest.mark.claim("A3")
+@settings(max_examples=settings().max_examples // 3)
+@given(of=worlds.CHANCES)
+@pytest.mark.parametrize("defect", DEFECTS)
+def test_chain_with_single_defect_does_not_compile(of: Random, defect: str) -> None:
+    assert with_defect(of, defect) == ""
+
+
+def test_chain_without_defect_compiles() -> None:
+    """Otherwise a program with a defect could be refused for something else."""
+    for of in map(Random, range(5)):
+        skills = [DOWN._replace(name="one"), *drawn_skills(of)[1:]]
+        found = findings(source(skills, bounded_chain(of, skills), bounded_chain(of, skills), Called(BACK, 0)))
+        assert not [each for each in found if each.code in OF_CHAINS]
 
 
 def test_both_kinds_of_chains_are_drawn() -> None:
@@ -212,16 +292,30 @@ def test_many_flights_under_bounded_chains_end(of: Random) -> None:
 # --------------------------------------------------------------------------------------------- what is detected
 
 
+def found_by(*defects: str) -> bool:
+    """Whether the search finds each of these defects in some program."""
+    return all(
+        any("an unbounded chain compiles" in with_defect(Random(seed), each) for seed in range(9)) for each in defects
+    )
+
+
 @pytest.mark.claim("A3", broken="a checker that accepts links without an end")
 def test_search_detects_checker_without_ends(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(chains, "check_end", lambda *_: None)
-    assert any("an unbounded chain compiles" in disagreement(Random(seed)) for seed in range(200))
+    assert found_by("a link without an end")
 
 
 @pytest.mark.claim("A3", broken="a checker that accepts any last link")
 def test_search_detects_checker_without_last_link(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(chains, "_last", lambda *_: None)
-    assert any("an unbounded chain compiles" in disagreement(Random(seed)) for seed in range(200))
+    assert found_by(*(each for each in DEFECTS if each.startswith("a last link")))
+
+
+@pytest.mark.claim("A3", broken="a checker that accepts a skill in its own chain")
+def test_search_detects_checker_without_owner(monkeypatch: pytest.MonkeyPatch) -> None:
+    check = chains.check_chain
+    monkeypatch.setattr(contracts, "check_chain", lambda context, links, _, span: check(context, links, None, span))
+    assert found_by("the skill itself")
 
 
 @pytest.mark.claim("A3", broken="chains that end in a hold without a limit")

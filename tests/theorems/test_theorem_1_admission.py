@@ -49,6 +49,9 @@ from reference.naive_code import TooNear
 from reference.oracle import Oracle
 from reference.world import APPROVAL_KEY, START, VEHICLE, loaded, renewed
 from rtshcua.decision import decide
+from rtshcua.decision.evaluate import Environment
+from rtshcua.decision.prepare import PreparedInvocation
+from rtshcua.decision.values import Sets
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.why.trace import NAMES
 from rtshcua.model.decision import Decision
@@ -73,6 +76,8 @@ POLICY = replace(flat.POLICY, rules=(*flat.POLICY.rules, flat.rule(RuleKind.FORB
 OF, UNENFORCED = (loaded(POLICY, low_mission(), mode) for mode in (EnforcementMode.SOFTWARE, EnforcementMode.NONE))
 STRANGER = SigningKey.from_seed(bytes([99]) * 32, duty=Duty.APPROVAL, development=True)
 ACTS = ("ask", "ask", "ask", "send", "send", "stand in", "ended", "sign", "again", "wait", "fly", "fly", "fly")
+#: us before the end of a deadline or validity; values become stale later than that
+SHORTLY_US = 100_000
 STRANGE = {BATTERY: 1_000, WIND: 20 * M, OBSTACLE: None, HEIGHT: 130 * M, POSITION_X: 600 * M}
 
 
@@ -126,16 +131,23 @@ class TakenOver:
         steps = self.loaded.bundle.mission.invocations
         if self.step >= len(steps):
             return
-        meant, at = steps[self.step], self.now.monotonic_us
+        meant, late = steps[self.step], self.of.random()  # it asks just before an end, and sends just after it:
+        overdue, outdated = late < 0.2, late > 0.95  # of the deadline, or of the validity
+        ready_us = meant.contract.deadline_us - SHORTLY_US
+        if overdue:  # nothing is released before it was received
+            self.wait(max(self.loaded.in_force.received_us(meant.step) + ready_us - self.now.monotonic_us, 0))
+        if outdated:
+            over_us = meant.issued_at_us + meant.contract.validity_us - self.now.utc_us - self.now.utc_error_us
+            self.wait(max(over_us - SHORTLY_US, 0))
+        at = self.now.monotonic_us
         state = self.told(meant, strange=0.25)
-        slow = self.of.random() < 0.1  # it asks late, and sends after the deadline
-        released_us = max(at - 9 * S, START.monotonic_us) if slow else at
+        released_us = at - ready_us if overdue else at
         asked = Request(STEP, meant.step, -1, meant.binding, self.now, state, released_us, meant.phase, 5_000)
         self.enforce(self.spoiled(asked) if self.of.random() < 0.25 else asked, meant)
         if self.permits and self.permits[-1] in self.admitted and self.admitted[self.permits[-1]][0] is meant:
             self.loaded.executor.ended()
-            if slow:
-                self.wait(1_200_000)
+            if overdue or outdated:
+                self.wait(2 * SHORTLY_US)
             self.send(self.permits[-1])
             self.loaded.executor.ended()
             self.step += 1
@@ -342,4 +354,16 @@ def test_search_detects_executor_without_time_check(monkeypatch: pytest.MonkeyPa
         return dispatch(self, permit, min(now_us, permit.not_after_us))
 
     monkeypatch.setattr(executors.Executor, "_dispatch", whenever)
+    assert breaks("sent after its deadline or validity")
+
+
+@pytest.mark.claim("T1", broken="permits whose deadline counts from the decision, not from the release")
+@pytest.mark.altered
+def test_search_detects_deadline_from_decision(monkeypatch: pytest.MonkeyPatch) -> None:
+    until = decide.valid_until
+
+    def from_now(invocation: PreparedInvocation, state: State, context: Context, sets: Sets, at: Environment) -> int:
+        return until(invocation, state, replace(context, released_us=sets.monotonic_us[0]), sets, at)
+
+    monkeypatch.setattr(decide, "valid_until", from_now)
     assert breaks("sent after its deadline or validity")

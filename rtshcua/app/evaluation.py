@@ -36,8 +36,11 @@ from rtshcua.evaluation.report_content import evaluation_report
 from rtshcua.evaluation.report_parts import EvaluationReport
 from rtshcua.evaluation.results import FailedAttempt, Result, UnavailableMode
 
-#: where raw data and report go by default
+#: where raw data and report go by default, and those of a sample
 OUTPUT: Final = Path("runs") / "evaluation"
+QUICK_OUTPUT: Final = Path("runs") / "evaluation-quick"
+#: the names of the report as a page and as a text
+PAGE, TEXT = "report.html", "report.md"
 _LARGEST: Final = 1 << 24
 #: characters of why an attempt failed that are kept
 _LONGEST_WHY: Final = 500
@@ -78,11 +81,12 @@ class EvaluationOutcome(NamedTuple):
 
 
 class WrittenReport(NamedTuple):
-    """The report about all that is in a folder, and its files."""
+    """The report about all that is in a folder, its files, and what in the raw data is not counted, by experiment."""
 
     report: EvaluationReport
     page: Path
     text: Path
+    not_counted: Sequence[tuple[str, str]] = ()
 
 
 class EvaluationProgress(Protocol):
@@ -147,7 +151,11 @@ def measure(
         return Refusal("in-use", text, "wait until it ends, or name another folder with `-o`", ExitCode.USAGE)
     except OSError as error:
         text = f"cannot write to `{folder.path}`: {words_of(error)}"
-        return Refusal("io", text, "the results so far are kept: repeat the command to continue", ExitCode.FULL)
+        kept = any(folder.path.glob("X*.jsonl"))
+        help = (
+            "the results so far are kept: repeat the command to continue" if kept else "name another folder with `-o`"
+        )
+        return Refusal("io", text, help, ExitCode.FULL)
     return EvaluationOutcome(len(made.units) - len(failed), len(made.units), failed)
 
 
@@ -185,7 +193,8 @@ def report(made: Evaluation) -> WrittenReport | Refusal:
     computer = found[0].header.computer if found else this_computer()
     at = f"made at {utc(time.time_ns() // 1_000)}"
     told = evaluation_report(results, computer, at, _settings(found), made.campaigns)
-    written = WrittenReport(told, folder.path / "report.html", folder.path / "report.md")
+    left_out = [(each.header.experiment, text) for each in found for text in _left_out(each)]
+    written = WrittenReport(told, folder.path / PAGE, folder.path / TEXT, left_out)
     try:
         replace(written.page, report_page.render(told).encode())
         replace(written.text, report_text.render(told).encode())
@@ -255,7 +264,7 @@ def _settings(found: Sequence[RawExperiment]) -> Sequence[tuple[str, str]]:
 def _left_out(found: RawExperiment) -> Iterator[str]:
     """What a file holds besides results."""
     if found.skipped:
-        yield f"{found.skipped:,} lines that are cut off, malformed or of units that are not complete"
+        yield f"{found.skipped:,} lines that are cut off, malformed, not of the design or of incomplete units"
     if found.failed:
         unit, first = found.failed[0]
         units = len({unit for unit, _ in found.failed})
@@ -310,7 +319,7 @@ def _plan(request: EvaluationRequest) -> EvaluationPlan:
 
 
 def _misused(request: EvaluationRequest) -> Refusal | None:
-    """Why the names of experiments or modes, or the number of processes, are not accepted."""
+    """Why the names of experiments or modes, the number of processes, or the folder are not accepted."""
     for kind, given, accepted in (("experiment", request.only, SOURCES), ("mode", request.modes, MODES)):
         unknown = next((name for name in given if name not in accepted), None)
         if unknown is not None:
@@ -320,4 +329,4 @@ def _misused(request: EvaluationRequest) -> Refusal | None:
         return Refusal("usage", text, f"accepted: at most {cores()}")
     if request.output.exists() and not request.output.is_dir():
         return Refusal("usage", f"`{request.output}` is not a folder", "`-o` expects the folder of an evaluation")
-    return None
+    return RawFolder(request.output).foreign_report((PAGE, TEXT))

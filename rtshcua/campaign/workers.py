@@ -111,24 +111,24 @@ class WorkerProcesses:
             self._pool = ProcessPoolExecutor(self._jobs, mp_context=get_context("spawn"), initializer=_quiet)
         futures = [self._pool.submit(work.fly, flight) for flight in flights]
         waits = set(futures)
-        try:
-            while waits:
-                self._look()
-                for future in _soon(waits):
-                    waits.remove(future)
-                    yield future.result()
-        finally:
-            for future in futures:
-                future.cancel()
+        while waits:
+            self._look()
+            for future in _soon(waits):
+                waits.remove(future)
+                yield future.result()
 
     def close(self) -> None:
         """Terminate the processes without waiting for their flights."""
         pool, self._pool = self._pool, None
         if pool is not None:
-            for process in list((pool._processes or {}).values()):
+            processes = list((pool._processes or {}).values())
+            # The pool's own thread cancels what waits. It prints a traceback for a future that anyone else cancelled,
+            # if it finds its processes dead before that future's turn.
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in processes:
                 with suppress(OSError):
                     process.terminate()
-            pool.shutdown(wait=True, cancel_futures=True)
+            pool.shutdown(wait=True)
 
 
 class DaskWorkers:

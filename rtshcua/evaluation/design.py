@@ -13,6 +13,9 @@ UNENFORCED: Final = "unenforced"
 MODES: Final = ("none", UNENFORCED, "software", "process", "trustzone-m", "optee")
 #: how often each cell is repeated
 RUNS: Final = 30
+#: what is run before it counts: rounds of all conditions of X4, and appends of X6 to another log
+WARM_ROUNDS: Final = 20
+WARM_APPENDS: Final = 200
 
 
 class EvaluationPoint(NamedTuple):

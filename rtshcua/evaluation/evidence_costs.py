@@ -16,16 +16,18 @@ from typing import Final
 from msgspec.structs import replace
 
 from rtshcua.adapters.store.evidence_file import EvidenceFile
+from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.verification import VerificationInputs, verify_carefully, verify_quickly
 from rtshcua.decision.decide import decide
 from rtshcua.evaluation.case_checks import Prepared
 from rtshcua.evaluation.cases import admissible
-from rtshcua.evaluation.design import EvaluationPlan, EvaluationPoint, WorkUnit
+from rtshcua.evaluation.design import WARM_APPENDS, EvaluationPlan, EvaluationPoint, WorkUnit
 from rtshcua.evaluation.results import AppendTiming, Result, VerificationTiming
 from rtshcua.evaluation.worlds import ISSUED_US, RECEIVED, FlatProgram, bound, pinned, program_at
 from rtshcua.evidence.log_writer import Recorder
 from rtshcua.evidence.report import LogVerdict
 from rtshcua.ground.audit.audit import Audit
+from rtshcua.ground.audit.trust import forget
 from rtshcua.model.durability import BUFFERED, SYNCED_FIRST, WRITTEN
 from rtshcua.model.flat.situation import Context, Now
 from rtshcua.onboard.enforcement.load import EnforcementMode
@@ -51,8 +53,6 @@ WAYS: Final[dict[str, Callable[[Path, VerificationInputs], Audit]]] = {
 #: the mission whose first step is decided again and again, and the time between two decisions in us
 _POINT: Final = EvaluationPoint("standard", 1_000_000)
 _APART_US: Final = 700
-#: appends before those that count
-_WARM: Final = 200
 
 
 def units(plan: EvaluationPlan) -> list[WorkUnit]:
@@ -74,9 +74,10 @@ def run(unit: WorkUnit) -> Sequence[Result]:
     with TemporaryDirectory(prefix="evidence-") as folder:
         path = Path(folder) / "log.jsonl"
         if what == "append":  # all records but the first, which opens the log
-            log.write(Path(folder) / "warm.jsonl", _WARM, WRITTEN)
+            log.write(Path(folder) / "warm.jsonl", WARM_APPENDS, WRITTEN)
             took_ns = log.write(path, int(records) + 1, DURABILITIES[str(durability)])
-            octets = path.stat().st_size
+            with open_regular(path) as file:
+                octets = path.stat().st_size - len(file.readline())
             return [
                 AppendTiming(durability=str(durability), repetition=int(number), octets=octets, appended_ns=took_ns)
             ]
@@ -85,18 +86,26 @@ def run(unit: WorkUnit) -> Sequence[Result]:
 
 
 def _verified(path: Path, records: int, runs: int) -> Iterator[VerificationTiming]:
+    """Each way in turns, and before it, for the published length, the same without a bundle that was opened before."""
     inputs = VerificationInputs(pinned())
-    for repetition in range(runs + 1):
-        for way, verify in WAYS.items():
-            if repetition == 0 and records > RECORDS:
-                continue
-            start_ns = perf_counter_ns()
-            report = verify(path, inputs).report
-            took_ns = perf_counter_ns() - start_ns
-            if report.verdict is not LogVerdict.VERIFIED or report.records != records:
-                raise RuntimeError(f"`{way}` of {records} records: {report.failure or report.shortfall}")
-            if repetition:  # the first opens the bundle, whose result is kept
-                yield VerificationTiming(way=way, records=records, repetition=repetition, took_ns=took_ns)
+    if records > RECORDS:
+        WAYS["fast"](path, inputs)  # opens the bundle
+    for repetition in range(1, runs + 1):
+        for way in WAYS:
+            for cold in (True, False) if records <= RECORDS else (False,):
+                if cold:
+                    forget()
+                took_ns = _verification_ns(path, records, way, inputs)
+                yield VerificationTiming(way=way, records=records, repetition=repetition, took_ns=took_ns, cold=cold)
+
+
+def _verification_ns(path: Path, records: int, way: str, inputs: VerificationInputs) -> int:
+    start_ns = perf_counter_ns()
+    report = WAYS[way](path, inputs).report
+    took_ns = perf_counter_ns() - start_ns
+    if report.verdict is not LogVerdict.VERIFIED or report.records != records:
+        raise RuntimeError(f"`{way}` of {records} records: {report.failure or report.shortfall}")
+    return took_ns
 
 
 def _root() -> bytes:

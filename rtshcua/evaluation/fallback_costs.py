@@ -20,7 +20,7 @@ from rtshcua.adapters.store.evidence_file import EvidenceFile
 from rtshcua.evaluation import cases
 from rtshcua.evaluation.case_checks import SLOW, StruckBundle
 from rtshcua.evaluation.cases import CASES, EvaluationCase
-from rtshcua.evaluation.design import EvaluationPlan, EvaluationPoint, WorkUnit
+from rtshcua.evaluation.design import WARM_ROUNDS, EvaluationPlan, EvaluationPoint, WorkUnit
 from rtshcua.evaluation.fallback_flights import FLOWN, reactions
 from rtshcua.evaluation.results import FallbackTiming, Result
 from rtshcua.evaluation.worlds import RECEIVED, World, not_here, program_at, root_of, world
@@ -41,8 +41,6 @@ ENFORCED: Final = ("software", "process", "trustzone-m", "optee")
 #: every case that is not allowed
 TRIGGERED: Final = tuple(each for each in CASES if each.outcome is not Outcome.ALLOW)
 _POINT: Final = EvaluationPoint("standard", 1_000_000)
-#: rounds before those that count
-_WARM: Final = 20
 
 
 def units(plan: EvaluationPlan) -> list[WorkUnit]:
@@ -97,7 +95,7 @@ def _measured(
         return _one(subject, case, request, recorder, file, sync=sync)
 
     took: dict[tuple[str, int], tuple[int, int]] = {}
-    for repetition in range(1 - _WARM, runs + 1):
+    for repetition in range(1 - WARM_ROUNDS, runs + 1):
         for case in group:
             took[case.name, repetition] = once(case, repetition, sync=False)[:2]
     for repetition in range(1, runs + 1):

@@ -51,9 +51,10 @@ from rtshcua.wire.response import decode as decode_response
 ABSENT: Final = "unavailable"
 #: the modes in an emulator, whose flights take minutes
 EMULATED: Final = ("trustzone-m", "optee")
-#: of a sample: the point of all modes, and one of a longer mission, which takes five times as long, of one mode
+#: of a sample: the point of all modes, and those of longer missions, which take longer, of one mode
 _QUICK_POINT: Final = EvaluationPoint("short", 1_500_000)
-_QUICK_LONGER: Final = (EvaluationPoint("standard", 500_000), "software")
+_QUICK_LONGER: Final = (EvaluationPoint("standard", 500_000), EvaluationPoint("extended", 500_000))
+_QUICK_MODE: Final = "software"
 #: the loop's longest wait, and how often it reads the vehicle's frames, in us of the flight
 _WAIT_US: Final = 100_000
 _TICK_US: Final = 50_000
@@ -248,10 +249,15 @@ def units(plan: EvaluationPlan) -> Sequence[WorkUnit]:
         for mode in here
         if (mode in EMULATED) is emulated
     ]
-    longer, mode = _QUICK_LONGER
-    if plan.quick and mode in here:
-        found += [WorkUnit("X1", (*longer, seed, mode)) for seed in range(1, plan.runs + 1)]
-    return [*(WorkUnit("X1", (ABSENT, mode)) for mode in absent), *found]
+    return [*(WorkUnit("X1", (ABSENT, mode)) for mode in absent), *found, *_longer(plan, here)]
+
+
+def _longer(plan: EvaluationPlan, here: Sequence[str]) -> Iterator[WorkUnit]:
+    """The flights of longer missions in a sample."""
+    if plan.quick and _QUICK_MODE in here:
+        for point in _QUICK_LONGER:
+            for seed in range(1, plan.runs + 1):
+                yield WorkUnit("X1", (*point, seed, _QUICK_MODE))
 
 
 def run(unit: WorkUnit) -> Sequence[Result]:

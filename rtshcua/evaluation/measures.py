@@ -9,7 +9,7 @@ from statistics import fmean, median
 from typing import Final, NamedTuple
 
 from rtshcua.evaluation.design import DEADLINES_US, MISSIONS, POINTS, RUNS, EvaluationPoint
-from rtshcua.evaluation.results import PointFlight, Result
+from rtshcua.evaluation.results import PointFlight, Result, StepTiming
 
 #: which durations of a flight are meant
 Durations = Callable[[PointFlight], Iterable[int]]
@@ -52,6 +52,21 @@ def remaining(flight: PointFlight) -> Iterator[int]:
 def proposal(flight: PointFlight) -> Iterator[int]:
     """The latency from the mission's text to its first command frame."""
     return iter((flight.proposal_ns,))
+
+
+def in_time(step: StepTiming, deadline_us: int) -> bool:
+    """Whether a step's first command frame was sent by its deadline."""
+    return step.end_to_end_ns is not None and step.end_to_end_ns <= 1_000 * deadline_us
+
+
+def misses(flight: PointFlight) -> int:
+    """The missed deadlines of a flight: by its count and by its times, whichever are more."""
+    return max(flight.misses, sum(not in_time(each, flight.deadline_us) for each in flight.invocations))
+
+
+def fallbacks(flight: PointFlight) -> int:
+    """The fallbacks of a flight: by its count and by its outcomes, whichever are more."""
+    return max(flight.fallbacks, sum(each.outcome == "fallback" for each in flight.invocations))
 
 
 class Distribution(NamedTuple):
@@ -126,19 +141,21 @@ class FlightTable:
         cells = ([v for each in self.cell(mode, point) for v in of(each)] for point in _points(mission))
         return averaged(by(values) for values in cells if values)
 
-    def added(self, mode: str, point: EvaluationPoint, of: Durations, by: Reduction) -> float | None:
-        """Return what a mode adds to `software` at a point: the median difference of the pairs of flights with the
-        same seed; None if there is no pair.
+    def added(self, mode: str, base: str, point: EvaluationPoint, of: Durations, by: Reduction) -> float | None:
+        """Return what a mode adds to another at a point: the median difference of the pairs of flights with the same
+        seed; None if there is no pair.
         """
-        mine, base = self._cells.get((mode, point), {}), self._cells.get(("software", point), {})
-        pairs = ((list(of(mine[seed])), list(of(base[seed]))) for seed in mine.keys() & base.keys())
+        mine, theirs = self._cells.get((mode, point), {}), self._cells.get((base, point), {})
+        pairs = ((list(of(mine[seed])), list(of(theirs[seed]))) for seed in mine.keys() & theirs.keys())
         differences = [by(more) - by(less) for more, less in pairs if more and less]
         return median(differences) if differences else None
 
-    def added_average(self, mode: str, mission: str | None, of: Durations, by: Reduction) -> Averaged | None:
-        """Return the mean and the range of what a mode adds, over the points of a mission, or over all points."""
+    def added_average(self, mode: str, base: str, mission: str | None, of: Durations, by: Reduction) -> Averaged | None:
+        """Return the mean and the range of what a mode adds to another, over the points of a mission, or over all
+        points.
+        """
         points = POINTS if mission is None else _points(mission)
-        found = (self.added(mode, point, of, by) for point in points)
+        found = (self.added(mode, base, point, of, by) for point in points)
         return averaged(each for each in found if each is not None)
 
     def flatness(self, mode: str) -> float | None:

@@ -8,6 +8,8 @@ from collections.abc import Mapping
 from enum import StrEnum
 from typing import Final, NamedTuple
 
+from rtshcua.evaluation.design import WARM_APPENDS, WARM_ROUNDS
+
 
 class Origin(StrEnum):
     """Where a figure comes from; the value is the mark that the report prints."""
@@ -250,6 +252,12 @@ CHOICES: Final = (
         "computer does not have is listed as not available",
     ),
     OpenChoice(
+        "languages", "X1, X2, X5", "in which language each mode decides, and so what the cost of isolation compares",
+        "`none`, `unenforced` and `software` decide in Python, `process`, `trustzone-m` and `optee` in C. So X5 has "
+        "two tables: less `software`, as published, which contains the change of the language and may be less than "
+        "nothing; and less `process`, which is the same program in C without a secure world",
+    ),
+    OpenChoice(
         "repetitions", "X1 to X5", "what differs between the 30 repetitions",
         "the seed of the simulation (noise, gusts) from 1 to 30, ids and log; in X3 the inputs that the case does not "
         "strike, within their admissible ranges",
@@ -291,7 +299,9 @@ CHOICES: Final = (
     OpenChoice(
         "cases", "X3", "seven of the twelve cases, all parameters, and the step that they strike",
         "the cases of the table, at `inspect_area`; `short` has none, there at `hover`. Two further cases are counted "
-        "apart",
+        "apart. A request names no version of a policy, as its binding covers it: case 13 ends as "
+        "`integrity/binding-mismatch`. `integrity/policy-version` can only follow where `decide` is called with "
+        "another version than its policy's, which no boundary does; tests of `decide` have it",
     ),
     OpenChoice(
         "agreement", "X3", "what is compared",
@@ -303,6 +313,12 @@ CHOICES: Final = (
         "a second layer: the cases as faults of whole flights in virtual time, judged by what is dispatched",
     ),
     OpenChoice("conditions", "X4", "the triggered conditions", "each case whose outcome is not allow"),
+    OpenChoice(
+        "warm-up", "X4, X6", "what runs before it counts",
+        f"X4: {WARM_ROUNDS} rounds of all conditions in the same mode; X6: {WARM_APPENDS} appends to another log. A "
+        "verification opens the bundle in the log once in a process: each way is timed with that (cold) and after it; "
+        "the latter is compared. No flight of X1 or X4 is repeated for warmth",
+    ),
     OpenChoice(
         "reaction", "X4", "how long a fallback takes with vehicle and network; the published figures are without them",
         "a further table: in a flight of `short`, from the telemetry frame that reveals the trouble during `hover`, or "
@@ -320,8 +336,9 @@ CHOICES: Final = (
     OpenChoice(
         "footprint", "X7", "which files make up a component, and how its artifact is measured",
         "the files that the table names, the size of their sources or program, and the greatest of samples of "
-        "`tracemalloc`, one each 10 s of the flight of the `standard` mission; of a secure world its data and stack by "
-        "its ELF sections, of a process its greatest resident memory. Totals are the sums of our rows",
+        "`tracemalloc`, one each 10 s of the flight of the `standard` mission (`--quick`: `short`); of a secure world "
+        "its data and stack by its ELF sections, of a process its greatest resident memory. Totals are the sums of our "
+        "rows",
     ),
     OpenChoice(
         "flat", "claims", "how far an overhead is flat over mission length",
@@ -334,16 +351,18 @@ CHOICES: Final = (
     ),
     OpenChoice(
         "tenfold", "targets", "how much faster we want to be",
-        "a tenth of the published figure; a missed target does not change the exit code",
+        "a tenth of the published figure, and of a range of its lower end; a missed target does not change the exit "
+        "code",
     ),
     OpenChoice(
         "plots", "X1, X2, X4, X5", "the published plots have linear axes, except the second panel of X2",
-        "logarithmic axes throughout, so that published and measured bars are legible on one axis",
+        "logarithmic axes throughout, so that published and measured bars are legible on one axis. What is not above "
+        "zero has no bar",
     ),
     OpenChoice(
         "peers", "comparison", "today's peers, and what shows the paper's own entries",
         "further rows by our judgement, with their sources; each entry of this system names the tests and pages that "
-        "show it",
+        "show it, and its limits",
     ),
     OpenChoice(
         "campaign", "campaign", "random faults", "flights with random faults, judged by the true state of the vehicle",

@@ -5,9 +5,9 @@
 - Each further line holds one result, with the key of its unit of work, its place among the unit's results, and the
   load of the computer.
 
-A unit is done when all its results are there. Lines that a crash cut off are skipped, and their unit runs again; a
-failed attempt is kept, and its unit runs again. All results of a unit that is there twice count: nothing replaces a
-measurement. One process at a time writes to a folder.
+A unit is done when all its results are there. Lines that a crash cut off, and results that are not of their unit or not
+of the design, are skipped, and their unit runs again; a failed attempt is kept, and its unit runs again. All results of
+a unit that is there twice count: nothing replaces a measurement. One process at a time writes to a folder.
 """
 
 import os
@@ -25,14 +25,26 @@ from rtshcua.adapters.store.reading import open_regular, read_regular, walk
 from rtshcua.adapters.store.writing import UNFINISHED, append, create_whole, lock, make_folder
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evaluation.computer import Computer
-from rtshcua.evaluation.design import WorkUnit
-from rtshcua.evaluation.results import FailedAttempt, Natural, Result
+from rtshcua.evaluation.design import MODES, POINTS, EvaluationPoint, WorkUnit
+from rtshcua.evaluation.published import CASES
+from rtshcua.evaluation.results import (
+    CaseFlight,
+    EnforceCheck,
+    FailedAttempt,
+    FallbackReaction,
+    FallbackTiming,
+    Natural,
+    PointFlight,
+    Result,
+)
 
 FORMAT: Final = 1
 #: octets of the longest line: a whole log's append times
 _LONGEST: Final = 1 << 24
 _ANOTHER: Final = "name another folder with `-o`, or remove this one"
+_ANOTHER_FILE: Final = "name another folder with `-o`, or remove this file"
 _LOCK: Final = ".lock"
+_CASES: Final = frozenset(each.name for each in CASES)
 #: the beginning of the name of a folder for the files of a run, which a killed process leaves behind
 _SCRATCH: Final = f"{UNFINISHED}work-"
 #: what must be the same to continue a file
@@ -79,7 +91,7 @@ class KeptResult(msgspec.Struct, frozen=True, kw_only=True):
 
 class RawExperiment(NamedTuple):
     """The content of a file: its header, the results of the units that are done, how many lines were skipped because
-    they are cut off or malformed, and the attempts that failed.
+    they are cut off, malformed or not of the design, and the attempts that failed.
     """
 
     header: RawHeader
@@ -119,6 +131,13 @@ class RawFolder:
                 yield scratch
         finally:
             os.close(handle)
+
+    def foreign_report(self, names: Sequence[str]) -> Refusal | None:
+        """Why a report in the folder must not be replaced: one of these names, without raw data beside it."""
+        reports = [self.path / name for name in names if (self.path / name).exists()]
+        if not reports or any(self.path.glob("X*.jsonl")):
+            return None
+        return Refusal("usage", f"`{reports[0]}` is there, but no raw data of an evaluation", _ANOTHER_FILE)
 
     def read(self, experiment: str) -> RawExperiment | Refusal | None:
         """Read a file; None if it is not there. Raises OSError."""
@@ -183,14 +202,39 @@ def _lines(file: BinaryIO) -> Iterator[bytes]:
         yield b"too long"
 
 
+def _belongs(key: tuple[str | int, ...], result: Result | None) -> bool:
+    """Whether a flight, check or timing is one of the design, and of the unit in whose line it stands."""
+    match result:
+        case PointFlight():
+            point = EvaluationPoint(result.mission, result.deadline_us)
+            return point in POINTS and result.mode in MODES and key == (*point, result.seed, result.mode)
+        case EnforceCheck():
+            point = EvaluationPoint(result.mission, result.deadline_us)
+            return point in POINTS and result.case in _CASES and key[:4] == ("check", *point, result.mode)
+        case CaseFlight():
+            place = "aloft" if result.aloft else "ground"
+            struck = (result.case, result.mission, result.deadline_us, result.flavour, place)
+            return result.case in _CASES and key == ("flight", *struck)
+        case FallbackTiming():
+            return result.case in _CASES and key[:1] == (result.mode,)
+        case FallbackReaction():
+            return result.case in _CASES and key[1:3] == (result.case, result.mode)
+    return True
+
+
 def _whole(header: RawHeader, lines: Iterable[bytes]) -> RawExperiment:
     """The units of which each part is there, in a row."""
     kept, skipped = list[KeptResult](), 0
     for line in lines:
         try:
-            kept.append(_KEPT.decode(line))
+            each = _KEPT.decode(line)
         except MALFORMED:
             skipped += line != b"\n"
+            continue
+        if _belongs(each.key, each.result):
+            kept.append(each)
+        else:
+            skipped += 1
     units: dict[WorkUnit, tuple[KeptResult, ...]] = {}
     failed: list[tuple[WorkUnit, FailedAttempt]] = []
     attempts = list[list[KeptResult]]()

@@ -34,8 +34,14 @@ class ReportCell(NamedTuple):
     kind: str
 
 
+class ReportLinks(NamedTuple):
+    """A cell of links."""
+
+    addresses: tuple[str, ...]
+
+
 #: the cells of a row
-ReportRow = tuple[str | ReportCell, ...]
+ReportRow = tuple[str | ReportCell | ReportLinks, ...]
 
 
 class ReportTable(NamedTuple):

@@ -6,7 +6,7 @@ from typing import Final
 
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.evaluation.published import CHOICES
-from rtshcua.evaluation.report_parts import EvaluationReport, ReportCell, ReportSection, ReportTable
+from rtshcua.evaluation.report_parts import EvaluationReport, ReportCell, ReportLinks, ReportSection, ReportTable
 
 #: what Markdown reads as markup in texts of others
 _SPECIAL: Final = re.compile(r"([\\*_<>|#&~]|\](?=[(\[]))")
@@ -60,7 +60,9 @@ def _row(cells: Iterable[str]) -> str:
     return "| " + " | ".join(each or " " for each in cells) + " |"
 
 
-def _cell(cell: str | ReportCell) -> str:
+def _cell(cell: str | ReportCell | ReportLinks) -> str:
+    if isinstance(cell, ReportLinks):
+        return ", ".join(f"<{address}>" for address in cell.addresses)
     if isinstance(cell, ReportCell):
         return f"**{_text(cell.text)}**" if cell.kind in _BOLD else _text(cell.text)
     return _text(cell)

@@ -114,7 +114,10 @@ class FallbackReaction(msgspec.Struct, frozen=True, kw_only=True, tag_field="res
 
 
 class AppendTiming(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="append"):
-    """X6: the appends of one log, by durability (`buffered`, `written`, `synced-first`), one duration a record."""
+    """X6: the appends of one log, by durability (`buffered`, `written`, `synced-first`), one duration a record.
+
+    `octets` are those of these records. The first record of the log, which has the bundle, is not among them.
+    """
 
     durability: str
     repetition: Natural
@@ -123,12 +126,15 @@ class AppendTiming(msgspec.Struct, frozen=True, kw_only=True, tag_field="result"
 
 
 class VerificationTiming(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="verification"):
-    """X6: one verification of a log: `fast`, `default`, `audit-no-derive`, `audit`."""
+    """X6: one verification of a log: `fast`, `default`, `audit-no-derive`, `audit`. `cold`: no verification before it
+    in this process opened the bundle of the log, whose result is kept.
+    """
 
     way: str
     records: Natural
     repetition: Natural
     took_ns: Natural
+    cold: bool = False
 
 
 class ComponentSize(msgspec.Struct, frozen=True, kw_only=True, tag_field="result", tag="component"):

@@ -111,10 +111,14 @@ def timings(runs: int = RUNS) -> Iterator[Result]:
             took = round(600_000 * chance.uniform(0.9, 1.4))
             yield FallbackReaction(case=case, mode="software", repetition=repetition, took_ns=took)
     for durability, most in (("buffered", 2_000), ("written", 4_000), ("synced-first", 700_000)):
-        appended = tuple(round(most * chance.uniform(0.8, 1.6)) for _ in range(1000))
-        yield AppendTiming(durability=durability, repetition=1, octets=570_000, appended_ns=appended)
+        for repetition in range(1, runs + 1):
+            appended = tuple(round(most * chance.uniform(0.8, 1.6)) for _ in range(1000))
+            yield AppendTiming(durability=durability, repetition=repetition, octets=570_000, appended_ns=appended)
     for way, each in (("fast", 1_060), ("default", 1_390), ("audit-no-derive", 10_900), ("audit", 31_100)):
-        yield VerificationTiming(way=way, records=1000, repetition=1, took_ns=each * 1000)
+        for repetition in range(1, runs + 1):
+            for cold in (True, False):
+                took = (each + 14_000 * cold) * 1000
+                yield VerificationTiming(way=way, records=1000, repetition=repetition, took_ns=took, cold=cold)
 
 
 def sizes() -> Iterator[ComponentSize]:

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import nullcontext
 from importlib import import_module
+from itertools import pairwise
 from typing import Any, cast
 
 from rtshcua import __version__
@@ -60,6 +61,8 @@ def _unknown(word: str) -> ExitCode:
 
 def _call(row: Row, words: list[str]) -> int:
     """Import the command of `row` and run it with typer, but report errors in our own format."""
+    if _is_output_empty(words):  # an empty path would be the current folder
+        return fail(ExitCode.USAGE, "`--output` has an empty value", "give the name of a file or folder")
     if row.fast_path:
         from rtshcua.front.cli import fast_path
 
@@ -105,6 +108,12 @@ def _call(row: Row, words: list[str]) -> int:
         return _misused(row, error, words)
 
 
+def _is_output_empty(words: list[str]) -> bool:
+    """Whether the option `--output` is there without a name, in the words before `--`."""
+    options = words[: words.index("--")] if "--" in words else words
+    return "--output=" in options or any(pair in (("-o", ""), ("--output", "")) for pair in pairwise(options))
+
+
 def _unguarded(command: object) -> None:
     """Disable typer's check of readable files: an unreadable file is bad input, not a wrong command line."""
     for parameter in getattr(command, "params", ()):
@@ -118,10 +127,15 @@ def _unguarded(command: object) -> None:
 
 
 def _reflowed(command: object) -> None:
-    """Join each paragraph of a command's help into one line, which typer wraps at the terminal's width."""
+    """Join each paragraph of a command's help into one line, which typer wraps at the terminal's width; and mark the
+    brackets in the help of its options as text: rich would drop them, with the defaults in them, as a style.
+    """
     text = getattr(command, "help", None)
     if text:
         command.help = "\n\n".join(" ".join(each.split()) for each in text.split("\n\n"))  # type: ignore[attr-defined]
+    for parameter in getattr(command, "params", ()):
+        if getattr(parameter, "help", None):
+            parameter.help = re.sub(r"(?<!\\)\[", r"\\[", parameter.help)
     for verb in getattr(command, "commands", {}).values():
         _reflowed(verb)
 

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import threading
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from random import Random
@@ -217,3 +218,25 @@ def test_stop_does_not_wait_for_flights_in_progress() -> None:
     with pytest.raises(Enough):
         list(processes.fly(NeverEnds(b"", b"", ()), few()))
     processes.close()
+
+
+@pytest.mark.slow
+def test_stop_prints_no_traceback(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where the processes are gone before the pool notices that it is closed."""
+    said = list[object]()
+    monkeypatch.setattr(threading, "excepthook", said.append)
+    looks = iter([None, None])
+
+    def look() -> None:
+        if next(looks, Enough) is Enough:
+            raise Enough
+
+    processes = WorkerProcesses(1, look)
+    with pytest.raises(Enough):
+        list(processes.fly(NeverEnds(b"", b"", ()), few()))
+    assert processes._pool is not None
+    for process in (*processes._pool._processes.values(),):
+        process.kill()
+        process.join()
+    processes.close()
+    assert said == []

@@ -4,11 +4,14 @@ from pathlib import Path
 
 import pytest
 
+from rtshcua.adapters.store.verification import VerificationInputs
 from rtshcua.evaluation import evidence_costs, fallback_costs
 from rtshcua.evaluation.cases import CASES
 from rtshcua.evaluation.design import EvaluationPlan, WorkUnit
 from rtshcua.evaluation.evidence_costs import DURABILITIES, WAYS
 from rtshcua.evaluation.results import AppendTiming, FallbackTiming, VerificationTiming
+from rtshcua.ground.audit import trust
+from rtshcua.ground.audit.audit import Audit
 from rtshcua.model.outcome import Outcome
 
 
@@ -34,11 +37,11 @@ def test_other_outcome_ends_the_measurement(monkeypatch: pytest.MonkeyPatch) -> 
 
 @pytest.mark.parametrize("durability", DURABILITIES)
 def test_each_record_of_a_log_is_an_append(durability: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(evidence_costs, "_WARM", 2)
+    monkeypatch.setattr(evidence_costs, "WARM_APPENDS", 2)
     (found,) = evidence_costs.run(WorkUnit("X6", ("append", durability, 20, 1)))
     assert isinstance(found, AppendTiming)
     assert (found.durability, found.repetition, len(found.appended_ns)) == (durability, 1, 20)
-    assert found.octets > 20 * 400
+    assert 20 * 400 < found.octets < 20 * 700, "the first record, with the bundle, is not among them"
 
 
 def test_log_is_verified_each_way() -> None:
@@ -46,6 +49,22 @@ def test_log_is_verified_each_way() -> None:
     assert all(isinstance(each, VerificationTiming) and each.took_ns > 0 for each in found)
     asked = [(each.way, each.repetition) for each in found if isinstance(each, VerificationTiming)]
     assert asked == [(way, number) for number in (1, 2) for way in WAYS]
+
+
+def test_each_way_is_verified_cold_and_warm(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cold, nothing remembers the bundle of the log."""
+    remembered = list[int]()
+    verify = evidence_costs.WAYS["default"]
+
+    def looked(path: Path, inputs: VerificationInputs) -> Audit:
+        remembered.append(trust._trusted.cache_info().currsize)
+        return verify(path, inputs)
+
+    monkeypatch.setitem(evidence_costs.WAYS, "default", looked)
+    found = evidence_costs.run(WorkUnit("X6", ("verification", "", 40, 2)))
+    asked = [(each.way, each.repetition, each.cold) for each in found if isinstance(each, VerificationTiming)]
+    assert asked == [(way, number, cold) for number in (1, 2) for way in WAYS for cold in (True, False)]
+    assert remembered == [0, 1, 0, 1]
 
 
 def test_log_that_is_not_verified_ends_the_measurement(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 from contextlib import nullcontext
-from errno import ENOSPC
+from errno import EACCES, ENOSPC
 from pathlib import Path
 from tempfile import gettempdir
 
@@ -206,8 +206,12 @@ def test_report_counts_what_is_not_in_the_results(tmp_path: Path, tiny: dict[str
     path.write_bytes(path.read_bytes() + b"x\n")
     written = report(asked(tmp_path))
     assert isinstance(written, WrittenReport)
+    assert [name for name, _ in written.not_counted] == ["X1", "X1"]
     text = " ".join(written.text.read_text().replace("\\", "").split())
-    assert "| X1, not counted | - | 1 lines that are cut off, malformed or of units that are not complete |" in text
+    assert (
+        "| X1, not counted | - | 1 lines that are cut off, malformed, not of the design or of incomplete units |"
+        in text
+    )
     assert "2 attempts at 2 units of work failed, 1 of which have no results yet; the first: none 0: Run" in text
 
 
@@ -283,6 +287,37 @@ def test_wrong_request_is_refused(change: dict[str, object], said: str, tmp_path
     refused = prepare(EvaluationRequest((), (), 1, 1, quick=False, output=tmp_path)._replace(**change))
     assert isinstance(refused, Refusal)
     assert refused.text.startswith(said)
+
+
+@rows("name", ["report.html", "report.md"])
+def test_report_of_something_else_is_kept(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text("of a campaign")
+    refused = prepare(EvaluationRequest((), (), 1, 1, quick=False, output=tmp_path))
+    assert isinstance(refused, Refusal)
+    assert (refused.slug, refused.text) == ("usage", f"`{tmp_path / name}` is there, but no raw data of an evaluation")
+    assert (tmp_path / name).read_text() == "of a campaign"
+    (tmp_path / name).unlink()
+
+
+def test_own_report_is_replaced(tmp_path: Path) -> None:
+    ended(asked(tmp_path))
+    (tmp_path / "report.html").write_text("an earlier one")
+    assert isinstance(report(asked(tmp_path)), WrittenReport)
+    assert (tmp_path / "report.html").read_text().startswith("<!DOCTYPE html>")
+
+
+def test_folder_that_cannot_be_made_keeps_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is kept is said only where something is."""
+
+    def forbidden(path: Path) -> None:
+        raise PermissionError(EACCES, "Permission denied", str(path))
+
+    made = asked(tmp_path / "new")
+    monkeypatch.setattr(raw_data, "make_folder", forbidden)
+    refused = measure(made, Silent(), Never(), here)
+    assert isinstance(refused, Refusal)
+    assert (refused.code, refused.help) == (ExitCode.FULL, "name another folder with `-o`")
+    monkeypatch.undo()
 
 
 def test_file_in_place_of_the_folder_is_refused(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from rtshcua.evaluation.results import (
     VerificationTiming,
 )
 
-HELD, MISSED, NOT_MEASURED, NOT_AVAILABLE = ClaimVerdict
+HELD, MISSED, INCOMPLETE, NOT_MEASURED, NOT_AVAILABLE = ClaimVerdict
 POINT = POINTS[4]
 
 
@@ -76,6 +76,12 @@ def test_a_failure_is_not_undone_by_flying_again() -> None:
     assert found.measured.startswith("1 and 0")
 
 
+def test_counts_of_a_claim_are_those_of_the_times() -> None:
+    late = steps_of(flight(*POINT, "software", 1), end_to_end_ns=9_000_000_000)
+    fell = steps_of(flight(*POINTS[5], "software", 1), outcome="fallback")
+    assert claim([late, fell], "x1/software").measured == "1 and 1; disturbed flights: 2"
+
+
 def steps_of(flight: PointFlight, **change: Any) -> PointFlight:
     """A flight that says of itself that nothing happened, with its second step changed."""
     first, second, *others = flight.invocations
@@ -118,12 +124,12 @@ def test_verdict_looks_good_only_where_every_claim_holds() -> None:
     assert judge([])._replace(claims=held).style == "held"
 
 
-def test_a_missing_cell_leaves_a_claim_not_measured() -> None:
+def test_a_missing_cell_leaves_a_claim_incomplete() -> None:
     found = claim(list(flights(["software"], POINTS[1:], runs=1)), "x1/software")
-    assert (found.verdict, found.runs) == (NOT_MEASURED, len(POINTS) - 1)
+    assert (found.verdict, found.runs) == (INCOMPLETE, len(POINTS) - 1)
 
 
-def test_too_few_repetitions_leave_a_claim_not_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_too_few_repetitions_leave_a_claim_incomplete(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(measures, "RUNS", 2)
     monkeypatch.setattr(headline_claims, "RUNS", 2)
     results = [*flights(["software"], runs=2), *checks(["software"], runs=2)]
@@ -134,23 +140,23 @@ def test_too_few_repetitions_leave_a_claim_not_measured(monkeypatch: pytest.Monk
         for each in results
         if not (isinstance(each, PointFlight) and each.seed == 2 and each.deadline_us == POINT.deadline_us)
     ]
-    assert claim(short, "x1/software").verdict is NOT_MEASURED
-    assert claim(list(checks(["software"], runs=1)), "x3/software").verdict is NOT_MEASURED
+    assert claim(short, "x1/software").verdict is INCOMPLETE
+    assert claim(list(checks(["software"], runs=1)), "x3/software").verdict is INCOMPLETE
 
 
 def test_the_same_run_twice_does_not_complete_a_cell(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(measures, "RUNS", 2)
     monkeypatch.setattr(headline_claims, "RUNS", 2)
     twice = [*flights(["software"], runs=1), *flights(["software"], runs=1), *checks(["software"], runs=1)] * 2
-    assert claim(twice, "x1/software").verdict is NOT_MEASURED
-    assert claim(twice, "x3/software").verdict is NOT_MEASURED
+    assert claim(twice, "x1/software").verdict is INCOMPLETE
+    assert claim(twice, "x3/software").verdict is INCOMPLETE
 
 
 def test_a_mode_that_is_not_available_counts_by_its_results_if_it_has_any() -> None:
     absent = UnavailableMode(mode="optee", why="QEMU is missing")
     assert claim([absent], "x1/optee").verdict is NOT_AVAILABLE
     assert target([absent], "isolation").verdict is NOT_AVAILABLE
-    assert claim([absent, flight(*POINT, "optee", 1)], "x1/optee").verdict is NOT_MEASURED
+    assert claim([absent, flight(*POINT, "optee", 1)], "x1/optee").verdict is INCOMPLETE
     assert claim([absent, *flights(["optee"], runs=1)], "x1/optee").verdict is HELD
 
 
@@ -184,7 +190,7 @@ def test_a_flown_case_that_does_not_hold_fails() -> None:
     assert claim(results, "x3/runtime").verdict is MISSED
     for missing in ({"aloft": False}, {"flavour": "px4"}, {"case": "normal allow"}):
         some = [replace(each, **missing) for each in case_flights()]
-        assert claim(some, "x3/runtime").verdict is NOT_MEASURED, missing
+        assert claim(some, "x3/runtime").verdict is INCOMPLETE, missing
 
 
 def scaled(factor: float) -> list[Result]:
@@ -203,7 +209,7 @@ def test_overhead_that_grows_with_the_mission_fails() -> None:
     assert claim(scaled(FLAT), "x2/software").verdict is HELD
     assert claim(scaled(1 / FLAT), "x2/software").verdict is HELD
     assert claim(scaled(FLAT + 0.01), "x2/software").verdict is MISSED
-    assert claim(scaled(FLAT + 0.01)[1:], "x2/software").verdict is NOT_MEASURED
+    assert claim(scaled(FLAT + 0.01)[1:], "x2/software").verdict is INCOMPLETE
 
 
 def test_evidence_that_takes_longer_than_microseconds_fails() -> None:
@@ -215,6 +221,16 @@ def test_evidence_that_takes_longer_than_microseconds_fails() -> None:
     assert claim(slow, "x6/verification").verdict is HELD
 
 
+def test_few_logs_leave_evidence_incomplete(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(headline_claims, "RUNS", 2)
+    for slug in ("x6/append", "x6/verification"):
+        found = claim(list(timings(1)), slug)
+        assert (found.verdict, found.runs, found.planned) == (INCOMPLETE, 1, 2)
+    for slug in ("append", "verification"):
+        found_ = target(list(timings(1)), slug)
+        assert (found_.verdict, found_.runs, found_.planned) == (INCOMPLETE, 1, 2)
+
+
 def test_other_appends_and_logs_of_other_lengths_are_not_compared() -> None:
     others: list[Result] = [
         AppendTiming(durability="buffered", repetition=1, octets=1, appended_ns=(1,) * 1000),
@@ -222,6 +238,7 @@ def test_other_appends_and_logs_of_other_lengths_are_not_compared() -> None:
         VerificationTiming(way="fast", records=1000, repetition=1, took_ns=1),
         VerificationTiming(way="default", records=999, repetition=1, took_ns=1),
         VerificationTiming(way="default", records=262_144, repetition=1, took_ns=1),
+        VerificationTiming(way="default", records=1000, repetition=1, took_ns=1, cold=True),
     ]
     for slug in ("x6/append", "x6/verification"):
         assert claim(others, slug).verdict is NOT_MEASURED
@@ -232,11 +249,11 @@ def test_other_appends_and_logs_of_other_lengths_are_not_compared() -> None:
 def test_a_target_is_a_tenth_and_a_missed_one_fails_no_claim() -> None:
     results = [*everything(runs=1)]
     held, missed = target(results, "end-to-end/short"), target(results, "fallback")
-    assert (held.verdict, held.limit, held.published) == (HELD, 5.57, 55.7)
-    assert missed.verdict is MISSED
+    assert (held.verdict, held.limit, held.published, held.stated) == (HELD, 5.57, 55.7, "55.7")
+    assert (missed.verdict, missed.stated) == (MISSED, "0.132 to 0.143")
     assert missed.limit == pytest.approx(0.0132)
     assert not judge(results).failed
-    assert target(list(timings(1))[1:], "fallback").verdict is NOT_MEASURED
+    assert target(list(timings(1))[1:], "fallback").verdict is INCOMPLETE
 
 
 def test_the_slowest_condition_counts_for_the_fallback_target() -> None:
@@ -258,6 +275,9 @@ def test_isolation_target_is_the_paired_difference() -> None:
         for each in results
     ]
     assert target(slower, "isolation").verdict is MISSED
+    assert target(results, "isolation-in-c").verdict is INCOMPLETE
+    in_c = [*flights(["process"], runs=1), *slower]
+    assert target(in_c, "isolation-in-c").measured == pytest.approx(17.29, abs=0.02)
 
 
 def test_each_mode_has_its_claims() -> None:

@@ -96,11 +96,15 @@ def test_differences_are_paired_by_seed() -> None:
             *(timed("optee", seed, took) for seed, took in ((3, 1_050), (1, 110), (2, 230), (8, 5_000))),
         ]
     )
-    assert table.added("optee", point, end_to_end, median) == 30  # of 10, 30 and 50; seeds 8 and 9 have no pair
-    assert table.added("optee", point, validation, median) == 3
-    assert table.added("process", point, end_to_end, median) is None
-    assert table.added_average("optee", "short", end_to_end, median) == Averaged(30, 30, 30, 1)
-    assert table.added_average("optee", "standard", end_to_end, median) is None
+    assert (
+        table.added("optee", "software", point, end_to_end, median) == 30
+    )  # of 10, 30 and 50; seeds 8 and 9 have no pair
+    assert table.added("optee", "software", point, validation, median) == 3
+    assert table.added("process", "software", point, end_to_end, median) is None
+    assert table.added_average("optee", "software", "short", end_to_end, median) == Averaged(30, 30, 30, 1)
+    assert table.added_average("optee", "software", "standard", end_to_end, median) is None
+    assert table.added("software", "optee", point, end_to_end, median) == -30
+    assert table.added("optee", "process", point, end_to_end, median) is None
 
 
 def test_flatness_needs_all_three_missions() -> None:

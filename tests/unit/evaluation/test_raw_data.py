@@ -7,12 +7,20 @@ from typing import Any
 import pytest
 from msgspec.structs import replace
 
+from reference.evaluation_results import case_flights, checks, flight
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evaluation import raw_data
 from rtshcua.evaluation.computer import Computer
-from rtshcua.evaluation.design import WorkUnit
+from rtshcua.evaluation.design import POINTS, WorkUnit
 from rtshcua.evaluation.raw_data import FORMAT, RawExperiment, RawFolder, RawHeader, design_digest
-from rtshcua.evaluation.results import FailedAttempt, Result, UnavailableMode, VerificationTiming
+from rtshcua.evaluation.results import (
+    FailedAttempt,
+    FallbackReaction,
+    FallbackTiming,
+    Result,
+    UnavailableMode,
+    VerificationTiming,
+)
 from virtual.rows import rows
 
 COMPUTER = Computer(
@@ -132,6 +140,61 @@ def test_line_of_others_is_skipped_and_counted(written: bytes, tmp_path: Path, m
     read = found(made)
     assert (read.results, read.skipped) == ((*verified(1), *verified(2)), 1)
     path.unlink()
+
+
+FLIGHT = flight("short", 100_000, "software", 1)
+CHECK = next(checks(["software"], POINTS[:1], runs=1))
+FLOWN = next(case_flights())
+TIMED = FallbackTiming(case="low battery", mode="software", repetition=1, local_ns=1, written_ns=2, synced_ns=3)
+REACTED = FallbackReaction(case="low battery", mode="software", repetition=1, took_ns=1)
+#: results with the keys of their units
+OWN = [
+    (("short", 100_000, 1, "software"), FLIGHT),
+    (("check", "short", 100_000, "software", 1), CHECK),
+    (("flight", "normal allow", "short", 100_000, "px4", "aloft"), FLOWN),
+    (("software", 30), TIMED),
+    (("reaction", "low battery", "software", 30), REACTED),
+]
+#: and such that are not of their unit, or not of the design
+OTHERS = [
+    (("short", 100_000, 2, "software"), FLIGHT),
+    (("short", 100_000, 1, "process"), FLIGHT),
+    (("short", 123_456, 1, "software"), replace(FLIGHT, deadline_us=123_456)),
+    (("brief", 100_000, 1, "software"), replace(FLIGHT, mission="brief")),
+    (("short", 100_000, 1, "magic"), replace(FLIGHT, mode="magic")),
+    (("check", "short", 100_000, "process", 1), CHECK),
+    (("check", "short", 100_000, "software", 1), replace(CHECK, case="another")),
+    (("check", "short", 5, "software", 1), replace(CHECK, deadline_us=5)),
+    (("flight", "replay", "short", 100_000, "px4", "aloft"), FLOWN),
+    (("flight", "normal allow", "short", 100_000, "px4", "ground"), FLOWN),
+    (("process", 30), TIMED),
+    (("software", 30), replace(TIMED, case="another")),
+    (("reaction", "replay", "software", 30), REACTED),
+]
+
+
+@rows(("key", "result"), OWN)
+def test_result_of_its_unit_counts(key: tuple[str | int, ...], result: Result, tmp_path: Path) -> None:
+    assert kept_as(key, result, tmp_path) == ((result,), 0)
+
+
+@rows(("key", "result"), OTHERS)
+def test_result_of_another_unit_or_design_is_skipped_and_counted(
+    key: tuple[str | int, ...], result: Result, tmp_path: Path
+) -> None:
+    assert kept_as(key, result, tmp_path) == ((), 1)
+
+
+def kept_as(key: tuple[str | int, ...], result: Result, path: Path) -> tuple[tuple[Result, ...], int]:
+    """What is read of a result that was kept for a unit, and how many lines were skipped."""
+    made = RawFolder(path)
+    with made.held():
+        assert made.begin(HEADER) is None
+        keep(made, WorkUnit("X6", key), result)
+    read = found(made)
+    assert bool(read.units) == bool(read.results)
+    (path / "X6.jsonl").unlink()
+    return read.results, read.skipped
 
 
 def test_lines_of_another_program_do_not_make_a_unit(folder: RawFolder) -> None:

@@ -4,12 +4,12 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated, Any, Final
 
 import typer
 
 from rtshcua.app import evaluation as service
-from rtshcua.app.evaluation import OUTPUT, Evaluation, EvaluationOutcome, EvaluationRequest, WrittenReport
+from rtshcua.app.evaluation import OUTPUT, QUICK_OUTPUT, Evaluation, EvaluationOutcome, EvaluationRequest, WrittenReport
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evaluation.experiments import UnitResults
@@ -43,7 +43,13 @@ Campaigns = Annotated[
     list[Path] | None,
     typer.Option(metavar="DIR", help="report the flights of this campaign too (repeatable): docs/flying/campaigns.md"),
 ]
-Output = Annotated[Path, typer.Option("--output", "-o", help="folder of the raw data and the report")]
+Output = Annotated[
+    Path | None,
+    typer.Option(
+        "--output", "-o",
+        help=f"folder of the raw data and the report [default: {OUTPUT}; with --quick {QUICK_OUTPUT}]",
+    ),
+]  # fmt: skip
 AsJson = Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")]
 
 
@@ -60,7 +66,7 @@ def paper(
     jobs: Jobs = None,
     quick: Quick = False,
     campaign: Campaigns = None,
-    output: Output = OUTPUT,
+    output: Output = None,
     as_json: AsJson = False,
 ) -> ExitCode:
     """Run the experiments of the paper (X1 to X7), and report our figures beside the published ones.
@@ -69,7 +75,11 @@ def paper(
     failed. Details: docs/evaluation.md.
     """
     findings = Findings(json=as_json)
-    request = EvaluationRequest(_names(only, upper=True), _names(modes), runs, jobs, quick, output, campaign or ())
+    empty = _empty(only=only, modes=modes)
+    if empty:
+        return findings.refuse(ExitCode.USAGE, "usage", f"`--{empty}` names nothing", "leave it out for all")
+    folder = output or (QUICK_OUTPUT if quick else OUTPUT)
+    request = EvaluationRequest(_names(only, upper=True), _names(modes), runs, jobs, quick, folder, campaign or ())
     made = service.prepare(request)
     if isinstance(made, Refusal):
         return findings.end(made)
@@ -86,22 +96,37 @@ def paper(
         out(*_told(ended, written))
     claims = written.report.claims
     code = ExitCode.DIAGNOSTICS if claims.failed else ExitCode.FAULT if ended.failed else ExitCode.OK
-    return findings.finish(
-        code, folder=str(output), report=str(written.page), done=ended.done, asked=ended.asked,
-        not_measured=[{"unit": _unit(each), "why": each.failed} for each in ended.failed],
-        claims=[each._asdict() for each in claims.claims], targets=[each._asdict() for each in claims.targets],
-    )  # fmt: skip
+    return findings.finish(code, folder=str(folder), **_summary(ended, written))
+
+
+def _empty(**lists: str | None) -> str:
+    """The name of an option that is there without a name in it; "" if there is none."""
+    return next((name for name, given in lists.items() if given is not None and not _names(given)), "")
+
+
+def _summary(ended: EvaluationOutcome, written: WrittenReport) -> dict[str, Any]:
+    """What became of the evaluation, as the members of a JSON object."""
+    claims = written.report.claims
+    return {
+        "report": str(written.page), "done": ended.done, "asked": ended.asked,
+        "not_measured": [{"unit": _unit(each), "why": each.failed} for each in ended.failed],
+        "not_counted": [{"experiment": name, "what": text} for name, text in written.not_counted],
+        "claims": [each._asdict() for each in claims.claims],
+        "targets": [each._asdict() for each in claims.targets],
+    }  # fmt: skip
 
 
 def _told(ended: EvaluationOutcome, written: WrittenReport) -> Sequence[str]:
     """The claims, the targets that were missed, and where the report is."""
     claims = written.report.claims
-    measured = [each for each in claims.claims if each.measured]
     lines = [
-        f"{each.verdict:<18} {each.text}: {each.measured} ({each.runs:,} of {each.planned:,} runs)" for each in measured
+        f"{each.verdict:<18} {each.text}: {each.measured or 'no figure yet'} ({each.runs:,} of {each.planned:,} runs)"
+        for each in claims.claims
+        if each.runs
     ]
-    lines += [f"{len(claims.claims) - len(measured)} of {len(claims.claims)} claims have no measurement yet"]
+    lines += [written.report.verdict.replace("`", "")]
     lines += [f"{'target missed':<18} {each.text}" for each in claims.targets if each.verdict is ClaimVerdict.MISSED]
+    lines += [f"{'not counted':<18} {name}: {text}" for name, text in written.not_counted]
     if ended.failed:
         first = ended.failed[0]
         lines.append(f"{len(ended.failed)} units of work failed, the first: {_unit(first)}: {first.failed}")

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.evaluation.design import MODES
+from rtshcua.evaluation.design import MISSIONS, MODES
 from rtshcua.evaluation.experiments import EXPERIMENTS
 from rtshcua.evaluation.raw_data import RawExperiment, RawFolder
 from rtshcua.evaluation.results import PointFlight, UnavailableMode
@@ -54,6 +54,7 @@ def test_sample_measures_each_experiment_in_each_mode(
     assert {each.mode for each in results if isinstance(each, PointFlight | UnavailableMode)} == set(modes)
     flown = [each for each in results if isinstance(each, PointFlight)]
     assert {each.ending for each in flown} == {"completed"}
+    assert {each.mission for each in flown} == {*MISSIONS}
     assert all(each.fallbacks == 0 and each.proposal_ns > 0 for each in flown)
     for flight in flown:
         assert [step.step for step in flight.invocations] == [*range(len(flight.invocations))]
@@ -114,9 +115,49 @@ def test_wrong_use_names_what_is_accepted(
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--only", ""], "`--only` names nothing"),
+        (["--only", " ,"], "`--only` names nothing"),
+        (["--modes", ""], "`--modes` names nothing"),
+        (["-o", ""], "`--output` has an empty value"),
+        (["--output="], "`--output` has an empty value"),
+    ],
+)
+def test_empty_value_is_wrong_use(
+    words: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An empty name of a folder would be the current folder, and no name of an experiment all of them."""
+    monkeypatch.chdir(tmp_path)
+    code, told = ran(capsys, *words)
+    assert (code, told["error"]["text"]) == (ExitCode.USAGE, said)
+    assert [*tmp_path.iterdir()] == []
+
+
+@pytest.mark.parametrize(("words", "folder"), [([], "evaluation"), (["--quick"], "evaluation-quick")])
+def test_sample_has_a_folder_of_its_own(
+    words: list[str], folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "runs" / folder).mkdir(parents=True)
+    (tmp_path / "runs" / folder / "report.md").touch()
+    code, told = ran(capsys, *words)
+    assert (code, told["error"]["slug"]) == (ExitCode.USAGE, "usage")
+    assert f"runs/{folder}/report.md` is there" in told["error"]["text"]
+
+
 def test_folder_of_something_else_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "X1.jsonl").write_text("{}\n")
     code, told = ran(capsys, "--only", "x1", "-o", str(tmp_path))
     assert code == ExitCode.INPUT, told
     assert "does not begin as raw data of an evaluation" in told["error"]["text"]
     assert (tmp_path / "X1.jsonl").read_text() == "{}\n"
+
+
+def test_help_names_the_defaults_of_options(capsys: pytest.CaptureFixture[str]) -> None:
+    """Rich takes what is in brackets for a style, and drops it."""
+    assert app.main(["bench", "paper", "--help"]) == ExitCode.OK
+    said = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    for default in ("all", "30; with --quick 1", "runs/evaluation; with --quick runs/evaluation-quick"):
+        assert f"[default: {default}]" in said

@@ -213,8 +213,8 @@ def _checked(
 
 
 def _flat(flights: FlightTable, absent: set[str]) -> Iterator[HeadlineClaim]:
-    """X2: the overhead does not grow with the length of a mission."""
-    for mode in MODES:
+    """X2: the overhead does not grow with the length of a mission. The baseline has none: its ratio is a figure only."""
+    for mode in [each for each in MODES if each != UNENFORCED]:
         key = f"x2/median/{{}}/{mode}"
         stated = [FIGURES[key.format(mission)].low for mission in MISSIONS if key.format(mission) in FIGURES]
         runs, ratio, complete = len(flights.flights(mode)), flights.flatness(mode), flights.complete(mode)

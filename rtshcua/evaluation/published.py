@@ -342,7 +342,8 @@ CHOICES: Final = (
     ),
     OpenChoice(
         "flat", "claims", "how far an overhead is flat over mission length",
-        f"the largest of the three median end-to-end latencies is at most {FLAT} times the smallest, in each mode",
+        f"the largest of the three median end-to-end latencies is at most {FLAT} times the smallest, in each mode. "
+        "Without enforcement there is no overhead: the ratio of `unenforced` is printed, and claims nothing",
     ),
     OpenChoice(
         "microseconds", "claims", "how far evidence costs microseconds",

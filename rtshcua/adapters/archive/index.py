@@ -63,10 +63,15 @@ _ROWS: Final = {
 }  # fmt: skip
 
 
-@cache
 def _engine() -> duckdb.DuckDBPyConnection:
-    """A shared engine for small queries, because making one takes longer; objects made in a cursor end with it. It
-    caches no file: the catalogue is replaced under the same name.
+    """A shared engine for small queries, because making one takes longer; objects made in a cursor end with it."""
+    return _engine_of(os.getpid())
+
+
+@cache
+def _engine_of(_process: int) -> duckdb.DuckDBPyConnection:
+    """The engine of one process: one that a fork took over waits for ever for threads that it does not have. It caches
+    no file: the catalogue is replaced under the same name.
     """
     return duckdb.connect(config={"enable_external_file_cache": "false"})
 

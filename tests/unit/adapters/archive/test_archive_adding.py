@@ -1,6 +1,8 @@
 """Logs are copied byte for byte, verified before they are indexed, and never indexed twice."""
 
 import json
+import os
+import signal
 from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
@@ -432,3 +434,13 @@ def test_a_witness_holds_both_flights_of_a_bundle_that_flew_twice(
     generated_logs.write(logs[0], "quad-07", 0, records=2)  # of the same boot, and nothing was sent
     (anew,) = take([logs[0]])
     assert (anew.entry.status, anew.entry.finding) == ("failed", "anchor/beyond")
+
+
+def test_a_forked_process_reads_the_catalogue_too(filled: ArchiveFolder) -> None:
+    """The engine of its parent would wait for threads that a fork does not copy."""
+    many = len(index.read_catalogue(filled))
+    child = os.fork()
+    if not child:
+        signal.alarm(60)
+        os._exit(0 if len(index.read_catalogue(filled)) == many else 1)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0

@@ -262,7 +262,7 @@ def acks(actions: list[Action], client: int = 1) -> list[tuple[int, int]]:
 
 
 def texts(actions: list[Action], client: int = 1) -> list[str]:
-    """The texts to a client, with their chunks joined."""
+    """The texts to a client: chunks joined, with one space for those that fill one."""
     found: list[str] = []
     for message in told(actions, client):
         if message.get_type() == "STATUSTEXT":
@@ -270,7 +270,7 @@ def texts(actions: list[Action], client: int = 1) -> list[str]:
                 found[-1] += message.text
             else:
                 found.append(message.text)
-    return found
+    return [" ".join(each.split()) for each in found]
 
 
 def command_long(number: int, *parameters: float, confirmation: int = 0) -> Any:

@@ -149,7 +149,7 @@ class ScriptClient:
         """Join the chunks of a text (STATUSTEXT, `id` and `chunk_seq`)."""
         self._text = (self._text if message.chunk_seq else "") + message.text
         if message.id == 0 or len(message.text) < 50:
-            self.texts.append(self._text)
+            self.texts.append(" ".join(self._text.split()))
 
     def position(self) -> Any:
         """The vehicle's position now."""

@@ -11,8 +11,8 @@ from rtshcua.mavlink.layouts import TEXT_OCTETS
 
 #: a text with the same key is sent once in this time, us
 TEXT_EVERY_US: Final = 5_000_000
-#: the most octets of one text: four chunks
-_LONGEST_TEXT: Final = 4 * TEXT_OCTETS
+#: the most chunks of one text
+_MOST_CHUNKS: Final = 4
 _MOST_KEYS: Final = 64
 #: a `client` record: its most octets; how many at once, and the interval after that, us
 LONGEST_RECORD: Final = 200
@@ -94,10 +94,7 @@ class ClientLink:
             if len(self._told) >= _MOST_KEYS:
                 self._told.clear()
             self._told[key] = now_us
-        octets = text.encode("ascii", "replace")[:_LONGEST_TEXT]
-        chunks = [octets[at : at + TEXT_OCTETS] for at in range(0, len(octets), TEXT_OCTETS)]
-        if len(chunks) > 1 and len(chunks[-1]) == TEXT_OCTETS:
-            chunks.append(b"")  # a text ends with a chunk that is not full
+        chunks = _chunks(text.encode("ascii", "replace"))
         self._texts = self._texts % 0xFFFF + 1
         number = self._texts if len(chunks) > 1 else 0
         for at, chunk in enumerate(chunks):
@@ -121,6 +118,23 @@ class ClientLink:
             if len(_compact(more)) <= LONGEST_RECORD:
                 said = more
         self._actions.append(ClientNote(_compact(said)))
+
+
+def _chunks(text: bytes) -> list[bytes]:
+    """The chunks of a STATUSTEXT. All but the last are full, as its `chunk_seq` demands; they are cut between words and
+    filled with spaces, because many clients show each chunk as a line of its own.
+    """
+    chunks: list[bytes] = []
+    while len(text) > TEXT_OCTETS and len(chunks) < _MOST_CHUNKS:
+        cut = text.rfind(b" ", 0, TEXT_OCTETS)
+        cut = TEXT_OCTETS if cut <= 0 else cut
+        chunks.append(text[:cut].ljust(TEXT_OCTETS))
+        text = text[cut:].lstrip()
+    if len(chunks) < _MOST_CHUNKS:
+        chunks.append(text)
+    if len(chunks) > 1 and len(chunks[-1]) == TEXT_OCTETS:
+        chunks.append(b"")  # a text ends with a chunk that is not full
+    return chunks
 
 
 def _compact(said: dict[str, Any]) -> str:

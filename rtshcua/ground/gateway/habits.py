@@ -15,18 +15,22 @@ from rtshcua.ground.gateway.interface import Action, Withhold
 from rtshcua.ground.gateway.translation import ACCEPTED, DENIED, TEMPORARILY_REJECTED
 from rtshcua.ground.gateway.vehicle_seen import VehicleSeen, parameter_name
 from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink.modes import PX4
 from rtshcua.mavlink.parameters import decode, encode
 
 #: how long an absorbed arming, or a mode without effect, is shown, us
 SHOWN_US: Final = 20_000_000
 _MOST_SHADOWS: Final = 32
+#: how ArduPilot and PX4 begin the reason why they do not arm: several clients show no other texts
+_REFUSED, _REFUSED_PX4 = "PreArm", "Arming denied"
 
 
 class ShownState:
     """What one client is shown, and the withheld messages that follow from it."""
 
-    def __init__(self, link: ClientLink, seen: VehicleSeen, actions: list[Action]) -> None:
+    def __init__(self, link: ClientLink, seen: VehicleSeen, actions: list[Action], autopilot: int) -> None:
         self._link = link
+        self._refused = _REFUSED_PX4 if autopilot == PX4 else _REFUSED
         self._seen = seen
         self._actions = actions
         self._armed_until_us = 0
@@ -46,26 +50,27 @@ class ShownState:
         mode, before, until_us = self._mode
         return mode if now_us < until_us and self._seen.mode == before else None
 
-    def arm(self, message: Received, now_us: int, unready: str | None) -> int:
-        """The answer to COMPONENT_ARM_DISARM. `unready`: why the vehicle cannot take off now, if known."""
+    def arm(self, message: Received, now_us: int, hindrance: tuple[int, str] | None) -> int:
+        """The answer to COMPONENT_ARM_DISARM. `hindrance`: why no take-off could follow now, with the MAV_RESULT."""
         wanted, force = message.number("param1"), message.number("param2")
         if not isnan(force) and force != 0:
             self._link.text("forced arming and disarming are refused", now_us)
             self._link.record("refused", now_us, command="COMPONENT_ARM_DISARM", reason="forced")
             return DENIED
         if wanted == 1:
-            return self._arm(now_us, unready)
+            return self._arm(now_us, hindrance)
         if wanted == 0:
             return self._disarm(now_us)
         return DENIED
 
-    def _arm(self, now_us: int, unready: str | None) -> int:
+    def _arm(self, now_us: int, hindrance: tuple[int, str] | None) -> int:
         if self._seen.armed:
             return ACCEPTED
-        if unready is not None:
-            self._link.text(f"not ready to arm: {unready}", now_us)
-            self._link.record("refused", now_us, command="COMPONENT_ARM_DISARM", reason=unready)
-            return TEMPORARILY_REJECTED
+        if hindrance is not None:
+            result, reason = hindrance
+            self._link.text(f"{self._refused}: {reason}", now_us)
+            self._link.record("refused", now_us, command="COMPONENT_ARM_DISARM", reason=reason)
+            return result
         self._armed_until_us = now_us + SHOWN_US
         self._link.text("armed for you; a permitted take-off arms the vehicle", now_us, "armed", NOTICE)
         self._link.record("absorbed", now_us, command="COMPONENT_ARM_DISARM")

@@ -43,11 +43,12 @@ _CLAUSE: Final = 100
 
 
 class QuickRefusal(NamedTuple):
-    """A MAV_RESULT, the slug of the reason, and the answer in words."""
+    """A MAV_RESULT, the slug of the reason, the answer in words, and whether other arguments might pass."""
 
     result: int
     reason: str
     text: str
+    by_argument: bool = False
 
 
 class QuickDecision:
@@ -68,7 +69,7 @@ class QuickDecision:
             return QuickRefusal(DENIED, Reason.NOT_PERMITTED, text)
         invocation = self._prepared(step, role, now)
         if isinstance(invocation, Refusal):
-            return QuickRefusal(DENIED, Reason.ARGUMENT_RANGE, f"{step.skill} denied: {invocation.text}")
+            return QuickRefusal(DENIED, Reason.ARGUMENT_RANGE, f"{step.skill} denied: {invocation.text}", True)
         context = Context(b"", flat.vehicle.identity, flat.version, 0, now.monotonic_us, 0, 0, ())
         state = self._state_of(now)
         decision = decide(invocation, state, self._policy, context, now)
@@ -81,7 +82,9 @@ class QuickDecision:
         near = self._accepted(near, step, role, context, state, now)
         words = _words(decision, near, invocation, state, self._policy, now)
         text = f"{step.skill} {'denied' if denied else 'rejected'}: {words}"
-        return QuickRefusal(DENIED if denied else TEMPORARILY_REJECTED, decision.reason, text)
+        parameters = {each.name for each in flat.contracts[self._skills[step.skill]].parameters}
+        by_argument = bool(near) and all(each.subject in parameters for each in near)
+        return QuickRefusal(DENIED if denied else TEMPORARILY_REJECTED, decision.reason, text, by_argument)
 
     def _accepted(
         self, near: tuple[Nearest, ...], step: ProposedStep, role: str, context: Context, state: State, now: Now

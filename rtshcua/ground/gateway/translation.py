@@ -143,14 +143,17 @@ class Translation:
                 return Untranslated(DENIED, f"{row.skill}: {parameter.name} is missing")
         return ProposedStep(row.skill, texts, tuple(cells))
 
-    def takeoff_to(self, altitude: int) -> ProposedStep | None:
-        """A take-off to a height in mm above home, by a skill of the table; None without such a skill."""
+    def takeoff_to(self, altitude: int | None = None) -> ProposedStep | None:
+        """A take-off to a height in mm above home, by default the least of its contract, by a skill of the table; None
+        without such a skill.
+        """
         for row in (each for some in self._rows.values() for each in some):
             contract = self._contracts.get(row.skill)
             if contract is not None and contract.motion.kind == MotionKind.CLIMB:
                 parameter = next(each for each in contract.parameters if each.cell == contract.motion.altitude)
                 if len(contract.parameters) == 1:
-                    return ProposedStep(row.skill, {parameter.name: written(altitude, Dimension.ALTITUDE)}, (altitude,))
+                    height = parameter.low if altitude is None else altitude
+                    return ProposedStep(row.skill, {parameter.name: written(height, Dimension.ALTITUDE)}, (height,))
         return None
 
     def with_speed(self, step: ProposedStep, metres_per_second: float) -> ProposedStep | Untranslated:

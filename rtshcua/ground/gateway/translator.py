@@ -189,7 +189,8 @@ class Gateway:
                     self._pilots[client] = link
                 elif len(self._clients) < _MOST_CLIENTS:
                     transfer = PlanTransfer(link, self._translation, self._settings.autopilot)
-                    self._clients[client] = _Client(link, ShownState(link, self._seen, self._actions), transfer)
+                    shown = ShownState(link, self._seen, self._actions, self._settings.autopilot)
+                    self._clients[client] = _Client(link, shown, transfer)
             case ClientDown(client):
                 self._down(client, now.monotonic_us)
             case ProposalChecked():
@@ -280,7 +281,7 @@ class Gateway:
         command, now_us = message.fields["command"], now.monotonic_us
         result: int | None
         if command == enums.MAV_CMD_COMPONENT_ARM_DISARM:
-            result = client.shown.arm(message, now_us, self._unready if self._stage == "waiting" else None)
+            result = client.shown.arm(message, now_us, self._cannot_take_off(client, now))
         elif command in REQUESTING:
             result = self._requests.command(client.link, message, now_us)
         elif command == enums.MAV_CMD_DO_SET_MODE:
@@ -420,7 +421,7 @@ class Gateway:
         now_us = now.monotonic_us
         refusal = self._quick.refusal(step, client.link.settings.role, now)
         if refusal is not None:
-            result, reason, text = refusal
+            result, reason, text, _ = refusal
         else:
             hindrance = self._hindrance(client, step, now_us)
             if hindrance is None:
@@ -429,6 +430,14 @@ class Gateway:
         client.link.text(text, now_us, f"{step.skill} {reason}" if command < 0 else "")
         client.link.record("refused", now_us, skill=step.skill, reason=reason, answer=text)
         return result
+
+    def _cannot_take_off(self, client: _Client, now: Now) -> tuple[int, str] | None:
+        """Why no take-off of this client could follow an arming now, whatever its height, and the MAV_RESULT."""
+        if self._stage == "waiting" and self._unready is not None:
+            return TEMPORARILY_REJECTED, self._unready
+        step = self._translation.takeoff_to()
+        refusal = None if step is None else self._quick.refusal(step, client.link.settings.role, now)
+        return None if refusal is None or refusal.by_argument else (refusal.result, refusal.text)
 
     def _stands(self, proposal: ClientProposal) -> bool:
         """Whether a proposal still says what the vehicle does: it is under way, or nothing was flown after it."""

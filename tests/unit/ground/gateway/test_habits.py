@@ -112,9 +112,30 @@ def test_a_vehicle_that_is_not_ready_is_not_shown_as_armed() -> None:
     world.line(type="vehicle", ready=False, unready="no position yet")
     actions = world.send(arm())
     assert acks(actions) == [(400, 1)]
-    assert texts(actions) == ["not ready to arm: no position yet"]
+    assert texts(actions) == ["Arming denied: no position yet"]
     world.line(type="vehicle", ready=False)
-    assert texts(world.send(arm())) == ["not ready to arm: the vehicle is not ready"]
+    assert texts(world.send(arm())) == ["Arming denied: the vehicle is not ready"]
+
+
+def test_arming_is_refused_where_no_take_off_could_follow() -> None:
+    """By hand: the autopilot, the role, the charge, the answer. ArduPilot's prefix is what several clients look for."""
+    world = GatewayWorld()
+    world.ready()
+    world.signals["battery"] = (3_000,)
+    actions = world.send(arm())
+    assert acks(actions) == [(400, 1)]
+    (said,) = texts(actions)
+    assert said.startswith("Arming denied: takeoff rejected: battery 30 %, accepted "), said
+    assert withheld(actions) == []
+    world = GatewayWorld(ARDUPILOT)
+    world.client(2, "nobody", role="trainee")
+    world.ready()
+    actions = world.send(arm(), client=2)
+    assert acks(actions, 2) == [(400, 2)]
+    assert texts(actions, 2) == ["PreArm: takeoff denied: no rule of bridge_inspection names the role trainee"]
+    chunks = [message.text for message in told(actions, 2) if message.get_type() == "STATUSTEXT"]
+    assert chunks == ["PreArm: takeoff denied: no rule of".ljust(50), "bridge_inspection names the role trainee"]
+    assert acks(world.send(arm())) == [(400, 0)], "another role may take off"
 
 
 # ---------------------------------------------------------------- modes

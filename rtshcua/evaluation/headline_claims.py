@@ -213,7 +213,7 @@ def _checked(
 
 
 def _flat(flights: FlightTable, absent: set[str]) -> Iterator[HeadlineClaim]:
-    """X2: the overhead does not grow with the length of a mission. The baseline has none: its ratio is a figure only."""
+    """X2: the overhead does not grow with the length of a mission. The baseline has none, so it claims nothing."""
     for mode in [each for each in MODES if each != UNENFORCED]:
         key = f"x2/median/{{}}/{mode}"
         stated = [FIGURES[key.format(mission)].low for mission in MISSIONS if key.format(mission) in FIGURES]

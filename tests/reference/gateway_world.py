@@ -48,6 +48,8 @@ HOME_LATITUDE, HOME_LONGITUDE, HOME_MM = 473_977_400, 85_455_900, 488_000
 #: 60 m north of home, above the meadow
 NORTH = 473_983_000, 85_455_900
 SYSTEM = 1
+#: the error of UTC that a gateway assumes where nobody states another
+UTC_ERROR_US = 500_000
 #: 10:00 of a day in 2026, UTC, us
 MORNING = 1_780_308_000_000_000
 
@@ -162,7 +164,7 @@ class GatewayWorld:
 
     def take(self, event: Event) -> list[Action]:
         """Pass an event in; return what is to be done."""
-        actions = self.gateway.take(event, Now(self.now_us, self.utc_us + self.now_us, 0))
+        actions = self.gateway.take(event, Now(self.now_us, self.utc_us + self.now_us, UTC_ERROR_US))
         self.done += actions
         return actions
 

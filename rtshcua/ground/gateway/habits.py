@@ -122,9 +122,10 @@ class ShownState:
 
 def set_parameter(
     link: ClientLink, seen: VehicleSeen, message: Received, shadowed: frozenset[str], now_us: int, *, bytewise: bool
-) -> None:
+) -> bool:
     """Answer PARAM_SET: a shadowed parameter is kept for this client; any other one keeps its value, which is the
-    answer of an autopilot that refuses. An unknown parameter is answered by nothing, as by the autopilots.
+    answer of an autopilot that refuses. Return False for a parameter that was not seen yet: its value is the answer,
+    once it is read.
     """
     name, kind = parameter_name(message), message.fields["param_type"]
     value = decode(message.fields["param_value"], kind, bytewise=bytewise)
@@ -134,15 +135,16 @@ def set_parameter(
         link.record("absorbed", now_us, parameter=name)
         echo = encode(value, kind, bytewise=bytewise)
         _tell_parameter(link, message, known, value if echo is None else echo)
-        return
+        return True
     if known is not None:
         if known.fields["param_value"] != message.fields["param_value"]:
             link.text(f"parameter {name} stays as it is: writes are refused", now_us, f"parameter {name}")
             link.record("refused", now_us, parameter=name)
         _tell_parameter(link, known, known, known.fields["param_value"])
-        return
+        return True
     link.text(f"parameter {name} is not set: writes are refused", now_us, f"parameter {name}")
     link.record("refused", now_us, parameter=name)
+    return False
 
 
 def tell_parameter(link: ClientLink, known: Received, shadows: bool = True) -> None:

@@ -28,6 +28,10 @@ from rtshcua.mavlink import enums, layouts
 #: the interval of request frames to the flight, us, and how many may wait
 REQUEST_EVERY_US: Final = 50_000
 _MOST_WAITING: Final = 64
+#: what the flight answers while it cannot take a request; when that is handed in again, us, and how often
+_NOT_YET: Final = frozenset({"busy", "refused", "no-vehicle"})
+_AGAIN_US: Final = 500_000
+_MOST_TRIES: Final = 40
 #: how long an answer of the vehicle is waited for, us
 _PATIENCE_US: Final = 1_000_000
 #: the interval of requests for all parameters, and of the parameters that are sent to a client at once, us
@@ -55,8 +59,31 @@ _STREAMS: Final = {
     12: (2, 168, 132, 147, 241, 242, 193),  # extra 3
 }
 _ALL_STREAMS: Final = 0
+#: the shortest interval at which a lasting message is repeated, us
+_REPEAT_US: Final = 200_000
 #: messages that stay true, however old they are
 _LASTING: Final = frozenset({AUTOPILOT_VERSION, HOME_POSITION})
+
+
+@dataclass(slots=True)
+class _Request:
+    """A frame for the flight. `rate_of` is the message whose interval it sets, None if it sets none."""
+
+    link: ClientLink
+    frame: bytes
+    rate_of: int | None
+    not_before_us: int = 0
+    tries: int = 1
+
+
+@dataclass(slots=True)
+class _Repeated:
+    """A message that stays true, which a client gets at an interval, us, and when next."""
+
+    link: ClientLink
+    message: int
+    every_us: int
+    next_us: int
 
 
 @dataclass(slots=True)
@@ -80,11 +107,13 @@ class HarmlessRequests:
         self._actions = actions
         self._number = 0
         self._sequence = 0
-        self._waiting: deque[tuple[int, bytes]] = deque()
+        self._waiting: deque[_Request] = deque()
+        self._handed: dict[int, _Request] = {}
         self._next_us = 0
         self._awaited: list[_Awaited] = []
         self._listed_us = -_LIST_EVERY_US
         self._lists: dict[int, tuple[ClientLink, deque[Received]]] = {}
+        self._repeated: dict[tuple[int, int], _Repeated] = {}
         #: the shortest interval that was asked for, by message, us
         self._intervals: dict[int, int] = dict(settings.needed_us)
 
@@ -125,9 +154,21 @@ class HarmlessRequests:
     def _set_interval(self, link: ClientLink, number: int, interval: float, now_us: int) -> int:
         if not self._may(link, "rates", now_us):
             return DENIED
+        if number in _LASTING:
+            self._repeat(link, number, interval, now_us)
+            return ACCEPTED
         if isnan(interval) or interval <= 0 or interval > 1e9:
             return ACCEPTED  # the default rate, or none: what others need goes on
         return ACCEPTED if self._faster(link, number, max(int(interval), SHORTEST_US)) else TEMPORARILY_REJECTED
+
+    def _repeat(self, link: ClientLink, number: int, interval: float, now_us: int) -> None:
+        """Send what is known of a lasting message again and again: the vehicle sends it when it changes, and the flight
+        lets nobody change that rate, because it takes each one as an answer.
+        """
+        self._repeated.pop((link.client, number), None)
+        if 0 < interval <= 1e9:
+            every_us = max(int(interval), _REPEAT_US)
+            self._repeated[link.client, number] = _Repeated(link, number, every_us, now_us)
 
     def _faster(self, link: ClientLink, number: int, interval_us: int) -> bool:
         """Request a message at an interval, if it is not requested as often already."""
@@ -138,6 +179,7 @@ class HarmlessRequests:
             link,
             layouts.COMMAND_LONG,
             command=enums.MAV_CMD_SET_MESSAGE_INTERVAL,
+            rate_of=number,
             param1=float(number),
             param2=float(interval_us),
             **self._target,
@@ -227,29 +269,56 @@ class HarmlessRequests:
 
     def tick(self, now_us: int) -> None:
         """Hand in the next request, send parts of lists, and end requests that the vehicle did not answer."""
-        if self._waiting and now_us >= self._next_us:
+        if self._waiting and now_us >= max(self._next_us, self._waiting[0].not_before_us):
             self._next_us = now_us + REQUEST_EVERY_US
             self._number += 1
-            self._actions.append(RequestFrame(self._number, *self._waiting.popleft()))
+            request = self._handed[self._number] = self._waiting.popleft()
+            while len(self._handed) > _MOST_WAITING:
+                self._handed.pop(next(iter(self._handed)))
+            self._actions.append(RequestFrame(self._number, request.link.client, request.frame))
         for each in [one for one in self._awaited if now_us >= one.until_us]:
             self._awaited.remove(each)
             each.link.ack(each.to, each.command, FAILED)
+        for lasting in self._repeated.values():
+            if now_us >= lasting.next_us:
+                known = self._seen.frame(lasting.message)
+                lasting.next_us = now_us + (lasting.every_us if known is not None else _LIST_EVERY_US)
+                if known is not None:
+                    lasting.link.forward(known)
+                else:
+                    self._request_message(lasting.link, lasting.message)
         for client, (link, rest) in list(self._lists.items()):
             for _ in range(min(_PARAMETERS_AT_ONCE, len(rest))):
                 tell_parameter(link, rest.popleft())
             if not rest:
                 del self._lists[client]
 
+    def answered(self, number: int, slug: str, now_us: int) -> None:
+        """The flight passed a request on, or not. A rate that it cannot take yet is asked for again; if it does not
+        change one, the client is told.
+        """
+        request = self._handed.pop(number, None)
+        if request is None or request.rate_of is None or slug == "accepted":
+            return
+        if slug in _NOT_YET and request.tries < _MOST_TRIES and len(self._waiting) < _MOST_WAITING:
+            request.tries += 1
+            request.not_before_us = now_us + _AGAIN_US
+            self._waiting.append(request)
+            return
+        self._intervals.pop(request.rate_of, None)
+        request.link.text(f"the rate of message {request.rate_of} stays as it is ({slug})", now_us, "rate")
+
     def forget(self, client: int) -> None:
         """A client is gone."""
         self._awaited = [each for each in self._awaited if each.link.client != client]
-        self._waiting = deque(each for each in self._waiting if each[0] != client)
+        self._waiting = deque(each for each in self._waiting if each.link.client != client)
         self._lists.pop(client, None)
+        self._repeated = {key: each for key, each in self._repeated.items() if key[0] != client}
 
-    def _hand_in(self, link: ClientLink, number: int, **values: Any) -> bool:
+    def _hand_in(self, link: ClientLink, number: int, rate_of: int | None = None, **values: Any) -> bool:
         """Queue a frame of our own for the flight; False if too many wait."""
         if len(self._waiting) >= _MOST_WAITING:
             return False
-        self._waiting.append((link.client, made(number, values, self._own, self._sequence)))
+        self._waiting.append(_Request(link, made(number, values, self._own, self._sequence), rate_of))
         self._sequence = (self._sequence + 1) % 256
         return True

@@ -74,17 +74,25 @@ class _Upload:
 
 
 class PlanTransfer:
-    """The transfers of one client."""
+    """The transfers of one connection. `plans` are the stored missions by the client's configured name: the address is
+    the identity, so all connections to it, and later ones, have the same mission.
+    """
 
-    def __init__(self, link: ClientLink, translation: Translation, autopilot: int) -> None:
+    def __init__(
+        self, link: ClientLink, translation: Translation, autopilot: int, plans: dict[str, UploadedPlan]
+    ) -> None:
         self._link = link
+        self._plans = plans
         self._translation = translation
         self._keeps_home = autopilot == ARDUPILOT
         self._pace = _ARDUPILOT if autopilot == ARDUPILOT else _PX4
         self._upload: _Upload | None = None
         self._checking: tuple[tuple[int, int], UploadedPlan] | None = None
-        #: the stored mission, if there is one
-        self.plan: UploadedPlan | None = None
+
+    @property
+    def plan(self) -> UploadedPlan | None:
+        """The stored mission, if there is one."""
+        return self._plans.get(self._link.name)
 
     @property
     def plan_is_idle(self) -> bool:
@@ -105,7 +113,7 @@ class PlanTransfer:
         count = message.fields["count"]
         self._upload = self._checking = None
         if count == 0:
-            self.plan = None
+            self._plans.pop(self._link.name, None)
             self._answer(message.sender, MISSION_ACCEPTED)
         elif count > MOST_ITEMS:
             self._link.text(f"a mission of {count} items is too long: at most {MOST_ITEMS}", now_us)
@@ -146,7 +154,7 @@ class PlanTransfer:
         if refusal is not None:
             self.refuse(sender, RefusedPlan(MISSION_DENIED, refusal), now_us)
             return
-        self.plan = plan
+        self._plans[self._link.name] = plan
         self._link.record("accepted", now_us, message="MISSION_COUNT", count=len(plan.items))
         self._answer(sender, MISSION_ACCEPTED)
 
@@ -196,7 +204,8 @@ class PlanTransfer:
         """MISSION_CLEAR_ALL: forget this client's mission. Fences stay as they are."""
         if self._refuses_type(message, now_us):
             return
-        self.plan = self._upload = self._checking = None
+        self._upload = self._checking = None
+        self._plans.pop(self._link.name, None)
         self._answer(message.sender, MISSION_ACCEPTED)
 
     def unsupported(self, message: Received, now_us: int) -> None:

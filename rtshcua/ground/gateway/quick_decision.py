@@ -43,12 +43,18 @@ _CLAUSE: Final = 100
 
 
 class QuickRefusal(NamedTuple):
-    """A MAV_RESULT, the slug of the reason, the answer in words, and whether other arguments might pass."""
+    """A MAV_RESULT, the slug of the reason, the skill, the reason in words, and whether other arguments might pass."""
 
     result: int
     reason: str
-    text: str
+    skill: str
+    words: str
     by_argument: bool = False
+
+    @property
+    def text(self) -> str:
+        """The answer to a client that asked for the step."""
+        return f"{self.skill} {'denied' if self.result == DENIED else 'rejected'}: {self.words}"
 
 
 class QuickDecision:
@@ -65,11 +71,11 @@ class QuickDecision:
         """Why a step is certainly refused now; None if it may pass, or is not decided here."""
         flat = self._policy.policy
         if role not in self._roles:
-            text = f"{step.skill} denied: no rule of {flat.name} names the role {role}"
-            return QuickRefusal(DENIED, Reason.NOT_PERMITTED, text)
+            words = f"no rule of {flat.name} names the role {role}"
+            return QuickRefusal(DENIED, Reason.NOT_PERMITTED, step.skill, words)
         invocation = self._prepared(step, role, now)
         if isinstance(invocation, Refusal):
-            return QuickRefusal(DENIED, Reason.ARGUMENT_RANGE, f"{step.skill} denied: {invocation.text}", True)
+            return QuickRefusal(DENIED, Reason.ARGUMENT_RANGE, step.skill, invocation.text, True)
         context = Context(b"", flat.vehicle.identity, flat.version, 0, now.monotonic_us, 0, 0, ())
         state = self._state_of(now)
         decision = decide(invocation, state, self._policy, context, now)
@@ -77,14 +83,13 @@ class QuickDecision:
             return None
         if flat.monitors and not self._is_certain(invocation, state, context, now):
             return None
-        denied = decision.outcome is Outcome.DENY
         near = nearest(decision, invocation, state, self._policy, now)
         near = self._accepted(near, step, role, context, state, now)
         words = _words(decision, near, invocation, state, self._policy, now)
-        text = f"{step.skill} {'denied' if denied else 'rejected'}: {words}"
         parameters = {each.name for each in flat.contracts[self._skills[step.skill]].parameters}
         by_argument = bool(near) and all(each.subject in parameters for each in near)
-        return QuickRefusal(DENIED if denied else TEMPORARILY_REJECTED, decision.reason, text, by_argument)
+        result = DENIED if decision.outcome is Outcome.DENY else TEMPORARILY_REJECTED
+        return QuickRefusal(result, decision.reason, step.skill, words, by_argument)
 
     def _accepted(
         self, near: tuple[Nearest, ...], step: ProposedStep, role: str, context: Context, state: State, now: Now
@@ -126,7 +131,7 @@ class QuickDecision:
             source=SourceKind.AGENT,
             role=self._roles[role],
             arguments=step.values,
-            issued_at_us=now.utc_us,
+            issued_at_us=now.utc_us - now.utc_error_us,  # certainly in the past
             phases=1,
             on_inadmissible=OnInadmissible.ABORT,
             contract=contract,

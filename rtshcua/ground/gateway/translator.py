@@ -3,9 +3,9 @@ and proposals. It never passes a client's frame on.
 
 Two clients that contradict each other are decided by rank and policy, never by who sent last. The client whose step
 flies or waits is in control, and for `KEEPS_US` after its last step. Another client's command is taken if its rank in
-the configuration is higher, or if its skill is one of the policy's `contingency`, which stops, returns or lands;
-otherwise it is rejected. The policy decides on every step besides. A pilot who requests control keeps it until he
-releases it.
+the configuration is higher, or if its skill is one of the policy's `contingency`, which stops, returns or lands, and
+the step that flies is none that stands later there: nobody stops another one's landing. Otherwise it is rejected. The
+policy decides on every step besides. A pilot who requests control keeps it until he releases it.
 """
 
 from collections.abc import Callable
@@ -55,6 +55,7 @@ from rtshcua.ground.gateway.interface import (
     ProposalChecked,
     Propose,
     ProposedStep,
+    RequestAnswered,
     Tick,
 )
 from rtshcua.ground.gateway.plan_transfer import PlanTransfer, UploadedPlan
@@ -115,6 +116,8 @@ _PILOTS: Final = frozenset(
         layouts.MISSION_CLEAR_ALL, layouts.SET_POSITION_TARGET_GLOBAL_INT, *_SETPOINTS, SETUP_SIGNING,
     }
 )  # fmt: skip
+#: the motions at whose end the vehicle stands on the ground
+_DOWN: Final = (MotionKind.HOME, MotionKind.LAND)
 # MISSION_STATE
 _NOT_STARTED, _ACTIVE, _PAUSED, _COMPLETE = 2, 3, 4, 5
 
@@ -148,11 +151,12 @@ class Gateway:
         self._requests = HarmlessRequests(settings, self._seen, self._actions)
         self._shadowed = shadowed_parameters(settings.accepted)
         policy = settings.policy.policy
-        self._safe = {policy.contracts[link.skill].name for link in policy.contingency}
+        self._safe = [policy.contracts[link.skill].name for link in policy.contingency]
         self._clients: dict[int, _Client] = {}
         self._pilots: dict[int, ClientLink] = {}
         self._proposals: dict[int, ClientProposal] = {}
         self._uploads: dict[int, _Client] = {}
+        self._plans: dict[str, UploadedPlan] = {}
         self._number = 0
         self._flown: ClientProposal | None = None  # the proposal whose step was dispatched last
         self._kept: tuple[_Client, int] | None = None  # who was in control last, and until when
@@ -188,11 +192,14 @@ class Gateway:
                 if of.pilot:
                     self._pilots[client] = link
                 elif len(self._clients) < _MOST_CLIENTS:
-                    transfer = PlanTransfer(link, self._translation, self._settings.autopilot)
+                    transfer = PlanTransfer(link, self._translation, self._settings.autopilot, self._plans)
                     shown = ShownState(link, self._seen, self._actions, self._settings.autopilot)
                     self._clients[client] = _Client(link, shown, transfer)
+                    self._of_mission(self._clients[client], now.monotonic_us)
             case ClientDown(client):
                 self._down(client, now.monotonic_us)
+            case RequestAnswered(number, slug):
+                self._requests.answered(number, slug, now.monotonic_us)
             case ProposalChecked():
                 self._checked(event, now.monotonic_us)
             case ProposalAnswered(number, slug, text):
@@ -421,7 +428,7 @@ class Gateway:
         now_us = now.monotonic_us
         refusal = self._quick.refusal(step, client.link.settings.role, now)
         if refusal is not None:
-            result, reason, text, _ = refusal
+            result, reason, text = refusal.result, refusal.reason, refusal.text
         else:
             hindrance = self._hindrance(client, step, now_us)
             if hindrance is None:
@@ -437,7 +444,7 @@ class Gateway:
             return TEMPORARILY_REJECTED, self._unready
         step = self._translation.takeoff_to()
         refusal = None if step is None else self._quick.refusal(step, client.link.settings.role, now)
-        return None if refusal is None or refusal.by_argument else (refusal.result, refusal.text)
+        return None if refusal is None or refusal.by_argument else (refusal.result, refusal.words)
 
     def _stands(self, proposal: ClientProposal) -> bool:
         """Whether a proposal still says what the vehicle does: it is under way, or nothing was flown after it."""
@@ -448,7 +455,7 @@ class Gateway:
         if self._pilot_holds:
             return "the pilot is in control"
         holder = self._holder(now_us)
-        contradicts = holder is not None and holder is not client and step.skill not in self._safe
+        contradicts = holder is not None and holder is not client and not self._is_safer(step.skill)
         if contradicts and holder is not None and client.link.settings.rank <= holder.link.settings.rank:
             return f"{holder.link.name} is in control"
         contract = self._translation.contract(step.skill)
@@ -462,6 +469,14 @@ class Gateway:
         if self._stage == "":
             return "no flight is ready yet"
         return self._unready
+
+    def _is_safer(self, skill: str) -> bool:
+        """Whether a skill is of the contingency, and not before the one that flies there."""
+        if skill not in self._safe:
+            return False
+        flown = self._flown
+        flies = "" if flown is None or flown.ended else flown.steps[flown.flies].skill
+        return flies not in self._safe or self._safe.index(skill) >= self._safe.index(flies)
 
     def _holder(self, now_us: int) -> _Client | None:
         """The client in control: that of the last proposal under way, or for some time after its end."""
@@ -665,14 +680,18 @@ class Gateway:
     def _of_mission(self, client: _Client, now_us: int) -> None:
         """Withhold the vehicle's own reports of a mission from a client that has one here."""
         has = client.transfer.plan is not None
-        client.shown.of_mission = frozenset({MISSION_CURRENT, MISSION_ITEM_REACHED}) if has else frozenset()
-        client.shown.update(now_us)
+        for each in self._clients.values():
+            if each.link.name == client.link.name:
+                each.shown.of_mission = frozenset({MISSION_CURRENT, MISSION_ITEM_REACHED}) if has else frozenset()
+                each.shown.update(now_us)
 
     # ---------------------------------------------------------------- parameters, files, others
 
     def _param_set(self, client: _Client, message: Received, now: Now) -> None:
         bytewise = is_bytewise(self._settings.autopilot)
-        set_parameter(client.link, self._seen, message, self._shadowed, now.monotonic_us, bytewise=bytewise)
+        known = set_parameter(client.link, self._seen, message, self._shadowed, now.monotonic_us, bytewise=bytewise)
+        if not known:
+            self._requests.want_parameter(client.link, parameter_name(message))
 
     def _param_read(self, client: _Client, message: Received, now: Now) -> None:
         self._requests.read_parameter(client.link, message, parameter_name(message), now.monotonic_us)
@@ -734,11 +753,25 @@ class Gateway:
             self._dead(client, now_us)
 
     def _dead(self, client: _Client, now_us: int) -> None:
-        """A client is dead: if its step flies or waits, the mission is cancelled, and the contingency flies."""
+        """A client is dead: if its step flies or waits, or flew last and nobody else is there, the mission is
+        cancelled, and the contingency flies. A step that brings the vehicle down goes on.
+        """
         client.link.record("dead", now_us)
         own = [each for each in self._proposals.values() if each.link is client.link and not each.ended]
-        if own and self._stage == "flying":
+        flown = self._flown
+        if not own and flown is not None and flown.link is client.link and not self._lives_another(client):
+            own = [flown]
+        if self._stage == "flying" and any(not self._brings_down(each) for each in own):
             self._actions.append(Cancel(client.link.client, f"{client.link.name} is silent"))
             for other in self._clients.values():
                 if other is not client:
                     other.link.text(f"{client.link.name} is silent: its flight is cancelled", now_us, severity=NOTICE)
+
+    def _lives_another(self, client: _Client) -> bool:
+        """Whether another client beats, which may take over."""
+        return any(each is not client and each.link.beats and not each.link.is_dead for each in self._clients.values())
+
+    def _brings_down(self, proposal: ClientProposal) -> bool:
+        """Whether what is left of a proposal only lands the vehicle."""
+        contracts = (self._translation.contract(each.skill) for each in proposal.steps[max(proposal.done, 0) :])
+        return all(each is not None and each.motion.kind in _DOWN for each in contracts) and not proposal.ended

@@ -304,6 +304,25 @@ def test_what_stops_or_lands_is_anybodys_that_the_policy_permits() -> None:
         assert [each for each, *_ in proposals(two().send(message, client=2))] == [skill]
 
 
+def test_nobody_stops_the_landing_of_another() -> None:
+    """MAVSDK asks ArduPilot to hold before it arms: a program that begins must not end what comes down. By hand: the
+    step that flies, the one that another client asks for, and whether it is taken.
+    """
+    hover, back, land = (command_long(number) for number in (193, 20, 21))
+    table = (
+        (land, hover, False), (land, back, False), (land, land, True),
+        (back, hover, False), (back, land, True), (hover, back, True), (hover, hover, True),
+    )  # fmt: skip
+    for flies, asked, taken in table:
+        world = GatewayWorld()
+        world.client(2, "other")
+        world.fly()
+        world.accept(world.send(flies))
+        world.dispatch(0)
+        assert bool(proposals(world.send(asked, client=2))) is taken, (flies, asked)
+        assert taken or proposals(world.send(hover)), "its own client may"
+
+
 def test_control_is_kept_for_a_time_after_the_last_step() -> None:
     world = two()
     world.line(type="effect", event="succeeded", kind=0, step=0)
@@ -397,6 +416,33 @@ def test_a_dead_client_ends_its_flight_and_a_living_one_does_not() -> None:
     assert [each for each in actions if isinstance(each, Cancel)] == [Cancel(1, "script is silent")]
     assert texts(actions, 2) == ["script is silent: its flight is cancelled"]
     assert not [each for each in world.wait(5_000_000) if isinstance(each, Cancel)], "once"
+
+
+def test_a_dead_client_whose_step_was_the_last_ends_the_flight_if_nobody_else_beats() -> None:
+    for others, cancelled in (((), True), ((2,), False)):
+        world = two()
+        world.line(type="effect", event="succeeded", kind=0, step=0)
+        for _ in range(4):
+            world.send(BEAT)
+            for each in others:
+                world.send(BEAT, client=each)
+            world.wait(1_000_000)
+        actions = []
+        for _ in range(5):
+            for each in others:
+                world.send(BEAT, client=each)
+            actions += world.wait(1_000_000)
+        assert (Cancel(1, "script is silent") in actions) is cancelled
+
+
+def test_a_dead_client_does_not_end_its_landing() -> None:
+    for message, cancelled in ((command_long(21), False), (command_long(20), False), (command_long(193), True)):
+        world = GatewayWorld()
+        world.fly()
+        world.send(BEAT)
+        world.accept(world.send(message))
+        world.dispatch(0)
+        assert (Cancel(1, "script is silent") in world.take(ClientDown(1))) is cancelled
 
 
 def test_a_dead_client_without_a_step_ends_nothing() -> None:

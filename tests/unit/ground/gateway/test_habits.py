@@ -17,7 +17,7 @@ from reference.gateway_world import (
     texts,
     told,
 )
-from rtshcua.ground.gateway.interface import Action, ClientNote, Propose, Withhold
+from rtshcua.ground.gateway.interface import Action, ClientNote, Propose, RequestFrame, Withhold
 from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode, Px4Mode
 
 BEAT = frozenset({0})
@@ -125,16 +125,16 @@ def test_arming_is_refused_where_no_take_off_could_follow() -> None:
     actions = world.send(arm())
     assert acks(actions) == [(400, 1)]
     (said,) = texts(actions)
-    assert said.startswith("Arming denied: takeoff rejected: battery 30 %, accepted "), said
+    assert said.startswith("Arming denied: battery 30 %, accepted "), said
     assert withheld(actions) == []
     world = GatewayWorld(ARDUPILOT)
     world.client(2, "nobody", role="trainee")
     world.ready()
     actions = world.send(arm(), client=2)
     assert acks(actions, 2) == [(400, 2)]
-    assert texts(actions, 2) == ["PreArm: takeoff denied: no rule of bridge_inspection names the role trainee"]
+    assert texts(actions, 2) == ["PreArm: no rule of bridge_inspection names the role trainee"]
     chunks = [message.text for message in told(actions, 2) if message.get_type() == "STATUSTEXT"]
-    assert chunks == ["PreArm: takeoff denied: no rule of".ljust(50), "bridge_inspection names the role trainee"]
+    assert chunks == ["PreArm: no rule of bridge_inspection names the".ljust(50), "role trainee"]
     assert acks(world.send(arm())) == [(400, 0)], "another role may take off"
 
 
@@ -229,8 +229,11 @@ def test_writes_of_other_parameters_are_answered_with_the_unchanged_value() -> N
     assert values(actions) == [("RTL_ALT", 1500.0, 9)]
     assert texts(actions) == [], "nothing would change"
     actions = world.send(mavlink.MAVLink_param_set_message(SYSTEM, 1, b"NO_SUCH_PARAM", 1, 9))
-    assert values(actions) == [], "the autopilots are silent"
+    assert values(actions) == []
     assert texts(actions) == ["parameter NO_SUCH_PARAM is not set: writes are refused"]
+    (asked,) = (each for each in world.wait() if isinstance(each, RequestFrame))
+    message = mavlink.MAVLink(None).decode(bytearray(asked.frame))
+    assert (message.get_type(), message.param_id) == ("PARAM_REQUEST_READ", "NO_SUCH_PARAM"), "its value is the answer"
 
 
 # ---------------------------------------------------------------- setpoints and others

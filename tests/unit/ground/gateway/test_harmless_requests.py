@@ -147,6 +147,50 @@ def test_request_frames_are_spaced_and_bounded() -> None:
     assert world.take(RequestAnswered(1, "refused")) == []
 
 
+def test_a_rate_that_the_flight_cannot_take_yet_is_asked_for_again() -> None:
+    world = GatewayWorld()
+    assert acks(world.send(command_long(511, 74, 250_000))) == [(511, 0)]
+    for tries in range(1, 4):
+        found = world.wait(600_000, step_us=50_000)
+        assert [each.param1 for each in requests(found)] == [74], tries
+        (asked,) = (each.number for each in found if isinstance(each, RequestFrame))
+        assert world.take(RequestAnswered(asked, "busy")) == []
+    found = world.wait(600_000, step_us=50_000)
+    (asked,) = (each.number for each in found if isinstance(each, RequestFrame))
+    assert world.take(RequestAnswered(asked, "accepted")) == []
+    assert requests(world.wait(2_000_000)) == []
+
+
+def test_a_rate_that_the_flight_does_not_change_is_told_and_may_be_asked_for_again() -> None:
+    world = GatewayWorld()
+    for _ in range(2):
+        world.send(command_long(511, 74, 250_000))
+        (asked,) = (each.number for each in world.wait(100_000) if isinstance(each, RequestFrame))
+        actions = world.take(RequestAnswered(asked, "rate"))
+        assert texts(actions) == ["the rate of message 74 stays as it is (rate)"]
+        world.wait(6_000_000)
+
+
+def test_home_is_repeated_at_the_interval_that_a_client_asks_for() -> None:
+    """The flight changes no rate of it. It is requested once where it was not seen."""
+
+    def homes(actions: list[Action]) -> int:
+        return len([message for message in told(actions) if message.get_type() == "HOME_POSITION"])
+
+    world = GatewayWorld()
+    assert acks(world.send(command_long(511, 148, 500_000))) == [(511, 0)]
+    assert [(each.command, each.param1) for each in requests(world.wait(2_000_000, step_us=50_000))] == [(512, 148)]
+    assert acks(world.send(command_long(511, 242, 500_000))) == [(511, 0)]
+    assert homes(world.wait(5_000_000, step_us=50_000)) in (9, 10, 11)
+    world.send(command_long(511, 242, 1_000))
+    assert homes(world.wait(1_000_000, step_us=50_000)) in (4, 5), "not more often than every 200 ms"
+    world.send(command_long(511, 242, -1))
+    assert homes(world.wait(5_000_000, step_us=50_000)) == 0
+    world.send(command_long(511, 242, 500_000))
+    world.take(ClientDown(1))
+    assert homes(world.wait(5_000_000, step_us=50_000)) == 0
+
+
 def test_the_list_of_messages_that_are_awaited_is_bounded() -> None:
     world = GatewayWorld()
     results = []

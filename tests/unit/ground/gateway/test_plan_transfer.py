@@ -20,7 +20,7 @@ from reference.gateway_world import (
 )
 from rtshcua.ground.gateway.interface import Action, ClientDown, ProposalAnswered, ProposalChecked, Propose, Withhold
 from rtshcua.ground.gateway.plan_transfer import MOST_ITEMS
-from rtshcua.mavlink.modes import ARDUPILOT, PX4
+from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode
 
 N, E = NORTH
 TAKEOFF, WAYPOINT, LOITER, RETURN, LAND, SPEED = 22, 16, 19, 20, 21, 178
@@ -441,3 +441,19 @@ def test_a_guided_item_is_flown_to_at_once_and_acknowledged_as_a_mission() -> No
     actions = world.send(guided(z=16))
     (propose,) = (each for each in actions if isinstance(each, Propose))
     assert results(world.take(ProposalChecked(propose.number, "no"))) == [(14, 0)]
+
+
+def test_all_connections_of_a_client_have_its_mission() -> None:
+    """As where a ground station plans, and an agent behind the same address sets the mode."""
+    world = GatewayWorld(ARDUPILOT)
+    world.client(2, "other")
+    world.ready()
+    stored(world, [HOME_ITEM, *mission(1)])
+    world.client(3, "script")
+    world.take(ClientDown(1))
+    sent = world.send(mavlink.MAVLink_mission_request_list_message(SYSTEM, 1), 3)
+    assert [message.count for message in told(sent, 3) if message.get_type() == "MISSION_COUNT"] == [6]
+    sent = world.send(mavlink.MAVLink_mission_request_list_message(SYSTEM, 1), 2)
+    assert [message.count for message in told(sent, 2) if message.get_type() == "MISSION_COUNT"] == [0]
+    flown = steps(world.send(mavlink.MAVLink_set_mode_message(SYSTEM, 1, CopterMode.AUTO), 3))
+    assert [each.skill for each in flown] == ["takeoff", "goto", "goto", "return_home"]

@@ -113,9 +113,9 @@ _AGAIN_S: Final = 5.0
 class ScriptClient:
     """A script that flies by COMMAND_LONG and COMMAND_INT, and reads acknowledgements and texts."""
 
-    def __init__(self, port: int, system: int = 250) -> None:
+    def __init__(self, port: int, system: int = 250, scheme: str = "udpout") -> None:
         self.link = mavutil.mavlink_connection(
-            f"udpout:127.0.0.1:{port}", source_system=system, dialect="ardupilotmega"
+            f"{scheme}:127.0.0.1:{port}", source_system=system, dialect="ardupilotmega"
         )
         self.texts: list[str] = []
         self._text = ""

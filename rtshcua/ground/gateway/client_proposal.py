@@ -128,7 +128,16 @@ class ClientProposal:
             self.refuse(DENIED, text, now_us)
         elif outcome == "fallback":
             self.refuse(TEMPORARILY_REJECTED, text, now_us)
-        elif outcome == "defer" and reason not in self.waits:
+        elif outcome == "defer":
+            self._wait(reason, text, now_us)
+
+    def wait_for(self, unready: str, now_us: int) -> None:
+        """The vehicle is not ready for it: tell the client why, once."""
+        if not (self.answered or self.ended):
+            self._wait(unready, f"{self.steps[0].skill} waits: {unready}", now_us)
+
+    def _wait(self, reason: str, text: str, now_us: int) -> None:
+        if reason not in self.waits:
             self.waits.add(reason)
             self.link.text(text, now_us, severity=NOTICE)
 

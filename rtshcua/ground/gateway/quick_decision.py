@@ -173,6 +173,8 @@ def _without_nearest(
         yield from _unknown(decision, invocation, state, policy)
     if clause is not None:
         text = " ".join(clause.text.split())
+        if decision.reason is Reason.OUT_OF_SCOPE and " when " in text:
+            text = "only when " + text.partition(" when ")[2]  # first what counts: some clients show 50 characters
         yield text if len(text) <= _CLAUSE else f"{text[: _CLAUSE - 3]}..."
 
 

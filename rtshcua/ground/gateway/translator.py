@@ -9,7 +9,7 @@ policy decides on every step besides. A pilot who requests control keeps it unti
 """
 
 from collections.abc import Callable
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, NamedTuple, TypeAlias
 
 from rtshcua.ground.gateway.accepted import COMMAND, ITEM, MESSAGE, MODE
 from rtshcua.ground.gateway.client_frames import (
@@ -59,10 +59,11 @@ from rtshcua.ground.gateway.interface import (
     Tick,
 )
 from rtshcua.ground.gateway.plan_transfer import PlanTransfer, UploadedPlan
-from rtshcua.ground.gateway.quick_decision import QuickDecision
+from rtshcua.ground.gateway.quick_decision import QuickDecision, QuickRefusal
 from rtshcua.ground.gateway.translation import (
     ACCEPTED,
     DENIED,
+    IN_PROGRESS,
     TEMPORARILY_REJECTED,
     UNSUPPORTED,
     Translation,
@@ -80,6 +81,9 @@ from rtshcua.model.flat.situation import Now
 KEEPS_US: Final = 10_000_000
 #: the least interval of proposals that come from setpoints of one client, us
 SETPOINT_US: Final = 500_000
+#: how long a command waits for a flight that is not ready yet, us
+HELD_US: Final = 10_000_000
+_NO_FLIGHT: Final = "no flight is ready yet"
 #: the most proposals of one client that are neither taken nor refused
 MOST_OPEN: Final = 4
 _SECOND_US: Final = 1_000_000
@@ -122,6 +126,14 @@ _DOWN: Final = (MotionKind.HOME, MotionKind.LAND)
 _NOT_STARTED, _ACTIVE, _PAUSED, _COMPLETE = 2, 3, 4, 5
 
 
+class _Held(NamedTuple):
+    """A command that waits for a flight, and until when."""
+
+    client: "_Client"
+    message: Received
+    until_us: int
+
+
 class _Client:
     """One ordinary client with everything that is kept about it."""
 
@@ -156,6 +168,8 @@ class Gateway:
         self._pilots: dict[int, ClientLink] = {}
         self._proposals: dict[int, ClientProposal] = {}
         self._uploads: dict[int, _Client] = {}
+        self._held: list[_Held] = []
+        self._holds = True
         self._plans: dict[str, UploadedPlan] = {}
         self._number = 0
         self._flown: ClientProposal | None = None  # the proposal whose step was dispatched last
@@ -163,6 +177,7 @@ class Gateway:
         self._pilot_holds = 0  # the system id of the pilot who requested control
         self._stage = ""  # of the flight: "", "waiting", "flying"
         self._unready: str | None = None
+        self._judged = False  # whether the flight has said if the vehicle is ready
         self._second_us = 0
         self._handlers = self._by_message()
 
@@ -178,7 +193,7 @@ class Gateway:
             case FlightLine(line):
                 self._flight_line(dict(line), now.monotonic_us)
             case Tick():
-                self._tick(now.monotonic_us)
+                self._tick(now)
             case _:
                 self._rare(event, now)
         actions = self._actions[:]
@@ -406,9 +421,13 @@ class Gateway:
             if not latest.answered:
                 latest.again(message.sender, command)
             return ACCEPTED if latest.answered else None
-        refused = self._refused(client, steps[0], command, now)
-        if refused is not None:
-            return refused
+        refusal = self._refusal(client, steps[0], now)
+        if refusal is not None:
+            if refusal.reason == _NO_FLIGHT and self._hold(client, message, command, now_us):
+                return None
+            client.link.text(refusal.text, now_us, f"{refusal.skill} {refusal.reason}" if command < 0 else "")
+            client.link.record("refused", now_us, skill=refusal.skill, reason=refusal.reason, answer=refusal.text)
+            return refusal.result
         waiting = [each for each in self._proposals.values() if each.link is client.link and not each.taken]
         if command < 0:
             if waiting or now_us - client.setpoint_us < SETPOINT_US:
@@ -423,20 +442,35 @@ class Gateway:
         self._actions.append(Propose(self._number, client.link.client, client.link.settings.role, steps))
         return None
 
-    def _refused(self, client: _Client, step: ProposedStep, command: int, now: Now) -> int | None:
-        """Refuse at once what is certainly refused by the policy, or cannot be taken now; return the result."""
-        now_us = now.monotonic_us
+    def _refusal(self, client: _Client, step: ProposedStep, now: Now) -> QuickRefusal | None:
+        """Why a step is certainly refused by the policy, or cannot be taken now."""
         refusal = self._quick.refusal(step, client.link.settings.role, now)
-        if refusal is not None:
-            result, reason, text = refusal.result, refusal.reason, refusal.text
-        else:
-            hindrance = self._hindrance(client, step, now_us)
-            if hindrance is None:
-                return None
-            result, reason, text = TEMPORARILY_REJECTED, hindrance, f"{step.skill} rejected: {hindrance}"
-        client.link.text(text, now_us, f"{step.skill} {reason}" if command < 0 else "")
-        client.link.record("refused", now_us, skill=step.skill, reason=reason, answer=text)
-        return result
+        hindrance = None if refusal is not None else self._hindrance(client, step, now.monotonic_us)
+        if hindrance is None:
+            return refusal
+        return QuickRefusal(TEMPORARILY_REJECTED, hindrance, step.skill, hindrance)
+
+    def _hold(self, client: _Client, message: Received, command: int, now_us: int) -> bool:
+        """Whether a command waits for the next flight, which is ready some seconds after a landing."""
+        if command < 0 or not self._holds or message.message in (layouts.MISSION_ITEM_INT, MISSION_ITEM):
+            return False
+        own = [each for each in self._held if each.client is client]
+        if not any(each.message.fields == message.fields for each in own):
+            if len(own) >= MOST_OPEN:
+                return False
+            self._held.append(_Held(client, message, now_us + HELD_US))
+        client.link.ack(message.sender, command, IN_PROGRESS)
+        return True
+
+    def _take_held(self, now: Now) -> None:
+        """Take the commands that waited for a flight, now that there is one, or refuse them after too long."""
+        ready = self._stage == "flying" or (self._stage == "waiting" and self._judged)
+        due = [each for each in self._held if ready or now.monotonic_us >= each.until_us]
+        self._held = [each for each in self._held if each not in due]
+        self._holds = False
+        for each in due:
+            self._handlers[each.message.message](each.client, each.message, now)
+        self._holds = True
 
     def _cannot_take_off(self, client: _Client, now: Now) -> tuple[int, str] | None:
         """Why no take-off of this client could follow an arming now, whatever its height, and the MAV_RESULT."""
@@ -466,8 +500,8 @@ class Gateway:
             return "the vehicle flies under another control"
         if not climbs:
             return "the vehicle is on the ground: take off first"
-        if self._stage == "":
-            return "no flight is ready yet"
+        if self._stage == "" or (self._held and not self._judged):
+            return _NO_FLIGHT
         return self._unready
 
     def _is_safer(self, skill: str) -> bool:
@@ -539,12 +573,16 @@ class Gateway:
     def _flight_line(self, line: dict[str, Any], now_us: int) -> None:
         match line.get("type"):
             case "hello":
-                self._stage, self._unready = "", None
+                self._stage, self._unready, self._judged = "", None, False
             case "waiting":
                 self._stage = "waiting"
             case "vehicle":
                 unready = line.get("unready")
                 self._unready = None if line.get("ready") else str(unready or "the vehicle is not ready")
+                self._judged = True
+                if self._unready is not None:
+                    for each in self._proposals.values():
+                        each.wait_for(self._unready, now_us)
             case "mission":
                 self._stage = "flying"
             case "decision" | "effect":
@@ -715,8 +753,10 @@ class Gateway:
 
     # ---------------------------------------------------------------- time
 
-    def _tick(self, now_us: int) -> None:
+    def _tick(self, now: Now) -> None:
+        now_us = now.monotonic_us
         self._requests.tick(now_us)
+        self._take_held(now)
         for proposal in list(self._proposals.values()):
             proposal.tick(now_us)
         every_second = now_us - self._second_us >= _SECOND_US
@@ -747,6 +787,7 @@ class Gateway:
         if client is None:
             return
         self._requests.forget(number)
+        self._held = [each for each in self._held if each.client is not client]
         self._uploads = {at: each for at, each in self._uploads.items() if each is not client}
         if client.link.beats and not client.link.is_dead:
             client.link.is_dead = True

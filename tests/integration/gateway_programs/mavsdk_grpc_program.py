@@ -2,6 +2,8 @@
 
 import asyncio
 import json
+import os
+import socket
 import sys
 from collections.abc import AsyncGenerator, Callable
 from contextlib import aclosing
@@ -27,7 +29,10 @@ class Program:
     """One vehicle, and its last texts."""
 
     def __init__(self) -> None:
-        self.vehicle = System()
+        with socket.socket() as probe:  # several programs at once: each with a server of its own
+            probe.bind(("127.0.0.1", 0))
+            port = probe.getsockname()[1]
+        self.vehicle = System(port=port)
         self.texts: list[str] = []
 
     async def connect(self, address: str) -> None:
@@ -80,6 +85,7 @@ async def main() -> None:
             said.append(str(error))
             await asyncio.sleep(0.5)
         print(json.dumps({"action": name, "succeeded": not said, "reads": [*said, *program.texts]}), flush=True)
+    os._exit(0)  # a thread that reads the server's output would wait for it; the server ends with our process group
 
 
 if __name__ == "__main__":

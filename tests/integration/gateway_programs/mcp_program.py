@@ -7,6 +7,7 @@ meanwhile. For each action it prints one JSON line with the texts of the answers
 
 import asyncio
 import json
+import os
 import sys
 from contextlib import suppress
 from typing import Any
@@ -25,7 +26,8 @@ async def call(session: ClientSession, tool: str, arguments: dict[str, Any]) -> 
 
 async def main() -> None:
     """Carry out the actions."""
-    server = StdioServerParameters(command=sys.argv[2], args=sys.argv[3:])
+    paths = {"PYTHONPATH": os.environ.get("PYTHONPATH", "")}  # what the server inherits is a short list
+    server = StdioServerParameters(command=sys.argv[2], args=sys.argv[3:], env=paths)
     async with stdio_client(server) as streams, ClientSession(*streams) as session, asyncio.timeout(LIMIT_S):
         await session.initialize()
         for tool, arguments, *meanwhile in json.loads(sys.argv[1]):

@@ -256,17 +256,58 @@ def test_setpoints_wait_for_the_answer_to_the_one_before() -> None:
 
 def test_on_the_ground_only_a_take_off_is_taken() -> None:
     world = GatewayWorld()
-    for message, text in (
-        (TAKEOFF, "takeoff rejected: no flight is ready yet"),
-        (reposition(), "goto rejected: the vehicle is on the ground: take off first"),
-    ):
-        actions = world.send(message)
-        assert (acks(actions), texts(actions)) == ([(message.command, 1)], [text])
+    actions = world.send(reposition())
+    assert (acks(actions), texts(actions)) == (
+        [(192, 1)], ["goto rejected: the vehicle is on the ground: take off first"]
+    )  # fmt: skip
     world.ready()
     world.line(type="vehicle", ready=False, unready="no position")
     assert texts(world.send(TAKEOFF)) == ["takeoff rejected: no position"]
     world.report(airborne=True, armed=True)
     assert texts(world.send(TAKEOFF)) == ["takeoff rejected: the vehicle flies under another control"]
+
+
+def test_a_command_waits_for_the_next_flight_for_a_bounded_time() -> None:
+    world = GatewayWorld()
+    assert acks(world.send(TAKEOFF)) == [(22, 5)]
+    assert acks(world.send(TAKEOFF)) == [(22, 5)], "the same once more"
+    actions = world.wait(9_900_000)
+    assert (acks(actions), proposals(actions)) == ([], [])
+    actions = world.wait(200_000)
+    assert (acks(actions), texts(actions)) == ([(22, 1)], ["takeoff rejected: no flight is ready yet"])
+    world.send(TAKEOFF)
+    world.ready()
+    assert [each for each, *_ in proposals(world.wait(100_000))] == ["takeoff"], "once"
+    assert proposals(world.wait(11_000_000)) == []
+
+
+def test_a_client_reads_why_the_vehicle_is_not_ready() -> None:
+    """Where it waited for the flight, and where the vehicle is no longer ready."""
+    world = GatewayWorld()
+    world.send(TAKEOFF)
+    world.line(type="hello")
+    world.line(type="waiting")
+    assert proposals(world.wait(500_000)) == [], "the flight has not said yet whether the vehicle is ready"
+    world.line(type="vehicle", ready=False, unready="no position")
+    actions = world.wait(100_000)
+    assert (acks(actions), texts(actions)) == ([(22, 1)], ["takeoff rejected: no position"])
+    world.line(type="vehicle", ready=True)
+    assert proposals(world.send(TAKEOFF)) != []
+    for _ in range(2):
+        told = world.line(type="vehicle", ready=False, unready="no position")
+    assert texts(world.done) == [*texts(world.done)[:-1], "takeoff waits: no position"]
+    assert texts(told) == [], "once"
+
+
+def test_commands_that_wait_for_a_flight_are_bounded_and_go_with_their_client() -> None:
+    world = GatewayWorld()
+    heights = [command_long(22, 0, 0, 0, 0, 0, 0, 495 + number) for number in range(6)]
+    assert [acks(world.send(each)) for each in heights] == [[(22, 5)]] * 4 + [[(22, 1)]] * 2
+    world.client(2, "other")
+    assert acks(world.send(heights[0], client=2), 2) == [(22, 5)]
+    world.take(ClientDown(1))
+    world.ready()
+    assert [each.client for each in world.wait(100_000) if isinstance(each, Propose)] == [2]
 
 
 # ---------------------------------------------------------------- two clients

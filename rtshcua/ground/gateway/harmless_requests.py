@@ -279,6 +279,15 @@ class HarmlessRequests:
         for each in [one for one in self._awaited if now_us >= one.until_us]:
             self._awaited.remove(each)
             each.link.ack(each.to, each.command, FAILED)
+        self._send_lasting(now_us)
+        for client, (link, rest) in list(self._lists.items()):
+            for _ in range(min(_PARAMETERS_AT_ONCE, len(rest))):
+                tell_parameter(link, rest.popleft())
+            if not rest:
+                del self._lists[client]
+
+    def _send_lasting(self, now_us: int) -> None:
+        """Send the messages that stay true to those who asked for an interval of them."""
         for lasting in self._repeated.values():
             if now_us >= lasting.next_us:
                 known = self._seen.frame(lasting.message)
@@ -287,11 +296,6 @@ class HarmlessRequests:
                     lasting.link.forward(known)
                 else:
                     self._request_message(lasting.link, lasting.message)
-        for client, (link, rest) in list(self._lists.items()):
-            for _ in range(min(_PARAMETERS_AT_ONCE, len(rest))):
-                tell_parameter(link, rest.popleft())
-            if not rest:
-                del self._lists[client]
 
     def answered(self, number: int, slug: str, now_us: int) -> None:
         """The flight passed a request on, or not. A rate that it cannot take yet is asked for again; if it does not

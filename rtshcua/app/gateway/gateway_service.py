@@ -15,7 +15,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Final, Protocol
+from typing import Any, Final, NamedTuple, Protocol
 
 import msgspec
 
@@ -39,7 +39,8 @@ from rtshcua.mavlink import dialect
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.framing import HEADER, message_id
 from rtshcua.model.flat.mission import Mission
-from rtshcua.model.flat.situation import Now
+from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
+from rtshcua.wire.clock import DRIFT_US
 
 #: the longest wait of the loop, in ms, and the interval of ticks, in us
 _TURN_MS: Final = 50
@@ -53,6 +54,8 @@ _MOST_RECORDS: Final = 200
 _RECORD_S: Final = 0.25
 #: how much earlier than now, besides the error of UTC, a mission is issued, us
 _ISSUED_BEFORE_US: Final = 100_000
+#: the lines of the agent socket that are records of the log
+_DATED: Final = ("decision", "effect")
 #: lines about clients that wait for the disk
 _MOST_UNWRITTEN: Final = 1_000
 #: how often the relay is started again
@@ -83,6 +86,28 @@ class FlightWords:
     root: Path
 
 
+class FlightTime(NamedTuple):
+    """A flight's time of day by one of its records: monotonic time, UTC and the bound on the error of UTC, in us."""
+
+    monotonic_us: int
+    utc_us: int
+    utc_error_us: int
+
+    @classmethod
+    def of(cls, line: Mapping[str, Any]) -> "FlightTime | None":
+        """The time in a line of the agent socket; None if it has none, or the flight does not know the time of day."""
+        values = [line.get(each) for each in ("at_us", "utc_us", "utc_error_us")]
+        monotonic_us, utc_us, error_us = (each if isinstance(each, int) else None for each in values)
+        if monotonic_us is None or utc_us is None or error_us is None or error_us >= UTC_UNKNOWN_US:
+            return None
+        return cls(monotonic_us, utc_us, error_us)
+
+    def now(self, monotonic_us: int) -> Now:
+        """The present moment by it; the error grows."""
+        since_us = monotonic_us - self.monotonic_us
+        return Now(monotonic_us, self.utc_us + since_us, self.utc_error_us + max(since_us, 0) * DRIFT_US // 1_000_000)
+
+
 @dataclass(slots=True)
 class GatewaySession:
     """One flight: its process, what it reported, the mission in force and the number of its released steps."""
@@ -95,6 +120,7 @@ class GatewaySession:
     accepted: Mission | None = None  # by the flight, but not announced yet
     began: bool = False  # a mission flies: that of clients, or of an earlier flight that is brought down
     released: int = 0
+    time: FlightTime | None = None  # of its last record; before the first one the time of day is this machine's
     close: Mapping[str, Any] = field(default_factory=dict)
     summary: dict[str, Any] = field(default_factory=dict)
 
@@ -112,6 +138,8 @@ class GatewaySession:
 
     def hear(self, line: Mapping[str, Any]) -> None:
         """Take in a line of the agent socket."""
+        if line.get("type") in _DATED:
+            self.time = FlightTime.of(line) or self.time
         match line.get("type"):
             case "hello":
                 self.hello = line
@@ -280,7 +308,10 @@ class GatewayService:
         return None
 
     def _now(self) -> Now:
+        """The present moment by the flight's time of day, which may be the vehicle's."""
         now = self._clock.now()
+        if self._session is not None and self._session.time is not None:
+            return self._session.time.now(now.monotonic_us)
         return Now(now.monotonic_us, now.utc_us, min(now.utc_error_us, self._utc_error_us))
 
     def _take(self, event: Event, now: Now) -> None:
@@ -427,7 +458,7 @@ class GatewayService:
         start = None if self._frames is None else self._frames.start(now)
         in_force, released = (None, 0) if session is None else (session.in_force, session.released)
         # a mission issued within the error of UTC would be deferred, because it may be issued in the future
-        issued_us = now.utc_us - self._utc_error_us - _ISSUED_BEFORE_US
+        issued_us = now.utc_us - now.utc_error_us - _ISSUED_BEFORE_US
         return ProposalMoment(issued_us, start, flight, in_force, released)
 
     def _advance(self, now: Now) -> None:

@@ -341,6 +341,9 @@ class GatewayService:
         assert self._heard is not None
         system, autopilot = self._heard
         missions, prepared = self._policy.missions, self._policy.prepared
+        if self._core is not None:
+            for action in self._core.end(now):
+                self._do(action, now)
         frames = self._frames = VehicleFrames(prepared, system)
         settings = GatewaySettings(
             system, autopilot, prepared, missions.defaults(),

@@ -114,11 +114,21 @@ class Proposals:
 
     def add(self, proposal: Propose) -> list[Event]:
         """Add a proposal; the refusal if there are too many."""
-        if len(self._waiting) >= _MOST_WAITING:
+        if not proposal.fly:  # a mission that the same client uploads again replaces the one before
+            self._waiting = [each for each in self._waiting if each.fly or each.client != proposal.client]
+        safe = self._is_safe(proposal)
+        if len(self._waiting) >= _MOST_WAITING * (2 if safe else 1):
             text = "too many commands at once; send them one after the other"
             return [ProposalChecked(proposal.number, text, for_now=True)]
-        self._waiting.append(proposal)
+        if safe:  # what stops, returns or lands waits for nothing that others ask for
+            at = next((at for at, each in enumerate(self._waiting) if not self._is_safe(each)), len(self._waiting))
+            self._waiting.insert(at, proposal)
+        else:
+            self._waiting.append(proposal)
         return []
+
+    def _is_safe(self, proposal: Propose) -> bool:
+        return proposal.fly and self._safe.issuperset(each.skill for each in proposal.steps)
 
     def advance(self, moment: ProposalMoment, *, ready: bool) -> tuple[list[Event], SignedProposal | None]:
         """Start and finish work. Return what the core is told, and the document that is handed in now. `ready`: the

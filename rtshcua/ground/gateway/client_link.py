@@ -66,6 +66,10 @@ class ClientLink:
             self._in_a_row = self._in_a_row + 1 if now_us - self._beat_us <= _REGULAR_US else 1
             self._beat_us, self.beats = now_us, True
 
+    def beats_now(self, now_us: int) -> bool:
+        """Whether it sends regular heartbeats."""
+        return self._in_a_row >= _REGULAR and not self.is_dead and now_us - self.heard_us <= DEAD_US
+
     def silent(self, now_us: int) -> bool:
         """Whether it sent regular heartbeats and is silent for too long."""
         return self._in_a_row >= _REGULAR and now_us - self.heard_us > DEAD_US

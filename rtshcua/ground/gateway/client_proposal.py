@@ -50,6 +50,8 @@ class ClientProposal:
     ended: bool = False
     #: how many of its steps succeeded
     done: int = 0
+    #: whether it was taken only because it makes the flight safer: that gives no control
+    borrows: bool = False
     told_us: int = 0
     #: notes of decisions that wait, each told once
     waits: set[str] = field(default_factory=set)

@@ -27,11 +27,13 @@ from rtshcua.mavlink import enums, layouts
 
 #: the interval of request frames to the flight, us, and how many may wait
 REQUEST_EVERY_US: Final = 50_000
-_MOST_WAITING: Final = 64
+_MOST_WAITING: Final = 128
+_MOST_OF_ONE: Final = 64
+_MOST_AWAITED: Final = 64
 #: what the flight answers while it cannot take a request; when that is handed in again, us, and how often
 _NOT_YET: Final = frozenset({"busy", "refused", "no-vehicle"})
 _AGAIN_US: Final = 500_000
-_MOST_TRIES: Final = 40
+_MOST_TRIES: Final = 7
 #: how long an answer of the vehicle is waited for, us
 _PATIENCE_US: Final = 1_000_000
 #: the interval of requests for all parameters, and of the parameters that are sent to a client at once, us
@@ -67,11 +69,14 @@ _LASTING: Final = frozenset({AUTOPILOT_VERSION, HOME_POSITION})
 
 @dataclass(slots=True)
 class _Request:
-    """A frame for the flight. `rate_of` is the message whose interval it sets, None if it sets none."""
+    """A frame for the flight. `rate_of` is the message whose interval it sets, None if it sets none, and `before` the
+    interval that it had, us.
+    """
 
     link: ClientLink
     frame: bytes
     rate_of: int | None
+    before: int | None = None
     not_before_us: int = 0
     tries: int = 1
 
@@ -109,6 +114,7 @@ class HarmlessRequests:
         self._sequence = 0
         self._waiting: deque[_Request] = deque()
         self._handed: dict[int, _Request] = {}
+        self._last = ""  # the client whose request was handed in last
         self._next_us = 0
         self._awaited: list[_Awaited] = []
         self._listed_us = -_LIST_EVERY_US
@@ -139,7 +145,7 @@ class HarmlessRequests:
             return ACCEPTED
         if not self._may(link, "messages", now_us):
             return DENIED
-        if len(self._awaited) >= _MOST_WAITING:
+        if len(self._awaited) >= _MOST_AWAITED:
             return TEMPORARILY_REJECTED
         if not any(each.message == number for each in self._awaited) and not self._request_message(link, number):
             return TEMPORARILY_REJECTED
@@ -269,10 +275,13 @@ class HarmlessRequests:
 
     def tick(self, now_us: int) -> None:
         """Hand in the next request, send parts of lists, and end requests that the vehicle did not answer."""
-        if self._waiting and now_us >= max(self._next_us, self._waiting[0].not_before_us):
+        request = self._next(now_us) if now_us >= self._next_us else None
+        if request is not None:
+            self._waiting.remove(request)
+            self._last = request.link.name
             self._next_us = now_us + REQUEST_EVERY_US
             self._number += 1
-            request = self._handed[self._number] = self._waiting.popleft()
+            self._handed[self._number] = request
             while len(self._handed) > _MOST_WAITING:
                 self._handed.pop(next(iter(self._handed)))
             self._actions.append(RequestFrame(self._number, request.link.client, request.frame))
@@ -305,15 +314,33 @@ class HarmlessRequests:
         if request is None or request.rate_of is None or slug == "accepted":
             return
         if slug in _NOT_YET and request.tries < _MOST_TRIES and len(self._waiting) < _MOST_WAITING:
+            request.not_before_us = now_us + (_AGAIN_US << request.tries - 1)
             request.tries += 1
-            request.not_before_us = now_us + _AGAIN_US
             self._waiting.append(request)
             return
-        self._intervals.pop(request.rate_of, None)
+        self._undo(request)
         request.link.text(f"the rate of message {request.rate_of} stays as it is ({slug})", now_us, "rate")
+
+    def _next(self, now_us: int) -> _Request | None:
+        """The request whose turn it is: of another client than the last one, if there is one."""
+        due = [each for each in self._waiting if now_us >= each.not_before_us]
+        return next((each for each in due if each.link.name != self._last), due[0] if due else None)
+
+    def _undo(self, request: _Request) -> None:
+        """A rate was not set: the interval is as before, unless another request changed it meanwhile."""
+        if request.rate_of is None:
+            return
+        if request.before is None:
+            self._intervals.pop(request.rate_of, None)
+        else:
+            self._intervals[request.rate_of] = request.before
 
     def forget(self, client: int) -> None:
         """A client is gone."""
+        for each in self._waiting:
+            if each.link.client == client:
+                self._undo(each)
+        self._handed = {number: each for number, each in self._handed.items() if each.link.client != client}
         self._awaited = [each for each in self._awaited if each.link.client != client]
         self._waiting = deque(each for each in self._waiting if each.link.client != client)
         self._lists.pop(client, None)
@@ -321,8 +348,10 @@ class HarmlessRequests:
 
     def _hand_in(self, link: ClientLink, number: int, rate_of: int | None = None, **values: Any) -> bool:
         """Queue a frame of our own for the flight; False if too many wait."""
-        if len(self._waiting) >= _MOST_WAITING:
+        own = sum(each.link.name == link.name for each in self._waiting)
+        if len(self._waiting) >= _MOST_WAITING or own >= _MOST_OF_ONE:
             return False
-        self._waiting.append(_Request(link, made(number, values, self._own, self._sequence), rate_of))
+        before = None if rate_of is None else self._intervals.get(rate_of)
+        self._waiting.append(_Request(link, made(number, values, self._own, self._sequence), rate_of, before))
         self._sequence = (self._sequence + 1) % 256
         return True

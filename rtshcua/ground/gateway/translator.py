@@ -9,7 +9,8 @@ policy decides on every step besides. A pilot who requests control keeps it unti
 """
 
 from collections.abc import Callable
-from typing import Any, Final, NamedTuple, TypeAlias
+from dataclasses import dataclass
+from typing import Any, Final, TypeAlias
 
 from rtshcua.ground.gateway.accepted import COMMAND, ITEM, MESSAGE, MODE
 from rtshcua.ground.gateway.client_frames import (
@@ -35,7 +36,7 @@ from rtshcua.ground.gateway.client_frames import (
     received,
 )
 from rtshcua.ground.gateway.client_link import NOTICE, ClientLink
-from rtshcua.ground.gateway.client_proposal import ClientProposal
+from rtshcua.ground.gateway.client_proposal import AGAIN_US, ClientProposal
 from rtshcua.ground.gateway.habits import ShownState, set_parameter
 from rtshcua.ground.gateway.harmless_requests import COMMANDS as REQUESTING
 from rtshcua.ground.gateway.harmless_requests import HarmlessRequests
@@ -57,11 +58,13 @@ from rtshcua.ground.gateway.interface import (
     ProposedStep,
     RequestAnswered,
     Tick,
+    Withhold,
 )
 from rtshcua.ground.gateway.plan_transfer import PlanTransfer, UploadedPlan
 from rtshcua.ground.gateway.quick_decision import QuickDecision, QuickRefusal
 from rtshcua.ground.gateway.translation import (
     ACCEPTED,
+    CANCELLED,
     DENIED,
     IN_PROGRESS,
     TEMPORARILY_REJECTED,
@@ -126,12 +129,15 @@ _DOWN: Final = (MotionKind.HOME, MotionKind.LAND)
 _NOT_STARTED, _ACTIVE, _PAUSED, _COMPLETE = 2, 3, 4, 5
 
 
-class _Held(NamedTuple):
-    """A command that waits for a flight, and until when."""
+@dataclass(slots=True)
+class _Held:
+    """A command that waits for a flight, until when, and when its client was last told that it is in progress."""
 
     client: "_Client"
     message: Received
+    command: int
     until_us: int
+    told_us: int
 
 
 class _Client:
@@ -177,6 +183,7 @@ class Gateway:
         self._pilot_holds = 0  # the system id of the pilot who requested control
         self._stage = ""  # of the flight: "", "waiting", "flying"
         self._unready: str | None = None
+        self._cancelled = False  # whether this flight was cancelled, because its client is dead
         self._judged = False  # whether the flight has said if the vehicle is ready
         self._second_us = 0
         self._handlers = self._by_message()
@@ -204,6 +211,7 @@ class Gateway:
         match event:
             case ClientUp(client, of):
                 link = ClientLink(client, of, self._settings.system, self._actions, now.monotonic_us)
+                self._actions.append(Withhold(client, frozenset()))  # an earlier gateway may have withheld something
                 if of.pilot:
                     self._pilots[client] = link
                 elif len(self._clients) < _MOST_CLIENTS:
@@ -304,6 +312,8 @@ class Gateway:
         result: int | None
         if command == enums.MAV_CMD_COMPONENT_ARM_DISARM:
             result = client.shown.arm(message, now_us, self._cannot_take_off(client, now))
+            if message.number("param1") == 0:
+                self._drop_held(client)
         elif command in REQUESTING:
             result = self._requests.command(client.link, message, now_us)
         elif command == enums.MAV_CMD_DO_SET_MODE:
@@ -423,21 +433,19 @@ class Gateway:
             return ACCEPTED if latest.answered else None
         refusal = self._refusal(client, steps[0], now)
         if refusal is not None:
-            if refusal.reason == _NO_FLIGHT and self._hold(client, message, command, now_us):
-                return None
-            client.link.text(refusal.text, now_us, f"{refusal.skill} {refusal.reason}" if command < 0 else "")
-            client.link.record("refused", now_us, skill=refusal.skill, reason=refusal.reason, answer=refusal.text)
-            return refusal.result
+            return self._refuse(client, refusal, message, command, now_us)
         waiting = [each for each in self._proposals.values() if each.link is client.link and not each.taken]
-        if command < 0:
-            if waiting or now_us - client.setpoint_us < SETPOINT_US:
-                return None  # it comes again
-            client.setpoint_us = now_us
+        if command < 0 and (waiting or now_us - client.setpoint_us < SETPOINT_US):
+            return None  # it comes again
         if len(waiting) >= MOST_OPEN:
             return TEMPORARILY_REJECTED
-        guided = message.message in (layouts.MISSION_ITEM_INT, MISSION_ITEM)
+        client.setpoint_us = now_us if command < 0 else client.setpoint_us
         self._number += 1
-        proposal = ClientProposal(self._number, client.link, message.sender, command, steps, now_us, guided)
+        proposal = ClientProposal(
+            self._number, client.link, message.sender, command, steps, now_us,
+            guided=message.message in (layouts.MISSION_ITEM_INT, MISSION_ITEM),
+            borrows=self._outranked(client, now_us) is not None,
+        )  # fmt: skip
         self._proposals[self._number] = client.latest = proposal
         self._actions.append(Propose(self._number, client.link.client, client.link.settings.role, steps))
         return None
@@ -450,27 +458,65 @@ class Gateway:
             return refusal
         return QuickRefusal(TEMPORARILY_REJECTED, hindrance, step.skill, hindrance)
 
+    def _refuse(
+        self, client: _Client, refusal: QuickRefusal, message: Received, command: int, now_us: int
+    ) -> int | None:
+        """Tell and record a refusal, and return its result; None if the command waits instead."""
+        if refusal.reason == _NO_FLIGHT and self._hold(client, message, command, now_us):
+            return None
+        if refusal.skill in self._safe:
+            self._drop_held(client)
+        client.link.text(refusal.text, now_us, f"{refusal.skill} {refusal.reason}" if command < 0 else "")
+        client.link.record("refused", now_us, skill=refusal.skill, reason=refusal.reason, answer=refusal.text)
+        return refusal.result
+
     def _hold(self, client: _Client, message: Received, command: int, now_us: int) -> bool:
         """Whether a command waits for the next flight, which is ready some seconds after a landing."""
         if command < 0 or not self._holds or message.message in (layouts.MISSION_ITEM_INT, MISSION_ITEM):
             return False
         own = [each for each in self._held if each.client is client]
-        if not any(each.message.fields == message.fields for each in own):
-            if len(own) >= MOST_OPEN:
-                return False
-            self._held.append(_Held(client, message, now_us + HELD_US))
+        same = next((each for each in own if each.command == command), None)
+        if same is not None:  # sent again, or changed: the last one counts, and waits no longer for it
+            same.message, same.told_us = message, now_us
+        elif len(own) < MOST_OPEN:
+            self._held.append(_Held(client, message, command, now_us + HELD_US, now_us))
+        else:
+            return False
         client.link.ack(message.sender, command, IN_PROGRESS)
         return True
+
+    def _drop_held(self, client: _Client) -> None:
+        """The client lands, stops or disarms: what it asked for before is withdrawn."""
+        for each in [one for one in self._held if one.client is client]:
+            self._held.remove(each)
+            client.link.ack(each.message.sender, each.command, CANCELLED)
 
     def _take_held(self, now: Now) -> None:
         """Take the commands that waited for a flight, now that there is one, or refuse them after too long."""
         ready = self._stage == "flying" or (self._stage == "waiting" and self._judged)
-        due = [each for each in self._held if ready or now.monotonic_us >= each.until_us]
+        now_us = now.monotonic_us
+        self._held = [each for each in self._held if not each.client.link.is_dead]
+        due = [each for each in self._held if ready or now_us >= each.until_us]
         self._held = [each for each in self._held if each not in due]
         self._holds = False
-        for each in due:
-            self._handlers[each.message.message](each.client, each.message, now)
-        self._holds = True
+        try:
+            for each in due:
+                self._handlers[each.message.message](each.client, each.message, now)
+        finally:
+            self._holds = True
+        for each in self._held:
+            if now_us - each.told_us >= AGAIN_US:
+                each.told_us = now_us
+                each.client.link.ack(each.message.sender, each.command, IN_PROGRESS)
+
+    def end(self, now: Now) -> list[Action]:
+        """This policy is no longer in force, and another gateway takes its place: answer what waits."""
+        for each in self._held:
+            each.client.link.text("the policy was renewed: send the command again", now.monotonic_us, "renewed")
+            each.client.link.ack(each.message.sender, each.command, TEMPORARILY_REJECTED)
+        actions = self._actions[:]
+        self._actions.clear()
+        return actions
 
     def _cannot_take_off(self, client: _Client, now: Now) -> tuple[int, str] | None:
         """Why no take-off of this client could follow an arming now, whatever its height, and the MAV_RESULT."""
@@ -488,10 +534,9 @@ class Gateway:
         """Why a step cannot be taken now, although the policy may permit it."""
         if self._pilot_holds:
             return "the pilot is in control"
-        holder = self._holder(now_us)
-        contradicts = holder is not None and holder is not client and not self._is_safer(step.skill)
-        if contradicts and holder is not None and client.link.settings.rank <= holder.link.settings.rank:
-            return f"{holder.link.name} is in control"
+        rival = self._outranked(client, now_us)
+        if rival is not None and not self._is_safer(step.skill):
+            return f"{rival.name} is in control"
         contract = self._translation.contract(step.skill)
         climbs = contract is not None and contract.motion.kind == MotionKind.CLIMB
         if self._stage == "flying":
@@ -500,23 +545,41 @@ class Gateway:
             return "the vehicle flies under another control"
         if not climbs:
             return "the vehicle is on the ground: take off first"
-        if self._stage == "" or (self._held and not self._judged):
+        if self._stage == "":
             return _NO_FLIGHT
         return self._unready
+
+    def _outranked(self, client: _Client, now_us: int) -> ClientLink | None:
+        """Another client that is in control, whose rank is not lower: also one that is gone, while its step brings the
+        vehicle down.
+        """
+        flown = self._flown
+        if flown is not None and flown.flies >= 0 and self._brings_down(flown) and flown.link.name != client.link.name:
+            rival = flown.link
+        else:
+            holder = self._holder(now_us)
+            if holder is None or holder is client:
+                return None
+            rival = holder.link
+        return rival if client.link.settings.rank <= rival.settings.rank else None
 
     def _is_safer(self, skill: str) -> bool:
         """Whether a skill is of the contingency, and not before the one that flies there."""
         if skill not in self._safe:
             return False
-        flown = self._flown
-        flies = "" if flown is None or flown.ended else flown.steps[flown.flies].skill
-        return flies not in self._safe or self._safe.index(skill) >= self._safe.index(flies)
+        under_way = {
+            each.steps[min(max(each.flies, each.done), len(each.steps) - 1)].skill
+            for each in self._proposals.values()
+            if not each.ended
+        }
+        furthest = max((self._safe.index(each) for each in under_way if each in self._safe), default=0)
+        return self._safe.index(skill) >= furthest
 
     def _holder(self, now_us: int) -> _Client | None:
         """The client in control: that of the last proposal under way, or for some time after its end."""
         for proposal in reversed(self._proposals.values()):
             client = self._clients.get(proposal.link.client)
-            if not proposal.ended and client is not None:
+            if not proposal.ended and not proposal.borrows and client is not None:
                 self._kept = client, now_us + KEEPS_US
                 return client
         if self._kept is not None and now_us < self._kept[1] and self._stage == "flying":
@@ -552,8 +615,6 @@ class Gateway:
             return
         if slug == "accepted":
             proposal.taken = True
-            if proposal.link.is_dead:
-                self._actions.append(Cancel(proposal.link.client, f"{proposal.link.name} is silent"))
             for each in self._proposals.values():
                 if each is not proposal and each.number < number:
                     each.keep_before(proposal.first)
@@ -573,7 +634,7 @@ class Gateway:
     def _flight_line(self, line: dict[str, Any], now_us: int) -> None:
         match line.get("type"):
             case "hello":
-                self._stage, self._unready, self._judged = "", None, False
+                self._stage, self._unready, self._judged, self._cancelled = "", None, False, False
             case "waiting":
                 self._stage = "waiting"
             case "vehicle":
@@ -610,7 +671,7 @@ class Gateway:
             for proposal in self._proposals.values():
                 words = f"{proposal.steps[0].skill} ended with the flight" + (f": {ending}" if ending else "")
                 proposal.refuse(TEMPORARILY_REJECTED, words, now_us)
-        self._stage, self._flown, self._kept = "", None, None
+        self._stage, self._flown, self._kept, self._cancelled = "", None, None, False
         self._proposals.clear()
 
     # ---------------------------------------------------------------- missions of clients
@@ -728,7 +789,7 @@ class Gateway:
     def _param_set(self, client: _Client, message: Received, now: Now) -> None:
         bytewise = is_bytewise(self._settings.autopilot)
         known = set_parameter(client.link, self._seen, message, self._shadowed, now.monotonic_us, bytewise=bytewise)
-        if not known:
+        if not known and "parameters" in client.link.settings.requests:
             self._requests.want_parameter(client.link, parameter_name(message))
 
     def _param_read(self, client: _Client, message: Received, now: Now) -> None:
@@ -765,12 +826,13 @@ class Gateway:
             client.shown.update(now_us)
             if client.link.silent(now_us) and not client.link.is_dead:
                 client.link.is_dead = True
-                self._dead(client, now_us)
+                client.link.record("dead", now_us)
             if every_second:
                 self._control_status(client, now_us)
                 self._mission_current(client, always=True)
         if every_second:
             self._second_us = now_us
+        self._end_without_client(now_us)
         self._tidy(now_us)
 
     def _control_status(self, client: _Client, now_us: int) -> None:
@@ -791,26 +853,34 @@ class Gateway:
         self._uploads = {at: each for at, each in self._uploads.items() if each is not client}
         if client.link.beats and not client.link.is_dead:
             client.link.is_dead = True
-            self._dead(client, now_us)
+            client.link.record("dead", now_us)
+            self._end_without_client(now_us)
 
-    def _dead(self, client: _Client, now_us: int) -> None:
-        """A client is dead: if its step flies or waits, or flew last and nobody else is there, the mission is
-        cancelled, and the contingency flies. A step that brings the vehicle down goes on.
+    def _end_without_client(self, now_us: int) -> None:
+        """Cancel the mission, once, so that the contingency flies, where the client is dead whose step flies, or waits,
+        or flew last while no other client beats. A step that brings the vehicle down goes on.
         """
-        client.link.record("dead", now_us)
-        own = [each for each in self._proposals.values() if each.link is client.link and not each.ended]
-        flown = self._flown
-        if not own and flown is not None and flown.link is client.link and not self._lives_another(client):
-            own = [flown]
-        if self._stage == "flying" and any(not self._brings_down(each) for each in own):
-            self._actions.append(Cancel(client.link.client, f"{client.link.name} is silent"))
-            for other in self._clients.values():
-                if other is not client:
-                    other.link.text(f"{client.link.name} is silent: its flight is cancelled", now_us, severity=NOTICE)
+        if self._stage != "flying" or self._cancelled:
+            return
+        of = self._responsible()
+        if of is None or not of.link.is_dead or (of.ended and self._anybody_beats(now_us)):
+            return
+        self._cancelled = True
+        self._actions.append(Cancel(of.link.client, f"{of.link.name} is silent"))
+        for other in self._clients.values():
+            if other.link is not of.link:
+                other.link.text(f"{of.link.name} is silent: its flight is cancelled", now_us, severity=NOTICE)
 
-    def _lives_another(self, client: _Client) -> bool:
-        """Whether another client beats, which may take over."""
-        return any(each is not client and each.link.beats and not each.link.is_dead for each in self._clients.values())
+    def _responsible(self) -> ClientProposal | None:
+        """What flies, or waits, or flew last; None where it brings the vehicle down."""
+        flown = self._flown
+        waiting = [each for each in self._proposals.values() if not each.ended]
+        of = waiting[-1] if waiting and (flown is None or flown.ended) else flown
+        return None if of is None or (of.flies >= 0 and self._brings_down(of)) else of
+
+    def _anybody_beats(self, now_us: int) -> bool:
+        """Whether a client sends regular heartbeats, which may take over."""
+        return any(each.link.beats_now(now_us) for each in self._clients.values())
 
     def _brings_down(self, proposal: ClientProposal) -> bool:
         """Whether what is left of a proposal only lands the vehicle."""

@@ -272,7 +272,7 @@ def test_a_command_waits_for_the_next_flight_for_a_bounded_time() -> None:
     assert acks(world.send(TAKEOFF)) == [(22, 5)]
     assert acks(world.send(TAKEOFF)) == [(22, 5)], "the same once more"
     actions = world.wait(9_900_000)
-    assert (acks(actions), proposals(actions)) == ([], [])
+    assert (acks(actions), proposals(actions)) == ([(22, 5), (22, 5)], []), "every four seconds"
     actions = world.wait(200_000)
     assert (acks(actions), texts(actions)) == ([(22, 1)], ["takeoff rejected: no flight is ready yet"])
     world.send(TAKEOFF)
@@ -302,12 +302,38 @@ def test_a_client_reads_why_the_vehicle_is_not_ready() -> None:
 def test_commands_that_wait_for_a_flight_are_bounded_and_go_with_their_client() -> None:
     world = GatewayWorld()
     heights = [command_long(22, 0, 0, 0, 0, 0, 0, 495 + number) for number in range(6)]
-    assert [acks(world.send(each)) for each in heights] == [[(22, 5)]] * 4 + [[(22, 1)]] * 2
+    assert [acks(world.send(each)) for each in heights] == [[(22, 5)]] * 6, "the last one counts"
     world.client(2, "other")
     assert acks(world.send(heights[0], client=2), 2) == [(22, 5)]
     world.take(ClientDown(1))
     world.ready()
     assert [each.client for each in world.wait(100_000) if isinstance(each, Propose)] == [2]
+    world = GatewayWorld()
+    for each in heights:
+        world.send(each)
+    world.ready()
+    (one,) = (each for each in world.wait(100_000) if isinstance(each, Propose))
+    assert one.steps[0].values == (12_000,)
+
+
+@pytest.mark.parametrize("message", [command_long(400, 0), command_long(21), command_long(20)])
+def test_a_client_that_lands_or_disarms_withdraws_what_waits(message: Any) -> None:
+    world = GatewayWorld()
+    world.send(TAKEOFF)
+    assert (22, 6) in acks(world.send(message))
+    world.ready()
+    assert proposals(world.wait(100_000)) == []
+
+
+def test_the_command_of_a_dead_client_waits_no_longer() -> None:
+    world = GatewayWorld()
+    for _ in range(4):
+        world.send(BEAT)
+        world.wait(1_000_000)
+    world.send(TAKEOFF)
+    world.wait(6_000_000)
+    world.ready()
+    assert proposals(world.wait(500_000)) == []
 
 
 # ---------------------------------------------------------------- two clients
@@ -362,6 +388,40 @@ def test_nobody_stops_the_landing_of_another() -> None:
         world.dispatch(0)
         assert bool(proposals(world.send(asked, client=2))) is taken, (flies, asked)
         assert taken or proposals(world.send(hover)), "its own client may"
+
+
+def test_a_landing_that_waits_for_its_dispatch_is_not_superseded_either() -> None:
+    world = GatewayWorld()
+    world.client(2, "other")
+    world.fly()
+    world.accept(world.send(command_long(21)))
+    assert proposals(world.send(command_long(193), client=2)) == []
+
+
+def test_a_landing_whose_client_is_gone_goes_on() -> None:
+    world = GatewayWorld()
+    world.client(2, "other")
+    world.fly()
+    world.accept(world.send(command_long(21)))
+    world.dispatch(0)
+    world.take(ClientDown(1))
+    for message in (reposition(), command_long(193)):
+        actions = world.send(message, client=2)
+        assert proposals(actions) == []
+        assert any("script is in control" in text for text in texts(actions, 2))
+    world.client(3, "script")
+    assert proposals(world.send(reposition(), client=3)) != [], "its own, connected again"
+
+
+def test_what_makes_the_flight_safer_gives_no_control() -> None:
+    world = two()
+    hover = number(world.send(command_long(193), client=2))
+    assert texts(world.send(reposition(z=509), client=2), 2) == ["goto rejected: script is in control"]
+    world.take(ProposalChecked(hover, None, 1))
+    world.take(ProposalAnswered(hover, "accepted"))
+    world.dispatch(1)
+    assert texts(world.send(reposition(z=510), client=2), 2) == ["goto rejected: script is in control"]
+    assert proposals(world.send(reposition(z=511))) != [], "who is in control may go on"
 
 
 def test_control_is_kept_for_a_time_after_the_last_step() -> None:
@@ -476,6 +536,45 @@ def test_a_dead_client_whose_step_was_the_last_ends_the_flight_if_nobody_else_be
         assert (Cancel(1, "script is silent") in actions) is cancelled
 
 
+def test_all_clients_that_die_together_end_the_flight() -> None:
+    for disconnect in (False, True):
+        world = two()
+        world.line(type="effect", event="succeeded", kind=0, step=0)
+        for _ in range(4):
+            world.send(BEAT)
+            world.send(BEAT, client=2)
+            world.wait(1_000_000)
+        actions = world.take(ClientDown(1)) + world.take(ClientDown(2)) if disconnect else []
+        actions += world.wait(6_000_000)
+        assert [each for each in actions if isinstance(each, Cancel)] == [Cancel(1, "script is silent")]
+
+
+def test_one_old_heartbeat_of_another_client_keeps_no_flight_up() -> None:
+    world = two()
+    world.line(type="effect", event="succeeded", kind=0, step=0)
+    world.send(BEAT, client=2)
+    for _ in range(4):
+        world.send(BEAT)
+        world.wait(1_000_000)
+    assert Cancel(1, "script is silent") in world.wait(6_000_000)
+
+
+def test_a_landing_that_is_refused_after_the_death_of_its_client_ends_the_flight() -> None:
+    world = two()
+    world.line(type="effect", event="succeeded", kind=0, step=0)
+    world.accept(world.send(command_long(21)))
+    world.send(BEAT)
+    assert Cancel(1, "script is silent") in world.take(ClientDown(1)), "it was not dispatched"
+    world = two()
+    world.accept(world.send(command_long(21)), 1)
+    world.dispatch(1)
+    world.send(BEAT)
+    assert not [each for each in world.take(ClientDown(1)) if isinstance(each, Cancel)]
+    assert Cancel(1, "script is silent") in world.line(type="effect", event="failed", kind=0, step=1) + world.wait(
+        50_000
+    )
+
+
 def test_a_dead_client_does_not_end_its_landing() -> None:
     for message, cancelled in ((command_long(21), False), (command_long(20), False), (command_long(193), True)):
         world = GatewayWorld()
@@ -522,7 +621,8 @@ def test_a_mission_taken_after_the_death_of_its_client_is_cancelled() -> None:
     proposed = number(world.send(TAKEOFF))
     world.take(ClientDown(1))
     world.take(ProposalChecked(proposed, None))
-    assert world.take(ProposalAnswered(proposed, "accepted")) == [Cancel(1, "script is silent")]
+    assert world.take(ProposalAnswered(proposed, "accepted")) == [], "nothing can be cancelled yet"
+    assert Cancel(1, "script is silent") in world.line(type="mission") + world.wait(50_000)
 
 
 def test_unknown_clients_and_frames_of_other_systems_are_passed_over() -> None:

@@ -150,12 +150,12 @@ def test_request_frames_are_spaced_and_bounded() -> None:
 def test_a_rate_that_the_flight_cannot_take_yet_is_asked_for_again() -> None:
     world = GatewayWorld()
     assert acks(world.send(command_long(511, 74, 250_000))) == [(511, 0)]
-    for tries in range(1, 4):
-        found = world.wait(600_000, step_us=50_000)
+    for tries in range(4):
+        found = world.wait(600_000 if tries == 0 else 500_000 << tries - 1, step_us=50_000)
         assert [each.param1 for each in requests(found)] == [74], tries
         (asked,) = (each.number for each in found if isinstance(each, RequestFrame))
         assert world.take(RequestAnswered(asked, "busy")) == []
-    found = world.wait(600_000, step_us=50_000)
+    found = world.wait(4_000_000, step_us=50_000)
     (asked,) = (each.number for each in found if isinstance(each, RequestFrame))
     assert world.take(RequestAnswered(asked, "accepted")) == []
     assert requests(world.wait(2_000_000)) == []

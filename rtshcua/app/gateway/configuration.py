@@ -169,7 +169,7 @@ def _configuration(table: SettingsTable, folder: Path) -> GatewayConfiguration:
         None if bundle is None else folder / bundle,
         None if data is None else folder / Path(data).expanduser(),
         None if state is None else folder / Path(state).expanduser(),
-        Path("runs") if runs is None else folder / runs,
+        folder / (runs or "runs"),
     )
 
 

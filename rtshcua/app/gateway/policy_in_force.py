@@ -109,7 +109,8 @@ def policy_in_force(
         help = "`rtshcua check` lists all errors of the sources"
         return Refusal("no-policy", str(error), help, ExitCode.DIAGNOSTICS)
     except Untrusted as error:
-        return Refusal(error.slug, str(error), getattr(error, "help", "") or "`rtshcua keys list` shows the keys")
+        first = "`rtshcua keys init` makes keys" if error.slug == "no-keys" else "`rtshcua keys list` shows the keys"
+        return Refusal(error.slug, str(error), getattr(error, "help", "") or first)
 
 
 def _first_mission(missions: Missions, roles: Sequence[str]) -> Mission | Refusal:
@@ -135,7 +136,8 @@ def _first_mission(missions: Missions, roles: Sequence[str]) -> Mission | Refusa
                 if found.mission is not None:
                     return found.mission
     text = f"`{missions.policy.name}` permits no take-off that an agent asks for as {', '.join(roles)}"
-    return Refusal("no-takeoff", text, "permit a skill that climbs: `permit takeoff by role operator through agent`")
+    help = "permit a skill that climbs: `permit takeoff by role operator through agent`"
+    return Refusal("no-takeoff", text, help, ExitCode.REFUSED)
 
 
 def _altitude(contract: Contract) -> str:

@@ -80,10 +80,12 @@ def allowed_skills(text: str) -> tuple[str, ...] | Refusal:
         skill = _OTHER_WORDS.get(name, name)
         if skill not in SKILLS:
             near = nearest(name, (*SKILLS, *_OTHER_WORDS))
-            help = f"did you mean `{near}`?" if near else f"accepted: {listed((*SKILLS, 'land', 'rtl', 'hold'))}"
+            help = f"did you mean `{near}`?" if near else f"accepted: {listed((*SKILLS, 'land', 'rtl', 'hold'))}."
             text = f"`{word.strip()}` is not a skill of `--allow`" if word.strip() else "`--allow` has an empty name"
             return Refusal("usage", text, f"{help} Other skills need a policy of your own: `--policy FILE`")
         found.add(skill)
+    if "takeoff" not in found:
+        return Refusal("usage", "`--allow` has no `takeoff`: nothing could fly", f"as in `--allow takeoff,{text}`")
     return tuple(skill for skill in SKILLS if skill in found)
 
 

@@ -221,7 +221,7 @@ def _identity(typed: _Typed) -> str:
 
 def _unit_apart(below: str | None, words: list[str]) -> tuple[str | None, list[str]]:
     """Return the height and the other words of `--below 30 m`, where a shell makes two words of it."""
-    if below is not None and below.replace(".", "", 1).isdigit() and words and words[0] in _UNITS:
+    if below is not None and below.replace(".", "", 1).isdigit() and words and words[0].isalpha():
         return f"{below} {words[0]}", words[1:]
     return below, words
 

@@ -113,6 +113,12 @@ def test_a_wrong_configuration_is_refused_with_the_nearest_fix(tmp_path: Path, w
     assert help in (found.help or "")
 
 
+def test_logs_are_kept_beside_the_configuration_by_default(tmp_path: Path) -> None:
+    found = read(tmp_path, '[policy]\nsources = ["rules.rts"]\n')
+    assert isinstance(found, GatewayConfiguration)
+    assert found.runs == tmp_path / "runs"
+
+
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     missing = read_configuration(tmp_path / "none.toml")
     assert isinstance(missing, Refusal)

@@ -117,9 +117,9 @@ def test_the_simulated_vehicle_starts_inside() -> None:
 
 def test_skills_have_other_words() -> None:
     assert allowed_skills("land,goto,take-off") == ("takeoff", "goto", "emergency_land")
-    assert allowed_skills("RTL, hold") == ("hover", "return_home")
+    assert allowed_skills("takeoff, RTL, hold") == ("takeoff", "hover", "return_home")
     told = allowed_skills("takeof")
     assert isinstance(told, Refusal)
     assert "did you mean `takeoff`?" in (told.help or "")
-    for text in ("", "takeoff,,goto", "orbit"):
+    for text in ("", "takeoff,,goto", "orbit", "goto,land"):
         assert isinstance(allowed_skills(text), Refusal)

@@ -22,6 +22,8 @@ WRONG = {
         "did you mean `30 m`?",
     ),
     "no length": (["--allow", "takeoff", "--below", "30 s"], 2, "`30 s` in `--below`", "--below 30 m"),
+    "another unit": (["--allow", "takeoff", "--below", "30", "ft"], 2, "`30 ft` in `--below` is not a height", "30 m"),
+    "no take-off": (["--allow", "goto", "--below", "30 m"], 2, "`--allow` has no `takeoff`", "--allow takeoff,goto"),
     "too low": (["--allow", "takeoff", "--below", "2 m"], 2, "`--below 2 m` is out of range", "`5 m`"),
     "too high": (["--allow", "takeoff", "--below", "1 km"], 2, "`--below 1 km` is out of range", "`500 m`"),
     "without `--allow`": (["--inside", "field.kml"], 2, "`--inside` requires `--allow`", "--allow takeoff"),
@@ -83,7 +85,9 @@ def test_a_policy_needs_keys(folder: Path, capsys: pytest.CaptureFixture[str]) -
     (folder / "rules.rts").write_text('import "lib:policies/bridge_inspection.rts"\n')
     source = Path(__file__).resolve().parents[4] / "policies/bridge_inspection.rts"
     assert main(["gateway", "--policy", str(source)]) == 4
-    assert "no-keys" in capsys.readouterr().err
+    told = capsys.readouterr().err
+    assert "no-keys" in told
+    assert "rtshcua keys init" in told
 
 
 def test_save_never_replaces_files(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:

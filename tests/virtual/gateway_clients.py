@@ -22,7 +22,7 @@ PROGRAMS: Final = CHECKOUT / "tests/integration/gateway_programs"
 OTHERS: Final = CHECKOUT / "build/gateway-clients"
 PATIENCE_S: Final = 120.0
 ROLES: Final = ("operator", "zone", "skill", "daylight", "battery", "wind")
-#: what each role's refusal says; the time of day is one at which nobody tests this, a minute of a day long gone by
+#: what each role's refusal says; the time of day that is permitted is a minute twelve hours from now
 REASONS: Final = {
     "zone": "inside pad",
     "skill": "the role skill may not",

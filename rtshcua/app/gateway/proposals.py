@@ -253,7 +253,7 @@ class Proposals:
                 payload = mission_payload(bind(mission, signer.digest))
                 document = seal_under(signer.envelope, payload, mission_key=signer.key)
                 return SignedProposal(number, document, mission, 0)
-            if self._replaced >= _MOST_REPLACED and not self._safe.issuperset(s.skill for s in compiled.proposal.steps):
+            if self._replaced >= _MOST_REPLACED and not self._is_safe(compiled.proposal):
                 raise Refused(f"this flight has taken {self._replaced} commands: land, and take off again")
             # a step that was released and then declined is kept too: the flight says so, and it is tried again
             kept = min(moment.released + self._again, len(moment.in_force.mission.invocations))

@@ -69,14 +69,15 @@ _LASTING: Final = frozenset({AUTOPILOT_VERSION, HOME_POSITION})
 
 @dataclass(slots=True)
 class _Request:
-    """A frame for the flight. `rate_of` is the message whose interval it sets, None if it sets none, and `before` the
-    interval that it had, us.
+    """A frame for the flight. `rate_of` is the message whose interval it sets, None if it sets none; `before` the
+    interval that it had, and `every_us` the one that it is to get, us.
     """
 
     link: ClientLink
     frame: bytes
     rate_of: int | None
     before: int | None = None
+    every_us: int | None = None
     not_before_us: int = 0
     tries: int = 1
 
@@ -191,7 +192,7 @@ class HarmlessRequests:
             **self._target,
         )
         if handed:
-            self._intervals[number] = interval_us
+            self._intervals[number] = self._waiting[-1].every_us = interval_us
         return handed
 
     # ---------------------------------------------------------------- messages
@@ -328,7 +329,7 @@ class HarmlessRequests:
 
     def _undo(self, request: _Request) -> None:
         """A rate was not set: the interval is as before, unless another request changed it meanwhile."""
-        if request.rate_of is None:
+        if request.rate_of is None or self._intervals.get(request.rate_of) != request.every_us:
             return
         if request.before is None:
             self._intervals.pop(request.rate_of, None)
@@ -337,7 +338,7 @@ class HarmlessRequests:
 
     def forget(self, client: int) -> None:
         """A client is gone."""
-        for each in self._waiting:
+        for each in (*self._waiting, *self._handed.values()):
             if each.link.client == client:
                 self._undo(each)
         self._handed = {number: each for number, each in self._handed.items() if each.link.client != client}

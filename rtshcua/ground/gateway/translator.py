@@ -311,7 +311,8 @@ class Gateway:
         command, now_us = message.fields["command"], now.monotonic_us
         result: int | None
         if command == enums.MAV_CMD_COMPONENT_ARM_DISARM:
-            result = client.shown.arm(message, now_us, self._cannot_take_off(client, now))
+            arms = message.number("param1") == 1 and not self._seen.armed
+            result = client.shown.arm(message, now_us, self._cannot_take_off(client, now) if arms else None)
             if message.number("param1") == 0:
                 self._drop_held(client)
         elif command in REQUESTING:

@@ -171,6 +171,23 @@ def test_a_rate_that_the_flight_does_not_change_is_told_and_may_be_asked_for_aga
         world.wait(6_000_000)
 
 
+def test_a_rate_that_was_not_set_leaves_what_another_client_has() -> None:
+    """By hand: a slower rate stands, a faster one is refused or its client goes before the flight answers."""
+    for gone in (False, True):
+        world = GatewayWorld()
+        world.client(2, "other")
+        world.send(command_long(511, 74, 500_000), client=2)
+        (first,) = (each.number for each in world.wait(100_000) if isinstance(each, RequestFrame))
+        world.take(RequestAnswered(first, "accepted"))
+        world.send(command_long(511, 74, 50_000))
+        (asked,) = (each.number for each in world.wait(100_000) if isinstance(each, RequestFrame))
+        world.take(ClientDown(1) if gone else RequestAnswered(asked, "rate"))
+        world.send(command_long(511, 74, 1_000_000), client=2)
+        assert requests(world.wait(500_000)) == [], "it is never lowered"
+        world.send(command_long(511, 74, 100_000), client=2)
+        assert [each.param2 for each in requests(world.wait(500_000))] == [100_000]
+
+
 def test_home_is_repeated_at_the_interval_that_a_client_asks_for() -> None:
     """The flight changes no rate of it. It is requested once where it was not seen."""
 

@@ -32,7 +32,7 @@ from rtshcua.evaluation.results import (
     EnforceCheck,
     VerificationTiming,
 )
-from rtshcua.ground.report.drawing.bar_chart import StackedPart, StackedRow, stacked_chart
+from rtshcua.ground.drawing.bar_chart import StackedPart, StackedRow, stacked_chart
 
 #: how many failing checks are listed
 _LISTED: Final = 20

@@ -41,7 +41,7 @@ from rtshcua.evaluation.report_parts import (
     span,
 )
 from rtshcua.evaluation.results import FallbackReaction, FallbackTiming, PointFlight
-from rtshcua.ground.report.drawing.bar_chart import ChartBar, ChartGroup, bar_chart
+from rtshcua.ground.drawing.bar_chart import ChartBar, ChartGroup, bar_chart
 
 #: the isolated modes, which decide in C; those after the first are compared with it too
 ISOLATED: Final = ("process", "trustzone-m", "optee")

@@ -2,15 +2,13 @@
 
 from rtshcua.evaluation.published import CHOICES
 from rtshcua.evaluation.report_parts import EvaluationReport, ReportChart
-from rtshcua.ground.report.drawing.bar_chart import BarChart
-from rtshcua.ground.report.html_page import rendered
+from rtshcua.ground.drawing.bar_chart import BarChart
+from rtshcua.ground.drawing.html import rendered
 
 
 def render(report: EvaluationReport) -> str:
     """Return the HTML page; the same bytes for the same report."""
-    return rendered(
-        "evaluation.html", package="rtshcua.evaluation", report=report, choices=CHOICES, template_of=_template
-    )
+    return rendered("rtshcua.evaluation", "evaluation.html", report=report, choices=CHOICES, template_of=_template)
 
 
 def _template(part: object) -> str | None:

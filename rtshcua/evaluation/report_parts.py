@@ -12,7 +12,7 @@ from rtshcua.evaluation.headline_claims import Claims, absent_modes
 from rtshcua.evaluation.measures import Averaged, FlightTable
 from rtshcua.evaluation.published import CASES
 from rtshcua.evaluation.results import Result
-from rtshcua.ground.report.drawing.bar_chart import BarChart, StackedChart
+from rtshcua.ground.drawing.bar_chart import BarChart, StackedChart
 
 ABSENT: Final = "not available here"
 UNMEASURED: Final = "not measured"

@@ -25,7 +25,7 @@ ALLOWED = {
     "front/cli/render/pages.py": "reads the pages that ship",
     "front/cli/unlock.py": "a passphrase may well come from a pipe",
     "ground/checker/time_zones.py": "reads the data of the package `tzdata`",
-    "ground/report/html_page.py": "reads the templates that ship",
+    "ground/drawing/html.py": "reads the templates that ship",
     "ground/language/generate.py": "a developer's tool: from the grammar to its table",
     "ground/language/table.py": "reads the table that ships",
     "codec/build_dialect.py": "a developer's tool: from pymavlink to the table",

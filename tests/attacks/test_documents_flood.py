@@ -23,7 +23,7 @@ from reference.world import MISSION_KEY, ROOT, START, VEHICLE, Run, loaded, seal
 from rtshcua.adapters.agent_socket import GAP_US, SHORT, WORK_AT_ONCE, WORK_RATE, AgentSocket, Encoded
 from rtshcua.app.fly import agents
 from rtshcua.app.fly.agents import Agents
-from rtshcua.front.cli.render.showing import words
+from rtshcua.app.telling import words
 from rtshcua.model.flat.situation import Now
 from rtshcua.onboard.enforcement.executor import Commands
 from rtshcua.onboard.enforcement.isolated import PART, PRESENT, Caller

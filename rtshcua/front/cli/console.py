@@ -10,12 +10,12 @@ import msgspec
 
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.app.exit_codes import code_of
+from rtshcua.app.telling.records import detail_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli import faults
 from rtshcua.front.cli.faults import error_object, fail, tell
 from rtshcua.front.cli.render.live.feed import Feed
-from rtshcua.front.cli.render.showing import log
 from rtshcua.front.cli.stdout import out_json
 from rtshcua.front.cli.unlock import unlock
 from rtshcua.wire.keys import Duty, SigningKey
@@ -53,7 +53,7 @@ class TerminalConsole:
 
     def detail_of(self, event: str, detail: str) -> str:
         """Return the text that `show` and `why` print for this event."""
-        return log.detail_of(event, detail)
+        return detail_of(event, detail)
 
     def unlock(self, duty: Duty, path: Path | None) -> SigningKey:
         """Return a key from a file or the key store; prompts for the passphrase if the key has one."""

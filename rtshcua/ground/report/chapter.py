@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping
 
 from rtshcua.decision.outline import rings
+from rtshcua.ground.drawing.site import PlaceView, ZoneOutline, ZoneView
 from rtshcua.ground.lower.policy_checks import applies, rule_applies
 from rtshcua.ground.lower.zones import derived_name
 from rtshcua.ground.prove.mission_bounds import Bounds, rounded_energy, rounded_time
@@ -51,14 +52,11 @@ from rtshcua.ground.report.report_model import (
     NominalView,
     ParameterView,
     PatternView,
-    PlaceView,
     RuleView,
     ScenarioView,
     SignalView,
     SkillView,
     StepView,
-    ZoneOutline,
-    ZoneView,
 )
 from rtshcua.ground.report.reported_policy import ReportedPolicy, within
 from rtshcua.model.flat.mission import Invocation, Mission

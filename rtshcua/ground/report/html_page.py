@@ -1,27 +1,17 @@
-"""Renders a policy report as one self-contained HTML page: no script, no other file, no network.
+"""Renders a policy report as one self-contained HTML page: no script, no other file, no network."""
 
-All texts of sources are escaped (Jinja's autoescape). The page's Content Security Policy (level 3) also forbids every
-style except its own, which it names by digest.
-"""
-
-import re
-from base64 import b64encode
-from functools import cache
-from hashlib import sha256
-from importlib.resources import files
 from typing import Final, NamedTuple
 
-from jinja2 import DictLoader, Environment, StrictUndefined
-from markupsafe import Markup, escape
-
-from rtshcua.diagnostics.excerpt import visible
+from rtshcua.ground.drawing.html import rendered
+from rtshcua.ground.drawing.profile import profiles
+from rtshcua.ground.drawing.zone_map import mission_map, zone_maps
 from rtshcua.ground.editor.keyword_help import REASONS
-from rtshcua.ground.report.drawing.canvas import number
-from rtshcua.ground.report.drawing.profile import profiles
-from rtshcua.ground.report.drawing.survey_patterns import drawn
-from rtshcua.ground.report.drawing.zone_map import mission_map, zone_maps
 from rtshcua.ground.report.glance import glance
 from rtshcua.ground.report.report_model import Chapter, PolicyReport
+from rtshcua.ground.report.survey_patterns import drawn
+
+#: where the templates are
+PACKAGE: Final = "rtshcua.ground.report"
 
 
 class GlossaryEntry(NamedTuple):
@@ -77,21 +67,14 @@ GLOSSARY: Final = (
 )
 
 
-#: invisible and reordering characters, which a comment or an intent may contain
-_HIDDEN = re.compile(
-    "[\x00-\x09\x0b-\x1f\x7f-\x9f\xad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb]"
-)
-#: the package of the common templates
-OWN: Final = "rtshcua.ground.report"
 #: the size of the footer on A4: margins of 14 and 16 mm, letters of 6 pt, 1.3 mm wide
 FOOT_LINES, FOOT_COLUMNS = 4, 116
-#: the space between a number and its unit, where a line must not break
-_UNIT = re.compile(r"(?<=\d) (?=(?:m/s|km/h|cm|mm|km|m|mV|V|%|s|ms|us|min|h|deg|N|S|E|W)\b|%)")
 
 
 def page(report: PolicyReport) -> str:
     """Render a report. The same report gives the same bytes."""
     return rendered(
+        PACKAGE,
         "policy_report.html",
         _footer(report),
         book=report,
@@ -108,22 +91,6 @@ def page(report: PolicyReport) -> str:
     )
 
 
-def rendered(template: str, more_style: str = "", package: str = OWN, **values: object) -> str:
-    """Render a template with values, the common style and an additional one. A package may have templates of its own
-    besides the common ones, in its folder `templates`.
-    """
-    environment, style = templates(package)
-    style += more_style
-    digest = b64encode(sha256(style.encode()).digest()).decode("ascii")
-    text = environment.get_template(template).render(style=Markup(style), style_digest=digest, **values)
-    return visibly(text)
-
-
-def visibly(text: str) -> str:
-    """Replace invisible characters of a page by visible descriptions."""
-    return _HIDDEN.sub(lambda found: escape(visible(found[0])), text)
-
-
 def _footer(report: PolicyReport) -> str:
     """The style of the footer of printed pages: a line for each policy with name, version and full digest, or if that
     does not fit, all on one line with the first half of each digest.
@@ -135,41 +102,6 @@ def _footer(report: PolicyReport) -> str:
         lines = [", ".join(f"{each.name} {each.version}: {each.digest[:32]}" for each in report.chapters)]
     signed = "\\a ".join(lines)
     return f'@page {{ @bottom-left {{ content: "{signed}"; font: 6pt monospace; white-space: pre-wrap; }} }}\n'
-
-
-@cache
-def templates(package: str = OWN) -> tuple[Environment, str]:
-    """The compiled templates, and the style of the page, which is followed by that of a package with its own."""
-    texts = {
-        each.name: each.read_text(encoding="utf-8")
-        for name in (OWN, package)
-        for each in (files(name) / "templates").iterdir()
-        if each.is_file()
-    }
-    styles = [text for name, text in texts.items() if name.endswith(".css")]
-    environment = Environment(
-        loader=DictLoader(texts),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=True,
-    )
-    environment.filters |= {"told": _told, "px": number}
-    return environment, "".join(styles)
-
-
-def _told(text: str, anchors: dict[str, str] | None = None) -> Markup:
-    """Convert a sentence to HTML: names become code, with links to their explanations."""
-    parts = []
-    for number_, part in enumerate(_UNIT.sub("\u00a0", text).split("`")):
-        if number_ % 2 == 0:
-            parts.append(escape(part))
-            continue
-        code = Markup("<code>{}</code>").format(part)
-        anchor = (anchors or {}).get(part)
-        parts.append(code if anchor is None else Markup('<a href="#{}">{}</a>').format(anchor, code))
-    return Markup("").join(parts)
 
 
 def _anchors(chapter: Chapter, number_: int) -> dict[str, str]:

@@ -12,11 +12,12 @@ from rtshcua.decision.zones import PreparedZone
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
+from rtshcua.ground.drawing.html import rendered
+from rtshcua.ground.drawing.zone_map import ZoneMap, mission_map
 from rtshcua.ground.language.load import Program
 from rtshcua.ground.pipeline.program import PlannedMission
 from rtshcua.ground.report.chapter import chapter, mission_view
-from rtshcua.ground.report.drawing.zone_map import ZoneMap, mission_map
-from rtshcua.ground.report.html_page import rendered
+from rtshcua.ground.report.html_page import PACKAGE
 from rtshcua.ground.report.report_model import Chapter
 from rtshcua.ground.report.reported_policy import ReportedPolicy
 from rtshcua.model.flat import mission as flat
@@ -71,7 +72,7 @@ class CheckedProgram:
         for under, mission, declaration in self._planned:
             subject = ReportedPolicy(self._program, under)
             view, about = mission_view(mission, under.policy, None, {}), chapter(subject)
-            plan = mission_map(about, view)
+            plan = mission_map(about.site, view.way)
             written = [step for phase in declaration.phases for step in phase.steps]
             of = [[each for each in self._found if _is_within(each, step)] for step in written]
             errors = [any(map(_is_error, some)) for some in of]
@@ -108,6 +109,7 @@ def mission_map_page(checkings: Sequence[CheckedProgram]) -> str:
     others = list(dict.fromkeys(text for checking in checkings for text in checking.others()))
     refused = sum(each.refused for each in drawings)
     return rendered(
+        PACKAGE,
         "checked.html",
         drawings=drawings,
         others=others,

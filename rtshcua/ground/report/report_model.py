@@ -6,6 +6,8 @@ vehicle's home.
 
 from dataclasses import dataclass
 
+from rtshcua.ground.drawing.site import PlannedStep, PlannedWay, Site, ZoneView
+
 
 @dataclass(frozen=True, slots=True)
 class FileDigest:
@@ -141,49 +143,6 @@ class SignalView:
 
 
 @dataclass(frozen=True, slots=True)
-class ZoneOutline:
-    """An outline in the local plane, exactly as signed: a circle with its centre and the square of its radius, or
-    rings, outer ones counter-clockwise and holes clockwise.
-    """
-
-    rings: tuple[tuple[tuple[int, int], ...], ...] = ()
-    centre: tuple[int, int] | None = None
-    radius_squared: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class PlaceView:
-    """A place in the declaration of a zone: its description, WGS 84, and its coordinates in the local plane."""
-
-    what: str
-    latitude: str
-    longitude: str
-    x: int
-    y: int
-
-
-@dataclass(frozen=True, slots=True)
-class ZoneView:
-    """A zone. `use` is its use in the airspace: `allowed`, `forbidden` or empty; `floor` and `ceiling` are in mm above
-    home, or None; `derived` means that a rule grows it from another zone.
-    """
-
-    name: str
-    note: str
-    use: str
-    shape: str
-    band: str
-    times: str
-    ground: ZoneOutline
-    floor: int | None
-    ceiling: int | None
-    places: tuple[PlaceView, ...]
-    place: str
-    changed: bool
-    derived: bool = False
-
-
-@dataclass(frozen=True, slots=True)
 class StepView:
     """A step of a mission, and its path of local places, which ends at the last one. `tighter` are the limits that
     tighten its skill's contract.
@@ -208,6 +167,11 @@ class MissionView:
     bounds: tuple[Fact, ...]
     values: str
     steps: tuple[StepView, ...]
+
+    @property
+    def way(self) -> PlannedWay:
+        """Its way, to be drawn."""
+        return PlannedWay(self.name, tuple(PlannedStep(step.number, step.path) for step in self.steps))
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,6 +265,11 @@ class Chapter:
     scenarios: tuple[ScenarioView, ...]
     since: str  # what it was compared with; empty where with nothing
     changes: tuple[ChangeView, ...]
+
+    @property
+    def site(self) -> Site:
+        """What is drawn of it."""
+        return Site(self.name, self.zones, self.home, self.home_within, self.return_altitude)
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,7 +28,7 @@ from rtshcua.evaluation.published import CASES, CHOICES
 from rtshcua.evaluation.report_content import evaluation_report
 from rtshcua.evaluation.report_parts import EvaluationReport, ReportChart, ReportTable, digits
 from rtshcua.evaluation.results import Result, UnavailableMode
-from rtshcua.ground.report.drawing.bar_chart import BarChart
+from rtshcua.ground.drawing.bar_chart import BarChart
 
 HOSTILE = (
     '"><svg onload=alert(1)>',

@@ -7,6 +7,7 @@ import typer
 
 from rtshcua.app.approvals import ApprovalDraft, ApprovalRequest, ApprovalSigner, draft_approval, sign_draft
 from rtshcua.app.flight_documents import MOST_S
+from rtshcua.app.telling import words
 from rtshcua.app.wording import shorten
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
@@ -23,7 +24,6 @@ from rtshcua.front.cli.options.document_options import (
     Person,
     SignedRoot,
 )
-from rtshcua.front.cli.render.showing import words
 from rtshcua.front.cli.unlock import terminal, unlock_person
 from rtshcua.ground.lower.signed_paths import PlannedPath
 

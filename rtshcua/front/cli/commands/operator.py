@@ -19,6 +19,7 @@ from rtshcua.app.exit_codes import untrusted
 from rtshcua.app.flight_documents import MOST_S, bundle_in_flight
 from rtshcua.app.fly.narrator import REPLACED, Answering, asks
 from rtshcua.app.recalls import Recalled
+from rtshcua.app.telling.records import Names
 from rtshcua.diagnostics.excerpt import escaped, visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.suggest import nearest
@@ -37,7 +38,6 @@ from rtshcua.front.cli.options.document_options import (
 )
 from rtshcua.front.cli.recalling import GOOD_S, HELP
 from rtshcua.front.cli.render.live.lines import asked
-from rtshcua.front.cli.render.showing.log import Names
 from rtshcua.front.cli.stdout import NewestLines
 from rtshcua.front.cli.unlock import unlock_person
 from rtshcua.front.cli.width import columns, fitted

@@ -13,12 +13,12 @@ from reference.forgery import edit
 from reference.world import APPROVAL_KEY, MISSION_KEY, ROOT_KEY, TICK, FakeVehicle, Run
 from rtshcua.app.fly.narrator import NOTHING_FLIES, Teller
 from rtshcua.app.fly.story import Summary
+from rtshcua.app.telling.records import Names, detail_of
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
 from rtshcua.front.cli.app import main
 from rtshcua.front.cli.render.live.lines import ending
-from rtshcua.front.cli.render.showing.log import Names, detail_of
 from rtshcua.onboard.enforcement.load import Loaded
 from rtshcua.onboard.ports import Interrupted, TakenOver
 from rtshcua.wire.keys import SigningKey

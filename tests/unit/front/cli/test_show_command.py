@@ -14,12 +14,12 @@ from reference.forgery import edit, flight, other_flight, read
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.writing import write_new
+from rtshcua.app.telling import words
+from rtshcua.app.telling.records import detail_of
 from rtshcua.app.wording import shorten, utc
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
-from rtshcua.front.cli.render.showing import words
-from rtshcua.front.cli.render.showing.log import detail_of
 from rtshcua.front.cli.render.showing.page import TextPage
 from rtshcua.front.cli.render.showing.policy import show_policy
 from rtshcua.model.flat.contract import CHOICE, Parameter

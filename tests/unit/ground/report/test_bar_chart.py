@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import pytest
 
-from rtshcua.ground.report.drawing.bar_chart import (
+from rtshcua.ground.drawing.bar_chart import (
     CHART_WIDTH,
     ChartBar,
     ChartGroup,

@@ -8,11 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rtshcua.ground.drawing.canvas import Canvas, LabelBox, canvas, contains, extent_of, hatching, path
+from rtshcua.ground.drawing.profile import profiles
+from rtshcua.ground.drawing.site import ZoneOutline, ZoneView
+from rtshcua.ground.drawing.zone_map import ZoneMap, mission_map, zone_maps
 from rtshcua.ground.geometry.polygons import contained
-from rtshcua.ground.report.drawing.canvas import Canvas, LabelBox, canvas, contains, extent_of, hatching, path
-from rtshcua.ground.report.drawing.profile import profiles
-from rtshcua.ground.report.drawing.zone_map import ZoneMap, mission_map, zone_maps
-from rtshcua.ground.report.report_model import Chapter, PolicyReport, ZoneOutline, ZoneView
+from rtshcua.ground.report.report_model import Chapter, PolicyReport
 
 NUMBER = r"-?\d+"
 
@@ -71,8 +72,8 @@ def touches(zone: ZoneOutline, x: int, y: int) -> bool:
 
 
 def maps(book: PolicyReport) -> list[ZoneMap]:
-    found = [plan for chapter in book.chapters for plan in zone_maps(chapter)]
-    return found + [mission_map(chapter, mission) for chapter in book.chapters for mission in chapter.missions]
+    found = [plan for chapter in book.chapters for plan in zone_maps(chapter.site)]
+    return found + [mission_map(chapter.site, mission.way) for chapter in book.chapters for mission in chapter.missions]
 
 
 def test_labels_are_on_the_map_and_do_not_overlap(everything: PolicyReport, standard: PolicyReport) -> None:
@@ -104,14 +105,14 @@ def crowded(chapter: Chapter, count: int) -> Chapter:
 
 
 def test_labels_without_room_are_listed(everything: PolicyReport) -> None:
-    for plan in zone_maps(crowded(everything.chapters[0], 120)):
+    for plan in zone_maps(crowded(everything.chapters[0], 120).site):
         boxes = [label.box for label in plan.labels]
         assert not [pair for pair in combinations(boxes, 2) if pair[0].meets(pair[1])]
         assert len(boxes) + len(plan.unlabelled) >= 121
 
 
 def test_columns_of_a_profile_are_side_by_side_above_their_names(everything: PolicyReport) -> None:
-    for profile in profiles(crowded(everything.chapters[0], 40)):
+    for profile in profiles(crowded(everything.chapters[0], 40).site):
         for one, other in zip(profile.columns, profile.columns[1:], strict=False):
             assert one.x + one.width < other.x
         assert all(7.3 * len(line) <= column.width + 16 for column in profile.columns for line in column.lines)
@@ -122,7 +123,7 @@ def test_columns_of_a_profile_are_side_by_side_above_their_names(everything: Pol
 def test_column_reaches_from_floor_to_ceiling(everything: PolicyReport, floor: int | None, ceiling: int | None) -> None:
     (chapter,) = everything.chapters
     zone = replace(chapter.zones[0], floor=floor, ceiling=ceiling)
-    (profile,) = profiles(replace(chapter, zones=(zone, replace(zone, name="next", floor=0, ceiling=200_000))))
+    (profile,) = profiles(replace(chapter, zones=(zone, replace(zone, name="next", floor=0, ceiling=200_000))).site)
     column, scale = profile.columns[0], (profile.columns[1].bottom - profile.columns[1].top) / 200_000
     assert column.open_above == (ceiling is None)
     assert column.bottom == pytest.approx(profile.ground - (floor or 0) * scale)

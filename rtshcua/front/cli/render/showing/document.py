@@ -1,19 +1,14 @@
 """A signed document for a flight under way, in words: who says what about which step. Nothing is verified here."""
 
-from base64 import b64decode
-from typing import NamedTuple
-
+from rtshcua.app.telling.documents import body_told, said
 from rtshcua.app.wording import utc
 from rtshcua.front.cli.render.showing.page import TextPage, named
-from rtshcua.front.cli.render.showing.people import NOBODY, People
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Parameter
 from rtshcua.model.flat.mission import Invocation
-from rtshcua.model.flat.struct import Flat
 from rtshcua.model.step_number import step_words
 from rtshcua.onboard.calls import quantity
-from rtshcua.wire import cose, names
+from rtshcua.wire import names
 from rtshcua.wire.approval import ApprovalDocument
-from rtshcua.wire.bundle import parse_unverified
 from rtshcua.wire.cancellation import CancellationDocument
 from rtshcua.wire.document import kind_of
 from rtshcua.wire.names import Artefact
@@ -32,44 +27,6 @@ _NAMES = {
     names.APPROVAL: "approval", names.RECALL: "recall", names.REPLACEMENT: "replacement",
     names.CANCELLATION: "cancellation",
 }  # fmt: skip
-_SHAPES: dict[Artefact, type[Flat]] = {
-    names.APPROVAL: ApprovalDocument,
-    names.RECALL: RecallDocument,
-    names.REPLACEMENT: ReplacementDocument,
-    names.CANCELLATION: CancellationDocument,
-}
-
-
-class Said(NamedTuple):
-    """What a document says, and the key that it says signed it."""
-
-    kind: Artefact
-    kid: bytes
-    body: Flat
-
-    @property
-    def text(self) -> str:
-        """One line: the answer, who gives it, and until when it is good."""
-        return self.told(NOBODY)
-
-    def told(self, people: People) -> str:
-        """The same, by whom among these people."""
-        return f"{_body(self.body)}; by {people.signer(self.kid)}"
-
-
-def said(document: bytes) -> Said:
-    """Parse a document without verifying it. Raises `Untrusted`."""
-    kind = kind_of(document)
-    envelope = cose.unverified(document)
-    return Said(kind, envelope.kid, parse_unverified(kind, envelope.payload, _SHAPES[kind]))
-
-
-def recorded(detail: str, people: People = NOBODY) -> str:
-    """What a document in a log says, in one line, and who signed it; what is wrong where it makes no sense."""
-    try:
-        return said(b64decode(detail, validate=True)).told(people)
-    except (ValueError, Untrusted):
-        return "the document is malformed"
 
 
 def kind_of_document(data: bytes) -> Artefact | None:
@@ -85,7 +42,7 @@ def show_document(page: TextPage, data: bytes) -> dict[str, object]:
     what = said(data)
     kind = _NAMES[what.kind]
     page.head(f"{kind.capitalize()} of {len(data)} bytes (not verified: the flight does that)")
-    page.row("says", _body(what.body))
+    page.row("says", body_told(what.body))
     page.row("signed by", f"key {what.kid.hex()}")
     match what.body:
         case ApprovalDocument() as answer:
@@ -125,18 +82,3 @@ def _argument(parameter: Parameter, cells: tuple[int, ...]) -> str:
     if parameter.kind == CHOICE and 0 <= values[0] < len(parameter.labels):
         return parameter.labels[values[0]]
     return f"zone {values[0]}" if parameter.kind == ZONE else quantity(values[0], parameter.dimension)
-
-
-def _body(body: Flat) -> str:
-    match body:
-        case ApprovalDocument(granted=granted, role=role, expires_at_us=until):
-            return f"{'granted' if granted else 'refused'} as {role}, good until {utc(until)}"
-        case RecallDocument(mission=mission, policy=policy, expires_at_us=until):
-            whom = f"the mission {mission.hex()}" if mission else f"all under the policy {policy.hex()}"
-            return f"calls home {whom}, good until {utc(until)}"
-        case ReplacementDocument(mission=mission, kept=kept):
-            return f"`{mission.name}`, {len(mission.invocations)} steps, new from {step_words(kept)}"
-        case CancellationDocument(mission=mission, expires_at_us=until):
-            return f"cancels the mission {mission.hex()}, good until {utc(until)}"
-        case _:
-            return ""

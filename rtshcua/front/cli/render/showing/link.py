@@ -1,8 +1,8 @@
 """A decision on a link on a page: what it needed, what else might have flown, and the state that was recorded."""
 
+from rtshcua.app.telling import words
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.evidence.records import DecisionRecord
-from rtshcua.front.cli.render.showing import words
 from rtshcua.front.cli.render.showing.page import TextPage
 from rtshcua.front.cli.render.showing.why import truth_of
 from rtshcua.ground.why.logged_decisions import LinkTrace, state_of

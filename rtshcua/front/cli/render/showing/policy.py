@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Sequence
 
 from rtshcua.adapters.loop import WAIT_US
+from rtshcua.app.telling import words
 from rtshcua.app.wording import utc
-from rtshcua.front.cli.render.showing import words
 from rtshcua.front.cli.render.showing.page import TextPage
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.contract import Contract, TimingClass

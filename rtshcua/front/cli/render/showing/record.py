@@ -7,13 +7,13 @@ import msgspec
 
 from rtshcua.app.documents import claimed
 from rtshcua.app.fly.simulated_flight import SIMULATED
+from rtshcua.app.telling import words
+from rtshcua.app.telling.people import NOBODY, People
+from rtshcua.app.telling.records import Names, detail_of
 from rtshcua.app.wording import true_to, utc
 from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Genesis, Recover, Sealing, Signed
 from rtshcua.evidence.report import LogReport, LogVerdict
-from rtshcua.front.cli.render.showing import words
-from rtshcua.front.cli.render.showing.log import Names, detail_of
 from rtshcua.front.cli.render.showing.page import TextPage
-from rtshcua.front.cli.render.showing.people import NOBODY, People
 from rtshcua.model.durability import SYNCED
 from rtshcua.model.durability import WORDS as DURABILITIES
 from rtshcua.model.flat.policy import Policy

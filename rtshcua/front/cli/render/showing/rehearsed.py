@@ -3,8 +3,8 @@
 import msgspec
 
 from rtshcua.app.fly.dry_run import FlightRehearsal
+from rtshcua.app.telling import words
 from rtshcua.diagnostics.exits import ExitCode
-from rtshcua.front.cli.render.showing import words
 from rtshcua.front.cli.render.showing.page import TextPage, for_terminal
 from rtshcua.front.cli.render.showing.why import would_pass
 from rtshcua.front.cli.stdout import out_json, out_rendered

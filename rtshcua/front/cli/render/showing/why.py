@@ -4,15 +4,15 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from rtshcua.app.prepared_mission import Subject
+from rtshcua.app.telling import words
+from rtshcua.app.telling.people import NOBODY, People
 from rtshcua.app.why import AssumedCase, decide_assumed
 from rtshcua.app.wording import utc
 from rtshcua.decision.nearest import DAYTIME, Nearest
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics.refusal import Refusal
-from rtshcua.front.cli.render.showing import words
 from rtshcua.front.cli.render.showing.page import TextPage
-from rtshcua.front.cli.render.showing.people import NOBODY, People
 from rtshcua.ground.why.trace import ConditionCheck, ReadValue, Trace, TracedStep, read_values
 from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.contract import Link

@@ -3,14 +3,14 @@
 from pathlib import Path
 
 from rtshcua.app.logged_decision import LoggedDecision, RecordLine, StepExplained, explained, read_decision
+from rtshcua.app.telling import words
+from rtshcua.app.telling.people import People
+from rtshcua.app.telling.records import Names
 from rtshcua.app.wording import utc
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.records import Close, DecisionRecord, Effect, Genesis, Recover, Seal
-from rtshcua.front.cli.render.showing import words
-from rtshcua.front.cli.render.showing.log import Names
 from rtshcua.front.cli.render.showing.page import TextPage
-from rtshcua.front.cli.render.showing.people import People
 from rtshcua.front.cli.render.showing.why import Case, show_why, truth_of
 from rtshcua.ground.why.logged_decisions import LinkTrace, state_of
 from rtshcua.model.flat.policy import Policy

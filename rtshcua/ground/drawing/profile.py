@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from rtshcua.ground.report.drawing.canvas import LETTER, ROUND, WIDTH, LabelBox, hatching
-from rtshcua.ground.report.report_model import Chapter, ZoneView
+from rtshcua.ground.drawing.canvas import LETTER, ROUND, WIDTH, LabelBox, hatching
+from rtshcua.ground.drawing.site import Site, ZoneView
 from rtshcua.model.quantity import Dimension, display
 
 #: px
@@ -30,8 +30,11 @@ class Column:
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """A drawing of columns; `marks` are heights with their place on the page, `returns` the line of the way home."""
+    """A drawing of columns for a policy; `marks` are heights with their place on the page, `returns` the line of the
+    way home.
+    """
 
+    policy: str
     width: int
     height: int
     left: int
@@ -41,19 +44,19 @@ class Profile:
     returns: tuple[float, str] | None
 
 
-def profiles(chapter: Chapter) -> tuple[Profile, ...]:
+def profiles(site: Site) -> tuple[Profile, ...]:
     """Draw the zones in as many drawings as necessary, all to the same scale."""
-    zones = [zone for zone in chapter.zones if not zone.derived]
+    zones = [zone for zone in site.zones if not zone.derived]
     limits = [limit for zone in zones for limit in (zone.floor, zone.ceiling) if limit is not None]
-    limits.append(chapter.return_altitude)
+    limits.append(site.return_altitude)
     highest, lowest = max([*limits, 10_000]), min([*limits, 0])
     top = highest + (highest - lowest) // _ABOVE
     fit = (WIDTH - _LEFT - 10) // _LEAST
     groups = [zones[at : at + fit] for at in range(0, len(zones), fit)]
-    return tuple(_profile(group, lowest, highest, top, chapter.return_altitude) for group in groups)
+    return tuple(_profile(site.policy, group, lowest, highest, top, site.return_altitude) for group in groups)
 
 
-def _profile(zones: Sequence[ZoneView], lowest: int, highest: int, top: int, returns: int) -> Profile:
+def _profile(policy: str, zones: Sequence[ZoneView], lowest: int, highest: int, top: int, returns: int) -> Profile:
     scale = _HEIGHT / (top - lowest)
     base = _TOP + _HEIGHT
 
@@ -67,7 +70,7 @@ def _profile(zones: Sequence[ZoneView], lowest: int, highest: int, top: int, ret
     first = -(-lowest // step) * step
     marks = tuple((at(height), display(height, Dimension.LENGTH)) for height in range(first, highest + 1, step))
     line = (at(returns), f"return at {display(returns, Dimension.LENGTH)}") if returns else None
-    return Profile(WIDTH, round(base) + 12 + _LINE * (most + 1), _LEFT, at(0), columns, marks, line)
+    return Profile(policy, WIDTH, round(base) + 12 + _LINE * (most + 1), _LEFT, at(0), columns, marks, line)
 
 
 def _column(zone: ZoneView, x: float, width: float, at: Callable[[int], float]) -> Column:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from math import ceil, floor, log10
 from typing import Final, NamedTuple
 
-from rtshcua.ground.report.drawing.canvas import LETTER, LINE, LabelBox, hatching
+from rtshcua.ground.drawing.canvas import LETTER, LINE, LabelBox, hatching
 
 #: px
 CHART_WIDTH: Final = 760

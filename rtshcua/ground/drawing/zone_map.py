@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
-from rtshcua.ground.report.drawing.canvas import (
+from rtshcua.ground.drawing.canvas import (
     ROUND,
     Canvas,
     DrawnExtent,
@@ -19,7 +19,7 @@ from rtshcua.ground.report.drawing.canvas import (
     number,
     path,
 )
-from rtshcua.ground.report.report_model import Chapter, MissionView, ZoneOutline, ZoneView
+from rtshcua.ground.drawing.site import PlannedWay, Site, ZoneOutline, ZoneView
 from rtshcua.model.quantity import Dimension, display
 
 #: px: zones smaller than this are kept free of other zones' labels
@@ -148,6 +148,7 @@ class ZoneMap:
     """A map; `bar` is the length of the scale bar in px, and what that is."""
 
     title: str
+    policy: str
     width: int
     height: int
     matrix: str
@@ -167,66 +168,67 @@ class ZoneMap:
         return self.on.at(x, y)
 
 
-def zone_maps(chapter: Chapter) -> tuple[ZoneMap, ...]:
+def zone_maps(site: Site) -> tuple[ZoneMap, ...]:
     """The map of all zones, and a detail map of the small ones if necessary."""
-    home = _home(chapter)
+    home = _home(site)
     whole = home
-    for zone in chapter.zones:
+    for zone in site.zones:
         whole = whole.around(extent_of(zone.ground))
-    drawn = [_map("The zones", chapter, chapter.zones, whole)]
+    drawn = [_map("The zones", site, site.zones, whole)]
     scale = canvas(whole).scale
-    small = [zone for zone in chapter.zones if extent_of(zone.ground).size * scale < _TINY]
+    small = [zone for zone in site.zones if extent_of(zone.ground).size * scale < _TINY]
     if small:
         near = home
         for zone in small:
             near = near.around(extent_of(zone.ground))
         if near.size * 2 < whole.size:
-            drawn.append(_map("The small zones", chapter, chapter.zones, near))
+            drawn.append(_map("The small zones", site, site.zones, near))
     return tuple(drawn)
 
 
-def mission_map(chapter: Chapter, mission: MissionView) -> ZoneMap:
+def mission_map(site: Site, way: PlannedWay) -> ZoneMap:
     """The map of a mission's path, with the zones near it."""
-    places = [chapter.home, *(place for step in mission.steps for place in step.path)]
+    places = [site.home, *(place for step in way.steps for place in step.path)]
     extent = extent_of_places(places)
-    extent = extent.around(_home(chapter))
-    declared = [zone for zone in chapter.zones if not zone.derived]
-    return _map(f"The way of {mission.name}", chapter, declared, extent, mission)
+    extent = extent.around(_home(site))
+    declared = [zone for zone in site.zones if not zone.derived]
+    return _map(f"The way of {way.name}", site, declared, extent, way)
 
 
-def _home(chapter: Chapter) -> DrawnExtent:
-    (x, y), r = chapter.home, max(chapter.home_within, 1_000)
+def _home(site: Site) -> DrawnExtent:
+    (x, y), r = site.home, max(site.home_within, 1_000)
     return DrawnExtent(x - r, y - r, x + r, y + r)
 
 
 def _map(
-    title: str, chapter: Chapter, zones: Sequence[ZoneView], extent: DrawnExtent, mission: MissionView | None = None
+    title: str, site: Site, zones: Sequence[ZoneView], extent: DrawnExtent, way: PlannedWay | None = None
 ) -> ZoneMap:
     on = canvas(extent)
     labels = Labels(on.width, on.height)
     bar = _bar(on)
     labels.reserve(LabelBox(8, on.height - 34, bar[0] + 16, 30))  # the scale bar
     labels.reserve(LabelBox(on.width - 40, 4, 36, 52))  # the north arrow
-    home = on.at(*chapter.home)
+    home = on.at(*site.home)
     labels.reserve(LabelBox(home[0] - 8, home[1] - 8, 16, 16))
-    stops = _stops(on, mission)
+    stops = _stops(on, way)
     for x, y in stops:
         labels.reserve(LabelBox(x - 5, y - 5, 10, 10))
-    way = [] if mission is None else _way(on, chapter, mission)
-    beneath = list(_boxes(way))
+    line = [] if way is None else _line(on, site, way)
+    beneath = list(_boxes(line))
     labels.place("home", "home", (home[0], home[1] + 18), avoid=beneath)
     for (x, y), numbers in stops.items():
         labels.place(_numbers(numbers), "stop", (x + 14, y - 12), avoid=beneath)
     unlabelled = label_zones(on, labels, zones, beneath)
     return ZoneMap(
         title=title,
+        policy=site.policy,
         width=on.width,
         height=on.height,
         matrix=on.matrix,
         outlines=tuple(_outlined(on, zone) for zone in by_size(zones)),
         home=home,
-        home_radius=chapter.home_within * on.scale,
-        ways=(" ".join(f"{number(x)},{number(y)}" for x, y in way),) if way else (),
+        home_radius=site.home_within * on.scale,
+        ways=(" ".join(f"{number(x)},{number(y)}" for x, y in line),) if line else (),
         stops=tuple(stops),
         labels=tuple(labels.placed),
         bar=bar,
@@ -246,23 +248,23 @@ def _outlined(on: Canvas, zone: ZoneView) -> DrawnZone:
     return DrawnZone(kind, words, path(zone.ground), lines)
 
 
-def _way(on: Canvas, chapter: Chapter, mission: MissionView) -> list[tuple[float, float]]:
-    return [on.at(*place) for place in (chapter.home, *(place for step in mission.steps for place in step.path))]
+def _line(on: Canvas, site: Site, way: PlannedWay) -> list[tuple[float, float]]:
+    return [on.at(*place) for place in (site.home, *(place for step in way.steps for place in step.path))]
 
 
-def _boxes(way: Sequence[tuple[float, float]]) -> Iterator[LabelBox]:
+def _boxes(line: Sequence[tuple[float, float]]) -> Iterator[LabelBox]:
     """Small boxes along a path, which labels avoid."""
-    for (ax, ay), (bx, by) in pairwise(way):
+    for (ax, ay), (bx, by) in pairwise(line):
         count = int(max(abs(bx - ax), abs(by - ay)) / 6) + 1
         for part in range(count + 1):
             yield LabelBox(ax + (bx - ax) * part / count - 2, ay + (by - ay) * part / count - 2, 4, 4)
 
 
-def _stops(on: Canvas, mission: MissionView | None) -> dict[tuple[float, float], list[int]]:
+def _stops(on: Canvas, way: PlannedWay | None) -> dict[tuple[float, float], list[int]]:
     """The places where steps end, with their numbers. A step without a path ends where the previous one did."""
     found: dict[tuple[float, float], list[int]] = {}
     at: tuple[int, int] | None = None
-    for step in () if mission is None else mission.steps:
+    for step in () if way is None else way.steps:
         at = step.path[-1] if step.path else at
         x, y = on.at(*(at or (0, 0)))
         near = next((stop for stop in found if abs(stop[0] - x) + abs(stop[1] - y) < 8), (x, y))

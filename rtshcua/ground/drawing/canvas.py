@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from math import isqrt
 
-from rtshcua.ground.report.report_model import ZoneOutline
+from rtshcua.ground.drawing.site import ZoneOutline
 
 #: px
 WIDTH, LEAST_HEIGHT, MOST_HEIGHT, MARGIN = 880, 300, 640, 34

@@ -6,9 +6,9 @@ from itertools import pairwise
 from math import hypot
 from typing import Final
 
+from rtshcua.ground.drawing.canvas import number
 from rtshcua.ground.geometry.shapes import SimplePolygon
 from rtshcua.ground.geometry.survey import survey
-from rtshcua.ground.report.drawing.canvas import number
 
 #: the sample area in mm, counter-clockwise; the altitude and the distance to its edge; its entry
 _AREA: Final = ((0, 0), (120_000, 0), (150_000, 55_000), (120_000, 90_000), (0, 90_000))

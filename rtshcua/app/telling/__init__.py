@@ -1,0 +1,1 @@
+"""Records, documents and values in words, for terminals and pages. Nothing is verified here."""

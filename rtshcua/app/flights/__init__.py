@@ -1,0 +1,1 @@
+"""Services about flights that were flown: read them, report them, export them."""

@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rtshcua.adapters.store.reading import read_regular
-from rtshcua.app.files import SOURCE, SPECIFICATION, overwriting_a_source, source_files
+from rtshcua.app.files import SOURCE, SPECIFICATION, source_files
+from rtshcua.app.pictures import DrawnMissions, unfit_picture, unfit_place, write_page, write_picture
 from rtshcua.app.programs import RootProgram, examine, keep_once, programs
 from rtshcua.app.wording import many
 from rtshcua.diagnostics.codes import Severity
@@ -25,8 +26,8 @@ Progress = Callable[[Sequence[RootProgram]], Iterator[RootProgram]]
 
 
 class CheckRequest(NamedTuple):
-    """The paths to check, further sources, an earlier version to compare with, and the path of a map. With an
-    `issued_at_us` of 0 the dates of zones are ignored.
+    """The paths to check, further sources, an earlier version to compare with, and the paths of a map and of a picture.
+    With an `issued_at_us` of 0 the dates of zones are ignored. `as_json` means that standard output has an object.
     """
 
     paths: Sequence[Path]
@@ -35,6 +36,8 @@ class CheckRequest(NamedTuple):
     map: Path | None = None
     issued_at_us: int = 0
     now_us: int = 0
+    picture: Path | None = None
+    as_json: bool = False
 
 
 class CheckedMission(NamedTuple):
@@ -100,7 +103,7 @@ def check(request: CheckRequest, progress: Progress = iter) -> CheckResult | Ref
     files = source_files(request.paths)
     if isinstance(files, Refusal):
         return files
-    unfit = None if request.map is None else _no_place(request.map, files)
+    unfit = _unfit(request, files)
     if unfit is not None:
         return unfit
     earlier = EarlierPolicies("", ()) if request.since is None else earlier_policies(request.since)
@@ -113,19 +116,20 @@ def check(request: CheckRequest, progress: Progress = iter) -> CheckResult | Ref
     return found._replace(programs=roots, not_here=tuple(gone))
 
 
-def draw_map(found: CheckResult, request: CheckRequest) -> int | Refusal:
-    """Write the requested map; return the number of drawn missions. Raises OSError."""
-    from rtshcua.adapters.store.writing import replace
-    from rtshcua.ground.report.mission_maps import CheckedProgram, mission_map_page
+def draw(found: CheckResult, request: CheckRequest) -> list[DrawnMissions] | Refusal:
+    """Write the requested map and picture, in this order. Raises OSError."""
+    from rtshcua.ground.report.mission_maps import CheckedMissions
 
-    assert request.map is not None
-    imported = overwriting_a_source(request.map, found.sources, "a page")
-    if imported is not None:
-        return imported
-    checked = [(each.reading.program, examine(each.reading, request.issued_at_us)) for each in found.programs]
-    checkings = [CheckedProgram(program, one.planned, one.diagnostics) for program, one in checked]
-    replace(request.map, mission_map_page(checkings).encode("utf-8"))
-    return sum(len(one.planned) for _, one in checked)
+    examined = [(each.reading.program, examine(each.reading, request.issued_at_us)) for each in found.programs]
+    checked = [CheckedMissions(program.sources, one.planned, one.diagnostics) for program, one in examined]
+    drawn: list[DrawnMissions] = []
+    for target, write in ((request.map, write_page), (request.picture, write_picture)):
+        one = None if target is None else write(target, checked, found.sources)
+        if isinstance(one, Refusal):
+            return one
+        if one is not None:
+            drawn.append(one)
+    return drawn
 
 
 def nothing_compared(found: CheckResult, since: Path) -> Refusal | None:
@@ -141,13 +145,12 @@ def nothing_compared(found: CheckResult, since: Path) -> Refusal | None:
     return Refusal("since", f"nothing in `{since}` is an earlier version of a policy here", help)
 
 
-def _no_place(target: Path, files: Sequence[Path]) -> Refusal | None:
-    """The refusal if no page can be written to `target`."""
-    if not target.parent.is_dir():
-        return Refusal("output", f"there is no folder `{target.parent}` to write to")
-    if target.exists() and not target.is_file():
-        return Refusal("output", f"`{target}` is not a regular file, and is not overwritten by a page")
-    return overwriting_a_source(target, files, "a page")
+def _unfit(request: CheckRequest, files: Sequence[Path]) -> Refusal | None:
+    """The refusal if the requested map or picture cannot be written."""
+    unfit = None if request.map is None else unfit_place(request.map, files, "a page")
+    if unfit is not None or request.picture is None:
+        return unfit
+    return unfit_picture(request.picture, files, as_json=request.as_json)
 
 
 def earlier_policies(path: Path) -> EarlierPolicies | Refusal:

@@ -38,6 +38,7 @@ CHECK: Mapping[str, tuple[str, Kind]] = {
     "--since": ("since", "path"),
     "--with": ("with_", "paths"),
     "--map": ("map_", "path"),
+    "--picture": ("picture", "path"),
     "--at": ("at", "text"),
     "--deny-warnings": ("deny_warnings", "flag"),
     "--json": ("as_json", "flag"),

@@ -7,7 +7,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from math import isqrt
 
+from rtshcua.diagnostics.excerpt import visible
 from rtshcua.ground.drawing.site import ZoneOutline
+from rtshcua.model.quantity import Dimension, display
 
 #: px
 WIDTH, LEAST_HEIGHT, MOST_HEIGHT, MARGIN = 880, 300, 640, 34
@@ -81,6 +83,12 @@ def number(value: float) -> str:
     return "0" if text == "-0" else text
 
 
+def told_distance(length: int) -> str:
+    """A round length of a scale in words: in km from 10 km on."""
+    whole, rest = divmod(length, 1_000_000)
+    return display(length, Dimension.LENGTH) if rest or whole < 10 else f"{whole} km"
+
+
 def extent_of(ground: ZoneOutline) -> DrawnExtent:
     """The extent of an outline."""
     if ground.centre is not None:
@@ -108,7 +116,17 @@ def path(ground: ZoneOutline) -> str:
     return "".join("M" + "L".join(f"{x} {-y}" for x, y in ring) + "Z" for ring in ground.rings)
 
 
-def contains(ground: ZoneOutline, x: int, y: int) -> bool:
+def path_on_page(on: Canvas, ground: ZoneOutline) -> str:
+    """The outline as the `d` of an SVG path, in px on the page."""
+    if ground.centre is not None:
+        (x, y), r = on.at(*ground.centre), number(radius(ground) * on.scale)
+        west, east = number(x - radius(ground) * on.scale), number(x + radius(ground) * on.scale)
+        return f"M{west} {number(y)}A{r} {r} 0 1 0 {east} {number(y)}A{r} {r} 0 1 0 {west} {number(y)}Z"
+    rings = ((on.at(*corner) for corner in ring) for ring in ground.rings)
+    return "".join("M" + "L".join(f"{number(x)} {number(y)}" for x, y in ring) + "Z" for ring in rings)
+
+
+def contains(ground: ZoneOutline, x: float, y: float) -> bool:
     """Whether a place is inside an outline, by the parity of the edges that a ray to the east crosses."""
     if ground.centre is not None:
         return (x - ground.centre[0]) ** 2 + (y - ground.centre[1]) ** 2 < ground.radius_squared
@@ -200,12 +218,15 @@ class Labels:
         anchor: tuple[float, float],
         own: Callable[[float, float], bool] | None = None,
         avoid: Sequence[LabelBox] = (),
+        subject: tuple[float, float] | None = None,
     ) -> bool:
         """Put a label near its anchor; false where there is no room for it.
 
-        `own` says what belongs to what the label is about: a label lies in that, or else beside it with a line to its
-        edge. `avoid` is kept free too, and the edge is not crossed, as long as there is another place.
+        `subject` is the point that the label is about, if that is not the anchor. `own` says what belongs to what the
+        label is about: a label lies in that, or else beside it with a line to its edge. `avoid` is kept free too, and
+        the edge is not crossed, as long as there is another place.
         """
+        text = visible(text)
         width = LETTER * len(text) + 6
         for kept, strict in (((*self.taken, *avoid), True), ((*self.taken, *avoid), False), (self.taken, False)):
             for x, y in _around(*anchor):
@@ -214,7 +235,8 @@ class Labels:
                     continue
                 if strict and own is not None and len({own(*point) for point in box.points()}) > 1:
                     continue
-                self.placed.append(MapLabel(text, kind, box, _leader(box, anchor, own)))
+                leader = _leader(box, anchor, own) if subject is None else _pointer(box, subject)
+                self.placed.append(MapLabel(text, kind, box, leader))
                 self.taken.append(box)
                 return True
         return False
@@ -246,6 +268,12 @@ def _leader(
                 outside = middle
         to_x, to_y = x + (to_x - x) * inside, y + (to_y - y) * inside
     return None if abs(x - to_x) + abs(y - to_y) < LINE / 2 else (x, y, to_x, to_y)
+
+
+def _pointer(box: LabelBox, subject: tuple[float, float]) -> tuple[float, float, float, float] | None:
+    """The line from a label to a point; None if both are near each other."""
+    x, y = box.nearest(*subject)
+    return None if abs(x - subject[0]) + abs(y - subject[1]) < 2 * LINE else (x, y, *subject)
 
 
 def _around(x: float, y: float) -> Iterator[tuple[float, float]]:

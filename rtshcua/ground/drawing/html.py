@@ -19,7 +19,7 @@ from rtshcua.ground.drawing.canvas import number
 
 #: invisible and reordering characters, which a comment or an intent may contain
 _HIDDEN = re.compile(
-    "[\x00-\x09\x0b-\x1f\x7f-\x9f\xad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb]"
+    "[\x00-\x09\x0b-\x1f\x7f-\x9f\xad\u061c\u180e\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\ufffe\uffff]"
 )
 #: the package of the common templates and the common style
 OWN: Final = "rtshcua.ground.drawing"
@@ -49,7 +49,7 @@ def templates(package: str) -> tuple[Environment, str]:
     texts = {
         each.name: each.read_text(encoding="utf-8")
         for name in (OWN, package)
-        for each in (files(name) / "templates").iterdir()
+        for each in sorted((files(name) / "templates").iterdir(), key=lambda file: file.name)
         if each.is_file()
     }
     styles = [text for name, text in texts.items() if name.endswith(".css")]

@@ -40,12 +40,21 @@ from rtshcua.model.ir.policies import PolicyDecl
 FILE_CODES = frozenset({codes.NO_SUCH_FILE, codes.NOT_TEXT, codes.TOO_LARGE, codes.IMPORT_PATH})
 
 
+class PlannedMission(NamedTuple):
+    """A mission with its planned path, and its policy. The mission may have errors."""
+
+    under: LoweredPolicy
+    mission: Mission
+    declaration: MissionDecl
+
+
 @dataclass(frozen=True, slots=True)
 class Compiled:
     """A flat policy and mission, both None if there are errors; the mission is not yet bound to the policy.
 
     `bounds` are the upper bounds of the mission. `sources` are the texts of the program and of the mission's parameter
-    settings, to which findings refer. `declared` are all policies of the program, by name and version.
+    settings, to which findings refer. `declared` are all policies of the program, by name and version. `planned` is the
+    mission as far as its path is planned, even if there are errors.
     """
 
     policy: Policy | None
@@ -54,14 +63,7 @@ class Compiled:
     bounds: Bounds | None = None
     sources: Mapping[str, Source] = field(default_factory=dict)
     declared: frozenset[tuple[str, int]] = frozenset()
-
-
-class PlannedMission(NamedTuple):
-    """A mission with its planned path, and its policy. The mission may have errors."""
-
-    under: LoweredPolicy
-    mission: Mission
-    declaration: MissionDecl
+    planned: PlannedMission | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,9 +108,10 @@ def compile_program(
     compiled = run.lowered(chosen)
     found = run.diagnostics()
     declared = frozenset((each.name.text, each.version) for unit in program.units for each in unit.policies)
+    planned = None if chosen is None else run.planned.get(chosen.name.text)
     if compiled is None or run.report.failed() or chosen is None:
-        return Compiled(None, None, found, None, run.report.sources, declared)
-    return Compiled(*compiled, found, run.bounds.get(chosen.name.text), run.report.sources, declared)
+        return Compiled(None, None, found, None, run.report.sources, declared, planned)
+    return Compiled(*compiled, found, run.bounds.get(chosen.name.text), run.report.sources, declared, planned)
 
 
 def check_program(program: Program, dialect: Dialect) -> tuple[Diagnostic, ...]:

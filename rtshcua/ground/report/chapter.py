@@ -2,8 +2,18 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 
-from rtshcua.decision.outline import rings
-from rtshcua.ground.drawing.site import PlaceView, ZoneOutline, ZoneView
+from rtshcua.ground.drawing.flat_site import (
+    ALLOWED,
+    FORBIDDEN,
+    OTHER,
+    ground_of,
+    is_timed,
+    limits_of,
+    margins_of,
+    places,
+)
+from rtshcua.ground.drawing.site import PlaceView, ZoneView
+from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.ground.lower.policy_checks import applies, rule_applies
 from rtshcua.ground.lower.zones import derived_name
 from rtshcua.ground.prove.mission_bounds import Bounds, rounded_energy, rounded_time
@@ -59,16 +69,15 @@ from rtshcua.ground.report.report_model import (
     StepView,
 )
 from rtshcua.ground.report.reported_policy import ReportedPolicy, within
+from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Invocation, Mission
 from rtshcua.model.flat.policy import AfterSilence, Policy
-from rtshcua.model.flat.zone import CIRCLE, HIGHEST, LOWEST, Zone, project, unproject
+from rtshcua.model.flat.zone import Zone, project, unproject
 from rtshcua.model.ir.expression import Grow, Quantity
 from rtshcua.model.ir.places import Combination, GeoJson, Shape, ZoneDecl
 from rtshcua.model.ir.skills import ClauseDecl, SkillDecl
 from rtshcua.model.quantity import Dimension, display
 from rtshcua.wire.bundle import policy_digest, policy_payload
-
-ALLOWED, FORBIDDEN, OTHER = "allowed", "forbidden", ""
 
 
 def zones(subject: ReportedPolicy, changed: frozenset[str]) -> tuple[ZoneView, ...]:
@@ -84,14 +93,6 @@ def zones(subject: ReportedPolicy, changed: frozenset[str]) -> tuple[ZoneView, .
     return tuple(views)
 
 
-def ground_of(zone: Zone) -> ZoneOutline:
-    """The outline of a flat zone."""
-    if zone.shape == CIRCLE:
-        x, y, squared = zone.data
-        return ZoneOutline(centre=(x, y), radius_squared=squared)
-    return ZoneOutline(rings=tuple(rings(zone)))
-
-
 def _declared(subject: ReportedPolicy, zone: Zone, changed: frozenset[str]) -> ZoneView:
     declared = subject.symbols.zones[zone.name]
     return ZoneView(
@@ -102,11 +103,12 @@ def _declared(subject: ReportedPolicy, zone: Zone, changed: frozenset[str]) -> Z
         band=describe_band(declared),
         times=describe_times(declared),
         ground=ground_of(zone),
-        floor=None if zone.floor == LOWEST else zone.floor,
-        ceiling=None if zone.ceiling == HIGHEST else zone.ceiling,
+        floor=limits_of(zone)[0],
+        ceiling=limits_of(zone)[1],
         places=tuple(_places(subject, declared, zone)),
         place=subject.place(declared.span),
         changed=zone.name in changed,
+        timed=is_timed(zone),
     )
 
 
@@ -122,12 +124,13 @@ def _derived(zone: Zone, grow: Grow) -> ZoneView:
         band=f"as `{grow.zone.name}`",
         times=f"as `{grow.zone.name}`",
         ground=ground_of(zone),
-        floor=None if zone.floor == LOWEST else zone.floor,
-        ceiling=None if zone.ceiling == HIGHEST else zone.ceiling,
+        floor=limits_of(zone)[0],
+        ceiling=limits_of(zone)[1],
         places=(),
         place="",
         changed=False,
         derived=True,
+        timed=is_timed(zone),
     )
 
 
@@ -198,16 +201,23 @@ def _bounds(bounds: Bounds) -> Iterator[Fact]:
 
 
 def _step(step: Invocation, mission: Mission, policy: Policy) -> StepView:
-    path = step.plan.path
     return StepView(
         number=step.step + 1,
         phase=mission.phases[step.phase],
         told=describe_step(step, policy),
         otherwise=describe_otherwise(step),
         tighter=tuple(describe_tighter(step, policy)),
-        path=tuple(zip(path[::2], path[1::2], strict=True)),
+        path=places(step.plan.path),
         altitude=step.plan.altitude,
+        motion=MotionKind(step.plan.kind).name.lower(),
+        speed=step.plan.speed,
     )
+
+
+def elevation_of(lowered: LoweredPolicy) -> int | None:
+    """The declared elevation of home, mm above mean sea level; None if there is none."""
+    declared = lowered.vehicle.elevation
+    return None if declared is None else declared.value
 
 
 def digest_of(policy: Policy) -> str:
@@ -242,6 +252,8 @@ def chapter(
         home=(0, 0),
         home_within=policy.vehicle.home_within,
         return_altitude=policy.vehicle.return_altitude,
+        elevation=elevation_of(subject.lowered),
+        margins=margins_of(policy),
         rights=rights(subject),
         rules=tuple(_rule(subject, number, changed) for number in range(len(policy.rules))),
         rules_left_out=tuple(

@@ -2,6 +2,7 @@
 
 from typing import Final, NamedTuple
 
+from rtshcua.ground.drawing.height_profile import planned_heights
 from rtshcua.ground.drawing.html import rendered
 from rtshcua.ground.drawing.profile import profiles
 from rtshcua.ground.drawing.zone_map import mission_map, zone_maps
@@ -84,6 +85,7 @@ def page(report: PolicyReport) -> str:
         glance=glance,
         plans=zone_maps,
         mission_plan=mission_map,
+        mission_side=planned_heights,
         profiles=profiles,
         pattern=drawn,
         anchors=_anchors,

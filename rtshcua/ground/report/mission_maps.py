@@ -1,28 +1,28 @@
-"""The HTML page of checked missions: the zones, the planned path, and the places where it fails.
+"""Drawings of checked missions: the zones, the planned way, its heights, and the places where it fails.
 
-The page includes refused missions if their path is planned.
+`mission_map_page` is the page of `rtshcua check --map`, and `mission_picture` the picture of `--picture`. Both include
+refused missions if their path is planned.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 from rtshcua.decision.values import AND, FALSE, TRUE, Truth
 from rtshcua.decision.zones import PreparedZone
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
+from rtshcua.ground.drawing.flat_site import site_of, way_of
+from rtshcua.ground.drawing.height_profile import HeightProfile, planned_heights
 from rtshcua.ground.drawing.html import rendered
+from rtshcua.ground.drawing.picture import PictureSheet, picture
+from rtshcua.ground.drawing.site import LeftAirspace, PlannedLeg, RefusedParts, planned_legs
 from rtshcua.ground.drawing.zone_map import ZoneMap, mission_map
-from rtshcua.ground.language.load import Program
 from rtshcua.ground.pipeline.program import PlannedMission
-from rtshcua.ground.report.chapter import chapter, mission_view
+from rtshcua.ground.report.chapter import elevation_of, mission_view
 from rtshcua.ground.report.html_page import PACKAGE
-from rtshcua.ground.report.report_model import Chapter
-from rtshcua.ground.report.reported_policy import ReportedPolicy
-from rtshcua.model.flat import mission as flat
-from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.policy import Policy
+from rtshcua.model.ir.missions import MissionDecl
 from rtshcua.model.ir.node import Node
 
 #: the number of places of a leg that are checked
@@ -32,63 +32,68 @@ Point = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True)
-class RefusedLegs:
-    """The refused parts of a map: legs in mm, y to the south, as SVG paths; and marks on the page."""
-
-    legs: tuple[str, ...]
-    marks: tuple[tuple[float, float], ...]
-
-
-@dataclass(frozen=True, slots=True)
 class StepFindings:
     """The description of a step, and its findings."""
 
+    number: int
     told: str
     found: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class MissionMap:
-    """A mission with its map."""
+class MissionDrawing:
+    """A mission with its map and its side view."""
 
     name: str
     intent: str
+    under: str
     refused: bool
-    chapter: Chapter
     plan: ZoneMap
-    failed: RefusedLegs
+    side: HeightProfile
     steps: tuple[StepFindings, ...]
 
 
-class CheckedProgram:
-    """A program with its planned missions and all findings."""
+class CheckedMissions:
+    """The planned missions of a program, with all its findings and its sources."""
 
-    def __init__(self, program: Program, planned: Sequence[PlannedMission], found: Sequence[Diagnostic]) -> None:
-        self._program, self._planned, self._found = program, planned, found
-        self._sources: Mapping[str, Source] = program.sources
+    def __init__(
+        self, sources: Mapping[str, Source], planned: Sequence[PlannedMission], found: Sequence[Diagnostic]
+    ) -> None:
+        self._sources, self._planned, self._found = sources, planned, found
 
-    def drawings(self) -> Iterator[MissionMap]:
-        """Yield the map of each mission."""
+    @property
+    def count(self) -> int:
+        """The number of missions."""
+        return len(self._planned)
+
+    def drawings(self) -> Iterator[MissionDrawing]:
+        """Yield the drawings of each mission."""
         for under, mission, declaration in self._planned:
-            subject = ReportedPolicy(self._program, under)
-            view, about = mission_view(mission, under.policy, None, {}), chapter(subject)
-            plan = mission_map(about.site, view.way)
+            policy = under.policy
+            view = mission_view(mission, policy, None, {})
             written = [step for phase in declaration.phases for step in phase.steps]
             of = [[each for each in self._found if _is_within(each, step)] for step in written]
-            errors = [any(map(_is_error, some)) for some in of]
-            failed = _failed(under.policy, [each.plan for each in mission.invocations], errors, plan)
-            yield MissionMap(
+            wrong = frozenset(number for number, some in enumerate(of, 1) if any(map(_is_error, some)))
+            site, way = site_of(policy, elevation_of(under)), way_of(mission)
+            legs = tuple(planned_legs(way, site))
+            refused = RefusedParts(wrong, tuple(_left(policy, [leg for leg in legs if leg.step.number in wrong])))
+            yield MissionDrawing(
                 name=mission.name,
                 intent=mission.intent,
-                refused=any(errors) or any(_is_error(each) for each in self._found),
-                chapter=about,
-                plan=plan,
-                failed=failed,
+                under=f"{policy.name}@{policy.version} for {policy.vehicle.identity}",
+                refused=any(_is_error(each) for each in self._found if not self._is_of_another(each, declaration)),
+                plan=mission_map(site, way, refused),
+                side=planned_heights(site, way, refused),
                 steps=tuple(
-                    StepFindings(step.told, tuple(map(self._words, some)))
+                    StepFindings(step.number, step.told, tuple(map(self._words, some)))
                     for step, some in zip(view.steps, of, strict=True)
                 ),
             )
+
+    def _is_of_another(self, found: Diagnostic, declaration: MissionDecl) -> bool:
+        """Whether a finding is within another mission."""
+        others = (each.declaration for each in self._planned if each.declaration is not declaration)
+        return any(_is_within(found, other) for other in others)
 
     def others(self) -> list[str]:
         """The findings outside the drawn steps."""
@@ -103,18 +108,44 @@ class CheckedProgram:
         return f"{at}{found.severity.value} {found.code.id}: {found.message}{help}"
 
 
-def mission_map_page(checkings: Sequence[CheckedProgram]) -> str:
+def mission_map_page(checked: Sequence[CheckedMissions]) -> str:
     """Render the page. The same sources give the same bytes."""
-    drawings = [each for checking in checkings for each in checking.drawings()]
-    others = list(dict.fromkeys(text for checking in checkings for text in checking.others()))
+    drawings = [each for one in checked for each in one.drawings()]
     refused = sum(each.refused for each in drawings)
     return rendered(
         PACKAGE,
         "checked.html",
         drawings=drawings,
-        others=others,
+        others=_others(checked),
         summary=f"Missions that are drawn: {len(drawings)}; of these refused: {refused}",
     )
+
+
+def mission_picture(checked: Sequence[CheckedMissions]) -> str:
+    """Write the picture: the missions one below the other, and then the findings outside of their steps."""
+    drawings = [each for one in checked for each in one.drawings()]
+    sheets = [_sheet(each) for each in drawings]
+    others = tuple(_others(checked))
+    if not sheets:
+        sheets.append(PictureSheet("No mission is drawn", ("No way of a mission could be planned.",), below=others))
+    elif others:
+        sheets.append(PictureSheet("What else was found", others))
+    return picture(", ".join(each.name for each in drawings) or "No mission is drawn", sheets)
+
+
+def _sheet(drawing: MissionDrawing) -> PictureSheet:
+    found = (f"Step {step.number}: {text}" for step in drawing.steps for text in step.found)
+    return PictureSheet(
+        title=f"{drawing.name}: {'refused' if drawing.refused else 'no errors'}",
+        above=(f"Under {drawing.under}.", *([drawing.intent] if drawing.intent else [])),
+        plan=drawing.plan,
+        side=drawing.side,
+        below=tuple(found),
+    )
+
+
+def _others(checked: Sequence[CheckedMissions]) -> list[str]:
+    return list(dict.fromkeys(text for one in checked for text in one.others()))
 
 
 def _is_within(found: Diagnostic, node: Node) -> bool:
@@ -128,25 +159,18 @@ def _is_error(found: Diagnostic) -> bool:
     return found.severity is Severity.ERROR
 
 
-def _failed(policy: Policy, plans: Sequence[flat.Plan], errors: Sequence[bool], drawn: ZoneMap) -> RefusedLegs:
-    """The legs of the refused steps, and the first place of each outside the airspace."""
+def _left(policy: Policy, legs: Sequence[PlannedLeg]) -> Iterator[LeftAirspace]:
+    """The first place outside the airspace of each step that has one."""
     keeps = _Airspace(policy)
-    legs: list[str] = []
-    marks: list[tuple[float, float]] = []
-    here, height = (0, 0), 0
-    for plan, wrong in zip(plans, errors, strict=True):
-        points = [here, *zip(plan.path[::2], plan.path[1::2], strict=True)]
-        if plan.kind == MotionKind.CLIMB or plan.path:
-            height = plan.altitude or height
-        if wrong and len(points) > 1:
-            legs.append("M" + "L".join(f"{x} {-y}" for x, y in points))
-        left = next(
-            (place for leg in pairwise(points) for place in _points_along(*leg) if not keeps(place, height)), None
-        )
-        if wrong and left is not None:
-            marks.append(drawn.at(*left))
-        here = points[-1]
-    return RefusedLegs(tuple(legs), tuple(marks))
+    seen: set[int] = set()
+    for leg in legs:
+        number = leg.step.number
+        if number in seen:
+            continue
+        left = next((place for place in _points_along(leg.begin[:2], leg.end[:2]) if not keeps(place, leg)), None)
+        if left is not None:
+            seen.add(number)
+            yield LeftAirspace(number, *left)
 
 
 def _points_along(one: Point, other: Point) -> Iterator[Point]:
@@ -158,7 +182,9 @@ def _points_along(one: Point, other: Point) -> Iterator[Point]:
 
 
 class _Airspace:
-    """Whether a place is within the airspace at all times, including the vehicle's position error."""
+    """Whether a place of a leg is within the airspace at all times and at all its heights, including the vehicle's
+    position error.
+    """
 
     def __init__(self, policy: Policy) -> None:
         stated, error = policy.airspace, policy.vehicle.position_error
@@ -168,10 +194,10 @@ class _Airspace:
             for numbers in (((), ()) if stated is None else (stated.inside, stated.outside))
         )
 
-    def __call__(self, place: Point, height: int) -> bool:
-        inside = (self._there(zone, place, height) for zone in self._inside)
-        outside = (self._there(zone, place, height) for zone in self._outside)
+    def __call__(self, place: Point, leg: PlannedLeg) -> bool:
+        inside = (self._there(zone, place, leg) for zone in self._inside)
+        outside = (self._there(zone, place, leg) for zone in self._outside)
         return all(truth == TRUE for truth in inside) and all(truth == FALSE for truth in outside)
 
-    def _there(self, zone: PreparedZone, place: Point, height: int) -> Truth:
-        return AND[zone.between(height, height)][zone.along(place, self._box)]
+    def _there(self, zone: PreparedZone, place: Point, leg: PlannedLeg) -> Truth:
+        return AND[zone.between(leg.low, leg.high)][zone.along(place, self._box)]

@@ -6,7 +6,8 @@ vehicle's home.
 
 from dataclasses import dataclass
 
-from rtshcua.ground.drawing.site import PlannedStep, PlannedWay, Site, ZoneView
+from rtshcua.ground.drawing.site import FlightMargins, PlannedStep, PlannedWay, Site, ZoneView
+from rtshcua.model.flat.contract import MotionKind
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +146,8 @@ class SignalView:
 @dataclass(frozen=True, slots=True)
 class StepView:
     """A step of a mission, and its path of local places, which ends at the last one. `tighter` are the limits that
-    tighten its skill's contract.
+    tighten its skill's contract. `motion` is the kind of its motion (`rtshcua.model.flat.contract.MotionKind`), and
+    `speed` is in mm/s, 0 where the vehicle chooses it.
     """
 
     number: int
@@ -155,6 +157,8 @@ class StepView:
     tighter: tuple[str, ...]
     path: tuple[tuple[int, int], ...]
     altitude: int
+    motion: str
+    speed: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,7 +175,13 @@ class MissionView:
     @property
     def way(self) -> PlannedWay:
         """Its way, to be drawn."""
-        return PlannedWay(self.name, tuple(PlannedStep(step.number, step.path) for step in self.steps))
+        return PlannedWay(
+            self.name,
+            tuple(
+                PlannedStep(step.number, step.path, MotionKind[step.motion.upper()], step.altitude, step.speed)
+                for step in self.steps
+            ),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,6 +257,8 @@ class Chapter:
     home: tuple[int, int]
     home_within: int
     return_altitude: int
+    elevation: int | None
+    margins: FlightMargins
     rights: tuple[Rights, ...]
     rules: tuple[RuleView, ...]
     rules_left_out: tuple[str, ...]
@@ -269,7 +281,15 @@ class Chapter:
     @property
     def site(self) -> Site:
         """What is drawn of it."""
-        return Site(self.name, self.zones, self.home, self.home_within, self.return_altitude)
+        return Site(
+            self.name,
+            self.zones,
+            self.home,
+            self.home_within,
+            self.return_altitude,
+            self.elevation,
+            self.margins,
+        )
 
 
 @dataclass(frozen=True, slots=True)

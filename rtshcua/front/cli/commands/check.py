@@ -27,6 +27,10 @@ def check(
     map_: Annotated[
         Path | None, typer.Option("--map", metavar="FILE.html", help="draw zones, routes and errors of the missions")
     ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.svg", help="draw the missions from above and from the side (-: standard output)"),
+    ] = None,
     at: Annotated[
         str | None,
         typer.Option(metavar="TIME", help="assume this time of issue (UTC) and apply the dates of zones"),
@@ -36,7 +40,7 @@ def check(
     ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")] = False,
 ) -> ExitCode:
-    """Report all errors in sources and in what they import. Needs no keys, and writes no file except --map.
+    """Report all errors in sources and in what they import. Needs no keys, and writes only --map and --picture.
 
     Each source and its imports form one program. A source that another one imports is checked as part of it. With a
     mission specification, all other sources belong to its policy. `rtshcua lint` also reports warnings about code that
@@ -45,7 +49,8 @@ def check(
     Without --at, the hours of zones are checked and their dates are not, so that the result does not depend on today's
     date. If a zone with dates is in force now, the command also prints what would be refused now.
 
-    With --map, the missions are drawn on one HTML page as far as their routes are planned, also if they have errors.
+    With --map, the missions are drawn on one HTML page as far as their routes are planned, also if they have errors;
+    with --picture in one SVG file, one below the other: zones, routes, margins, ways home, heights and errors.
 
     With --since, at least one policy must have an earlier version of the same name and vehicle there; otherwise
     nothing was compared, which is an error (3). Earlier policies without a counterpart here are listed.
@@ -58,6 +63,7 @@ def check(
         since=since,
         with_=with_ or (),
         map_=map_,
+        picture=picture,
         at=at,
         deny_warnings=deny_warnings,
         as_json=as_json,

@@ -39,7 +39,7 @@ OPTION_GROUPS: Final[Mapping[str, Mapping[str, tuple[str, ...]]]] = {
         ),
     },
     "compile": {
-        "The mission": ("--mission", "--set", "--with", "--at", "--output"),
+        "The mission": ("--mission", "--set", "--with", "--at", "--output", "--picture"),
         "Accepted claims": ("--source", "--role", "--policy"),
         "Replacement for a flight under way": ("--replaces", "--from", "--flight", "--root"),
         "Keys": ("--policy-key", "--mission-key", "--passphrase-file"),

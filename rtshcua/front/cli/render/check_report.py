@@ -6,15 +6,17 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from rtshcua.app.check import CheckedMission, CheckRequest, CheckResult, check, draw_map, nothing_compared
+from rtshcua.app.check import CheckedMission, CheckRequest, CheckResult, check, draw, nothing_compared
 from rtshcua.app.exit_codes import exit_code
 from rtshcua.app.files import SPECIFICATION
-from rtshcua.app.wording import many, moment, utc
+from rtshcua.app.pictures import STANDARD_OUTPUT
+from rtshcua.app.wording import moment, utc
 from rtshcua.diagnostics.codes import UNKNOWN_NAME
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.faults import say
 from rtshcua.front.cli.render.bounds import bounds_dict, bounds_told, steps_told
+from rtshcua.front.cli.render.drawn import tell_drawn
 from rtshcua.front.cli.render.findings import Findings
 from rtshcua.front.cli.render.progress import watched
 from rtshcua.front.cli.stdout import out
@@ -27,6 +29,7 @@ def check_sources(
     since: Path | None = None,
     with_: Sequence[Path] = (),
     map_: Path | None = None,
+    picture: Path | None = None,
     at: str | None = None,
     deny_warnings: bool = False,
     as_json: bool = False,
@@ -36,7 +39,9 @@ def check_sources(
     issued_at_us = 0 if at is None else moment(at)
     if issued_at_us is None:
         return findings.refuse(ExitCode.USAGE, "usage", f"`{at}` is not a UTC time", "accepted: 2026-01-31T08:00:00Z")
-    request = CheckRequest(paths, since, with_, map_, issued_at_us, time.time_ns() // 1_000)
+    now_us = time.time_ns() // 1_000
+    request = CheckRequest(paths, since, with_, map_, issued_at_us, now_us, picture=picture, as_json=as_json)
+    quiet = as_json or picture == STANDARD_OUTPUT
     found = check(request, watched)
     if isinstance(found, Refusal):
         return findings.end(found)
@@ -45,14 +50,13 @@ def check_sources(
     alone = len(root.asked) == 1 and not with_ and root.name.lower().endswith(SPECIFICATION)
     if alone and not as_json and any(each.code is UNKNOWN_NAME for each in found.diagnostics):
         say(" help: the names in a specification are declared in its policy's sources; pass them with `--with FILE`")
-    if code is ExitCode.OK and not as_json:
+    if code is ExitCode.OK and not quiet:
         _tell(found, since, request.now_us)
-    if map_ is not None:
-        drawn = draw_map(found, request)
+    if map_ is not None or picture is not None:
+        drawn = draw(found, request)
         if isinstance(drawn, Refusal):
             return findings.end(drawn)
-        if not as_json:
-            out(f"{many(drawn, 'mission')} drawn in {map_}")
+        tell_drawn(drawn, picture, findings, quiet=quiet)
     refused = nothing_compared(found, since) if code is ExitCode.OK and since is not None else None
     return findings.end(refused) if refused is not None else findings.finish(code, **_as_json(found))
 

@@ -46,6 +46,10 @@ class Findings:
         forbidding = {Severity.ERROR, Severity.WARNING} if self._deny_warnings else {Severity.ERROR}
         return any(each.severity in forbidding for each in found)
 
+    def add(self, **members: Any) -> None:
+        """Add members to the object of `json`, however the command ends."""
+        self._object |= members
+
     def refuse(self, code: ExitCode, slug: str, message: str, help: str | None = None) -> ExitCode:
         """End with an error that is not about a source."""
         if not self._json:

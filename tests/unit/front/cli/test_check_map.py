@@ -53,8 +53,10 @@ def stops(page: str) -> list[tuple[float, float]]:
 def test_map_marks_where_a_mission_is_refused(at: Path) -> None:
     code, page = drawn(at, "47.39760 N, 8.54900 E", "20 m")
     assert code == ExitCode.DIAGNOSTICS
-    assert page.count('class="failed-leg"') == 1
-    ((x, y),) = crosses(page)
+    page_map, page_side = page.split('id="heights-1-title"')
+    assert page_map.count('class="failed-leg"') == page_side.count('class="failed-leg"') == 1
+    assert len(crosses(page_side)) == 1
+    ((x, y),) = crosses(page_map)
     (from_x, from_y), (to_x, to_y) = stops(page)[1:3]
     part = (x - from_x) / (to_x - from_x)  # on the leg, before its middle, where the school begins
     assert 0.15 < part < 0.3
@@ -67,7 +69,7 @@ def test_map_marks_where_a_mission_is_refused(at: Path) -> None:
 def test_step_refused_for_its_arguments_has_no_cross(at: Path) -> None:
     code, page = drawn(at, "bridge_a.entry", "41 m")
     assert code == ExitCode.DIAGNOSTICS
-    assert page.count('class="failed-leg"') == 1
+    assert page.count('class="failed-leg"') == 2  # on the map and in the side view
     assert crosses(page) == []
     assert "error E0703" in page
 

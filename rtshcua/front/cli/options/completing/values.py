@@ -17,6 +17,7 @@ FILES: Final[dict[str, Sequence[str]]] = {
     "with_": _SOURCES,
     "check paths": ("*.rts", "*.json"),
     "check map_": ("*.html",),
+    "picture": ("*.svg",),
     "check since": ("*.bundle", "*.rts"),
     "gateway inside": ("*.kml", "*.geojson", "*.json"),
     "gateway policy": _SOURCES,

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rtshcua.adapters.store.keystore import PROPOSERS, KeyStore
+from rtshcua.app.pictures import DrawnMissions, unfit_picture, write_picture
 from rtshcua.app.programs import compile_sources, meant, no_source
 from rtshcua.app.signing_keys import check_trusted, strangers
 from rtshcua.diagnostics.diagnostic import Diagnostic
@@ -20,8 +21,9 @@ from rtshcua.wire.keys import SigningKey
 
 
 class CompileRequest(NamedTuple):
-    """A source, further sources, the mission with its parameter values, its allowed claims (`pins`), and the path of
-    the bundle; by default beside the source, with the `suffix`.
+    """A source, further sources, the mission with its parameter values, its allowed claims (`pins`), the path of the
+    bundle, by default beside the source with the `suffix`, and that of a picture. `as_json` means that standard output
+    has an object.
     """
 
     source: Path
@@ -32,6 +34,8 @@ class CompileRequest(NamedTuple):
     issued_at_us: int
     mission: str | None = None
     values: Sequence[str] = ()
+    picture: Path | None = None
+    as_json: bool = False
 
 
 class CompileResult(NamedTuple):
@@ -41,6 +45,13 @@ class CompileResult(NamedTuple):
     diagnostics: tuple[Diagnostic, ...]
     sources: Mapping[str, Source]
     target: Path
+
+    @property
+    def to_sign(self) -> tuple[Policy, Mission]:
+        """The policy and the mission of sources without errors."""
+        assert self.compiled.policy is not None
+        assert self.compiled.mission is not None
+        return self.compiled.policy, self.compiled.mission
 
 
 class SignedBundle(NamedTuple):
@@ -69,7 +80,7 @@ def compile_mission(request: CompileRequest) -> CompileResult | Refusal:
     if refused is not None:
         return refused
     target = request.output or request.source.with_suffix(request.suffix)
-    refused = _no_target(target, given)
+    refused = _no_target(target, given) or _no_picture(request, target)
     if refused is not None:
         return refused
     compiled, sources = compile_sources(
@@ -79,6 +90,14 @@ def compile_mission(request: CompileRequest) -> CompileResult | Refusal:
     return unknown or CompileResult(compiled, meant(compiled.diagnostics, sources, given), sources, target)
 
 
+def draw(made: CompileResult, picture: Path) -> DrawnMissions | Refusal:
+    """Write the picture of a mission, also if it is refused, as far as it is planned. Raises OSError."""
+    from rtshcua.ground.report.mission_maps import CheckedMissions
+
+    planned = () if made.compiled.planned is None else (made.compiled.planned,)
+    return write_picture(picture, [CheckedMissions(made.sources, planned, made.diagnostics)], made.sources)
+
+
 def sign_bundle(
     policy: Policy, mission: Mission, signers: tuple[SigningKey, SigningKey], store: KeyStore, issued_at_us: int
 ) -> SignedBundle:
@@ -86,6 +105,15 @@ def sign_bundle(
     data = sign(policy, mission, policy_key=signers[0], mission_key=signers[1])
     check_trusted(store, signers[1], policy, mission)
     return SignedBundle(data, signers, strangers(store, signers, policy.vehicle.identity, issued_at_us))
+
+
+def _no_picture(request: CompileRequest, bundle: Path) -> Refusal | None:
+    """The refusal if the requested picture cannot be written."""
+    if request.picture is None:
+        return None
+    if request.picture.resolve() == bundle.resolve():
+        return Refusal("usage", f"`{bundle}` cannot be both the bundle and the picture", "name two files")
+    return unfit_picture(request.picture, [request.source, *request.further], as_json=request.as_json)
 
 
 def _no_target(target: Path, given: Sequence[Path]) -> Refusal | None:

@@ -9,13 +9,23 @@ import typer
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.writing import replace_inside
-from rtshcua.app.compile import CompileRequest, CompileResult, SignedBundle, claimed_pins, compile_mission, sign_bundle
+from rtshcua.app.compile import (
+    CompileRequest,
+    CompileResult,
+    SignedBundle,
+    claimed_pins,
+    compile_mission,
+    draw,
+    sign_bundle,
+)
 from rtshcua.app.exit_codes import exit_code
+from rtshcua.app.pictures import STANDARD_OUTPUT
 from rtshcua.app.signing_keys import another_key
 from rtshcua.app.wording import moment
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.render.bounds import bounds_dict, bounds_told
+from rtshcua.front.cli.render.drawn import tell_drawn
 from rtshcua.front.cli.render.findings import Findings
 from rtshcua.front.cli.replacing import Replacing, replace_with, warned
 from rtshcua.front.cli.stdout import out
@@ -66,6 +76,10 @@ Flight = Annotated[
     str | None, typer.Option(metavar="ID", help="with --replaces: the flight, as its id or one of its sockets")
 ]
 Root = Annotated[Path | None, typer.Option(help="with --replaces: the signed trust root (default: the key store's)")]
+Picture = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE.svg", help="draw the mission from above and from the side (-: standard output)"),
+]
 DenyWarnings = Annotated[bool, typer.Option("--deny-warnings", help="treat warnings as errors")]
 AsJson = Annotated[bool, typer.Option("--json", help="print one JSON object on standard output")]
 
@@ -88,10 +102,14 @@ def compile(
     first: FirstStep = None,
     flight: Flight = None,
     root: Root = None,
+    picture: Picture = None,
     deny_warnings: DenyWarnings = False,
     as_json: AsJson = False,
 ) -> ExitCode:
-    """Check a mission and sign it into a bundle that can fly. If there are errors, nothing is written.
+    """Check a mission and sign it into a bundle that can fly. If there are errors, nothing is written except --picture.
+
+    With --picture, the mission is drawn before it is signed, also if it has errors: zones, the route with its margins,
+    ways home, heights and errors.
 
     With --replaces, the mission is signed as a replacement for a flight under way, under the same policy. The steps
     before --from stay unchanged. `rtshcua replace` sends it to the flight.
@@ -110,21 +128,36 @@ def compile(
     if len({first is None, flight is None, not replaces}) > 1:
         return findings.refuse(ExitCode.USAGE, "usage", "`--replaces`, `--from` and `--flight` require each other")
     suffix = ".replacement" if replaces else ".bundle"
-    request = CompileRequest(source, with_ or (), output, suffix, pins, issued_at, mission, tuple(set_ or ()))
-    made = compile_mission(request)
-    if isinstance(made, Refusal):
-        return findings.end(made)
-    compiled, target = made.compiled, made.target
-    if findings.report(made.diagnostics, made.sources) or compiled.policy is None or compiled.mission is None:
-        return findings.finish(exit_code(compiled.diagnostics))
+    values = tuple(set_ or ())
+    request = CompileRequest(source, with_ or (), output, suffix, pins, issued_at, mission, values, picture, as_json)
+    quiet = as_json or picture == STANDARD_OUTPUT
+    made = _compiled(request, findings, quiet=quiet)
+    if isinstance(made, ExitCode):
+        return made
     store = KeyStore(data_folder())
     if replaces and first is not None and flight is not None:
         order = Replacing(
-            replaces, index_of(first), flight, root, mission_key, passphrase_file, issued_at, deny_warnings, target
+            replaces, index_of(first), flight, root, mission_key, passphrase_file, issued_at, deny_warnings, made.target
         )  # fmt: skip
-        return replace_with(compiled.policy, compiled.mission, order, store, findings, quiet=as_json)
+        return replace_with(*made.to_sign, order, store, findings, quiet=quiet)
     keys = (policy_key, mission_key, passphrase_file)
-    return _sign(made, store, keys, findings, issued_at, deny_warnings=deny_warnings, quiet=as_json)
+    return _sign(made, store, keys, findings, issued_at, deny_warnings=deny_warnings, quiet=quiet)
+
+
+def _compiled(request: CompileRequest, findings: Findings, *, quiet: bool) -> CompileResult | ExitCode:
+    """Compile a mission, report the findings, and draw it if requested; the exit code if the command ends here."""
+    made = compile_mission(request)
+    if isinstance(made, Refusal):
+        return findings.end(made)
+    refused = findings.report(made.diagnostics, made.sources)
+    drawn = None if request.picture is None else draw(made, request.picture)
+    if isinstance(drawn, Refusal):
+        return findings.end(drawn)
+    if drawn is not None:
+        tell_drawn([drawn], request.picture, findings, quiet=quiet)
+    if refused or made.compiled.policy is None or made.compiled.mission is None:
+        return findings.finish(exit_code(made.compiled.diagnostics))
+    return made
 
 
 def _sign(
@@ -132,31 +165,28 @@ def _sign(
     issued_at: int, *, deny_warnings: bool, quiet: bool,
 ) -> ExitCode:  # fmt: skip
     """Sign a compiled mission into a bundle, and say so."""
-    compiled, target, (policy_key, mission_key, passphrase_file) = made.compiled, made.target, keys
-    assert compiled.policy is not None
-    assert compiled.mission is not None
+    target, (policy_key, mission_key, passphrase_file) = made.target, keys
+    policy, mission = made.to_sign
     try:
         signers = (
             unlock(store, Duty.POLICY, path=policy_key, passphrase_file=passphrase_file),
-            unlock_for(
-                store, compiled.mission, path=mission_key, passphrase_file=passphrase_file, policy=compiled.policy
-            ),
+            unlock_for(store, mission, path=mission_key, passphrase_file=passphrase_file, policy=policy),
         )
-        signed = sign_bundle(compiled.policy, compiled.mission, signers, store, issued_at)
+        signed = sign_bundle(policy, mission, signers, store, issued_at)
     except Untrusted as error:
-        return findings.end(another_key(error, compiled.policy, compiled.mission))
+        return findings.end(another_key(error, policy, mission))
     if not warned(signed.warnings, findings, deny=deny_warnings):
         return ExitCode.UNTRUSTED
     replace_inside(target, signed.data)
     if not quiet:
-        out(_told(compiled.policy, compiled.mission, target))
-        if compiled.bounds is not None:
-            out(bounds_told(compiled.bounds))
+        out(_told(policy, mission, target))
+        if made.compiled.bounds is not None:
+            out(bounds_told(made.compiled.bounds))
     return findings.finish(
         ExitCode.OK,
-        bundle=_described(compiled.policy, compiled.mission, target, signed),
+        bundle=_described(policy, mission, target, signed),
         warnings=signed.warnings,
-        bounds=None if compiled.bounds is None else bounds_dict(compiled.bounds),
+        bounds=None if made.compiled.bounds is None else bounds_dict(made.compiled.bounds),
     )
 
 

@@ -369,7 +369,7 @@ def _profile(
 
 def _label(labels: Labels, axes: _Axes, drawn: _DrawnHeights, bands: Sequence[ZoneBand], returns: int) -> Iterator[str]:
     """Place the labels of steps, marks, heights and zones; yield the marks and zones without room."""
-    beneath = [box for line in drawn.lines for box in boxes_along(line)]
+    beneath = boxes_along(*drawn.lines)
     for (x, y), numbers in drawn.stops.items():
         labels.place(told_numbers(numbers), "stop", (x + 14, y - 12), avoid=beneath, subject=(x, y))
     for mark in drawn.marks:

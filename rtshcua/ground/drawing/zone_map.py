@@ -315,7 +315,7 @@ def _map(
         labels.reserve(LabelBox(x - 5, y - 5, 10, 10))
     for mark in drawn.marks:
         labels.reserve(LabelBox(mark.x - 7, mark.y - 7, 14, 14))
-    beneath = [box for line in drawn.lines for box in boxes_along(line)]
+    beneath = boxes_along(*drawn.lines)
     labels.place("home", "home", (home[0], home[1] + 18), avoid=beneath, subject=home)
     for (x, y), numbers in drawn.stops.items():
         labels.place(told_numbers(numbers), "stop", (x + 14, y - 12), avoid=beneath, subject=(x, y))
@@ -464,12 +464,16 @@ def _outlined(on: Canvas, zone: ZoneView) -> DrawnZone:
     return DrawnZone(kind, words, path(zone.ground), path_on_page(on, zone.ground), lines)
 
 
-def boxes_along(line: Sequence[tuple[float, float]]) -> Iterator[LabelBox]:
-    """Small boxes along a line on the page, which labels avoid."""
-    for (ax, ay), (bx, by) in pairwise(line):
-        count = int(max(abs(bx - ax), abs(by - ay)) / 6) + 1
-        for part in range(count + 1):
-            yield LabelBox(ax + (bx - ax) * part / count - 2, ay + (by - ay) * part / count - 2, 4, 4)
+def boxes_along(*lines: Sequence[tuple[float, float]]) -> tuple[LabelBox, ...]:
+    """Small boxes along lines on the page, which labels avoid; one where several lie over each other."""
+    found: dict[tuple[int, int], LabelBox] = {}
+    for line in lines:
+        for (ax, ay), (bx, by) in pairwise(line):
+            count = int(max(abs(bx - ax), abs(by - ay)) / 6) + 1
+            for part in range(count + 1):
+                x, y = ax + (bx - ax) * part / count, ay + (by - ay) * part / count
+                found.setdefault((int(x / 3), int(y / 3)), LabelBox(x - 2, y - 2, 4, 4))
+    return tuple(found.values())
 
 
 def _stops(on: Canvas, way: PlannedWay, site: Site) -> dict[tuple[float, float], list[int]]:

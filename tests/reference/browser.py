@@ -102,11 +102,16 @@ class OpenPage:
 
 
 @contextmanager
-def opened(browser: Browser, file: Path, *, width: int = 1280, dark: bool = False) -> Iterator[OpenPage]:
-    """A page from a file, in a window of this width, of a reader who prefers light or dark."""
+def opened(
+    browser: Browser, file: Path, *, width: int = 1280, dark: bool = False, before: str = ""
+) -> Iterator[OpenPage]:
+    """A page from a file, in a window of this width, of a reader who prefers light or dark. The script `before` runs
+    before those of the page.
+    """
     context = browser.new_context(
         viewport={"width": width, "height": 900}, color_scheme="dark" if dark else "light", reduced_motion="reduce"
     )
+    context.add_init_script(before)
     page = context.new_page()
     found = OpenPage(page)
     page.on("console", lambda said: found.errors.append(said.text) if said.type in ("warning", "error") else None)

@@ -17,11 +17,12 @@ def _csp(text: str) -> str:
 def page(embedded: str, *, redacted: bool = False, hook: bool = False) -> str:
     """The page with the text of a log (`embedding.embed`)."""
     module = "\n" + script() + (HOOK if hook else "")
+    permitted = f"default-src 'none'; script-src {_csp(module)}; style-src {_csp(STYLE)}"
     return f"""<!DOCTYPE html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; script-src {_csp(module)}; style-src {_csp(STYLE)}; base-uri 'none'; form-action 'none'">
+<meta http-equiv="Content-Security-Policy" content="{permitted}; base-uri 'none'; form-action 'none'">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="color-scheme" content="light dark">
 <title>Verification</title>

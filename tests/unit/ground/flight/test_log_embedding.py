@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from reference.forgery import flight, leaf, read
 from reference.independent_verifier import merkle
+from rtshcua.ground.drawing.html import visibly
 from rtshcua.ground.flight import embedding
 from rtshcua.ground.flight.embedding import MOST_OCTETS, embed, extract, redact, script
 
@@ -69,8 +70,18 @@ def test_script_is_self_contained_and_has_the_same_limit() -> None:
     text = script()
     assert "</script" not in text.lower()
     assert "<!--" not in text
+    assert visibly(text) == text  # no invisible character, which a page would replace, and break the digest
     own = text[text.index("Verifies an evidence log") :]
-    for word in (r"\beval\b", r"\bFunction\(", r"\bfetch\(", "XMLHttpRequest", "innerHTML", "outerHTML", r"\bimport\b", "document.write"):
+    for word in (
+        r"\beval\b",
+        r"\bFunction\(",
+        r"\bfetch\(",
+        "XMLHttpRequest",
+        "innerHTML",
+        "outerHTML",
+        r"\bimport\b",
+        "document.write",
+    ):
         assert not re.search(word, own), word
     (limit,) = re.findall(r"const MOST_OCTETS = 2 \*\* (\d+);", own)
     assert 2 ** int(limit) == MOST_OCTETS

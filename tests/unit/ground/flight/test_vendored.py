@@ -8,7 +8,9 @@ import pytest
 CHECKOUT = Path(__file__).parents[4]
 VENDOR = CHECKOUT / "rtshcua/ground/flight/templates/vendor"
 PACKAGE = CHECKOUT / "build/npm/node_modules/@noble/ed25519"
-LOCK = json.loads((CHECKOUT / "requirements/npm/package-lock.json").read_text())["packages"]["node_modules/@noble/ed25519"]
+LOCK = json.loads((CHECKOUT / "requirements/npm/package-lock.json").read_text())["packages"][
+    "node_modules/@noble/ed25519"
+]
 
 
 def test_table_names_the_pinned_package() -> None:

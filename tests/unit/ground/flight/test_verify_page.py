@@ -11,13 +11,13 @@ import pytest
 from playwright.sync_api import Browser
 
 from reference.browser import AXE, CHROMIUM, OpenPage, opened
-from reference.forgery import flight, read, signed, write
+from reference.forgery import edit, flight, read, signed, write
 from reference.long_log import RECORDS, long_log
 from reference.verifiers import ROOT_KEY
 from reference.verify_page import page
 from rtshcua.ground.flight.embedding import MOST_OCTETS, embed, redact
-from virtual import case
 from rtshcua.wire.keys import Duty
+from virtual import case
 
 pytestmark = [
     pytest.mark.clients,
@@ -32,7 +32,9 @@ def show(browser: Browser, tmp_path: Path) -> Show:
     """Opens the page with a log; the browser must report no errors, and request nothing."""
 
     @contextmanager
-    def opening(data: bytes | str, *, redacted: bool = False, width: int = 1280, dark: bool = False) -> Iterator[OpenPage]:
+    def opening(
+        data: bytes | str, *, redacted: bool = False, width: int = 1280, dark: bool = False
+    ) -> Iterator[OpenPage]:
         file = tmp_path / "page.html"
         file.write_text(page(data if isinstance(data, str) else embed(data), redacted=redacted), encoding="utf-8")
         with opened(browser, file, width=width, dark=dark) as found:
@@ -122,7 +124,8 @@ def test_key_may_come_from_a_file(show: Show, content: bytes, said: str, way: st
             shown.page.set_input_files("#pinned-file", file)
         else:
             given = shown.page.evaluate_handle(
-                """text => { const data = new DataTransfer(); const octets = Uint8Array.from(atob(text), c => c.charCodeAt(0));
+                """text => {
+                const data = new DataTransfer(), octets = Uint8Array.from(atob(text), each => each.charCodeAt(0));
                 data.items.add(new File([octets], "given")); return data; }""",
                 b64encode(content).decode(),
             )
@@ -186,7 +189,7 @@ def test_changed_embedding_fails(show: Show, text: str, why: str) -> None:
 
 
 def test_texts_of_a_log_stay_text(show: Show) -> None:
-    hostile = '</script><img src=x onerror=alert(1)><b>\u202e\u2066dorc\u200b\x07"\'&amp;' + "long" * 2_000
+    hostile = "</script><img src=x onerror=alert(1)><b>\u202e\u2066dorc\u200b\x07\"'&amp;" + "long" * 2_000
     genesis = read(flight()[0]) | {"mission": hostile, "vehicle": hostile}
     lines = signed([write(genesis), *flight()[1:]])
     with show(b"".join(lines), width=390) as shown:
@@ -221,7 +224,11 @@ def test_page_stays_responsive_with_a_log_of_an_hour(show: Show) -> None:
 @pytest.mark.parametrize("dark", [False, True])
 @pytest.mark.parametrize("width", [390, 1280])
 def test_page_is_accessible(show: Show, width: int, dark: bool) -> None:
-    for data, key, word in ((CLOSED, ROOT_KEY.hex(), "verified"), (CLOSED[:-700], ROOT_KEY.hex(), "incomplete"), (CLOSED, "", "unverified")):
+    for data, key, word in (
+        (CLOSED, ROOT_KEY.hex(), "verified"),
+        (CLOSED[:-700], ROOT_KEY.hex(), "incomplete"),
+        (CLOSED, "", "unverified"),
+    ):
         with show(data, width=width, dark=dark) as shown:
             assert shown.axe() == []
             assert verdict(shown, key)[0] == word
@@ -237,3 +244,39 @@ def test_button_works_by_keyboard(show: Show) -> None:
         shown.page.keyboard.press("Tab")
         shown.page.keyboard.press("Enter")
         shown.page.wait_for_selector("#badge.verified")
+
+
+#: browsers whose Ed25519 is missing, or has another rule than docs/log-format.md
+OTHER_BROWSERS = {
+    "without Ed25519": "crypto.subtle.importKey = () => Promise.reject(new DOMException('', 'NotSupportedError'))",
+    "with the cofactor": "crypto.subtle.verify = () => Promise.resolve(true)",
+    "refuses everything": "crypto.subtle.verify = () => Promise.resolve(false)",
+}
+
+
+@pytest.mark.parametrize("name", OTHER_BROWSERS)
+def test_library_verifies_where_the_browser_does_not(browser: Browser, tmp_path: Path, name: str) -> None:
+    forged = b"".join(_with_signature_changed())
+    for data, expected in ((CLOSED, "verified"), (forged, "failed")):
+        file = tmp_path / "page.html"
+        file.write_text(page(embed(data)), encoding="utf-8")
+        with opened(browser, file, before=OTHER_BROWSERS[name]) as shown:
+            word, details = verdict(shown)
+            assert word == expected
+            assert ("seal/signature" in details) == (expected == "failed")
+
+
+def _with_signature_changed() -> list[bytes]:
+    lines = list(flight())
+    checkpoint = read(lines[7])["checkpoint"]
+    lines[7] = edit(lines[7], checkpoint=checkpoint[:-20] + ("A" if checkpoint[-20] != "A" else "B") + checkpoint[-19:])
+    return lines
+
+
+def test_page_says_where_it_cannot_verify(browser: Browser, tmp_path: Path) -> None:
+    file = tmp_path / "page.html"
+    file.write_text(page(embed(CLOSED)), encoding="utf-8")
+    with opened(browser, file, before="Object.defineProperty(crypto, 'subtle', { value: undefined })") as shown:
+        word, details = verdict(shown)
+        assert word == "unverified"
+        assert "open the page from a file or over https" in details

@@ -32,6 +32,7 @@ from reference.forgery import (
     signed,
     write,
 )
+from reference.independent_records import unbase64
 from reference.resealing import resealed
 from reference.verifiers import ROOT_KEY, careful, independent
 from reference.verify_page import page
@@ -141,9 +142,7 @@ def with_gap() -> list[bytes]:
     lines = list(flight())
     silent = 60_000_000
     before = read(lines[8])
-    later = [
-        edit(line, at_us=read(line)["at_us"] + silent, utc_us=read(line)["utc_us"] + silent) for line in lines[9:]
-    ]
+    later = [edit(line, at_us=read(line)["at_us"] + silent, utc_us=read(line)["utc_us"] + silent) for line in lines[9:]]
     gap = before | {"event": "stalled", "detail": f"{silent} us", "durability": 1}
     gap |= {name: before[name] + silent for name in ("at_us", "utc_us")}
     return signed([*lines[:9], write(gap), *later])
@@ -235,6 +234,21 @@ def _with(number: int, line: bytes) -> list[bytes]:
     return lines
 
 
+def _begun(**fields: object) -> list[bytes]:
+    """The flight with another genesis, signed by all of its keys."""
+    return signed(_with(0, edit(flight()[0], **fields)))
+
+
+def _rooted(change: Any = None, **fields: Any) -> list[bytes]:
+    """The same, with another trust root (see `_root`)."""
+    return _begun(root=_root(change, **fields))
+
+
+def _flipped(field: str, at: int) -> list[bytes]:
+    """The same, with one bit changed in what a field of the genesis has in base64."""
+    return _begun(**{field: b64encode(_flip(unbase64(read(flight()[0])[field]), at)).decode()})
+
+
 def _note(number: int, change: Any) -> list[bytes]:
     return _with(number, edit(flight()[number], checkpoint=change(read(flight()[number])["checkpoint"])))
 
@@ -246,6 +260,8 @@ def forgeries() -> dict[str, tuple[list[bytes], bytes]]:
     stranger = SigningKey.from_seed(STRANGER, duty=Duty.LOG, development=True)
     strange_root = SigningKey.from_seed(STRANGER, duty=Duty.ROOT, development=True)
     bundle = read(genesis)["bundle"]
+    strange_policy = SigningKey.from_seed(STRANGER, duty=Duty.POLICY, development=True)
+    first_key = read(genesis)["next_key"]
     odd = log_vectors.ODD
     made: dict[str, list[bytes]] = {
         "genesis edited": _with(0, edit(genesis, mode="none")),
@@ -255,7 +271,7 @@ def forgeries() -> dict[str, tuple[list[bytes], bytes]]:
         "close edited": _with(23, edit(close, ending="aborted")),
         "edited and linked": rehashed(_with(1, edit(note, detail="another"))),
         "edited and counted": rewritten(_with(1, edit(note, detail="another"))),
-        "edited, and signed with one epoch key": captured(_with(9, edit(lines[9], outcome="deny")), seed_of(read(lines[0])["next_key"])),
+        "edited, and signed with one epoch key": captured(_with(9, edit(lines[9], outcome="deny")), seed_of(first_key)),
         "line removed": [*lines[:5], *lines[6:]],
         "line removed and numbered": renumbered([*lines[:5], *lines[6:]]),
         "line removed and rewritten": rewritten([*lines[:5], *lines[6:]]),
@@ -278,7 +294,7 @@ def forgeries() -> dict[str, tuple[list[bytes], bytes]]:
         "next key swapped": _with(7, edit(seal, next_key=stranger.public.hex())),
         "log key swapped": _with(0, edit(genesis, log_key=stranger.public.hex())),
         "log key of a stranger": signed(as_log_key(lines, stranger), stranger),
-        "seal by a stranger": resealed(lines, lambda key: STRANGER if key == read(genesis)["next_key"] else seed_of(key)),
+        "seal by a stranger": resealed(lines, lambda key: STRANGER if key == first_key else seed_of(key)),
         "checkpoint of another root": _note(7, lambda text: text.replace(text.split("\n")[2], "A" * 43 + "=")),
         "checkpoint of another size": _note(7, lambda text: text.replace("\n7\n", "\n8\n")),
         "checkpoint with a leading zero": _note(7, lambda text: text.replace("\n7\n", "\n07\n")),
@@ -289,31 +305,31 @@ def forgeries() -> dict[str, tuple[list[bytes], bytes]]:
         "checkpoint of the next seal": _note(7, lambda _: read(lines[12])["checkpoint"]),
         "no checkpoint": _note(7, lambda _: None),
         "empty checkpoint": _note(7, lambda _: ""),
-        "bundle changed": signed(_with(0, edit(genesis, bundle=b64encode(_flip(log_vectors.unbase64(bundle), 900)).decode()))),
-        "bundle of another vehicle": signed(_with(0, edit(genesis, bundle=log_vectors.bundle(odd)))),
-        "vehicle of another bundle": signed(_with(0, edit(genesis, vehicle=odd))),
-        "bundle not canonical base64": signed(_with(0, edit(genesis, bundle=bundle + "\n"))),
-        "bundle by a stranger": signed(_with(0, edit(genesis, bundle=log_vectors.bundle("quad-07", policy=SigningKey.from_seed(STRANGER, duty=Duty.POLICY, development=True))))),
-        "another mission": signed(_with(0, edit(genesis, mission="another"))),
-        "root by a stranger": signed(_with(0, edit(genesis, root=_root(signer=strange_root)))),
-        "root changed": signed(_with(0, edit(genesis, root=b64encode(_flip(log_vectors.unbase64(read(genesis)["root"]), 300)).decode()))),
-        "root without its tag": signed(_with(0, edit(genesis, root=b64encode(log_vectors.unbase64(read(genesis)["root"])[1:]).decode()))),
-        "root expired": signed(_with(0, edit(genesis, root=_root(issued_at_us=1, expires_at_us=2)))),
-        "root of version 0": signed(_with(0, edit(genesis, root=_root(version=0)))),
-        "root without a development mark": signed(_with(0, edit(genesis, root=_root(development=False)))),
-        "root that revokes nothing": signed(_with(0, edit(genesis, root=_root(revoked=())))),
-        "root that revokes its key": signed(_with(0, edit(genesis, root=_root(revoked=(LOG_KEY.kid,))))),
-        "root that revokes twice": signed(_with(0, edit(genesis, root=_root(revoked=(bytes(16), bytes(16)))))),
-        "log key of another vehicle": signed(_with(0, edit(genesis, root=_root(_only(Duty.LOG, vehicles=("quad-08",)))))),
-        "log key expired": signed(_with(0, edit(genesis, root=_root(_only(Duty.LOG, expires_us=read(genesis)["utc_us"]))))),
-        "policy key of another vehicle": signed(_with(0, edit(genesis, root=_root(_only(Duty.POLICY, vehicles=()))))),
-        "mission key of another policy": signed(_with(0, edit(genesis, root=_root(_only(Duty.MISSION, policies=("another",)))))),
-        "mission key of another role": signed(_with(0, edit(genesis, root=_root(_only(Duty.MISSION, roles=("nobody",)))))),
-        "mission key of another source": signed(_with(0, edit(genesis, root=_root(_only(Duty.MISSION, sources=("onboard",)))))),
-        "policy key with policies": signed(_with(0, edit(genesis, root=_root(_only(Duty.POLICY, policies=("*",)))))),
-        "approval key of nobody": signed(_with(0, edit(genesis, root=_root(_only(Duty.APPROVAL, person="Ada"))))),
-        "log key of small order": signed(_with(0, edit(genesis, root=_small_order_root()))),
-        "log key with another name": signed(_with(0, edit(genesis, log_kid="00" * 16))),
+        "bundle changed": _flipped("bundle", 900),
+        "bundle of another vehicle": _begun(bundle=log_vectors.bundle(odd)),
+        "vehicle of another bundle": _begun(vehicle=odd),
+        "bundle not canonical base64": _begun(bundle=bundle + "\n"),
+        "bundle by a stranger": _begun(bundle=log_vectors.bundle("quad-07", policy=strange_policy)),
+        "another mission": _begun(mission="another"),
+        "root by a stranger": _rooted(signer=strange_root),
+        "root changed": _flipped("root", 300),
+        "root without its tag": _begun(root=b64encode(unbase64(read(genesis)["root"])[1:]).decode()),
+        "root expired": _rooted(issued_at_us=1, expires_at_us=2),
+        "root of version 0": _rooted(version=0),
+        "root without a development mark": _rooted(development=False),
+        "root that revokes nothing": _rooted(revoked=()),
+        "root that revokes its key": _rooted(revoked=(LOG_KEY.kid,)),
+        "root that revokes twice": _rooted(revoked=(bytes(16), bytes(16))),
+        "log key of another vehicle": _rooted(_only(Duty.LOG, vehicles=("quad-08",))),
+        "log key expired": _rooted(_only(Duty.LOG, expires_us=read(genesis)["utc_us"])),
+        "policy key of another vehicle": _rooted(_only(Duty.POLICY, vehicles=())),
+        "mission key of another policy": _rooted(_only(Duty.MISSION, policies=("another",))),
+        "mission key of another role": _rooted(_only(Duty.MISSION, roles=("nobody",))),
+        "mission key of another source": _rooted(_only(Duty.MISSION, sources=("onboard",))),
+        "policy key with policies": _rooted(_only(Duty.POLICY, policies=("*",))),
+        "approval key of nobody": _rooted(_only(Duty.APPROVAL, person="Ada")),
+        "log key of small order": _begun(root=_small_order_root()),
+        "log key with another name": _begun(log_kid="00" * 16),
         "space": _with(1, note.replace(b",", b", ", 1)),
         "escape": _with(1, note.replace(b'"type":"effect"', b'"type":"\\u0065ffect"')),
         "key twice": _with(1, note.replace(b'"seq":1', b'"seq":1,"seq":1')),
@@ -336,8 +352,8 @@ def forgeries() -> dict[str, tuple[list[bytes], bytes]]:
         "list": _with(1, b"[]\n"),
         "deep": _with(1, b"[" * 100_000 + b"\n"),
         "version": _with(0, edit(genesis, version=5)),
-        "format": signed(_with(0, edit(genesis, format="other"))),
-        "received later": signed(_with(0, edit(genesis, received_us=read(genesis)["at_us"] + 1))),
+        "format": _begun(format="other"),
+        "received later": _begun(received_us=read(genesis)["at_us"] + 1),
         "clock back": signed(_with(5, edit(lines[5], at_us=1))),
         "clocks apart": signed(_with(5, edit(lines[5], utc_us=0))),
         "late": signed(_with(6, edit(lines[6], at_us=40_000_000, utc_us=read(lines[6])["utc_us"] + 27_780_000))),
@@ -479,7 +495,9 @@ def test_changed_redacted_log_fails(script: Script) -> None:
     flipped = []
     for whole_document in (data, bare):
         for _ in range(100):
-            at = chance.randrange(whole_document.index(b'"leaves"') if whole_document is data else 0, len(whole_document))
+            at = chance.randrange(
+                whole_document.index(b'"leaves"') if whole_document is data else 0, len(whole_document)
+            )
             flipped.append(_flip(whole_document, at))
     assert {script.redacted(each, ROOT_KEY)["verdict"] for each in flipped} == {"failed"}
 

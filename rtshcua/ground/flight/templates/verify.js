@@ -228,16 +228,16 @@ const { embedded, verifyLog, verifyRedacted, signerOf, signatureCounts } = (() =
   };
 
   /** The payload and the key of an envelope that one of these keys signed for a duty. */
-  const openEnvelope = async (data, keys, duty, version) => {
+  const openEnvelope = async (data, keys, duty, version, what = duty) => {
     const { protectedHeader, payload, signature, content, kid } = envelopeOf(data);
-    check(content === `application/vnd.rtshcua.${duty}+cbor`, "wrong-content-type", `the envelope does not hold a ${duty}`);
+    check(content === `application/vnd.rtshcua.${what}+cbor`, "wrong-content-type", `the envelope does not hold a ${what}`);
     const key = keys.find((each) => same(each.kid, kid));
     check(key, "unknown-key", `key ${hex(kid)} is not in the trust root`);
     check(key.duty === duty, "wrong-duty", `key ${hex(kid)} is trusted for ${key.duty}, not for ${duty}`);
     const external = octetString(label(`rtshcua/duty/${duty}`));
     const signed = concat([0x84, 0x6a], label("Signature1"), octetString(protectedHeader), external, octetString(payload));
     check(await signatureCounts(key.public, signature, signed), "bad-signature", `key ${hex(kid)} did not sign these bytes for ${duty}`);
-    return { body: artefact(payload, `rtshcua/${duty}`, version), payload, key };
+    return { body: artefact(payload, `rtshcua/${what}`, version), payload, key };
   };
   const artefact = (data, name, version) => {
     const value = decode(data);
@@ -551,6 +551,348 @@ const { embedded, verifyLog, verifyRedacted, signerOf, signatureCounts } = (() =
   const ownLeaf = (record) => leafOf(label(`${JSON.stringify({ ...record, checkpoint: null })}\n`));
   const sameOrNull = (a, b) => (a === null || b === null ? a === b : same(a, b));
 
+  // ------------------------------------------------------------------------------------------------ witnesses
+
+  const LONGEST_NOTE = 2 ** 14;
+
+  /** Compares what witnesses cosigned (section 5, anchors) with the log; reads the notes in the log alone. */
+  class Witnesses {
+    signed = new Map(); // by size, the digest of the log's checkpoint
+    ahead = new Map(); // the same of notes, whose checkpoint is still to come, and the name of a witness
+    seen = new Map(); // by key, the largest size that it cosigned
+
+    constructor(root, genesis) {
+      this.origin = originOf(genesis);
+      this.threshold = root.witnesses;
+      this.keys = root.keys.filter((key) => key.duty === "witness" && refusalOf(key, genesis.vehicle, genesis.utc_us) === null);
+    }
+
+    compare(size, own, seen, name) {
+      check(own === seen, "anchor/root", `witness \`${name}\` saw another log at ${size} records: this one was rewritten`);
+    }
+
+    async take(record, checkpoint) {
+      if (record.event === "anchored") await this.anchor(record.detail);
+      if (!("checkpoint" in record)) return;
+      const { size } = checkpoint, digest = hex(checkpoint.digest), waiting = this.ahead.get(size);
+      this.signed.set(size, digest);
+      this.ahead.delete(size);
+      if (waiting) this.compare(size, digest, waiting.digest, waiting.name);
+    }
+
+    async anchor(note) {
+      const at = note.lastIndexOf("\n\n"), text = note.slice(0, at + 1), below = note.slice(at + 2);
+      if (note.length > LONGEST_NOTE || at < 0 || !below.endsWith("\n")) return;
+      const signers = [];
+      for (const line of below.slice(0, -1).split("\n")) {
+        const found = await this.cosigner(line, text);
+        if (found === false) return; // a wrong signature in the name of a witness: the note is no evidence
+        if (found) signers.push(found);
+      }
+      let checkpoint = null;
+      try {
+        checkpoint = checkpointOf(text);
+      } catch { /* not a checkpoint */ }
+      if (!signers.length || checkpoint?.origin !== this.origin) return;
+      const { size } = checkpoint, digest = hex(await sha256(label(text))), [{ name }] = signers;
+      for (const signer of signers) if (!(this.seen.get(signer.key)?.size >= size)) this.seen.set(signer.key, { ...signer, size });
+      if (!this.ahead.has(size)) this.ahead.set(size, { digest, name });
+      const own = this.signed.get(size) ?? null, waiting = this.ahead.get(size);
+      if (own === null) this.compare(size, digest, waiting.digest, waiting.name);
+      else {
+        this.ahead.delete(size);
+        this.compare(size, own, digest, name);
+      }
+    }
+
+    /** The witness who cosigned with this line; null for a line of anybody else, false for a wrong signature. */
+    async cosigner(line, text) {
+      const parts = /^\u2014 ([^ \n]+) ([^ \n]+)$/.exec(line), blob = parts && unbase64(parts[2]);
+      if (blob?.length !== 76) return null;
+      for (const key of this.keys) {
+        if (!same(blob.subarray(0, 4), await noteId(parts[1], 4, key.public))) continue;
+        const time = new DataView(blob.buffer, 4, 8).getBigUint64(0);
+        const signed = label(`cosignature/v1\ntime ${time}\n${text}`);
+        const holds = time < 2n ** 63n && (await signatureCounts(key.public, blob.subarray(12), signed));
+        return holds && { key: hex(key.public), name: parts[1] };
+      }
+      return null;
+    }
+
+    /** How many records enough witnesses saw, at the end of a log of so many. */
+    finish(records) {
+      if (this.ahead.size) {
+        const size = Math.max(...this.ahead.keys()), { name } = this.ahead.get(size);
+        check(size < records, "anchor/beyond", `witness \`${name}\` saw a longer log: the end of this one was removed`);
+        check(false, "anchor/root", `witness \`${name}\` saw a checkpoint of ${size} records, which is not in the log`);
+      }
+      const sizes = [...this.seen.values()].map(({ size }) => size).sort((a, b) => b - a);
+      return sizes.length >= this.threshold ? sizes[this.threshold - 1] + 1 : 0;
+    }
+  }
+
+  // ------------------------------------------------------------------------------------------------ the boundary
+
+  const UTC_UNKNOWN = 2n ** 52n, APART_US = 2_000_000n, DRIFT_US = 500n;
+  const MOST_MARKS = 128, MARK = 8, MOST_STATEMENT = 2048, MOST_SLOTS = 72, MOST_MONITORS = 32, MOST_WRITES = 32;
+  const OUTCOMES = ["allow", "deny", "defer", "fallback"];
+  // rtshcua/model/outcome.py, in the order of their numbers
+  const REASONS = ["admitted", "integrity/binding-mismatch", "integrity/wrong-vehicle", "integrity/policy-version",
+    "integrity/argument-out-of-range", "freshness/replayed", "freshness/issued-in-future", "freshness/expired",
+    "freshness/clock-uncertain", "authority/class-not-permitted", "authority/forbidden", "authority/forbid-unknown",
+    "authority/not-permitted", "authority/out-of-scope", "approval/awaited", "approval/refused", "approval/timed-out",
+    "context/phase-not-reached", "context/phase-passed", "timing/no-slack", "state/violated", "state/unknown",
+    "safety/envelope", "safety/airspace", "safety/invariant-violated", "safety/energy", "safety/degraded", "safety/unknown"];
+  const STATUSES = ["", "malformed", "unknown_step", "not_current", "clock_apart", "clock_unknown"];
+  const DOCUMENTS = ["", "approval", "recall", "replacement", "cancellation"];
+  const WIDTHS = { B: [1, 0n], h: [2, 1n], H: [2, 0n], I: [4, 0n], q: [8, 1n], Q: [8, 0n] };
+
+  /** Big-endian integers in the layout of Python's `struct`. Throws RangeError where one does not fit. */
+  const packed = (layout, values) => {
+    const parts = [...layout].map((kind, n) => {
+      const [size, signed] = WIDTHS[kind], bits = 8n * BigInt(size), value = BigInt(values[n]), least = -(signed << (bits - 1n));
+      if (value < least || value >= least + 2n ** bits) throw new RangeError(`${value} does not fit`);
+      const octets = new DataView(new ArrayBuffer(8));
+      octets.setBigUint64(0, BigInt.asUintN(64, value));
+      return new Uint8Array(octets.buffer, 8 - size);
+    });
+    return concat(...parts);
+  };
+  const timesOf = (record) => [record.at_us, record.utc_us, record.utc_error_us];
+
+  const decided = (record) => {
+    const { state, context } = record, { values, ages, monitors = [] } = state;
+    const [outcome, reason] = [OUTCOMES.indexOf(record.outcome), REASONS.indexOf(record.reason)];
+    const fits = reason >= 0 && isHash(record.binding) && values.length === ages.length && values.length <= MOST_SLOTS && monitors.length <= MOST_MONITORS;
+    if (!fits) throw new RangeError("not a request");
+    const body = concat(
+      packed("Bhh", [record.kind, record.step, record.link]), unhex(record.binding),
+      packed("QQQQQH", [...timesOf(record), context.released_us, context.remaining_us, context.phase]),
+      packed("q".repeat(values.length), values.map((value) => value ?? -(2n ** 63n))),
+      packed("I".repeat(ages.length), ages), packed("B".repeat(monitors.length), monitors),
+    );
+    const name = label("rtshcua/request");
+    const said = [outcome, reason, record.rule_step, Math.max(record.target_link, -1), record.valid_until_us, context.consumed];
+    return [2, concat(packed("BBBhqB", said), [0x83, 0x60 | name.length], name, [2], octetString(body))];
+  };
+  /** The 32 bits of the float that is nearest to a decimal. */
+  const bitsOf = (text) => {
+    const value = Math.fround(/^[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?$/.test(text) ? Number(text) : NaN) + 0;
+    if (!Number.isFinite(value)) throw new RangeError("not a float");
+    const view = new DataView(new ArrayBuffer(4));
+    view.setFloat32(0, value);
+    return view.getUint32(0);
+  };
+  const writes = (detail) => {
+    const way = ["set ", "restore "].findIndex((word) => detail.startsWith(word)), listed = detail.slice(detail.indexOf(" ") + 1).split(", ");
+    if (way < 0 || listed.length > MOST_WRITES) throw new RangeError("not a list of parameters");
+    const parts = listed.map((write) => {
+      const found = /^([A-Z0-9_]{1,16}) from (\S+) to (\S+)$/.exec(write);
+      if (!found) throw new RangeError("not a parameter");
+      return concat(label(found[1].padEnd(16, "\0")), packed("II", found.slice(2).map(bitsOf)));
+    });
+    return concat([way, parts.length], ...parts);
+  };
+  const EFFECTS = new Map([
+    ["undecided", ({ detail }) => {
+      const said = /^([a-z_]+) ([0-9a-f]{64})$/.exec(detail), status = STATUSES.indexOf(said?.[1], 1);
+      if (status < 0) throw new RangeError("no status");
+      return [3, concat([status], unhex(said[2]))];
+    }],
+    ...DOCUMENTS.slice(1).map((event, n) => [event, async (record) => {
+      const document = unbase64(record.detail);
+      if (!document) throw new RangeError("not base64");
+      return [4, concat(packed("BhQQQ", [n + 1, record.step, ...timesOf(record)]), await sha256(document))];
+    }]),
+    ["dispatched", (record) => [6, packed("BhhQQ", [record.kind, record.step, Math.max(record.link, -1), record.token, record.at_us])]],
+    ["refused", (record) => [7, concat(packed("Q", [record.at_us]), label(record.detail))]],
+    ["permitted", ({ detail }) => [8, writes(detail)]],
+    ["not-permitted", ({ detail }) => [9, label(detail)]],
+  ]);
+  /** Tag and payload of the boundary's entry for a record; null where it had no part in it. */
+  const entryOf = async (record) => {
+    const make = record.type === "decision" ? decided : EFFECTS.get(record.event);
+    try {
+      return make ? await make(record) : null;
+    } catch (error) {
+      if (!(error instanceof RangeError)) throw error;
+      throw new Flaw("boundary/record", "the record does not contain an entry that a boundary makes");
+    }
+  };
+  const following = (digest, tag, payload) =>
+    sha256(concat(label("rtshcua/boundary\0"), digest, packed("BI", [tag, payload.length]), payload));
+
+  const STATEMENT = { flight: 16, session: 0, before: 32, count: 0, digest: 32, marks: null, frames: 0, left: 32, repeated: 0,
+    declined: 0, stopped: 0, ahead: 0, aside: 32, source: 0, at: 0, utc: 0, error: 0 }; // 0: a number; else octets
+  const COUNTED_BY = ["frames", "repeated", "declined", "stopped", "ahead"];
+  const openStatement = async (data, keys) => {
+    check(data && data.length <= MOST_STATEMENT, "malformed", "not a statement");
+    const { body } = await openEnvelope(data, keys, "boundary", 2, "statement"), names = Object.keys(STATEMENT);
+    const form = (value, size) => (size === 0 ? integral(value) && value >= 0 : isOctets(value) && (size === null || value.length === size));
+    const shaped = Array.isArray(body) && body.length === names.length + 1 && names.every((name, n) => form(body[n], STATEMENT[name]));
+    const said = shaped ? Object.fromEntries(names.map((name, n) => [name, body[n]])) : null;
+    check(said && typeof body.at(-1) === "boolean" && said.marks.length % MARK === 0 && said.marks.length <= MARK * MOST_MARKS &&
+      said.source <= 4, "malformed", "not a statement of a boundary");
+    const marks = Array.from({ length: said.marks.length / MARK }, (_, n) => said.marks.subarray(MARK * n, MARK * (n + 1)));
+    return { ...said, marks, count: Number(said.count), final: body.at(-1) };
+  };
+
+  /** Compares the records with the boundary's own evidence (section 7). Its flaws name the record. */
+  class Boundary {
+    digest = new Uint8Array(32);
+    count = 0;
+    pending = []; // entries that no statement covers yet
+    marks = []; // of entries whose records are still to come
+    last = null;
+    stated = false; // in this epoch
+    recovered = false;
+    lost = null;
+    gapEnd = null;
+
+    constructor(root, genesis) {
+      this.keys = root.keys.filter((key) => key.duty === "boundary" && refusalOf(key, genesis.vehicle, genesis.utc_us) === null);
+      this.genesis = genesis;
+      this.claim = this.claimed(genesis);
+    }
+
+    claimed(record) {
+      const [at, utc, error] = timesOf(record).map(BigInt);
+      return error < UTC_UNKNOWN ? { record: record.seq, at, ahead: utc - at, error } : null;
+    }
+
+    async take(record) {
+      if (!this.keys.length) return;
+      this.claim ??= this.claimed(record);
+      const event = record.type === "effect" ? record.event : null;
+      if (this.lost !== null) check(!this.makes(record), "boundary/after-loss", "the boundary was lost before this record, and so cannot have made its entry");
+      else if (event === "boundary-lost") this.lose(record);
+      else if (event === "boundary") await this.state(record);
+      else if (record.type === "decision" || event !== null) {
+        if (event === "stalled") this.gapEnd = BigInt(record.at_us);
+        await this.enter(record);
+      } else this.end(record);
+    }
+
+    /** Whether only a boundary makes a record. Links fly without it, and a missing answer counts as a refusal. */
+    makes(record) {
+      if (record.type !== "effect") return record.type === "decision";
+      if (record.event === "refused" || record.event === "not-permitted") return false;
+      const ofLink = record.event === "dispatched" && [1, 2].includes(record.kind);
+      return record.event === "boundary" || (EFFECTS.has(record.event) && !ofLink);
+    }
+
+    unsigned(holds, when) {
+      check(holds, "boundary/missing", `the boundary did not sign its own evidence ${when}: its statement was removed`);
+    }
+
+    complete() {
+      check(this.count >= this.last.count, "boundary/omitted", "the boundary made entries before this that no record contains: the records were removed");
+    }
+
+    lose(record) {
+      this.lost = record.seq;
+      this.unsigned(this.last, "before this");
+      this.complete();
+    }
+
+    async enter(record) {
+      const entry = await entryOf(record);
+      if (entry === null) return;
+      this.unsigned(this.last, "before this");
+      check(!this.last.final, "boundary/invented", "the boundary signed the number of its entries, and made no later entry for this record");
+      this.digest = await following(this.digest, ...entry);
+      this.count += 1;
+      if (this.count > this.last.count) {
+        this.pending.push({ record: record.seq, digest: this.digest });
+        return;
+      }
+      const mark = this.marks.shift() ?? this.digest.subarray(0, MARK);
+      this.differs(same(mark, this.digest.subarray(0, MARK)) && (this.count < this.last.count || same(this.digest, this.last.digest)));
+    }
+
+    differs(holds, record = null) {
+      if (!holds) throw new Flaw("boundary/differs", "the boundary made no such entry here: this record was altered, invented or moved, or an earlier one was removed", record);
+    }
+
+    async state(record) {
+      const said = await this.opened(record), { last } = this;
+      check(same(said.flight, unhex(this.genesis.boot)), "boundary/other-flight", "the boundary signed this statement in another flight");
+      let added = said.count - (last?.count ?? 0), { marks } = said;
+      if (last === null) {
+        const bundle = await sha256(unbase64(this.genesis.bundle));
+        const begin = concat(packed("Q", [said.session]), said.before, said.flight, bundle, [this.genesis.mode === "none" ? 0 : 1]);
+        [this.digest, this.count] = [await following(new Uint8Array(32), 1, begin), 1];
+        check(marks.length && same(marks[0], this.digest.subarray(0, MARK)), "boundary/beginning", "the boundary's session did not begin with this flight, bundle and mode");
+      } else {
+        check(said.session === last.session && same(said.before, last.before), "boundary/other-session", "the boundary signed this statement in another session");
+        const grows = said.count >= last.count && COUNTED_BY.every((name) => said[name] >= last[name]);
+        check(!last.final && grows, "boundary/replayed", "the statement is older than the previous one, or follows the final one");
+        this.complete();
+      }
+      check(marks.length === Math.min(added, MOST_MARKS), "boundary/missing", "the statement does not mark each entry since the previous one: an entry was removed, or the statement is older");
+      if (last === null) [marks, added] = [marks.slice(1), added - 1];
+      const { pending } = this;
+      [this.pending, this.last, this.stated] = [[], said, true];
+      for (const [n, entry] of pending.entries()) {
+        if (n >= added) throw new Flaw("boundary/invented", "the boundary signed the number of its entries, and made no later entry for this record", entry.record);
+        this.differs(n >= marks.length || same(marks[n], entry.digest.subarray(0, MARK)), entry.record);
+      }
+      this.marks = marks.slice(pending.length);
+      check(this.count !== said.count || same(this.digest, said.digest), "boundary/differs", "the preceding records do not match what the boundary signed");
+      this.time(record, said, BigInt(last === null ? said.at : last.at));
+      const [gapEnd, at] = [this.gapEnd, BigInt(said.at)];
+      this.gapEnd = null;
+      check(gapEnd === null || at >= gapEnd - APART_US, "boundary/gap", "the boundary signed this statement before the end of the gap that precedes it");
+    }
+
+    async opened(record) {
+      try {
+        return await openStatement(unbase64(record.detail), this.keys);
+      } catch (error) {
+        if (!(error instanceof Flaw)) throw error;
+        throw new Flaw(`boundary/${error.slug}`, `the boundary's signed statement is not trusted: ${error.message}`);
+      }
+    }
+
+    /** Compares the time of day that the records claim with the boundary's own clock. */
+    time(record, said, since) {
+      const [at, utc, error] = [said.at, said.utc, said.error].map(BigInt), claims = [this.claim, this.claimed(record)];
+      this.claim = null;
+      for (const claim of claims.filter(Boolean)) {
+        const from = claim.at > since ? claim.at : since, passed = at > from ? at - from : 0n;
+        const off = at + claim.ahead - utc, allowed = claim.error + (passed * DRIFT_US) / 1_000_000n + APART_US;
+        if (error >= UTC_UNKNOWN || (off < 0n ? -off : off) + error > allowed) {
+          throw new Flaw("boundary/clock", "the claimed time of day differs from the boundary's own clock", claim.record);
+        }
+      }
+    }
+
+    end(record) {
+      const { type } = record;
+      const recovers = type === "recover" || (type === "close" && this.recovered && record.ending === "recovered");
+      if (!recovers) {
+        this.unsigned(this.last && this.stated && !this.pending.length, "at the end of this epoch");
+        if (type === "close") {
+          check(this.last.final, "boundary/not-ended", "the boundary did not sign an end here: later records were removed");
+          this.complete();
+        }
+      }
+      if (type === "recover") [this.recovered, this.claim] = [true, null];
+      [this.stated, this.gapEnd] = [false, null];
+    }
+
+    /** What is shown of a log without a flaw, and what is not. */
+    claims() {
+      if (!this.keys.length) return [[], ["what the boundary itself decided and sent: the trust root has no key of duty `boundary` for this vehicle"]];
+      if (this.last === null) return [[], ["what the boundary itself decided and sent: the log ends before its statement"]];
+      const shown = [`session ${this.last.session} of the boundary signed for ${this.last.count - 1} decisions, documents and dispatches, which are the recorded ones in this order`];
+      const notShown = ["that the frames of the telemetry are those that the boundary passed, and what it attests of its own code"];
+      if (this.last.ahead) notShown.push(`whether any of the ${this.last.ahead} frames that the boundary signed ahead were sent: it cannot observe that`);
+      if (!this.last.final || this.lost !== null) notShown.push("what the boundary did after its last statement");
+      return [shown, notShown];
+    }
+  }
+
   // ------------------------------------------------------------------------------------------------ the walk
 
   /** Section 5, step 5: the clocks. Sums of two integers of 2^53 are exact as BigInt only. */
@@ -620,6 +962,9 @@ const { embedded, verifyLog, verifyRedacted, signerOf, signatureCounts } = (() =
     unsigned = 0; // lines that no key covered when a log was recovered
     recoveries = 0;
     discarded = 0;
+    contradicted = null; // by a witness
+    disputed = null; // by the boundary
+    anchored = 0;
 
     constructor(octets, pinned) {
       this.octets = octets;
@@ -639,11 +984,28 @@ const { embedded, verifyLog, verifyRedacted, signerOf, signatureCounts } = (() =
       this.clocks.take(record);
       if ("checkpoint" in record) await this.sign(record);
       else this.term.take(record, this.seq - this.first);
-      if (record.type === "genesis") this.basis = await trust(record, this.pinned);
+      if (record.type === "genesis") {
+        this.basis = await trust(record, this.pinned);
+        this.witnesses = new Witnesses(this.basis.root, record);
+        this.boundary = new Boundary(this.basis.root, record);
+      } else this.disputed ??= await this.flawOf(this.boundary.take(record));
+      this.contradicted ??= await this.flawOf(this.witnesses.take(record, this.checkpoint));
       this.seq += 1;
       this.offset += line.length;
       this.prev = hex(leaf);
       return true;
+    }
+
+    /** The flaw that a check ends with, or null. The log itself is read on: a flaw of its own comes first. */
+    async flawOf(checked) {
+      try {
+        await checked;
+        return null;
+      } catch (error) {
+        if (!(error instanceof Flaw)) throw error;
+        error.record ??= this.seq;
+        return error;
+      }
     }
 
     async sign(record) {
@@ -754,7 +1116,10 @@ const { embedded, verifyLog, verifyRedacted, signerOf, signatureCounts } = (() =
       `${span(0, seq)}: in the form of the format, in order, without a gap in the chain, with consistent clocks`,
       `${span(0, sealed)}: signed for, in ${walk.epochs} sealed ${walk.epochs === 1 ? "epoch" : "epochs"}`,
     ];
-    const notShown = [];
+    const [notShown, [signed, unsigned]] = [[], walk.boundary.claims()];
+    shown.push(...signed);
+    if (walk.anchored) shown.push(`${span(0, Math.min(walk.anchored, seq))}: seen by enough witnesses, outside of the vehicle`);
+    if (shortfall && close) notShown.push(shortfall.text);
     if (close) {
       const except = walk.recoveries ? `, except ${walk.unsigned} records that were unsigned when the log broke off, and the data after them` : "";
       shown.push(`the log is closed and signed: nobody without the log key, or the epoch keys of the time, changed, added or removed a record${except}`);
@@ -770,11 +1135,11 @@ const { embedded, verifyLog, verifyRedacted, signerOf, signatureCounts } = (() =
       notShown.push(`what happened in a gap of ${gap.us / 1_000_000} s before record ${gap.record}: nothing was recorded; ${by}`);
     }
     if (basis.root.development) notShown.push("development keys are stored unencrypted: anyone who can read them can sign anything");
-    if (basis.root.keys.some((key) => key.duty === "boundary")) {
-      notShown.push("that the records are those that the enforcement boundary signed: use `rtshcua verify-log --audit`");
+    notShown.push(...unsigned);
+    if (walk.anchored < seq) {
+      notShown.push(`${seq - walk.anchored} records are unanchored: a holder of the log key, or of later epoch keys, could have removed or rewritten them; this page reads the notes of witnesses in the log, and no files beside it`);
     }
     notShown.push(
-      "that witnesses saw these records: this page does not read anchors, so a holder of the log key could have removed or rewritten them",
       "that no key was revoked later: only newer trust roots tell",
       "that decisions follow from their recorded inputs, and commands from decisions: use `rtshcua verify-log --audit`",
       "that the recorded state is what the vehicle's sensors measured",
@@ -797,7 +1162,13 @@ const { embedded, verifyLog, verifyRedacted, signerOf, signatureCounts } = (() =
   const verifyLog = async (octets, pinned, progress = () => {}) => {
     const walk = new Walk(octets, pinned);
     try {
-      const shortfall = await walkThrough(walk, octets, progress);
+      const ended = await walkThrough(walk, octets, progress);
+      if (walk.contradicted) throw walk.contradicted;
+      walk.anchored = walk.witnesses.finish(walk.seq);
+      if (walk.disputed) throw walk.disputed;
+      const { lost } = walk.boundary;
+      const shortfall = ended ?? (lost === null ? null
+        : { record: lost, slug: "boundary/lost", text: "the runtime reports that the boundary was lost in flight; only the runtime vouches for the following records" });
       return { verdict: shortfall ? "incomplete" : "verified", records: walk.seq, failure: null, shortfall, ...claims(walk, shortfall) };
     } catch (error) {
       return failed(error, walk.seq);

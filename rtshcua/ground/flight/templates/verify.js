@@ -293,6 +293,7 @@ const { embedded, verifyLog, verifyRedacted, signerOf, signatureCounts } = (() =
     for (const key of root.keys) keys.push(await keyOf(key));
     const thresholds = fieldsOf(root.thresholds, COUNTED, ["witness"]);
     const witnesses = thresholds.witness ?? 1;
+    check(COUNTED.every((duty) => integral(thresholds[duty]) && thresholds[duty] >= 1), "malformed", "at least one signature is needed");
     check(COUNTED.every((duty) => thresholds[duty] === 1), "unsupported-threshold", "only one signature of a duty is supported");
     check(integral(witnesses) && witnesses >= 1, "malformed", "at least one witness is needed");
     check(witnesses === 1 || witnesses <= keys.filter((key) => key.duty === "witness").length,

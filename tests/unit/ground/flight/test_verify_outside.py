@@ -75,8 +75,19 @@ def _altered() -> Iterator[tuple[str, list[bytes]]]:
                 yield f"{number}: {name}", [*LINES[:number], forged, *LINES[number + 1 :]]
 
 
+def _stalled(number: int) -> list[bytes]:
+    """A gap of 30 s before a record, which the boundary's clock does not show."""
+    times = [{name: read(line)[name] + 30_000_000 for name in ("at_us", "utc_us")} for line in LINES[number:]]
+    silent = read(LINES[number])["at_us"] - read(LINES[number - 1])["at_us"] + 30_000_000
+    gap = read(LINES[number]) | times[0] | {"event": "stalled", "detail": f"{silent} us"}
+    later = [edit(line, **moved) for line, moved in zip(LINES[number:], times, strict=True)]
+    return [*LINES[:number], write(gap), *later]
+
+
 def _moved() -> Iterator[tuple[str, list[bytes]]]:
     for number in range(1, len(LINES) - 1):
+        if read(LINES[number]).get("event") == "boundary":
+            yield f"gap before {number}", _stalled(number)
         yield f"{number} removed", [*LINES[:number], *LINES[number + 1 :]]
         yield f"{number} twice", [*LINES[:number], LINES[number], *LINES[number:]]
         before, line = LINES[number - 1 : number + 1]

@@ -186,6 +186,21 @@ def _note(number: int, change: Any) -> list[bytes]:
     return _with(number, edit(flight()[number], checkpoint=change(read(flight()[number])["checkpoint"])))
 
 
+def _texts(number: int, change: Any) -> list[bytes]:
+    """The flight with another signed text in one record, signed by all keys."""
+    return resealed(flight(), seed_of, text=lambda n, text: change(text) if n == number else text)
+
+
+def _other_key(text: str) -> str:
+    key = text.split("\n")[4]
+    return text.replace(key, f"key {'A' * 43}=")
+
+
+def _swapped(text: str) -> str:
+    lines = text.splitlines(True)
+    return "".join([*lines[:4], lines[5], lines[4]])
+
+
 def forgeries() -> dict[str, tuple[list[bytes], bytes]]:
     """Forged logs by name, each with the pinned key."""
     lines = list(flight())
@@ -293,6 +308,16 @@ def forgeries() -> dict[str, tuple[list[bytes], bytes]]:
         "gap that is not there": signed(_with(8, edit(lines[8], event="stalled", detail="1 us"))),
         "genesis twice": signed([genesis, *lines]),
         "epoch": resealed(_with(7, edit(seal, epoch=9)), seed_of, keep=("epoch",)),
+        "records": resealed(_with(7, edit(seal, records=9)), seed_of, keep=("records",)),
+        "octets": resealed(_with(7, edit(seal, bytes=9)), seed_of, keep=("bytes",)),
+        "genesis after another log": resealed(_with(0, edit(genesis, _prev="11" * 32)), seed_of, relink=False),
+        "checkpoint of another key": _texts(7, lambda text: text.replace("\nkey ", f"\nkey {'A' * 43}=\nother ")),
+        "checkpoint names another key": _texts(7, _other_key),
+        "checkpoint without a key": _texts(7, lambda text: text.replace(text.split("\n")[4] + "\n", "")),
+        "checkpoint with a word": _texts(7, lambda text: text.replace("\nrecord ", "\nRecord ")),
+        "checkpoint with a line": _texts(7, lambda text: text + "more\n"),
+        "checkpoint with its lines swapped": _texts(7, _swapped),
+        "checkpoint with a short root": _texts(7, lambda text: text.replace(text.split("\n")[2], "AAAA")),
         "digest": resealed(_with(7, edit(seal, digest="00" * 32)), seed_of, keep=("digest",)),
     }  # fmt: skip
     found = {name: (lines, ROOT_KEY) for name, lines in made.items()}
@@ -309,6 +334,13 @@ def test_forgeries_fail_at_the_record_that_python_names(script: Script) -> None:
     assert len(made) > 90
     slugs = {slug for _, slug, _ in found.values()}
     assert len(slugs) > 30, sorted(slugs)
+
+
+def test_long_lines_are_refused(script: Script) -> None:
+    body = """const log = new Uint8Array(2 ** 26 + 1).fill(120);
+    log[log.length - 1] = given;
+    return (await tested.verifyLog(log, new Uint8Array(32))).failure.slug;"""
+    assert [script.call(body, last) for last in (10, 120)] == ["record/too-long"] * 2
 
 
 def test_rejected_vectors_fail(script: Script) -> None:

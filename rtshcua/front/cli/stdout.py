@@ -46,6 +46,13 @@ def out_source(text: str) -> None:
     print(text, end="")
 
 
+def out_bytes(data: bytes) -> None:
+    """Write a file to standard output, unchanged: its texts are escaped already, and no binary one is for a terminal."""
+    sys.stdout.flush()
+    sys.stdout.buffer.write(data)
+    sys.stdout.flush()
+
+
 class NewestLines:
     """A non-blocking output that keeps the newest lines if the reader is slow."""
 

@@ -93,6 +93,7 @@ COMMANDS = (
     Row("archive", "audit", "store many verified logs and query them", ends_in_order=True),
     Row("why", "audit", "explain a decision: what decided, and which values would pass"),
     Row("bench", "audit", "run the published evaluation on this computer", reports=True),
+    Row("export", "audit", "write a flight as KML, GPX, GeoJSON, CSV, plan, MCAP or tlog"),
     Row("show", "audit", "print the contents of a bundle, key, trust root or log"),
 )
 

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Final
 
+from rtshcua.app.flights.export import FORMATS as EXPORTS
 from rtshcua.app.lint.scope import FORMATS
 from rtshcua.diagnostics.codes import REGISTRY
 from rtshcua.front.cli.table import COMMANDS
@@ -32,6 +33,7 @@ FILES: Final[dict[str, Sequence[str]]] = {
     "log": _LOGS,
     "logs": _LOGS,
     "anchors": ("*.anchors",),
+    "export run": _LOGS,
     "why path": ("*.rts", "*.json", "*.bundle", "*.jsonl"),
 }
 
@@ -47,6 +49,8 @@ def words(command: str, parameter: str) -> tuple[str, ...]:
         return tuple(row.name for row in COMMANDS)
     if (command, parameter) == ("lint", "format"):
         return FORMATS
+    if (command, parameter) == ("export", "to"):
+        return EXPORTS
     if (command, parameter) == ("schema", "form"):
         return tuple(FORMS)
     return LEVELS if parameter == "fail_on" else ()

@@ -1,0 +1,248 @@
+"""The service `export`: a flight as a file for other programs."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from rtshcua import __version__
+from rtshcua.adapters.store.logs import lines
+from rtshcua.adapters.store.reading import open_regular
+from rtshcua.adapters.store.runs import LOG, TELEMETRY
+from rtshcua.app.documents import kind_of, no_log
+from rtshcua.app.flights.flight_reading import read_flight
+from rtshcua.app.logs import NO_LOG_HELP, is_log, log_of
+from rtshcua.app.pin import trusted
+from rtshcua.app.sidecar_files import run_folder
+from rtshcua.app.telling.records import Names
+from rtshcua.app.verify_log import VerifyRequest, verify_log
+from rtshcua.app.wording import many
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.kinds import BUNDLE, DOCUMENT, KEY, PROOF, SOURCE, SPECIFICATION
+from rtshcua.diagnostics.kinds import LOG as FLIGHT_LOG
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.diagnostics.suggest import listed, nearest
+from rtshcua.evidence.log_writer import BOUNDARY
+from rtshcua.evidence.reading import read
+from rtshcua.evidence.records import DecisionRecord, Effect, Genesis
+from rtshcua.evidence.report import LogVerdict
+from rtshcua.ground.flight.export.exported import FlightExport, ToldRecord, with_usable_track
+from rtshcua.ground.flight.flown import Flight
+from rtshcua.wire.request import STEP
+
+KML, GPX, GEOJSON, CSV, PLAN, MCAP, TLOG = FORMATS = ("kml", "gpx", "geojson", "csv", "plan", "mcap", "tlog")
+#: formats that no terminal shows
+BINARY: Final = frozenset({MCAP, TLOG})
+
+_EVIDENCE: Final = (SOURCE, SPECIFICATION, BUNDLE, DOCUMENT, KEY, PROOF, FLIGHT_LOG)
+_ONLY_PLAN: Final = f"of this run only the plan can be exported: `--to {PLAN}`"
+
+
+class ExportRequest(NamedTuple):
+    """A log or a run folder, the format, and the file that will be written (None: standard output)."""
+
+    run: Path
+    format: str
+    target: Path | None
+
+
+class LogStatus(NamedTuple):
+    """Whether the log verifies; `verdict` is None if nothing could be verified, and `text` says why."""
+
+    verdict: LogVerdict | None
+    text: str
+
+    @property
+    def verified(self) -> bool:
+        """Whether it verifies up to its signed close."""
+        return self.verdict is LogVerdict.VERIFIED
+
+
+class ExportedFile(NamedTuple):
+    """The content of the file, the number of its points (items of a plan, frames of a tlog), the datum of its heights,
+    the status of the log, and warnings.
+    """
+
+    data: bytes
+    points: int
+    datum: str
+    log: LogStatus
+    warnings: tuple[str, ...]
+
+
+class _Made(NamedTuple):
+    data: bytes
+    points: int
+    datum: str
+    warnings: tuple[str, ...] = ()
+
+
+def accepted(format: str) -> Refusal | None:
+    """The refusal of an unknown format."""
+    if format in FORMATS:
+        return None
+    near = nearest(format, FORMATS)
+    help = f"did you mean `{near}`?" if near else f"accepted: {listed(FORMATS)}"
+    return Refusal("usage", f"unknown format `{format}`", help)
+
+
+def name_for(run: Path, format: str) -> Path:
+    """The name of the file in the current folder: that of the run folder, or else of the log."""
+    log = log_of(run)
+    name = log.resolve().parent.name if log.name == LOG else log.stem
+    return Path(f"{name or 'flight'}.{format}")
+
+
+def export(request: ExportRequest) -> ExportedFile | Refusal:
+    """Make the file; it is not written here. Raises OSError."""
+    refused = accepted(request.format) or _unwritable(request.target, log_of(request.run))
+    if refused is not None:
+        return refused
+    log = log_of(request.run)
+    if not is_log(log):
+        return Refusal("input", *no_log(log, request.run, NO_LOG_HELP))
+    read_back = read_flight(log)
+    if isinstance(read_back, Refusal):
+        return read_back
+    flight, dropped = with_usable_track(read_back)
+    refused = _lacking(request, flight)
+    if refused is not None:
+        return refused
+    status = _status(log)
+    made_by = f"rtshcua {__version__}"
+    exported = FlightExport(flight, _told(log, flight), made_by, status.verified, status.text)
+    made = _made(request.format, exported, log)
+    if isinstance(made, Refusal):
+        return made
+    warnings = list(made.warnings)
+    if dropped and request.format not in (PLAN, TLOG):
+        warnings.append(f"left out {many(dropped, 'position')} with an impossible place or time")
+    damaged = None if flight.telemetry is None else flight.telemetry.damaged
+    if damaged is not None and request.format not in (PLAN, TLOG):
+        warnings.append(f"the telemetry is damaged from byte {damaged} on; what follows was not read")
+    return ExportedFile(made.data, made.points, made.datum, status, tuple(warnings))
+
+
+def _unwritable(target: Path | None, log: Path) -> Refusal | None:
+    if target is None:
+        return None
+    if target.is_dir():
+        return Refusal("output", f"`{target}` is a folder", "name a file with `-o`")
+    if not target.parent.is_dir():
+        return Refusal("output", f"there is no folder `{target.parent}` to write to", code=ExitCode.INPUT)
+    if not target.is_file():
+        return None
+    kind, folder = kind_of(target), run_folder(log)
+    if folder is not None and target.resolve().parent == folder.resolve():
+        return Refusal("output", f"`{target}` is a file of the run, and is not overwritten", "write it elsewhere")
+    if kind in _EVIDENCE or target.samefile(log):
+        name = "the log" if kind is None else kind.name
+        return Refusal("output", f"`{target}` is {name}, and is not overwritten by an export", "name another file")
+    return None
+
+
+def _lacking(request: ExportRequest, flight: Flight) -> Refusal | None:
+    """The refusal if the telemetry lacks what the format shows."""
+    if request.format == PLAN:
+        return None
+    if flight.telemetry is None:
+        return Refusal("no-telemetry", f"`{request.run}` has no telemetry", _ONLY_PLAN, ExitCode.INPUT)
+    if not flight.telemetry.track and request.format not in (MCAP, TLOG):
+        return Refusal("no-position", f"the telemetry of `{request.run}` has no position", _ONLY_PLAN, ExitCode.INPUT)
+    return None
+
+
+def _status(log: Path) -> LogStatus:
+    """Verify the log and the files beside it quickly, with the key store's root."""
+    pinned = trusted(None)
+    if isinstance(pinned, Refusal):
+        return LogStatus(None, "not verified: the key store has no root to verify it with")
+    report = verify_log(log, VerifyRequest(pinned.key, pinned.roots), lambda _: None).report
+    flaw = report.failure or report.shortfall
+    if report.verdict is LogVerdict.VERIFIED or flaw is None:
+        return LogStatus(LogVerdict.VERIFIED, f"verified with the key store's root {pinned.key.hex()}")
+    if report.verdict is LogVerdict.INCOMPLETE:
+        return LogStatus(LogVerdict.INCOMPLETE, f"not verified: it is incomplete: {flaw.text}")
+    return LogStatus(LogVerdict.FAILED, f"not verified: {flaw.slug} at record {flaw.record}: {flaw.text}")
+
+
+def _told(log: Path, flight: Flight) -> tuple[ToldRecord, ...]:
+    """The decisions and events in words; statements of the boundary are left out."""
+    with open_regular(log) as file:
+        first = read(next(lines(file), b""))
+    names = Names.of(first) if isinstance(first, Genesis) else Names(None)
+    told = []
+    for record in flight.records:
+        if isinstance(record, DecisionRecord) or (isinstance(record, Effect) and record.event != BOUNDARY):
+            told.append(_told_record(record, flight, names))
+        names.follow(record)
+    return tuple(told)
+
+
+def _told_record(record: DecisionRecord | Effect, flight: Flight, names: Names) -> ToldRecord:
+    words = " ".join(names.tell(record).removeprefix("· ").split())
+    t_us, step = flight.since_begun(record.at_us), record.step if record.kind >= STEP else -1
+    if isinstance(record, DecisionRecord):
+        return ToldRecord(t_us, True, record.outcome, record.reason, step, words)
+    return ToldRecord(t_us, False, record.event, "", step, words)
+
+
+def _made(format: str, exported: FlightExport, log: Path) -> _Made | Refusal:
+    """The content in a format."""
+    if format == PLAN:
+        return _plan(exported)
+    if format == MCAP:
+        return _mcap(exported)
+    if format == TLOG:
+        return _tlog(log)
+    make, datum = _text_format(format, exported)
+    return _Made(make(exported), len(exported.track), datum)
+
+
+def _text_format(format: str, exported: FlightExport) -> tuple[Callable[[FlightExport], bytes], str]:
+    """The function that makes a format, and its datum."""
+    from rtshcua.ground.flight.export import csv_table, geojson, gpx, kml
+    from rtshcua.ground.flight.export.exported import home_of
+
+    if format == KML:
+        return kml.kml, kml.datum(home_of(exported.flight))
+    if format == GPX:
+        return gpx.gpx, gpx.DATUM
+    return (geojson.geojson, geojson.DATUM) if format == GEOJSON else (csv_table.csv_table, csv_table.DATUM)
+
+
+def _plan(exported: FlightExport) -> _Made:
+    from rtshcua.adapters.vehicle.fence import fence_of
+    from rtshcua.adapters.vehicle.flavour import FenceHabits
+    from rtshcua.ground.flight.export import qgc_plan
+    from rtshcua.ground.flight.export.exported import home_of
+    from rtshcua.mavlink.enums import MAV_FRAME_GLOBAL
+
+    # the autopilot is not known: what each of them would make narrower than the policy is left out
+    fence = fence_of(exported.flight.policy, FenceHabits(MAV_FRAME_GLOBAL, all_inclusions=True, switches=()))
+    warnings = [f"the fence of the plan leaves out {each}" for each in fence.left_out]
+    if home_of(exported.flight).above_sea is None:
+        warnings.append("home's height above the sea is not known; the plan says 0 m")
+    data, items = qgc_plan.qgc_plan(exported, fence.items)
+    return _Made(data, items, qgc_plan.DATUM, tuple(warnings))
+
+
+def _mcap(exported: FlightExport) -> _Made | Refusal:
+    try:
+        from rtshcua.ground.flight.export import mcap_file
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] != "mcap":
+            raise
+        help = "run `pip install '.[export]'` in the checkout"
+        return Refusal("input", f"the package `{error.name}` is required and not installed", help)
+    return _Made(mcap_file.mcap_file(exported), len(exported.track), mcap_file.DATUM)
+
+
+def _tlog(log: Path) -> _Made | Refusal:
+    from rtshcua.ground.flight.export.whole_tlog import DATUM, whole_tlog
+
+    with open_regular(log.parent / TELEMETRY) as file:
+        whole = whole_tlog(file.read())
+    if not whole.frames:
+        return Refusal("no-telemetry", f"`{log.parent / TELEMETRY}` has no whole frame", _ONLY_PLAN, ExitCode.INPUT)
+    cut = f"the telemetry is damaged: cut after {many(whole.frames, 'frame')}; {many(whole.left_out, 'byte')} left out"
+    return _Made(whole.data, whole.frames, DATUM, (cut,) if whole.left_out else ())

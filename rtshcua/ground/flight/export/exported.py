@@ -1,0 +1,232 @@
+"""What an export says of a flight, and how its values are written: exactly, with units, and with each height's datum.
+
+Values are integers until they are written. A text that comes from outside (names, intents, texts of the vehicle) passes
+`shown` in every format: control, invisible and reordering characters become visible, as `<U+202E>`.
+"""
+
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from datetime import UTC, datetime, timedelta
+from itertools import pairwise
+from typing import Final, NamedTuple
+
+from rtshcua.diagnostics.excerpt import visible
+from rtshcua.ground.flight.flown import Flight, SignalSeries, TrackPoint
+from rtshcua.mavlink.dialect import DATUM
+from rtshcua.model.flat.signal import DRAIN, Signal
+from rtshcua.model.flat.zone import HALF_TURN
+from rtshcua.model.quantity import Datum, Dimension
+from rtshcua.model.step_number import number_of
+
+#: decimals of a value in 1e-7 degree, in mm or mm/s, in 1/100 degree, and in us
+DEGREES, METRES, HEADING, SECONDS = 7, 3, 2, 6
+#: from this gap on, two points of a track are not joined, us
+GAP_US: Final = 5_000_000
+#: the first UTC that MCAP cannot represent (2**64 ns, in the year 2554), us
+NO_TIME: Final = 2**64 // 1_000
+
+#: unit and decimals of the dimensions of signals; of an altitude the datum is written too
+_UNITS: Final = {
+    Dimension.LENGTH.value: ("m", 3),
+    Dimension.ALTITUDE.value: ("m", 3),
+    Dimension.SPEED.value: ("m_s", 3),
+    Dimension.DURATION.value: ("s", 6),
+    Dimension.ANGLE.value: ("deg", 7),
+    Dimension.RATIO.value: ("percent", 2),
+    Dimension.VOLTAGE.value: ("V", 3),
+    Dimension.COUNT.value: ("", 0),
+}
+
+
+class ToldRecord(NamedTuple):
+    """A decision or an event of the log in words. `name` is the outcome of a decision, or the slug of an event; `step`
+    is a step index, -1 for none.
+    """
+
+    t_us: int
+    is_decision: bool
+    name: str
+    reason: str
+    step: int
+    words: str
+
+    @property
+    def step_number(self) -> int | None:
+        """The number of the step, from 1; None for none."""
+        return number_of(self.step) if self.step >= 0 else None
+
+    @property
+    def label(self) -> str:
+        """The step and the name, in short."""
+        name = shown(self.name)
+        return name if self.step_number is None else f"step {self.step_number}: {name}"
+
+
+class FlightExport(NamedTuple):
+    """A flight that is exported, with the records of its log in words; what made the file; whether the log verifies,
+    and the same in words.
+    """
+
+    flight: Flight
+    told: tuple[ToldRecord, ...]
+    made_by: str
+    verified: bool
+    log_status: str
+
+    @property
+    def decisions(self) -> tuple[ToldRecord, ...]:
+        """The decisions among the records."""
+        return tuple(each for each in self.told if each.is_decision)
+
+    @property
+    def track(self) -> tuple[TrackPoint, ...]:
+        """The track of the telemetry; empty without telemetry."""
+        return () if self.flight.telemetry is None else self.flight.telemetry.track
+
+    @property
+    def title(self) -> str:
+        """The mission and the vehicle."""
+        return f"{shown(self.flight.mission.name)} of {shown(self.flight.genesis.vehicle)}"
+
+    def description(self, *more: str) -> tuple[str, ...]:
+        """What the file is made from, line by line; `more` is about its format."""
+        policy = self.flight.policy
+        return (
+            f"mission {self.title} under {shown(policy.name)}@{policy.version},"
+            f" begun {utc_text(self.flight.genesis.utc_us)}",
+            f"intent: {shown(self.flight.mission.intent)}",
+            *more,
+            f"log: {shown(self.log_status)}; an export is never a record, only the log is evidence",
+            f"made by {self.made_by}",
+        )
+
+
+class HomeHeight(NamedTuple):
+    """The place of home in 1e-7 degree, and its height above mean sea level in mm, None if it is not known. `reported`:
+    the vehicle said where its home is; otherwise it is the declared one.
+    """
+
+    latitude: int
+    longitude: int
+    above_sea: int | None
+    reported: bool
+
+
+def home_of(flight: Flight) -> HomeHeight:
+    """The vehicle's home (HOME_POSITION), or else the declared one, with the height that the track implies."""
+    telemetry, declared = flight.telemetry, flight.policy.projection
+    if telemetry is not None and telemetry.home is not None:
+        return HomeHeight(*telemetry.home, True)
+    track = () if telemetry is None else telemetry.track
+    above_sea = track[0].above_sea - track[0].above_home if track else None
+    return HomeHeight(declared.latitude, declared.longitude, above_sea, False)
+
+
+def with_usable_track(flight: Flight) -> tuple[Flight, int]:
+    """The flight without the points of its track that no format can hold, and their number: places that do not exist,
+    0 N 0 E, which autopilots report before they know where they are, and times outside of 1970 to 2554.
+    """
+    telemetry = flight.telemetry
+    if telemetry is None:
+        return flight, 0
+    kept = tuple(each for each in telemetry.track if _is_usable(each, flight.genesis.utc_us))
+    dropped = len(telemetry.track) - len(kept)
+    signals = tuple(
+        each._replace(points=tuple(one for one in each.points if 0 <= flight.utc_of(one[0]) < NO_TIME))
+        for each in telemetry.signals
+    )
+    texts = tuple(each for each in telemetry.texts if 0 <= flight.utc_of(each.t_us) < NO_TIME)
+    return flight._replace(telemetry=telemetry._replace(track=kept, signals=signals, texts=texts)), dropped
+
+
+def _is_usable(point: TrackPoint, begun_us: int) -> bool:
+    return (
+        abs(point.latitude) <= HALF_TURN // 2
+        and abs(point.longitude) <= HALF_TURN
+        and (point.latitude, point.longitude) != (0, 0)
+        and 0 <= begun_us + point.t_us < NO_TIME
+    )
+
+
+def segments(track: Sequence[TrackPoint]) -> Iterator[tuple[TrackPoint, ...]]:
+    """The parts of a track between gaps; what was flown in a gap is not known."""
+    begin = 0
+    for number, (one, other) in enumerate(pairwise(track), start=1):
+        if other.t_us - one.t_us > GAP_US:
+            yield tuple(track[begin:number])
+            begin = number
+    if begin < len(track):
+        yield tuple(track[begin:])
+
+
+class KnownPlace(NamedTuple):
+    """The reported place nearest in time, and how far its report is from the time in question, us."""
+
+    point: TrackPoint
+    off_us: int
+
+    @property
+    def remark(self) -> str:
+        """How old the place is, where that matters; else empty."""
+        if abs(self.off_us) <= 1_000_000:
+            return ""
+        when = "earlier" if self.off_us > 0 else "later"
+        return f"place reported {decimal(abs(self.off_us), SECONDS)[:-3]} s {when}"
+
+
+def place_at(track: Sequence[TrackPoint], t_us: int) -> KnownPlace | None:
+    """Where the vehicle was; None without a track."""
+    if not track:
+        return None
+    after = bisect_right(track, t_us, key=lambda each: each.t_us)
+    near = min(track[max(after - 1, 0) : after + 1], key=lambda each: abs(each.t_us - t_us))
+    return KnownPlace(near, t_us - near.t_us)
+
+
+def decimal(value: int, digits: int) -> str:
+    """`value / 10**digits`, exactly, with all decimals."""
+    if not digits:
+        return str(value)
+    whole, rest = divmod(abs(value), 10**digits)
+    return f"{'-' if value < 0 else ''}{whole}.{rest:0{digits}d}"
+
+
+def number(value: int, digits: int) -> float:
+    """`value / 10**digits` for JSON: the nearest double, which is written with these decimals."""
+    return value / int(10**digits)
+
+
+def utc_text(us: int, digits: int = SECONDS) -> str:
+    """A UTC time in us since the Unix epoch as ISO 8601 (xsd:dateTime), cut to so many decimals of a second."""
+    moment = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=us)
+    return f"{moment:%Y-%m-%dT%H:%M:%S}.{us % 1_000_000 // 10 ** (SECONDS - digits):0{digits}d}Z"
+
+
+def shown(text: str) -> str:
+    """A text from outside as one line that every format and reader can hold."""
+    return visible(text)
+
+
+class SignalUnit(NamedTuple):
+    """How the values of a signal are written: a suffix for its name, and decimals."""
+
+    suffix: str
+    digits: int
+
+    @property
+    def title(self) -> str:
+        """The suffix with its separator."""
+        return f"_{self.suffix}" if self.suffix else ""
+
+
+def unit_of(signal: Signal | SignalSeries, signals: Sequence[Signal]) -> SignalUnit:
+    """The unit of a signal of a policy, with the datum of an altitude (by its first message and field)."""
+    suffix, digits = _UNITS.get(signal.dimension, ("", 0))
+    if signal.name == DRAIN:
+        suffix = f"{suffix}_per_min"
+    if signal.dimension == Dimension.ALTITUDE.value:
+        declared = next((each for each in signals if each.name == signal.name), None)
+        source = None if declared is None or not declared.sources else declared.sources[0]
+        datum = None if source is None else DATUM.get((source.message, source.fields[0]))
+        suffix = f"above_{Datum.HOME.value if datum is None else datum.value}_m"
+    return SignalUnit(suffix, digits)

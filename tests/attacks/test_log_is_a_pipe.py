@@ -27,6 +27,7 @@ PATIENCE_S = 60
         ["show"],
         ["why"],
         ["prove", "--since", "0"],
+        ["export", "--to", "plan"],
         ["archive", "add", "--root", ROOT, "--archive", "ARCHIVE"],
     ],
 )

@@ -1,5 +1,6 @@
 """MAVSDK flies the simulated vehicle: its server is a process, and so is the program that asks it."""
 
+import json
 import re
 import shutil
 import subprocess
@@ -10,7 +11,10 @@ from pathlib import Path
 
 import pytest
 
+from reference.exported_flight import run_in
 from rtshcua.adapters.simulator import Simulator
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli import app
 
 pytest.importorskip("mavsdk_grpc.bin", reason="MAVSDK has no server for this platform")
 pytestmark = pytest.mark.clients
@@ -83,3 +87,26 @@ def test_mavsdk_program_flies_the_vehicle(flavour: str, port: int) -> None:
         out, _ = flight.communicate(timeout=PATIENCE_S)
     assert flight.returncode == 0, out
     assert out.splitlines() == STEPS
+
+
+def test_mavsdk_imports_an_exported_plan(port: int, tmp_path: Path) -> None:
+    """It reads the files of QGroundControl as that program does: what it would upload is what was planned."""
+    run, plan = run_in(tmp_path / "run"), tmp_path / "flight.plan"
+    assert app.main(["export", str(run), "--to", "plan", "-o", str(plan)]) == ExitCode.OK
+    program = Path(__file__).with_name("mavsdk_plan.py")
+    with (
+        server(["--flavour", "px4"], port) as there,
+        process(sys.executable, str(program), there, str(plan)) as loading,
+    ):
+        out, _ = loading.communicate(timeout=PATIENCE_S)
+    assert loading.returncode == 0, out
+    found, written = json.loads(out), json.loads(plan.read_text(encoding="utf-8"))
+    items = [
+        [each["frame"], each["command"], *each["params"][:4], *(round(1e7 * place) for place in each["params"][4:6])]
+        for each in written["mission"]["items"]
+    ]
+    assert [each[:8] for each in found["mission"]] == items
+    assert [each[8] for each in found["mission"]] == [each["params"][6] for each in written["mission"]["items"]]
+    fence = written["geoFence"]
+    assert len(found["fence"]) == len(fence["circles"]) + sum(len(each["polygon"]) for each in fence["polygons"])
+    assert found["rally"] == []

@@ -16,6 +16,7 @@ from rtshcua.app.sidecar_files import run_folder
 from rtshcua.app.telling.records import Names
 from rtshcua.app.verify_log import VerifyRequest, verify_log
 from rtshcua.app.wording import many
+from rtshcua.decision.prepare import prepare, prepare_mission
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.kinds import BUNDLE, DOCUMENT, KEY, PROOF, SOURCE, SPECIFICATION
 from rtshcua.diagnostics.kinds import LOG as FLIGHT_LOG
@@ -25,13 +26,10 @@ from rtshcua.evidence.log_writer import BOUNDARY
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import DecisionRecord, Effect, Genesis
 from rtshcua.evidence.report import LogVerdict
+from rtshcua.ground.flight.export import CSV, FORMATS, GEOJSON, GPX, KML, MCAP, PLAN, TLOG
 from rtshcua.ground.flight.export.exported import FlightExport, ToldRecord, with_usable_track
 from rtshcua.ground.flight.flown import Flight
 from rtshcua.wire.request import STEP
-
-KML, GPX, GEOJSON, CSV, PLAN, MCAP, TLOG = FORMATS = ("kml", "gpx", "geojson", "csv", "plan", "mcap", "tlog")
-#: formats that no terminal shows
-BINARY: Final = frozenset({MCAP, TLOG})
 
 _EVIDENCE: Final = (SOURCE, SPECIFICATION, BUNDLE, DOCUMENT, KEY, PROOF, FLIGHT_LOG)
 _ONLY_PLAN: Final = f"of this run only the plan can be exported: `--to {PLAN}`"
@@ -104,7 +102,7 @@ def export(request: ExportRequest) -> ExportedFile | Refusal:
     if isinstance(read_back, Refusal):
         return read_back
     flight, dropped = with_usable_track(read_back)
-    refused = _lacking(request, flight)
+    refused = _inconsistent(request, flight) or _lacking(request, flight)
     if refused is not None:
         return refused
     status = _status(log)
@@ -140,6 +138,15 @@ def _unwritable(target: Path | None, log: Path) -> Refusal | None:
     return None
 
 
+def _inconsistent(request: ExportRequest, flight: Flight) -> Refusal | None:
+    """The refusal of a mission that replacements, which nobody has verified, made inconsistent."""
+    prepared = prepare(flight.policy)
+    found = prepared if isinstance(prepared, Refusal) else prepare_mission(flight.mission, prepared)
+    if not isinstance(found, Refusal):
+        return None
+    return Refusal("malformed", f"the replaced mission in `{request.run}` is inconsistent: {found.text}")
+
+
 def _lacking(request: ExportRequest, flight: Flight) -> Refusal | None:
     """The refusal if the telemetry lacks what the format shows."""
     if request.format == PLAN:
@@ -159,7 +166,9 @@ def _status(log: Path) -> LogStatus:
     report = verify_log(log, VerifyRequest(pinned.key, pinned.roots), lambda _: None).report
     flaw = report.failure or report.shortfall
     if report.verdict is LogVerdict.VERIFIED or flaw is None:
-        return LogStatus(LogVerdict.VERIFIED, f"verified with the key store's root {pinned.key.hex()}")
+        signed = any(each.slug == "telemetry" for each in report.proven)
+        telemetry = "with the telemetry that it names" if signed else "which does not cover the telemetry"
+        return LogStatus(LogVerdict.VERIFIED, f"verified with the key store's root {pinned.key.hex()}, {telemetry}")
     if report.verdict is LogVerdict.INCOMPLETE:
         return LogStatus(LogVerdict.INCOMPLETE, f"not verified: it is incomplete: {flaw.text}")
     return LogStatus(LogVerdict.FAILED, f"not verified: {flaw.slug} at record {flaw.record}: {flaw.text}")
@@ -181,6 +190,8 @@ def _told(log: Path, flight: Flight) -> tuple[ToldRecord, ...]:
 def _told_record(record: DecisionRecord | Effect, flight: Flight, names: Names) -> ToldRecord:
     words = " ".join(names.tell(record).removeprefix("· ").split())
     t_us, step = flight.since_begun(record.at_us), record.step if record.kind >= STEP else -1
+    if t_us < 0:  # monotonic time restarts after a crash
+        t_us = record.utc_us - flight.genesis.utc_us
     if isinstance(record, DecisionRecord):
         return ToldRecord(t_us, True, record.outcome, record.reason, step, words)
     return ToldRecord(t_us, False, record.event, "", step, words)
@@ -207,7 +218,10 @@ def _text_format(format: str, exported: FlightExport) -> tuple[Callable[[FlightE
         return kml.kml, kml.datum(home_of(exported.flight))
     if format == GPX:
         return gpx.gpx, gpx.DATUM
-    return (geojson.geojson, geojson.DATUM) if format == GEOJSON else (csv_table.csv_table, csv_table.DATUM)
+    if format == GEOJSON:
+        return geojson.geojson, geojson.DATUM
+    assert format == CSV
+    return csv_table.csv_table, csv_table.DATUM
 
 
 def _plan(exported: FlightExport) -> _Made:

@@ -47,7 +47,7 @@ def out_source(text: str) -> None:
 
 
 def out_bytes(data: bytes) -> None:
-    """Write a file to standard output, unchanged: its texts are escaped already, and no binary one is for a terminal."""
+    """Write a file to standard output, unchanged; its texts are escaped already, and a terminal gets no binary one."""
     sys.stdout.flush()
     sys.stdout.buffer.write(data)
     sys.stdout.flush()

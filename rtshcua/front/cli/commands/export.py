@@ -9,12 +9,13 @@ import typer
 
 from rtshcua.adapters.store.writing import write_out
 from rtshcua.app.flights import export as service
-from rtshcua.app.flights.export import BINARY, FORMATS, ExportedFile, ExportRequest
+from rtshcua.app.flights.export import ExportedFile, ExportRequest
 from rtshcua.app.wording import many
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.faults import fail, refuse, say
 from rtshcua.front.cli.stdout import out, out_bytes, out_json
+from rtshcua.ground.flight.export import BINARY, FORMATS, PLAN, TLOG
 
 app = typer.Typer(add_completion=False)
 
@@ -62,7 +63,7 @@ def export(
     if as_json:
         out_json(json.dumps(_object(to, target, made), ensure_ascii=False))
     else:
-        points = many(made.points, "item" if to == service.PLAN else "frame" if to == service.TLOG else "point")
+        points = many(made.points, "item" if to == PLAN else "frame" if to == TLOG else "point")
         out(f"wrote `{target}`: {points}, {many(len(made.data), 'byte')}", f"  heights  {made.datum}")
     return ExitCode.OK
 

@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import Final, NamedTuple
 
 from rtshcua.diagnostics.excerpt import visible
-from rtshcua.ground.flight.flown import Flight, SignalSeries, TrackPoint
+from rtshcua.ground.flight.flown import Flight, GeoPlace, SignalSeries, TrackPoint
 from rtshcua.mavlink.dialect import DATUM
 from rtshcua.model.flat.signal import DRAIN, Signal
 from rtshcua.model.flat.zone import HALF_TURN
@@ -115,7 +115,7 @@ class HomeHeight(NamedTuple):
 def home_of(flight: Flight) -> HomeHeight:
     """The vehicle's home (HOME_POSITION), or else the declared one, with the height that the track implies."""
     telemetry, declared = flight.telemetry, flight.policy.projection
-    if telemetry is not None and telemetry.home is not None:
+    if telemetry is not None and telemetry.home is not None and _exists(telemetry.home):
         return HomeHeight(*telemetry.home, True)
     track = () if telemetry is None else telemetry.track
     above_sea = track[0].above_sea - track[0].above_home if track else None
@@ -140,12 +140,12 @@ def with_usable_track(flight: Flight) -> tuple[Flight, int]:
 
 
 def _is_usable(point: TrackPoint, begun_us: int) -> bool:
-    return (
-        abs(point.latitude) <= HALF_TURN // 2
-        and abs(point.longitude) <= HALF_TURN
-        and (point.latitude, point.longitude) != (0, 0)
-        and 0 <= begun_us + point.t_us < NO_TIME
-    )
+    return _exists(point) and 0 <= begun_us + point.t_us < NO_TIME
+
+
+def _exists(at: TrackPoint | GeoPlace) -> bool:
+    on_earth = abs(at.latitude) <= HALF_TURN // 2 and abs(at.longitude) <= HALF_TURN
+    return on_earth and (at.latitude, at.longitude) != (0, 0)
 
 
 def segments(track: Sequence[TrackPoint]) -> Iterator[tuple[TrackPoint, ...]]:

@@ -67,7 +67,7 @@ def datum(home: HomeHeight) -> str:
 
 
 def _describe(parent: Element, *lines: str) -> None:
-    add(parent, "description", "<br/>".join(escape(line) for line in lines if line))
+    add(parent, "description", "<br/>".join(escape(line, quote=False) for line in lines if line))
 
 
 def _folder(parent: Element, name: str) -> Element:

@@ -9,7 +9,7 @@ from itertools import pairwise
 from math import cos, isqrt, pi, sin
 from typing import Any, Final, NamedTuple
 
-from shapely import Polygon, box
+from shapely import Polygon, box, get_parts, make_valid
 from shapely.geometry.polygon import orient
 
 from rtshcua.ground.flight.flown import Flight
@@ -76,10 +76,10 @@ def _areas(zone: Zone, projection: Projection) -> Iterator[Area]:
     rings = [
         tuple(_unrolled(projection, x, y) for x, y in zip(ring[::2], ring[1::2], strict=True)) for ring in _rings(zone)
     ]
-    outers = [Polygon(ring) for ring in rings if _is_outer(ring)]
-    for outer in outers:
-        holes = [ring for ring in rings if not _is_outer(ring) and outer.contains(Polygon(ring))]
-        yield from cut_area(Polygon(outer.exterior, holes))
+    for ring in filter(_is_outer, rings):
+        outer = make_valid(Polygon(ring))  # rounding to 1e-7 degree, and the poles, can make a ring touch itself
+        holes = [hole for hole in rings if not _is_outer(hole) and outer.contains(Polygon(hole).representative_point())]
+        yield from cut_area(make_valid(Polygon(ring, holes)))
 
 
 def _rings(zone: Zone) -> Iterator[Sequence[int]]:
@@ -102,13 +102,13 @@ def _is_outer(ring: Ring) -> bool:
 
 
 def _unrolled(projection: Projection, x: int, y: int) -> Place:
-    """A local place; its longitude may be beyond 180 degrees, so that no ring breaks."""
+    """A local place; its longitude may be beyond 180 degrees, so that no ring breaks. No zone reaches over a pole."""
     latitude, longitude = unproject(projection, x, y)
-    return meridian(longitude, projection.longitude), latitude
+    return meridian(longitude, projection.longitude), max(-HALF_TURN // 2, min(latitude, HALF_TURN // 2))
 
 
 def cut_area(whole: Any) -> Iterator[Area]:
-    """A polygon of shapely, whose longitudes may be beyond 180 degrees, as areas that are not."""
+    """Polygons of shapely, whose longitudes may be beyond 180 degrees, as areas that are not."""
     west, _, east, _ = whole.bounds
     for turn in range(-1, 2):
         left = turn * TURN - HALF_TURN
@@ -116,7 +116,7 @@ def cut_area(whole: Any) -> Iterator[Area]:
             continue
         whole_turn = left <= west and east <= left + TURN
         part = whole if whole_turn else whole.intersection(box(left, -HALF_TURN, left + TURN, HALF_TURN))
-        for each in getattr(part, "geoms", (part,)):
+        for each in get_parts(get_parts(part)):
             if each.geom_type == "Polygon" and each.area > 0:
                 oriented = orient(each)
                 yield Area(

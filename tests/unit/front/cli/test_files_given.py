@@ -19,6 +19,7 @@ LINES = flight()
 READERS = (
     ("verify-log", *ROOT), ("verify-log", *ROOT, "--fast"), ("verify-log", *ROOT, "--audit"),
     ("verify-log", *ROOT, "--explain", "0"), ("show",), ("why",), ("prove", "0"), ("recover", "--dry-run"),
+    ("export", "--to", "plan", "-o", "flight.plan"),
 )  # fmt: skip
 
 

@@ -3,11 +3,11 @@
 from collections.abc import Sequence
 from typing import Final
 
-from rtshcua.app.flights.export import FORMATS as EXPORTS
 from rtshcua.app.lint.scope import FORMATS
 from rtshcua.diagnostics.codes import REGISTRY
 from rtshcua.front.cli.table import COMMANDS
 from rtshcua.ground.agent.tool_forms import FORMS
+from rtshcua.ground.flight.export import FORMATS as EXPORTS
 from rtshcua.ground.project.project_settings import LEVELS
 
 _SOURCES, _BUNDLE, _LOGS, _ROOTS = ("*.rts",), ("*.bundle",), ("*.jsonl",), ("*.trust",)

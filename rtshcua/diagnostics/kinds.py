@@ -44,8 +44,8 @@ HTML: Final = FileKind("a web page", "")
 MARKDOWN: Final = FileKind("a Markdown document", "")
 SCRIPT: Final = FileKind("a script", "")
 EMPTY: Final = FileKind("an empty file", "it was not written completely: create or copy it again")
-ULOG: Final = FileKind("a PX4 log (ULog)", "give the `log.jsonl` of a run, or the run's folder")
-DATAFLASH: Final = FileKind("an ArduPilot log (DataFlash)", "give the `log.jsonl` of a run, or the run's folder")
+ULOG: Final = FileKind("a PX4 log (ULog)", "`rtshcua bind RUN FILE` binds it to the log of a run")
+DATAFLASH: Final = FileKind("an ArduPilot log (DataFlash)", "`rtshcua bind RUN FILE` binds it to the log of a run")
 
 _GEOMETRIES = "Point|MultiPoint|LineString|MultiLineString|Polygon|MultiPolygon|GeometryCollection"
 _BEGINS: Final = (

@@ -37,6 +37,7 @@ RECALL: Final = Artefact("rtshcua/recall", 2, items=FEW)  # 2: names the flight
 REPLACEMENT: Final = Artefact("rtshcua/replacement", 2)  # 2: names the flight
 CANCELLATION: Final = Artefact("rtshcua/cancellation", 1, items=FEW)
 QUALIFICATION: Final = Artefact("rtshcua/qualification", 1, items=MANY)
+AUTOPILOT_BINDING: Final = Artefact("rtshcua/autopilot-binding", 1, items=1 << 12)
 RECEIPT: Final = Artefact("rtshcua/receipt", 2, items=FEW)  # 2: with the boundary's digest
 STATEMENT: Final = Artefact("rtshcua/statement", 2, items=FEW)
 LOG: Final = Artefact("rtshcua/log", 4, "")  # JSON lines (RFC 8785), without a registered suffix; 4: `received_us`

@@ -88,6 +88,7 @@ COMMANDS = (
         "verify integrity, signatures and decisions of a log",
         ends_in_order=True,
     ),
+    Row("bind", "audit", "bind the autopilot's own log of a flight to the evidence log"),
     Row("prove", "audit", "write a small proof of one record of a log, or of its consistency"),
     Row("verify-proof", "audit", "verify such a proof without the log"),
     Row("archive", "audit", "store many verified logs and query them", ends_in_order=True),

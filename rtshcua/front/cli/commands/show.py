@@ -14,6 +14,7 @@ from rtshcua.app.documents import kind_of
 from rtshcua.app.logs import CUT_AT_FIRST
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.faults import distrust, fail
+from rtshcua.front.cli.render.showing.autopilot_binding import is_autopilot_binding, show_autopilot_binding
 from rtshcua.front.cli.render.showing.bundle import show_bundle
 from rtshcua.front.cli.render.showing.document import kind_of_document, show_document
 from rtshcua.front.cli.render.showing.keys import KEY_FILE, show_key, show_root
@@ -84,4 +85,6 @@ def _show(page: TextPage, path: Path) -> dict[str, object] | None:
         return show_root(page, data, now_us)
     if head.startswith(_ENVELOPE) and is_qualification(data):
         return show_qualification(page, data)
+    if head.startswith(_ENVELOPE) and is_autopilot_binding(data):
+        return show_autopilot_binding(page, data)
     return show_document(page, data) if kind_of_document(data) is not None else None

@@ -16,6 +16,7 @@ _SOURCES, _BUNDLE, _LOGS, _ROOTS = ("*.rts",), ("*.bundle",), ("*.jsonl",), ("*.
 FILES: Final[dict[str, Sequence[str]]] = {
     "paths": _SOURCES,
     "with_": _SOURCES,
+    "bind file": ("*.ulg", "*.bin", "*.BIN"),
     "check paths": ("*.rts", "*.json"),
     "check map_": ("*.html",),
     "picture": ("*.svg",),

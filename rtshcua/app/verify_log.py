@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rtshcua.adapters.store.verification import Progress, VerificationInputs, verify_carefully, verify_quickly
-from rtshcua.app.flights.binding import roots_of, with_bindings
+from rtshcua.app.flights.binding import roots_of, with_bindings, with_unread_bindings
 from rtshcua.app.fly.simulated_flight import with_simulated
 from rtshcua.app.sidecar_files import RawFrames, anchors_beside, bundle_beside, raw_frames, with_summary, with_unread
 from rtshcua.evidence.finding import Claim, Finding
@@ -45,8 +45,10 @@ def verify_log(path: Path, request: VerifyRequest, progress: Progress) -> Audit:
         report = raw.unread(report) if request.fast else raw.judged(report, followed=followed)
     report = with_summary(_required(report) if request.anchored else report, path)
     report = unconfirmed.told(with_unread(with_simulated(report, path), path))
-    if audit.basis is not None:
-        report = with_bindings(report, path, roots_of(audit.basis.root, request.roots), fast=request.fast)
+    if request.fast:
+        report = with_unread_bindings(report, path)
+    elif audit.basis is not None:
+        report = with_bindings(report, path, roots_of(audit.basis.root, request.roots))
     return audit._replace(report=report)
 
 

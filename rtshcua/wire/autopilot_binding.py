@@ -43,7 +43,7 @@ class BoundDeviation(Flat, frozen=True):
 
 class AutopilotBinding(Flat, frozen=True):
     """A binding. The evidence log is named by its `flight` (`boot` of its genesis), the leaf of its first line, the
-    number of its records and the root of their tree; the autopilot's log by its SHA-256 and size. `file` is only a name.
+    number of its records and the root of their tree; the autopilot's log by its SHA-256 and size. `file` is a name.
 
     `source` is the message of its track, `clock` the origin of the offset between the two clocks: a time since the
     evidence log's first record is `offset_us` and the time since the autopilot's boot. `utc_apart_us` is how far the

@@ -14,10 +14,10 @@ import msgspec
 
 from rtshcua.adapters.autopilot_log.reports import NO_LIBRARY, UNREADABLE, ReadFailed, ReadLog, ReadSoFar, Report
 
-#: memory beside the file itself, in octets: pyulog and numpy need 200 MB to start, the track of an hour 100 MB
-_MEMORY = 3 << 30
-#: seconds of computing: pyulog reads 10 MB a second
-_SECONDS, _OCTETS_A_SECOND = 60, 1 << 20
+#: memory besides the file itself, in octets: libraries need 400 MB of addresses, the track of an hour 200 MB at most
+_MEMORY = 2 << 30
+#: seconds of computing; pyulog reads some 10 MB a second
+_SECONDS, _OCTETS_A_SECOND = 20, 1 << 20
 
 
 def main(kind: str, descriptor: int) -> None:
@@ -46,6 +46,8 @@ def _read(kind: str, size: int, progress: Callable[[int], None]) -> ReadLog | Re
         return found
     except ImportError as error:
         return ReadFailed(NO_LIBRARY, error.name or "")
+    except MemoryError:
+        return ReadFailed(UNREADABLE, "reading it takes too much memory")
     except Exception as error:  # noqa: BLE001  whatever a library raises, the file is at fault
         return ReadFailed(UNREADABLE, f"{type(error).__name__}: {error}"[:200])
 

@@ -106,7 +106,12 @@ def _reported(file: BinaryIO, kind: AutopilotLogKind, progress: Callable[[int], 
     try:
         command = [sys.executable, "-P", "-m", _MODULE, kind.value, str(its)]
         process = subprocess.Popen(
-            command, stdin=file, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, pass_fds=(its,)
+            command,
+            stdin=file,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            pass_fds=(its,),
+            env=os.environ | {"OPENBLAS_NUM_THREADS": "1"},
         )
     except BaseException:
         os.close(ours)

@@ -46,7 +46,7 @@ class CountedFile:
         data = self._file.read(count)
         self._left -= max(len(data), 1)
         if self._left < 0:
-            raise TooDamaged
+            raise TooDamaged("it is damaged in too many places")
         self.cut = len(data) < count and not (count == _HEADER and not data)
         if (at := self._file.tell()) - self._told >= _STEP:
             self._told = at

@@ -94,7 +94,7 @@ def _compared(log: Path, read: ReadFile) -> tuple[BootClock, TrackAgreement] | R
         return Refusal("no-telemetry", text, "name the folder of the run", ExitCode.INPUT)
     times = boot_times(flight, flight.telemetry, read.log)
     if isinstance(times, Refusal):
-        return times._replace(code=ExitCode.REFUSED)
+        return times._replace(code=ExitCode.INPUT)
     track = flight.telemetry.track
     return times.clock, agreement(track, times.boot_us, read.log.track, flight.policy.projection)
 

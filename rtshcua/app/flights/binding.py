@@ -97,20 +97,29 @@ def roots_of(log_root: TrustRoot | None, signed: Sequence[bytes]) -> list[TrustR
     return [*([] if log_root is None else [log_root]), *sorted(others, key=lambda root: -root.version)]
 
 
-def with_bindings(report: LogReport, log: Path, roots: Sequence[TrustRoot], *, fast: bool) -> LogReport:
+def with_bindings(report: LogReport, log: Path, roots: Sequence[TrustRoot]) -> LogReport:
     """Add to the report of a log without failure what the bindings beside it show. They never change the verdict."""
     if report.failure is not None or report.genesis is None:
         return report
     shown, not_shown = list[Claim](), list[Claim]()
     for found in read_bindings(log.parent):
-        claims = _claims(found, report, log, roots, fast=fast)
+        claims = _claims(found, report, log, roots)
         shown += claims[0]
         not_shown += claims[1]
     return report._replace(proven=(*report.proven, *shown), unproven=(*report.unproven, *not_shown))
 
 
+def with_unread_bindings(report: LogReport, log: Path) -> LogReport:
+    """Add to the report of a log without failure that the bindings beside it were not compared with it."""
+    names = [] if report.failure is not None else [f"`{each.path.name}`" for each in read_bindings(log.parent)]
+    if not names:
+        return report
+    text = f"the autopilot's log by {', '.join(names)}: it was not compared: without `--fast`"
+    return report._replace(unproven=(*report.unproven, Claim("autopilot/unread", text)))
+
+
 def _claims(
-    found: FoundBinding, report: LogReport, log: Path, roots: Sequence[TrustRoot], *, fast: bool
+    found: FoundBinding, report: LogReport, log: Path, roots: Sequence[TrustRoot]
 ) -> tuple[list[Claim], list[Claim]]:
     """What a binding shows of a log, and what it does not show."""
     assert report.genesis is not None
@@ -127,14 +136,12 @@ def _claims(
     kid = cose.unverified(found.document, limit=MAX_AUTOPILOT_BINDING).kid.hex()
     text = f"log key {kid} binds `{binding.file}`, {described(binding)}, to this log: {agreed(binding)}"
     doubts = [] if binding.agreed == binding.points else [Claim("autopilot/apart", apart(binding))]
-    return [Claim("autopilot", text)], [*doubts, *_file(binding, found.path.parent, fast=fast)]
+    return [Claim("autopilot", text)], [*doubts, *_file(binding, found.path.parent)]
 
 
-def _file(binding: AutopilotBinding, folder: Path, *, fast: bool) -> list[Claim]:
+def _file(binding: AutopilotBinding, folder: Path) -> list[Claim]:
     """What is not shown because the autopilot's log is not there, or was changed."""
     whose = f"the contents of `{binding.file}`, the autopilot's log"
-    if fast:
-        return [Claim("autopilot/unread", f"{whose}: it was not read: without `--fast`")]
     try:
         with open_regular(folder / binding.file, folder) as file:
             same = file_digest(file, "sha256").digest() == binding.digest

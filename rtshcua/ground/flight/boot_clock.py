@@ -3,6 +3,9 @@
 `GLOBAL_POSITION_INT.time_boot_ms` is the clock of the autopilot's own log (PX4: hrt_absolute_time; ArduPilot:
 AP_HAL::micros64). A report comes later than it was made, so the offset is the least difference between the time of
 receipt and the time in the report. A constant delay of the link cannot be told from the offset.
+
+`time_boot_ms` has 32 bits: it begins again after 49.7 days, and the clock of PX4 in simulation can begin in 1970. So of
+the times that it can mean, the one nearest to the log counts.
 """
 
 from enum import StrEnum
@@ -17,6 +20,9 @@ from rtshcua.model.flat.situation import UTC_UNKNOWN_US
 _AGAIN_US: Final = 1_000_000
 #: two clocks of one boot do not differ by more, beyond their errors, us: a receiver's UTC may lack a leap second
 _SLACK_US: Final = 2_000_000
+
+#: `time_boot_ms` begins again after this time, us
+_TURN_US: Final = (1 << 32) * 1_000
 
 OTHER_BOOT: Final = "other-boot"
 
@@ -69,26 +75,30 @@ _HELP: Final = "give the autopilot's log of this flight"
 
 def _by_telemetry(flight: Flight, telemetry: FlightTelemetry, log: AutopilotLog) -> BootTimes | Refusal:
     first, last = log.track[0].boot_us, log.track[-1].boot_us
-    boots = _boots(telemetry.boot_us)
-    within = [sum(first <= boot <= last for _, boot in telemetry.boot_us[begin:end]) for begin, end in boots]
+    near = (first + last) // 2
+    pairs = [
+        (t_us, near + (boot - near + _TURN_US // 2) % _TURN_US - _TURN_US // 2) for t_us, boot in telemetry.boot_us
+    ]
+    boots = _boots(pairs)
+    within = [sum(first <= boot <= last for _, boot in pairs[begin:end]) for begin, end in boots]
     most = max(within)
     if not most:
-        lowest, highest = (f(boot for _, boot in telemetry.boot_us) for f in (min, max))
+        lowest, highest = (f(boot for _, boot in pairs) for f in (min, max))
         text = (
             f"the autopilot's log is of another boot: it has {_seconds(first)} to {_seconds(last)} after its boot, the "
             f"flight {_seconds(lowest)} to {_seconds(highest)}"
         )
         return Refusal(OTHER_BOOT, text, _HELP)
     begin, end = boots[within.index(most)]
-    delays = sorted(t_us - boot for t_us, boot in telemetry.boot_us[begin:end])
+    delays = sorted(t_us - boot for t_us, boot in pairs[begin:end])
     offset_us = delays[0]
     apart = None if log.utc_of_boot is None else log.utc_of_boot.utc_us - offset_us - flight.genesis.utc_us
     clock = BootClock(ClockSource.TELEMETRY, offset_us, nearest_rank(delays, 95) - offset_us, apart)
-    times = (boot if begin <= number < end else None for number, (_, boot) in enumerate(telemetry.boot_us))
+    times = (boot if begin <= number < end else None for number, (_, boot) in enumerate(pairs))
     return BootTimes(clock, tuple(times))
 
 
-def _boots(pairs: tuple[tuple[int, int], ...]) -> list[tuple[int, int]]:
+def _boots(pairs: list[tuple[int, int]]) -> list[tuple[int, int]]:
     """The first and the end of the pairs of each boot."""
     begins = [0]
     begins += [number for number in range(1, len(pairs)) if pairs[number][1] < pairs[number - 1][1] - _AGAIN_US]

@@ -5,7 +5,7 @@ from rtshcua.wire import names
 
 def test_names_and_content_types_are_unique():
     table = [value for value in vars(names).values() if isinstance(value, names.Artefact)]
-    assert len({artefact.name for artefact in table}) == len(table) == 18
+    assert len({artefact.name for artefact in table}) == len(table) == 19
     assert len({artefact.content_type for artefact in table}) == len(table)
 
 

@@ -42,7 +42,7 @@ def bind(
 
     Compares the autopilot's track with the one in the telemetry, at the same times since the autopilot's boot, and
     writes a signed document beside the log: the digests of both logs, the offset of their clocks, and where they agree
-    within 1 m and 100 ms. `rtshcua verify-log` verifies it. A log of another boot is refused (exit code 5).
+    within 1 m and 100 ms. `rtshcua verify-log` verifies it. A log of another boot is refused.
     """
     pinned = trusted(root)
     if isinstance(pinned, Refusal):

@@ -22,9 +22,16 @@ _PAGE: Final = 528
 _FIRST: Final = b"\xa3"  # the first octet of a message
 
 
+class _Reader(DFReader_binary):  # type: ignore[misc]
+    """The reader without its search for a time of day, which reads a log without GPS whole."""
+
+    def init_clock(self) -> None:
+        """Do without: each message has its `TimeUS`."""
+
+
 def read_log(path: str, size: int, progress: Callable[[int], None]) -> ReadLog | ReadFailed:
     """Read a log, as far as it can be read. Raises what pymavlink raises for a damaged file."""
-    log = DFReader_binary(path, progress_callback=lambda percent: progress(size * percent // 100))
+    log = _Reader(path, progress_callback=lambda percent: progress(size * percent // 100))
     end = _end(log)
     unread = size - end
     skipped = end - sum(count * log.formats[number].len for number, count in enumerate(log.counts) if count)

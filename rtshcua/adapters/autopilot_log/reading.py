@@ -60,6 +60,7 @@ def read_autopilot_log(
         file.seek(0)
         digest = file_digest(file, "sha256").digest()
         found = _read(path, file, kind, lambda done: progress(done, before.st_size))
+        progress(before.st_size, before.st_size)
         after = os.fstat(file.fileno())
     if (before.st_size, before.st_mtime_ns) != (after.st_size, after.st_mtime_ns):
         return Refusal("changed", f"`{path}` was changed while it was read", "try again after it was copied")

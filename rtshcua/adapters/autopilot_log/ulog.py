@@ -7,13 +7,13 @@ in degrees and m; the topics `vehicle_gnss` and `sensor_gnss` of 2026 have `lati
 """
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, BinaryIO, Final
 
 import numpy
 from pyulog import ULog
 
 from rtshcua.adapters.autopilot_log.reports import NO_TRACK, ReadFailed, ReadLog
+from rtshcua.adapters.store.reading import open_regular
 
 _POSITION: Final = "vehicle_global_position"
 _RECEIVERS: Final = ("vehicle_gps_position", "vehicle_gnss", "sensor_gps", "sensor_gnss")
@@ -71,7 +71,7 @@ _HEADER: Final = 3  # octets of a message's header
 
 def read_log(path: str, size: int, progress: Callable[[int], None]) -> ReadLog | ReadFailed:
     """Read a log, as far as it can be read. Raises `TooDamaged`, and what pyulog raises for a damaged file."""
-    with Path(path).open("rb") as file:
+    with open_regular(path) as file:
         return _read(CountedFile(file, size, progress))
 
 

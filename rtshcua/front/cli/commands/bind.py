@@ -1,9 +1,6 @@
 """`rtshcua bind`: bind the autopilot's own log of a flight to the evidence log."""
 
 import json
-import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -17,6 +14,7 @@ from rtshcua.app.pin import trusted
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.faults import refuse
+from rtshcua.front.cli.render.progress import counting
 from rtshcua.front.cli.render.showing.autopilot_binding import bound_rows
 from rtshcua.front.cli.render.showing.page import for_terminal, named
 from rtshcua.front.cli.stdout import out_json, out_rendered
@@ -25,7 +23,7 @@ from rtshcua.wire.keys import Duty, SigningKey
 
 app = typer.Typer(add_completion=False)
 
-_LONG = 8 << 20  # size from which a progress bar is shown, bytes
+_LONG = 8 << 20  # size from which progress is shown, bytes
 
 
 @app.command()
@@ -51,8 +49,13 @@ def bind(
     def sign() -> SigningKey:
         return unlock(KeyStore(data_folder()), Duty.LOG, path=log_key, passphrase_file=passphrase_file)
 
-    with _progress() as told:
-        bound = service(BindRequest(run, file, pinned, sign), told)
+    say = counting(quiet=False)
+
+    def told(done: int, size: int) -> None:
+        if size >= _LONG:
+            say(f"reading {100 * done // size} %" if done < size else "")
+
+    bound = service(BindRequest(run, file, pinned, sign), told)
     if isinstance(bound, Refusal):
         return refuse(bound)
     if as_json:
@@ -64,17 +67,3 @@ def bind(
     bound_rows(page, bound.binding)
     out_rendered(str(page))
     return ExitCode.OK
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[int, int], None]]:
-    """Yield a progress callback; it drives a bar on the terminal if the file is large."""
-    if sys.stderr is None or not sys.stderr.isatty():
-        yield lambda _done, _all: None
-        return
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("reading", total=None, visible=False)
-        yield lambda done, size: bar.update(task, completed=done, total=size, visible=size >= _LONG)

@@ -55,6 +55,8 @@ MISSING: dict[str, str | None] = {
     "recover": "none", "witness": "none",
     "verify-log": "none", "prove": "none 1", "verify-proof": "none", "archive": "add none", "why": "none",
     "bench": "paper --campaign none", "show": "none", "export": "none --to csv",
+    "verify-log": "none", "bind": "none none.ulg", "prove": "none 1", "verify-proof": "none", "archive": "add none", "why": "none",
+    "bench": "paper --campaign none", "show": "none",
 }  # fmt: skip
 
 

@@ -10,12 +10,14 @@ from msgspec.structs import replace
 from reference.bound_run import ROOT, bind_words, run_folder, with_log
 from reference.forgery import LOG_KEY
 from rtshcua.adapters.store.writing import write_new
-from rtshcua.app.flights.binding import read_bindings
+from rtshcua.app.flights.binding import read_bindings, trusted_binding
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
 from rtshcua.wire.autopilot_binding import AutopilotBinding, sign_autopilot_binding
 from rtshcua.wire.key_file import dump_signing_key
 from rtshcua.wire.keys import Duty, SigningKey
+from rtshcua.wire.untrusted import Untrusted
+from virtual import case
 
 STRANGER = SigningKey.from_seed(b"\x77" * 32, duty=Duty.LOG, development=True)
 
@@ -108,6 +110,16 @@ def test_key_of_a_stranger_binds_nothing(run: Path, tmp_path: Path, capsys: pyte
     assert app.main(bind_words(run, run / binding.file)) == ExitCode.UNTRUSTED
     assert "the key cannot sign for this log" in capsys.readouterr().err
     assert not list(run.glob("*.binding"))
+
+
+def test_revoked_key_binds_nothing(run: Path) -> None:
+    path, binding = content(run)
+    root = case.root()[0]
+    newer = replace(root, version=2, keys=(), revoked=(LOG_KEY.kid,))
+    assert trusted_binding(path.read_bytes(), [root], binding.vehicle) == binding
+    with pytest.raises(Untrusted) as refused:
+        trusted_binding(path.read_bytes(), [root, newer], binding.vehicle)
+    assert refused.value.slug == "revoked-key"
 
 
 def test_control_characters_of_a_file_name_reach_no_terminal(run: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -176,7 +176,7 @@ def apart(binding: AutopilotBinding) -> str:
     worst = sorted(binding.deviations, key=lambda each: -max(each.horizontal, each.vertical))[:_SHOWN]
     rest = len(binding.deviations) + binding.others - len(worst)
     told = [
-        f"{_s(each.from_us)} to {_s(each.to_us)} s by {_away(each.horizontal, each.vertical)}"
+        f"{_times(each.from_us, each.to_us)} by {_away(each.horizontal, each.vertical)}"
         for each in sorted(worst, key=lambda each: each.from_us)
     ]
     if told:
@@ -191,6 +191,12 @@ def _away(horizontal: int, vertical: int) -> str:
 def _percent(part: int, whole: int) -> str:
     tenths = 1_000 * part // whole if whole else 0
     return f"{tenths // 10}.{tenths % 10} %" if tenths % 10 else f"{tenths // 10} %"
+
+
+def _times(from_us: int, to_us: int) -> str:
+    """A time of the flight: `180.4 to 182.9 s`, or one moment."""
+    first, last = _s(from_us), _s(to_us)
+    return f"{first} s" if first == last else f"{first} to {last} s"
 
 
 def _s(us: int) -> str:

@@ -27,7 +27,7 @@ def show_autopilot_binding(page: TextPage, data: bytes) -> dict[str, object]:
 
 def bound_rows(page: TextPage, binding: AutopilotBinding) -> None:
     """Add what is bound, and how far it agrees."""
-    page.row("file", f"{binding.file}, {described(binding)} of {binding.size} bytes")
+    page.row("file", f"{binding.file}: {binding.size} bytes, {described(binding)}")
     page.row("SHA-256", binding.digest.hex())
     page.row("vehicle", binding.vehicle)
     page.row("flight", binding.flight.hex())
@@ -44,7 +44,7 @@ def clock_told(binding: AutopilotBinding) -> str:
     """The offset of the clocks, as text."""
     by = "the telemetry" if binding.clock == "telemetry" else "GPS time alone"
     offset, error = _seconds(binding.offset_us), display(binding.error_us, Dimension.DURATION)
-    text = f"boot at {offset} of the flight, by {by}, error {error}"
+    text = f"the autopilot booted at {offset} of the flight, by {by}, error {error}"
     if binding.utc_apart_us is None:
         return text
     return f"{text}; the autopilot's UTC differs by {_seconds(binding.utc_apart_us)}"

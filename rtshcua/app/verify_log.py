@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rtshcua.adapters.store.verification import Progress, VerificationInputs, verify_carefully, verify_quickly
-from rtshcua.app.flights.binding import roots_of, with_bindings, with_unread_bindings
+from rtshcua.app.autopilot_bindings import roots_of, with_bindings, with_unread_bindings
 from rtshcua.app.fly.simulated_flight import with_simulated
 from rtshcua.app.sidecar_files import RawFrames, anchors_beside, bundle_beside, raw_frames, with_summary, with_unread
 from rtshcua.evidence.finding import Claim, Finding

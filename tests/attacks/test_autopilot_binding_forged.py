@@ -10,7 +10,7 @@ from msgspec.structs import replace
 from reference.bound_run import ROOT, bind_words, run_folder, with_log
 from reference.forgery import LOG_KEY
 from rtshcua.adapters.store.writing import write_new
-from rtshcua.app.flights.binding import read_bindings, trusted_binding
+from rtshcua.app.autopilot_bindings import read_bindings, trusted_binding
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
 from rtshcua.wire.autopilot_binding import AutopilotBinding, sign_autopilot_binding

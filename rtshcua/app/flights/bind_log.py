@@ -7,11 +7,13 @@ from typing import NamedTuple
 
 from rtshcua import __version__
 from rtshcua.adapters.autopilot_log.reading import ReadFile, read_autopilot_log
+from rtshcua.adapters.store.folders import data_folder
+from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.runs import TELEMETRY
 from rtshcua.adapters.store.writing import replace_inside
+from rtshcua.app.autopilot_bindings import binding_name, genesis_leaf, roots_of, trusted_binding
 from rtshcua.app.documents import no_log
 from rtshcua.app.exit_codes import untrusted
-from rtshcua.app.flights.binding import binding_name, genesis_leaf, roots_of, trusted_binding
 from rtshcua.app.flights.flight_reading import read_flight
 from rtshcua.app.logs import NO_LOG_HELP, finding_code, is_log, log_of
 from rtshcua.app.pin import Pin
@@ -40,7 +42,7 @@ class BindRequest(NamedTuple):
     run: Path
     file: Path
     pin: Pin
-    unlock: Callable[[], SigningKey]
+    unlock: Callable[[KeyStore], SigningKey]
 
 
 class BoundLog(NamedTuple):
@@ -73,7 +75,7 @@ def bind(request: BindRequest, progress: Callable[[int, int], None] = lambda _do
         return compared
     clock, found = compared
     binding = _binding(request, report, genesis_leaf(log), read, clock, found)
-    key = request.unlock()
+    key = request.unlock(KeyStore(data_folder()))
     signed = sign_autopilot_binding(binding, key)
     roots = roots_of(None if verified.basis is None else verified.basis.root, request.pin.roots)
     try:

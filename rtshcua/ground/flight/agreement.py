@@ -66,16 +66,7 @@ def agreement(
 
     A point without a time, or where the autopilot's track has a gap, is not compared.
     """
-    other = [_Local(each.boot_us, *project(plane, each.latitude, each.longitude), each.above_sea) for each in log]
-    times = [each.boot_us for each in other]
-    found: list[tuple[int, int, int] | None] = []
-    for point, at_us in zip(track, boot_us, strict=True):
-        span = None if at_us is None else _around(other, times, at_us)
-        if span is None:
-            found.append(None)
-            continue
-        x, y = project(plane, point.latitude, point.longitude)
-        found.append((point.t_us, _horizontal(span, x, y), _vertical(span, point.above_sea)))
+    found = _distances(track, boot_us, log, plane)
     compared = [each for each in found if each is not None]
     agreed = sum(_agrees(each) for each in compared)
     steps = [(b.t_us - a.t_us, i) for i, (a, b) in enumerate(pairwise(track))]
@@ -89,6 +80,23 @@ def agreement(
         flown_us=sum(step for step, _ in steps),
         covered_us=sum(step for step, i in steps if found[i] is not None and found[i + 1] is not None),
     )
+
+
+def _distances(
+    track: Sequence[TrackPoint], boot_us: Sequence[int | None], log: Sequence[AutopilotPoint], plane: Projection
+) -> list[tuple[int, int, int] | None]:
+    """The time of each point, and its horizontal and vertical distance; None for one that cannot be compared."""
+    other = [_Local(each.boot_us, *project(plane, each.latitude, each.longitude), each.above_sea) for each in log]
+    times = [each.boot_us for each in other]
+    found: list[tuple[int, int, int] | None] = []
+    for point, at_us in zip(track, boot_us, strict=True):
+        span = None if at_us is None else _around(other, times, at_us)
+        if span is None:
+            found.append(None)
+            continue
+        x, y = project(plane, point.latitude, point.longitude)
+        found.append((point.t_us, _horizontal(span, x, y), _vertical(span, point.above_sea)))
+    return found
 
 
 def _agrees(each: tuple[int, int, int]) -> bool:

@@ -27,7 +27,7 @@ _TURN_US: Final = (1 << 32) * 1_000
 OTHER_BOOT: Final = "other-boot"
 
 
-class ClockSource(StrEnum):
+class OffsetSource(StrEnum):
     """How the offset was found."""
 
     TELEMETRY = "telemetry"
@@ -40,7 +40,7 @@ class BootClock(NamedTuple):
     the autopilot's UTC is ahead of ours at the same moment; None if one of them is unknown.
     """
 
-    source: ClockSource
+    source: OffsetSource
     offset_us: int
     error_us: int
     utc_apart_us: int | None
@@ -93,7 +93,7 @@ def _by_telemetry(flight: Flight, telemetry: FlightTelemetry, log: AutopilotLog)
     delays = sorted(t_us - boot for t_us, boot in pairs[begin:end])
     offset_us = delays[0]
     apart = None if log.utc_of_boot is None else log.utc_of_boot.utc_us - offset_us - flight.genesis.utc_us
-    clock = BootClock(ClockSource.TELEMETRY, offset_us, nearest_rank(delays, 95) - offset_us, apart)
+    clock = BootClock(OffsetSource.TELEMETRY, offset_us, nearest_rank(delays, 95) - offset_us, apart)
     times = (boot if begin <= number < end else None for number, (_, boot) in enumerate(pairs))
     return BootTimes(clock, tuple(times))
 
@@ -118,7 +118,7 @@ def _by_gps(flight: Flight, telemetry: FlightTelemetry, log: AutopilotLog) -> Bo
     if not any(log.track[0].boot_us <= boot <= log.track[-1].boot_us for boot in boots):
         return Refusal(OTHER_BOOT, "the autopilot's log is of another time: by UTC it has nothing of the flight", _HELP)
     error_us = genesis.utc_error_us + log.utc_of_boot.error_us
-    return BootTimes(BootClock(ClockSource.GPS, offset_us, error_us, None), boots)
+    return BootTimes(BootClock(OffsetSource.GPS, offset_us, error_us, None), boots)
 
 
 def _seconds(us: int) -> str:

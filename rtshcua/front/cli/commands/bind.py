@@ -6,7 +6,6 @@ from typing import Annotated
 
 import typer
 
-from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.app.flights.bind_log import BindRequest
 from rtshcua.app.flights.bind_log import bind as service
@@ -15,7 +14,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.faults import refuse
 from rtshcua.front.cli.render.progress import counting
-from rtshcua.front.cli.render.showing.autopilot_binding import bound_rows
+from rtshcua.front.cli.render.showing.bound_log import bound_rows
 from rtshcua.front.cli.render.showing.page import for_terminal, named
 from rtshcua.front.cli.stdout import out_json, out_rendered
 from rtshcua.front.cli.unlock import unlock
@@ -46,8 +45,8 @@ def bind(
     if isinstance(pinned, Refusal):
         return refuse(pinned)
 
-    def sign() -> SigningKey:
-        return unlock(KeyStore(data_folder()), Duty.LOG, path=log_key, passphrase_file=passphrase_file)
+    def sign(store: KeyStore) -> SigningKey:
+        return unlock(store, Duty.LOG, path=log_key, passphrase_file=passphrase_file)
 
     say = counting(quiet=False)
 

@@ -14,7 +14,7 @@ from rtshcua.app.documents import kind_of
 from rtshcua.app.logs import CUT_AT_FIRST
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.faults import distrust, fail
-from rtshcua.front.cli.render.showing.autopilot_binding import is_autopilot_binding, show_autopilot_binding
+from rtshcua.front.cli.render.showing.bound_log import is_autopilot_binding, show_autopilot_binding
 from rtshcua.front.cli.render.showing.bundle import show_bundle
 from rtshcua.front.cli.render.showing.document import kind_of_document, show_document
 from rtshcua.front.cli.render.showing.keys import KEY_FILE, show_key, show_root

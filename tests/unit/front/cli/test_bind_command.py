@@ -8,7 +8,7 @@ import pytest
 
 from reference.autopilot_logs import ardupilot_log, px4_log
 from reference.bound_run import ROOT, bind_words, flight_of, recorded, run_folder, with_log
-from rtshcua.app.flights.binding import FoundBinding, agreement_of, read_bindings
+from rtshcua.app.autopilot_bindings import FoundBinding, agreement_of, read_bindings
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli import app
 from rtshcua.ground.flight.autopilot_log import AutopilotPoint

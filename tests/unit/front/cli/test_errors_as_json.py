@@ -57,6 +57,8 @@ MISSING: dict[str, str | None] = {
     "bench": "paper --campaign none", "show": "none", "export": "none --to csv",
     "verify-log": "none", "bind": "none none.ulg", "prove": "none 1", "verify-proof": "none", "archive": "add none", "why": "none",
     "bind": "none none.ulg", "verify-log": "none", "prove": "none 1", "verify-proof": "none", "archive": "add none", "why": "none",
+    "recover": "none", "witness": "none", "bind": "none none.ulg",
+    "verify-log": "none", "prove": "none 1", "verify-proof": "none", "archive": "add none", "why": "none",
     "bench": "paper --campaign none", "show": "none",
 }  # fmt: skip
 

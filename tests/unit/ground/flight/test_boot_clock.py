@@ -14,7 +14,7 @@ from rtshcua.ground.flight.autopilot_log import (
     UtcOfBoot,
     utc_of_boot,
 )
-from rtshcua.ground.flight.boot_clock import BootTimes, ClockSource, boot_times
+from rtshcua.ground.flight.boot_clock import BootTimes, OffsetSource, boot_times
 from rtshcua.ground.flight.flown import Flight, FlightTelemetry, TrackPoint
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US
 
@@ -56,7 +56,7 @@ def test_offset_is_that_of_the_least_delayed_report() -> None:
     pairs = [(n * S // 10 + 5_000 + 1_000 * (n * 37 % 100), 40 * S + n * S // 10) for n in range(200)]
     pairs[90] = (pairs[90][0] + 3 * S, pairs[90][1])
     clock = times(flight(pairs), log(30 * S, 70 * S)).clock
-    assert clock.source is ClockSource.TELEMETRY
+    assert clock.source is OffsetSource.TELEMETRY
     assert clock.offset_us == 5_000 - 40 * S
     assert clock.error_us == 95_000  # 95 of 100 reports are no later
     assert clock.utc_apart_us is None
@@ -119,7 +119,7 @@ def test_offset_by_gps_alone() -> None:
     pairs = [(n * S, 0) for n in range(10)]
     of = log(30 * S, 60 * S, UtcOfBoot(UTC - 35 * S, 20_000))
     result = times(flight(pairs), of)
-    assert result.clock.source is ClockSource.GPS
+    assert result.clock.source is OffsetSource.GPS
     assert (result.clock.offset_us, result.clock.error_us) == (-35 * S, 120_000)
     assert result.boot_us == tuple(35 * S + n * S for n in range(10))
     for flown, unlike, slug in (

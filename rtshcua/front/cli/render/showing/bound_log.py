@@ -1,6 +1,6 @@
 """An autopilot binding for a person and for a program."""
 
-from rtshcua.app.flights.binding import agreed, apart, described
+from rtshcua.app.autopilot_bindings import agreed, apart, described
 from rtshcua.app.wording import utc
 from rtshcua.front.cli.render.showing.page import TextPage, named
 from rtshcua.model.quantity import Dimension, display

@@ -52,12 +52,7 @@ MISSING: dict[str, str | None] = {
     "recall": "none --to x", "operator": None, "replace": "none --to x", "gateway": "none.toml", "mcp": None,
     "agent-bundle": "out --bundle none --with none.rts --to x", "doctor": "none --connect udpin:127.0.0.1:1",
     "qualify": "none.rts --connect udpin:127.0.0.1:1 --vehicle x --pilot x", "sim": None,
-    "recover": "none", "witness": "none",
-    "verify-log": "none", "prove": "none 1", "verify-proof": "none", "archive": "add none", "why": "none",
-    "bench": "paper --campaign none", "show": "none", "export": "none --to csv",
-    "verify-log": "none", "bind": "none none.ulg", "prove": "none 1", "verify-proof": "none", "archive": "add none", "why": "none",
-    "bind": "none none.ulg", "verify-log": "none", "prove": "none 1", "verify-proof": "none", "archive": "add none", "why": "none",
-    "recover": "none", "witness": "none", "bind": "none none.ulg",
+    "recover": "none", "witness": "none", "bind": "none none.ulg", "export": "none --to csv",
     "verify-log": "none", "prove": "none 1", "verify-proof": "none", "archive": "add none", "why": "none",
     "bench": "paper --campaign none", "show": "none",
 }  # fmt: skip

@@ -81,9 +81,15 @@ class RecordLine(NamedTuple):
 
 
 class LoggedDecision:
-    """The parts of a log that an explanation needs, read once; `number`: the requested record."""
+    """The parts of a log that an explanation needs, read once; `number`: the requested record; `subject` gives the
+    mission of the bundle, if somebody has prepared it already.
+    """
 
-    def __init__(self, path: Path, number: int | None, words: Callable[[Genesis], RecordWords]) -> None:
+    def __init__(
+        self, path: Path, number: int | None, words: Callable[[Genesis], RecordWords],
+        subject: Callable[[Genesis], Subject | Refusal] | None = None,
+    ) -> None:  # fmt: skip
+        self._subject_of = subject or self._unpacked
         self.start_us = 0
         self.chosen: DecisionRecord | Effect | Close | Recover | Seal | None = None
         self.what = ""  # that record as one line
@@ -103,6 +109,11 @@ class LoggedDecision:
         self._flown = False
 
     @property
+    def in_force(self) -> Subject | None:
+        """The mission in force after the last record; None before the first one."""
+        return self._in_force
+
+    @property
     def begun(self) -> bool:
         """Whether the first record could be read."""
         return self._in_force is not None
@@ -114,14 +125,15 @@ class LoggedDecision:
                 record = read(line)
                 if isinstance(record, Flaw):
                     break
-                refused = self._take(record)
+                refused = self.take(record)
                 if refused is not None:
                     return refused
         return None
 
-    def _take(self, record: AnyRecord) -> Refusal | None:
+    def take(self, record: AnyRecord) -> Refusal | None:
+        """Take the next record of the log; a refusal where it makes no sense."""
         if isinstance(record, Genesis):
-            found = unpacked(octets(record.bundle) or b"", f"the bundle in `{self._path}`")
+            found = self._subject_of(record)
             if isinstance(found, Refusal):
                 return found
             self.start_us, self._in_force, self._words = record.at_us, found, self._words_of(record)
@@ -151,6 +163,9 @@ class LoggedDecision:
                 return newer
             self._in_force = newer
         return None
+
+    def _unpacked(self, genesis: Genesis) -> Subject | Refusal:
+        return unpacked(octets(genesis.bundle) or b"", f"the bundle in `{self._path}`")
 
     def _find_cause(self, record: DecisionRecord | Effect | Close | Recover | Seal) -> None:
         """Find the last event that aborted the mission, before a fallback flew.

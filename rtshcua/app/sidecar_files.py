@@ -1,8 +1,9 @@
 """The files beside a log that are compared with it: bundle, raw frames, summary, and notes of witnesses."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from hashlib import file_digest
 from pathlib import Path
+from typing import Final, Protocol
 
 from rtshcua.adapters.store.logs import read_anchors, read_named, unreadable
 from rtshcua.adapters.store.reading import open_regular, read_regular
@@ -55,23 +56,52 @@ def with_summary(report: LogReport, log: Path) -> LogReport:
     return report._replace(unproven=(*report.unproven, claim))
 
 
+#: the sender and the number of the message in a frame's header
+SENDER_AND_NUMBER: Final = slice(5, 10)
+
+
+class FrameListener(Protocol):
+    """Gets the frames that somebody reads anyway, but not those whose sender and number it skips; and how much of the
+    file was read, in octets.
+    """
+
+    skipped: set[bytes]
+    offset: int
+
+    def take(self, entry: tlog.TlogEntry) -> None:
+        """Take the next entry."""
+
+
 class RawFrames:
-    """The raw frames file at `path`, which may be missing. `frames` is for the auditor."""
+    """The raw frames file at `path`, which may be missing. `frames` is for the auditor; what `heard` returns once the
+    first frame is read gets what is read.
+    """
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
+    def __init__(self, path: Path, heard: Callable[[], FrameListener | None] = lambda: None) -> None:
+        self._path, self._heard = path, heard
         self._damaged: int | None = None
-        self.frames = FrameAudit(self._entries())
+        self._reading = self._entries()
+        self.frames = FrameAudit(self._reading)
 
-    def _entries(self) -> Iterator[tuple[int, bytes]]:
+    def close(self) -> None:
+        """End the reading, wherever it is."""
+        self._reading.close()
+
+    def _entries(self) -> Generator[tuple[int, bytes], None, None]:
         if not self._path.exists():
             return
+        listener = self._heard()
         with open_regular(self._path, self._path.parent) as file:
             try:
                 for entry in tlog.stream(file):
+                    if listener is not None and entry.frame[SENDER_AND_NUMBER] not in listener.skipped:
+                        listener.take(entry)
                     yield entry.at_us, entry.frame
             except tlog.DamagedTlog as damaged:
                 self._damaged = damaged.offset
+            finally:
+                if listener is not None:
+                    listener.offset = file.tell() if self._damaged is None else self._damaged
 
     def unread(self, report: LogReport) -> LogReport:
         """Add to the report that the frames were not read."""
@@ -116,7 +146,7 @@ def _unproven(report: LogReport, text: str) -> LogReport:
     return report._replace(unproven=(*report.unproven, Claim("telemetry", text)))
 
 
-def raw_frames(log: Path) -> RawFrames | None:
-    """The raw frames in the run folder of a log; None if it is not in one."""
+def raw_frames(log: Path, heard: Callable[[], FrameListener | None] = lambda: None) -> RawFrames | None:
+    """The raw frames in the run folder of a log; None if it is not in one. `heard`: see `RawFrames`."""
     folder = run_folder(log)
-    return None if folder is None else RawFrames(folder / TELEMETRY)
+    return None if folder is None else RawFrames(folder / TELEMETRY, heard)

@@ -7,7 +7,15 @@ from typing import NamedTuple
 from rtshcua.adapters.store.verification import Progress, VerificationInputs, verify_carefully, verify_quickly
 from rtshcua.app.autopilot_bindings import roots_of, with_bindings, with_unread_bindings
 from rtshcua.app.fly.simulated_flight import with_simulated
-from rtshcua.app.sidecar_files import RawFrames, anchors_beside, bundle_beside, raw_frames, with_summary, with_unread
+from rtshcua.app.sidecar_files import (
+    FrameListener,
+    RawFrames,
+    anchors_beside,
+    bundle_beside,
+    raw_frames,
+    with_summary,
+    with_unread,
+)
 from rtshcua.evidence.finding import Claim, Finding
 from rtshcua.evidence.records import AnyRecord, Effect
 from rtshcua.evidence.report import LogReport, LogVerdict, cosigned
@@ -34,15 +42,26 @@ class VerifyRequest(NamedTuple):
     anchored: bool = False
 
 
-def verify_log(path: Path, request: VerifyRequest, progress: Progress) -> Audit:
-    """Verify a log and the files beside it. Raises OSError."""
-    raw = raw_frames(path)
+def verify_log(
+    path: Path, request: VerifyRequest, progress: Progress, each: Callable[[AnyRecord], None] = lambda _: None,
+    heard: Callable[[], FrameListener | None] = lambda: None,
+) -> Audit:  # fmt: skip
+    """Verify a log and the files beside it. An audit passes each valid record to `each`, and the raw frames that it
+    reads to what `heard` returns once it reads the first. Raises OSError.
+    """
+    raw = raw_frames(path, heard)
     unconfirmed = UnconfirmedFallbacks()
-    audit = audited(path, request, progress, unconfirmed.take, raw)
+
+    def take(record: AnyRecord) -> None:
+        unconfirmed.take(record)
+        each(record)
+
+    audit = audited(path, request, progress, take, raw)
     report = audit.report
     if raw is not None:
         followed = request.audit and request.derive
         report = raw.unread(report) if request.fast else raw.judged(report, followed=followed)
+        raw.close()
     report = with_summary(_required(report) if request.anchored else report, path)
     report = unconfirmed.told(with_unread(with_simulated(report, path), path))
     if request.fast:

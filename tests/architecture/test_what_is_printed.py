@@ -28,10 +28,9 @@ ALLOWED = {
     "front/cli/commands/keys.py": "asks for a passphrase in our own words",
     "front/cli/render/live/__main__.py": "lines of `live/lines.py`, each of which passes `visible` or `escaped`",
     "front/cli/render/live/screen.py": "in colour; each text passes `visible`",
-    "front/cli/render/progress.py": "passes `visible`",
+    "front/cli/render/progress.py": "passes `visible`; a bar of our own words",
     "front/cli/stdout.py": "the door",
     "front/cli/unlock.py": "asks for a passphrase, by the duty of its key",
-    "front/cli/commands/verify_log.py": "a bar",
     "simulation/process.py": "a process of its own: its ready line is JSON in ASCII, its options are ours",
 }
 PRINTING = {

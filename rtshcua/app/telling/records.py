@@ -110,13 +110,13 @@ class Names:
     def tell(self, record: AnyRecord) -> str:
         """A record as one line of text."""
         if isinstance(record, DecisionRecord):
-            subject = self._subject(record.kind, record.step, record.link)
+            subject = self.subject(record.kind, record.step, record.link)
             clause = f" because {self._quoted(record)}" if record.clause is not None else ""
             target = f", to {record.target}" if record.target is not None else ""
             return f"{record.outcome:<9} {subject}: {record.reason}{clause}{target}"
         if isinstance(record, Effect):
-            subject = self._subject(record.kind, record.step, record.link)
-            detail = detail_of(record.event, record.detail, self.people)
+            subject = self.subject(record.kind, record.step, record.link)
+            detail = self.detail(record)
             return "  ".join(word for word in (f"· {record.event:<15}", subject, detail) if word).rstrip()
         if isinstance(record, Close):
             return f"closed after {many(record.seq, 'record')}: {record.ending}"
@@ -125,6 +125,10 @@ class Names:
         if isinstance(record, Recover):
             return f"recovered, {record.discarded_bytes} bytes discarded; epoch {record.epoch} sealed"
         return f"begun in mode {record.mode}"
+
+    def detail(self, record: Effect) -> str:
+        """The detail of an effect for a person."""
+        return detail_of(record.event, record.detail, self.people)
 
     def _quoted(self, record: DecisionRecord) -> str:
         steps = () if self._bundle is None else self._bundle.mission.invocations
@@ -136,7 +140,8 @@ class Names:
                 return words.quoted(policy, of, clause)
         return f"`{record.clause}`"
 
-    def _subject(self, kind: int, step: int, link: int) -> str:
+    def subject(self, kind: int, step: int, link: int) -> str:
+        """The step, or the link of a fallback, that a record is about; empty if it is about none."""
         if kind not in _KINDS:
             return ""
         if kind == FALLBACK_LINK and link == DEGRADE:

@@ -4,11 +4,14 @@ from collections.abc import Sequence
 from itertools import pairwise
 from math import atan2, degrees, isqrt
 
+from rtshcua.decision.nearest import DAYTIME, Nearest
 from rtshcua.decision.outline import rings as outline
+from rtshcua.ground.why.trace import ReadValue
 from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.contract import CHOICE, PLACE, ZONE, Contract, Link, MotionKind, Parameter, SourceKind
 from rtshcua.model.flat.mission import Invocation, Plan
 from rtshcua.model.flat.policy import Monitor, MonitorKind, Policy
+from rtshcua.model.flat.signal import ENUMERATION, POSITION
 from rtshcua.model.flat.zone import AREA, CIRCLE, HIGHEST, LOWEST, Zone
 from rtshcua.model.quantity import Dimension, display
 from rtshcua.onboard.calls import argument, is_own
@@ -18,6 +21,7 @@ from rtshcua.onboard.calls import geographic as geographic
 from rtshcua.onboard.calls import place as place
 from rtshcua.onboard.calls import quantity as quantity
 
+_MINUTE = 60_000_000
 _MOTIONS = {
     MotionKind.HOLD: "hold",
     MotionKind.CLIMB: "climb straight up",
@@ -170,3 +174,33 @@ def monitor(monitor: Monitor) -> str:
             return f"rising `{monitor.when.text}`"
         case _:
             return f"falling `{monitor.when.text}`"
+
+
+def read_value(policy: Policy, read: ReadValue) -> str:
+    """The value of a signal that a decision read."""
+    assert read.signal is not None
+    known = [value for value in read.values if value is not None]
+    if len(known) < len(read.values):
+        told = "unknown"
+    elif read.signal.kind == POSITION:
+        told = place(policy, known[0], known[1])
+    elif read.signal.kind == ENUMERATION:
+        told = dict(read.signal.labels).get(known[0], str(known[0]))
+    else:
+        told = quantity(known[0], read.signal.dimension)
+    return f"{told}{' (stale)' if read.stale else ''}"
+
+
+def would_pass(nearest: Nearest) -> str:
+    """What a subject should be."""
+    return f"{nearest.subject} = {nearest_value(nearest)}"
+
+
+def nearest_value(nearest: Nearest) -> str:
+    """The value that would pass."""
+    if nearest.choices:
+        return " or ".join(nearest.choices)
+    if nearest.dimension == DAYTIME:
+        minutes = nearest.value // _MINUTE
+        return f"{minutes // 60:02}:{minutes % 60:02}"
+    return quantity(nearest.value, nearest.dimension)

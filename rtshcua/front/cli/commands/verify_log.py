@@ -1,15 +1,11 @@
 """`rtshcua verify-log`: verify logs, and name the first record that fails."""
 
 import json
-import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from rtshcua.adapters.store.verification import Progress
 from rtshcua.app import verify_log as service
 from rtshcua.app.documents import no_log
 from rtshcua.app.logs import NO_LOG_HELP, is_log, log_of, logs_and_others, report_code
@@ -19,13 +15,11 @@ from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.faults import fail, of_each, refuse, say
+from rtshcua.front.cli.render.progress import octets_of
 from rtshcua.front.cli.render.verdict import as_object, as_text
 from rtshcua.front.cli.stdout import out_json
 
 app = typer.Typer(add_completion=False)
-
-_LONG = 32 << 20  # size from which a progress bar is shown, bytes
-
 
 Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="logs, run folders, or parents of these")]
 Root = Annotated[
@@ -108,7 +102,7 @@ def _verify(given: Path, pinned: Pin, request: VerifyRequest, *, as_json: bool, 
     path = log_of(given)
     if not is_log(path):
         return fail(ExitCode.INPUT, *no_log(path, given, NO_LOG_HELP))
-    with _progress(path.stat().st_size) as told:
+    with octets_of("verifying", path.stat().st_size) as told:
         found = service.verify_log(path, request, told)
     code = report_code(found.report)
     if as_json:
@@ -116,17 +110,3 @@ def _verify(given: Path, pinned: Pin, request: VerifyRequest, *, as_json: bool, 
     else:
         as_text(found, path, pinned, first=first)
     return code
-
-
-@contextmanager
-def _progress(size: int) -> Iterator[Progress]:
-    """Yield a progress callback; it drives a bar on the terminal if the log is long."""
-    if size < _LONG or not sys.stderr.isatty():
-        yield lambda _: None
-        return
-    from rich.console import Console
-    from rich.progress import Progress as Bar
-
-    with Bar(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("verifying", total=size)
-        yield lambda done: bar.update(task, completed=done)

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TypeVar
 
 from rtshcua.app.wording import shorten
@@ -11,6 +12,8 @@ T = TypeVar("T", bound=tuple[object, ...])
 
 #: no progress is shown for fewer items
 _FEW = 4
+#: octets from which a bar is shown
+_LONG = 32 << 20
 _CLEAR = "\r\033[K"
 
 
@@ -47,3 +50,19 @@ def time_left(seconds: float) -> str:
     if minutes >= 60:
         return f"{minutes // 60} h {minutes % 60} min"
     return f"{minutes} min" if minutes else "under 1 min"
+
+
+@contextmanager
+def octets_of(what: str, size: int) -> Iterator[Callable[[int], None]]:
+    """Yield a function that takes the number of octets done of `size`; it drives a bar on the terminal if they are
+    many.
+    """
+    if size < _LONG or not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    from rich.console import Console
+    from rich.progress import Progress as Bar
+
+    with Bar(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(what, total=size)
+        yield lambda done: bar.update(task, completed=done)

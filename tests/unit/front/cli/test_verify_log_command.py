@@ -19,8 +19,7 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.evidence.finding import Finding
 from rtshcua.evidence.report import LogReport, LogVerdict
 from rtshcua.front.cli import app
-from rtshcua.front.cli.commands import verify_log
-from rtshcua.front.cli.render import verdict
+from rtshcua.front.cli.render import progress, verdict
 from rtshcua.wire.keys import Duty
 from rtshcua.wire.names import LOG
 from virtual import case
@@ -380,7 +379,7 @@ def test_a_hostile_log_does_not_write_to_the_terminal(run: Path, capsys: pytest.
 def test_long_log_shows_progress(
     run: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(verify_log, "_LONG", 100)
+    monkeypatch.setattr(progress, "_LONG", 100)
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
     assert verify(run) == ExitCode.OK
 

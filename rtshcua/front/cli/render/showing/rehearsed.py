@@ -6,7 +6,6 @@ from rtshcua.app.fly.dry_run import FlightRehearsal
 from rtshcua.app.telling import words
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.front.cli.render.showing.page import TextPage, for_terminal
-from rtshcua.front.cli.render.showing.why import would_pass
 from rtshcua.front.cli.stdout import out_json, out_rendered
 from rtshcua.model.outcome import Outcome
 from rtshcua.model.step_number import number_of
@@ -48,7 +47,7 @@ def _page(rehearsal: FlightRehearsal) -> TextPage:
                     indent=7,
                     width=10,
                 )
-            page.rows("would pass", [would_pass(one) for one in each.nearest], indent=7, width=10)
+            page.rows("would pass", [words.would_pass(one) for one in each.nearest], indent=7, width=10)
     page.text("")
     waits = sum(each.hopeful and each.decision.outcome is not Outcome.ALLOW for each in found)
     admitted = sum(each.decision.outcome is Outcome.ALLOW for each in found)

@@ -8,7 +8,6 @@ from rtshcua.app.telling import words
 from rtshcua.app.telling.people import NOBODY, People
 from rtshcua.app.why import AssumedCase, decide_assumed
 from rtshcua.app.wording import utc
-from rtshcua.decision.nearest import DAYTIME, Nearest
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics.refusal import Refusal
@@ -17,14 +16,12 @@ from rtshcua.ground.why.trace import ConditionCheck, ReadValue, Trace, TracedSte
 from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.contract import Link
 from rtshcua.model.flat.policy import Policy
-from rtshcua.model.flat.signal import ENUMERATION, POSITION
 from rtshcua.model.flat.situation import ConfirmAnswer, Context, Now, State
 from rtshcua.model.outcome import Outcome
 from rtshcua.model.step_number import number_of
 from rtshcua.onboard.calls import is_own
 
 _TRUTHS: Mapping[int, str] = {TRUE: "true", FALSE: "false", UNKNOWN: "unknown"}
-_MINUTE = 60_000_000
 #: the roles of checks that pass when they are not true
 _AGAINST = frozenset({"forbid", "confirm", "degrade"})
 
@@ -70,7 +67,7 @@ def show_why(page: TextPage, trace: Trace, case: Case) -> dict[str, object]:
     if decision.outcome is Outcome.FALLBACK:
         page.row("flies", _flies(decision.target, case.aloft))
     for nearest in trace.nearest:
-        page.row("would pass", would_pass(nearest))
+        page.row("would pass", words.would_pass(nearest))
     page.head("Step by step")
     steps = [_step(page, step, case, decision.clause) for step in trace.steps]
     if trace.chain and decision.outcome is Outcome.FALLBACK:
@@ -90,7 +87,12 @@ def show_why(page: TextPage, trace: Trace, case: Case) -> dict[str, object]:
         "target": None if decision.target is None else decision.target.text,
         "aloft": case.aloft,
         "would_pass": [
-            {"subject": each.subject, "value": each.value, "words": _words(each), "choices": list(each.choices)}
+            {
+                "subject": each.subject,
+                "value": each.value,
+                "words": words.nearest_value(each),
+                "choices": list(each.choices),
+            }
             for each in trace.nearest
         ],
         "steps": steps,
@@ -204,33 +206,8 @@ def _read(invocation: PreparedInvocation, read: ReadValue) -> str:
         contract = invocation.invocation.contract
         named = [parameter for parameter in contract.parameters if parameter.name == read.name]
         return words.arguments(policy, named, invocation.invocation.arguments)
-    value = "unknown" if None in read.values else _value(policy, read)
-    return f"{read.name} = {value}{' (stale)' if read.stale else ''}"
-
-
-def _value(policy: Policy, read: ReadValue) -> str:
-    assert read.signal is not None
-    known = [value for value in read.values if value is not None]
-    if read.signal.kind == POSITION:
-        return words.place(policy, known[0], known[1])
-    if read.signal.kind == ENUMERATION:
-        return dict(read.signal.labels).get(known[0], str(known[0]))
-    return words.quantity(known[0], read.signal.dimension)
+    return f"{read.name} = {words.read_value(policy, read)}"
 
 
 def _for_program(read: list[ReadValue]) -> list[dict[str, object]]:
     return [{"name": each.name, "values": list(each.values), "stale": each.stale} for each in read]
-
-
-def would_pass(nearest: Nearest) -> str:
-    """What a subject should be."""
-    return f"{nearest.subject} = {_words(nearest)}"
-
-
-def _words(nearest: Nearest) -> str:
-    if nearest.choices:
-        return " or ".join(nearest.choices)
-    if nearest.dimension == DAYTIME:
-        minutes = nearest.value // _MINUTE
-        return f"{minutes // 60:02}:{minutes % 60:02}"
-    return words.quantity(nearest.value, nearest.dimension)

@@ -1,5 +1,6 @@
 """A side view: heights above home along a planned way, or in the time of a flight, with the zones that lie there."""
 
+from bisect import bisect_right
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby, pairwise
@@ -87,7 +88,8 @@ class AxisMark(NamedTuple):
 class HeightProfile:
     """A side view. `above` are the titles of the axes of heights (the second is empty where the elevation of home is
     not known), and `along` that of the other axis. `volume` (the `d` of a path) are the heights between which a leg
-    is checked, `ground` the lines of the ground where it is known, and `home` the height of home.
+    is checked, `ground` the lines of the ground where it is known, and `home` the height of home. `span` are the places
+    on the page of the begin and of the end of the other axis, and how long that is: in us if it is `timed`, else in mm.
     """
 
     title: str
@@ -113,6 +115,8 @@ class HeightProfile:
     labels: tuple[MapLabel, ...]
     keys: tuple[DrawingKey, ...]
     unlabelled: tuple[str, ...]
+    span: tuple[float, float, int]
+    timed: bool
 
 
 class _Place(NamedTuple):
@@ -171,11 +175,12 @@ class _DrawnHeights(NamedTuple):
 
 
 class _Titles(NamedTuple):
-    """The title and the description of a side view, and the title of its axis along the way."""
+    """The title and the description of a side view, and the title of its axis along the way, which may be of times."""
 
     title: str
     description: str
     along: str
+    timed: bool = False
 
 
 def planned_heights(site: Site, way: PlannedWay, refused: RefusedParts = NOT_REFUSED) -> HeightProfile:
@@ -222,6 +227,7 @@ def flown_heights(site: Site, flown: FlownWay) -> HeightProfile:
             "Heights of the flown track",
             f"A side view: heights above home over the time of the flight, up to {highest}.",
             "time since the flight began",
+            timed=True,
         ),
         across,
     )
@@ -260,10 +266,8 @@ def _thinned(line: Sequence[_Place]) -> Sequence[_Place]:
 
 
 def _height_at(places: Sequence[_Place], t_us: int) -> int:
-    """The height at the latest place until a time, or at the first one."""
-    return max(
-        (place for place in places if place.along <= t_us), default=places[0], key=lambda place: place.along
-    ).height
+    """The height at the latest place until a time, or at the first one; the places are in the order of their times."""
+    return places[max(bisect_right(places, t_us, key=lambda place: place.along) - 1, 0)].height
 
 
 def _planned(
@@ -364,6 +368,8 @@ def _profile(
         labels=tuple(labels.placed),
         keys=tuple(_keys(site, drawn, bands)),
         unlabelled=unlabelled,
+        span=(axes.x(0), axes.x(axes.last), axes.last),
+        timed=titles.timed,
     )
 
 

@@ -216,7 +216,7 @@ class ZoneMap:
     policy: str
     width: int
     height: int
-    matrix: str
+    on: Canvas
     outlines: tuple[DrawnZone, ...]
     home: tuple[float, float]
     home_radius: float
@@ -233,6 +233,11 @@ class ZoneMap:
     keys: tuple[DrawingKey, ...]
     unlabelled: tuple[str, ...]
     around: tuple[str, ...]  # zones that contain the whole map
+
+    @property
+    def matrix(self) -> str:
+        """The SVG transform of outlines to the page."""
+        return self.on.matrix
 
 
 def zone_maps(site: Site) -> tuple[ZoneMap, ...]:
@@ -331,7 +336,7 @@ def _map(
         policy=site.policy,
         width=on.width,
         height=on.height,
-        matrix=on.matrix,
+        on=on,
         outlines=outlines,
         home=home,
         home_radius=site.home_within * on.scale,

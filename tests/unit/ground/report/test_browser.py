@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from reference.browser import CHROMIUM, dumped, layout
+from reference.browser import AXE, CHROMIUM, dumped, layout, opened, running
 from rtshcua.front.cli.app import main
 from rtshcua.ground.report.html_page import page
 from rtshcua.ground.report.report_model import PolicyReport
@@ -47,3 +47,14 @@ def test_map_of_a_refused_mission_fits(tmp_path: Path, width: int) -> None:
 def test_browser_reports_no_errors(tmp_path: Path, everything: PolicyReport) -> None:
     _, said = dumped(tmp_path, page(everything), 1200)
     assert "CONSOLE" not in said
+
+
+@pytest.mark.skipif(not AXE.is_file(), reason="axe-core is not installed")
+def test_page_is_accessible(tmp_path: Path, everything: PolicyReport) -> None:
+    file = tmp_path / "page.html"
+    file.write_text(page(everything), encoding="utf-8")
+    with running() as browser:
+        for width in WIDTHS:
+            for dark in (False, True):
+                with opened(browser, file, width=width, dark=dark) as shown:
+                    assert shown.axe() == []

@@ -12,23 +12,18 @@ from time import process_time
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
-from msgspec.structs import replace
-
-from reference import flat_case as flat
 from rtshcua.adapters.loop import RunLoop
 from rtshcua.adapters.store.evidence_file import EvidenceFile
 from rtshcua.model.durability import WRITTEN
-from rtshcua.model.flat.contract import MotionKind
-from rtshcua.model.flat.mission import Plan
 from virtual import case
 from virtual.flight import Flight
+from virtual.long_flight import legs
 
 HOURS = 2
 HOUR_US = 3_600 * case.S
 STEPS = 400  # more steps than are reached
 LIMIT_BYTES = 2 << 20
 LIMIT_OBJECTS = 20  # per flown step: each step keeps its last decision
-_ENDURANCE_US = 10 * HOUR_US
 
 
 class Sink(EvidenceFile):
@@ -49,18 +44,9 @@ class Sink(EvidenceFile):
 
 
 def flight() -> Flight:
-    """Yield legs without end."""
-    steps = [case.step(0, 0, flat.TAKEOFF, Plan(MotionKind.CLIMB, (), 15 * case.M, 0), 15 * case.M)]
-    for number in range(1, STEPS):
-        place = (150 * case.M if number % 2 else -50 * case.M, 0)
-        leg = case.step(1, 1, flat.GOTO, Plan(MotionKind.FLY, place, 15 * case.M, 0), *place, 15 * case.M)
-        steps.append(replace(leg, step=number, invocation_id=number.to_bytes(16, "big")))
-    policy = case.policy()
-    contracts = tuple(replace(each, validity_us=_ENDURANCE_US, duration_us=0) for each in policy.contracts)
-    steps = [replace(each, contract=replace(each.contract, validity_us=_ENDURANCE_US, duration_us=0)) for each in steps]
-    vehicle = replace(policy.vehicle, endurance_us=_ENDURANCE_US)
-    sealed = case.seal(case.mission(steps), replace(policy, contracts=contracts, vehicle=vehicle))
-    return Flight(sealed, case.simulated("px4", hover_us=_ENDURANCE_US))
+    """Legs without end."""
+    mission, policy, config = legs(STEPS)
+    return Flight(case.seal(mission, policy), config)
 
 
 def held() -> tuple[int, int]:

@@ -60,19 +60,19 @@ class VehicleText(NamedTuple):
 
 
 class Silence(NamedTuple):
-    """A time without a frame of the autopilot in the telemetry."""
+    """A time without a report of the autopilot's position, signals or state in the telemetry."""
 
     from_us: int
     to_us: int
 
 
 class FlightTelemetry(NamedTuple):
-    """What the telemetry of a flight says; `frames` is the number of frames of the autopilot, and `damaged` says where
-    the file breaks off (an octet), None if it is whole. `boot_us` are pairs of a time and the autopilot's own time
-    since its boot, in us.
+    """What the telemetry of a flight says; `reports` is the number of frames with these, and `damaged` says where
+    the file breaks off (an octet), None if it is whole. `boot_us` has for each point of the track its time and
+    the autopilot's own time since its boot, in us.
     """
 
-    frames: int
+    reports: int
     track: tuple[TrackPoint, ...]
     home: GeoPlace | None
     signals: tuple[SignalSeries, ...]

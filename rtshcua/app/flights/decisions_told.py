@@ -1,0 +1,144 @@
+"""The decisions of a flight in words: what decided, what it read, and what would have passed."""
+
+from typing import Final
+
+from rtshcua.app.flights.clause_places import ClausePlaces
+from rtshcua.app.logged_decision import LinkExplained, StepExplained, explained
+from rtshcua.app.prepared_mission import Subject, after
+from rtshcua.app.telling import words
+from rtshcua.app.telling.people import People
+from rtshcua.app.telling.records import Names
+from rtshcua.decision.values import TRUE
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.evidence.records import DecisionRecord, Effect
+from rtshcua.ground.editor.keyword_help import REASONS
+from rtshcua.ground.flight.report_content import DecisionView, ReadSignal
+from rtshcua.ground.why.logged_decisions import context_of, state_of
+from rtshcua.ground.why.trace import ReadValue, read_values
+from rtshcua.model.decision import Decisive
+from rtshcua.model.flat.policy import Policy, Rule
+from rtshcua.model.outcome import Outcome, Reason
+from rtshcua.onboard.calls import argument
+
+#: the most decisions that are explained in full
+MOST_EXPLAINED: Final = 300
+#: the most values of a decision that are told
+_MOST_READ: Final = 20
+
+
+class DecisionWords:
+    """Collects the decisions of a log; equal ones in a row, such as those while a step waits, are one."""
+
+    def __init__(self, subject: Subject, names: Names, start_us: int, places: ClausePlaces) -> None:
+        self._subject, self._names, self._start_us, self._places = subject, names, start_us, places
+        self._told: list[DecisionView] = []
+        self._last: tuple[object, ...] = ()
+        self.explained = 0
+
+    @property
+    def views(self) -> tuple[DecisionView, ...]:
+        """The decisions in words, in order."""
+        return tuple(self._told)
+
+    def take(self, record: DecisionRecord | Effect) -> None:
+        """Take the next record, after `Names.follow`."""
+        if isinstance(record, Effect):
+            if record.event == "replacement":
+                newer = after(self._subject, record.detail)
+                self._subject = self._subject if isinstance(newer, Refusal) else newer
+            elif record.event == "repeated" and self._told and record.detail.isdecimal():
+                last = self._told[-1]
+                self._told[-1] = last._replace(
+                    repeats=last.repeats + int(record.detail[:9]), until_us=record.at_us - self._start_us
+                )
+            return
+        key = (record.kind, record.step, record.link, record.outcome, record.reason, record.clause, record.target)
+        t_us = record.at_us - self._start_us
+        if key == self._last and record.outcome != "allow":
+            last = self._told[-1]
+            self._told[-1] = last._replace(repeats=last.repeats + 1, until_us=t_us)
+            return
+        self._last = key
+        self._told.append(self._view(record, t_us))
+
+    def _view(self, record: DecisionRecord, t_us: int) -> DecisionView:
+        reads: tuple[ReadSignal, ...] = ()
+        passing: tuple[str, ...] = ()
+        clause = "" if record.clause is None else f"`{' '.join(record.clause.split())}`"
+        place = "" if record.clause_at is None else self._places.place(record.clause_at[0], record.clause_at[1])
+        if self.explained < MOST_EXPLAINED:
+            self.explained += 1
+            found = explained(record, self._subject)
+            if isinstance(found, StepExplained):
+                clause = words.quoted(
+                    self._policy, found.invocation.invocation, found.trace.decision.clause
+                ) or clause  # fmt: skip
+                reads = self._reads(record, found)
+                permit = _permit(found)
+                if permit is not None:
+                    clause, place = (
+                        f"`{' '.join(permit.text.split())}`",
+                        self._places.place(permit.source, permit.start),
+                    )
+                passing = tuple(map(words.would_pass, found.trace.nearest))
+            elif isinstance(found, LinkExplained):
+                passing = tuple(
+                    f"{each.text}: {'may fly' if each.admissible else 'may not'}" for each in found.trace.chain
+                )
+        subject = self._names.subject(record.kind, record.step, record.link)
+        return DecisionView(
+            record.seq, t_us, t_us, 1, subject, record.outcome, record.reason,
+            _meaning(record.reason), clause, place, record.target or "", reads, passing,
+            self._approvals(record), None,
+        )  # fmt: skip
+
+    @property
+    def _policy(self) -> Policy:
+        return self._subject.policy.policy
+
+    def _reads(self, record: DecisionRecord, found: StepExplained) -> tuple[ReadSignal, ...]:
+        """The values that the deciding clause read; of an `allow`, those of all conditions that were checked."""
+        flat, state = found.invocation.invocation, state_of(record)
+        decisive = found.trace.decision.clause
+        checked: list[Decisive] = [each.clause for step in found.trace.steps for each in step.checks]
+        told: dict[str, ReadSignal] = {}
+        for clause in [decisive] if decisive is not None else checked:
+            for read in read_values(clause, self._policy, flat.contract, flat.arguments, state):
+                age = None
+                if read.signal is not None:
+                    age = max(state.ages[slot] for slot in read.signal.slots)
+                told.setdefault(read.name, ReadSignal(read.name, self._value(found, read), age))
+        return tuple(told.values())[:_MOST_READ]
+
+    def _value(self, found: StepExplained, read: ReadValue) -> str:
+        if read.signal is not None:
+            return words.read_value(self._policy, read)
+        flat = found.invocation.invocation
+        parameter = next(each for each in flat.contract.parameters if each.name == read.name)
+        return argument(self._policy, parameter, flat.arguments)
+
+    def _approvals(self, record: DecisionRecord) -> tuple[str, ...]:
+        people: People = self._names.people
+        roles = self._policy.roles
+        told = []
+        for each in context_of(record).approvals:
+            role = roles[each.role] if 0 <= each.role < len(roles) else f"role {each.role}"
+            by = people.by_number.get(each.person)
+            told.append(f"{'granted' if each.granted else 'refused'} as {role}{f' by {by}' if by else ''}")
+        return tuple(dict.fromkeys(told))
+
+
+def _permit(found: StepExplained) -> Rule | None:
+    """The rule that permitted an allowed step."""
+    if found.trace.decision.outcome is not Outcome.ALLOW:
+        return None
+    checks = (check for step in found.trace.steps for check in step.checks)
+    return next((each.clause for each in checks
+                 if each.role == "permit" and each.truth == TRUE and isinstance(each.clause, Rule)), None)  # fmt: skip
+
+
+def _meaning(reason: str) -> str:
+    try:
+        return REASONS[Reason(reason)]
+    except ValueError:
+        return ""

@@ -1,0 +1,110 @@
+"""The service `report`: verify a flight, and say what it was, as the content of a page; or what it is so far."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Final, NamedTuple
+
+from rtshcua.adapters.store.logs import lines
+from rtshcua.adapters.store.reading import open_regular
+from rtshcua.adapters.store.verification import Progress
+from rtshcua.app.flights.flight_told import CollectedFlight, FlightTelling
+from rtshcua.app.flights.redaction import Redaction, may_stay
+from rtshcua.app.logs import report_code
+from rtshcua.app.pin import Pin
+from rtshcua.app.verify_log import VerifyRequest, verify_log
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.evidence.finding import Flaw
+from rtshcua.evidence.reading import read
+from rtshcua.evidence.records import Close
+from rtshcua.ground.flight.embedding import MOST_OCTETS, embed, redact
+from rtshcua.ground.flight.report_content import FlightReport, GapView
+
+#: the most letters of an embedded log
+_MOST_EMBEDDED: Final = 4 << 20
+
+
+class FlightReportRequest(NamedTuple):
+    """A log, the root to trust, the folders in which sources are sought, the time of the page, and what is left out."""
+
+    log: Path
+    pin: Pin
+    sources: Sequence[Path]
+    made_at_us: int
+    removed: tuple[str, ...] = ()
+
+
+class ReportedFlight(NamedTuple):
+    """The content of a page, the exit code of the verification, and, if it is redacted, what searches the page for what
+    should be gone.
+    """
+
+    report: FlightReport
+    code: ExitCode
+    redaction: Redaction | None
+
+
+def flight_report(request: FlightReportRequest, progress: Progress = lambda _: None) -> ReportedFlight | Refusal:
+    """Verify a flight with all its decisions, and tell it. Raises OSError."""
+    collected = CollectedFlight(request.log, request.sources)
+    verify = VerifyRequest(request.pin.key, request.pin.roots, audit=True)
+    audit = verify_log(request.log, verify, progress, collected.take, lambda: collected.heard)
+    collected.update_telemetry()  # what the audit did not read
+    flight = collected.flight()
+    if isinstance(flight, Refusal):
+        return flight
+    telling = FlightTelling(
+        audit.report, flight, collected, made_at_us=request.made_at_us,
+        pinned=f"root key `{request.pin.key.hex()}`", details=not request.removed,
+    )  # fmt: skip
+    told = telling.report()
+    redaction = Redaction(flight, collected.persons, request.removed) if request.removed else None
+    if redaction is not None:
+        told = redaction.report(told, flight)
+    return ReportedFlight(_with_log(told, request, audit.report.records), report_code(audit.report), redaction)
+
+
+def _with_log(report: FlightReport, request: FlightReportRequest, records: int) -> FlightReport:
+    """The report with the log, or of a redacted one with what may stay of it. Raises OSError."""
+    with open_regular(request.log) as file:
+        data = file.read(MOST_OCTETS + 1)
+    if request.removed:
+        kept = data.splitlines(keepends=True)[:records]
+        data = redact(kept, may_stay(request.removed), checkpoints="names" not in request.removed)
+    text = "" if len(data) > MOST_OCTETS else embed(data)
+    if not text or len(text) > _MOST_EMBEDDED:
+        gap = GapView("page", "the log is too large to be embedded: verify the file itself with `rtshcua verify-log`")
+        return report._replace(gaps=(*report.gaps, gap))
+    return report._replace(log=text)
+
+
+class LiveFlight:
+    """A flight that is still being recorded, read again and again from its growing log and telemetry."""
+
+    def __init__(self, log: Path, sources: Sequence[Path]) -> None:
+        self._log = log
+        self._collected = CollectedFlight(log, sources)
+        self._offset = 0
+        #: whether the log was closed: nothing follows
+        self.closed = False
+
+    def update(self) -> bool:
+        """Read what is new; return whether there was anything. Raises OSError."""
+        before = self._offset
+        with open_regular(self._log) as file:
+            file.seek(self._offset)
+            for line in lines(file):
+                record = read(line) if line.endswith(b"\n") else None
+                if record is None or isinstance(record, Flaw):
+                    break
+                self._collected.take(record)
+                self._offset += len(line)
+                self.closed = isinstance(record, Close)
+        return self._collected.update_telemetry() or self._offset > before
+
+    def report(self, made_at_us: int) -> FlightReport | Refusal:
+        """The content of the page so far."""
+        flight = self._collected.flight()
+        if isinstance(flight, Refusal):
+            return flight
+        return FlightTelling(None, flight, self._collected, made_at_us=made_at_us, pinned="no key").report()

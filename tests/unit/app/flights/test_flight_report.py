@@ -1,0 +1,148 @@
+"""The content of a flight's report: six lines that answer a customer's questions, from the log alone."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from reference.forgery import edit, signed
+from rtshcua.app.flights.flight_report import FlightReportRequest, LiveFlight, flight_report
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.ground.flight.embedding import extract
+from rtshcua.ground.flight.report_content import FlightReport, as_plain
+from rtshcua.ground.flight.report_page import page
+from virtual import case
+from virtual.flight_reports import MADE_US, PIN, report_of
+
+
+def answers(report: FlightReport) -> list[str]:
+    return [line.answer for line in report.summary]
+
+
+def test_completed_flight_in_six_lines(completed: Path) -> None:
+    report, code, _ = report_of(completed)
+    asked, allowed, flew, ended, intact, unvouched = answers(report)
+    assert "3 steps" in asked
+    assert "takeoff(altitude = 15 m)" in asked
+    assert "version" in allowed
+    assert "3 of 3 steps completed" in flew
+    assert ended == "The mission was completed."
+    assert intact.startswith("Yes: ")
+    assert "witness" in unvouched
+    assert (report.verdict, code) == ("verified", ExitCode.OK)
+    assert report.steps_done == report.steps == 3
+    assert report.highest is not None
+    assert 14 * case.M < report.highest < 20 * case.M
+    assert report.distance is not None
+    assert 80 * case.M < report.distance < 120 * case.M  # 45 m there, and back
+
+
+def test_flight_that_turned_home_says_why(turned: Path) -> None:
+    report = report_of(turned).report
+    ended = answers(report)[3]
+    assert "Ended early" in ended
+    assert "battery" in ended
+    assert "flew." in ended
+    lanes = {each.lane for each in report.timeline}
+    assert {"proposed", "compiled", "decided", "dispatched", "observed", "fallback"} <= lanes
+    flown = [each for each in report.timeline if each.lane == "fallback" and each.until_us is not None]
+    stopped = [each for each in report.timeline if each.lane == "dispatched"]
+    assert stopped[-1].until_us is not None
+    assert stopped[-1].until_us <= flown[0].t_us
+
+
+def test_events_and_decisions_are_those_of_the_log(completed: Path) -> None:
+    report = report_of(completed).report
+    lines = [json.loads(line) for line in (completed / "log.jsonl").read_bytes().splitlines()]
+    decided = [each for each in lines if each["type"] == "decision"]
+    assert [each.seq for each in report.decisions] == [each["seq"] for each in decided]
+    assert [each.t_us for each in report.decisions] == [each["at_us"] - lines[0]["at_us"] for each in decided]
+    assert [each.seq for each in report.records] == list(range(len(lines)))
+    for view, record in zip(report.decisions, decided, strict=True):
+        assert (view.outcome, view.reason) == (record["outcome"], record["reason"])
+        ages = record["state"]["ages"]
+        assert all(read.age_us is None or read.age_us in ages for read in view.reads)
+        assert view.reads
+    assert report.timeline == tuple(sorted(report.timeline, key=lambda each: each.t_us))
+
+
+def test_repeated_decisions_are_one(completed: Path) -> None:
+    lines = (completed / "log.jsonl").read_bytes().splitlines(keepends=True)
+    at = next(n for n, line in enumerate(lines) if b'"type":"decision"' in line)
+    changed = edit(lines[at], outcome="defer", reason="approval/awaited", target_link=-1)
+    run = completed.parent / "repeated"
+    run.mkdir(exist_ok=True)
+    (run / "log.jsonl").write_bytes(b"".join(signed([*lines[:at], changed, changed, changed, *lines[at:]])))
+    report = report_of(run).report
+    waited, allowed = report.decisions[:2]
+    assert (waited.outcome, waited.repeats, waited.seq) == ("defer", 3, at)
+    assert allowed.outcome == "allow"
+    assert report.verdict == "failed"  # nobody decided that
+
+
+def test_log_that_fails_has_a_page_that_says_so(completed: Path, tmp_path: Path) -> None:
+    data = (completed / "log.jsonl").read_bytes()
+    at = data.index(b'"admitted"')
+    (tmp_path / "log.jsonl").write_bytes(data[:at] + b'"admitteD"' + data[at + 10 :])
+    report, code, _ = report_of(tmp_path)
+    assert report.verdict == "failed"
+    assert answers(report)[4].startswith("No: record ")
+    assert code == ExitCode.EVIDENCE
+    assert 'class="said failed"' in page(report)
+
+
+def test_log_without_end_is_incomplete(completed: Path, tmp_path: Path) -> None:
+    lines = (completed / "log.jsonl").read_bytes().splitlines(keepends=True)
+    (tmp_path / "log.jsonl").write_bytes(b"".join(lines[:-3]))
+    report, code, _ = report_of(tmp_path)
+    assert (report.verdict, report.ending, code) == ("incomplete", "not closed", ExitCode.INCOMPLETE)
+    assert report.track is None
+    assert {"telemetry", "witnesses"} <= {each.what for each in report.gaps}
+
+
+@pytest.mark.parametrize("data", [b"", b'{"_prev":"', b"{}\n", b"\xff\xfe garbage\n"])
+def test_log_without_a_first_record_is_refused(tmp_path: Path, data: bytes) -> None:
+    (tmp_path / "log.jsonl").write_bytes(data)
+    found = flight_report(FlightReportRequest(tmp_path / "log.jsonl", PIN, (), MADE_US))
+    assert isinstance(found, Refusal)
+
+
+def test_embedded_log_is_the_file(completed: Path) -> None:
+    report = report_of(completed).report
+    assert extract(report.log) == (completed / "log.jsonl").read_bytes()
+    assert report.without_log().log == ""
+
+
+def test_page_is_reproducible_and_its_content_is_json(completed: Path) -> None:
+    report = report_of(completed).report
+    assert page(report) == page(report_of(completed).report)
+    plain = json.loads(json.dumps(as_plain(report)))
+    assert plain["verdict"] == "verified"
+    assert plain["decisions"][0]["reads"][0].keys() == {"name", "value", "age_us"}
+
+
+def test_growing_log_is_told_as_far_as_it_goes(completed: Path, tmp_path: Path) -> None:
+    data = (completed / "log.jsonl").read_bytes()
+    lines = data.splitlines(keepends=True)
+    log = tmp_path / "log.jsonl"
+    log.write_bytes(lines[0][:100])
+    live = LiveFlight(log, ())
+    assert not live.update()
+    assert isinstance(live.report(MADE_US), Refusal)
+    log.write_bytes(b"".join(lines[:9]) + lines[9][:20])
+    assert live.update()
+    found = live.report(MADE_US)
+    assert isinstance(found, FlightReport)
+    assert (len(found.records), found.verdict, found.ending) == (9, "growing", "flying")
+    assert not live.closed
+    log.write_bytes(data)
+    (tmp_path / "telemetry.tlog").write_bytes((completed / "telemetry.tlog").read_bytes())
+    assert live.update()
+    assert live.closed
+    found = live.report(MADE_US)
+    assert isinstance(found, FlightReport)
+    whole = report_of(completed).report
+    assert found.timeline == whole.timeline
+    assert found.decisions == whole.decisions
+    assert "Not verified yet" in found.verified

@@ -1,0 +1,135 @@
+"""`rtshcua report`: pages, a logbook, and every wrong input."""
+
+import io
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from rtshcua.diagnostics.exits import ExitCode
+from rtshcua.front.cli.app import main
+from virtual import flight_reports
+
+ROOT = ["--root", flight_reports.PIN.key.hex()]
+AT = ["--at", "2026-01-31T08:00:00Z"]
+
+
+class Terminal(io.StringIO):
+    """A standard output that is a terminal."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("report")
+    flight_reports.completed(folder / "runs" / "a")
+    flight_reports.turned(folder / "runs" / "b")
+    return folder / "runs"
+
+
+@pytest.fixture(autouse=True)
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_page_is_written(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["report", str(runs / "a"), "-o", "page.html", *ROOT, *AT]) == ExitCode.OK
+    assert "verified, completed: written to page.html" in capsys.readouterr().out
+    assert "The mission was completed." in Path("page.html").read_text(encoding="utf-8")
+
+
+def test_page_goes_to_a_pipe_and_to_a_file_of_its_run_on_a_terminal(
+    runs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert main(["report", str(runs / "a" / "log.jsonl"), *ROOT, *AT]) == ExitCode.OK
+    piped = capsys.readouterr().out
+    assert piped.startswith("<!DOCTYPE html>")
+    monkeypatch.setattr(sys, "stdout", Terminal())
+    assert main(["report", str(runs / "a"), *ROOT, *AT]) == ExitCode.OK
+    assert Path("a.html").read_text(encoding="utf-8") == piped
+
+
+def test_folder_as_target_gets_a_page_with_the_name_of_the_run(runs: Path, here: Path) -> None:
+    (here / "pages").mkdir()
+    assert main(["report", str(runs / "a"), "-o", "pages", *ROOT]) == ExitCode.OK
+    assert (here / "pages" / "a.html").is_file()
+
+
+def test_several_flights_make_a_logbook(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["report", str(runs), "-o", "book", *ROOT, *AT]) == ExitCode.OK
+    assert sorted(each.name for each in Path("book").iterdir()) == ["a.html", "b.html", "index.html"]
+    index = Path("book/index.html").read_text(encoding="utf-8")
+    assert index.count("<tr>") == 3  # the head, and one for each
+    assert 'href="a.html"' in index
+    assert "1 of 2" in index  # missions completed
+    capsys.readouterr()
+
+
+def test_json_has_the_content_of_each_page(runs: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["report", str(runs), "-o", "book", "--json", *ROOT]) == ExitCode.OK
+    found = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [each["page"] for each in found] == ["book/a.html", "book/b.html"]
+    assert [each["ending"] for each in found] == ["completed", "aborted"]
+    assert main(["report", str(runs / "a"), "--json", *ROOT]) == ExitCode.OK
+    (line,) = capsys.readouterr().out.splitlines()
+    assert json.loads(line)["page"] is None
+
+
+def test_exit_code_is_that_of_the_verification(runs: Path, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    data = (runs / "a" / "log.jsonl").read_bytes()
+    Path("cut.jsonl").write_bytes(data[: data.rindex(b'{"_prev"')])
+    assert main(["report", "cut.jsonl", "-o", "cut.html", *ROOT]) == ExitCode.INCOMPLETE
+    Path("bad.jsonl").write_bytes(data.replace(b'"admitted"', b'"admitteD"', 1))
+    assert main(["report", "bad.jsonl", "-o", "bad.html", *ROOT]) == ExitCode.EVIDENCE
+    assert main(["report", str(runs / "a"), "-o", "a.html", "--root", "00" * 32]) == ExitCode.UNTRUSTED
+    assert 'class="said failed"' in Path("bad.html").read_text(encoding="utf-8")
+    assert main(["report", str(runs / "a"), "bad.jsonl", "-o", "book", *ROOT]) == ExitCode.EVIDENCE
+    assert Path("book/bad.html").is_file()
+
+
+def test_redacted_page(runs: Path) -> None:
+    assert main(["report", str(runs / "a"), "-o", "r.html", "--redact", "position,names", *ROOT]) == ExitCode.OK
+    text = Path("r.html").read_text(encoding="utf-8")
+    assert "not a record" in text
+    assert "quad-07" not in text
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "told"),
+    [
+        (["missing"], ExitCode.INPUT, "missing"),
+        (["empty"], ExitCode.INPUT, "log.jsonl"),
+        (["text.txt"], ExitCode.INPUT, "not a log"),
+        (["RUN", "--redact", "everything"], ExitCode.USAGE, "accepted: `position`, `names`"),
+        (["RUN", "--tiles", "http://tiles.example/{z}/{x}/{y}.png"], ExitCode.USAGE, "accepted: an https address"),
+        (["RUN", "--tiles", "https://tiles.example/{z}/{x}.png"], ExitCode.USAGE, "accepted: an https address"),
+        (["RUN", "--tiles", "https://a.b/{z}/{x}/{y}; script-src *"], ExitCode.USAGE, "accepted: an https address"),
+        (["RUN", "--at", "yesterday"], ExitCode.USAGE, "is not a UTC time"),
+        (["RUN", "-o", "no/such/page.html"], ExitCode.INPUT, "there is no folder"),
+        (["RUN", "-o", "RUN/log.jsonl"], ExitCode.USAGE, "is not overwritten"),
+        (["RUN", "RUN2", "-o", "text.txt"], ExitCode.USAGE, "is a file"),
+        (["RUN", "--root", "nothing.trust"], ExitCode.INPUT, "nothing.trust"),
+    ],
+)
+def test_wrong_input(
+    runs: Path, here: Path, capsys: pytest.CaptureFixture[str], words: list[str], code: ExitCode, told: str
+) -> None:
+    Path("text.txt").write_text("no log\n")
+    Path("empty").mkdir()
+    named = [each.replace("RUN2", str(runs / "b")).replace("RUN", str(runs / "a")) for each in words]
+    root = [] if "--root" in named else ROOT
+    assert main(["report", *named, *root]) == code
+    captured = capsys.readouterr()
+    assert told in captured.err.replace("\n  ", " ")
+    assert "Traceback" not in captured.err
+    assert sorted(each.name for each in here.iterdir()) == ["empty", "text.txt"]
+
+
+def test_log_is_not_overwritten(runs: Path) -> None:
+    before = (runs / "a" / "log.jsonl").read_bytes()
+    assert main(["report", str(runs / "a"), "-o", str(runs / "a" / "log.jsonl"), *ROOT]) != ExitCode.OK
+    assert (runs / "a" / "log.jsonl").read_bytes() == before

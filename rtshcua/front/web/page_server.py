@@ -1,0 +1,126 @@
+"""Serves one page on the loopback interface, to whoever knows its token: the path of its address.
+
+Another user or a page from elsewhere does not know the token. A page from elsewhere that made its own name resolve to
+this machine sends that name as `Host`, and is refused. Nothing can be changed by a request.
+"""
+
+import secrets
+import threading
+from collections.abc import Callable
+from hashlib import sha256
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Final, NamedTuple
+
+_HOST: Final = "127.0.0.1"
+#: how long a client may take over its request, s
+_PATIENCE_S: Final = 10.0
+_MOST_CLIENTS: Final = 16
+#: how often the end is looked for, s
+_POLL_S: Final = 0.1
+
+
+class ServedPage(NamedTuple):
+    """A page and its tag, which changes with its content."""
+
+    data: bytes
+    tag: str
+
+
+def served(text: str) -> ServedPage:
+    """A page with the tag of its content."""
+    data = text.encode("utf-8")
+    return ServedPage(data, f'"{sha256(data).hexdigest()[:32]}"')
+
+
+class PageServer:
+    """Serves what `page` returns, in threads of its own. Raises OSError where the port is taken."""
+
+    def __init__(self, page: Callable[[], ServedPage], port: int = 0) -> None:
+        token = secrets.token_urlsafe(24)
+        self._server = _Server((_HOST, port), _Handler)
+        self._server.page, self._server.path = page, f"/{token}/"
+        taken = self._server.server_address[1]
+        self._server.hosts = {f"{_HOST}:{taken}", f"localhost:{taken}"}
+        #: the address for a browser
+        self.address = f"http://{_HOST}:{taken}/{token}/"
+        self._thread = threading.Thread(target=self._server.serve_forever, args=(_POLL_S,), name="page", daemon=True)
+
+    def __enter__(self) -> "PageServer":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._server.shutdown()
+        self._server.server_close()
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+    request_queue_size = 64
+    page: Callable[[], ServedPage]
+    path: str
+    hosts: set[str]
+
+    def __init__(self, address: tuple[str, int], handler: type[BaseHTTPRequestHandler]) -> None:
+        super().__init__(address, handler)
+        self.free = threading.BoundedSemaphore(_MOST_CLIENTS)
+
+    def process_request(self, request, client_address) -> None:  # type: ignore[no-untyped-def]
+        if not self.free.acquire(blocking=False):
+            self.shutdown_request(request)
+            return
+        super().process_request(request, client_address)
+
+    def process_request_thread(self, request, client_address) -> None:  # type: ignore[no-untyped-def]
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self.free.release()
+
+    def handle_error(self, request: object, client_address: object) -> None:
+        """A client that goes away is no fault."""
+
+
+class _Handler(BaseHTTPRequestHandler):
+    server: _Server
+    server_version = "rtshcua"
+    sys_version = ""
+    timeout = _PATIENCE_S
+
+    def do_GET(self) -> None:
+        self._answer(with_body=True)
+
+    def do_HEAD(self) -> None:
+        self._answer(with_body=False)
+
+    def _answer(self, *, with_body: bool) -> None:
+        known = secrets.compare_digest(self.path.encode("utf-8", "replace"), self.server.path.encode())
+        if self.headers.get("Host") not in self.server.hosts or not known:
+            self.send_error(HTTPStatus.NOT_FOUND)
+            return
+        page = self.server.page()
+        same = self.headers.get("If-None-Match") == page.tag
+        self.send_response(HTTPStatus.NOT_MODIFIED if same else HTTPStatus.OK)
+        self.send_header("ETag", page.tag)
+        for name, value in _HEADERS:
+            self.send_header(name, value)
+        if not same:
+            self.send_header("Content-Type", "text/html; charset=utf-8")
+            self.send_header("Content-Length", str(len(page.data)))
+        self.end_headers()
+        if with_body and not same:
+            self.wfile.write(page.data)
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Nothing: the token would be in it."""
+
+
+_HEADERS: Final = (
+    ("Cache-Control", "no-store"),
+    ("Referrer-Policy", "no-referrer"),
+    ("X-Content-Type-Options", "nosniff"),
+    ("X-Frame-Options", "DENY"),
+    ("Cross-Origin-Resource-Policy", "same-origin"),
+    ("Cross-Origin-Opener-Policy", "same-origin"),
+)

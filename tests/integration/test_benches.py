@@ -45,6 +45,7 @@ SAMPLES: dict[str, dict[str, Any]] = {
     "reaction": {"PROCESSES": 1, "IN_PROCESS": 2, "QUICK": 2, "MUTE": 1},
     "recall": {"RECALLS": 1, "RESTARTS": 1, "FLAVOURS": ("px4",)},
     "recorded_flights": {},
+    "report": {"LEGS": 2, "RUNS": 1, "CHROMIUM": None},
     "startup": {"ROUNDS": 1, "COMMANDS": (("--help",), ("check", "missions/short.rts"))},
     "verify": {"RECORDS": 300, "ROUNDS": 1},
     "virtual_time": {"NAMES": ("short",), "MANY": "short", "FRAMES": 5, "MANY_FRAMES": 5, "ROUNDS": 1},

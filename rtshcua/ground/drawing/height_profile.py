@@ -293,7 +293,7 @@ def _planned(
     for each in refused.left:
         at = _along(each, legs, line)
         if at is not None:
-            marks.append(DrawnMark(*axes.point(*at), "left", f"step {each.step} leaves the airspace"))
+            marks.append(DrawnMark(*axes.point(*at), "left", f"step {each.number} leaves the airspace"))
     stops: dict[tuple[float, float], list[int]] = {}
     at_end = drawn[0]
     for step in way.steps:
@@ -314,7 +314,7 @@ def _along(left: LeftAirspace, legs: Sequence[PlannedLeg], line: Sequence[_Place
     """The distance along the way and the height of a place of a step: on the leg that comes nearest to it."""
     found = []
     for leg, (begin, end) in zip(legs, pairwise(line), strict=True):
-        if leg.step.number == left.step:
+        if leg.step.number == left.number:
             x, y, length = leg.end.x - leg.begin.x, leg.end.y - leg.begin.y, end.along - begin.along
             part = 0.0 if not length else ((left.x - leg.begin.x) * x + (left.y - leg.begin.y) * y) / length**2
             part = min(max(part, 0.0), 1.0)

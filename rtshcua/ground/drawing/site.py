@@ -136,9 +136,9 @@ class PlannedLeg(NamedTuple):
 
 
 class LeftAirspace(NamedTuple):
-    """The first place of a step that is outside the airspace."""
+    """The first place of a step, by its number, that is outside the airspace."""
 
-    step: int
+    number: int
     x: int
     y: int
 

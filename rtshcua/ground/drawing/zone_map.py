@@ -400,7 +400,7 @@ def _drawn_way(on: Canvas, site: Site, shown: _MapWay) -> _DrawnWay:
     tracks = () if flown is None else tuple([on.at(each.x, each.y) for each in part] for part in flown.parts)
     marks = [] if flown is None else [DrawnMark(*on.at(each.x, each.y), each.kind, each.label) for each in flown.marks]
     marks += [
-        DrawnMark(*on.at(each.x, each.y), "left", f"step {each.step} leaves the airspace") for each in refused.left
+        DrawnMark(*on.at(each.x, each.y), "left", f"step {each.number} leaves the airspace") for each in refused.left
     ]
     failed = tuple(_failed(on, legs, refused.steps))
     way = _DrawnWay(

@@ -26,7 +26,7 @@ ALLOWED = {
     "front/cli/unlock.py": "a passphrase may well come from a pipe",
     "ground/checker/time_zones.py": "reads the data of the package `tzdata`",
     "ground/drawing/html.py": "reads the templates that ship",
-    "ground/flight/report_page.py": "reads the scripts that ship",
+    "ground/flight/flight_page.py": "reads the scripts that ship",
     "ground/flight/embedding.py": "reads the scripts that ship",
     "ground/language/generate.py": "a developer's tool: from the grammar to its table",
     "ground/language/table.py": "reads the table that ships",

@@ -8,8 +8,8 @@ from msgspec.structs import replace
 
 from reference.forgery import edit, signed
 from reference.html_outline import Outline
+from rtshcua.ground.flight.flight_page import page
 from rtshcua.ground.flight.logbook_page import LogbookEntry, logbook_page
-from rtshcua.ground.flight.report_page import page
 from virtual import case, flight_reports, run_folder
 from virtual.flight_reports import report_of
 

@@ -11,7 +11,7 @@ from reference.forgery import edit, signed
 from reference.kept_frames import Entries, kept
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
-from rtshcua.app.flights import export as service
+from rtshcua.app.flights import flight_export as service
 from rtshcua.app.flights.flight_reading import read_flight
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.flight.export.exported import FlightExport, ToldRecord, with_usable_track

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from rtshcua import __version__
-from rtshcua.adapters.autopilot_log.reading import ReadFile, read_autopilot_log
+from rtshcua.adapters.autopilot_log.limited_reading import ReadFile, read_autopilot_log
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.runs import TELEMETRY

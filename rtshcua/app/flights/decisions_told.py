@@ -7,12 +7,12 @@ from rtshcua.app.logged_decision import LinkExplained, StepExplained, explained
 from rtshcua.app.prepared_mission import Subject, after
 from rtshcua.app.telling import words
 from rtshcua.app.telling.people import People
-from rtshcua.app.telling.records import Names
+from rtshcua.app.telling.records_told import Names
 from rtshcua.decision.values import TRUE
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.records import DecisionRecord, Effect
 from rtshcua.ground.editor.keyword_help import REASONS
-from rtshcua.ground.flight.report_content import DecisionView, ReadSignal
+from rtshcua.ground.flight.flight_content import DecisionView, ReadSignal
 from rtshcua.ground.why.logged_decisions import context_of, state_of
 from rtshcua.ground.why.trace import ReadValue, read_values
 from rtshcua.model.decision import Decisive

@@ -18,7 +18,7 @@ from rtshcua.evidence.finding import Flaw
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import Close
 from rtshcua.ground.flight.embedding import MOST_OCTETS, embed, redact
-from rtshcua.ground.flight.report_content import FlightReport, GapView
+from rtshcua.ground.flight.flight_content import FlightReport, GapView
 
 #: the most letters of an embedded log
 _MOST_EMBEDDED: Final = 4 << 20

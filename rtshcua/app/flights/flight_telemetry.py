@@ -7,7 +7,14 @@ from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.vehicle.telemetry import Telemetry
 from rtshcua.app.sidecar_files import SENDER_AND_NUMBER
 from rtshcua.codec.frames import Codec, ReceivedFrame, kind_of
-from rtshcua.ground.flight.flown import FlightTelemetry, GeoPlace, SignalSeries, Silence, TrackPoint, VehicleText
+from rtshcua.ground.flight.flown import (
+    FlightTelemetry,
+    GeoPlace,
+    SignalSeries,
+    TelemetrySilence,
+    TrackPoint,
+    VehicleText,
+)
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.layouts import GLOBAL_POSITION_INT, HEARTBEAT, STATUSTEXT
 from rtshcua.mavlink.tlog import DamagedTlog, TlogEntry, stream
@@ -76,7 +83,7 @@ class TelemetryReading:
         self._ground: int | None = None
         self._home: GeoPlace | None = None
         self._texts: list[VehicleText] = []
-        self._silences: list[Silence] = []
+        self._silences: list[TelemetrySilence] = []
         self._boot: list[tuple[int, int]] = []
 
     def follow(self, path: Path) -> bool:
@@ -104,7 +111,7 @@ class TelemetryReading:
                 return
             due_us = 0
         if at_us - self._heard_us > SILENT_US and self._reports:
-            self._silences.append(Silence(self._heard_us - self._begun_us, at_us - self._begun_us))
+            self._silences.append(TelemetrySilence(self._heard_us - self._begun_us, at_us - self._begun_us))
         self._heard_us = at_us
         self._reports += 1
         if at_us >= due_us:

@@ -20,24 +20,24 @@ from rtshcua.app.prepared_mission import Subject, prepared
 from rtshcua.app.sidecar_files import run_folder
 from rtshcua.app.telling import words
 from rtshcua.app.telling.people import People
-from rtshcua.app.telling.records import Names
+from rtshcua.app.telling.records_told import Names
 from rtshcua.app.wording import many, true_to, utc
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.log_writer import origin_of
 from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Genesis
 from rtshcua.evidence.report import LogReport, LogVerdict
 from rtshcua.ground.drawing.flat_site import site_of, way_of
-from rtshcua.ground.flight.flown import Flight
-from rtshcua.ground.flight.report_content import (
-    BoundLog,
+from rtshcua.ground.flight.flight_content import (
+    AutopilotLogView,
     FlightReport,
     GapView,
-    RecordLine,
-    SignalView,
+    ListedRecord,
+    SignalCurve,
     SummaryLine,
     TimelineEvent,
     TrackView,
 )
+from rtshcua.ground.flight.flown import Flight
 from rtshcua.model.flat.signal import POSITION
 from rtshcua.model.step_number import step_words
 from rtshcua.wire.autopilot_binding import AutopilotBinding
@@ -101,7 +101,7 @@ class CollectedFlight:
         self.cause = LoggedDecision(log, None, self._names_of, self._subject_of)
         self.names: Names | None = None
         self.decisions: DecisionWords | None = None
-        self.told: list[RecordLine] = []
+        self.told: list[ListedRecord] = []
         self.left_out = 0
         self.log, self._sources = log, sources
         self._start_us = 0
@@ -165,7 +165,7 @@ class CollectedFlight:
         if len(self.told) >= _MOST_RECORDS:
             self.left_out += 1
         elif self.names is not None:
-            self.told.append(RecordLine(record.seq, record.at_us - self._start_us, self.names.tell(record).strip()))
+            self.told.append(ListedRecord(record.seq, record.at_us - self._start_us, self.names.tell(record).strip()))
 
 
 class FlightTelling:
@@ -403,22 +403,22 @@ class FlightTelling:
         told = f"{self._names.subject(record.kind, record.step, record.link)}: {how}"
         return TimelineEvent(lane, from_us, to_us, "step" if record.kind == STEP else "link", told, record.seq)
 
-    def _bound(self) -> Iterator[BoundLog]:
+    def _bound(self) -> Iterator[AutopilotLogView]:
         """The autopilot's logs that are bound to this flight."""
         folder = run_folder(self._log)
         for found in () if folder is None else read_bindings(folder):
             if isinstance(found.content, AutopilotBinding):
                 binding = found.content
                 whole = binding.compared == binding.points and not binding.deviations
-                yield BoundLog(described(binding), agreed(binding), "" if whole else apart(binding))
+                yield AutopilotLogView(described(binding), agreed(binding), "" if whole else apart(binding))
 
-    def _signals(self) -> tuple[SignalView, ...]:
+    def _signals(self) -> tuple[SignalCurve, ...]:
         telemetry = self._flight.telemetry
         if telemetry is None:
             return ()
         limits = signal_limits(self._flight.policy, self._flight.mission)
         slots = {each.name: each.slot for each in self._flight.policy.signals if each.kind != POSITION}
-        return tuple(SignalView(each, limits.get(slots[each.name], ())) for each in telemetry.signals)
+        return tuple(SignalCurve(each, limits.get(slots[each.name], ())) for each in telemetry.signals)
 
     def _gaps(self) -> tuple[GapView, ...]:
         flight, report, telemetry = self._flight, self._report, self._flight.telemetry

@@ -14,9 +14,9 @@ from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.reading import read
 from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Recover, Seal
+from rtshcua.ground.flight.flight_content import FlightReport, ListedRecord, TrackView
+from rtshcua.ground.flight.flight_page import own_words
 from rtshcua.ground.flight.flown import Flight, TrackPoint
-from rtshcua.ground.flight.report_content import FlightReport, RecordLine, TrackView
-from rtshcua.ground.flight.report_page import own_words
 
 #: what can be removed, in the order in which a page names it
 REDACTABLE: Final = ("position", "names")
@@ -128,7 +128,7 @@ def _is_place(value: str) -> bool:
     return _COORDINATE.search(value) is not None
 
 
-def _bare(record: AnyRecord, start_us: int) -> RecordLine:
+def _bare(record: AnyRecord, start_us: int) -> ListedRecord:
     """A record without its details."""
     if isinstance(record, DecisionRecord):
         told = f"decision: {record.outcome}, {record.reason}"
@@ -136,7 +136,7 @@ def _bare(record: AnyRecord, start_us: int) -> RecordLine:
         told = f"effect: {record.event}"
     else:
         told = record.type
-    return RecordLine(record.seq, record.at_us - start_us, told)
+    return ListedRecord(record.seq, record.at_us - start_us, told)
 
 
 def _placeholders(flight: Flight, persons: Iterable[str]) -> Iterator[tuple[str, str]]:

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from rtshcua.decision.tree import AtMost, Both, CodeScope, Either, Negation, Node, parse, scope_of
-from rtshcua.ground.flight.report_content import SignalLimit
+from rtshcua.ground.flight.flight_content import SignalLimit
 from rtshcua.model.flat.code import Clause
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy, RuleKind

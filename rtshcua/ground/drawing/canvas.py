@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from math import isqrt
 
 from rtshcua.diagnostics.excerpt import visible
-from rtshcua.ground.drawing.site import ZoneOutline
+from rtshcua.ground.drawing.drawn_site import ZoneOutline
 from rtshcua.model.quantity import Dimension, display
 
 #: px

@@ -4,7 +4,7 @@ from math import isqrt
 from typing import Final
 
 from rtshcua.decision.outline import rings
-from rtshcua.ground.drawing.site import FlightMargins, PlannedStep, PlannedWay, Site, ZoneOutline, ZoneView
+from rtshcua.ground.drawing.drawn_site import FlightMargins, PlannedStep, PlannedWay, Site, ZoneOutline, ZoneView
 from rtshcua.model.flat.code import Op
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission

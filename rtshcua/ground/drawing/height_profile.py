@@ -22,8 +22,7 @@ from rtshcua.ground.drawing.canvas import (
     hatching,
     told_distance,
 )
-from rtshcua.ground.drawing.flat_site import told_band
-from rtshcua.ground.drawing.site import (
+from rtshcua.ground.drawing.drawn_site import (
     NOT_REFUSED,
     FlownWay,
     LeftAirspace,
@@ -35,6 +34,7 @@ from rtshcua.ground.drawing.site import (
     ZoneView,
     planned_legs,
 )
+from rtshcua.ground.drawing.flat_site import told_band
 from rtshcua.ground.drawing.zone_map import (
     AT_TIMES,
     ZONE_KEYS,

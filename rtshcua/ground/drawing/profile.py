@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from rtshcua.ground.drawing.canvas import LETTER, ROUND, WIDTH, LabelBox, hatching
-from rtshcua.ground.drawing.site import Site, ZoneView
+from rtshcua.ground.drawing.drawn_site import Site, ZoneView
 from rtshcua.model.quantity import Dimension, display
 
 #: px

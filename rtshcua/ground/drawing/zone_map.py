@@ -27,7 +27,7 @@ from rtshcua.ground.drawing.canvas import (
     path_on_page,
     told_distance,
 )
-from rtshcua.ground.drawing.site import (
+from rtshcua.ground.drawing.drawn_site import (
     NOT_REFUSED,
     FlownWay,
     PlannedLeg,

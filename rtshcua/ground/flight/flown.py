@@ -59,7 +59,7 @@ class VehicleText(NamedTuple):
     text: str
 
 
-class Silence(NamedTuple):
+class TelemetrySilence(NamedTuple):
     """A time without a report of the autopilot's position, signals or state in the telemetry."""
 
     from_us: int
@@ -77,7 +77,7 @@ class FlightTelemetry(NamedTuple):
     home: GeoPlace | None
     signals: tuple[SignalSeries, ...]
     texts: tuple[VehicleText, ...]
-    silences: tuple[Silence, ...]
+    silences: tuple[TelemetrySilence, ...]
     boot_us: tuple[tuple[int, int], ...]
     damaged: int | None
 

@@ -6,8 +6,8 @@ from typing import Final, NamedTuple
 from markupsafe import Markup
 
 from rtshcua.ground.drawing.html import rendered
-from rtshcua.ground.flight.report_content import FlightReport
-from rtshcua.ground.flight.report_page import PACKAGE, content_policy, script
+from rtshcua.ground.flight.flight_content import FlightReport
+from rtshcua.ground.flight.flight_page import PACKAGE, content_policy, script
 
 _VERDICTS: Final = ("verified", "incomplete", "failed")
 

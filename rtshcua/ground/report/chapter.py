@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 
+from rtshcua.ground.drawing.drawn_site import PlaceView, ZoneView
 from rtshcua.ground.drawing.flat_site import (
     ALLOWED,
     FORBIDDEN,
@@ -12,7 +13,6 @@ from rtshcua.ground.drawing.flat_site import (
     margins_of,
     places,
 )
-from rtshcua.ground.drawing.site import PlaceView, ZoneView
 from rtshcua.ground.lower.policy import LoweredPolicy
 from rtshcua.ground.lower.policy_checks import applies, rule_applies
 from rtshcua.ground.lower.zones import derived_name

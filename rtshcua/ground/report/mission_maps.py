@@ -12,11 +12,11 @@ from rtshcua.decision.zones import PreparedZone
 from rtshcua.diagnostics.codes import Severity
 from rtshcua.diagnostics.diagnostic import Diagnostic
 from rtshcua.diagnostics.span import Source
+from rtshcua.ground.drawing.drawn_site import LeftAirspace, PlannedLeg, RefusedParts, planned_legs
 from rtshcua.ground.drawing.flat_site import site_of, way_of
 from rtshcua.ground.drawing.height_profile import HeightProfile, planned_heights
 from rtshcua.ground.drawing.html import rendered
 from rtshcua.ground.drawing.picture import PictureSheet, picture
-from rtshcua.ground.drawing.site import LeftAirspace, PlannedLeg, RefusedParts, planned_legs
 from rtshcua.ground.drawing.zone_map import ZoneMap, mission_map
 from rtshcua.ground.pipeline.program import PlannedMission
 from rtshcua.ground.report.chapter import elevation_of, mission_view

@@ -6,7 +6,7 @@ vehicle's home.
 
 from dataclasses import dataclass
 
-from rtshcua.ground.drawing.site import FlightMargins, PlannedStep, PlannedWay, Site, ZoneView
+from rtshcua.ground.drawing.drawn_site import FlightMargins, PlannedStep, PlannedWay, Site, ZoneView
 from rtshcua.model.flat.contract import MotionKind
 
 

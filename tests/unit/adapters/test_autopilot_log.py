@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from reference import dataflash_writer as df
 from reference import ulog_writer as ul
 from reference.autopilot_logs import ardupilot_log, px4_log
-from rtshcua.adapters.autopilot_log import reading
-from rtshcua.adapters.autopilot_log.reading import ReadFile, read_autopilot_log
+from rtshcua.adapters.autopilot_log import limited_reading as reading
+from rtshcua.adapters.autopilot_log.limited_reading import ReadFile, read_autopilot_log
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.flight.autopilot_log import AutopilotLogKind, AutopilotPoint, LogCondition, UtcOfBoot

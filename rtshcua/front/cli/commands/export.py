@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from rtshcua.adapters.store.writing import write_out
-from rtshcua.app.flights import export as service
-from rtshcua.app.flights.export import ExportedFile, ExportRequest
+from rtshcua.app.flights import flight_export as service
+from rtshcua.app.flights.flight_export import ExportedFile, ExportRequest
 from rtshcua.app.wording import many
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal

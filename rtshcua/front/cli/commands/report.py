@@ -24,7 +24,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.faults import fail, refuse, say
 from rtshcua.front.cli.render.progress import octets_of
 from rtshcua.front.cli.stdout import out, out_json, out_rendered
-from rtshcua.ground.flight.report_content import FlightReport, as_plain
+from rtshcua.ground.flight.flight_content import FlightReport, as_plain
 
 app = typer.Typer(add_completion=False)
 
@@ -198,7 +198,7 @@ def _reported(request: FlightReportRequest) -> ReportedFlight | Refusal:
 
 
 def _written(found: ReportedFlight, target: Path | None, tiles: str) -> str | Refusal:
-    from rtshcua.ground.flight.report_page import page
+    from rtshcua.ground.flight.flight_page import page
 
     gc.freeze()  # what is there stays until the end: looking through it again and again takes a third of the time
     text = page(found.report, tiles=tiles)

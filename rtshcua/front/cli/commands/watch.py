@@ -17,7 +17,7 @@ from rtshcua.front.cli.faults import fail, refuse, say
 from rtshcua.front.cli.interrupts import StopRequest
 from rtshcua.front.cli.stdout import out, out_json
 from rtshcua.front.web.page_server import PageServer, ServedPage, served
-from rtshcua.ground.flight.report_content import FlightReport
+from rtshcua.ground.flight.flight_content import FlightReport
 
 app = typer.Typer(add_completion=False)
 
@@ -91,7 +91,7 @@ class _WatchedPage:
 
     def current(self) -> ServedPage:
         """The page as it is now."""
-        from rtshcua.ground.flight.report_page import page
+        from rtshcua.ground.flight.flight_page import page
 
         with self._lock:
             if self._page is None:

@@ -23,7 +23,7 @@ from rtshcua.ground.flight.export.exported import (
     shown,
     utc_text,
 )
-from rtshcua.ground.flight.export.shapes import Area, Ring, ZoneShape, cut_line, planned_path, zone_shapes
+from rtshcua.ground.flight.export.geo_shapes import GeoArea, Ring, ZoneShape, cut_line, planned_path, zone_shapes
 from rtshcua.ground.flight.export.xml_text import add, document
 
 #: colours as aabbggrr: of the track, the planned path, zones to stay inside, zones to stay outside, and other zones
@@ -174,7 +174,9 @@ def _band(zone: ZoneShape, home: HomeHeight) -> str:
     return f"{low}to {height(zone.ceiling)}" if zone.ceiling is not None else f"{low}without a ceiling"
 
 
-def _polygons(parent: Element, areas: Iterable[Area], height: int | None, home: HomeHeight, *, extruded: bool) -> None:
+def _polygons(
+    parent: Element, areas: Iterable[GeoArea], height: int | None, home: HomeHeight, *, extruded: bool
+) -> None:
     """Polygons at a height in mm above home; on the ground if it is None."""
     if height is None:
         mode, above = "clampToGround", None

@@ -10,8 +10,8 @@ from rtshcua.app.flights.flight_report import FlightReportRequest, LiveFlight, f
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.flight.embedding import extract
-from rtshcua.ground.flight.report_content import FlightReport, as_plain
-from rtshcua.ground.flight.report_page import page
+from rtshcua.ground.flight.flight_content import FlightReport, as_plain
+from rtshcua.ground.flight.flight_page import page
 from virtual import case
 from virtual.flight_reports import MADE_US, PIN, report_of
 

@@ -16,8 +16,8 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.evidence.merkle import MerkleTree, leaf_hash
 from rtshcua.evidence.note import octets
 from rtshcua.ground.flight.embedding import extract
-from rtshcua.ground.flight.report_content import FlightReport, as_plain
-from rtshcua.ground.flight.report_page import page
+from rtshcua.ground.flight.flight_content import FlightReport, as_plain
+from rtshcua.ground.flight.flight_page import page
 from virtual.flight_reports import report_of
 
 #: a place in degrees, in every way that our texts and records write it

@@ -12,9 +12,9 @@ from reference.browser import AXE, CHROMIUM, OpenPage, layout, opened, running
 from rtshcua.app.flights.flight_report import LiveFlight
 from rtshcua.front.web.page_server import PageServer, served
 from rtshcua.ground.flight.embedding import embed, extract
+from rtshcua.ground.flight.flight_content import FlightReport
+from rtshcua.ground.flight.flight_page import page
 from rtshcua.ground.flight.logbook_page import LogbookEntry, logbook_page
-from rtshcua.ground.flight.report_content import FlightReport
-from rtshcua.ground.flight.report_page import page
 from virtual.flight_reports import MADE_US, PIN, report_of
 
 WIDTHS = [390, 820, 1280]

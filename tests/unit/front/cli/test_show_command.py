@@ -15,7 +15,7 @@ from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.writing import write_new
 from rtshcua.app.telling import words
-from rtshcua.app.telling.records import detail_of
+from rtshcua.app.telling.records_told import detail_of
 from rtshcua.app.wording import shorten, utc
 from rtshcua.diagnostics.excerpt import visible
 from rtshcua.diagnostics.exits import ExitCode

@@ -6,8 +6,8 @@ import pytest
 from msgspec.structs import replace
 
 from rtshcua.app.programs import compile_sources
+from rtshcua.ground.drawing.drawn_site import FlightMargins, PlannedLeg, PlannedStep, PlannedWay, Site, planned_legs
 from rtshcua.ground.drawing.flat_site import site_of, told_band, way_of
-from rtshcua.ground.drawing.site import FlightMargins, PlannedLeg, PlannedStep, PlannedWay, Site, planned_legs
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.policy import Policy

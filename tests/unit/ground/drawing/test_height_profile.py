@@ -7,8 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.ground.drawing.canvas import contains
-from rtshcua.ground.drawing.height_profile import HeightProfile, flown_heights, inside, planned_heights, told_time
-from rtshcua.ground.drawing.site import (
+from rtshcua.ground.drawing.drawn_site import (
     FlightMark,
     FlownPlace,
     FlownWay,
@@ -20,6 +19,7 @@ from rtshcua.ground.drawing.site import (
     ZoneOutline,
     ZoneView,
 )
+from rtshcua.ground.drawing.height_profile import HeightProfile, flown_heights, inside, planned_heights, told_time
 from rtshcua.model.flat.contract import MotionKind
 
 

@@ -9,10 +9,10 @@ from xml.etree import ElementTree as ET
 import pytest
 
 from rtshcua.app.programs import compile_sources
+from rtshcua.ground.drawing.drawn_site import FlightMark, FlownPlace, FlownWay, PlannedWay, Site
 from rtshcua.ground.drawing.flat_site import site_of, way_of
 from rtshcua.ground.drawing.height_profile import planned_heights
 from rtshcua.ground.drawing.picture import PictureSheet, picture
-from rtshcua.ground.drawing.site import FlightMark, FlownPlace, FlownWay, PlannedWay, Site
 from rtshcua.ground.drawing.zone_map import ZoneMap, mission_map
 
 MISSIONS = Path(__file__).resolve().parents[4] / "missions"

@@ -31,7 +31,7 @@ from reference.exported_flight import (
 )
 from rtshcua.ground.flight.export.csv_table import csv_table
 from rtshcua.ground.flight.export.exported import FlightExport
-from rtshcua.ground.flight.export.geojson import geojson
+from rtshcua.ground.flight.export.geojson_file import geojson
 from rtshcua.ground.flight.export.gpx import gpx
 from rtshcua.ground.flight.export.kml import kml
 from rtshcua.ground.flight.export.mcap_file import mcap_file

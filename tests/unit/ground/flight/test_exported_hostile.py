@@ -31,12 +31,12 @@ from rtshcua.ground.flight.export.exported import (
     utc_text,
     with_usable_track,
 )
-from rtshcua.ground.flight.export.geojson import geojson
+from rtshcua.ground.flight.export.geo_shapes import cut_line
+from rtshcua.ground.flight.export.geojson_file import geojson
 from rtshcua.ground.flight.export.gpx import gpx
 from rtshcua.ground.flight.export.kml import kml
 from rtshcua.ground.flight.export.mcap_file import mcap_file
 from rtshcua.ground.flight.export.qgc_plan import qgc_plan
-from rtshcua.ground.flight.export.shapes import cut_line
 from rtshcua.ground.flight.flown import TrackPoint, VehicleText
 from rtshcua.model.flat.zone import HALF_TURN, TURN
 

@@ -8,7 +8,7 @@ import pytest
 
 from reference.exported_flight import export_of, moved, run_in
 from reference.qgc_loader import load
-from rtshcua.app.flights import export as service
+from rtshcua.app.flights import flight_export as service
 from rtshcua.ground.flight.export.exported import FlightExport
 from rtshcua.ground.flight.export.qgc_plan import qgc_plan
 from rtshcua.mavlink import enums

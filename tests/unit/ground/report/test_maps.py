@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtshcua.ground.drawing.canvas import Canvas, LabelBox, canvas, contains, extent_of, hatching, path
+from rtshcua.ground.drawing.drawn_site import ZoneOutline, ZoneView
 from rtshcua.ground.drawing.profile import profiles
-from rtshcua.ground.drawing.site import ZoneOutline, ZoneView
 from rtshcua.ground.drawing.zone_map import ZoneMap, mission_map, zone_maps
 from rtshcua.ground.geometry.polygons import contained
 from rtshcua.ground.report.report_model import Chapter, PolicyReport

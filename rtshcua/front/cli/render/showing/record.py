@@ -9,7 +9,7 @@ from rtshcua.app.documents import claimed
 from rtshcua.app.fly.simulated_flight import SIMULATED
 from rtshcua.app.telling import words
 from rtshcua.app.telling.people import NOBODY, People
-from rtshcua.app.telling.records import Names, detail_of
+from rtshcua.app.telling.records_told import Names, detail_of
 from rtshcua.app.wording import true_to, utc
 from rtshcua.evidence.records import AnyRecord, Close, DecisionRecord, Effect, Genesis, Recover, Sealing, Signed
 from rtshcua.evidence.report import LogReport, LogVerdict

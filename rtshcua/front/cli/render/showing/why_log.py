@@ -5,7 +5,7 @@ from pathlib import Path
 from rtshcua.app.logged_decision import LoggedDecision, RecordLine, StepExplained, explained, read_decision
 from rtshcua.app.telling import words
 from rtshcua.app.telling.people import People
-from rtshcua.app.telling.records import Names
+from rtshcua.app.telling.records_told import Names
 from rtshcua.app.wording import utc
 from rtshcua.decision.prepare import PreparedInvocation
 from rtshcua.diagnostics.refusal import Refusal

@@ -35,7 +35,7 @@ Place = tuple[int, int]
 Ring = tuple[Place, ...]
 
 
-class Area(NamedTuple):
+class GeoArea(NamedTuple):
     """A polygon: its outer ring counter-clockwise, its holes clockwise; the first place is not repeated at the end."""
 
     outer: Ring
@@ -54,7 +54,7 @@ class ZoneShape(NamedTuple):
     ceiling: int | None
     radius: int | None
     timed: bool
-    areas: tuple[Area, ...]
+    areas: tuple[GeoArea, ...]
 
 
 def zone_shapes(policy: Policy) -> Iterator[ZoneShape]:
@@ -72,7 +72,7 @@ def zone_shapes(policy: Policy) -> Iterator[ZoneShape]:
         )
 
 
-def _areas(zone: Zone, projection: Projection) -> Iterator[Area]:
+def _areas(zone: Zone, projection: Projection) -> Iterator[GeoArea]:
     rings = [
         tuple(_unrolled(projection, x, y) for x, y in zip(ring[::2], ring[1::2], strict=True)) for ring in _rings(zone)
     ]
@@ -107,7 +107,7 @@ def _unrolled(projection: Projection, x: int, y: int) -> Place:
     return meridian(longitude, projection.longitude), max(-HALF_TURN // 2, min(latitude, HALF_TURN // 2))
 
 
-def cut_area(whole: Any) -> Iterator[Area]:
+def cut_area(whole: Any) -> Iterator[GeoArea]:
     """Polygons of shapely, whose longitudes may be beyond 180 degrees, as areas that are not."""
     west, _, east, _ = whole.bounds
     for turn in range(-1, 2):
@@ -119,7 +119,7 @@ def cut_area(whole: Any) -> Iterator[Area]:
         for each in get_parts(get_parts(part)):
             if each.geom_type == "Polygon" and each.area > 0:
                 oriented = orient(each)
-                yield Area(
+                yield GeoArea(
                     _places(oriented.exterior, turn * TURN),
                     tuple(_places(hole, turn * TURN) for hole in oriented.interiors),
                 )

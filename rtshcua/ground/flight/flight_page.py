@@ -15,9 +15,9 @@ from urllib.parse import urlsplit
 
 from markupsafe import Markup
 
+from rtshcua.ground.drawing.drawn_site import FlightMark, FlownPlace, FlownWay
 from rtshcua.ground.drawing.height_profile import flown_heights
 from rtshcua.ground.drawing.html import rendered
-from rtshcua.ground.drawing.site import FlightMark, FlownPlace, FlownWay
 from rtshcua.ground.drawing.time_charts import (
     ChartLimit,
     ChartLine,
@@ -34,7 +34,7 @@ from rtshcua.ground.drawing.time_charts import (
 )
 from rtshcua.ground.drawing.zone_map import ZoneMap, mission_map
 from rtshcua.ground.flight import embedding
-from rtshcua.ground.flight.report_content import LANES, FlightReport, SignalView
+from rtshcua.ground.flight.flight_content import LANES, FlightReport, SignalCurve
 from rtshcua.model.flat.zone import SHIFT, Projection
 from rtshcua.model.quantity import Dimension, display
 
@@ -167,7 +167,7 @@ def _scaled(points: Sequence[tuple[int, int | None]], divide: int) -> list[tuple
     return [(t_us, None if value is None else value / divide) for t_us, value in points]
 
 
-def _signal(view: SignalView, axis: TimeAxis) -> TimeChart:
+def _signal(view: SignalCurve, axis: TimeAxis) -> TimeChart:
     series = view.series
     unit, divide = _UNITS.get(series.dimension, ("", 1))
     points = _scaled(thinned(series.points, _MOST_POINTS), 1 if series.labels else divide)
@@ -247,7 +247,7 @@ def _plane(projection: Projection | None) -> dict[str, float]:
     }  # fmt: skip
 
 
-def _signal_data(view: SignalView) -> dict[str, object]:
+def _signal_data(view: SignalCurve) -> dict[str, object]:
     series = view.series
     unit, divide = _UNITS.get(series.dimension, ("", 1))
     points = thinned(series.points, _MOST_POINTS)

@@ -22,7 +22,7 @@ from rtshcua.ground.flight.export.exported import (
     shown,
     utc_text,
 )
-from rtshcua.ground.flight.export.shapes import Area, Ring, ZoneShape, cut_line, planned_path, zone_shapes
+from rtshcua.ground.flight.export.geo_shapes import GeoArea, Ring, ZoneShape, cut_line, planned_path, zone_shapes
 
 DATUM: Final = "WGS 84 positions without a height; heights are properties that name their datum"
 
@@ -129,7 +129,7 @@ def _zone(zone: ZoneShape) -> Feature:
     )
 
 
-def _rings(area: Area) -> list[list[list[float]]]:
+def _rings(area: GeoArea) -> list[list[list[float]]]:
     return [_ring(area.outer), *map(_ring, area.holes)]
 
 

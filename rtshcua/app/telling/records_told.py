@@ -7,7 +7,7 @@ from contextlib import suppress
 from rtshcua.adapters.utc import CLOCK
 from rtshcua.app.documents import Claimed, claimed, replaced
 from rtshcua.app.telling import words
-from rtshcua.app.telling.documents import recorded
+from rtshcua.app.telling.documents_told import recorded
 from rtshcua.app.telling.people import NOBODY, People
 from rtshcua.app.wording import many
 from rtshcua.evidence.finding import Flaw

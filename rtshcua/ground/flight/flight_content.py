@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any, Final, NamedTuple
 
-from rtshcua.ground.drawing.site import PlannedWay, Site
+from rtshcua.ground.drawing.drawn_site import PlannedWay, Site
 from rtshcua.ground.flight.flown import SignalSeries, TrackPoint
 from rtshcua.model.flat.zone import Projection
 
@@ -72,7 +72,7 @@ class SignalLimit(NamedTuple):
     told: str
 
 
-class SignalView(NamedTuple):
+class SignalCurve(NamedTuple):
     """A signal over time, with the limits that conditions of the policy compare it with."""
 
     series: SignalSeries
@@ -86,7 +86,7 @@ class GapView(NamedTuple):
     told: str
 
 
-class RecordLine(NamedTuple):
+class ListedRecord(NamedTuple):
     """A record of the log in words."""
 
     seq: int
@@ -101,7 +101,7 @@ class TrackView(NamedTuple):
     places: tuple[tuple[int, int], ...]
 
 
-class BoundLog(NamedTuple):
+class AutopilotLogView(NamedTuple):
     """The autopilot's own log, bound to this one: what it is, and whether its track agrees with ours, in words."""
 
     what: str
@@ -141,14 +141,14 @@ class FlightReport(NamedTuple):
     site: Site
     way: PlannedWay
     track: TrackView | None
-    bound: tuple[BoundLog, ...]
+    bound: tuple[AutopilotLogView, ...]
     timeline: tuple[TimelineEvent, ...]
     decisions: tuple[DecisionView, ...]
-    signals: tuple[SignalView, ...]
+    signals: tuple[SignalCurve, ...]
     gaps: tuple[GapView, ...]
     proven: tuple[str, ...]
     unproven: tuple[str, ...]
-    records: tuple[RecordLine, ...]
+    records: tuple[ListedRecord, ...]
     totals: Mapping[str, int]
     log: str
     redacted: tuple[str, ...]

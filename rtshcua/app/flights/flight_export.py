@@ -13,7 +13,7 @@ from rtshcua.app.flights.flight_reading import read_flight
 from rtshcua.app.logs import NO_LOG_HELP, is_log, log_of
 from rtshcua.app.pin import trusted
 from rtshcua.app.sidecar_files import run_folder
-from rtshcua.app.telling.records import Names
+from rtshcua.app.telling.records_told import Names
 from rtshcua.app.verify_log import VerifyRequest, verify_log
 from rtshcua.app.wording import many
 from rtshcua.decision.prepare import prepare, prepare_mission
@@ -211,7 +211,7 @@ def _made(format: str, exported: FlightExport, log: Path) -> _Made | Refusal:
 
 def _text_format(format: str, exported: FlightExport) -> tuple[Callable[[FlightExport], bytes], str]:
     """The function that makes a format, and its datum."""
-    from rtshcua.ground.flight.export import csv_table, geojson, gpx, kml
+    from rtshcua.ground.flight.export import csv_table, geojson_file, gpx, kml
     from rtshcua.ground.flight.export.exported import home_of
 
     if format == KML:
@@ -219,7 +219,7 @@ def _text_format(format: str, exported: FlightExport) -> tuple[Callable[[FlightE
     if format == GPX:
         return gpx.gpx, gpx.DATUM
     if format == GEOJSON:
-        return geojson.geojson, geojson.DATUM
+        return geojson_file.geojson, geojson_file.DATUM
     assert format == CSV
     return csv_table.csv_table, csv_table.DATUM
 

@@ -118,21 +118,37 @@ def with_unread_bindings(report: LogReport, log: Path) -> LogReport:
     return report._replace(unproven=(*report.unproven, Claim("autopilot/unread", text)))
 
 
-def _claims(
-    found: FoundBinding, report: LogReport, log: Path, roots: Sequence[TrustRoot]
-) -> tuple[list[Claim], list[Claim]]:
-    """What a binding shows of a log, and what it does not show."""
+def trusted_bindings(report: LogReport, log: Path, roots: Sequence[TrustRoot]) -> list[AutopilotBinding]:
+    """The bindings beside a log without failure that are trusted and of this log."""
+    if report.failure is not None or report.genesis is None:
+        return []
+    found = (_bound(each, report, log, roots) for each in read_bindings(log.parent))
+    return [each for each in found if isinstance(each, AutopilotBinding)]
+
+
+def _bound(found: FoundBinding, report: LogReport, log: Path, roots: Sequence[TrustRoot]) -> AutopilotBinding | Claim:
+    """The content of a binding that is trusted and of this log; else what is not shown."""
     assert report.genesis is not None
     whose, genesis = f"the autopilot's log by `{found.path.name}`", report.genesis
     try:
         binding = trusted_binding(found.document, roots, genesis.vehicle)
     except Untrusted as error:
-        return [], [Claim("autopilot/untrusted", f"{whose}: the document is not trusted: {error}")]
+        return Claim("autopilot/untrusted", f"{whose}: the document is not trusted: {error}")
     if (binding.flight, binding.genesis) != (bytes.fromhex(genesis.boot), genesis_leaf(log)):
-        return [], [Claim("autopilot/other-log", f"{whose}: it is bound to another log")]
+        return Claim("autopilot/other-log", f"{whose}: it is bound to another log")
     if (binding.records, binding.root) != (report.records, report.root):
         text = f"{whose}: it was bound to {binding.records} records, the log has others"
-        return [], [Claim("autopilot/other-log", text)]
+        return Claim("autopilot/other-log", text)
+    return binding
+
+
+def _claims(
+    found: FoundBinding, report: LogReport, log: Path, roots: Sequence[TrustRoot]
+) -> tuple[list[Claim], list[Claim]]:
+    """What a binding shows of a log, and what it does not show."""
+    binding = _bound(found, report, log, roots)
+    if isinstance(binding, Claim):
+        return [], [binding]
     kid = cose.unverified(found.document, limit=MAX_AUTOPILOT_BINDING).kid.hex()
     text = f"log key {kid} binds `{binding.file}`, {described(binding)}, to this log: {agreed(binding)}"
     doubts = [] if binding.agreed == binding.points else [Claim("autopilot/apart", apart(binding))]

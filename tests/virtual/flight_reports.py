@@ -1,9 +1,11 @@
 """Reports of run folders, under the tests' root."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
-from rtshcua.app.flights.flight_report import FlightReportRequest, ReportedFlight, flight_report
+from rtshcua.app.flights.flight_report import FlightReportRequest, LiveFlight, ReportedFlight, flight_report
 from rtshcua.app.pin import Pin
+from rtshcua.ground.flight.flight_content import FlightReport
 from rtshcua.model.faults import BatteryLevel
 from rtshcua.wire.keys import Duty
 from virtual import case, run_folder
@@ -31,3 +33,13 @@ def turned(at: Path) -> Path:
     config = case.simulated("ardupilot", faults=(BatteryLevel(16 * case.S, 1_800),))
     flown = once("flight-report-turned", lambda: run_folder.fly(case.mission(case.short_steps()), config))
     return run_folder.folder(at, flown)
+
+
+def told(lines: Iterable[bytes], at: Path) -> FlightReport:
+    """What a page says of these lines of a log, while it grows: nothing is verified."""
+    (at / "log.jsonl").write_bytes(b"".join(lines))
+    live = LiveFlight(at / "log.jsonl", ())
+    live.update()
+    found = live.report(MADE_US)
+    assert isinstance(found, FlightReport)
+    return found

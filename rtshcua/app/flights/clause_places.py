@@ -2,12 +2,15 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
+from copy import copy
 from hashlib import sha256
 from pathlib import Path
 from typing import Final
 
 from rtshcua import library
 from rtshcua.adapters.store.reading import read_regular
+from rtshcua.model.flat.mission import Mission
+from rtshcua.model.flat.policy import Policy
 
 #: a larger file is no source
 _MOST: Final = 1 << 20
@@ -19,18 +22,31 @@ class ClausePlaces:
     folders. A file with another digest is not the source.
     """
 
-    def __init__(self, names: Sequence[str], digests: Sequence[bytes], folders: Sequence[Path]) -> None:
-        self._names = tuple(names)
-        self._texts = tuple(map(lambda name, digest: _text(name, digest, folders), names, digests))
+    def __init__(self, policy: Policy, mission: Mission, folders: Sequence[Path]) -> None:
+        self._folders = folders
+        self._policy = _sources(policy.sources, policy.source_digests, folders)
+        self._mission = _sources(mission.sources, mission.source_digests, folders)
+
+    def of_mission(self, names: Sequence[str], digests: Sequence[bytes]) -> "ClausePlaces":
+        """The same policy, with the sources of another mission."""
+        other = copy(self)
+        other._mission = _sources(names, digests, self._folders)
+        return other
 
     def place(self, source: int, start: int) -> str:
-        """Where a clause stands: the file, and the line or else the offset in characters."""
-        if not 0 <= source < len(self._names):
+        """Where a clause stands: the file, and the line or else the offset in characters; empty if that is unknown."""
+        sources = (*self._policy, *self._mission)
+        if not 0 <= source < len(sources):
             return ""
-        text = self._texts[source]
+        name, text = sources[source]
         if text is None:
-            return f"{self._names[source]}, from character {start}"
-        return f"{self._names[source]}:{text.count(chr(10), 0, start) + 1}"
+            return f"{name}, from character {start}"
+        return f"{name}:{text.count(chr(10), 0, max(start, 0)) + 1}"
+
+
+def _sources(names: Sequence[str], digests: Sequence[bytes], folders: Sequence[Path]) -> list[tuple[str, str | None]]:
+    """The names of sources with their texts, which are None if they are not at hand."""
+    return [(name, _text(name, digest, folders)) for name, digest in zip(names, digests, strict=False)]
 
 
 def _text(name: str, digest: bytes, folders: Sequence[Path]) -> str | None:

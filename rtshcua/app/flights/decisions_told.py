@@ -2,6 +2,7 @@
 
 from typing import Final
 
+from rtshcua.app.documents import recorded_replacement
 from rtshcua.app.flights.clause_places import ClausePlaces
 from rtshcua.app.logged_decision import LinkExplained, StepExplained, explained
 from rtshcua.app.prepared_mission import Subject, after
@@ -19,6 +20,7 @@ from rtshcua.model.decision import Decisive
 from rtshcua.model.flat.policy import Policy, Rule
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.onboard.calls import argument
+from rtshcua.wire.request import Ref
 
 #: the most decisions that are explained in full
 MOST_EXPLAINED: Final = 300
@@ -30,10 +32,15 @@ class DecisionWords:
     """Collects the decisions of a log; equal ones in a row, such as those while a step waits, are one."""
 
     def __init__(self, subject: Subject, names: Names, start_us: int, places: ClausePlaces) -> None:
-        self._subject, self._names, self._start_us, self._places = subject, names, start_us, places
+        self._subject, self._names, self._start_us = subject, names, start_us
+        #: the sources of steps from a number on: those of the bundle, and of each replacement
+        self._sources = [(0, places)]
         self._told: list[DecisionView] = []
         self._last: tuple[object, ...] = ()
-        self.explained = 0
+        self._ref: Ref | None = None  # what the last decision is about
+        self._explained = 0
+        #: how many decisions are told without what they read
+        self.unexplained = 0
 
     @property
     def views(self) -> tuple[DecisionView, ...]:
@@ -44,9 +51,8 @@ class DecisionWords:
         """Take the next record, after `Names.follow`."""
         if isinstance(record, Effect):
             if record.event == "replacement":
-                newer = after(self._subject, record.detail)
-                self._subject = self._subject if isinstance(newer, Refusal) else newer
-            elif record.event == "repeated" and self._told and record.detail.isdecimal():
+                self._replace(record)
+            elif record.event == "repeated" and self._ref == record.ref and record.detail.isdecimal():
                 last = self._told[-1]
                 self._told[-1] = last._replace(
                     repeats=last.repeats + int(record.detail[:9]), until_us=record.at_us - self._start_us
@@ -58,16 +64,32 @@ class DecisionWords:
             last = self._told[-1]
             self._told[-1] = last._replace(repeats=last.repeats + 1, until_us=t_us)
             return
-        self._last = key
+        self._last, self._ref = key, record.ref
         self._told.append(self._view(record, t_us))
+
+    def _replace(self, record: Effect) -> None:
+        newer = after(self._subject, record.detail)
+        if isinstance(newer, Refusal):
+            return  # which verification names
+        kept = recorded_replacement(record.detail).kept
+        self._sources.append(
+            (kept, self._sources[0][1].of_mission(newer.mission.sources, newer.mission.source_digests))
+        )
+        self._subject = newer
+
+    def _place(self, step: int, source: int, start: int) -> str:
+        places = next(places for first, places in reversed(self._sources) if first <= max(step, 0))
+        return places.place(source, start)
 
     def _view(self, record: DecisionRecord, t_us: int) -> DecisionView:
         reads: tuple[ReadSignal, ...] = ()
         passing: tuple[str, ...] = ()
         clause = "" if record.clause is None else f"`{' '.join(record.clause.split())}`"
-        place = "" if record.clause_at is None else self._places.place(record.clause_at[0], record.clause_at[1])
-        if self.explained < MOST_EXPLAINED:
-            self.explained += 1
+        place = "" if record.clause_at is None else self._place(record.step, *record.clause_at[:2])
+        chain: tuple[str, ...] = ()
+        self.unexplained += self._explained >= MOST_EXPLAINED
+        if self._explained < MOST_EXPLAINED:
+            self._explained += 1
             found = explained(record, self._subject)
             if isinstance(found, StepExplained):
                 clause = words.quoted(
@@ -78,7 +100,7 @@ class DecisionWords:
                 if permit is not None:
                     clause, place = (
                         f"`{' '.join(permit.text.split())}`",
-                        self._places.place(permit.source, permit.start),
+                        self._place(record.step, permit.source, permit.start),
                     )
                 passing = tuple(map(words.would_pass, found.trace.nearest))
             elif isinstance(found, LinkExplained):
@@ -88,7 +110,7 @@ class DecisionWords:
         subject = self._names.subject(record.kind, record.step, record.link)
         return DecisionView(
             record.seq, t_us, t_us, 1, subject, record.outcome, record.reason,
-            _meaning(record.reason), clause, place, record.target or "", reads, passing,
+            _meaning(record.reason), clause, place, record.target or "", reads, passing, chain,
             self._approvals(record), None,
         )  # fmt: skip
 

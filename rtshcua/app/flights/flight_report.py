@@ -7,7 +7,9 @@ from typing import Final, NamedTuple
 from rtshcua.adapters.store.logs import lines
 from rtshcua.adapters.store.reading import open_regular
 from rtshcua.adapters.store.verification import Progress
-from rtshcua.app.flights.flight_told import CollectedFlight, FlightTelling
+from rtshcua.app.autopilot_bindings import roots_of, trusted_bindings
+from rtshcua.app.flights.collected_flight import CollectedFlight
+from rtshcua.app.flights.flight_told import flight_told
 from rtshcua.app.flights.redaction import Redaction, may_stay
 from rtshcua.app.logs import report_code
 from rtshcua.app.pin import Pin
@@ -47,27 +49,28 @@ class ReportedFlight(NamedTuple):
 def flight_report(request: FlightReportRequest, progress: Progress = lambda _: None) -> ReportedFlight | Refusal:
     """Verify a flight with all its decisions, and tell it. Raises OSError."""
     collected = CollectedFlight(request.log, request.sources)
+    size = request.log.stat().st_size  # of a log that grows, what comes later is not embedded
     verify = VerifyRequest(request.pin.key, request.pin.roots, audit=True)
     audit = verify_log(request.log, verify, progress, collected.take, lambda: collected.heard)
     collected.update_telemetry()  # what the audit did not read
     flight = collected.flight()
     if isinstance(flight, Refusal):
         return flight
-    telling = FlightTelling(
-        audit.report, flight, collected, made_at_us=request.made_at_us,
-        pinned=f"root key `{request.pin.key.hex()}`", details=not request.removed,
+    roots = roots_of(None if audit.basis is None else audit.basis.root, request.pin.roots)
+    told = flight_told(
+        audit.report, flight, collected, trusted_bindings(audit.report, request.log, roots),
+        made_at_us=request.made_at_us, pinned=f"root key `{request.pin.key.hex()}`", details=not request.removed,
     )  # fmt: skip
-    told = telling.report()
     redaction = Redaction(flight, collected.persons, request.removed) if request.removed else None
     if redaction is not None:
         told = redaction.report(told, flight)
-    return ReportedFlight(_with_log(told, request, audit.report.records), report_code(audit.report), redaction)
+    return ReportedFlight(_with_log(told, request, audit.report.records, size), report_code(audit.report), redaction)
 
 
-def _with_log(report: FlightReport, request: FlightReportRequest, records: int) -> FlightReport:
+def _with_log(report: FlightReport, request: FlightReportRequest, records: int, size: int) -> FlightReport:
     """The report with the log, or of a redacted one with what may stay of it. Raises OSError."""
     with open_regular(request.log) as file:
-        data = file.read(MOST_OCTETS + 1)
+        data = file.read(min(size, MOST_OCTETS + 1))
     if request.removed:
         kept = data.splitlines(keepends=True)[:records]
         data = redact(kept, may_stay(request.removed), checkpoints="names" not in request.removed)
@@ -84,7 +87,7 @@ class LiveFlight:
     def __init__(self, log: Path, sources: Sequence[Path]) -> None:
         self._log = log
         self._collected = CollectedFlight(log, sources)
-        self._offset = 0
+        self._offset = self._records = 0
         #: whether the log was closed: nothing follows
         self.closed = False
 
@@ -94,9 +97,13 @@ class LiveFlight:
         with open_regular(self._log) as file:
             file.seek(self._offset)
             for line in lines(file):
-                record = read(line) if line.endswith(b"\n") else None
-                if record is None or isinstance(record, Flaw):
+                if not line.endswith(b"\n"):
+                    break  # the rest is still to be written
+                record = read(line)
+                if isinstance(record, Flaw):
+                    self._collected.flaw = f"record {self._records} {record.text}"
                     break
+                self._records += 1
                 self._collected.take(record)
                 self._offset += len(line)
                 self.closed = isinstance(record, Close)
@@ -107,4 +114,4 @@ class LiveFlight:
         flight = self._collected.flight()
         if isinstance(flight, Refusal):
             return flight
-        return FlightTelling(None, flight, self._collected, made_at_us=made_at_us, pinned="no key").report()
+        return flight_told(None, flight, self._collected, made_at_us=made_at_us, pinned="no key")

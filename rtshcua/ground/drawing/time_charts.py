@@ -1,6 +1,6 @@
 """Drawings over a common time axis: lines of values with their limits, and lanes of events.
 
-All drawings of one axis put the same time at the same place, so that one cursor serves them all.
+Each drawing says where on it the axis begins and ends (`TimeAxis.span`), so that one cursor serves them all.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -77,6 +77,11 @@ class ChartLimit(NamedTuple):
     low: bool
 
 
+def line_gap_us(gap_us: int, axis: TimeAxis) -> int:
+    """The time without a value after which a line is broken."""
+    return max(gap_us, (axis.to_us - axis.from_us) // _BREAK)
+
+
 class DrawnLine(NamedTuple):
     """A line on the page, as the `d` of an SVG path."""
 
@@ -86,7 +91,7 @@ class DrawnLine(NamedTuple):
 
 
 class TimeChart(NamedTuple):
-    """A chart on the page. `marks` and `right` are places of values with their words, on the left and on the right;
+    """A chart on the page. `marks` are places of values with their words;
     `limits` are those in the chart, each with its other edge, `described` the words of all; `scale` is the value at the
     top and at the bottom.
     """
@@ -99,8 +104,6 @@ class TimeChart(NamedTuple):
     bottom: float
     axis: TimeAxis
     marks: tuple[tuple[float, str], ...]
-    right: tuple[tuple[float, str], ...]
-    right_unit: str
     lines: tuple[DrawnLine, ...]
     limits: tuple[tuple[float, str, float], ...]
     described: tuple[str, ...]
@@ -109,38 +112,28 @@ class TimeChart(NamedTuple):
 
 def time_chart(
     title: str, description: str, unit: str, axis: TimeAxis, lines: Sequence[ChartLine],
-    limits: Sequence[ChartLimit] = (), labels: Mapping[int, str] | None = None, second: tuple[str, float] | None = None,
-    plot: float = _PLOT,
+    limits: Sequence[ChartLimit] = (), labels: Mapping[int, str] | None = None,
 ) -> TimeChart:  # fmt: skip
-    """Draw lines over time. `labels` name the values of an enumeration; `second` is the unit of a second axis, and
-    what its values are more.
-    """
+    """Draw lines over time. `labels` name the values of an enumeration."""
     values = [value for line in lines for _, value in line.points if value is not None]
     bounds = [limit.value for limit in limits if _is_near(limit.value, values)]
-    ticks = sorted(labels or ()) if labels else _ticks([*values, *bounds])
+    ticks = list(map(float, sorted(labels))) if labels else _ticks([*values, *bounds])
     low, high = ticks[0], max(ticks[-1], ticks[0] + 1e-9)
-    top, bottom = float(_TOP), _TOP + plot
+    top, bottom = float(_TOP), float(_TOP + _PLOT)
 
     def at(value: float) -> float:
-        return bottom - (value - low) / (high - low) * plot
+        return bottom - (value - low) / (high - low) * _PLOT
 
-    marks = tuple((at(each), labels[int(each)] if labels else f"{each:,.10g}") for each in ticks)
-    if labels:
-        marks = tuple((y, _cut(words, LEFT - 12)) for y, words in marks)
-    drawn = tuple(
-        DrawnLine(line.kind, line.told, "".join(_path(axis, line, at, stepped=labels is not None))) for line in lines
-    )
-    shown = tuple(
+    stepped = labels is not None
+    drawn = (DrawnLine(line.kind, line.told, "".join(_path(axis, line, at, stepped=stepped))) for line in lines)
+    shown = (
         (at(limit.value), limit.told, bottom if limit.low else top) for limit in limits if low <= limit.value <= high
     )
-    right: tuple[tuple[float, str], ...] = ()
-    if second is not None and not labels:
-        more = second[1]
-        right = tuple((at(each - more), f"{each:,.10g}") for each in _ticks([low + more, high + more]) if
-                      low <= each - more <= high)  # fmt: skip
+    words = [_cut(labels[int(each)], LEFT - 12) if labels else f"{each:,.10g}" for each in ticks]
     return TimeChart(
-        title, description, unit, bottom + _FOOT, top, bottom, axis, marks, right, "" if second is None else second[0],
-        drawn, shown, tuple(limit.told for limit in limits), (high, low),
+        title, description, unit, bottom + _FOOT, top, bottom, axis,
+        tuple(zip(map(at, ticks), words, strict=True)), tuple(drawn), tuple(shown),
+        tuple(limit.told for limit in limits), (high, low),
     )  # fmt: skip
 
 
@@ -170,7 +163,7 @@ def _cut(text: str, width: float) -> str:
 
 
 def _path(axis: TimeAxis, line: ChartLine, at: Callable[[float], float], *, stepped: bool) -> Iterator[str]:
-    gap_us = max(line.gap_us, (axis.to_us - axis.from_us) // _BREAK)
+    gap_us = line_gap_us(line.gap_us, axis)
     before: tuple[int, float] | None = None
     for t_us, value in line.points:
         if value is None:

@@ -33,7 +33,9 @@ class ReadSignal(NamedTuple):
 
 class DecisionView(NamedTuple):
     """A decision, or `repeats` equal ones in a row until `until_us`, in words. `seq` is the number of the first record;
-    `clause` is what decided, as it was written, and `place` where. `where` is where the vehicle was.
+    `clause` is what decided, as it was written, and `place` where. `would_pass` are the nearest values
+    with which a step would have passed, `chain` the links of a fallback and whether each may fly. `where` is where the
+    vehicle was.
     """
 
     seq: int
@@ -49,6 +51,7 @@ class DecisionView(NamedTuple):
     flies: str
     reads: tuple[ReadSignal, ...]
     would_pass: tuple[str, ...]
+    chain: tuple[str, ...]
     approvals: tuple[str, ...]
     where: tuple[int, int] | None
 
@@ -113,7 +116,7 @@ class FlightReport(NamedTuple):
     """Everything that a page shows of one flight.
 
     `highest` is the greatest height above home, and `distance` that over ground, by the telemetry. `verdict` is that
-    of the verification that made the page: `verified`, `incomplete` or `failed`, in words in `verified`. `log` is the
+    of the verification that made the page: `verified`, `incomplete` or `failed`. `log` is the
     log as the page embeds it, empty if it is too large; `redacted` names what was removed.
     `projection` is that of the local plane.
     """
@@ -132,7 +135,6 @@ class FlightReport(NamedTuple):
     highest: int | None
     distance: int | None
     verdict: str
-    verified: str
     pinned: str
     origin: str
     root: str
@@ -152,6 +154,11 @@ class FlightReport(NamedTuple):
     totals: Mapping[str, int]
     log: str
     redacted: tuple[str, ...]
+
+    @property
+    def verified(self) -> str:
+        """The verdict in words."""
+        return self.summary[4].answer
 
     def without_log(self) -> "FlightReport":
         """The report without the octets of the log."""

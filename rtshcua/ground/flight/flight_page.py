@@ -29,6 +29,7 @@ from rtshcua.ground.drawing.time_charts import (
     axis_of,
     clock,
     lane_chart,
+    line_gap_us,
     thinned,
     time_chart,
 )
@@ -220,7 +221,7 @@ def _data(report: FlightReport, axis: TimeAxis, plan: ZoneMap | None) -> Markup:
         "home": None,
         "track": None,
         "map": None,
-        "signals": [_signal_data(each) for each in report.signals if each.series.points],
+        "signals": [_signal_data(each, axis) for each in report.signals if each.series.points],
     }
     track, elevation = report.track, report.site.elevation
     if track is not None:
@@ -247,12 +248,13 @@ def _plane(projection: Projection | None) -> dict[str, float]:
     }  # fmt: skip
 
 
-def _signal_data(view: SignalCurve) -> dict[str, object]:
+def _signal_data(view: SignalCurve, axis: TimeAxis) -> dict[str, object]:
     series = view.series
     unit, divide = _UNITS.get(series.dimension, ("", 1))
     points = thinned(series.points, _MOST_POINTS)
     return {
         "name": series.name,
+        "gap": line_gap_us(series.stale_us, axis) // 1_000,
         "unit": unit,
         "divide": 1 if series.labels else divide,
         "labels": {str(number): text for number, text in series.labels.items()},

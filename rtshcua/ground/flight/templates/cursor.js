@@ -1,6 +1,7 @@
 "use strict";
 // One cursor over the map, the heights, the timeline and the signals.
 (() => {
+  const GAP_MS = 5000; // after a longer silence a place is not known any more
   const begin = at => {
     const data = JSON.parse(document.getElementById("flight-data").textContent);
     const slider = document.getElementById("cursor");
@@ -46,7 +47,9 @@
       const words = [clock(ms)];
       if (track) {
         const at = last(track.t, ms);
-        if (at >= 0) {
+        const known = at >= 0 && ms - track.t[at] <= GAP_MS;
+        here?.setAttribute("visibility", known ? "visible" : "hidden");
+        if (known) {
           if (here) {
             here.setAttribute("r", 6);
             here.setAttribute("cx", data.map.x0 + track.x[at] * data.map.scale);
@@ -58,7 +61,7 @@
       }
       for (const each of signals) {
         const at = last(each.t, ms);
-        const value = at < 0 ? null : each.v[at];
+        const value = at < 0 || ms - each.t[at] > each.gap ? null : each.v[at];
         words.push(`${each.name} ${value === null ? "unknown" : each.labels[value] ?? `${value / each.divide} ${each.unit}`.trim()}`);
       }
       told.textContent = words.join(" \u00b7 ");

@@ -29,7 +29,7 @@
     try {
       const found = await fetch(location.pathname, { headers: tag ? { "If-None-Match": tag } : {}, cache: "no-store" });
       if (found.status === 200) {
-        if (tag !== null || found.headers.get("ETag") !== tag) growing = show(await found.text());
+        growing = show(await found.text());
         tag = found.headers.get("ETag");
       } else if (found.status !== 304) throw new Error(String(found.status));
       if (!growing) { location.reload(); return; }

@@ -5,10 +5,12 @@ from pathlib import Path
 
 import pytest
 
+from reference import bound_run
 from reference.forgery import edit, signed
 from rtshcua.app.flights.flight_report import FlightReportRequest, LiveFlight, flight_report
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.front.cli.app import main
 from rtshcua.ground.flight.embedding import extract
 from rtshcua.ground.flight.flight_content import FlightReport, as_plain
 from rtshcua.ground.flight.flight_page import page
@@ -146,3 +148,20 @@ def test_growing_log_is_told_as_far_as_it_goes(completed: Path, tmp_path: Path) 
     assert found.timeline == whole.timeline
     assert found.decisions == whole.decisions
     assert "Not verified yet" in found.verified
+
+
+def test_autopilots_log_that_is_bound_to_this_flight_is_told_and_no_other(tmp_path: Path) -> None:
+    own, other = bound_run.run_folder(tmp_path / "own"), bound_run.run_folder(tmp_path / "other", other=True)
+    for run in (own, other):
+        assert main(bound_run.bind_words(run, bound_run.with_log(run))) == ExitCode.OK
+    (told,) = report_of(own).report.bound
+    assert told.what == "a PX4 log"
+    assert "positions agree within 1 m and 100 ms" in told.agreement
+    for document in (*own.glob("*.binding"), *other.glob("*.binding")):
+        if document.parent == own:
+            document.unlink()
+        else:
+            (own / document.name).write_bytes(document.read_bytes())
+    report = report_of(own).report
+    assert report.bound == ()
+    assert any("bound to another log" in text for text in report.unproven)

@@ -98,16 +98,6 @@ def test_enumeration_is_drawn_in_steps_with_its_labels() -> None:
     assert re.fullmatch(r"M[\d. ]+H[\d.]+V[\d.]+", chart.lines[0].d)
 
 
-def test_second_axis_has_round_values_at_their_height() -> None:
-    line = ChartLine("flown", "", [(0, 0.0), (S, 20.0)])
-    chart = time_chart("heights", "", "m", axis_of(0, S), [line], second=("m above sea", 488.0))
-    top, bottom = chart.scale
-    for y, words in chart.right:
-        above_home = bottom + (chart.bottom - y) / (chart.bottom - chart.top) * (top - bottom)
-        assert float(words) == pytest.approx(488.0 + above_home)
-    assert chart.right
-
-
 def test_events_are_at_their_times_in_their_lanes() -> None:
     lanes = [Lane("decided", [LaneEvent(S, None, "allow", "a")]), Lane("flown", [LaneEvent(S, 3 * S, "step", "b")])]
     chart = lane_chart("t", "", axis_of(0, 4 * S), lanes)

@@ -1,23 +1,21 @@
 """`rtshcua watch`: a flight in a browser of this machine, while it flies."""
 
 import json
-import threading
 import time
 from pathlib import Path
 from typing import Annotated, Final
 
 import typer
 
-from rtshcua.app.flights.flight_report import FlightReportRequest, LiveFlight, flight_report
-from rtshcua.app.flights.watched import log_of_flight
+from rtshcua.app.flights.flight_report import FlightReportRequest
+from rtshcua.app.flights.watched import WatchedPage, log_of_flight
 from rtshcua.app.pin import trusted
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.front.cli.faults import fail, refuse, say
 from rtshcua.front.cli.interrupts import StopRequest
 from rtshcua.front.cli.stdout import out, out_json
-from rtshcua.front.web.page_server import PageServer, ServedPage, served
-from rtshcua.ground.flight.flight_content import FlightReport
+from rtshcua.front.web.page_server import PageServer, served
 
 app = typer.Typer(add_completion=False)
 
@@ -56,8 +54,8 @@ def watch(
     if isinstance(pinned, Refusal):
         say(f"the closed log will not be verified: {pinned.text}")
     request = None if isinstance(pinned, Refusal) else FlightReportRequest(log, pinned, (Path(),), 0)
-    page = _WatchedPage(log, request)
-    with PageServer(page.current, port) as server, StopRequest() as stop:
+    page = WatchedPage(log, request)
+    with PageServer(lambda: served(page.current()), port) as server, StopRequest() as stop:
         if as_json:
             out_json(json.dumps({"address": server.address, "log": str(log)}))
         else:
@@ -69,42 +67,3 @@ def watch(
     if as_json:
         out_json(json.dumps({"closed": page.closed, "verdict": page.verdict}))
     return ExitCode.OK
-
-
-class _WatchedPage:
-    """The page of a flight, made anew when there is something new and somebody asks."""
-
-    def __init__(self, log: Path, request: FlightReportRequest | None) -> None:
-        self._live = LiveFlight(log, (Path(),))
-        self._request = request
-        self._lock = threading.Lock()
-        self._page: ServedPage | None = None
-        self.closed, self.verdict = False, "growing"
-        self._live.update()
-
-    def update(self) -> None:
-        """Read what is new of the log."""
-        with self._lock:
-            if not self.closed and self._live.update():
-                self._page = None
-            self.closed = self._live.closed
-
-    def current(self) -> ServedPage:
-        """The page as it is now."""
-        from rtshcua.ground.flight.flight_page import page
-
-        with self._lock:
-            if self._page is None:
-                found = self._report()
-                text = found.text if isinstance(found, Refusal) else page(found, live=found.verdict == "growing")
-                self._page = served(text)
-            return self._page
-
-    def _report(self) -> FlightReport | Refusal:
-        made_at_us = time.time_ns() // 1_000
-        if self._live.closed and self._request is not None:
-            found = flight_report(self._request._replace(made_at_us=made_at_us))
-            if not isinstance(found, Refusal):
-                self.verdict = found.report.verdict
-                return found.report
-        return self._live.report(made_at_us)

@@ -78,7 +78,7 @@ LAYOUTS_OF_CLIENTS: Final = LAYOUTS | {
     AUTOPILOT_VERSION_REQUEST: _layout(85, "<BB", _TARGET),
     HOME_POSITION: _layout(104, "<iii", "latitude longitude altitude"),
     SETUP_SIGNING: _layout(71, "<Q", "initial_timestamp"),
-    CONTROL_STATUS: _layout(184, "<BB", "sysid_in_control flags"),
+    CONTROL_STATUS: _layout(21, "<BB", "flags gcs_main"),  # of the development dialect, since 2026
 }  # fmt: skip
 
 

@@ -254,7 +254,7 @@ class Gateway:
         else:
             link.record("passed", now_us, message=message.message)
         if command == REQUEST_OPERATOR_CONTROL:
-            self._pilot_holds = message.system if message.number("param2") == 1 else 0
+            self._pilot_holds = message.system if _requests_control(message) else 0
             for each in self._clients.values():
                 self._control_status(each, now_us)
 
@@ -840,7 +840,7 @@ class Gateway:
         """CONTROL_STATUS: who is in control, for the whole system."""
         holder = self._holder(now_us)
         system = self._pilot_holds or (0 if holder is None else holder.link.system_id)
-        client.link.send(CONTROL_STATUS, sysid_in_control=system, flags=1)
+        client.link.send(CONTROL_STATUS, flags=1, gcs_main=system)
 
     def _down(self, number: int, now_us: int) -> None:
         link = self._pilots.pop(number, None)
@@ -887,3 +887,11 @@ class Gateway:
         """Whether what is left of a proposal only lands the vehicle."""
         contracts = (self._translation.contract(each.skill) for each in proposal.steps[max(proposal.done, 0) :])
         return all(each is not None and each.motion.kind in _DOWN for each in contracts) and not proposal.ended
+
+
+def _requests_control(message: Received) -> bool:
+    """Whether REQUEST_OPERATOR_CONTROL requests control: `param1` is 1. Stations of 2025 have their system id or 0 in
+    `param1`, the action in `param2`, and in `param3` 0 or 1, where now is a time of 3 s and more.
+    """
+    action, before, more = (message.number(f"param{at}") for at in (1, 2, 3))
+    return action == 1 or (before == 1 and more in (0, 1))

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v10 import ardupilotmega as mavlink1
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from pymavlink.generator.mavcrc import x25crc
 
 from rtshcua.ground.gateway.client_frames import (
     CONTROL_STATUS,
@@ -46,9 +47,13 @@ def test_layouts_are_those_of_pymavlink() -> None:
 
 
 def test_a_control_status_has_the_layout_of_the_development_dialect() -> None:
-    frame = made(CONTROL_STATUS, {"sysid_in_control": 255, "flags": 1}, (1, 1), 7)
-    assert frame[:12] == bytes([0xFD, 2, 0, 0, 7, 1, 1, 0x00, 0x02, 0, 255, 1])
-    assert LAYOUTS_OF_CLIENTS[CONTROL_STATUS].extra == 184
+    """By hand from development.xml of July 2026: flags, gcs_main, and ten secondary stations, which are 0 here."""
+    frame = made(CONTROL_STATUS, {"gcs_main": 255, "flags": 1}, (1, 1), 7)
+    assert frame[:12] == bytes([0xFD, 2, 0, 0, 7, 1, 1, 0x00, 0x02, 0, 1, 255])
+    checksum = x25crc()
+    checksum.accumulate_str("CONTROL_STATUS uint8_t flags uint8_t gcs_main uint8_t gcs_secondary ")
+    checksum.accumulate(bytes([10]))
+    assert LAYOUTS_OF_CLIENTS[CONTROL_STATUS].extra == (checksum.crc & 0xFF) ^ (checksum.crc >> 8)
 
 
 @pytest.mark.parametrize("dialect", [mavlink, mavlink1])

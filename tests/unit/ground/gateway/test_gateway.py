@@ -41,9 +41,9 @@ def number(actions: list[Action]) -> int:
 
 
 def controls(actions: list[Action], client: int = 1) -> list[int]:
-    """`sysid_in_control` of each CONTROL_STATUS to a client."""
+    """`gcs_main` of each CONTROL_STATUS to a client."""
     frames = [each.frame for each in actions if isinstance(each, ToClient) and each.client == client]
-    return [frame[10] if frame[1] > 1 else 0 for frame in frames if frame[7:10] == b"\x00\x02\x00"]
+    return [frame[11] if frame[1] > 1 else 0 for frame in frames if frame[7:10] == b"\x00\x02\x00"]
 
 
 def records(actions: list[Action]) -> list[Any]:
@@ -465,6 +465,9 @@ def test_a_pilot_in_control_keeps_every_client_out_until_he_releases() -> None:
     assert texts(world.send(command_long(32100, 0, 1))) == ["the pilot is in control"]
     world.send(command_long(32100, 0, 0), client=9, sender=(250, 1), pilot=True)
     assert len(proposals(world.send(reposition()))) == 1
+    assert controls(world.send(command_long(32100, 1, 0, 10, 250), client=9, sender=(250, 1), pilot=True)) == [250]
+    released = world.send(command_long(32100, 0, 1, 10, 250), client=9, sender=(250, 1), pilot=True)
+    assert 250 not in controls(released), "of the dialect since 2026 the action comes first"
     world.send(command_long(32100, 0, 1), client=9, sender=(250, 1), pilot=True)
     world.take(ClientDown(9))
     assert controls(world.wait(1_100_000)) != [250], "a pilot who is gone holds nothing"

@@ -123,7 +123,10 @@ def policy(path: Path = POLICY) -> PreparedPolicy:
 class GatewayWorld:
     """A gateway, its time in us, and what it did. Signals are canonical values by name; others are unknown."""
 
-    def __init__(self, autopilot: int = PX4, under: PreparedPolicy | None = None, needed_us: Any = None) -> None:
+    def __init__(
+        self, autopilot: int = PX4, under: PreparedPolicy | None = None, needed_us: Any = None,
+        more: tuple[AcceptedCommand, ...] = (),
+    ) -> None:  # fmt: skip
         self.autopilot = autopilot
         self.policy = policy() if under is None else under
         self.now_us = 1_000_000
@@ -132,16 +135,10 @@ class GatewayWorld:
             "position": (0, 0), "height": (0,), "battery": (9_000,), "battery.cell": (4_000,), "gps.fix": (3,),
             "landed": (1,), "velocity.north": (0,), "velocity.east": (0,), "velocity.down": (0,),
         }  # fmt: skip
-        settings = GatewaySettings(
-            SYSTEM,
-            autopilot,
-            self.policy,
-            DEFAULTS,
-            ROWS,
-            lambda now: self.state(),
-            {} if needed_us is None else needed_us,
+        self.settings = GatewaySettings(
+            SYSTEM, autopilot, self.policy, DEFAULTS, (*ROWS, *more), lambda now: self.state(), needed_us or {}
         )
-        self.gateway = Gateway(settings)
+        self.gateway = Gateway(self.settings)
         self.done: list[Action] = []
         self._vehicle = mavlink.MAVLink(None, SYSTEM, 1)
         self._client = mavlink.MAVLink(None, 245, 190)

@@ -143,18 +143,19 @@ class Translation:
                 return Untranslated(DENIED, f"{row.skill}: {parameter.name} is missing")
         return ProposedStep(row.skill, texts, tuple(cells))
 
-    def takeoff_to(self, altitude: int | None = None) -> ProposedStep | None:
-        """A take-off to a height in mm above home, by default the least of its contract, by a skill of the table; None
-        without such a skill.
+    def takeoffs_to(self, altitude: int | None = None) -> list[ProposedStep | None]:
+        """The take-off to a height in mm above home, by default the least of its contract, by each skill of the table
+        that climbs; None for a skill that needs other arguments besides.
         """
-        for row in (each for some in self._rows.values() for each in some):
-            contract = self._contracts.get(row.skill)
+        found: list[ProposedStep | None] = []
+        for skill in dict.fromkeys(each.skill for some in self._rows.values() for each in some):
+            contract = self._contracts.get(skill)
             if contract is not None and contract.motion.kind == MotionKind.CLIMB:
                 parameter = next(each for each in contract.parameters if each.cell == contract.motion.altitude)
-                if len(contract.parameters) == 1:
-                    height = parameter.low if altitude is None else altitude
-                    return ProposedStep(row.skill, {parameter.name: written(height, Dimension.ALTITUDE)}, (height,))
-        return None
+                height = parameter.low if altitude is None else altitude
+                step = ProposedStep(skill, {parameter.name: written(height, Dimension.ALTITUDE)}, (height,))
+                found.append(step if len(contract.parameters) == 1 else None)
+        return found
 
     def with_speed(self, step: ProposedStep, metres_per_second: float) -> ProposedStep | Untranslated:
         """A step that flies, with another speed over ground; other steps stay as they are."""

@@ -523,9 +523,14 @@ class Gateway:
         """Why no take-off of this client could follow an arming now, whatever its height, and the MAV_RESULT."""
         if self._stage == "waiting" and self._unready is not None:
             return TEMPORARILY_REJECTED, self._unready
-        step = self._translation.takeoff_to()
-        refusal = None if step is None else self._quick.refusal(step, client.link.settings.role, now)
-        return None if refusal is None or refusal.by_argument else (refusal.result, refusal.words)
+        refusals: list[QuickRefusal] = []
+        for step in self._translation.takeoffs_to():
+            refusal = None if step is None else self._quick.refusal(step, client.link.settings.role, now)
+            if refusal is None or refusal.by_argument:
+                return None
+            refusals.append(refusal)
+        least = min(refusals, key=lambda each: each.result, default=None)
+        return None if least is None else (least.result, least.words)
 
     def _stands(self, proposal: ClientProposal) -> bool:
         """Whether a proposal still says what the vehicle does: it is under way, or nothing was flown after it."""
@@ -707,7 +712,8 @@ class Gateway:
         first = self._translation.contract(steps[0].skill)
         if first is None or first.motion.kind == MotionKind.CLIMB or first.motion.altitude < 0 or not self._rests:
             return steps, 0
-        takeoff = self._translation.takeoff_to(steps[0].values[first.motion.altitude])
+        takeoffs = self._translation.takeoffs_to(steps[0].values[first.motion.altitude])
+        takeoff = next((each for each in takeoffs if each is not None), None)
         return (steps, 0) if takeoff is None else ((takeoff, *steps), 1)
 
     def _start(self, client: _Client, message: Received, command: int, now: Now) -> int | None:

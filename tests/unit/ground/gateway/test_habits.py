@@ -1,5 +1,6 @@
 import json
 from math import nan
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,12 +12,15 @@ from reference.gateway_world import (
     acks,
     command_int,
     command_long,
+    policy,
     proposals,
     reposition,
     setpoint,
     texts,
     told,
 )
+from reference.sources import CHECKOUT
+from rtshcua.ground.gateway.accepted import COMMAND, AcceptedCommand
 from rtshcua.ground.gateway.interface import Action, ClientNote, Propose, RequestFrame, Withhold
 from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode, Px4Mode
 
@@ -136,6 +140,27 @@ def test_arming_is_refused_where_no_take_off_could_follow() -> None:
     chunks = [message.text for message in told(actions, 2) if message.get_type() == "STATUSTEXT"]
     assert chunks == ["PreArm: no rule of bridge_inspection names the".ljust(50), "role trainee"]
     assert acks(world.send(arm())) == [(400, 0)], "another role may take off"
+
+
+def test_arming_is_accepted_where_any_skill_may_take_off(tmp_path: Path) -> None:
+    """`hop` demands less charge than `takeoff`, and both are asked."""
+    take_off = (CHECKOUT / "skills/takeoff.rts").read_text()
+    hop = take_off[take_off.index("skill takeoff") : take_off.index("  // What a MAVLink client")] + "}\n"
+    policies = (CHECKOUT / "policies/bridge_inspection.rts").read_text()
+    source = tmp_path / "hops.rts"
+    source.write_text(
+        policies.replace("policy bridge_inspection", hop.replace("skill takeoff", "skill hop") + "policy bridge_inspection")
+        .replace("battery > 40 %", "battery > 20 %")
+        .replace("  permit  goto by", "  permit  hop by role operator through agent\n  permit  goto by")
+    )
+    row = AcceptedCommand("hop", COMMAND, "MAV_CMD_NAV_VTOL_TAKEOFF", 84, "", (), ())
+    world = GatewayWorld(under=policy(source), more=(row,))
+    world.ready()
+    for battery, result in ((3_000, 0), (1_500, 1)):
+        world.signals["battery"] = (battery,)
+        actions = world.send(arm())
+        assert acks(actions) == [(400, result)], battery
+        world.send(arm(0))
 
 
 # ---------------------------------------------------------------- modes

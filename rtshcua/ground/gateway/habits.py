@@ -64,13 +64,13 @@ class ShownState:
         return DENIED
 
     def _arm(self, now_us: int, hindrance: tuple[int, str] | None) -> int:
-        if self._seen.armed:
-            return ACCEPTED
         if hindrance is not None:
             result, reason = hindrance
             self._link.text(f"{self._refused}: {reason}", now_us)
             self._link.record("refused", now_us, command="COMPONENT_ARM_DISARM", reason=reason)
             return result
+        if self._seen.armed:
+            return ACCEPTED
         self._armed_until_us = now_us + SHOWN_US
         self._link.text("armed for you; a permitted take-off arms the vehicle", now_us, "armed", NOTICE)
         self._link.record("absorbed", now_us, command="COMPONENT_ARM_DISARM")

@@ -87,6 +87,7 @@ SETPOINT_US: Final = 500_000
 #: how long a command waits for a flight that is not ready yet, us
 HELD_US: Final = 10_000_000
 _NO_FLIGHT: Final = "no flight is ready yet"
+_LANDS: Final = "the vehicle is still landing"
 #: the most proposals of one client that are neither taken nor refused
 MOST_OPEN: Final = 4
 _SECOND_US: Final = 1_000_000
@@ -183,6 +184,7 @@ class Gateway:
         self._pilot_holds = 0  # the system id of the pilot who requested control
         self._stage = ""  # of the flight: "", "waiting", "flying"
         self._unready: str | None = None
+        self._flew = False  # whether the vehicle was in the air during this flight
         self._cancelled = False  # whether this flight was cancelled, because its client is dead
         self._judged = False  # whether the flight has said if the vehicle is ready
         self._second_us = 0
@@ -235,6 +237,7 @@ class Gateway:
     def _from_vehicle(self, frame: bytes, now_us: int) -> None:
         number = self._seen.take(frame, now_us)
         if number == layouts.HEARTBEAT:
+            self._flew |= self._stage == "flying" and not self._seen.on_ground
             for client in self._clients.values():
                 client.shown.update(now_us)
                 client.shown.heartbeat(now_us)
@@ -311,7 +314,7 @@ class Gateway:
         command, now_us = message.fields["command"], now.monotonic_us
         result: int | None
         if command == enums.MAV_CMD_COMPONENT_ARM_DISARM:
-            arms = message.number("param1") == 1 and not self._seen.armed
+            arms = message.number("param1") == 1
             result = client.shown.arm(message, now_us, self._cannot_take_off(client, now) if arms else None)
             if message.number("param1") == 0:
                 self._drop_held(client)
@@ -400,8 +403,7 @@ class Gateway:
             names = PX4_NAMES if self._settings.autopilot == PX4 else COPTER_NAMES
             self._reject(client, f"mode {names.get(mode, str(mode))} has no mapping", command, now_us)
             return DENIED
-        contract = self._translation.contract(row.skill)
-        if contract is not None and contract.motion.kind != MotionKind.CLIMB and self._rests:
+        if self._rests and self._translation.contract(row.skill) is not None and not self._climbs(row.skill):
             client.shown.show_mode(mode, now_us)
             return ACCEPTED
         return self._propose(client, message, self._step(client, row, message, now_us), command, now)
@@ -410,6 +412,13 @@ class Gateway:
     def _rests(self) -> bool:
         """Whether the vehicle is on the ground and no mission flies."""
         return self._stage != "flying" and self._seen.on_ground
+
+    @property
+    def _lands(self) -> bool:
+        """Whether the vehicle lands, or has touched down and its flight is not over."""
+        if self._seen.landed_state == enums.MAV_LANDED_STATE_LANDING:
+            return True
+        return self._flew and self._seen.on_ground
 
     # ---------------------------------------------------------------- proposals
 
@@ -453,6 +462,8 @@ class Gateway:
 
     def _refusal(self, client: _Client, step: ProposedStep, now: Now) -> QuickRefusal | None:
         """Why a step is certainly refused by the policy, or cannot be taken now."""
+        if self._climbs(step.skill) and self._lands:
+            return QuickRefusal(TEMPORARILY_REJECTED, _LANDS, step.skill, _LANDS)
         refusal = self._quick.refusal(step, client.link.settings.role, now)
         hindrance = None if refusal is not None else self._hindrance(client, step, now.monotonic_us)
         if hindrance is None:
@@ -521,6 +532,10 @@ class Gateway:
 
     def _cannot_take_off(self, client: _Client, now: Now) -> tuple[int, str] | None:
         """Why no take-off of this client could follow an arming now, whatever its height, and the MAV_RESULT."""
+        if self._lands:
+            return TEMPORARILY_REJECTED, _LANDS
+        if self._seen.armed:
+            return None
         if self._stage == "waiting" and self._unready is not None:
             return TEMPORARILY_REJECTED, self._unready
         refusals: list[QuickRefusal] = []
@@ -543,17 +558,19 @@ class Gateway:
         rival = self._outranked(client, now_us)
         if rival is not None and not self._is_safer(step.skill):
             return f"{rival.name} is in control"
-        contract = self._translation.contract(step.skill)
-        climbs = contract is not None and contract.motion.kind == MotionKind.CLIMB
         if self._stage == "flying":
             return None
         if not self._seen.on_ground:
             return "the vehicle flies under another control"
-        if not climbs:
+        if not self._climbs(step.skill):
             return "the vehicle is on the ground: take off first"
         if self._stage == "":
             return _NO_FLIGHT
         return self._unready
+
+    def _climbs(self, skill: str) -> bool:
+        contract = self._translation.contract(skill)
+        return contract is not None and contract.motion.kind == MotionKind.CLIMB
 
     def _outranked(self, client: _Client, now_us: int) -> ClientLink | None:
         """Another client that is in control, whose rank is not lower: also one that is gone, while its step brings the
@@ -640,7 +657,7 @@ class Gateway:
     def _flight_line(self, line: dict[str, Any], now_us: int) -> None:
         match line.get("type"):
             case "hello":
-                self._stage, self._unready, self._judged, self._cancelled = "", None, False, False
+                self._stage, self._unready, self._judged, self._cancelled, self._flew = "", None, False, False, False
             case "waiting":
                 self._stage = "waiting"
             case "vehicle":
@@ -677,7 +694,7 @@ class Gateway:
             for proposal in self._proposals.values():
                 words = f"{proposal.steps[0].skill} ended with the flight" + (f": {ending}" if ending else "")
                 proposal.refuse(TEMPORARILY_REJECTED, words, now_us)
-        self._stage, self._flown, self._kept, self._cancelled = "", None, None, False
+        self._stage, self._flown, self._kept, self._cancelled, self._flew = "", None, None, False, False
         self._proposals.clear()
 
     # ---------------------------------------------------------------- missions of clients

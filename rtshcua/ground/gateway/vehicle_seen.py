@@ -76,10 +76,15 @@ class VehicleSeen:
         return None if heartbeat is None else int(heartbeat.fields["custom_mode"])
 
     @property
+    def landed_state(self) -> int:
+        """`landed_state` of the last EXTENDED_SYS_STATE; 0 (undefined) without one."""
+        state = self.message(layouts.EXTENDED_SYS_STATE)
+        return 0 if state is None else int(state.fields["landed_state"])
+
+    @property
     def on_ground(self) -> bool:
         """Whether it is certainly on the ground: EXTENDED_SYS_STATE says so, or it is disarmed and does not say."""
-        state = self.message(layouts.EXTENDED_SYS_STATE)
-        landed = 0 if state is None else state.fields["landed_state"]
+        landed = self.landed_state
         return landed == enums.MAV_LANDED_STATE_ON_GROUND or (landed == 0 and not self.armed)
 
     def parameter(self, name: str) -> float | None:

@@ -21,7 +21,7 @@ from reference.gateway_world import (
 )
 from reference.sources import CHECKOUT
 from rtshcua.ground.gateway.accepted import COMMAND, AcceptedCommand
-from rtshcua.ground.gateway.interface import Action, ClientNote, Propose, RequestFrame, Withhold
+from rtshcua.ground.gateway.interface import Action, ClientNote, FlightEnded, Propose, RequestFrame, Withhold
 from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode, Px4Mode
 
 BEAT = frozenset({0})
@@ -140,6 +140,29 @@ def test_arming_is_refused_where_no_take_off_could_follow() -> None:
     chunks = [message.text for message in told(actions, 2) if message.get_type() == "STATUSTEXT"]
     assert chunks == ["PreArm: no rule of bridge_inspection names the".ljust(50), "role trainee"]
     assert acks(world.send(arm())) == [(400, 0)], "another role may take off"
+
+
+def test_while_the_vehicle_lands_arming_and_take_off_have_one_answer() -> None:
+    """By hand: `landed_state`, and whether the flight is over. Touched down, the vehicle stays armed for a moment."""
+    world = GatewayWorld()
+    world.fly()
+    for landed, lands in ((4, True), (1, True), (2, False)):
+        world.vehicle(mavlink.MAVLink_extended_sys_state_message(0, landed))
+        world.signals["landed"] = (landed,)
+        for message, number, before in (
+            (arm(), 400, "Arming denied: "),
+            (command_long(22, 0, 0, 0, 0, 0, 0, 503), 22, "takeoff rejected: "),
+        ):
+            actions = world.send(message)
+            if lands:
+                assert (acks(actions), texts(actions)) == ([(number, 1)], [before + "the vehicle is still landing"])
+            else:
+                assert "landing" not in "".join(texts(actions))
+    world.take(FlightEnded())
+    world.report(armed=False, airborne=False)
+    world.signals["landed"] = (1,)
+    world.ready()
+    assert acks(world.send(arm())) == [(400, 0)]
 
 
 def test_arming_is_accepted_where_any_skill_may_take_off(tmp_path: Path) -> None:

@@ -44,7 +44,7 @@ class ClientLink:
         self.is_dead = False
         #: the system id of its last frame
         self.system_id = 0
-        #: its values of parameters that only give defaults
+        #: the client's values of parameters that only give defaults; all its connections share them
         self.shadows: dict[str, float] = {}
         self._autopilot = system, enums.MAV_COMP_ID_AUTOPILOT1
         self._actions = actions

@@ -81,9 +81,9 @@ class ClientProposal:
         self.ended = True
         self.answer(CANCELLED)
 
-    def again(self, sender: tuple[int, int], command: int) -> None:
-        """The same command came again before its answer: it is the one to be answered."""
-        self.sender, self.command = sender, command
+    def again(self, link: ClientLink, sender: tuple[int, int], command: int) -> None:
+        """The same command came again, perhaps by another connection of the client: it is the one to be answered."""
+        self.link, self.sender, self.command = link, sender, command
         if self.told_us and command >= 0 and not self.guided:
             self.link.ack(sender, command, IN_PROGRESS)
 

@@ -9,7 +9,7 @@ policy decides on every step besides. A pilot who requests control keeps it unti
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Final, TypeAlias
 
 from rtshcua.ground.gateway.accepted import COMMAND, ITEM, MESSAGE, MODE
@@ -141,17 +141,26 @@ class _Held:
     told_us: int
 
 
-class _Client:
-    """One ordinary client with everything that is kept about it."""
+@dataclass(slots=True)
+class _Source:
+    """What all connections of one configured client share, also later ones: its values of parameters that only give
+    defaults, and the mission that it started last with the plan of that. Its plan is in `Gateway._plans`.
+    """
 
-    def __init__(self, link: ClientLink, shown: ShownState, transfer: PlanTransfer) -> None:
+    shadows: dict[str, float] = field(default_factory=dict)
+    mission: tuple[ClientProposal, UploadedPlan] | None = None
+
+
+class _Client:
+    """One connection of an ordinary client with everything that is kept about it."""
+
+    def __init__(self, link: ClientLink, source: _Source, shown: ShownState, transfer: PlanTransfer) -> None:
         self.link = link
+        self.source = source
         self.shown = shown
         self.transfer = transfer
         self.latest: ClientProposal | None = None
         self.setpoint_us = -SETPOINT_US
-        #: the mission that it started last, and the plan of that
-        self.mission: tuple[ClientProposal, UploadedPlan] | None = None
         self.reported: tuple[int, int] | None = None  # the last MISSION_CURRENT: item and state
 
 
@@ -172,6 +181,7 @@ class Gateway:
         policy = settings.policy.policy
         self._safe = [policy.contracts[link.skill].name for link in policy.contingency]
         self._clients: dict[int, _Client] = {}
+        self._sources: dict[str, _Source] = {}
         self._pilots: dict[int, ClientLink] = {}
         self._proposals: dict[int, ClientProposal] = {}
         self._uploads: dict[int, _Client] = {}
@@ -180,7 +190,7 @@ class Gateway:
         self._plans: dict[str, UploadedPlan] = {}
         self._number = 0
         self._flown: ClientProposal | None = None  # the proposal whose step was dispatched last
-        self._kept: tuple[_Client, int] | None = None  # who was in control last, and until when
+        self._kept: tuple[ClientLink, int] | None = None  # who was in control last, and until when
         self._pilot_holds = 0  # the system id of the pilot who requested control
         self._stage = ""  # of the flight: "", "waiting", "flying"
         self._unready: str | None = None
@@ -217,10 +227,7 @@ class Gateway:
                 if of.pilot:
                     self._pilots[client] = link
                 elif len(self._clients) < _MOST_CLIENTS:
-                    transfer = PlanTransfer(link, self._translation, self._settings.autopilot, self._plans)
-                    shown = ShownState(link, self._seen, self._actions, self._settings.autopilot)
-                    self._clients[client] = _Client(link, shown, transfer)
-                    self._of_mission(self._clients[client], now.monotonic_us)
+                    self._join(link, now.monotonic_us)
             case ClientDown(client):
                 self._down(client, now.monotonic_us)
             case RequestAnswered(number, slug):
@@ -231,6 +238,18 @@ class Gateway:
                 self._answered(number, slug, text, now.monotonic_us)
             case FlightEnded():
                 self._ended("", now.monotonic_us)
+
+    def _join(self, link: ClientLink, now_us: int) -> None:
+        """A client is there: it goes on with what its former connection left."""
+        source = self._sources.setdefault(link.name, _Source())
+        link.shadows = source.shadows
+        transfer = PlanTransfer(link, self._translation, self._settings.autopilot, self._plans)
+        shown = ShownState(link, self._seen, self._actions, self._settings.autopilot)
+        self._clients[link.client] = client = _Client(link, source, shown, transfer)
+        for each in self._proposals.values():
+            if each.link.name == link.name and each.link.client not in self._clients:
+                each.link = link
+        self._of_mission(client, now_us)
 
     # ---------------------------------------------------------------- the vehicle and the pilot
 
@@ -439,7 +458,7 @@ class Gateway:
         now_us, latest = now.monotonic_us, client.latest
         if latest is not None and latest.steps == steps and self._stands(latest):
             if not latest.answered:
-                latest.again(message.sender, command)
+                latest.again(client.link, message.sender, command)
             return ACCEPTED if latest.answered else None
         refusal = self._refusal(client, steps[0], now)
         if refusal is not None:
@@ -581,9 +600,9 @@ class Gateway:
             rival = flown.link
         else:
             holder = self._holder(now_us)
-            if holder is None or holder is client:
+            if holder is None or holder.name == client.link.name:
                 return None
-            rival = holder.link
+            rival = holder
         return rival if client.link.settings.rank <= rival.settings.rank else None
 
     def _is_safer(self, skill: str) -> bool:
@@ -598,22 +617,32 @@ class Gateway:
         furthest = max((self._safe.index(each) for each in under_way if each in self._safe), default=0)
         return self._safe.index(skill) >= furthest
 
-    def _holder(self, now_us: int) -> _Client | None:
+    def _holder(self, now_us: int) -> ClientLink | None:
         """The client in control: that of the last proposal under way, or for some time after its end."""
         for proposal in reversed(self._proposals.values()):
-            client = self._clients.get(proposal.link.client)
-            if not proposal.ended and not proposal.borrows and client is not None:
-                self._kept = client, now_us + KEEPS_US
-                return client
+            link = None if proposal.ended or proposal.borrows else self._connected(proposal.link)
+            if link is not None:
+                self._kept = link, now_us + KEEPS_US
+                return link
         if self._kept is not None and now_us < self._kept[1] and self._stage == "flying":
-            return self._kept[0] if self._kept[0].link.client in self._clients else None
+            return self._connected(self._kept[0])
         return None
+
+    def _connected(self, link: ClientLink) -> ClientLink | None:
+        """A connection that is up, else another one of the same client."""
+        if link.client in self._clients:
+            return link
+        return next((each.link for each in self._of(link.name)), None)
+
+    def _of(self, name: str) -> list[_Client]:
+        """The connections of a client."""
+        return [each for each in self._clients.values() if each.link.name == name]
 
     def _controller(self, now_us: int) -> str:
         if self._pilot_holds:
             return "the pilot"
         holder = self._holder(now_us)
-        return "nobody" if holder is None else holder.link.name
+        return "nobody" if holder is None else holder.name
 
     def _checked(self, event: ProposalChecked, now_us: int) -> None:
         number, refusal, first, for_now = event
@@ -740,10 +769,11 @@ class Gateway:
             self._reject(client, "there is no mission to start", command, now_us)
             return TEMPORARILY_REJECTED
         before = 0
-        if client.mission is not None and client.mission[1] is plan and self._stage == "flying":
-            last = client.mission[0]
+        mission = client.source.mission
+        if mission is not None and mission[1] is plan and self._stage == "flying":
+            last = mission[0]
             if not last.ended:
-                last.again(message.sender, command)
+                last.again(client.link, message.sender, command)
                 return ACCEPTED if last.answered else None
             before = 0 if last.done >= len(last.item_of) else last.done + len(plan.steps) - len(last.item_of)
         steps, more = self._from_ground(plan.steps[max(before, 0) :])
@@ -752,13 +782,14 @@ class Gateway:
         if result is None and proposal is not None and proposal.steps == steps:
             items = plan.item_of[max(before, 0) :]
             proposal.item_of = (*items[:1] * more, *items)
-            client.mission = proposal, plan
+            client.source.mission = proposal, plan
         return result
 
     def _jump(self, client: _Client, item: float, now_us: int) -> int:
         """DO_SET_MISSION_CURRENT, MISSION_SET_CURRENT: only back to the beginning, before the start."""
         if item == 0 and client.transfer.plan is not None:
-            client.mission = None if client.mission is None or client.mission[0].ended else client.mission
+            mission = client.source.mission
+            client.source.mission = None if mission is None or mission[0].ended else mission
             return ACCEPTED
         self._reject(client, "a mission starts at its first item", _SET_MISSION_CURRENT, now_us)
         return DENIED
@@ -769,21 +800,22 @@ class Gateway:
 
     def _progress(self, proposal: ClientProposal, now_us: int) -> None:
         """A step of a client's mission began or ended: report items as an autopilot does."""
-        client = self._clients.get(proposal.link.client)
-        if client is None or client.mission is None or client.mission[0] is not proposal or not proposal.item_of:
-            return
         done, items = proposal.done, proposal.item_of
-        if done and (done == len(items) or items[done] != items[done - 1]) and proposal.flies == done - 1:
-            client.link.send(MISSION_ITEM_REACHED, seq=items[done - 1])
-        self._mission_current(client)
+        reached = bool(done) and (done == len(items) or items[done : done + 1] != items[done - 1 : done])
+        for client in self._of(proposal.link.name):
+            if client.source.mission is None or client.source.mission[0] is not proposal or not items:
+                return
+            if reached and proposal.flies == done - 1:
+                client.link.send(MISSION_ITEM_REACHED, seq=items[done - 1])
+            self._mission_current(client)
 
     def _mission_current(self, client: _Client, *, always: bool = False) -> None:
         plan = client.transfer.plan
         if plan is None:
             return
-        item, state = 0, _NOT_STARTED
-        if client.mission is not None and client.mission[1] is plan:
-            proposal = client.mission[0]
+        (item, state), mission = (0, _NOT_STARTED), client.source.mission
+        if mission is not None and mission[1] is plan:
+            proposal = mission[0]
             items = proposal.item_of
             if items and proposal.done >= len(items):
                 item, state = items[-1], _COMPLETE
@@ -803,10 +835,9 @@ class Gateway:
     def _of_mission(self, client: _Client, now_us: int) -> None:
         """Withhold the vehicle's own reports of a mission from a client that has one here."""
         has = client.transfer.plan is not None
-        for each in self._clients.values():
-            if each.link.name == client.link.name:
-                each.shown.of_mission = frozenset({MISSION_CURRENT, MISSION_ITEM_REACHED}) if has else frozenset()
-                each.shown.update(now_us)
+        for each in self._of(client.link.name):
+            each.shown.of_mission = frozenset({MISSION_CURRENT, MISSION_ITEM_REACHED}) if has else frozenset()
+            each.shown.update(now_us)
 
     # ---------------------------------------------------------------- parameters, files, others
 
@@ -862,7 +893,7 @@ class Gateway:
     def _control_status(self, client: _Client, now_us: int) -> None:
         """CONTROL_STATUS: who is in control, for the whole system."""
         holder = self._holder(now_us)
-        system = self._pilot_holds or (0 if holder is None else holder.link.system_id)
+        system = self._pilot_holds or (0 if holder is None else holder.system_id)
         client.link.send(CONTROL_STATUS, flags=1, gcs_main=system)
 
     def _down(self, number: int, now_us: int) -> None:

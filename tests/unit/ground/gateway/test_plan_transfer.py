@@ -15,6 +15,7 @@ from reference.gateway_world import (
     command_long,
     item,
     proposals,
+    reposition,
     texts,
     told,
 )
@@ -292,9 +293,9 @@ def test_speeds_of_a_mission_hold_until_the_next_one() -> None:
 # ---------------------------------------------------------------- flying it
 
 
-def states(actions: list[Action]) -> list[tuple[str, int, int]]:
+def states(actions: list[Action], client: int = 1) -> list[tuple[str, int, int]]:
     found = []
-    for message in told(actions):
+    for message in told(actions, client):
         if message.get_type() == "MISSION_CURRENT":
             found.append(("current", message.seq, message.mission_state))
         elif message.get_type() == "MISSION_ITEM_REACHED":
@@ -457,3 +458,33 @@ def test_all_connections_of_a_client_have_its_mission() -> None:
     assert [message.count for message in told(sent, 2) if message.get_type() == "MISSION_COUNT"] == [0]
     flown = steps(world.send(mavlink.MAVLink_set_mode_message(SYSTEM, 1, CopterMode.AUTO), 3))
     assert [each.skill for each in flown] == ["takeoff", "goto", "goto", "return_home"]
+
+
+def test_a_client_that_connects_again_goes_on_with_its_mission() -> None:
+    """Its progress, the answer to its command, its value of a parameter, and its control are those of its name."""
+    world = GatewayWorld()
+    world.client(2, "other")
+    world.ready()
+    stored(world, mission())
+    world.send(mavlink.MAVLink_param_set_message(SYSTEM, 1, b"MIS_TAKEOFF_ALT", 12.0, 9))
+    world.accept(world.send(command_long(300)))
+    world.take(ClientDown(1))
+    world.client(3, "script")
+    actions = world.dispatch(0)
+    assert (acks(actions, 3), states(actions, 3)) == ([(300, 0)], [("current", 0, 3)])
+    actions = world.line(type="effect", event="succeeded", kind=0, step=0)
+    assert states(actions, 3) == [("reached", 0, 0), ("current", 1, 3)]
+    world.client(4, "script")
+    world.fly()
+    actions = world.dispatch(1)
+    assert acks(world.send(command_long(300), 4), 4) == [(300, 0)], "it flies already"
+    assert texts(world.send(command_long(193, 0), 2), 2) == [], "a hover is safer"
+    assert texts(world.send(reposition(), 2), 2) == ["goto rejected: script is in control"]
+    assert [skill for skill, *_ in proposals(world.send(reposition(), 4))] == ["goto"]
+    world = GatewayWorld()
+    world.send(mavlink.MAVLink_param_set_message(SYSTEM, 1, b"MIS_TAKEOFF_ALT", 12.0, 9))
+    world.take(ClientDown(1))
+    world.client(3, "script")
+    world.ready()
+    taken_off = world.send(command_long(22, 0, 0, 0, 0, nan, nan, nan), 3)
+    assert proposals(taken_off) == [("takeoff", {"altitude": "12 m"}, (12_000,))]

@@ -337,18 +337,19 @@ class GatewayService:
         return self._system in (None, frame[_SYSTEM_AT])
 
     def _begin_core(self, now: Now) -> None:
-        """Start the core for the vehicle and the policy, and tell it which clients there are."""
+        """Start the core for the vehicle and the policy, and tell it which clients there are; or renew its policy."""
         assert self._heard is not None
         system, autopilot = self._heard
         missions, prepared = self._policy.missions, self._policy.prepared
-        if self._core is not None:
-            for action in self._core.end(now):
-                self._do(action, now)
         frames = self._frames = VehicleFrames(prepared, system)
         settings = GatewaySettings(
             system, autopilot, prepared, missions.defaults(),
             accepted_commands(missions.program, dialect.load(), missions.policy), frames.state, frames.needed_us,
         )  # fmt: skip
+        if self._core is not None:
+            for action in self._core.renew(settings, now):
+                self._do(action, now)
+            return
         self._core = Gateway(settings)
         for number, client in self._clients.items():
             self._take(interface.ClientUp(number, client), now)

@@ -6,7 +6,7 @@ home. A mission is stored only after it was translated and checked as a whole. F
 https://mavlink.io/en/services/mission.html
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import isnan
 from typing import Any, Final, NamedTuple
@@ -83,8 +83,9 @@ class PlanTransfer:
     ) -> None:
         self._link = link
         self._plans = plans
-        self._translation = translation
-        self._keeps_home = autopilot == ARDUPILOT
+        #: under the policy in force
+        self.translation = translation
+        self._autopilot = autopilot
         self._pace = _ARDUPILOT if autopilot == ARDUPILOT else _PX4
         self._upload: _Upload | None = None
         self._checking: tuple[tuple[int, int], UploadedPlan] | None = None
@@ -138,7 +139,7 @@ class PlanTransfer:
             self._ask(upload, now_us)
             return None
         self._upload = None
-        made = self.translated(upload.items, shadows, now_us)
+        made = read_plan(upload.items, self.translation, shadows, now_us, self._autopilot)
         if isinstance(made, RefusedPlan):
             self.refuse(upload.sender, made, now_us)
             return None
@@ -231,25 +232,27 @@ class PlanTransfer:
     def _answer(self, to: tuple[int, int], result: int, kind: int = MISSION) -> None:
         self._link.send(layouts.MISSION_ACK, type=result, mission_type=kind & 0xFF, **_target(to))
 
-    # ---------------------------------------------------------------- what the items mean
 
-    def translated(
-        self, items: list[Received], shadows: Mapping[str, float], now_us: int
-    ) -> UploadedPlan | RefusedPlan:
-        """The steps of a mission's items. DO_CHANGE_SPEED is no step: it sets the speed of the flights after it.
+# ---------------------------------------------------------------- what the items mean
 
-        An item that stays or lands at a place becomes a flight to the place, and then the step.
-        """
-        made = _Steps(self._translation, shadows, now_us)
-        for number, item in enumerate(items):
-            if self._keeps_home and number == 0:
-                continue
-            problem = made.add(number, item)
-            if problem is not None:
-                return RefusedPlan(problem.result, f"item {number}: {problem.text}")
-        if not made.steps:
-            return RefusedPlan(MISSION_INVALID, "the mission has no item that flies")
-        return UploadedPlan(tuple(items), tuple(made.steps), tuple(made.item_of))
+
+def read_plan(
+    items: Sequence[Received], translation: Translation, shadows: Mapping[str, float], now_us: int, autopilot: int
+) -> UploadedPlan | RefusedPlan:
+    """The steps of a mission's items. DO_CHANGE_SPEED is no step: it sets the speed of the flights after it.
+
+    An item that stays or lands at a place becomes a flight to the place, and then the step.
+    """
+    made = _Steps(translation, shadows, now_us)
+    for number, item in enumerate(items):
+        if autopilot == ARDUPILOT and number == 0:
+            continue
+        problem = made.add(number, item)
+        if problem is not None:
+            return RefusedPlan(problem.result, f"item {number}: {problem.text}")
+    if not made.steps:
+        return RefusedPlan(MISSION_INVALID, "the mission has no item that flies")
+    return UploadedPlan(tuple(items), tuple(made.steps), tuple(made.item_of))
 
 
 class _Steps:

@@ -60,7 +60,7 @@ from rtshcua.ground.gateway.interface import (
     Tick,
     Withhold,
 )
-from rtshcua.ground.gateway.plan_transfer import PlanTransfer, UploadedPlan
+from rtshcua.ground.gateway.plan_transfer import PlanTransfer, RefusedPlan, UploadedPlan, read_plan
 from rtshcua.ground.gateway.quick_decision import QuickDecision, QuickRefusal
 from rtshcua.ground.gateway.translation import (
     ACCEPTED,
@@ -144,11 +144,14 @@ class _Held:
 @dataclass(slots=True)
 class _Source:
     """What all connections of one configured client share, also later ones: its values of parameters that only give
-    defaults, and the mission that it started last with the plan of that. Its plan is in `Gateway._plans`.
+    defaults, and the mission that it started last with the plan of that. Its plan is in `Gateway._plans`. `withdrawn`:
+    why its mission was withdrawn, until one of them is told.
     """
 
+    role: str
     shadows: dict[str, float] = field(default_factory=dict)
     mission: tuple[ClientProposal, UploadedPlan] | None = None
+    withdrawn: str = ""
 
 
 class _Client:
@@ -171,20 +174,18 @@ class Gateway:
     """All clients of one vehicle. `take` is called with each event, in order, by one caller."""
 
     def __init__(self, settings: GatewaySettings) -> None:
-        self._settings = settings
         self._actions: list[Action] = []
         self._seen = VehicleSeen(settings.system)
-        self._translation = Translation(settings, self._seen)
-        self._quick = QuickDecision(settings)
         self._requests = HarmlessRequests(settings, self._seen, self._actions)
-        self._shadowed = shadowed_parameters(settings.accepted)
-        policy = settings.policy.policy
-        self._safe = [policy.contracts[link.skill].name for link in policy.contingency]
+        self._under(settings)
         self._clients: dict[int, _Client] = {}
         self._sources: dict[str, _Source] = {}
         self._pilots: dict[int, ClientLink] = {}
         self._proposals: dict[int, ClientProposal] = {}
         self._uploads: dict[int, _Client] = {}
+        #: missions that are to be checked under a renewed policy, and those that are being checked, by proposal
+        self._unchecked: set[str] = set()
+        self._rechecks: dict[int, tuple[str, UploadedPlan]] = {}
         self._held: list[_Held] = []
         self._holds = True
         self._plans: dict[str, UploadedPlan] = {}
@@ -199,6 +200,66 @@ class Gateway:
         self._judged = False  # whether the flight has said if the vehicle is ready
         self._second_us = 0
         self._handlers = self._by_message()
+
+    def _under(self, settings: GatewaySettings) -> None:
+        """Take what depends on the policy."""
+        self._settings = settings
+        self._translation = Translation(settings, self._seen)
+        self._quick = QuickDecision(settings)
+        self._shadowed = shadowed_parameters(settings.accepted)
+        policy = settings.policy.policy
+        self._safe = [policy.contracts[link.skill].name for link in policy.contingency]
+
+    def renew(self, settings: GatewaySettings, now: Now) -> list[Action]:
+        """Another policy is in force, while nothing flies. Everything is kept; stored missions are read again, and
+        checked again under it.
+        """
+        now_us = now.monotonic_us
+        self._under(settings)
+        self._requests.need(settings.needed_us)
+        for client in self._clients.values():
+            client.transfer.translation = self._translation
+        for client in dict.fromkeys(self._uploads.values()):
+            client.transfer.checked("the policy was renewed: upload it again", now_us)
+        self._uploads.clear()
+        for name, plan in list(self._plans.items()):
+            source = self._sources[name]
+            read = read_plan(plan.items, self._translation, source.shadows, now_us, settings.autopilot)
+            if isinstance(read, RefusedPlan):
+                self._withdraw(name, read.text, now_us)
+                continue
+            self._plans[name] = read
+            self._unchecked.add(name)
+            mission = source.mission
+            source.mission = (mission[0], read) if mission is not None and mission[1] is plan else None
+        return self._taken()
+
+    def _check_again(self) -> None:
+        """Ask for the check of missions that were stored under an earlier policy."""
+        for name in sorted(self._unchecked & self._plans.keys()):
+            self._number += 1
+            self._rechecks = {at: each for at, each in self._rechecks.items() if each[0] != name}
+            self._rechecks[self._number] = name, self._plans[name]
+            client = next((each.link.client for each in self._of(name)), 0)
+            steps = self._from_ground(self._plans[name].steps)[0]
+            self._actions.append(Propose(self._number, client, self._sources[name].role, steps, fly=False))
+        self._unchecked.clear()
+
+    def _checked_again(self, name: str, plan: UploadedPlan, event: ProposalChecked, now_us: int) -> None:
+        if self._plans.get(name) is not plan or event.refusal is None:
+            return
+        if event.for_now:
+            self._unchecked.add(name)
+        else:
+            self._withdraw(name, event.refusal, now_us)
+
+    def _withdraw(self, name: str, why: str, now_us: int) -> None:
+        """Forget a mission that the policy does not permit any more, and tell its client, at once or once it is there."""
+        del self._plans[name]
+        source = self._sources[name]
+        source.mission, source.withdrawn = None, f"mission withdrawn, the policy was renewed: {why}"
+        for client in self._of(name)[:1]:
+            self._of_mission(client, now_us)
 
     def take(self, event: Event, now: Now) -> list[Action]:
         """What is to be done after an event."""
@@ -215,6 +276,9 @@ class Gateway:
                 self._tick(now)
             case _:
                 self._rare(event, now)
+        return self._taken()
+
+    def _taken(self) -> list[Action]:
         actions = self._actions[:]
         self._actions.clear()
         return actions
@@ -241,7 +305,7 @@ class Gateway:
 
     def _join(self, link: ClientLink, now_us: int) -> None:
         """A client is there: it goes on with what its former connection left."""
-        source = self._sources.setdefault(link.name, _Source())
+        source = self._sources.setdefault(link.name, _Source(link.settings.role))
         link.shadows = source.shadows
         transfer = PlanTransfer(link, self._translation, self._settings.autopilot, self._plans)
         shown = ShownState(link, self._seen, self._actions, self._settings.autopilot)
@@ -540,15 +604,6 @@ class Gateway:
                 each.told_us = now_us
                 each.client.link.ack(each.message.sender, each.command, IN_PROGRESS)
 
-    def end(self, now: Now) -> list[Action]:
-        """This policy is no longer in force, and another gateway takes its place: answer what waits."""
-        for each in self._held:
-            each.client.link.text("the policy was renewed: send the command again", now.monotonic_us, "renewed")
-            each.client.link.ack(each.message.sender, each.command, TEMPORARILY_REJECTED)
-        actions = self._actions[:]
-        self._actions.clear()
-        return actions
-
     def _cannot_take_off(self, client: _Client, now: Now) -> tuple[int, str] | None:
         """Why no take-off of this client could follow an arming now, whatever its height, and the MAV_RESULT."""
         if self._lands:
@@ -650,6 +705,10 @@ class Gateway:
         if upload is not None:
             upload.transfer.checked(refusal, now_us)
             self._of_mission(upload, now_us)
+            return
+        again = self._rechecks.pop(number, None)
+        if again is not None:
+            self._checked_again(*again, event, now_us)
             return
         proposal = self._proposals.get(number)
         if proposal is None:
@@ -833,9 +892,13 @@ class Gateway:
         self._of_mission(client, now.monotonic_us)
 
     def _of_mission(self, client: _Client, now_us: int) -> None:
-        """Withhold the vehicle's own reports of a mission from a client that has one here."""
+        """Withhold the vehicle's own reports of a mission from a client that has one here, or say why it has none."""
         has = client.transfer.plan is not None
+        why, client.source.withdrawn = client.source.withdrawn, ""
         for each in self._of(client.link.name):
+            if why:
+                each.link.text(why, now_us)
+                each.link.record("withdrawn", now_us, message="MISSION_COUNT", reason=why)
             each.shown.of_mission = frozenset({MISSION_CURRENT, MISSION_ITEM_REACHED}) if has else frozenset()
             each.shown.update(now_us)
 
@@ -886,6 +949,7 @@ class Gateway:
                 self._control_status(client, now_us)
                 self._mission_current(client, always=True)
         if every_second:
+            self._check_again()
             self._second_us = now_us
         self._end_without_client(now_us)
         self._tidy(now_us)

@@ -19,9 +19,18 @@ from reference.gateway_world import (
     texts,
     told,
 )
-from rtshcua.ground.gateway.interface import Action, ClientDown, ProposalAnswered, ProposalChecked, Propose, Withhold
+from rtshcua.ground.gateway.interface import (
+    Action,
+    ClientDown,
+    FlightEnded,
+    ProposalAnswered,
+    ProposalChecked,
+    Propose,
+    Withhold,
+)
 from rtshcua.ground.gateway.plan_transfer import MOST_ITEMS
 from rtshcua.mavlink.modes import ARDUPILOT, PX4, CopterMode
+from rtshcua.model.flat.situation import Now
 
 N, E = NORTH
 TAKEOFF, WAYPOINT, LOITER, RETURN, LAND, SPEED = 22, 16, 19, 20, 21, 178
@@ -488,3 +497,71 @@ def test_a_client_that_connects_again_goes_on_with_its_mission() -> None:
     world.ready()
     taken_off = world.send(command_long(22, 0, 0, 0, 0, nan, nan, nan), 3)
     assert proposals(taken_off) == [("takeoff", {"altitude": "12 m"}, (12_000,))]
+
+
+# ---------------------------------------------------------------- a renewed policy
+
+
+def renewed(world: GatewayWorld, **changes: Any) -> list[Action]:
+    """The gateway under a renewed policy, between two flights; what the first second led to."""
+    world.take(FlightEnded())
+    actions = world.gateway.renew(world.settings._replace(**changes), Now(world.now_us, 0, 0))
+    return actions + world.wait(1_100_000)
+
+
+def test_a_renewed_policy_keeps_missions_parameters_and_what_is_shown() -> None:
+    world = GatewayWorld()
+    world.ready()
+    stored(world, mission())
+    world.send(mavlink.MAVLink_param_set_message(SYSTEM, 1, b"MIS_TAKEOFF_ALT", 12.0, 9))
+    world.send(command_long(400, 1))
+    world.accept(world.send(command_long(300)))
+    world.dispatch(0)
+    world.line(type="effect", event="succeeded", kind=0, step=0)
+    actions = renewed(world)
+    (check,) = (each for each in actions if isinstance(each, Propose))
+    assert (check.fly, [step.skill for step in check.steps]) == (False, ["takeoff", "goto", "goto", "return_home"])
+    assert ("current", 1, 4) in states(actions), "its progress"
+    assert texts(actions + world.take(ProposalChecked(check.number, None))) == []
+    assert [message.base_mode >> 7 for message in told(world.report()) if message.get_type() == "HEARTBEAT"] == [1]
+    world.ready()
+    assert len(proposals(world.send(command_long(300)))) == 4
+    taken_off = world.send(command_long(22, 0, 0, 0, 0, nan, nan, nan))
+    assert proposals(taken_off) == [("takeoff", {"altitude": "12 m"}, (12_000,))]
+
+
+def test_a_mission_that_a_renewed_policy_does_not_permit_is_withdrawn_with_the_reason() -> None:
+    world = GatewayWorld()
+    world.ready()
+    stored(world, mission())
+    (check,) = (each for each in renewed(world) if isinstance(each, Propose))
+    actions = world.take(ProposalChecked(check.number, "the vehicle does not report its position", for_now=True))
+    assert texts(actions) == []
+    (check,) = (each for each in world.wait(1_100_000) if isinstance(each, Propose))
+    actions = world.take(ProposalChecked(check.number, "the way home is too long"))
+    assert texts(actions) == ["mission withdrawn, the policy was renewed: the way home is too long"]
+    assert [each.messages for each in actions if isinstance(each, Withhold)] == [frozenset()]
+    assert texts(world.send(command_long(300))) == ["there is no mission to start"]
+
+
+def test_a_client_that_is_away_reads_later_that_its_mission_was_withdrawn() -> None:
+    """Also where no item of it can be read under the renewed policy."""
+    world = GatewayWorld()
+    world.ready()
+    stored(world, mission())
+    world.take(ClientDown(1))
+    assert not any(isinstance(each, Propose) for each in renewed(world, accepted=()))
+    world.client(2, "script")
+    assert texts(world.done, 2) == ["mission withdrawn, the policy was renewed: item 0: command 22 has no mapping"]
+    world.client(3, "script")
+    assert texts(world.done, 3) == []
+
+
+def test_an_upload_and_a_command_that_wait_meet_a_renewed_policy() -> None:
+    """The check of the upload ended with the former policy; the command goes on waiting for the next flight."""
+    world = GatewayWorld()
+    upload(world, mission())
+    world.send(command_long(22, 0, 0, 0, 0, 0, 0, 503))
+    assert results(renewed(world)) == [(14, 0)]
+    world.ready()
+    assert [skill for skill, *_ in proposals(world.wait(100_000))] == ["takeoff"]

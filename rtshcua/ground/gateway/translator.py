@@ -8,6 +8,7 @@ the step that flies is none that stands later there: nobody stops another one's 
 policy decides on every step besides. A pilot who requests control keeps it until he releases it.
 """
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final, TypeAlias
@@ -91,6 +92,11 @@ _LANDS: Final = "the vehicle is still landing"
 #: the most proposals of one client that are neither taken nor refused
 MOST_OPEN: Final = 4
 _SECOND_US: Final = 1_000_000
+#: how long the same command gets the same refusal, and after a refused setpoint the next ones are passed over, us
+REFUSED_US: Final = 200_000
+#: the most decisions a second on commands of one client; those that stop, return or land are counted apart
+MOST_DECISIONS: Final = 20
+_TOO_MANY: Final = f"too many commands: at most {MOST_DECISIONS} a second are decided"
 _MOST_CLIENTS: Final = 256
 
 REQUEST_OPERATOR_CONTROL: Final = 32_100
@@ -152,6 +158,18 @@ class _Source:
     shadows: dict[str, float] = field(default_factory=dict)
     mission: tuple[ClientProposal, UploadedPlan] | None = None
     withdrawn: str = ""
+    #: when its last commands were decided, us: those of other skills, and those of safe ones
+    decided: tuple[deque[int], deque[int]] = field(
+        default_factory=lambda: (deque(maxlen=MOST_DECISIONS), deque(maxlen=MOST_DECISIONS))
+    )
+
+    def may_decide(self, now_us: int, *, safe: bool = False) -> bool:
+        """Whether one more command may be decided now. It is counted."""
+        times = self.decided[safe]
+        if len(times) == MOST_DECISIONS and now_us - times[0] < _SECOND_US:
+            return False
+        times.append(now_us)
+        return True
 
 
 class _Client:
@@ -163,7 +181,10 @@ class _Client:
         self.shown = shown
         self.transfer = transfer
         self.latest: ClientProposal | None = None
-        self.setpoint_us = -SETPOINT_US
+        #: the earliest time of the next proposal from a setpoint
+        self.setpoint_us = 0
+        #: its last command, what it was decided on, the result, and until when that is repeated
+        self.refused: tuple[object, int, int] | None = None
         self.reported: tuple[int, int] | None = None  # the last MISSION_CURRENT: item and state
 
 
@@ -386,6 +407,8 @@ class Gateway:
         if message.message in _SAYS_NOTHING or not message.is_for(self._settings.system):
             return
         handler = self._handlers.get(message.message)
+        if message.message not in (layouts.COMMAND_LONG, layouts.COMMAND_INT):
+            client.refused = None  # it may have changed what the command was refused for
         if handler is not None:
             handler(client, message, now)
         else:
@@ -394,7 +417,25 @@ class Gateway:
             client.link.record("refused", now.monotonic_us, message=message.message)
 
     def _command(self, client: _Client, message: Received, now: Now) -> None:
+        """COMMAND_LONG, COMMAND_INT. A repeated one costs nearly nothing: it has the answer of the last one."""
         command, now_us = message.fields["command"], now.monotonic_us
+        seen, content = self._seen, repr({**message.fields, "confirmation": 0})  # in `repr` NaN is equal to NaN
+        state = (
+            content, self._stage, self._unready, self._pilot_holds, seen.armed, seen.landed_state, len(seen.parameters),
+        )  # fmt: skip
+        if client.refused is not None and client.refused[0] == state and now_us < client.refused[2]:
+            client.link.ack(message.sender, command, client.refused[1])
+            return
+        result = self._result(client, message, command, now)
+        client.refused = None
+        if result is not None:
+            client.link.ack(message.sender, command, result)
+            if result != ACCEPTED and self._holds:
+                client.refused = state, result, now_us + REFUSED_US
+
+    def _result(self, client: _Client, message: Received, command: int, now: Now) -> int | None:
+        """The result of a command; None if the answer comes later."""
+        now_us = now.monotonic_us
         result: int | None
         if command == enums.MAV_CMD_COMPONENT_ARM_DISARM:
             arms = message.number("param1") == 1
@@ -414,8 +455,7 @@ class Gateway:
             result = self._jump(client, message.number("param1"), now_us)
         else:
             result = self._mapped(client, message, command, now)
-        if result is not None:
-            client.link.ack(message.sender, command, result)
+        return result
 
     def _mapped(self, client: _Client, message: Received, command: int, now: Now) -> int | None:
         """A command that the table may have; its result, None if the answer comes later."""
@@ -434,13 +474,18 @@ class Gateway:
         return step
 
     def _setpoint(self, client: _Client, message: Received, now: Now) -> None:
-        row, now_us = self._translation.row(MESSAGE, message.message, message), now.monotonic_us
+        now_us = now.monotonic_us
+        if now_us < client.setpoint_us:
+            return  # it comes again
+        row = self._translation.row(MESSAGE, message.message, message)
         if row is None:
             what = _SETPOINTS[message.message]
             client.link.text(f"{what} refused: send positions", now_us, what)
             client.link.record("refused", now_us, message=message.message)
             return
-        self._propose(client, message, self._step(client, row, message, now_us), -1, now)
+        result = self._propose(client, message, self._step(client, row, message, now_us), -1, now)
+        if result not in (None, ACCEPTED):
+            client.setpoint_us = now_us + REFUSED_US
 
     def _reject(self, client: _Client, text: str, command: int, now_us: int) -> None:
         client.link.text(text, now_us, text)
@@ -524,15 +569,19 @@ class Gateway:
             if not latest.answered:
                 latest.again(client.link, message.sender, command)
             return ACCEPTED if latest.answered else None
+        waiting = [each for each in self._proposals.values() if each.link is client.link and not each.taken]
+        if command < 0 and waiting:
+            return None  # it comes again
+        if not client.source.may_decide(now_us, safe=steps[0].skill in self._safe):
+            client.link.text(_TOO_MANY, now_us, _TOO_MANY)
+            client.link.record("refused", now_us, skill=steps[0].skill, reason=_TOO_MANY)
+            return TEMPORARILY_REJECTED
         refusal = self._refusal(client, steps[0], now)
         if refusal is not None:
             return self._refuse(client, refusal, message, command, now_us)
-        waiting = [each for each in self._proposals.values() if each.link is client.link and not each.taken]
-        if command < 0 and (waiting or now_us - client.setpoint_us < SETPOINT_US):
-            return None  # it comes again
         if len(waiting) >= MOST_OPEN:
             return TEMPORARILY_REJECTED
-        client.setpoint_us = now_us if command < 0 else client.setpoint_us
+        client.setpoint_us = now_us + SETPOINT_US if command < 0 else client.setpoint_us
         self._number += 1
         proposal = ClientProposal(
             self._number, client.link, message.sender, command, steps, now_us,
@@ -612,6 +661,8 @@ class Gateway:
             return None
         if self._stage == "waiting" and self._unready is not None:
             return TEMPORARILY_REJECTED, self._unready
+        if not client.source.may_decide(now.monotonic_us):
+            return TEMPORARILY_REJECTED, _TOO_MANY
         refusals: list[QuickRefusal] = []
         for step in self._translation.takeoffs_to():
             refusal = None if step is None else self._quick.refusal(step, client.link.settings.role, now)

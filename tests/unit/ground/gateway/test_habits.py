@@ -404,8 +404,9 @@ def test_a_text_of_whole_chunks_ends_with_an_empty_one() -> None:
 def test_records_beyond_the_rate_are_counted() -> None:
     world = GatewayWorld()
     recorded: list[Any] = []
-    for _ in range(100):
-        recorded += [json.loads(each.text) for each in world.send(command_long(246, 1)) if isinstance(each, ClientNote)]
+    for at in range(100):
+        sent = world.send(command_long(246, at))
+        recorded += [json.loads(each.text) for each in sent if isinstance(each, ClientNote)]
     assert len(recorded) == 20
     world.now_us += 5_000_000
     (next_one,) = (json.loads(each.text) for each in world.send(command_long(246)) if isinstance(each, ClientNote))

@@ -1,5 +1,7 @@
 import statistics
 import time
+from math import nan
+from typing import Any
 
 import pytest
 
@@ -12,9 +14,12 @@ from reference.gateway_world import (
     policy,
     proposals,
     reposition,
+    setpoint,
     texts,
 )
 from reference.sources import CHECKOUT
+from rtshcua.decision.decide import decide
+from rtshcua.ground.gateway import quick_decision
 
 SCHOOL = {"latitude": 473_972_900, "longitude": 85_477_100}
 ABROAD = {"latitude": 473_990_000, "longitude": 85_700_000}
@@ -169,3 +174,78 @@ def test_a_refusal_takes_about_a_millisecond_or_less() -> None:
         world.send(reposition(z=540 + number % 7))
         times.append(time.perf_counter() - begun)
     assert statistics.median(times) < 0.02
+
+
+# ---------------------------------------------------------------- floods
+
+
+def flooded(monkeypatch: pytest.MonkeyPatch, world: GatewayWorld, messages: list[Any]) -> tuple[int, int, int]:
+    """Send 800 commands in a second by four connections; how many were decided, answered and told in a text."""
+    decided = 0
+
+    def counted(*words: Any) -> Any:
+        nonlocal decided
+        decided += 1
+        return decide(*words)
+
+    monkeypatch.setattr(quick_decision, "decide", counted)
+    answered = said = 0
+    for at in range(800):
+        world.now_us += 1_250
+        actions = world.send(messages[at % len(messages)], 1 + at % 4)
+        answered += len(acks(actions, 1 + at % 4))
+        said += len(texts(actions, 1 + at % 4))
+    return decided, answered, said
+
+
+def of_four() -> GatewayWorld:
+    world = GatewayWorld()
+    for number in (2, 3, 4):
+        world.client(number, "script")
+    return world
+
+
+def test_a_flood_of_one_refused_command_is_decided_a_few_times_and_answered_each_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """MAVSDK leaves parameters NaN. A decision is made again after 200 ms; each moves its value once or twice."""
+    for message, ready in ((reposition(z=550), False), (command_long(400, 1, nan), True), (command_long(21), True)):
+        world = of_four()
+        world.signals["battery"] = (3_000,)
+        if ready:
+            world.ready()
+        else:
+            world.fly()
+        decided, answered, said = flooded(monkeypatch, world, [message])
+        assert answered == 800
+        assert decided <= 100, message
+        assert said <= 24, message
+
+
+def test_a_flood_of_similar_commands_leaves_room_to_land(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = of_four()
+    world.fly()
+    decided, answered, said = flooded(monkeypatch, world, [reposition(z=550 + at / 10) for at in range(400)])
+    assert (answered, decided <= 100) == (800, True), decided
+    assert said <= 48
+    assert texts(world.done)[-1] == "too many commands: at most 20 a second are decided"
+    assert [skill for skill, *_ in proposals(world.send(command_long(21), 2))] == ["emergency_land"]
+    world.wait(1_100_000)
+    assert [skill for skill, *_ in proposals(world.send(reposition(), 3))] == ["goto"]
+
+
+def test_a_flood_of_refused_setpoints_is_decided_a_few_times(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = of_four()
+    world.fly()
+    decided, *_ = flooded(monkeypatch, world, [setpoint(z=80 + at / 10) for at in range(100)])
+    assert decided <= 100, decided
+
+
+def test_a_refusal_is_decided_again_once_the_vehicle_has_changed() -> None:
+    world = GatewayWorld()
+    assert acks(world.send(command_long(300))) == [(300, 1)]
+    assert texts(world.send(command_long(300))) == []
+    world.now_us += 200_000
+    assert texts(world.send(command_long(193, 0))) == ["hover rejected: the vehicle is on the ground: take off first"]
+    world.fly()
+    assert len(proposals(world.send(command_long(193, 0)))) == 1, "at once"

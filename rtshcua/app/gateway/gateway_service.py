@@ -49,8 +49,8 @@ _TICK_US: Final = 50_000
 HEARTBEAT_S: Final = 20.0
 #: the wait before a flight is started again: after one that flew, and after each one in a row that did not
 _AGAIN_S: Final = (0.2, 1.0, 2.0, 5.0, 15.0)
-#: lines about clients that wait for the log, and the least interval between two, in seconds (docs/agents.md)
-_MOST_RECORDS: Final = 200
+#: lines about each client that wait for the log, and the least interval between two, in seconds (docs/agents.md)
+_MOST_RECORDS: Final = 50
 _RECORD_S: Final = 0.25
 #: how much earlier than now, besides the error of UTC, a mission is issued, us
 _ISSUED_BEFORE_US: Final = 100_000
@@ -157,6 +157,28 @@ class GatewaySession:
                 self.close = line
 
 
+class ClientRecords:
+    """The lines about clients that wait for the flight's log: of each client at most so many, and one in its turn."""
+
+    def __init__(self) -> None:
+        self._waiting: dict[str, deque[str]] = {}
+
+    def add(self, client: str, text: str) -> None:
+        """Add a line; the oldest of this client gives way."""
+        self._waiting.setdefault(client, deque(maxlen=_MOST_RECORDS)).append(text)
+
+    def next(self) -> str | None:
+        """The next line; None if none waits."""
+        client = next(iter(self._waiting), None)
+        if client is None:
+            return None
+        lines = self._waiting.pop(client)
+        text = lines.popleft()
+        if lines:
+            self._waiting[client] = lines  # behind the others
+        return text
+
+
 class ClientJournal:
     """The lines about all clients in `gateway.jsonl`, written by another thread: no client waits for the disk."""
 
@@ -206,7 +228,7 @@ class GatewayService:
         self._poll, self._polled, self._tick_us = select.poll(), list[int](), 0
         self._handed: int | None = None  # the number of the document that the flight has not answered
         self._journal = ClientJournal(runs / "gateway.jsonl")
-        self._records: deque[str] = deque(maxlen=_MOST_RECORDS)
+        self._records = ClientRecords()
         self._record_s = 0.0
         self._wakes, self._wake = socket.socketpair()
         for each in (self._wakes, self._wake):
@@ -424,8 +446,10 @@ class GatewayService:
                 self._request(number, frame, now)
             case interface.Cancel(_, reason):
                 self._cancel(reason, now)
-            case interface.ClientNote(text):
-                self._record(text)
+            case interface.ClientNote(text, said):
+                self._console.tell({"event": "client", "told": said})
+                self._journal.keep({"at_us": time.time_ns() // 1_000, **said})
+                self._records.add(str(said["client"]), text)
 
     def _request(self, number: int, frame: bytes, now: Now) -> None:
         if self._session is None or self._session.link.descriptor is None:
@@ -442,19 +466,14 @@ class GatewayService:
             self._session.link.hand_in(self._numbers, document)
             self._console.tell({"event": "cancelled", "why": reason})
 
-    def _record(self, text: str) -> None:
-        """Keep a line about a client: at once in `gateway.jsonl`, and for the log of the flight."""
-        self._records.append(text)
-        with suppress(ValueError):
-            self._console.tell({"event": "client", "told": json.loads(text)})
-        self._journal.keep({"at_us": time.time_ns() // 1_000, "client": text})
-
     def _hand_in_records(self) -> None:
         session = self._session
-        if not self._records or session is None or session.in_force is None or time.monotonic() < self._record_s:
+        if session is None or session.in_force is None or time.monotonic() < self._record_s:
             return
-        self._record_s = time.monotonic() + _RECORD_S
-        session.link.record(0, self._records.popleft())
+        text = self._records.next()
+        if text is not None:
+            self._record_s = time.monotonic() + _RECORD_S
+            session.link.record(0, text)
 
     def _moment(self, now: Now) -> ProposalMoment:
         session = self._session

@@ -2,6 +2,7 @@
 
 import json
 from collections import deque
+from textwrap import shorten
 from typing import Any, Final
 
 from rtshcua.ground.gateway.client_frames import COMMAND_ACK, made
@@ -14,8 +15,10 @@ TEXT_EVERY_US: Final = 5_000_000
 #: the most chunks of one text
 _MOST_CHUNKS: Final = 4
 _MOST_KEYS: Final = 64
-#: a `client` record: its most octets; how many at once, and the interval after that, us
+#: a `client` record: its most octets, and the most characters of a text in it; how many at once, and the interval after that, us
 LONGEST_RECORD: Final = 200
+_LONGEST_TEXT: Final = 80
+_LONGEST_NAME: Final = 40
 _RECORDS: Final = 20
 _RECORD_EVERY_US: Final = 200_000
 #: MAV_SEVERITY
@@ -113,15 +116,12 @@ class ClientLink:
             self._left_out += 1
             return
         self._recorded.append(now_us)
-        said: dict[str, Any] = {"client": self.name[:32], "effect": effect}
+        said: dict[str, Any] = {"client": self.name[:_LONGEST_NAME], "effect": effect}
         if self._left_out:
             said["left_out"] = self._left_out
             self._left_out = 0
-        for key, value in detail.items():
-            more = said | {key: value[:80] if isinstance(value, str) else value}
-            if len(_compact(more)) <= LONGEST_RECORD:
-                said = more
-        self._actions.append(ClientNote(_compact(said)))
+        said |= detail
+        self._actions.append(ClientNote(_brief(said), said))
 
 
 def _chunks(text: bytes) -> list[bytes]:
@@ -139,6 +139,15 @@ def _chunks(text: bytes) -> list[bytes]:
     if len(chunks) > 1 and len(chunks[-1]) == TEXT_OCTETS:
         chunks.append(b"")  # a text ends with a chunk that is not full
     return chunks
+
+
+def _brief(said: dict[str, Any]) -> str:
+    """A record for the flight's log: long texts are cut between words, and what does not fit is left out."""
+    brief: dict[str, Any] = {}
+    for key, value in said.items():
+        more = brief | {key: shorten(value, _LONGEST_TEXT, placeholder="...") if isinstance(value, str) else value}
+        brief = more if len(_compact(more)) <= LONGEST_RECORD else brief
+    return _compact(brief)
 
 
 def _compact(said: dict[str, Any]) -> str:

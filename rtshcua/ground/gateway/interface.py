@@ -203,9 +203,10 @@ class Cancel(NamedTuple):
 
 
 class ClientNote(NamedTuple):
-    """A `client` line for the flight's log: compact JSON, at most 200 bytes."""
+    """What happened to a frame of a client. `text` is for the flight's log: compact JSON, at most 200 bytes."""
 
     text: str
+    said: Mapping[str, Any]
 
 
 Action: TypeAlias = ToClient | Withhold | Propose | RequestFrame | Cancel | ClientNote

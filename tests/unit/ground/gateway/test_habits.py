@@ -385,9 +385,20 @@ def test_long_texts_come_in_chunks_and_records_stay_short() -> None:
     assert [message.chunk_seq for message in chunks] == list(range(len(chunks)))
     assert len({message.id for message in chunks}) == 1
     assert chunks[0].id > 0
-    (recorded,) = (each.text for each in actions if isinstance(each, ClientNote))
-    assert len(recorded) <= 200
-    assert json.loads(recorded)["client"] == "a" * 32
+    (note,) = (each for each in actions if isinstance(each, ClientNote))
+    assert len(note.text) <= 200
+    assert json.loads(note.text)["client"] == "a" * 40
+    (said,) = texts(actions, 3)
+    assert note.said["answer"] == said, "whole"
+
+
+def test_a_long_text_in_a_record_is_cut_between_words() -> None:
+    world = GatewayWorld()
+    reason = "the way home from there is longer than the charge that is left for it permits, so it is refused"
+    world.gateway._clients[1].link.record("refused", world.now_us, reason=reason)
+    (note,) = (each for each in world.wait() if isinstance(each, ClientNote))
+    assert note.said == {"client": "script", "effect": "refused", "reason": reason}
+    assert json.loads(note.text)["reason"] == "the way home from there is longer than the charge that is left for it..."
 
 
 def test_a_text_of_whole_chunks_ends_with_an_empty_one() -> None:

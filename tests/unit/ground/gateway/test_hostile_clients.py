@@ -1,5 +1,6 @@
 """Whatever clients send: every proposal is a step of the table, and every frame for the vehicle is housekeeping."""
 
+import json
 import struct
 from typing import Any
 
@@ -81,6 +82,7 @@ def checked(world: GatewayWorld, actions: list[Action]) -> None:
                 assert frame[5:7] == bytes([SYSTEM, 1])
             case ClientNote(text):
                 assert len(text) <= 200
+                assert json.loads(text).items() <= {**each.said, **json.loads(text)}.items()
 
 
 @st.composite

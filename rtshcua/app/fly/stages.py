@@ -107,14 +107,14 @@ def _stages(
     if refusal is not None:
         return refusal
     begun = start_boundary(context, verified, previous, debts.left)
+    if not isinstance(begun, Refusal) and begun.apart is not None:  # use the boundary's time of day here too
+        context.utc.follow(begun.apart.time)
     if not isinstance(begun, Refusal) and request.wait_s is not None:
         begun = await_mission(context, begun, previous)
     if isinstance(begun, Refusal):
         return begun
     if isinstance(begun.loaded.preparation, PreparationIssuer):  # a boundary process received them at its start
         begun.loaded.preparation.owes(debts.left)
-    if begun.apart is not None:  # use the boundary's time of day here too
-        context.utc.follow(begun.apart.time)
     connected = connect(context, begun, previous, debts)
     if isinstance(connected, Refusal):
         return connected

@@ -15,6 +15,7 @@ import msgspec
 from rtshcua.adapters.clock import LinkClock
 from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.store.runs import BUNDLE
+from rtshcua.adapters.utc import UtcWatch
 from rtshcua.adapters.vehicle.connected import ConnectedVehicle
 from rtshcua.adapters.vehicle.transport import UdpTransport
 from rtshcua.app.fly.agents import Agents
@@ -81,8 +82,8 @@ class MissionWait:
 
     def __init__(
         self, base: Loaded, admit: Callable[[bytes], Loaded | Refusal], superseded: Callable[[], Refusal | None],
-        lost: Callable[[], Refusal | None], vehicle: ConnectedVehicle, clock: LinkClock, interrupts: Interrupts,
-        agents: Agents, *,
+        lost: Callable[[], Refusal | None], vehicle: ConnectedVehicle, clock: LinkClock, utc: UtcWatch,
+        interrupts: Interrupts, agents: Agents, *,
         console: Console, most_s: float, notes: Sequence[str] = (),
     ) -> None:  # fmt: skip
         self._base = base
@@ -90,6 +91,7 @@ class MissionWait:
         self._superseded, self._lost = superseded, lost
         self._vehicle = vehicle
         self._clock = clock
+        self._utc = utc
         self._interrupts = interrupts
         self._agents = agents
         self._most_s = most_s
@@ -129,11 +131,18 @@ class MissionWait:
                 reported_s, before, unready = now_s, unready, self._vehicle.driver.unready or ""
                 if unready != before:
                     self._report("vehicle", f"not ready yet: {unready}" if unready else "the vehicle is ready")
+                self._look_at_utc()
                 self._agents.tell(self._state(unready))
             admitted = self._handed_in()
             if admitted is not None:
                 return admitted
             events = self._vehicle.poll(self._clock.now().monotonic_us, self._clock.us_in(_POLL_S))
+
+    def _look_at_utc(self) -> None:
+        """Take the vehicle's time of day, if it is needed: whoever hands in a bundle dates it by that time."""
+        driver, now = self._vehicle.driver, self._clock.now()
+        if driver.flavour is not None and self._utc.look(driver.source, driver.flavour.name, now.monotonic_us):
+            driver.asks_utc = False
 
     def _handed_in(self) -> Admitted | Refusal | None:
         found = self._agents.events(self._clock.now())
@@ -182,8 +191,8 @@ class MissionWait:
 
     def _state(self, unready: str) -> bytes:
         """The JSON line for the sockets: why the vehicle is not ready, and every signal with its age."""
-        seen, now_us = self._vehicle.driver.seen, self._clock.now().monotonic_us
-        state, current = self._monitor.state(now_us), self._monitor.current(now_us)
+        seen, now = self._vehicle.driver.seen, self._clock.now()
+        state, current = self._monitor.state(now.monotonic_us), self._monitor.current(now.monotonic_us)
         signals = [
             {
                 "name": signal.name,
@@ -195,6 +204,9 @@ class MissionWait:
         ]
         report = {
             "type": "vehicle",
+            "at_us": now.monotonic_us,
+            "utc_us": now.utc_us,
+            "utc_error_us": now.utc_error_us,
             "ready": not unready,
             "unready": unready or None,
             "armed": bool(seen.armed),
@@ -293,8 +305,9 @@ def _wait(
     def lost() -> Refusal | None:
         return None if apart is None else apart.lost()
 
+    driver.asks_utc, driver.asks_back = context.utc.vehicle_may_tell, context.utc.question
     wait = MissionWait(
-        base, admit, trusted.superseded, lost, vehicle, context.clock, context.interrupts, agents,
+        base, admit, trusted.superseded, lost, vehicle, context.clock, context.utc, context.interrupts, agents,
         console=context.console, most_s=request.wait_s, notes=notes,
     )  # fmt: skip
     admitted = wait.follow(events)

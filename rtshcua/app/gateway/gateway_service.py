@@ -54,8 +54,8 @@ _MOST_RECORDS: Final = 50
 _RECORD_S: Final = 0.25
 #: how much earlier than now, besides the error of UTC, a mission is issued, us
 _ISSUED_BEFORE_US: Final = 100_000
-#: the lines of the agent socket that are records of the log
-_DATED: Final = ("decision", "effect")
+#: the lines of the agent socket with the flight's time: of a flight that waits, and records of the log
+_DATED: Final = ("decision", "effect", "vehicle")
 #: lines about clients that wait for the disk
 _MOST_UNWRITTEN: Final = 1_000
 #: how often the relay is started again
@@ -120,7 +120,7 @@ class GatewaySession:
     accepted: Mission | None = None  # by the flight, but not announced yet
     began: bool = False  # a mission flies: that of clients, or of an earlier flight that is brought down
     released: int = 0
-    time: FlightTime | None = None  # of its last record; before the first one the time of day is this machine's
+    time: FlightTime | None = None  # of its last line with one
     close: Mapping[str, Any] = field(default_factory=dict)
     summary: dict[str, Any] = field(default_factory=dict)
 
@@ -330,7 +330,10 @@ class GatewayService:
         return None
 
     def _now(self) -> Now:
-        """The present moment by the flight's time of day, which may be the vehicle's."""
+        """The present moment by the flight's time of day, which may be the vehicle's; every take-off has it, because
+        it waits for the flight's first `vehicle` line. Where the flight knows no time of day, it is this machine's, with
+        the stated error: then only the flight's decision on the first step, which has waited for a time, can tell.
+        """
         now = self._clock.now()
         if self._session is not None and self._session.time is not None:
             return self._session.time.now(now.monotonic_us)

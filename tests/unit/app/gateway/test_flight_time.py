@@ -27,8 +27,12 @@ def test_records_tell_the_time_and_the_last_one_counts() -> None:
     assert heard.time == FlightTime(101 * S, 4_001 * S, 6 * S)
 
 
+def test_a_flight_that_waits_tells_the_time_of_the_first_bundle() -> None:
+    assert session(line("vehicle")).time == FlightTime(100 * S, 5_000 * S, 6 * S)
+
+
 @pytest.mark.parametrize("other", [
-    {"type": "vehicle", "at_us": 1, "utc_us": 1, "utc_error_us": 1}, line(utc_error_us=UTC_UNKNOWN_US),
+    {"type": "hello", "at_us": 1, "utc_us": 1, "utc_error_us": 1}, line(utc_error_us=UTC_UNKNOWN_US),
     line(utc_us=None), line(at_us="100"), {"type": "effect"},
 ])  # fmt: skip
 def test_other_lines_do_not_change_the_time(other: dict[str, Any]) -> None:

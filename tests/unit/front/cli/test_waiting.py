@@ -16,6 +16,7 @@ from reference.documents import approval, low, recall, replacement
 from reference.world import START
 from rtshcua.adapters.agent_socket import flight_at, hand_in
 from rtshcua.adapters.clock import SystemClock
+from rtshcua.adapters.utc import UtcWatch
 from rtshcua.app.fly import waiting
 from rtshcua.app.fly.agents import Agents
 from rtshcua.app.fly.stop_wishes import Interrupts, Wish
@@ -56,7 +57,10 @@ class Vehicle:
         self.announced: list[str] = []
         self.passed: list[bytes] = []
         self.slot = next(each.slot for each in base.bundle.policy.signals if each.name == "battery")
-        self.driver = SimpleNamespace(unready="GPS", seen=SimpleNamespace(armed=False, airborne=None))
+        self.driver = SimpleNamespace(
+            unready="GPS", seen=SimpleNamespace(armed=False, airborne=None), asks_utc=True,
+            source=SimpleNamespace(utc=lambda now_us: None), flavour=SimpleNamespace(name="px4"),
+        )  # fmt: skip
 
     def poll(self, now_us: int, timeout_us: int) -> list[Event]:
         threading.Event().wait(0.001)
@@ -82,9 +86,10 @@ class World:
         self.tried: list[bytes] = []
         self.newer: Refusal | None = None
         self.flies = low()
-        vehicle: Any = self.vehicle
+        self.clock, vehicle = Clock(), cast(Any, self.vehicle)
+        self.utc = UtcWatch(self.clock, kernel_us=lambda: None)
         self.waiting = MissionWait(
-            base, self.admit, lambda: self.newer, lambda: None, vehicle, Clock(), self.interrupts, self.agents,
+            base, self.admit, lambda: self.newer, lambda: None, vehicle, self.clock, self.utc, self.interrupts, self.agents,
             console=TerminalConsole("json", Path(), None), most_s=most_s, notes=["a note"],
         )  # fmt: skip
         self.ended: Admitted | Refusal | None = None
@@ -181,6 +186,11 @@ def test_followers_see_that_the_vehicle_waits(begin: Callable[..., World]) -> No
     assert {each["type"] for each in vehicle} == {"vehicle"}
     last = vehicle[-1]
     assert (last["ready"], last["unready"], last["armed"]) == (True, None, False)
+    assert (last["utc_us"], last["utc_error_us"], last["at_us"] > 0) == (START.utc_us, 0, True)
+    assert (world.utc.bound.source, world.vehicle.driver.asks_utc) == ("unknown", True)
+    world.vehicle.driver.source.utc = lambda now_us: (START.utc_us, 0)
+    lines_of(world, 12)
+    assert (world.utc.bound.source, world.vehicle.driver.asks_utc) == ("vehicle", False)
     (battery,) = (each for each in last["signals"] if each["name"] == "battery")
     assert (battery["value"], battery["stale"]) == ("80 %", False)
     assert next(each["value"] for each in last["signals"] if each["name"] != "battery") == "unknown"

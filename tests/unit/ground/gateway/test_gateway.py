@@ -59,7 +59,10 @@ def test_a_command_is_acknowledged_when_its_step_is_dispatched() -> None:
     actions = world.send(TAKEOFF)
     assert acks(actions) == []
     world.accept(actions)
-    assert acks(world.dispatch(0)) == [(22, 0)]
+    actions = world.dispatch(0)
+    assert acks(actions) == [(22, 0)]
+    permitted = {"client": "script", "effect": "permitted", "skill": "takeoff", "step": 0}
+    assert records(actions) == [permitted | {"arguments": {"altitude": "15 m"}}]
     assert acks(world.line(type="effect", event="dispatched", kind=0, step=0)) == []
 
 

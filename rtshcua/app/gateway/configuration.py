@@ -100,6 +100,14 @@ DEFAULT_CLIENTS: Final = (
 )
 
 
+def reached(address: str) -> str:
+    """The address by which a client on this machine reaches one of the gateway's: its other end."""
+    for way, other in (("udpout:", "udpin:"), ("udpin:", "udpout:"), ("tcpin:", "tcp:")):
+        if address.startswith(way):
+            return other + address[len(way) :].replace("0.0.0.0", "127.0.0.1")
+    return address
+
+
 def clients_of(configuration: GatewayConfiguration) -> tuple[ConfiguredClient, ...]:
     """Return the configured clients, or the default ones that do not meet the vehicle at its port. Raises
     `Misconfigured` for a client that would.
@@ -131,6 +139,10 @@ def _meets(side: ConfiguredClient, vehicle: VehicleSide) -> bool:
 
 def read_configuration(path: Path) -> GatewayConfiguration | Refusal:
     """Return the configuration in a file."""
+    if path.suffix == ".rts":
+        kept = path.with_name(FILE)
+        help = f"`rtshcua gateway {kept}`" if kept.is_file() else f"`rtshcua gateway --policy {path}`"
+        return misconfigured(str(path), "this is a source of a policy; a configuration is expected", help)
     try:
         data = read_regular(path, _MOST_OCTETS)
         if len(data) > _MOST_OCTETS:

@@ -6,6 +6,7 @@ decides.
 """
 
 import json
+import re
 import select
 import socket
 import time
@@ -23,7 +24,7 @@ from rtshcua.adapters.clock import SystemClock
 from rtshcua.adapters.gateway.messages import RelayKind, RelayMessage, Up
 from rtshcua.adapters.store.writing import append
 from rtshcua.app.fly.stop_wishes import Interrupts
-from rtshcua.app.gateway.configuration import ConfiguredClient
+from rtshcua.app.gateway.configuration import ConfiguredClient, reached
 from rtshcua.app.gateway.flight_process import AgentLink, FlightProcess
 from rtshcua.app.gateway.policy_in_force import PolicyInForce
 from rtshcua.app.gateway.proposals import FlightMission, ProposalMoment, Proposals
@@ -62,6 +63,7 @@ _MOST_UNWRITTEN: Final = 1_000
 _MOST_RELAYS: Final = 3
 #: exit codes of a flight that it would have again
 _LASTING: Final = (ExitCode.USAGE, ExitCode.INPUT, ExitCode.UNTRUSTED)
+_DESCRIPTOR: Final = re.compile(r"\bfd:[0-9]+\b", re.ASCII)
 #: HEARTBEAT: its number, and the offset of `autopilot` in its payload; the offset of the system in a frame
 _HEARTBEAT, _AUTOPILOT_AT, _SYSTEM_AT = 0, 5, 5
 
@@ -222,7 +224,7 @@ class GatewayService:
         self._heard: tuple[int, int] | None = None  # system and autopilot of the vehicle's heartbeat
         self._clients: dict[int, ClientSettings] = {}
         self._session: GatewaySession | None = None
-        self._failed, self._next_s, self._relays = 0, 0.0, 0
+        self._failed, self._next_s, self._relays, self._flown = 0, 0.0, 0, 0
         self._numbers = 0
         self._requests: dict[int, int] = {}
         self._poll, self._polled, self._tick_us = select.poll(), list[int](), 0
@@ -245,15 +247,22 @@ class GatewayService:
     # ---------------------------------------------------------------- the loop
 
     def run(self) -> ExitCode | Refusal:
-        """Run until it is interrupted, or until the number of sessions was flown."""
+        """Run until it is interrupted, or until the number of sessions was flown. The summary is told last."""
+        ended = self._run()
+        if not isinstance(ended, Refusal):
+            self._console.tell({"event": "summary", "exit_code": int(ended), "sessions": self._flown})
+        return ended
+
+    def _run(self) -> ExitCode | Refusal:
         began_s, ending = time.monotonic(), False
         with Interrupts() as interrupts:
             while True:
                 if interrupts.wish() is not None:
                     if self._session is None or not self._session.flies:
                         return ExitCode.INTERRUPTED if ending else ExitCode.OK
+                    if not ending:
+                        self._console.tell({"event": "interrupted"})
                     ending = True
-                    self._console.tell({"event": "interrupted"})
                     self._session.process.interrupt()
                 if (refusal := self._turn(self._wait())) is not None:
                     return refusal
@@ -388,7 +397,8 @@ class GatewayService:
                 up = msgspec.json.decode(message.payload, type=Up)
                 side = self._sides[up.index]
                 self._clients[client] = ClientSettings(side.name, side.role, side.rank, side.pilot, side.requests)
-                self._console.tell({"event": "client-up", "client": client, "name": side.name, "peer": up.peer})
+                peer = reached(up.peer)
+                self._console.tell({"event": "client-up", "client": client, "name": side.name, "peer": peer})
                 self._take(interface.ClientUp(client, self._clients[client]), now)
             case RelayKind.DOWN:
                 gone = self._clients.pop(client, None)
@@ -419,8 +429,13 @@ class GatewayService:
     def _told_by_run(self, session: GatewaySession, event: Mapping[str, Any]) -> None:
         """Keep what `run --json` says at the end, and show what it says about the vehicle."""
         if event.get("event") in ("refused", "not-admitted", "note", "summary"):
-            self._console.tell({"event": "flight", "told": dict(event)})
+            told = {key: self._of_vehicle(value) if isinstance(value, str) else value for key, value in event.items()}
+            self._console.tell({"event": "flight", "told": told})
         session.summary.update({key: event[key] for key in ("log", "run", "ending", "exit_code") if key in event})
+
+    def _of_vehicle(self, text: str) -> str:
+        """A text of the flight, whose vehicle is an inherited descriptor, with the vehicle's address."""
+        return _DESCRIPTOR.sub(lambda _: self._relay.vehicle, text)
 
     def _answered(self, line: Mapping[str, Any], now: Now) -> None:
         number, slug, text = line.get("id"), str(line.get("slug", "")), str(line.get("text", ""))
@@ -554,6 +569,7 @@ class GatewayService:
         session.process.close()
         if flew:
             self._failed = 0
+            self._flown += 1
             self._left = None if self._left is None else self._left - 1
             self._console.tell(
                 {
@@ -562,10 +578,11 @@ class GatewayService:
                 }
             )  # fmt: skip
         else:
+            why = self._of_vehicle(_last(errors))
             if code in _LASTING:
-                return Refusal("flight", f"the flight cannot begin: {_last(errors)}", "", exit_code_in(code))
+                return Refusal("flight", f"the flight cannot begin: {why}", "", exit_code_in(code))
             self._failed += 1
-            self._console.tell({"event": "flight-failed", "exit_code": code, "text": _last(errors)})
+            self._console.tell({"event": "flight-failed", "exit_code": code, "text": why})
         self._next_s = time.monotonic() + _AGAIN_S[min(self._failed, len(_AGAIN_S) - 1)]
         return None
 

@@ -122,8 +122,9 @@ def policy_text(rules: QuickRules, home: GeoPoint, return_mm: int, version: int 
 
 
 def _introduction(rules: QuickRules) -> str:
+    typed = ",".join("land" if skill == "emergency_land" else skill for skill in rules.allow)
     return (
-        f"// What `rtshcua gateway --allow {','.join(rules.allow)} --below {_m(rules.below_mm)}` permits.\n"
+        f"// What `rtshcua gateway --allow {typed} --below {_m(rules.below_mm)}` permits.\n"
         "// Whatever no rule permits is denied. Change it as you need, and raise the version with every change."
     )
 

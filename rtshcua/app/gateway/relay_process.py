@@ -35,13 +35,13 @@ _MOST_AT_ONCE: Final = 256
 class StartedRelay:
     """A relay that is started, until `stop`. It has its own session, so that Ctrl-C in a terminal does not reach it.
 
-    `opened` are the addresses of the clients in their order, as they are bound.
+    `vehicle` is the vehicle's address; `opened` are those of the clients in their order, as they are bound.
     """
 
     def __init__(self, vehicle: str, clients: Sequence[ConfiguredClient]) -> None:
         self.control, control = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self.telemetry, telemetry = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._vehicle, self._clients = vehicle, tuple(clients)
+        self.vehicle, self._clients = vehicle, tuple(clients)
         self.opened: tuple[str, ...] = ()
         setup = RelaySetup(
             vehicle,
@@ -123,7 +123,7 @@ class StartedRelay:
     def again(self) -> "StartedRelay | Refusal":
         """A new relay in the place of this one, which ended."""
         self.stop()
-        relay = StartedRelay(self._vehicle, self._clients)
+        relay = StartedRelay(self.vehicle, self._clients)
         refusal = relay.await_ready()
         if refusal is not None:
             relay.stop()

@@ -1,5 +1,6 @@
 """Start a gateway: its policy and keys, the simulated vehicle if no other is named, the relay, and the service."""
 
+import difflib
 import json
 import socket
 import tempfile
@@ -7,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from math import isqrt
 from pathlib import Path
 from typing import Final
 
@@ -25,6 +27,7 @@ from rtshcua.app.gateway.configuration import (
     ConfiguredClient,
     GatewayConfiguration,
     VehicleSide,
+    reached,
 )
 from rtshcua.app.gateway.gateway_service import FlightWords, GatewayConsole, GatewayService
 from rtshcua.app.gateway.policy_in_force import PolicyInForce, Unlock, development_keys, policy_in_force
@@ -37,6 +40,7 @@ from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.flat.zone import unproject
+from rtshcua.model.quantity import Dimension, display
 from rtshcua.simulation.config import HOME, AutopilotKind
 
 #: where the simulated vehicle sends, unless the port is taken; and the return height of a vehicle that says nothing
@@ -89,7 +93,7 @@ class _Starting:
         configuration = self._configuration = request.configuration
         self._simulated = configuration.vehicle.connect is None
         self._facts: VehicleFacts | None = None
-        self._renews = False
+        self._text = ""  # of the policy of `--allow`
         self._version = 1 if self._simulated else int(time.time() - _SINCE_S) // 60
         own = data_folder() / DEVELOPMENT if request.save is None else request.save / DEVELOPMENT
         self._data = configuration.data or (data_folder() if request.quick is None else own)
@@ -176,11 +180,13 @@ class _Starting:
         text = policy_text(self._request.quick, home, return_mm, self._version)
         if isinstance(text, Refusal):
             return text
-        if self._request.save is not None and not self._renews and (refusal := self._save(text)) is not None:
-            return refusal
         source = self._work / SOURCE
+        if not self._text:
+            if self._request.save is not None and (refusal := self._save(text)) is not None:
+                return refusal
+            self._console.tell({"event": "policy", "text": text})
+        self._text = text
         write_file(source, text.encode())
-        self._console.tell({"event": "policy", "text": text})
         store = development_keys(self._data, (POLICY,))
         return policy_in_force([source], None, self._work, roles, store, self._unlock(store))
 
@@ -201,15 +207,34 @@ class _Starting:
         policy = frames.policy
         if place is None or max(map(abs, place)) <= policy.vehicle.home_within // 2:
             return None
+        before = self._text, self._version
         self._version += 1
-        self._renews = True  # what was saved stays as it is
         home = GeoPoint(*unproject(policy.projection, *place))
         self._facts = (self._facts or VehicleFacts(home, policy.vehicle.return_altitude))._replace(home=home)
         renewed = self._policy()
         if isinstance(renewed, Refusal):
+            self._text, self._version = before
             self._console.tell({"event": "note", "text": f"the policy keeps its home: {renewed.text}"})
             return None
+        away_mm = isqrt(place[0] ** 2 + place[1] ** 2) // 100 * 100
+        why = f"the vehicle landed {display(away_mm, Dimension.LENGTH)} from its home"
+        lines = difflib.ndiff(before[0].splitlines(), self._text.splitlines())
+        changed = [line for line in lines if line[:1] in "+-"]
+        self._console.tell({"event": "policy", "text": self._text, "why": why, "changed": changed})
+        if self._request.save is not None:
+            self._save_renewed(self._request.save, before[1])
         return renewed
+
+    def _save_renewed(self, folder: Path, version: int) -> None:
+        """Write the renewed policy in the place of the saved one, which is kept beside it by its version."""
+        saved, kept = folder / SOURCE, folder / f"policy-{version}.rts"
+        try:
+            if saved.exists():
+                saved.rename(kept)
+            write_file(saved, self._text.encode())
+        except OSError as error:
+            text = f"cannot write the renewed policy to `{folder}`: {words_of(error)}"
+            self._console.tell({"event": "note", "text": text})
 
     def _save(self, text: str) -> Refusal | None:
         """Write the policy and the configuration, so that an engineer can go on with them."""
@@ -263,9 +288,12 @@ class _Starting:
 
     def _introduce(self, policy: PolicyInForce, relay: StartedRelay, words: FlightWords) -> None:
         clients = [
-            {"name": each.name, "address": each.address, "opened": opened, "pilot": each.pilot, "role": each.role}
+            {
+                "name": each.name, "address": each.address, "opened": opened, "connect": reached(opened),
+                "pilot": each.pilot, "role": each.role,
+            }
             for each, opened in zip(self._configuration.clients, relay.opened, strict=True)
-        ]
+        ]  # fmt: skip
         self._console.tell(
             {
                 "event": "ready",

@@ -246,6 +246,11 @@ class _Console:
 
 
 def _policy(event: Mapping[str, Any]) -> None:
+    if "why" in event:
+        out(f"the policy was renewed: {event['why']}; what changed:", "")
+        out_source("\n".join(event["changed"]) + "\n")
+        out("", flush=True)
+        return
     out("the policy:", "")
     out_source(event["text"])
     out("", flush=True)
@@ -255,7 +260,9 @@ def _ready(event: Mapping[str, Any]) -> None:
     lines = [f"{event['vehicle']} under {event['policy']}; clients connect here:"]
     for each in event["clients"]:
         who = "pilot, full passage" if each["pilot"] else f"as {each['role']}"
-        lines.append(f"  {each['name']:<10} {_reached(each['opened'])}  ({who})")
+        lines.append(f"  {each['name']:<10} {each['connect']}  ({who})")
+    if any("0.0.0.0" in each["opened"] for each in event["clients"]):
+        lines.append("  from another machine, with this one's address in place of 127.0.0.1")
     lines.append(f"  logs in {event['runs']}/; a person recalls a flight with --to {event['operator_socket']}")
     if event["development"]:
         lines.append(f"  development keys without a passphrase, for trying out only: {event['keys']}")
@@ -264,17 +271,15 @@ def _ready(event: Mapping[str, Any]) -> None:
     out(*lines, "  stop it    Ctrl-C", flush=True)
 
 
-def _reached(address: str) -> str:
-    """How a client reaches an address: at its other end."""
-    for way, other in (("udpout:", "udpin:"), ("udpin:", "udpout:"), ("tcpin:", "tcp:")):
-        if address.startswith(way):
-            return other + address[len(way) :]
-    return address
-
-
 def _client(event: Mapping[str, Any]) -> None:
-    told = event["told"]
-    out("client: " + ", ".join(f"{key} {value}" for key, value in told.items()), flush=True)
+    """Print one line about a request: who, whether it was permitted, what, and why not."""
+    told = dict(event["told"])
+    who, effect, more = told.pop("client"), told.pop("effect"), told.pop("left_out", 0)
+    arguments = "".join(f" {name} {value}" for name, value in told.get("arguments", {}).items())
+    what = " ".join(f"{key} {value}" for key, value in told.items() if key in ("command", "message", "mode", "parameter"))
+    text = told.get("answer") or ": ".join(filter(None, (told.get("skill", what), told.get("reason", ""))))
+    left = f" ({more} more before it)" if more else ""
+    out(f"{who}: {effect} {text}{arguments}{left}", flush=True)
 
 
 def _session(event: Mapping[str, Any]) -> None:
@@ -300,4 +305,5 @@ _SHOWN: Final[Mapping[str, Callable[[Mapping[str, Any]], None]]] = {
     "cancelled": _note("the flight is cancelled: {why}"),
     "interrupted": _note("Ctrl-C: the vehicle is brought down"),
     "note": _note("note: {text}"),
+    "summary": _note("the gateway ended after {sessions} flights"),
 }

@@ -5,11 +5,28 @@ from pathlib import Path
 
 import pytest
 
+from rtshcua.app.gateway.configuration import reached
 from rtshcua.front.cli.app import main
-from rtshcua.front.cli.commands.gateway import _Console, _reached
+from rtshcua.front.cli.commands.gateway import _Console
 
 KML = "<kml><Placemark><Polygon/></Placemark></kml>"
 QUICK = ["--allow", "takeoff,goto,land", "--below", "30", "m"]
+
+#: what is recorded about a client, by the line that people read
+CLIENTS: dict[str, dict[str, object]] = {
+    "refused goto denied: altitude 60 m, accepted 30 m (authority/out-of-scope)": {
+        "effect": "refused", "skill": "goto", "reason": "authority/out-of-scope",
+        "answer": "goto denied: altitude 60 m, accepted 30 m (authority/out-of-scope)",
+    },
+    "permitted goto target 47.3983000 N, 8.5455900 E altitude 20 m": {
+        "effect": "permitted", "skill": "goto", "step": 1,
+        "arguments": {"target": "47.3983000 N, 8.5455900 E", "altitude": "20 m"},
+    },
+    "refused command 246: command 246 has no mapping (80 more before it)": {
+        "effect": "refused", "left_out": 80, "command": 246, "reason": "command 246 has no mapping",
+    },
+    "absorbed parameter MIS_TAKEOFF_ALT": {"effect": "absorbed", "parameter": "MIS_TAKEOFF_ALT"},
+}  # fmt: skip
 
 WRONG = {
     "no policy": ([], 2, "the gateway has no policy", "--allow takeoff,goto,land --below 30 m"),
@@ -31,6 +48,8 @@ WRONG = {
     "a second configuration": ([*QUICK, "a.toml", "b.toml"], 2, "`b.toml`", "one configuration"),
     "a missing area": ([*QUICK, "--inside", "none.kml"], 3, "cannot read `none.kml`", ""),
     "an area without polygon": ([*QUICK, "--inside", "field.kml"], 3, "no outer boundaries", ""),
+    "a policy": (["kept/policy.rts"], 3, "this is a source of a policy", "rtshcua gateway kept/gateway.toml"),
+    "another policy": (["mine.rts"], 3, "this is a source of a policy", "rtshcua gateway --policy mine.rts"),
     "a missing configuration": (["none.toml"], 3, "cannot read `none.toml`", ""),
     "a client": ([*QUICK, "--client", "a=udpin:1"], 2, "port of the link is missing", "udpin"),
     "an address twice": (
@@ -53,6 +72,8 @@ WRONG = {
 def folder(own_world: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "field.kml").write_text(KML)
+    (tmp_path / "kept").mkdir()
+    (tmp_path / "kept" / "gateway.toml").touch()
     return tmp_path
 
 
@@ -106,12 +127,21 @@ def test_events_are_lines_of_text_or_json(capsys: pytest.CaptureFixture[str], mo
             "event": "ready", "vehicle": "simulated px4", "policy": "gateway@1", "runs": "runs", "keys": "/keys",
             "operator_socket": "/tmp/operator.sock", "development": True, "saved": "mine",
             "clients": [
-                {"name": "station", "opened": "udpout:127.0.0.1:14550", "pilot": False, "role": "operator"},
-                {"name": "pilot", "opened": "tcpin:0.0.0.0:5760", "pilot": True, "role": "operator"},
+                {
+                    "name": "station", "opened": "udpout:127.0.0.1:14550", "connect": "udpin:127.0.0.1:14550",
+                    "pilot": False, "role": "operator",
+                },
+                {
+                    "name": "pilot", "opened": "tcpin:0.0.0.0:5760", "connect": "tcp:127.0.0.1:5760", "pilot": True,
+                    "role": "operator",
+                },
             ],
         },
         {"event": "client-up", "name": "station", "peer": "127.0.0.1:9\x1b[2J"},
-        {"event": "client", "told": {"client": "station", "effect": "refused", "skill": "goto"}},
+        *({"event": "client", "told": {"client": "station"} | told} for told in CLIENTS.values()),
+        {"event": "policy", "text": "", "why": "the vehicle landed 13 m from its home", "changed": ["- a", "+ b"]},
+        {"event": "interrupted"},
+        {"event": "summary", "exit_code": 0, "sessions": 2},
         {"event": "session", "ending": "completed", "exit_code": 0, "log": "runs/a/log.jsonl", "root": "/keys/root"},
         {"event": "unknown"},
     ]  # fmt: skip
@@ -120,7 +150,12 @@ def test_events_are_lines_of_text_or_json(capsys: pytest.CaptureFixture[str], mo
     text = capsys.readouterr().out
     assert max(map(len, text.splitlines())) <= 80
     assert "udpin:127.0.0.1:14550  (as operator)" in text
-    assert "tcp:0.0.0.0:5760  (pilot, full passage)" in text
+    assert "tcp:127.0.0.1:5760  (pilot, full passage)" in text
+    assert "from another machine, with this one's address" in text
+    plain = " ".join(text.split())
+    for line in CLIENTS:
+        assert f"station: {line}" in plain, line
+    assert "renewed: the vehicle landed 13 m from its home; what changed: - a + b" in plain
     assert "\x1b" not in text
     assert "rtshcua verify-log --audit runs/a/log.jsonl --root /keys/root" in " ".join(text.split())
     for event in events:
@@ -129,5 +164,12 @@ def test_events_are_lines_of_text_or_json(capsys: pytest.CaptureFixture[str], mo
 
 
 def test_the_other_end_of_an_address() -> None:
-    assert _reached("udpin:0.0.0.0:14550") == "udpout:0.0.0.0:14550"
-    assert _reached("serial:/dev/ttyUSB0:57600") == "serial:/dev/ttyUSB0:57600"
+    """By hand: what a client on this machine connects to. A sender's place is no address of the gateway's."""
+    for opened, connect in (
+        ("udpin:0.0.0.0:14550", "udpout:127.0.0.1:14550"),
+        ("udpout:127.0.0.1:14550", "udpin:127.0.0.1:14550"),
+        ("tcpin:192.168.1.4:5760", "tcp:192.168.1.4:5760"),
+        ("serial:/dev/ttyUSB0:57600", "serial:/dev/ttyUSB0:57600"),
+        ("127.0.0.1:40312", "127.0.0.1:40312"),
+    ):
+        assert reached(opened) == connect

@@ -41,7 +41,7 @@ def test_a_script_flies_and_is_refused(tmp_path: Path, flavour: str) -> None:
 
         taken_off(client)
         assert client.goto(*OUTSIDE, 8) == DENIED
-        assert any("only when target inside field" in text for text in client.texts), client.texts
+        assert any("target outside field, nearest accepted 47." in text for text in client.texts), client.texts
         assert client.goto(*INSIDE, 60) == DENIED
         assert client.goto(*INSIDE, 8) == ACCEPTED
         client.until_at(*INSIDE)

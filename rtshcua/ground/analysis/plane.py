@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import isqrt
-from typing import Protocol
+from typing import Any, Protocol
 
 from rtshcua.decision.outline import rings as outline
 from rtshcua.ground.geometry.polygons import Point, Ring
@@ -117,24 +117,41 @@ def _inner(zones: Sequence[Zone], inside: list[int], outside: list[int]) -> Iter
     """
     import shapely  # noqa: PLC0415  it is slow to import
 
-    def plan(zone: Zone) -> shapely.Geometry:
-        if zone.shape == CIRCLE:
-            x, y, square = zone.data
-            return shapely.Point(x, y).buffer(square**0.5, quad_segs=_QUARTER)
-        found = shapely.Polygon()
-        for ring in rings_of(zone):  # a hole removes area, a part in a hole adds it again
-            found = found.symmetric_difference(shapely.Polygon(ring))
-        return found
-
-    left = plan(zones[inside[0]])
+    left = _plan(zones[inside[0]])
     for zone in inside[1:]:
-        left = left.intersection(plan(zones[zone]))
+        left = left.intersection(_plan(zones[zone]))
     for zone in outside:
-        left = left.difference(plan(zones[zone]))
+        left = left.difference(_plan(zones[zone]))
     parts = [part for part in shapely.get_parts(left) if part.area > 0]
     for part in sorted(parts, key=lambda each: -float(each.area)):
         point = part.representative_point()
         yield round(point.x), round(point.y)
+
+
+def _plan(zone: Zone) -> Any:
+    """The ground plan of a zone in shapely."""
+    import shapely  # noqa: PLC0415
+
+    if zone.shape == CIRCLE:
+        x, y, square = zone.data
+        return shapely.Point(x, y).buffer(square**0.5, quad_segs=_QUARTER)
+    found = shapely.Polygon()
+    for ring in rings_of(zone):  # a hole removes area, a part in a hole adds it again
+        found = found.symmetric_difference(shapely.Polygon(ring))
+    return found
+
+
+def nearest_inside(zone: Zone, place: Point, margin_mm: int) -> Point | None:
+    """Return the place in the ground plan of a zone, this far from its edge, that is nearest to another one; None if
+    there is no room. Shapely computes it with floats, so the caller must verify it.
+    """
+    import shapely  # noqa: PLC0415
+
+    room = _plan(zone).buffer(-margin_mm)
+    if room.is_empty:
+        return None
+    x, y = shapely.shortest_line(room, shapely.Point(place)).coords[0]
+    return round(x), round(y)
 
 
 def _exact_region(zone: Zone) -> Region | None:

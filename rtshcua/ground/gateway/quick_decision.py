@@ -9,14 +9,17 @@ from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 from rtshcua.decision.decide import decide, possible
-from rtshcua.decision.nearest import DAYTIME, LOCAL_TIME, Nearest, nearest
+from rtshcua.decision.evaluate import build
+from rtshcua.decision.nearest import DAYTIME, LOCAL_TIME, ChangeSearch, Nearest, nearest, offer
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare_invocation
 from rtshcua.decision.situation import environment, situation
 from rtshcua.decision.times import local_time
+from rtshcua.decision.tree import Both, Node, PointInside
 from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.ground.analysis.plane import nearest_inside
 from rtshcua.ground.gateway.interface import GatewaySettings, ProposedStep
-from rtshcua.ground.gateway.translation import DENIED, TEMPORARILY_REJECTED
+from rtshcua.ground.gateway.translation import DENIED, TEMPORARILY_REJECTED, degrees
 from rtshcua.ground.lower.mission import straight_plan
 from rtshcua.ground.why.trace import read_values
 from rtshcua.model.decision import Decision
@@ -25,6 +28,7 @@ from rtshcua.model.flat.limits import DAY
 from rtshcua.model.flat.mission import Invocation, OnInadmissible
 from rtshcua.model.flat.policy import Airspace
 from rtshcua.model.flat.situation import Context, Now, State
+from rtshcua.model.flat.zone import unproject
 from rtshcua.model.outcome import Outcome, Reason
 from rtshcua.model.quantity import Dimension, display
 
@@ -40,6 +44,8 @@ _PHASE: Final = "flight"
 _ROUNDS: Final = 3
 #: the most characters of a clause in an answer
 _CLAUSE: Final = 100
+#: how far from the edge of a zone the nearest accepted place is looked for, mm
+_MARGINS_MM: Final = (1_000, 5_000, 15_000)
 
 
 class QuickRefusal(NamedTuple):
@@ -86,6 +92,9 @@ class QuickDecision:
         near = nearest(decision, invocation, state, self._policy, now)
         near = self._accepted(near, step, role, context, state, now)
         words = _words(decision, near, invocation, state, self._policy, now)
+        if decision.reason is Reason.OUT_OF_SCOPE and not near:
+            unmet = self._unmet(step, role, invocation, context, state, now)
+            words = f"{'; '.join(unmet)} ({decision.reason})" if unmet else words
         parameters = {each.name for each in flat.contracts[self._skills[step.skill]].parameters}
         by_argument = bool(near) and all(each.subject in parameters for each in near)
         result = DENIED if decision.outcome is Outcome.DENY else TEMPORARILY_REJECTED
@@ -111,6 +120,55 @@ class QuickDecision:
             if [each.subject for each in tried] != [each.subject for each in near]:
                 return near
         return near
+
+    def _unmet(
+        self, step: ProposedStep, role: str, invocation: PreparedInvocation, context: Context, state: State, now: Now
+    ) -> list[str]:
+        """Each condition of a permit that does not hold, with the nearest accepted value; none if that is not known for
+        one of them. Of several permits, that with the fewest such conditions counts.
+        """
+        policy, contract = self._policy, invocation.invocation.contract
+        at = environment(situation(state, policy, now), policy, invocation.arguments, invocation.phase)
+        rules = [policy.compiler.when(permit.rule) for permit in invocation.candidates.permits]
+        left = ([each for each in _conjuncts(rule) if build(each, policy.tables)(at) != TRUE] for rule in rules if rule)
+        conditions = min(left, key=len, default=[])
+        search, found, values = ChangeSearch(at, policy.tables), list[str](), list(step.values)
+        for each in sorted(conditions, key=lambda node: isinstance(node, PointInside)):
+            if isinstance(each, PointInside):
+                place = self._inside(each, step._replace(values=tuple(values)), role, context, state, now)
+                zone = policy.policy.zones[each.zone].name
+                name = next(one.name for one in contract.parameters if one.cell == each.cell)
+                found.insert(0, f"{name} outside {zone}" + ("" if place is None else f", nearest accepted {place}"))
+                continue
+            offers = [offer(change, contract, policy.policy, at) for change in search.find(each, True) or ()]
+            if not offers or not all(one.options for one in offers):
+                return []
+            for one in offers:
+                names = tuple(name for _, name in one.options if name)
+                near = Nearest(one.subject, one.dimension, one.options[0][0], names)
+                found.append(f"{_found(near, invocation, state, policy, now)}, accepted {_value(near)}")
+                if one.change.argument and one.change.at is not None:
+                    values[one.change.at] = near.value
+        return found
+
+    def _inside(
+        self, condition: PointInside, step: ProposedStep, role: str, context: Context, state: State, now: Now
+    ) -> str | None:
+        """The nearest place in a zone, so far from its edge that the step may be permitted; None if none is known."""
+        flat, cell, values = self._policy.policy, condition.cell, list(step.values)
+        there = values[cell], values[cell + 1]
+        for margin_mm in _MARGINS_MM:
+            place = nearest_inside(flat.zones[condition.zone], there, margin_mm)
+            if place is None:
+                return None
+            values[cell : cell + 2] = place
+            moved = self._prepared(step._replace(values=tuple(values)), role, now)
+            if not isinstance(moved, Refusal):
+                decision = decide(moved, state, self._policy, context, now)
+                if decision.outcome is Outcome.ALLOW or decision.reason in _NOT_HERE:
+                    latitude, longitude = unproject(flat.projection, *place)
+                    return f"{degrees(latitude, 'NS')}, {degrees(longitude, 'EW')}"
+        return None
 
     def _is_certain(self, invocation: PreparedInvocation, state: State, context: Context, now: Now) -> bool:
         """Whether it is refused whatever the temporal monitors remember."""
@@ -143,6 +201,15 @@ class QuickDecision:
             binding=b"",
         )
         return prepare_invocation(invocation, self._policy, phases)
+
+
+def _conjuncts(node: Node) -> Iterator[Node]:
+    """The conditions that a condition joins by `and`."""
+    if isinstance(node, Both):
+        yield from _conjuncts(node.left)
+        yield from _conjuncts(node.right)
+    else:
+        yield node
 
 
 def _words(

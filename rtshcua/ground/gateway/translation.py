@@ -224,7 +224,7 @@ class Translation:
         x, y = project(self._policy.projection, latitude, longitude)
         if max(abs(x), abs(y)) > MAX_COORDINATE:
             return Untranslated(DENIED, f"{parameter.name} is further away than any zone can be")
-        return (x, y), f"{_degrees(latitude, 'NS')}, {_degrees(longitude, 'EW')}"
+        return (x, y), f"{degrees(latitude, 'NS')}, {degrees(longitude, 'EW')}"
 
     def _height_here(self, parameter: Parameter, now_us: int) -> Argument | Untranslated:
         here = self._seen.here(now_us)
@@ -292,7 +292,7 @@ def _has(message: Received, name: str, wanted: int | None, mask: int) -> bool:
     return isfinite(value) and value == int(value) and int(value) & mask == wanted
 
 
-def _degrees(value: int, hemispheres: str) -> str:
+def degrees(value: int, hemispheres: str) -> str:
     """Degrees as in sources: `47.3977000 N`, exactly."""
     whole, rest = divmod(abs(value), 10_000_000)
     return f"{whole}.{rest:07} {hemispheres[value < 0]}"

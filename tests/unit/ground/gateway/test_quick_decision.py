@@ -1,8 +1,10 @@
+import re
 import statistics
 import time
 from math import nan
 from typing import Any
 
+import msgspec
 import pytest
 
 from reference.gateway_world import (
@@ -19,7 +21,9 @@ from reference.gateway_world import (
 )
 from reference.sources import CHECKOUT
 from rtshcua.decision.decide import decide
+from rtshcua.ground.analysis.plane import nearest_inside
 from rtshcua.ground.gateway import quick_decision
+from rtshcua.model.flat.zone import CIRCLE
 
 SCHOOL = {"latitude": 473_972_900, "longitude": 85_477_100}
 ABROAD = {"latitude": 473_990_000, "longitude": 85_700_000}
@@ -43,7 +47,7 @@ def test_each_refusal_has_a_result_and_a_text_with_the_limit() -> None:
         (aloft(), reposition(z=550), 2, "goto denied: altitude 62 m, accepted 40 m (integrity/argument-out-of-range)"),
         (aloft(), reposition(z=533), 2, "goto denied: altitude 45 m, accepted 40 m (authority/out-of-scope)"),
         (aloft(), reposition(z=490), 2, "goto denied: altitude 2 m, accepted 5 m (integrity/argument-out-of-range)"),
-        (aloft(), reposition(**ABROAD), 2, "when target inside city and altitude <= 40 m (authority/out-of-scope)"),
+        (aloft(), reposition(**ABROAD), 2, "8.5514068 E (authority/out-of-scope)"),
         (aloft(), reposition(**SCHOOL), 2, "by any when target inside grow(school, 20 m) (authority/forbidden)"),
         (low, reposition(), 1, "goto rejected: battery 20 %, accepted 30.01 % (state/violated)"),
         (gone, reposition(), 1, "goto rejected: gps.fix unknown; gps.fix >= fix_3d (state/unknown)"),
@@ -57,6 +61,29 @@ def test_each_refusal_has_a_result_and_a_text_with_the_limit() -> None:
         assert acks(actions) == [(192, result)], text
         (said,) = texts(actions)
         assert said.endswith(text), said
+
+
+def test_a_refused_target_says_which_conditions_failed_and_the_nearest_accepted_values() -> None:
+    """By hand: height above sea, and what fails besides the target. The named values are then accepted."""
+    for z, besides in ((508.0, ""), (533.0, "; altitude 45 m, accepted 40 m")):
+        world = aloft()
+        (said,) = texts(world.send(reposition(**ABROAD, z=z)))
+        found = re.fullmatch(
+            r"goto denied: target outside city, nearest accepted ([0-9.]+) N, ([0-9.]+) E(.*) \(authority/out-of-scope\)", said
+        )
+        assert found, said
+        assert found[3] == besides
+        place = {"latitude": round(float(found[1]) * 1e7), "longitude": round(float(found[2]) * 1e7)}
+        assert [skill for skill, *_ in proposals(world.send(reposition(**place, z=min(z, 528.0))))] == ["goto"]
+
+
+def test_a_target_in_an_area_without_room_is_refused_without_a_nearest_one() -> None:
+    world = aloft()
+    flat = world.policy.policy
+    city = next(number for number, each in enumerate(flat.zones) if each.name == "city")
+    tiny = msgspec.structs.replace(flat.zones[city], shape=CIRCLE, data=(0, 0, 500 * 500))
+    assert nearest_inside(tiny, (9_000, 0), 1_000) is None
+    assert nearest_inside(tiny, (9_000, 0), 100) == (400, 0)
 
 
 def test_a_role_that_may_not_is_named() -> None:

@@ -27,16 +27,17 @@ _BUFFER: Final = 1 << 20
 
 
 class RelayError(Exception):
-    """The relay did not begin. `failure` says why."""
+    """The relay did not begin. `failure` says why; `of_address`: because an address cannot be opened."""
 
-    def __init__(self, failure: SetupFailure) -> None:
+    def __init__(self, failure: SetupFailure, *, of_address: bool) -> None:
         super().__init__(failure.text)
-        self.failure = failure
+        self.failure, self.of_address = failure, of_address
 
 
 class RelayProcess:
     """A running relay. `control` and `telemetry` are the starter's ends of its sockets, non-blocking; `bound`: the
-    address of each client as it is open; `pid`: its process. Raises RelayError.
+    address of each client as it is open; `pid`: its process. It has its own session, so that Ctrl-C in a terminal does
+    not reach it. Raises RelayError.
     """
 
     def __init__(self, vehicle: str, clients: Sequence[ClientSetup], silence_s: int = 3) -> None:
@@ -46,8 +47,8 @@ class RelayProcess:
         setup = RelaySetup(vehicle, control.fileno(), telemetry.fileno(), tuple(clients), silence_s)
         with control, telemetry:
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "rtshcua.adapters.gateway"], stdin=subprocess.PIPE, stdout=subprocess.DEVNULL,
-                pass_fds=[control.fileno(), telemetry.fileno()],
+                [sys.executable, "-P", "-m", "rtshcua.adapters.gateway"], stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL, pass_fds=[control.fileno(), telemetry.fileno()], start_new_session=True,
             )  # fmt: skip
         self.pid = self._process.pid
         assert self._process.stdin is not None
@@ -63,7 +64,11 @@ class RelayProcess:
         """
         flight, relay = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with relay:
-            send_flight(self.control, relay)
+            self.control.setblocking(True)
+            try:
+                send_flight(self.control, relay)
+            finally:
+                self.control.setblocking(False)
         return flight
 
     def poll(self) -> int | None:
@@ -75,7 +80,7 @@ class RelayProcess:
         return self._process.wait(patience_s)
 
     def close(self) -> None:
-        """End the process."""
+        """End the process; a second time does nothing."""
         self.control.close()
         self.telemetry.close()
         try:
@@ -99,4 +104,4 @@ class RelayProcess:
             text = "the relay did not begin in time" if late else "the relay's process ended before it began"
             failure = SetupFailure(None, text, "its own message is on the standard error stream")
         self.close()
-        raise RelayError(failure)
+        raise RelayError(failure, of_address=bool(greeting))

@@ -277,7 +277,7 @@ class GatewayService:
         if self._session is not None:
             self._session.link.close()
             self._session.process.stop()
-        self._relay.stop()
+        self._relay.close()
         self._journal.close()
         self._proposals.close()
         self._wakes.close()
@@ -340,8 +340,8 @@ class GatewayService:
 
     def _now(self) -> Now:
         """The present moment by the flight's time of day, which may be the vehicle's; every take-off has it, because
-        it waits for the flight's first `vehicle` line. Where the flight knows no time of day, it is this machine's, with
-        the stated error: then only the flight's decision on the first step, which has waited for a time, can tell.
+        it waits for the flight's first `vehicle` line. While the flight knows none, it is this machine's, with the
+        stated error; the flight decides on the first step once it knows a time.
         """
         now = self._clock.now()
         if self._session is not None and self._session.time is not None:
@@ -544,7 +544,7 @@ class GatewayService:
             if self._heard is not None:
                 self._begin_core(self._now())
         try:
-            link = self._relay.connect_flight()
+            link = self._relay.session()
             with link:
                 words = [str(self._policy.base), *self._words.options]
                 process = FlightProcess(words, link, self._words.environment)

@@ -135,9 +135,10 @@ class _Starting:
     # ---------------------------------------------------------------- the vehicle
 
     def _relay(self, address: str) -> StartedRelay | Refusal:
-        relay = StartedRelay(address, self._configuration.clients)
-        self._stack.callback(relay.stop)  # stopping twice does nothing
-        return relay.await_ready() or relay
+        relay = StartedRelay.start(address, self._configuration.clients)
+        if not isinstance(relay, Refusal):
+            self._stack.callback(relay.close)
+        return relay
 
     def _examined(self, relay: StartedRelay) -> VehicleFacts | Refusal:
         assert self._request.quick is not None
@@ -292,7 +293,7 @@ class _Starting:
                 "name": each.name, "address": each.address, "opened": opened, "connect": reached(opened),
                 "pilot": each.pilot, "role": each.role,
             }
-            for each, opened in zip(self._configuration.clients, relay.opened, strict=True)
+            for each, opened in zip(self._configuration.clients, relay.bound, strict=True)
         ]  # fmt: skip
         self._console.tell(
             {

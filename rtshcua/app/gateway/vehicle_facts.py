@@ -48,7 +48,7 @@ def examine(relay: StartedRelay, source: Path, side: VehicleSide, state: Path) -
     except LinkKeyError as error:
         return Refusal(f"link-key-{error.slug}", str(error), error.help or "", code_of(error.slug))
     driver = ExaminingDriver(policy, clock, frames, signing.verifier, side.system)
-    link = relay.connect_flight()
+    link = relay.session()
     transport = open_transport(Address(LinkCarrier.INHERITED, "", link.detach()))
     vehicle = ConnectedVehicle(transport, driver, clock, lambda _utc_us, _frame: None)
     try:

@@ -15,10 +15,11 @@ TEXT_EVERY_US: Final = 5_000_000
 #: the most chunks of one text
 _MOST_CHUNKS: Final = 4
 _MOST_KEYS: Final = 64
-#: a `client` record: its most octets, and the most characters of a text in it; how many at once, and the interval after that, us
+#: a `client` record: its most octets, and the most characters of a text in it and of the client's name
 LONGEST_RECORD: Final = 200
 _LONGEST_TEXT: Final = 80
 _LONGEST_NAME: Final = 40
+#: how many records at once, and the interval after that, us
 _RECORDS: Final = 20
 _RECORD_EVERY_US: Final = 200_000
 #: MAV_SEVERITY

@@ -146,8 +146,8 @@ class ClientProposal:
     def _happened(self, event: str, at: int, now_us: int) -> None:
         if event == "dispatched":
             self.flies = at
-            step = self.steps[at]
-            self.link.record("permitted", now_us, skill=step.skill, step=self.first + at, arguments=dict(step.arguments))
+            skill, arguments, _ = self.steps[at]
+            self.link.record("permitted", now_us, skill=skill, step=self.first + at, arguments=dict(arguments))
             self.answer(ACCEPTED)
         elif event in _ENDS and at == self.flies:
             self.done = at + 1 if event == "succeeded" else self.done

@@ -6,7 +6,6 @@ a client that asks for less gets what is there.
 """
 
 from collections import deque
-from collections.abc import Mapping
 from dataclasses import dataclass
 from math import isnan
 from typing import Any, Final
@@ -124,11 +123,6 @@ class HarmlessRequests:
         self._repeated: dict[tuple[int, int], _Repeated] = {}
         #: the shortest interval that was asked for, by message, us
         self._intervals: dict[int, int] = dict(settings.needed_us)
-
-    def need(self, needed_us: Mapping[int, int]) -> None:
-        """The intervals that a renewed policy needs: no longer ones remain."""
-        for number, interval_us in needed_us.items():
-            self._intervals[number] = min(interval_us, self._intervals.get(number, interval_us))
 
     # ---------------------------------------------------------------- commands
 

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from typing import Final, NamedTuple
 
 from rtshcua.decision.decide import decide, possible
-from rtshcua.decision.evaluate import build
-from rtshcua.decision.nearest import DAYTIME, LOCAL_TIME, ChangeSearch, Nearest, nearest, offer
+from rtshcua.decision.evaluate import Environment, build
+from rtshcua.decision.nearest import DAYTIME, LOCAL_TIME, ChangeSearch, Nearest, NearestChange, Offer, nearest, offer
 from rtshcua.decision.prepare import PreparedInvocation, PreparedPolicy, prepare_invocation
 from rtshcua.decision.situation import environment, situation
 from rtshcua.decision.times import local_time
@@ -23,7 +23,7 @@ from rtshcua.ground.gateway.translation import DENIED, TEMPORARILY_REJECTED, deg
 from rtshcua.ground.lower.mission import straight_plan
 from rtshcua.ground.why.trace import read_values
 from rtshcua.model.decision import Decision
-from rtshcua.model.flat.contract import SourceKind
+from rtshcua.model.flat.contract import Contract, SourceKind
 from rtshcua.model.flat.limits import DAY
 from rtshcua.model.flat.mission import Invocation, OnInadmissible
 from rtshcua.model.flat.policy import Airspace
@@ -129,27 +129,37 @@ class QuickDecision:
         """
         policy, contract = self._policy, invocation.invocation.contract
         at = environment(situation(state, policy, now), policy, invocation.arguments, invocation.phase)
-        rules = [policy.compiler.when(permit.rule) for permit in invocation.candidates.permits]
-        left = ([each for each in _conjuncts(rule) if build(each, policy.tables)(at) != TRUE] for rule in rules if rule)
-        conditions = min(left, key=len, default=[])
-        search, found, values = ChangeSearch(at, policy.tables), list[str](), list(step.values)
-        for each in sorted(conditions, key=lambda node: isinstance(node, PointInside)):
-            if isinstance(each, PointInside):
-                place = self._inside(each, step._replace(values=tuple(values)), role, context, state, now)
-                zone = policy.policy.zones[each.zone].name
-                name = next(one.name for one in contract.parameters if one.cell == each.cell)
-                found.insert(0, f"{name} outside {zone}" + ("" if place is None else f", nearest accepted {place}"))
-                continue
-            offers = [offer(change, contract, policy.policy, at) for change in search.find(each, True) or ()]
-            if not offers or not all(one.options for one in offers):
+        conditions = self._failed(invocation, at)
+        found, values = list[str](), list(step.values)
+        places = [each for each in conditions if isinstance(each, PointInside)]
+        for condition in (each for each in conditions if each not in places):
+            changes = self._changes(condition, contract, at)
+            if not changes:
                 return []
-            for one in offers:
-                names = tuple(name for _, name in one.options if name)
-                near = Nearest(one.subject, one.dimension, one.options[0][0], names)
+            for subject, near in changes:
                 found.append(f"{_found(near, invocation, state, policy, now)}, accepted {_value(near)}")
-                if one.change.argument and one.change.at is not None:
-                    values[one.change.at] = near.value
+                if subject.argument and subject.at is not None:
+                    values[subject.at] = near.value
+        for each in places:
+            place = self._inside(each, step._replace(values=tuple(values)), role, context, state, now)
+            name = next(one.name for one in contract.parameters if one.cell == each.cell)
+            zone = policy.policy.zones[each.zone].name
+            found.insert(0, f"{name} outside {zone}" + ("" if place is None else f", nearest accepted {place}"))
         return found
+
+    def _changes(self, condition: Node, contract: Contract, at: Environment) -> list[tuple[NearestChange, Nearest]]:
+        """The changes of values with which a condition holds, made together; none if no such changes are known."""
+        changes = ChangeSearch(at, self._policy.tables).find(condition, True) or ()
+        offers = [offer(each, contract, self._policy.policy, at) for each in changes]
+        return [(each.change, _nearest_of(each)) for each in offers] if all(each.options for each in offers) else []
+
+    def _failed(self, invocation: PreparedInvocation, at: Environment) -> list[Node]:
+        """The conditions that do not hold, of the permit that has the fewest."""
+        compiler, tables = self._policy.compiler, self._policy.tables
+        whens = (compiler.when(permit.rule) for permit in invocation.candidates.permits)
+        rules = (list(_conjuncts(when)) for when in whens if when is not None)
+        failed = ([each for each in rule if build(each, tables)(at) != TRUE] for rule in rules)
+        return min(failed, key=len, default=[])
 
     def _inside(
         self, condition: PointInside, step: ProposedStep, role: str, context: Context, state: State, now: Now
@@ -201,6 +211,11 @@ class QuickDecision:
             binding=b"",
         )
         return prepare_invocation(invocation, self._policy, phases)
+
+
+def _nearest_of(offer: Offer) -> Nearest:
+    names = tuple(name for _, name in offer.options if name)
+    return Nearest(offer.subject, offer.dimension, offer.options[0][0], names)
 
 
 def _conjuncts(node: Node) -> Iterator[Node]:

@@ -232,12 +232,11 @@ class Gateway:
         self._safe = [policy.contracts[link.skill].name for link in policy.contingency]
 
     def renew(self, settings: GatewaySettings, now: Now) -> list[Action]:
-        """Another policy is in force, while nothing flies. Everything is kept; stored missions are read again, and
-        checked again under it.
+        """Another policy with the same signals is in force, while nothing flies. Everything is kept; stored missions
+        are read again, and checked again under it.
         """
         now_us = now.monotonic_us
         self._under(settings)
-        self._requests.need(settings.needed_us)
         for client in self._clients.values():
             client.transfer.translation = self._translation
         for client in dict.fromkeys(self._uploads.values()):
@@ -266,16 +265,8 @@ class Gateway:
             self._actions.append(Propose(self._number, client, self._sources[name].role, steps, fly=False))
         self._unchecked.clear()
 
-    def _checked_again(self, name: str, plan: UploadedPlan, event: ProposalChecked, now_us: int) -> None:
-        if self._plans.get(name) is not plan or event.refusal is None:
-            return
-        if event.for_now:
-            self._unchecked.add(name)
-        else:
-            self._withdraw(name, event.refusal, now_us)
-
     def _withdraw(self, name: str, why: str, now_us: int) -> None:
-        """Forget a mission that the policy does not permit any more, and tell its client, at once or once it is there."""
+        """Forget a mission that the policy does not permit any more, and tell its client once it is there."""
         del self._plans[name]
         source = self._sources[name]
         source.mission, source.withdrawn = None, f"mission withdrawn, the policy was renewed: {why}"
@@ -757,10 +748,12 @@ class Gateway:
             upload.transfer.checked(refusal, now_us)
             self._of_mission(upload, now_us)
             return
-        again = self._rechecks.pop(number, None)
-        if again is not None:
-            self._checked_again(*again, event, now_us)
-            return
+        name, plan = self._rechecks.pop(number, ("", None))
+        if plan is not None and refusal is not None and self._plans.get(name) is plan:
+            if for_now:
+                self._unchecked.add(name)
+            else:
+                self._withdraw(name, refusal, now_us)
         proposal = self._proposals.get(number)
         if proposal is None:
             return

@@ -276,7 +276,7 @@ def _client(event: Mapping[str, Any]) -> None:
     told = dict(event["told"])
     who, effect, more = told.pop("client"), told.pop("effect"), told.pop("left_out", 0)
     arguments = "".join(f" {name} {value}" for name, value in told.get("arguments", {}).items())
-    what = " ".join(f"{key} {value}" for key, value in told.items() if key in ("command", "message", "mode", "parameter"))
+    what = " ".join(f"{key} {told[key]}" for key in ("command", "message", "mode", "parameter") if key in told)
     text = told.get("answer") or ": ".join(filter(None, (told.get("skill", what), told.get("reason", ""))))
     left = f" ({more} more before it)" if more else ""
     out(f"{who}: {effect} {text}{arguments}{left}", flush=True)

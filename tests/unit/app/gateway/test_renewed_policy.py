@@ -26,7 +26,9 @@ class Told:
         self.events.append(event)
 
 
-def test_a_landing_elsewhere_shows_why_and_what_changed_and_keeps_both_policies(own_world: None, tmp_path: Path) -> None:
+def test_a_landing_elsewhere_shows_why_and_what_changed_and_keeps_both_policies(
+    own_world: None, tmp_path: Path
+) -> None:
     """By hand: 12 m north and 5 m west of home are 13 m. The declared home is good for 5 m."""
     told, saved = Told(), tmp_path / "kept"
     configuration = GatewayConfiguration(clients=(ConfiguredClient("script", "udpin:127.0.0.1:9"),))

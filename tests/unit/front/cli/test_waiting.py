@@ -89,8 +89,8 @@ class World:
         self.clock, vehicle = Clock(), cast(Any, self.vehicle)
         self.utc = UtcWatch(self.clock, kernel_us=lambda: None)
         self.waiting = MissionWait(
-            base, self.admit, lambda: self.newer, lambda: None, vehicle, self.clock, self.utc, self.interrupts, self.agents,
-            console=TerminalConsole("json", Path(), None), most_s=most_s, notes=["a note"],
+            base, self.admit, lambda: self.newer, lambda: None, vehicle, self.clock, self.utc, self.interrupts,
+            self.agents, console=TerminalConsole("json", Path(), None), most_s=most_s, notes=["a note"],
         )  # fmt: skip
         self.ended: Admitted | Refusal | None = None
         self.thread = threading.Thread(target=self.run)

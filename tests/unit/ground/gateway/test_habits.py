@@ -172,7 +172,9 @@ def test_arming_is_accepted_where_any_skill_may_take_off(tmp_path: Path) -> None
     policies = (CHECKOUT / "policies/bridge_inspection.rts").read_text()
     source = tmp_path / "hops.rts"
     source.write_text(
-        policies.replace("policy bridge_inspection", hop.replace("skill takeoff", "skill hop") + "policy bridge_inspection")
+        policies.replace(
+            "policy bridge_inspection", hop.replace("skill takeoff", "skill hop") + "policy bridge_inspection"
+        )
         .replace("battery > 40 %", "battery > 20 %")
         .replace("  permit  goto by", "  permit  hop by role operator through agent\n  permit  goto by")
     )

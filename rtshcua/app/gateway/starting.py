@@ -17,6 +17,7 @@ from rtshcua.adapters.simulator import Simulator, SimulatorError
 from rtshcua.adapters.store.folders import data_folder
 from rtshcua.adapters.store.keystore import KeyStore
 from rtshcua.adapters.store.laying import lay
+from rtshcua.adapters.store.reading import read_regular
 from rtshcua.adapters.store.writing import PRIVATE_FOLDER, make_folder
 from rtshcua.adapters.store.writing import replace as write_file
 from rtshcua.adapters.utc import kernel_error_us, vehicle_counts
@@ -37,6 +38,7 @@ from rtshcua.app.gateway.vehicle_facts import VehicleFacts, examine
 from rtshcua.app.gateway.vehicle_state import VehicleFrames
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
+from rtshcua.ground.language.size_limits import MAX_SIZE
 from rtshcua.model.flat.policy import Policy
 from rtshcua.model.flat.situation import Now
 from rtshcua.model.flat.zone import unproject
@@ -231,7 +233,7 @@ class _Starting:
         saved, kept = folder / SOURCE, folder / f"policy-{version}.rts"
         try:
             if saved.exists():
-                saved.rename(kept)
+                write_file(kept, read_regular(saved, MAX_SIZE))
             write_file(saved, self._text.encode())
         except OSError as error:
             text = f"cannot write the renewed policy to `{folder}`: {words_of(error)}"

@@ -64,11 +64,12 @@ class RelayProcess:
         """
         flight, relay = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with relay:
+            timeout_s = self.control.gettimeout()
             self.control.setblocking(True)
             try:
                 send_flight(self.control, relay)
             finally:
-                self.control.setblocking(False)
+                self.control.settimeout(timeout_s)
         return flight
 
     def poll(self) -> int | None:

@@ -277,9 +277,9 @@ def _client(event: Mapping[str, Any]) -> None:
     who, effect, more = told.pop("client"), told.pop("effect"), told.pop("left_out", 0)
     arguments = "".join(f" {name} {value}" for name, value in told.get("arguments", {}).items())
     what = " ".join(f"{key} {told[key]}" for key in ("command", "message", "mode", "parameter") if key in told)
-    text = told.get("answer") or ": ".join(filter(None, (told.get("skill", what), told.get("reason", ""))))
+    text = told.get("answer") or ": ".join(filter(None, (f"{effect} {told.get('skill', what)}", told.get("reason"))))
     left = f" ({more} more before it)" if more else ""
-    out(f"{who}: {effect} {text}{arguments}{left}", flush=True)
+    out(f"{who}: {text}{arguments}{left}", flush=True)
 
 
 def _session(event: Mapping[str, Any]) -> None:
@@ -305,5 +305,5 @@ _SHOWN: Final[Mapping[str, Callable[[Mapping[str, Any]], None]]] = {
     "cancelled": _note("the flight is cancelled: {why}"),
     "interrupted": _note("Ctrl-C: the vehicle is brought down"),
     "note": _note("note: {text}"),
-    "summary": _note("the gateway ended after {sessions} flights"),
+    "summary": _note("the gateway ended; flights: {sessions}"),
 }

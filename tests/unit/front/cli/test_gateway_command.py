@@ -14,7 +14,7 @@ QUICK = ["--allow", "takeoff,goto,land", "--below", "30", "m"]
 
 #: what is recorded about a client, by the line that people read
 CLIENTS: dict[str, dict[str, object]] = {
-    "refused goto denied: altitude 60 m, accepted 30 m (authority/out-of-scope)": {
+    "goto denied: altitude 60 m, accepted 30 m (authority/out-of-scope)": {
         "effect": "refused", "skill": "goto", "reason": "authority/out-of-scope",
         "answer": "goto denied: altitude 60 m, accepted 30 m (authority/out-of-scope)",
     },

@@ -54,6 +54,8 @@ def test_a_script_flies_and_is_refused(tmp_path: Path, flavour: str) -> None:
         assert run.wait() == 0
         told = run.wait_for("session")
     assert told["ending"] == "completed"
+    assert run.events[-1] == {"event": "summary", "exit_code": 0, "sessions": 1}
+    assert "fd:" not in json.dumps(run.events), "the flight's link is the vehicle's address"
     log = tmp_path / told["log"]
     assert "superseded" in [each["event"] for each in effects(log)]
     # take-off, three go-tos, landing; holds between them are links
@@ -68,12 +70,14 @@ def test_the_next_flight_begins_where_the_vehicle_landed(tmp_path: Path) -> None
     """Away from its home: the policy is written again for the new one."""
     with running(tmp_path, "--flavour", "ardupilot", "--sessions", "2") as (run, client):
         taken_off(client)
-        assert client.goto(*INSIDE, 6) == ACCEPTED
+        assert client.goto(*INSIDE, 6) == ACCEPTED, client.texts
         client.until_at(*INSIDE)
         assert client.command(mavlink.MAV_CMD_NAV_LAND) == ACCEPTED
         client.until_disarmed()
         run.wait_for("session")
-        run.wait_for("policy", 2)
+        renewed = run.wait_for("policy", 2)
+        assert renewed["why"].endswith(" from its home")
+        assert {each[:2] for each in renewed["changed"]} == {"- ", "+ "}
         taken_off(client)
         assert client.command(mavlink.MAV_CMD_NAV_LAND) == ACCEPTED
         client.until_disarmed()
@@ -84,10 +88,14 @@ def test_the_next_flight_begins_where_the_vehicle_landed(tmp_path: Path) -> None
 def test_ctrl_c_brings_the_vehicle_down(tmp_path: Path) -> None:
     with running(tmp_path) as (run, client):
         taken_off(client)
-        run.process.send_signal(signal.SIGINT)
+        for _ in range(2):  # the second one asks the flight for its state
+            run.process.send_signal(signal.SIGINT)
+            client.until_s(0.5)
         client.until_disarmed()
         assert run.wait() == 130
         told = run.wait_for("session")
+        assert len(run.all("interrupted")) == 1
+        assert run.events[-1] == {"event": "summary", "exit_code": 130, "sessions": 1}
     assert told["ending"] == "interrupted"
     assert verified(run, ["--audit", told["log"]], tmp_path).returncode == 0
 

@@ -12,15 +12,15 @@ from rtshcua.mavlink.framing import (
     FLAGS,
     HEADER,
     MARKER,
+    OLD_HEADER,
+    OLD_MARKER,
     frame_length,
     message_id,
+    number_of,
     octets_of_checksum,
 )
 
-#: a frame of MAVLink 1: marker, length, sequence, system, component, message; then payload and checksum
-_OLD_MARKER: Final = 0xFE
-_OLD_HEADER: Final = 6
-_MARKERS: Final = (MARKER, _OLD_MARKER)
+_MARKERS: Final = (MARKER, OLD_MARKER)
 
 
 class StreamCounts(NamedTuple):
@@ -73,7 +73,7 @@ class FrameStream:
                 start += 1
                 continue
             start += length
-            old += frame[0] == _OLD_MARKER
+            old += frame[0] == OLD_MARKER
             if self._every or (frame[0] == MARKER and not _is_unknown(frame)):
                 frames.append(frame)
         self._kept = data[start:]
@@ -86,8 +86,8 @@ class FrameStream:
 
 def _length(data: bytes, start: int) -> int | None:
     """The length of the frame that begins here; 0 if there is none, None if its header is incomplete."""
-    if data[start] == _OLD_MARKER:
-        return _OLD_HEADER + data[start + 1] + CHECKSUM if start + 1 < len(data) else None
+    if data[start] == OLD_MARKER:
+        return OLD_HEADER + data[start + 1] + CHECKSUM if start + 1 < len(data) else None
     if start + FLAGS < len(data) and data[start + FLAGS] & ~FLAG_SIGNED:
         return 0
     return frame_length(data, start) if start + HEADER <= len(data) else None
@@ -99,10 +99,7 @@ def _is_unknown(frame: bytes) -> bool:
 
 def _is_good(frame: bytes, following: bytes) -> bool:
     """Whether its checksum is right, or cannot be verified and another frame follows."""
-    if frame[0] == _OLD_MARKER:
-        kind, header = kind_of(frame[5]), _OLD_HEADER
-    else:
-        kind, header = kind_of(message_id(frame, 0)), HEADER
+    kind, header = kind_of(number_of(frame)), OLD_HEADER if frame[0] == OLD_MARKER else HEADER
     if kind is None:
         return frame[0] == MARKER and following[:1] == bytes([MARKER])
     end = header + frame[1]

@@ -1,6 +1,10 @@
-"""The layout of a MAVLink 2 frame on the wire, see https://mavlink.io/en/guide/serialization.html."""
+"""The layout of a MAVLink frame on the wire, see https://mavlink.io/en/guide/serialization.html.
+
+Without a further word a frame is one of MAVLink 2. Those of MAVLink 1 are only found and named here.
+"""
 
 from binascii import crc_hqx
+from collections.abc import Iterator
 from struct import Struct
 from typing import Final
 
@@ -14,6 +18,9 @@ FLAGS = 2
 "The offset of the incompatibility flags."
 FLAG_SIGNED = 0x01
 "The only incompatibility flag that is defined; a frame with another one cannot be decoded."
+OLD_MARKER = 0xFE
+OLD_HEADER = 6
+"Of MAVLink 1: marker, length, sequence, system, component, message."
 
 MIRROR: Final = bytes(int(f"{octet:08b}"[::-1], 2) for octet in range(256))
 
@@ -27,6 +34,32 @@ def frame_length(data: bytes, start: int) -> int:
 def message_id(data: bytes, start: int) -> int:
     """The message's number, from the frame's header."""
     return data[start + 7] | data[start + 8] << 8 | data[start + 9] << 16
+
+
+def whole_length(data: bytes, start: int) -> int | None:
+    """The length of the frame, of either version, that begins here; None if none does, or it ends after the data."""
+    left = len(data) - start
+    if data[start] == MARKER and left >= HEADER + CHECKSUM:
+        length = frame_length(data, start)
+    elif data[start] == OLD_MARKER and left >= OLD_HEADER + CHECKSUM:
+        length = OLD_HEADER + data[start + 1] + CHECKSUM
+    else:
+        return None
+    return length if length <= left else None
+
+
+def frames_in(datagram: bytes) -> Iterator[bytes]:
+    """Each frame, of either version, of a datagram of whole frames; what is none, is yielded as the last one."""
+    start = 0
+    while start < len(datagram):
+        length = whole_length(datagram, start) or len(datagram)
+        yield datagram[start : start + length]
+        start += length
+
+
+def number_of(data: bytes, start: int = 0) -> int:
+    """The message's number in a whole frame of either version."""
+    return message_id(data, start) if data[start] == MARKER else data[start + 5]
 
 
 def checksum(octets: bytes, start: int = 0xFFFF) -> int:

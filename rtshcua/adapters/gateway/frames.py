@@ -1,6 +1,6 @@
 """Frames in datagrams, as the relay needs them: whole or not, their message numbers, and frames of MAVLink 1."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Sequence
 from typing import Final
 
 from rtshcua.codec.frames import kind_of
@@ -11,14 +11,15 @@ from rtshcua.mavlink.framing import (
     HEAD,
     HEADER,
     MARKER,
+    OLD_HEADER,
+    OLD_MARKER,
     SIGNATURE,
-    message_id,
+    frames_in,
+    number_of,
     octets_of_checksum,
+    whole_length,
 )
 
-#: a frame of MAVLink 1: marker, length, sequence, system, component, message; then payload and checksum
-OLD_MARKER: Final = 0xFE
-_OLD_HEADER: Final = 6
 #: the most octets of a datagram that several frames share: none is fragmented on Ethernet or Wi-Fi
 MOST_SHARED: Final = 1_400
 
@@ -37,42 +38,17 @@ def numbers_in(datagram: bytes) -> Sequence[int] | None:
 def _walked(datagram: bytes) -> Sequence[int] | None:
     numbers, start = [], 0
     while start < len(datagram):
-        length = _length(datagram, start)
+        length = whole_length(datagram, start)
         if length is None:
             return None
-        numbers.append(_number(datagram, start))
+        numbers.append(number_of(datagram, start))
         start += length
     return numbers or None
 
 
-def _length(data: bytes, start: int) -> int | None:
-    """The length of the frame that begins here; None if it does not end within the data, or there is none."""
-    left = len(data) - start
-    if data[start] == MARKER and left >= HEADER + CHECKSUM:
-        length = HEADER + data[start + 1] + CHECKSUM + (SIGNATURE if data[start + FLAGS] & FLAG_SIGNED else 0)
-    elif data[start] == OLD_MARKER and left >= _OLD_HEADER + CHECKSUM:
-        length = _OLD_HEADER + data[start + 1] + CHECKSUM
-    else:
-        return None
-    return length if length <= left else None
-
-
-def _number(data: bytes, start: int) -> int:
-    return message_id(data, start) if data[start] == MARKER else data[start + 5]
-
-
-def frames_in(datagram: bytes) -> Iterator[bytes]:
-    """Each frame of a datagram of whole frames."""
-    start = 0
-    while start < len(datagram):
-        length = _length(datagram, start) or len(datagram)
-        yield datagram[start : start + length]
-        start += length
-
-
 def without(datagram: bytes, numbers: Collection[int]) -> bytes:
     """A datagram of whole frames without those of these messages. It may be empty."""
-    return b"".join(frame for frame in frames_in(datagram) if _number(frame, 0) not in numbers)
+    return b"".join(frame for frame in frames_in(datagram) if number_of(frame) not in numbers)
 
 
 def parcels(datagrams: Sequence[bytes]) -> Sequence[bytes]:
@@ -115,7 +91,7 @@ def _is_good(frame: bytes) -> bool:
     old = frame[0] == OLD_MARKER
     if not old and frame[FLAGS] & ~FLAG_SIGNED:
         return False  # nobody could decode it
-    kind, header = (kind_of(frame[5]), _OLD_HEADER) if old else (kind_of(message_id(frame, 0)), HEADER)
+    kind, header = kind_of(number_of(frame)), OLD_HEADER if old else HEADER
     if kind is None:
         return not old
     end = header + frame[1]
@@ -130,6 +106,6 @@ def upgraded(frame: bytes) -> bytes:
     kind = kind_of(frame[5]) if frame[0] == OLD_MARKER else None
     if kind is None:
         return frame
-    payload = frame[_OLD_HEADER : _OLD_HEADER + frame[1]].rstrip(b"\0") or b"\0"
+    payload = frame[OLD_HEADER : OLD_HEADER + frame[1]].rstrip(b"\0") or b"\0"
     head = HEAD.pack(MARKER, len(payload), 0, 0, frame[2], frame[3], frame[4], frame[5], 0)
     return head + payload + octets_of_checksum(head[1:] + payload + kind.extra)

@@ -29,7 +29,7 @@ from rtshcua.app.gateway.flight_process import AgentLink, FlightProcess
 from rtshcua.app.gateway.policy_in_force import PolicyInForce
 from rtshcua.app.gateway.proposals import FlightMission, ProposalMoment, Proposals
 from rtshcua.app.gateway.relay_process import StartedRelay
-from rtshcua.app.gateway.vehicle_state import VehicleFrames, split
+from rtshcua.app.gateway.vehicle_state import VehicleFrames
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.gateway import interface
@@ -38,7 +38,7 @@ from rtshcua.ground.gateway.interface import ClientSettings, Event, GatewaySetti
 from rtshcua.ground.gateway.translator import Gateway
 from rtshcua.mavlink import dialect
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
-from rtshcua.mavlink.framing import HEADER, message_id
+from rtshcua.mavlink.framing import HEADER, MARKER, frames_in, message_id
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.wire.clock import DRIFT_US
@@ -308,8 +308,9 @@ class GatewayService:
         except (ConnectionError, ValueError):
             return self._relay_ended(now)
         for datagram in self._relay.frames():
-            for frame in split(datagram):
-                self._from_vehicle(frame, now)
+            for frame in frames_in(datagram):
+                if frame[0] == MARKER:  # of MAVLink 1, of which clients and the flight may have some, nothing is read
+                    self._from_vehicle(frame, now)
         ticks = now.monotonic_us - self._tick_us >= _TICK_US
         if ticks or not ready.isdisjoint(self._polled[3:]):
             self._from_flight(now)
@@ -408,7 +409,7 @@ class GatewayService:
                     self._take(interface.ClientDown(client), now)
             case RelayKind.CLIENT | RelayKind.PILOT:
                 of = interface.FromClient if message.kind is RelayKind.CLIENT else interface.FromPilot
-                for frame in split(message.payload):
+                for frame in frames_in(message.payload):
                     self._take(of(client, frame), now)
 
     def _from_flight(self, now: Now) -> None:

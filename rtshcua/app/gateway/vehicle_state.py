@@ -2,11 +2,9 @@
 
 The flight decides on its own state, with the age of each measurement at its source. Here a value is as old as its
 report, so that it is never taken for older than it is.
-
 """
 
 from collections import deque
-from collections.abc import Iterator
 from typing import Final
 
 from rtshcua.adapters.vehicle.telemetry import Telemetry
@@ -16,7 +14,7 @@ from rtshcua.ground.prove.step_starts import MissionStart, StartPlace
 from rtshcua.mavlink import dialect
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.enums import MAV_LANDED_STATE_ON_GROUND
-from rtshcua.mavlink.framing import HEADER, frame_length, message_id
+from rtshcua.mavlink.framing import HEADER, message_id
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.ports import Readings
@@ -90,12 +88,3 @@ class VehicleFrames:
         for kept in self._last.values():
             kept.clear()
         return self._monitor.state(now.monotonic_us)
-
-
-def split(datagram: bytes) -> Iterator[bytes]:
-    """The frames of a datagram that holds whole frames."""
-    start = 0
-    while start < len(datagram):
-        end = start + frame_length(datagram, start)
-        yield datagram[start:end]
-        start = end

@@ -1,4 +1,4 @@
-"""Read the frames of clients, and make frames for them: MAVLink 1 and 2 in, MAVLink 2 out.
+"""Read the frames of clients, and make frames for them, of MAVLink 2: the relay converts those of MAVLink 1.
 
 The layouts are those of `mavlink.layouts` and of the further messages that clients send or get. A frame of another
 message cannot be verified, and nothing of it is read but its number.
@@ -16,15 +16,11 @@ from rtshcua.mavlink.framing import (
     HEAD,
     HEADER,
     MARKER,
-    SIGNATURE,
     checksum,
+    frame_length,
     octets_of_checksum,
 )
 from rtshcua.mavlink.layouts import LAYOUTS, Layout
-
-#: MAVLink 1: its marker, and its header (marker, length, sequence, system, component, message)
-MARKER_1: Final = 0xFE
-HEADER_1: Final = 6
 
 SET_MODE: Final = 11
 MISSION_WRITE_PARTIAL_LIST: Final = 38
@@ -111,47 +107,24 @@ class Received(NamedTuple):
         return self.fields.get("target_system", 0) in systems and self.fields.get("target_component", 0) in components
 
 
-class _Envelope(NamedTuple):
-    """What a frame's header says: its sender, its message, and where its payload is."""
-
-    system: int
-    component: int
-    message: int
-    start: int
-    end: int
-
-
-def _envelope(frame: bytes) -> _Envelope | None:
-    """The header of one complete frame, of either version; None for anything else."""
-    if len(frame) >= HEADER + CHECKSUM and frame[0] == MARKER:
-        _, length, flags, compatible, _, system, component, low, high = HEAD.unpack_from(frame)
-        if flags & ~FLAG_SIGNED or compatible:
-            return None
-        found = _Envelope(system, component, low | high << 16, HEADER, HEADER + length)
-        tail = SIGNATURE if flags else 0
-    elif len(frame) >= HEADER_1 + CHECKSUM and frame[0] == MARKER_1:
-        found, tail = _Envelope(frame[3], frame[4], frame[5], HEADER_1, HEADER_1 + frame[1]), 0
-    else:
-        return None
-    return found if len(frame) == found.end + CHECKSUM + tail else None
-
-
 def received(frame: bytes) -> Received | None:
     """The fields of one complete frame, signed or not; None for damaged or incomplete octets.
 
     The checksum is verified where the layout is known.
     """
-    found = _envelope(frame)
-    if found is None:
+    if len(frame) < HEADER + CHECKSUM or frame[0] != MARKER or len(frame) != frame_length(frame, 0):
         return None
-    system, component, number, start, end = found
+    _, length, flags, compatible, _, system, component, low, high = HEAD.unpack_from(frame)
+    if flags & ~FLAG_SIGNED or compatible:
+        return None
+    number, end = low | high << 16, HEADER + length
     layout = LAYOUTS_OF_CLIENTS.get(number)
     if layout is None:
         return Received(system, component, number, {})
     if checksum(frame[1:end] + bytes([layout.extra])) != int.from_bytes(frame[end : end + CHECKSUM], "little"):
         return None
     size = layout.fields.size
-    payload = frame[start : min(end, start + size)].ljust(size, b"\0")  # trailing zeros are not sent
+    payload = frame[HEADER : min(end, HEADER + size)].ljust(size, b"\0")  # trailing zeros are not sent
     return Received(system, component, number, dict(zip(layout.names, layout.fields.unpack(payload), strict=True)))
 
 
@@ -169,10 +142,3 @@ def made(number: int, values: dict[str, Any], sender: tuple[int, int], sequence:
     payload = payload.rstrip(b"\0") or b"\0"
     head = HEAD.pack(MARKER, len(payload), 0, 0, sequence % 256, *sender, number & 0xFFFF, number >> 16)
     return head + payload + octets_of_checksum(head[1:] + payload + bytes([layout.extra]))
-
-
-def message_of(frame: bytes) -> int:
-    """The message number of a frame of the vehicle, of either version; -1 for octets that are too short."""
-    if len(frame) >= HEADER and frame[0] == MARKER:
-        return frame[7] | frame[8] << 8 | frame[9] << 16
-    return frame[5] if len(frame) >= HEADER_1 and frame[0] == MARKER_1 else -1

@@ -2,9 +2,9 @@
 
 from typing import Final
 
-from rtshcua.ground.gateway.client_frames import HOME_POSITION, MARKER_1, Received, message_of, received
+from rtshcua.ground.gateway.client_frames import HOME_POSITION, Received, received
 from rtshcua.mavlink import enums, layouts
-from rtshcua.mavlink.framing import MARKER, unsigned
+from rtshcua.mavlink.framing import HEADER, message_id, unsigned
 
 #: the most kinds of messages that are kept; the dialect has about 250
 _MOST_KINDS: Final = 512
@@ -25,11 +25,9 @@ class VehicleSeen:
 
     def take(self, frame: bytes, now_us: int) -> int:
         """Keep a frame of the autopilot; return its message number, -1 if it is from elsewhere."""
-        number = message_of(frame)
-        at = 5 if frame[:1] == bytes([MARKER]) else 3
-        autopilot = self._system, enums.MAV_COMP_ID_AUTOPILOT1
-        if number < 0 or (frame[at], frame[at + 1]) != autopilot:
+        if len(frame) < HEADER or (frame[5], frame[6]) != (self._system, enums.MAV_COMP_ID_AUTOPILOT1):
             return -1
+        number = message_id(frame, 0)
         if number in self._frames or len(self._frames) < _MOST_KINDS:
             self._frames[number] = frame, now_us
         if number == layouts.PARAM_VALUE:
@@ -39,9 +37,7 @@ class VehicleSeen:
     def frame(self, number: int) -> bytes | None:
         """The last frame of a message, without its signature; None if none came."""
         found = self._frames.get(number)
-        if found is None:
-            return None
-        return found[0] if found[0][0] == MARKER_1 else unsigned(found[0])
+        return None if found is None else unsigned(found[0])
 
     def message(self, number: int, within_us: int | None = None, now_us: int = 0) -> Received | None:
         """The fields of the last frame of a message; None if none came, or none within this time before now."""

@@ -12,14 +12,13 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.adapters.gateway.frames import (
     MOST_SHARED,
-    frames_in,
     good_frames,
     numbers_in,
     parcels,
     upgraded,
     without,
 )
-from rtshcua.mavlink.framing import with_flags
+from rtshcua.mavlink.framing import frames_in, with_flags
 
 SPEAKER = mavlink.MAVLink(None, srcSystem=7, srcComponent=8)
 OLD = old.MAVLink(None, srcSystem=7, srcComponent=8)

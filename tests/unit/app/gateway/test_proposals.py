@@ -1,14 +1,22 @@
 """Proposals become a bundle, then replacements that the vehicle's boundary accepts, whatever happens in between."""
 
+import socket
 import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from pymavlink.dialects.v10 import ardupilotmega as mavlink1
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rtshcua.adapters.store.keystore import KeyStore, read_key
+from rtshcua.app.gateway.configuration import ConfiguredClient
+from rtshcua.app.gateway.gateway_service import FlightWords, GatewayService
 from rtshcua.app.gateway.policy_in_force import PolicyInForce, Unlock, development_keys, policy_in_force
 from rtshcua.app.gateway.proposals import FlightMission, ProposalMoment, Proposals, SignedProposal, arranged
 from rtshcua.app.gateway.quick_policy import GeoPoint, QuickRules, policy_text
+from rtshcua.app.gateway.relay_process import StartedRelay
 from rtshcua.diagnostics.exits import ExitCode
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.gateway.interface import Event, ProposalAnswered, ProposalChecked, Propose, ProposedStep
@@ -301,3 +309,53 @@ def test_development_keys_are_private_and_say_so(store: KeyStore) -> None:
     assert folder.stat().st_mode & 0o077 == 0
     assert "without a passphrase" in (folder / "DEVELOPMENT-KEYS.txt").read_text()
     assert store.key_path(Duty.MISSION, whose="agent").stat().st_mode & 0o077 == 0
+
+
+# ---------------------------------------------------------------- the service with its relay
+
+
+class Console:
+    def __init__(self) -> None:
+        self.events: list[Mapping[str, object]] = []
+
+    def tell(self, event: Mapping[str, object]) -> None:
+        self.events.append(event)
+
+
+@contextmanager
+def serving(policy: PolicyInForce, folder: Path) -> Iterator[tuple[GatewayService, socket.socket]]:
+    """A gateway without a flight, and the vehicle's socket."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
+        vehicle.bind(("127.0.0.1", 0))
+        clients = [ConfiguredClient("script", "udpout:127.0.0.1:9")]
+        relay = StartedRelay.start(f"udpout:127.0.0.1:{vehicle.getsockname()[1]}", clients)
+        assert isinstance(relay, StartedRelay)
+        words = FlightWords((), folder / "agent", {}, folder / "root")
+        service = GatewayService(
+            relay, policy, clients, words, Console(), folder, system=1, utc_error_us=0, renew=lambda frames, now: None
+        )
+        with relay.session() as flight:  # the relay's socket of the vehicle opens with the first frame to it
+            flight.send(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3).pack(mavlink.MAVLink(None, 1, 191)))
+            vehicle.settimeout(10)
+            vehicle.connect(vehicle.recvfrom(1_000)[1])
+        try:
+            yield service, vehicle
+        finally:
+            service.close()
+
+
+def test_frames_of_mavlink_1_on_the_vehicles_link_are_no_fault(policy: PolicyInForce, tmp_path: Path) -> None:
+    """A camera, a gimbal or another vehicle behind the autopilot may speak it."""
+    old, new = mavlink1.MAVLink(None, 1, 42), mavlink.MAVLink(None, 1, 1)
+    beat = mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3).pack(new)
+    landed = mavlink.MAVLink_extended_sys_state_message(0, 2).pack(new)
+    said = mavlink1.MAVLink_mission_current_message(7), mavlink1.MAVLink_extended_sys_state_message(0, 1)
+    others = [each.pack(old) for each in said]
+    with serving(policy, tmp_path) as (service, vehicle):
+        vehicle.send(b"".join(others))
+        vehicle.send(others[0] + beat + others[1] + landed + others[0])
+        end_s = time.monotonic() + 10
+        while (service._frames is None or service._frames.aloft is None) and time.monotonic() < end_s:
+            assert service._turn(service._wait()) is None
+        assert service._frames is not None
+        assert service._frames.aloft, "frames between them are read"

@@ -13,7 +13,6 @@ from rtshcua.ground.gateway.client_frames import (
     LAYOUTS_OF_CLIENTS,
     LOG_REQUEST_LIST,
     made,
-    message_of,
     received,
 )
 from rtshcua.mavlink.layouts import LAYOUTS
@@ -56,11 +55,11 @@ def test_a_control_status_has_the_layout_of_the_development_dialect() -> None:
     assert LAYOUTS_OF_CLIENTS[CONTROL_STATUS].extra == (checksum.crc & 0xFF) ^ (checksum.crc >> 8)
 
 
-@pytest.mark.parametrize("dialect", [mavlink, mavlink1])
-def test_a_client_may_speak_both_versions(dialect: Any) -> None:
-    sender = dialect.MAVLink(None, 255, 190)
-    message = dialect.MAVLink_command_long_message(1, 1, 22, 0, 1.5, 0, 0, 0, 0, 0, 10)
-    found = received(message.pack(sender, force_mavlink1=dialect is mavlink1))
+def test_frames_of_the_second_version_are_read() -> None:
+    """Those of the first one are converted by the relay."""
+    message = mavlink.MAVLink_command_long_message(1, 1, 22, 0, 1.5, 0, 0, 0, 0, 0, 10)
+    assert received(message.pack(mavlink1.MAVLink(None, 255, 190), force_mavlink1=True)) is None
+    found = received(message.pack(mavlink.MAVLink(None, 255, 190)))
     assert found is not None
     assert found.sender == (255, 190)
     assert (found.fields["command"], found.number("param1"), found.number("param7")) == (22, 1.5, 10.0)
@@ -117,12 +116,6 @@ def test_a_made_frame_is_one_for_pymavlink() -> None:
     assert (message.get_type(), message.start, message.end, message.get_seq()) == ("LOG_REQUEST_LIST", 0, 0xFFFF, 44)
     with pytest.raises(ValueError, match="format"):
         made(LOG_REQUEST_LIST, {"end": 1 << 20}, (1, 191), 0)
-
-
-def test_the_number_of_a_message_is_in_both_headers() -> None:
-    assert message_of(bytes([0xFD, 0, 0, 0, 0, 1, 1, 1, 2, 3])) == 0x030201
-    assert message_of(bytes([0xFE, 0, 0, 1, 1, 33])) == 33
-    assert [message_of(octets) for octets in (b"", b"\xfd", b"\xfe1234", b"1234567890")] == [-1, -1, -1, -1]
 
 
 @given(st.binary(max_size=300))

@@ -461,6 +461,8 @@ class GatewayService:
             case interface.Propose():
                 for event in self._proposals.add(action):
                     self._take(event, now)
+            case interface.Withdraw(number):
+                self._proposals.withdraw(number)
             case interface.RequestFrame(number, _, frame):
                 self._request(number, frame, now)
             case interface.Cancel(_, reason):

@@ -107,6 +107,7 @@ class Proposals:
         self._switch_s = sys.getswitchinterval()
         self._waiting: list[Propose] = []
         self._running: tuple[Propose, Future[_Compiled]] | None = None
+        self._stale = False  # what runs is not wanted any more
         self._compiled: _Compiled | None = None
         self._sent: SignedProposal | None = None
         self._again = 0
@@ -165,16 +166,28 @@ class Proposals:
         return [ProposalAnswered(sent.number, slug, text)], sent.mission if slug == "accepted" else None
 
     def forget(self) -> list[Event]:
-        """The flight ended: what waits is refused."""
-        numbers = [each.number for each in self._waiting]
+        """The flight ended: what was to be flown is refused, also what is being compiled. Checks of missions go on."""
+        numbers = [each.number for each in self._waiting if each.fly]
+        if self._running is not None and self._running[0].fly and not self._stale:
+            self._stale = True
+            numbers.append(self._running[0].number)
         if self._compiled is not None:
             numbers.append(self._compiled.proposal.number)
-        self._waiting, self._compiled, self._again, self._replaced = [], None, 0, 0
+        self._waiting = [each for each in self._waiting if not each.fly]
+        self._compiled, self._again, self._replaced = None, 0, 0
         events: list[Event] = [ProposalChecked(number, "the flight ended", for_now=True) for number in numbers]
         if self._sent is not None:
             events.append(ProposalAnswered(self._sent.number, "unreachable", "the flight ended"))
         self._sent = None
         return events
+
+    def withdraw(self, number: int) -> None:
+        """Forget a proposal that was not handed in yet."""
+        self._waiting = [each for each in self._waiting if each.number != number]
+        if self._running is not None and self._running[0].number == number:
+            self._stale = True
+        if self._compiled is not None and self._compiled.proposal.number == number:
+            self._compiled = None
 
     @property
     def busy(self) -> bool:
@@ -205,12 +218,14 @@ class Proposals:
         sys.setswitchinterval(_SWITCH_S)
         future = self._worker.submit(self._compile, proposal, before, moment)
         future.add_done_callback(lambda _: self._wake())
-        self._running = proposal, future
+        self._running, self._stale = (proposal, future), False
 
     def _finish(self) -> list[Event]:
         assert self._running is not None
         (proposal, future), self._running = self._running, None
         sys.setswitchinterval(self._switch_s)
+        if self._stale:
+            return []
         try:
             compiled = future.result()
         except Refused as error:

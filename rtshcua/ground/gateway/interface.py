@@ -187,6 +187,12 @@ class Propose(NamedTuple):
     fly: bool = True
 
 
+class Withdraw(NamedTuple):
+    """Forget a proposal that was not handed in yet. It has no answer."""
+
+    number: int
+
+
 class RequestFrame(NamedTuple):
     """Hand a frame for the vehicle to the flight as a request; its gate passes it as housekeeping, or not at all."""
 
@@ -209,4 +215,4 @@ class ClientNote(NamedTuple):
     said: Mapping[str, Any]
 
 
-Action: TypeAlias = ToClient | Withhold | Propose | RequestFrame | Cancel | ClientNote
+Action: TypeAlias = ToClient | Withhold | Propose | Withdraw | RequestFrame | Cancel | ClientNote

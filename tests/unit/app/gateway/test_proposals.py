@@ -246,6 +246,42 @@ def test_the_flight_ends_while_a_document_is_with_it(proposals: Proposals) -> No
     assert proposals.answered("accepted", "") == ([], None)
 
 
+def test_what_is_compiled_for_a_flight_that_ended_is_never_handed_in(proposals: Proposals) -> None:
+    proposals.add(propose(1, TAKEOFF))
+    assert proposals.advance(moment(), ready=True) == ([], None), "the worker compiles"
+    assert proposals.forget() == [ProposalChecked(1, "the flight ended", for_now=True)]
+    proposals.add(propose(2, LAND))
+    assert [each.number for each in signed(proposals, moment())[0] if isinstance(each, ProposalChecked)] == [2]
+
+
+def test_the_check_of_a_mission_goes_on_when_a_flight_ends(proposals: Proposals) -> None:
+    for number in (1, 2):
+        proposals.add(Propose(number, number, "operator", (TAKEOFF, LAND), fly=False))
+    proposals.advance(moment(), ready=False)
+    assert proposals.forget() == []
+    assert [signed(proposals, moment())[0] for _ in range(2)] == [
+        [ProposalChecked(1, None)],
+        [ProposalChecked(2, None)],
+    ]
+
+
+@pytest.mark.parametrize("compiled", [False, True])
+def test_a_withdrawn_proposal_is_never_handed_in(proposals: Proposals, compiled: bool) -> None:
+    proposals.add(propose(1, TAKEOFF))
+    proposals.add(propose(2, TAKEOFF))
+    proposals.add(propose(3, TAKEOFF))
+    assert proposals.advance(moment(), ready=False) == ([], None), "the worker compiles"
+    while compiled and proposals._compiled is None:
+        assert proposals.advance(moment(), ready=False) == ([], None)
+        time.sleep(0.005)
+    proposals.withdraw(1)
+    proposals.withdraw(2)
+    events, document = signed(proposals, moment())
+    assert events == [ProposalChecked(3, None, 0)]
+    assert document is not None
+    assert document.number == 3
+
+
 def test_a_cancellation_is_for_the_mission_in_force(proposals: Proposals, vehicle: Vehicle) -> None:
     assert proposals.cancellation(moment()) is None
     proposals.add(propose(1, TAKEOFF))

@@ -224,6 +224,11 @@ class GatewayWorld:
         self.signals |= {"height": (height_mm,), "landed": (2,)}
         self.report(armed=True, airborne=True, mode=Px4Mode.HOLD if self.autopilot == PX4 else CopterMode.GUIDED)
 
+    def offboard(self, client: int = 1) -> list[Action]:
+        """A client asks for the mode in which setpoints are heeded."""
+        mode = (6, 0) if self.autopilot == PX4 else (CopterMode.GUIDED, 0)
+        return self.send(command_long(176, 1, *mode), client)
+
     def accept(self, actions: list[Action], first: int = 0) -> int:
         """The worker signs the only proposal of these actions, and the flight takes it; return its number."""
         (number,) = (each.number for each in actions if isinstance(each, Propose))

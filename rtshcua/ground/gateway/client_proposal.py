@@ -52,6 +52,8 @@ class ClientProposal:
     done: int = 0
     #: whether it was taken only because it makes the flight safer: that gives no control
     borrows: bool = False
+    #: why it is not wanted any more, while the flight may still fly it; else empty
+    withdrawn: str = ""
     told_us: int = 0
     #: notes of decisions that wait, each told once
     waits: set[str] = field(default_factory=set)

@@ -51,7 +51,9 @@ class ShownState:
         return mode if now_us < until_us and self._seen.mode == before else None
 
     def arm(self, message: Received, now_us: int, hindrance: tuple[int, str] | None) -> int:
-        """The answer to COMPONENT_ARM_DISARM. `hindrance`: why no take-off could follow now, with the MAV_RESULT."""
+        """The answer to COMPONENT_ARM_DISARM. `hindrance`: why no take-off could follow an arming now, or what takes
+        off in spite of a disarming, with the MAV_RESULT.
+        """
         wanted, force = message.number("param1"), message.number("param2")
         if not isnan(force) and force != 0:
             self._link.text("forced arming and disarming are refused", now_us)
@@ -60,7 +62,7 @@ class ShownState:
         if wanted == 1:
             return self._arm(now_us, hindrance)
         if wanted == 0:
-            return self._disarm(now_us)
+            return self._disarm(now_us, hindrance)
         return DENIED
 
     def _arm(self, now_us: int, hindrance: tuple[int, str] | None) -> int:
@@ -77,14 +79,17 @@ class ShownState:
         self.update(now_us)
         return ACCEPTED
 
-    def _disarm(self, now_us: int) -> int:
+    def _disarm(self, now_us: int, hindrance: tuple[int, str] | None) -> int:
         if self._seen.armed:
-            self._link.text("disarming is refused: land, then the vehicle disarms", now_us)
-            self._link.record("refused", now_us, command="COMPONENT_ARM_DISARM", reason="armed")
-            return TEMPORARILY_REJECTED
+            hindrance = TEMPORARILY_REJECTED, "land, then the vehicle disarms"
         self._armed_until_us = 0
         self.update(now_us)
-        return ACCEPTED
+        if hindrance is None:
+            return ACCEPTED
+        result, reason = hindrance
+        self._link.text(f"disarming is refused: {reason}", now_us)
+        self._link.record("refused", now_us, command="COMPONENT_ARM_DISARM", reason=reason)
+        return result
 
     def show_mode(self, mode: int, now_us: int) -> None:
         """Show a mode that the client asked for, until the vehicle's changes, for a bounded time."""

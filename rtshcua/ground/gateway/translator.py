@@ -59,6 +59,7 @@ from rtshcua.ground.gateway.interface import (
     ProposedStep,
     RequestAnswered,
     Tick,
+    Withdraw,
     Withhold,
 )
 from rtshcua.ground.gateway.plan_transfer import PlanTransfer, RefusedPlan, UploadedPlan, read_plan
@@ -155,6 +156,8 @@ class _Source:
     """
 
     role: str
+    #: whether its setpoints are heeded: whether it is, as it sees it, in GUIDED or OFFBOARD
+    guided: bool
     shadows: dict[str, float] = field(default_factory=dict)
     mission: tuple[ClientProposal, UploadedPlan] | None = None
     withdrawn: str = ""
@@ -317,7 +320,7 @@ class Gateway:
 
     def _join(self, link: ClientLink, now_us: int) -> None:
         """A client is there: it goes on with what its former connection left."""
-        source = self._sources.setdefault(link.name, _Source(link.settings.role))
+        source = self._sources.setdefault(link.name, _Source(link.settings.role, self._settings.autopilot != PX4))
         link.shadows = source.shadows
         transfer = PlanTransfer(link, self._translation, self._settings.autopilot, self._plans)
         shown = ShownState(link, self._seen, self._actions, self._settings.autopilot)
@@ -429,10 +432,13 @@ class Gateway:
         now_us = now.monotonic_us
         result: int | None
         if command == enums.MAV_CMD_COMPONENT_ARM_DISARM:
-            arms = message.number("param1") == 1
-            result = client.shown.arm(message, now_us, self._cannot_take_off(client, now) if arms else None)
-            if message.number("param1") == 0:
-                self._drop_held(client)
+            wanted, hindrance = message.number("param1"), None
+            if wanted == 1:
+                hindrance = self._cannot_take_off(client, now)
+            elif wanted == 0:
+                self._take_back(f"{client.link.name} disarms", now_us, client.link.name)
+                hindrance = self._takes_off()
+            result = client.shown.arm(message, now_us, hindrance)
         elif command in REQUESTING:
             result = self._requests.command(client.link, message, now_us)
         elif command == enums.MAV_CMD_DO_SET_MODE:
@@ -474,6 +480,12 @@ class Gateway:
             client.link.text(f"{what} refused: send positions", now_us, what)
             client.link.record("refused", now_us, message=message.message)
             return
+        if not client.source.guided:
+            mode = "OFFBOARD" if self._settings.autopilot == PX4 else "GUIDED"
+            client.setpoint_us = now_us + REFUSED_US
+            client.link.text(f"setpoints wait until you ask for mode {mode}", now_us, "guided", NOTICE)
+            client.link.record("refused", now_us, message=message.message, reason=f"not in {mode}")
+            return
         result = self._propose(client, message, self._step(client, row, message, now_us), -1, now)
         if result not in (None, ACCEPTED):
             client.setpoint_us = now_us + REFUSED_US
@@ -512,6 +524,7 @@ class Gateway:
         guided, auto = (each[self._settings.autopilot == PX4] for each in (_WITHOUT_EFFECT, _MISSION_MODES))
         now_us = now.monotonic_us
         if mode == guided:
+            client.source.guided = True
             if self._seen.mode != mode:
                 client.shown.show_mode(mode, now_us)
             return ACCEPTED
@@ -523,6 +536,12 @@ class Gateway:
             self._reject(client, f"mode {names.get(mode, str(mode))} has no mapping", command, now_us)
             return DENIED
         if self._rests and self._translation.contract(row.skill) is not None and not self._climbs(row.skill):
+            self._take_back(f"{client.link.name} asks for {row.skill}", now_us, client.link.name)
+            client.source.guided = False
+            hindrance = self._takes_off()
+            if hindrance is not None:
+                self._reject(client, f"{row.skill} rejected: {hindrance[1]}", command, now_us)
+                return hindrance[0]
             client.shown.show_mode(mode, now_us)
             return ACCEPTED
         return self._propose(client, message, self._step(client, row, message, now_us), command, now)
@@ -555,15 +574,18 @@ class Gateway:
     def _offer(
         self, client: _Client, steps: tuple[ProposedStep, ...], message: Received, command: int, now: Now
     ) -> int | None:
-        now_us, latest = now.monotonic_us, client.latest
+        now_us, latest, safe = now.monotonic_us, client.latest, steps[0].skill in self._safe
+        if safe:
+            self._withdraw_waiting(f"{client.link.name} asks for {steps[0].skill}", now_us, client.link.name)
         if latest is not None and latest.steps == steps and self._stands(latest):
             if not latest.answered:
                 latest.again(client.link, message.sender, command)
             return ACCEPTED if latest.answered else None
-        waiting = [each for each in self._proposals.values() if each.link is client.link and not each.taken]
+        own = [each for each in self._proposals.values() if each.link is client.link and not each.ended]
+        waiting = [each for each in own if not each.taken]
         if command < 0 and waiting:
             return None  # it comes again
-        if not client.source.may_decide(now_us, safe=steps[0].skill in self._safe):
+        if not client.source.may_decide(now_us, safe=safe):
             client.link.text(_TOO_MANY, now_us, _TOO_MANY)
             client.link.record("refused", now_us, skill=steps[0].skill, reason=_TOO_MANY)
             return TEMPORARILY_REJECTED
@@ -572,6 +594,9 @@ class Gateway:
             return self._refuse(client, refusal, message, command, now_us)
         if len(waiting) >= MOST_OPEN:
             return TEMPORARILY_REJECTED
+        if safe:
+            self._withdraw_waiting(f"{client.link.name} asks for {steps[0].skill}", now_us)
+            client.source.guided = False
         client.setpoint_us = now_us + SETPOINT_US if command < 0 else client.setpoint_us
         self._number += 1
         proposal = ClientProposal(
@@ -600,7 +625,7 @@ class Gateway:
         if refusal.reason == _NO_FLIGHT and self._hold(client, message, command, now_us):
             return None
         if refusal.skill in self._safe:
-            self._drop_held(client)
+            self._take_back(f"{client.link.name} asks for {refusal.skill}", now_us, client.link.name)
         client.link.text(refusal.text, now_us, f"{refusal.skill} {refusal.reason}" if command < 0 else "")
         client.link.record("refused", now_us, skill=refusal.skill, reason=refusal.reason, answer=refusal.text)
         return refusal.result
@@ -620,11 +645,55 @@ class Gateway:
         client.link.ack(message.sender, command, IN_PROGRESS)
         return True
 
-    def _drop_held(self, client: _Client) -> None:
-        """The client lands, stops or disarms: what it asked for before is withdrawn."""
-        for each in [one for one in self._held if one.client is client]:
-            self._held.remove(each)
-            client.link.ack(each.message.sender, each.command, CANCELLED)
+    def _take_back(self, why: str, now_us: int, name: str = "") -> None:
+        """Withdraw what clients, or one of them, asked for and what did not begin yet. A flight that has such a step
+        already is cancelled: on the ground it ends, in the air its contingency flies.
+        """
+        self._withdraw_waiting(why, now_us, name, safe_too=not name)
+        for each in self._pending(name, safe_too=not name):
+            each.withdrawn = why
+        self._cancel_withdrawn()
+
+    def _withdraw_waiting(self, why: str, now_us: int, name: str = "", *, safe_too: bool = False) -> None:
+        """Withdraw what waits for a flight, or was not handed in to it yet, of all clients or of one of them."""
+        for held in [one for one in self._held if name in ("", one.client.link.name)]:
+            self._held.remove(held)
+            held.client.link.ack(held.message.sender, held.command, CANCELLED)
+        for each in self._pending(name, safe_too=safe_too):
+            if each.first < 0:
+                self._actions.append(Withdraw(each.number))
+                each.refuse(CANCELLED, f"{each.steps[0].skill} withdrawn: {why}", now_us)
+
+    def _pending(self, name: str, *, safe_too: bool) -> list[ClientProposal]:
+        """The proposals of which no step was dispatched, of all clients or of one of them; those that only stop, return
+        or land are left out.
+        """
+        return [
+            each
+            for each in self._proposals.values()
+            if not each.ended
+            and each.flies < 0
+            and name in ("", each.link.name)
+            and (safe_too or any(step.skill not in self._safe for step in each.steps))
+        ]
+
+    def _cancel_withdrawn(self) -> None:
+        """Cancel the flight, once it can be, that has a step which is not wanted any more."""
+        of = next((each for each in self._proposals.values() if each.withdrawn and not each.ended), None)
+        if of is not None and self._stage == "flying" and not self._cancelled:
+            self._cancelled = True
+            self._actions.append(Cancel(of.link.client, of.withdrawn))
+
+    def _takes_off(self) -> tuple[int, str] | None:
+        """What may take off although a client disarms or lands on the ground, and the MAV_RESULT."""
+        for each in self._proposals.values():
+            if each.withdrawn and not each.ended:
+                return TEMPORARILY_REJECTED, f"the flight of {each.steps[0].skill} is being cancelled: ask again"
+            if not each.ended and not self._brings_down(each):
+                return TEMPORARILY_REJECTED, f"{each.steps[0].skill} is under way: land"
+        if self._held:
+            return TEMPORARILY_REJECTED, f"{self._held[0].client.link.name} waits to take off"
+        return None
 
     def _take_held(self, now: Now) -> None:
         """Take the commands that waited for a flight, now that there is one, or refuse them after too long."""
@@ -674,7 +743,7 @@ class Gateway:
         rival = self._outranked(client, now_us)
         if rival is not None and not self._is_safer(step.skill):
             return f"{rival.name} is in control"
-        if self._stage == "flying":
+        if self._stage == "flying" and (self._flown is not None or not self._seen.on_ground):
             return None
         if not self._seen.on_ground:
             return "the vehicle flies under another control"
@@ -801,6 +870,7 @@ class Gateway:
                         each.wait_for(self._unready, now_us)
             case "mission":
                 self._stage = "flying"
+                self._cancel_withdrawn()
             case "decision" | "effect":
                 self._step_line(line, now_us)
             case "close":
@@ -885,7 +955,7 @@ class Gateway:
         if result is None and proposal is not None and proposal.steps == steps:
             items = plan.item_of[max(before, 0) :]
             proposal.item_of = (*items[:1] * more, *items)
-            client.source.mission = proposal, plan
+            client.source.mission, client.source.guided = (proposal, plan), False
         return result
 
     def _jump(self, client: _Client, item: float, now_us: int) -> int:

@@ -28,7 +28,9 @@ from rtshcua.ground.gateway.interface import (
     Propose,
     Tick,
     ToClient,
+    Withdraw,
 )
+from rtshcua.mavlink.modes import ARDUPILOT, PX4
 
 TAKEOFF = command_long(22, 0, 0, 0, 0, 0, 0, 503)
 LATE_TAKEOFF = command_long(22, 0, 0, 0, 0, 0, 0, 503, confirmation=1)
@@ -44,6 +46,11 @@ def controls(actions: list[Action], client: int = 1) -> list[int]:
     """`gcs_main` of each CONTROL_STATUS to a client."""
     frames = [each.frame for each in actions if isinstance(each, ToClient) and each.client == client]
     return [frame[11] if frame[1] > 1 else 0 for frame in frames if frame[7:10] == b"\x00\x02\x00"]
+
+
+def cancels(actions: list[Action]) -> list[int]:
+    """The client of each cancellation."""
+    return [each.client for each in actions if isinstance(each, Cancel)]
 
 
 def records(actions: list[Action]) -> list[Any]:
@@ -217,6 +224,8 @@ def test_a_step_refused_while_another_flies_leaves_that_one() -> None:
 def test_a_stream_of_one_target_is_one_proposal() -> None:
     world = GatewayWorld()
     world.fly()
+    world.offboard()
+    world.done.clear()
     found = []
     for at in range(100):  # 10 s at 10 Hz
         world.now_us += 100_000
@@ -235,6 +244,7 @@ def test_a_stream_of_one_target_is_one_proposal() -> None:
 def test_a_moving_target_is_proposed_at_most_twice_a_second() -> None:
     world = GatewayWorld()
     world.fly()
+    world.offboard()
     found = 0
     for at in range(100):
         world.now_us += 100_000
@@ -249,9 +259,132 @@ def test_a_moving_target_is_proposed_at_most_twice_a_second() -> None:
 def test_setpoints_wait_for_the_answer_to_the_one_before() -> None:
     world = GatewayWorld()
     world.fly()
+    world.offboard()
     assert len(proposals(world.send(setpoint()))) == 1
     world.now_us += 600_000
     assert proposals(world.send(setpoint(z=21))) == []
+
+
+SAFE = (command_long(21), command_long(20), command_long(193, 0))
+SAFE_MODES = tuple(command_long(176, 1, 4, sub) for sub in (3, 5, 6))  # Hold, Return, Land
+DISARMS = command_long(400, 0)
+
+
+# ---------------------------------------------------------------- what is withdrawn
+
+
+@pytest.mark.parametrize("message", [DISARMS, *SAFE, *SAFE_MODES])
+def test_what_is_not_handed_in_is_withdrawn_by_a_client_that_disarms_stops_or_lands(message: Any) -> None:
+    world = GatewayWorld()
+    world.ready()
+    proposed = number(world.send(TAKEOFF))
+    actions = world.send(message)
+    assert Withdraw(proposed) in actions
+    said = acks(actions)
+    assert said[0] == (22, 6)
+    assert said[1:] == [(int(message.command), 1 if message in SAFE else 0)], "on the ground nothing lands or stops"
+    assert acks(world.take(ProposalChecked(proposed, None))) == [], "it is forgotten"
+
+
+@pytest.mark.parametrize("message", [DISARMS, *SAFE, *SAFE_MODES])
+def test_what_is_with_the_flight_is_cancelled_and_the_client_is_not_told_that_it_is_safe(message: Any) -> None:
+    """The flight has the bundle, but has not announced its mission."""
+    world = GatewayWorld()
+    world.ready()
+    world.accept(world.send(TAKEOFF))
+    actions = world.send(message)
+    assert (int(message.command), 0) not in acks(actions)
+    assert not cancels(actions), "nothing can be cancelled yet"
+    assert cancels(world.line(type="mission")) == [1]
+    assert cancels(world.wait(5_000_000)) == [], "once"
+    assert acks(world.line(type="close", ending="cancelled")) == [(22, 1)]
+    assert acks(world.send(DISARMS)) == [(400, 0)]
+
+
+@pytest.mark.parametrize("message", [DISARMS, *SAFE])
+def test_a_take_off_that_waits_for_approval_is_cancelled(message: Any) -> None:
+    world = GatewayWorld()
+    world.ready()
+    world.accept(world.send(TAKEOFF))
+    world.line(type="mission")
+    world.line(type="decision", kind=0, step=0, outcome="defer", reason="approval/awaited")
+    actions = world.send(message)
+    assert (cancels(actions), (400, 0) in acks(actions)) == ([1], False)
+
+
+def test_a_disarming_while_another_clients_take_off_is_under_way_is_no_success() -> None:
+    world = GatewayWorld()
+    world.client(2, "other")
+    world.ready()
+    proposed = world.send(TAKEOFF)
+    actions = world.send(DISARMS, client=2)
+    assert (acks(actions, 2), texts(actions, 2)) == (
+        [(400, 1)], ["disarming is refused: takeoff is under way: land"]
+    )  # fmt: skip
+    assert acks(world.send(SAFE_MODES[0], client=2), 2) == [(176, 1)]
+    world.accept(proposed)
+    assert acks(world.dispatch(0)) == [(22, 0)]
+
+
+@pytest.mark.parametrize("message", SAFE_MODES)
+def test_a_mode_that_stops_or_lands_withdraws_what_waits_for_a_flight(message: Any) -> None:
+    world = GatewayWorld()
+    world.send(TAKEOFF)
+    assert acks(world.send(message)) == [(22, 6), (176, 0)]
+    world.ready()
+    assert proposals(world.wait(100_000)) == []
+
+
+@pytest.mark.parametrize("message", [*SAFE, *SAFE_MODES])
+def test_no_target_from_before_supersedes_a_step_that_stops_or_lands(message: Any) -> None:
+    """Whoever asked for the target: the one who lands, by any connection, or another client."""
+    for lands, name in ((1, "script"), (2, "script"), (2, "other")):
+        world = GatewayWorld()
+        world.fly()
+        world.client(2, name)
+        pending = [number(world.send(reposition(z=508 + at))) for at in range(4)]
+        actions = world.send(message, client=lands)
+        assert len(proposals(actions)) == 1
+        assert [each.number for each in actions if isinstance(each, Withdraw)] == pending
+        assert acks(actions) == [(192, 6)] * 4
+
+
+def test_a_return_that_waits_is_not_withdrawn_by_a_landing() -> None:
+    world = GatewayWorld()
+    world.fly()
+    world.send(command_long(20))
+    assert not [each for each in world.send(command_long(21)) if isinstance(each, Withdraw)]
+
+
+# ---------------------------------------------------------------- which setpoints are heeded
+
+
+@pytest.mark.parametrize("autopilot", [PX4, ARDUPILOT])
+def test_setpoints_are_ignored_after_a_safe_step_until_their_mode_is_asked_for(autopilot: int) -> None:
+    modes = {PX4: ((4, 5), (4, 6), (4, 3)), ARDUPILOT: ((6, 0), (9, 0), (5, 0))}[autopilot]
+    for message in (*SAFE, *(command_long(176, 1, *mode) for mode in modes)):
+        world = GatewayWorld(autopilot)
+        world.fly()
+        world.client(2, "script")
+        if autopilot == PX4:
+            actions = world.send(setpoint())
+            assert (proposals(actions), texts(actions)) == ([], ["setpoints wait until you ask for mode OFFBOARD"])
+        world.offboard(client=2)
+        world.now_us += 200_000
+        first = world.send(setpoint())
+        assert len(proposals(first)) == 1
+        world.accept(first)
+        world.dispatch(0)
+        world.wait(1_000_000)
+        safe = world.send(message)
+        world.accept(safe, 1)
+        world.dispatch(1)
+        for _ in range(20):
+            world.wait(200_000)
+            assert proposals(world.send(setpoint(z=25)) + world.send(setpoint(z=26), client=2)) == []
+        world.offboard()
+        world.wait(200_000)
+        assert len(proposals(world.send(setpoint(z=25)))) == 1
 
 
 # ---------------------------------------------------------------- where a step makes no sense

@@ -316,6 +316,7 @@ def test_setpoints_without_a_position_are_refused_with_a_text_once_in_five_secon
 def test_a_refused_target_is_told_once_in_five_seconds_however_often_it_comes() -> None:
     world = GatewayWorld()
     world.fly()
+    world.offboard()
     said: list[str] = []
     for _ in range(90):
         world.now_us += 100_000
@@ -324,6 +325,7 @@ def test_a_refused_target_is_told_once_in_five_seconds_however_often_it_comes() 
     home_unknown = GatewayWorld()
     home_unknown.gateway._seen._frames.pop(242)
     home_unknown.fly()
+    home_unknown.offboard()
     home_unknown.gateway._seen._frames.pop(242)
     assert len(texts(home_unknown.send(setpoint(z=508, frame=5)))) == 1
     assert texts(home_unknown.send(setpoint(z=508, frame=5))) == []

@@ -264,6 +264,7 @@ def test_a_flood_of_similar_commands_leaves_room_to_land(monkeypatch: pytest.Mon
 def test_a_flood_of_refused_setpoints_is_decided_a_few_times(monkeypatch: pytest.MonkeyPatch) -> None:
     world = of_four()
     world.fly()
+    world.offboard()
     decided, *_ = flooded(monkeypatch, world, [setpoint(z=80 + at / 10) for at in range(100)])
     assert decided <= 100, decided
 

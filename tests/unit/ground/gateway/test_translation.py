@@ -174,7 +174,10 @@ def test_only_masks_of_the_table_are_positions() -> None:
         (0, False),
         (0xFFFF, False),
     ):
-        actions = aloft().send(setpoint(mask=mask))
+        world = aloft()
+        world.offboard()
+        world.done.clear()
+        actions = world.send(setpoint(mask=mask))
         assert ([each[:2] for each in proposals(actions)] == [wanted]) is proposed, mask
         assert acks(actions) == []
 

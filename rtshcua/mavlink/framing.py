@@ -62,6 +62,12 @@ def number_of(data: bytes, start: int = 0) -> int:
     return message_id(data, start) if data[start] == MARKER else data[start + 5]
 
 
+def sender_of(frame: bytes) -> tuple[int, int]:
+    """System and component of the sender of a whole frame of either version."""
+    at = 5 if frame[0] == MARKER else 3
+    return frame[at], frame[at + 1]
+
+
 def checksum(octets: bytes, start: int = 0xFFFF) -> int:
     """CRC-16/MCRF4XX over everything after the marker up to the checksum, and the message's extra octet.
 

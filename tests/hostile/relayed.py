@@ -130,7 +130,7 @@ class Relayed:
 
     def withhold(self, client: int, *messages: int) -> None:
         """The starter withholds messages from a client."""
-        self.process.control.send(encoded(RelayKind.WITHHOLD, client, withheld(messages)))
+        self.process.control.send(encoded(RelayKind.WITHHOLD, client, withheld(1, messages)))
 
     def close(self) -> None:
         """End everything."""

@@ -15,6 +15,7 @@ from typing import Any
 import msgspec
 import pytest
 from pymavlink.dialects.v10 import ardupilotmega as old
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from hostile.relayed import (
     HERE,
@@ -82,6 +83,26 @@ def test_only_a_session_and_a_pilot_reach_the_vehicle(opened: Callable[..., Any]
     assert gateway.next(RelayKind.PILOT, lambda each: each.payload != beat()).payload == arming(1)
     gateway.flight.send(arming(2) + beat())
     assert gateway.vehicle.recv(4_096) == arming(2) + beat()
+    asks = mavlink.MAVLink_command_long_message(1, 1, 32_100, 0, 1, 0, 0, 0, 0, 0, 0)
+    asked = bytes(asks.pack(mavlink.MAVLink(None, srcSystem=255, srcComponent=190)))
+    pilot.send(asked)
+    pilot.send(arming(3) + asked + arming(4))
+    assert gateway.vehicle.recv(4_096) == arming(3) + arming(4), "the gateway answers requests for control"
+    assert gateway.next(RelayKind.PILOT, lambda each: each.payload not in (beat(), arming(1))).payload == asked
+
+
+@pytest.mark.parametrize("address", [UDP, TCP])
+def test_everything_of_a_pilot_reaches_the_vehicle(opened: Callable[..., Any], address: str) -> None:
+    """More than the rate of a client, in datagrams of many frames, while another sender floods his address."""
+    gateway: Relayed = opened(relayed(ClientSetup("q", address, pilot=True, rate=10)))
+    (port,) = gateway.ports()
+    pilot, noise = (opened(udp_client(port) if address == UDP else tcp_client(port)) for _ in range(2))
+    for number in range(50):
+        noise.send(beat() * 40)
+        pilot.send(b"".join(arming(number * 5 + at) for at in range(5)))
+    octets = b""
+    while octets.count(arming(0)[15:40]) < 250 or octets.count(beat()[10:]) < 2_000:
+        octets += gateway.vehicle.recv(1 << 16)
 
 
 def test_dialogues_of_others_are_not_for_clients(opened: Callable[..., Any]) -> None:
@@ -113,12 +134,17 @@ def test_answers_and_withheld_messages(opened: Callable[..., Any]) -> None:
     gateway.says(clock(1), clock(2) + beat())
     assert client.recv(4_096) == beat()  # SYSTEM_TIME is withheld
     assert until(2, another.recv) == [1, 2]
+    camera, other = (mavlink.MAVLink(None, srcSystem=system, srcComponent=each) for system, each in ((1, 100), (2, 1)))
+    for speaker in (camera, other):
+        gateway.says(clock(9), bytes(mavlink.MAVLink_system_time_message(10, 10).pack(speaker)))
+        assert until(10, client.recv) == [10]  # of the autopilot alone
+        assert until(10, another.recv)[-2:] == [9, 10]
     gateway.withhold(first)
     gateway.answer(first, acknowledged())
     assert client.recv(4_096) == acknowledged()
     gateway.says(clock(3))
     assert until(3, client.recv) == [3]
-    assert until(3, pilot.recv) == [1, 2, -1, 3]  # no answer for every client
+    assert until(3, pilot.recv) == [1, 2, -1, 9, 10, 9, 10, 3]  # no answer for every client
     gateway.answer(60_000, acknowledged())  # nobody
     gateway.says(clock(4))
     assert until(4, client.recv) == [4]

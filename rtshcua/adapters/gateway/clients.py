@@ -23,6 +23,8 @@ READS: Final = 8
 _LONGEST: Final = 4_096
 #: octets read from a stream at once
 _CHUNK: Final = 1_024
+#: more frames a second than any link has: what a pilot sends is bounded by the turns alone
+_PILOTS_RATE: Final = S
 #: for each frame a second that may be passed on, this many reads a second, at least `_LEAST_READS`
 _READS_OF_A_FRAME: Final = 4
 _LEAST_READS: Final = 400
@@ -74,7 +76,7 @@ class ClientPeer:
         self.number, self.index, self.setup, self.where = number, index, setup, where
         self.up = False
         self.made_us = self.heard_us = now_us
-        self.bucket = Bucket(setup.rate, setup.rate)
+        self.bucket = Bucket(rate := _rate(setup), rate)
         self.counts = ClientCounts(number)
         #: the messages that it does not get from the vehicle, besides the dialogues of others
         self.withheld: frozenset[int] = frozenset()
@@ -148,8 +150,13 @@ def open_side(hub: Hub, index: int, setup: ClientSetup, address: Address, now_us
             return LineSide(hub, index, setup, address, now_us)
 
 
+def _rate(setup: ClientSetup) -> int:
+    """How many frames a second a peer may send."""
+    return _PILOTS_RATE if setup.pilot else setup.rate
+
+
 def _reads(setup: ClientSetup) -> Bucket:
-    rate = max(_LEAST_READS, _READS_OF_A_FRAME * setup.rate)
+    rate = max(_LEAST_READS, _READS_OF_A_FRAME * _rate(setup))
     return Bucket(rate, rate // 4)
 
 
@@ -255,7 +262,7 @@ class _TcpPeer(ClientPeer):
         self.link = link
         self.frames = FrameStream(every=True)
         self.reads = _reads(self.setup)
-        octets = _OCTETS_OF_A_FRAME * self.setup.rate
+        octets = _OCTETS_OF_A_FRAME * _rate(self.setup)
         self.octets = Bucket(octets, octets)
         self._side = side
         self._unsent = b""

@@ -4,6 +4,7 @@ from collections.abc import Collection, Sequence
 from typing import Final
 
 from rtshcua.codec.frames import kind_of
+from rtshcua.mavlink.enums import MAV_CMD_REQUEST_OPERATOR_CONTROL
 from rtshcua.mavlink.framing import (
     CHECKSUM,
     FLAG_SIGNED,
@@ -17,9 +18,14 @@ from rtshcua.mavlink.framing import (
     frames_in,
     number_of,
     octets_of_checksum,
+    sender_of,
     whole_length,
 )
+from rtshcua.mavlink.layouts import COMMAND_INT, COMMAND_LONG
 
+#: the offset of the command in the payload of COMMAND_LONG and COMMAND_INT
+_COMMAND_AT: Final = 28
+_REQUEST_CONTROL: Final = MAV_CMD_REQUEST_OPERATOR_CONTROL.to_bytes(2, "little")
 #: the most octets of a datagram that several frames share: none is fragmented on Ethernet or Wi-Fi
 MOST_SHARED: Final = 1_400
 
@@ -46,9 +52,20 @@ def _walked(datagram: bytes) -> Sequence[int] | None:
     return numbers or None
 
 
-def without(datagram: bytes, numbers: Collection[int]) -> bytes:
-    """A datagram of whole frames without those of these messages. It may be empty."""
-    return b"".join(frame for frame in frames_in(datagram) if number_of(frame) not in numbers)
+def asks_for_control(frame: bytes) -> bool:
+    """Whether a frame is a command REQUEST_OPERATOR_CONTROL, whose number has one place in both kinds of commands."""
+    at = HEADER + _COMMAND_AT
+    is_command = frame[0] == MARKER and number_of(frame) in (COMMAND_INT, COMMAND_LONG)
+    return is_command and frame[1] > _COMMAND_AT + 1 and frame[at : at + 2] == _REQUEST_CONTROL
+
+
+def without(datagram: bytes, numbers: Collection[int], sender: tuple[int, int] | None = None) -> bytes:
+    """A datagram of whole frames without those of these messages, of all senders or one. It may be empty."""
+    return b"".join(
+        frame
+        for frame in frames_in(datagram)
+        if number_of(frame) not in numbers or sender not in (None, sender_of(frame))
+    )
 
 
 def parcels(datagrams: Sequence[bytes]) -> Sequence[bytes]:

@@ -14,6 +14,7 @@ socket is the end of FLIGHT, and the relay reports it. Both ways a datagram has 
 """
 
 import socket
+from collections.abc import Iterable
 from enum import IntEnum
 from struct import Struct
 from typing import Final, NamedTuple
@@ -43,7 +44,8 @@ class RelayKind(IntEnum):
     MAVLink 2 (those of MAVLink 1 are converted), with a right checksum where the dialect has the message; their
     signatures were not verified."""
     PILOT = 6
-    "Frames of a pilot, which went to the vehicle. Payload: one or more whole frames."
+    """Frames of a pilot, which went to the vehicle, except REQUEST_OPERATOR_CONTROL, which the starter answers.
+    Payload: one or more whole frames."""
     FLIGHT_ENDED = 7
     "The socket of the session was closed by the other side. Nothing of it goes to the vehicle any more. No payload."
     COUNTERS = 8
@@ -52,8 +54,9 @@ class RelayKind(IntEnum):
     ANSWER = 16
     "Payload: one or more whole frames for this client (or `EVERY_CLIENT`)."
     WITHHOLD = 17
-    """Payload: the message numbers, 4 octets each, little-endian, that this client does not get from the vehicle from
-    now on, besides `DIALOGUES`. It replaces the previous list; an empty one ends it."""
+    """Payload: the system of the vehicle's autopilot, 1 octet, and the message numbers, 3 octets each, little-endian,
+    that this client does not get from that autopilot from now on, besides `DIALOGUES`. It replaces the previous list;
+    one without numbers ends it."""
     FLIGHT = 18
     "A session begins: its socket is in the ancillary data. It replaces the previous one. No payload."
 
@@ -85,8 +88,8 @@ class ClientSetup(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A client's own address, as `adapters/vehicle/address.py` reads it, and its limits.
 
     `peers`: how many senders (`udpin`) or connections (`tcpin`) at once; each is a client with a number of its own.
-    `rate`: frames a second that are passed on, and as many at once. A sender keeps its place until it was silent for
-    `silence_s`, a connection too if it never sent a frame; then another one may take it.
+    `rate`: frames a second that are passed on, and as many at once; a pilot has no such limit. A sender keeps its place
+    until it was silent for `silence_s`, a connection too if it never sent a frame; then another one may take it.
     """
 
     name: str
@@ -178,9 +181,9 @@ def decoded(datagram: bytes) -> RelayMessage:
     return RelayMessage(RelayKind(kind), client, datagram[_HEAD.size :])
 
 
-def withheld(numbers: tuple[int, ...]) -> bytes:
+def withheld(system: int, numbers: Iterable[int]) -> bytes:
     """The payload of `WITHHOLD`."""
-    return b"".join(number.to_bytes(4, "little") for number in numbers)
+    return bytes([system]) + b"".join(number.to_bytes(3, "little") for number in numbers)
 
 
 def send_flight(control: socket.socket, flight: socket.socket) -> None:

@@ -16,7 +16,7 @@ from typing import Final
 import msgspec
 
 from rtshcua.adapters.gateway.clients import ClientPeer, ClientSide, open_side, reason
-from rtshcua.adapters.gateway.frames import numbers_in, parcels, without
+from rtshcua.adapters.gateway.frames import asks_for_control, numbers_in, parcels, without
 from rtshcua.adapters.gateway.messages import (
     DIALOGUES,
     EVERY_CLIENT,
@@ -33,6 +33,7 @@ from rtshcua.adapters.gateway.messages import (
 from rtshcua.adapters.vehicle.address import AddressError, LinkCarrier, parse
 from rtshcua.adapters.vehicle.transport import open_transport
 from rtshcua.codec.stream import FrameStream
+from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1
 
 S: Final = 1_000_000
 #: the most datagrams of the vehicle in one turn; they are sent on together
@@ -166,7 +167,10 @@ class Relay:
         peer.counts.frames += len(frames)
         datagram = frames[0] if len(frames) == 1 else b"".join(frames)
         if peer.setup.pilot:
-            self._to_vehicle(datagram)
+            if not any(map(asks_for_control, frames)):
+                self._to_vehicle(datagram)
+            elif passed := [each for each in frames if not asks_for_control(each)]:
+                self._to_vehicle(b"".join(passed))
             self._tell(RelayKind.PILOT, peer.number, datagram)
         else:
             self._tell(RelayKind.CLIENT, peer.number, datagram)
@@ -180,6 +184,7 @@ class Relay:
         self._stream = FrameStream(every=True)
         self._place: Hashable = None
         self._heard_us = 0
+        self._autopilot = 0, MAV_COMP_ID_AUTOPILOT1
         self._vehicle_at: set[int] = set()
         try:
             address = parse(setup.vehicle)
@@ -244,13 +249,17 @@ class Relay:
                 pilot.send(datagram)
         theirs = every if DIALOGUES.isdisjoint(numbers) else parcels(_without(batch, DIALOGUES))
         for peer in self._ordinary:
-            for datagram in theirs if peer.withheld.isdisjoint(numbers) else _without(theirs, peer.withheld):
+            for datagram in theirs if peer.withheld.isdisjoint(numbers) else self._reduced(theirs, peer):
                 peer.send(datagram)
         for datagram in every:
             try:
                 self._telemetry.send(datagram)
             except OSError:
                 self._counters.telemetry_lost += 1
+
+    def _reduced(self, datagrams: Sequence[bytes], peer: ClientPeer) -> list[bytes]:
+        """What a peer gets: other components and systems behind the autopilot have the same messages."""
+        return _without(datagrams, peer.withheld, self._autopilot)
 
     def _to_vehicle(self, frames: bytes) -> None:
         """Lost while nobody was heard at an address that others send to."""
@@ -316,8 +325,9 @@ class Relay:
         if kind is RelayKind.ANSWER:
             self._answer(client, payload)
         elif kind is RelayKind.WITHHOLD and client in self._peers:
-            numbers = (payload[start : start + 4] for start in range(0, len(payload), 4))
+            numbers = (payload[start : start + 3] for start in range(1, len(payload), 3))
             self._peers[client].withheld = frozenset(int.from_bytes(each, "little") for each in numbers)
+            self._autopilot = payload[0], MAV_COMP_ID_AUTOPILOT1
         elif kind is RelayKind.FLIGHT and descriptors:
             self._begin_flight(descriptors[0])
 
@@ -386,9 +396,9 @@ def _sized(link: socket.socket, buffer: int) -> socket.socket:
     return link
 
 
-def _without(datagrams: Sequence[bytes], numbers: frozenset[int]) -> list[bytes]:
+def _without(datagrams: Sequence[bytes], numbers: frozenset[int], sender: tuple[int, int] | None = None) -> list[bytes]:
     """Datagrams without the frames of these messages, and without those that are then empty."""
-    return [kept for datagram in datagrams if (kept := without(datagram, numbers))]
+    return [kept for datagram in datagrams if (kept := without(datagram, numbers, sender))]
 
 
 def _unopened(client: int | None, address: str, error: OSError) -> SetupFailure:

@@ -457,7 +457,8 @@ class GatewayService:
             case interface.ToClient(client, frame):
                 self._relay.answer(client, frame)
             case interface.Withhold(client, messages):
-                self._relay.withhold(client, messages)
+                assert self._heard is not None
+                self._relay.withhold(client, self._heard[0], messages)
             case interface.Propose():
                 for event in self._proposals.add(action):
                     self._take(event, now)

@@ -61,10 +61,10 @@ class StartedRelay(RelayProcess):
         with suppress(OSError):
             self.control.send(encoded(RelayKind.ANSWER, client, frames))
 
-    def withhold(self, client: int, numbers: frozenset[int]) -> None:
-        """Set the vehicle's messages that a client does not get."""
+    def withhold(self, client: int, system: int, numbers: frozenset[int]) -> None:
+        """Set the messages of this system's autopilot that a client does not get."""
         with suppress(OSError):
-            self.control.send(encoded(RelayKind.WITHHOLD, client, withheld(tuple(sorted(numbers)))))
+            self.control.send(encoded(RelayKind.WITHHOLD, client, withheld(system, sorted(numbers))))
 
     def again(self) -> "StartedRelay | Refusal":
         """A new relay in the place of this one, which ended."""

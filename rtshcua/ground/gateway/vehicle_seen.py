@@ -4,7 +4,7 @@ from typing import Final
 
 from rtshcua.ground.gateway.client_frames import HOME_POSITION, Received, received
 from rtshcua.mavlink import enums, layouts
-from rtshcua.mavlink.framing import HEADER, message_id, unsigned
+from rtshcua.mavlink.framing import HEADER, message_id, sender_of, unsigned
 
 #: the most kinds of messages that are kept; the dialect has about 250
 _MOST_KINDS: Final = 512
@@ -25,7 +25,7 @@ class VehicleSeen:
 
     def take(self, frame: bytes, now_us: int) -> int:
         """Keep a frame of the autopilot; return its message number, -1 if it is from elsewhere."""
-        if len(frame) < HEADER or (frame[5], frame[6]) != (self._system, enums.MAV_COMP_ID_AUTOPILOT1):
+        if len(frame) < HEADER or sender_of(frame) != (self._system, enums.MAV_COMP_ID_AUTOPILOT1):
             return -1
         number = message_id(frame, 0)
         if number in self._frames or len(self._frames) < _MOST_KINDS:

@@ -84,6 +84,17 @@ def test_frame_with_a_changed_octet_is_no_good(picked: int, place: int, change: 
         assert garbage == len(frame)
 
 
+def test_frames_of_one_sender_are_left_out() -> None:
+    speakers = [(1, 1), (1, 100), (2, 1)]
+    frames = [
+        bytes(mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, 0, 3).pack(mavlink.MAVLink(None, *each)))
+        for each in speakers
+    ] + [bytes(old.MAVLink_heartbeat_message(2, 3, 0, 0, 0, 3).pack(old.MAVLink(None, 1, 154)))]
+    assert without(b"".join(frames), {0}, (1, 1)) == b"".join(frames[1:])
+    assert without(b"".join(frames), {0}, (1, 154)) == b"".join(frames[:3])
+    assert without(b"".join(frames), {0}) == b""
+
+
 def test_frames_before_a_bad_one_are_good() -> None:
     bad = SOME[1][:-1] + bytes([SOME[1][-1] ^ 1])
     assert good_frames(SOME[0] + bad + SOME[2]) == ([SOME[0]], len(bad) + len(SOME[2]))

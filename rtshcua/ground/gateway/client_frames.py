@@ -20,7 +20,7 @@ from rtshcua.mavlink.framing import (
     frame_length,
     octets_of_checksum,
 )
-from rtshcua.mavlink.layouts import LAYOUTS, Layout
+from rtshcua.mavlink.layouts import LAYOUTS, SET_POSITION_TARGET_GLOBAL_INT, Layout
 
 SET_MODE: Final = 11
 MISSION_WRITE_PARTIAL_LIST: Final = 38
@@ -41,6 +41,15 @@ AUTOPILOT_VERSION_REQUEST: Final = 183
 HOME_POSITION: Final = 242
 SETUP_SIGNING: Final = 256
 CONTROL_STATUS: Final = 512
+
+#: streams that move a vehicle, in words
+SETPOINTS: Final = {
+    SET_POSITION_TARGET_LOCAL_NED: "local setpoints",
+    SET_ATTITUDE_TARGET: "attitude and thrust setpoints",
+    RC_CHANNELS_OVERRIDE: "RC override",
+    MANUAL_CONTROL: "manual control",
+    SET_POSITION_TARGET_GLOBAL_INT: "setpoints other than a position",
+}
 
 _TARGET: Final = "target_system target_component"
 _MOTION: Final = "vx vy vz afx afy afz yaw yaw_rate type_mask"

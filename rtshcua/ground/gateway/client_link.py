@@ -5,7 +5,7 @@ from collections import deque
 from textwrap import shorten
 from typing import Any, Final
 
-from rtshcua.ground.gateway.client_frames import COMMAND_ACK, made
+from rtshcua.ground.gateway.client_frames import COMMAND_ACK, Received, made
 from rtshcua.ground.gateway.interface import Action, ClientNote, ClientSettings, ToClient
 from rtshcua.mavlink import enums, layouts
 from rtshcua.mavlink.layouts import TEXT_OCTETS
@@ -41,8 +41,6 @@ class ClientLink:
         self.settings = settings
         #: when a frame came last, monotonic us
         self.heard_us = now_us
-        #: whether it sent a heartbeat: only then does a disconnection mean that it is dead
-        self.beats = False
         self._beat_us = now_us
         self._in_a_row = 0
         self.is_dead = False
@@ -63,20 +61,29 @@ class ClientLink:
         """Its configured name."""
         return self.settings.name
 
-    def hear(self, system: int, now_us: int, *, beats: bool) -> None:
-        """A frame came."""
-        self.heard_us, self.system_id, self.is_dead = now_us, system, False
-        if beats and self._in_a_row < _REGULAR:
-            self._in_a_row = self._in_a_row + 1 if now_us - self._beat_us <= _REGULAR_US else 1
-            self._beat_us, self.beats = now_us, True
+    def hear(self, message: Received, now_us: int) -> None:
+        """A frame came. One of a radio on the way says nothing about the client."""
+        if message.component == enums.MAV_COMP_ID_TELEMETRY_RADIO:
+            return
+        self.heard_us, self.system_id, self.is_dead = now_us, message.system, False
+        if now_us - self._beat_us > DEAD_US:
+            self._in_a_row = 0  # whoever is there now, perhaps another program, sends none
+        if message.message == layouts.HEARTBEAT:
+            self._in_a_row = min(self._in_a_row + 1, _REGULAR) if now_us - self._beat_us <= _REGULAR_US else 1
+            self._beat_us = now_us
+
+    @property
+    def is_regular(self) -> bool:
+        """Whether it sent regular heartbeats: only then does silence, or a disconnection, mean that it is dead."""
+        return self._in_a_row >= _REGULAR
 
     def beats_now(self, now_us: int) -> bool:
         """Whether it sends regular heartbeats."""
-        return self._in_a_row >= _REGULAR and not self.is_dead and now_us - self.heard_us <= DEAD_US
+        return self.is_regular and not self.is_dead and now_us - self.heard_us <= DEAD_US
 
     def silent(self, now_us: int) -> bool:
         """Whether it sent regular heartbeats and is silent for too long."""
-        return self._in_a_row >= _REGULAR and now_us - self.heard_us > DEAD_US
+        return self.is_regular and now_us - self.heard_us > DEAD_US
 
     def send(self, number: int, **values: Any) -> None:
         """Send a message as the autopilot."""

@@ -20,7 +20,7 @@ class ClientSettings(NamedTuple):
     """A configured client side.
 
     `role` is a role of the policy, by name. `rank` decides between clients that contradict each other: a command of a
-    higher rank supersedes a running step of a lower one. `pilot`: its frames go to the vehicle; the pilot always wins.
+    higher rank supersedes a running step of a lower one. `pilot`: its frames go to the vehicle.
     `requests` are the kinds of harmless requests that it may make, of `REQUESTS`.
     """
 
@@ -72,14 +72,14 @@ class ClientDown(NamedTuple):
 
 
 class FromClient(NamedTuple):
-    """A frame of an ordinary client, whose signature was verified if it must be signed. Its checksum was not."""
+    """A frame of an ordinary client. Signatures of clients are not verified."""
 
     client: int
     frame: bytes
 
 
 class FromPilot(NamedTuple):
-    """A frame of a pilot's ground station, which went to the vehicle."""
+    """A frame of a pilot's ground station, which went to the vehicle, unless it requests or releases control."""
 
     client: int
     frame: bytes

@@ -21,17 +21,14 @@ from rtshcua.ground.gateway.client_frames import (
     CONTROL_STATUS,
     FILE_TRANSFER_PROTOCOL,
     LOG_REQUEST_LIST,
-    MANUAL_CONTROL,
     MISSION_CURRENT,
     MISSION_ITEM,
     MISSION_ITEM_REACHED,
     MISSION_SET_CURRENT,
     MISSION_WRITE_PARTIAL_LIST,
-    RC_CHANNELS_OVERRIDE,
     REQUEST_DATA_STREAM,
-    SET_ATTITUDE_TARGET,
     SET_MODE,
-    SET_POSITION_TARGET_LOCAL_NED,
+    SETPOINTS,
     SETUP_SIGNING,
     Received,
     received,
@@ -62,6 +59,7 @@ from rtshcua.ground.gateway.interface import (
     Withdraw,
     Withhold,
 )
+from rtshcua.ground.gateway.pilots import Pilots
 from rtshcua.ground.gateway.plan_transfer import PlanTransfer, RefusedPlan, UploadedPlan, read_plan
 from rtshcua.ground.gateway.quick_decision import QuickDecision, QuickRefusal
 from rtshcua.ground.gateway.translation import (
@@ -100,7 +98,6 @@ MOST_DECISIONS: Final = 20
 _TOO_MANY: Final = f"too many commands: at most {MOST_DECISIONS} a second are decided"
 _MOST_CLIENTS: Final = 256
 
-REQUEST_OPERATOR_CONTROL: Final = 32_100
 _SET_MISSION_CURRENT: Final = 224
 _GUIDED_ITEM: Final = 2  # `current` of a mission item that is flown to at once (ArduPilot)
 #: commands that would change the vehicle itself: denied; other commands without a mapping are not supported
@@ -112,25 +109,11 @@ _SAYS_NOTHING: Final = frozenset(
         300, MISSION_CURRENT, layouts.GLOBAL_POSITION_INT,
     }
 )  # fmt: skip
-_SETPOINTS: Final = {
-    SET_POSITION_TARGET_LOCAL_NED: "local setpoints",
-    SET_ATTITUDE_TARGET: "attitude and thrust setpoints",
-    RC_CHANNELS_OVERRIDE: "RC override",
-    MANUAL_CONTROL: "manual control",
-    layouts.SET_POSITION_TARGET_GLOBAL_INT: "setpoints other than a position",
-}
 #: what an absorbed mode is: clients ask for it before they send targets
 _WITHOUT_EFFECT: Final = (CopterMode.GUIDED, Px4Mode.OFFBOARD)
 _MISSION_MODES: Final = (CopterMode.AUTO, Px4Mode.MISSION)
 #: the flight's answers to a document that a later one may not get
 _FOR_NOW: Final = frozenset({"busy", "already-released", "superseded", "not-flying", "falling-back"})
-#: what of a pilot's frames is recorded
-_PILOTS: Final = frozenset(
-    {
-        layouts.COMMAND_LONG, layouts.COMMAND_INT, SET_MODE, layouts.PARAM_SET, layouts.MISSION_COUNT,
-        layouts.MISSION_CLEAR_ALL, layouts.SET_POSITION_TARGET_GLOBAL_INT, *_SETPOINTS, SETUP_SIGNING,
-    }
-)  # fmt: skip
 #: the motions at whose end the vehicle stands on the ground
 _DOWN: Final = (MotionKind.HOME, MotionKind.LAND)
 # MISSION_STATE
@@ -204,7 +187,7 @@ class Gateway:
         self._under(settings)
         self._clients: dict[int, _Client] = {}
         self._sources: dict[str, _Source] = {}
-        self._pilots: dict[int, ClientLink] = {}
+        self._pilots = Pilots(settings.system)
         self._proposals: dict[int, ClientProposal] = {}
         self._uploads: dict[int, _Client] = {}
         #: missions that are to be checked under a renewed policy, and those that are being checked, by proposal
@@ -216,7 +199,6 @@ class Gateway:
         self._number = 0
         self._flown: ClientProposal | None = None  # the proposal whose step was dispatched last
         self._kept: tuple[ClientLink, int] | None = None  # who was in control last, and until when
-        self._pilot_holds = 0  # the system id of the pilot who requested control
         self._stage = ""  # of the flight: "", "waiting", "flying"
         self._unready: str | None = None
         self._flew = False  # whether the vehicle was in the air during this flight
@@ -304,7 +286,7 @@ class Gateway:
                 link = ClientLink(client, of, self._settings.system, self._actions, now.monotonic_us)
                 self._actions.append(Withhold(client, frozenset()))  # an earlier gateway may have withheld something
                 if of.pilot:
-                    self._pilots[client] = link
+                    self._pilots.join(link)
                 elif len(self._clients) < _MOST_CLIENTS:
                     self._join(link, now.monotonic_us)
             case ClientDown(client):
@@ -342,22 +324,12 @@ class Gateway:
         self._requests.seen(number)
 
     def _from_pilot(self, client: int, frame: bytes, now_us: int) -> None:
-        """A pilot's frame: it went to the vehicle. It is recorded, and whether he takes or releases control."""
-        link, message = self._pilots.get(client), received(frame)
-        if link is None or message is None:
+        """A pilot's frame: if he takes control, nothing begins any more that clients asked for before."""
+        if not self._pilots.take(client, frame, now_us):
             return
-        link.hear(message.system, now_us, beats=message.message == layouts.HEARTBEAT)
-        if message.message not in _PILOTS:
-            return
-        command = message.fields.get("command")
-        if command is not None:
-            link.record("passed", now_us, message=message.message, command=command)
-        else:
-            link.record("passed", now_us, message=message.message)
-        if command == REQUEST_OPERATOR_CONTROL:
-            self._pilot_holds = message.system if _requests_control(message) else 0
-            for each in self._clients.values():
-                self._control_status(each, now_us)
+        if self._pilots.in_control:
+            self._take_back("the pilot is in control", now_us)
+        self._control_status(now_us)
 
     # ---------------------------------------------------------------- frames of clients
 
@@ -372,7 +344,7 @@ class Gateway:
             layouts.COMMAND_LONG: self._command,
             layouts.COMMAND_INT: self._command,
             SET_MODE: self._set_mode,
-            **dict.fromkeys(_SETPOINTS, self._setpoint),
+            **dict.fromkeys(SETPOINTS, self._setpoint),
             layouts.PARAM_SET: self._param_set,
             layouts.PARAM_REQUEST_READ: self._param_read,
             layouts.PARAM_REQUEST_LIST: asks(lambda link, _, now_us: self._requests.list_parameters(link, now_us)),
@@ -397,7 +369,7 @@ class Gateway:
         client, message = self._clients.get(number), received(frame)
         if client is None or message is None:
             return
-        client.link.hear(message.system, now.monotonic_us, beats=message.message == layouts.HEARTBEAT)
+        client.link.hear(message, now.monotonic_us)
         if message.message in _SAYS_NOTHING or not message.is_for(self._settings.system):
             return
         handler = self._handlers.get(message.message)
@@ -415,7 +387,8 @@ class Gateway:
         command, now_us = message.fields["command"], now.monotonic_us
         seen, content = self._seen, repr({**message.fields, "confirmation": 0})  # in `repr` NaN is equal to NaN
         state = (
-            content, self._stage, self._unready, self._pilot_holds, seen.armed, seen.landed_state, len(seen.parameters),
+            content, self._stage, self._unready, self._pilots.in_control, seen.armed, seen.landed_state,
+            len(seen.parameters),
         )  # fmt: skip
         if client.refused is not None and client.refused[0] == state and now_us < client.refused[2]:
             client.link.ack(message.sender, command, client.refused[1])
@@ -445,9 +418,8 @@ class Gateway:
             result = self._do_set_mode(client, message, now)
         elif command == enums.MAV_CMD_MISSION_START:
             result = self._start(client, message, command, now)
-        elif command == REQUEST_OPERATOR_CONTROL:
-            self._reject(client, f"{self._controller(now_us)} is in control", command, now_us)
-            result = DENIED
+        elif command == enums.MAV_CMD_REQUEST_OPERATOR_CONTROL:
+            result = self._asks_for_control(client, command, now_us)
         elif command == _SET_MISSION_CURRENT:
             result = self._jump(client, message.number("param1"), now_us)
         else:
@@ -476,7 +448,7 @@ class Gateway:
             return  # it comes again
         row = self._translation.row(MESSAGE, message.message, message)
         if row is None:
-            what = _SETPOINTS[message.message]
+            what = SETPOINTS[message.message]
             client.link.text(f"{what} refused: send positions", now_us, what)
             client.link.record("refused", now_us, message=message.message)
             return
@@ -652,7 +624,7 @@ class Gateway:
         self._withdraw_waiting(why, now_us, name, safe_too=not name)
         for each in self._pending(name, safe_too=not name):
             each.withdrawn = why
-        self._cancel_withdrawn()
+        self._cancel_withdrawn(now_us)
 
     def _withdraw_waiting(self, why: str, now_us: int, name: str = "", *, safe_too: bool = False) -> None:
         """Withdraw what waits for a flight, or was not handed in to it yet, of all clients or of one of them."""
@@ -677,12 +649,19 @@ class Gateway:
             and (safe_too or any(step.skill not in self._safe for step in each.steps))
         ]
 
-    def _cancel_withdrawn(self) -> None:
+    def _cancel(self, link: ClientLink, why: str, now_us: int) -> None:
+        """Cancel the flight, once: its contingency flies, or on the ground it ends."""
+        self._cancelled = True
+        self._actions.append(Cancel(link.client, why))
+        for other in self._clients.values():
+            if other.link is not link:
+                other.link.text(f"{why}: the flight is cancelled", now_us, severity=NOTICE)
+
+    def _cancel_withdrawn(self, now_us: int) -> None:
         """Cancel the flight, once it can be, that has a step which is not wanted any more."""
         of = next((each for each in self._proposals.values() if each.withdrawn and not each.ended), None)
         if of is not None and self._stage == "flying" and not self._cancelled:
-            self._cancelled = True
-            self._actions.append(Cancel(of.link.client, of.withdrawn))
+            self._cancel(of.link, of.withdrawn, now_us)
 
     def _takes_off(self) -> tuple[int, str] | None:
         """What may take off although a client disarms or lands on the ground, and the MAV_RESULT."""
@@ -738,7 +717,7 @@ class Gateway:
 
     def _hindrance(self, client: _Client, step: ProposedStep, now_us: int) -> str | None:
         """Why a step cannot be taken now, although the policy may permit it."""
-        if self._pilot_holds:
+        if self._pilots.in_control:
             return "the pilot is in control"
         rival = self._outranked(client, now_us)
         if rival is not None and not self._is_safer(step.skill):
@@ -804,11 +783,15 @@ class Gateway:
         """The connections of a client."""
         return [each for each in self._clients.values() if each.link.name == name]
 
-    def _controller(self, now_us: int) -> str:
-        if self._pilot_holds:
-            return "the pilot"
+    def _asks_for_control(self, client: _Client, command: int, now_us: int) -> int:
+        """The answer to REQUEST_OPERATOR_CONTROL of a client: steps give control, and nothing else does."""
         holder = self._holder(now_us)
-        return "nobody" if holder is None else holder.name
+        if holder is not None and holder.name == client.link.name and not self._pilots.in_control:
+            return ACCEPTED
+        who = "the pilot" if self._pilots.in_control else "nobody" if holder is None else holder.name
+        more = ": a step that is flown gives control" if who == "nobody" else ""
+        self._reject(client, f"{who} is in control{more}", command, now_us)
+        return DENIED
 
     def _checked(self, event: ProposalChecked, now_us: int) -> None:
         number, refusal, first, for_now = event
@@ -870,7 +853,7 @@ class Gateway:
                         each.wait_for(self._unready, now_us)
             case "mission":
                 self._stage = "flying"
-                self._cancel_withdrawn()
+                self._cancel_withdrawn(now_us)
             case "decision" | "effect":
                 self._step_line(line, now_us)
             case "close":
@@ -1057,37 +1040,44 @@ class Gateway:
             client.transfer.tick(now_us)
             client.shown.update(now_us)
             if client.link.silent(now_us) and not client.link.is_dead:
-                client.link.is_dead = True
-                client.link.record("dead", now_us)
+                self._die(client, now_us)
             if every_second:
-                self._control_status(client, now_us)
                 self._mission_current(client, always=True)
         if every_second:
+            self._control_status(now_us)
             self._check_again()
             self._second_us = now_us
         self._end_without_client(now_us)
         self._tidy(now_us)
 
-    def _control_status(self, client: _Client, now_us: int) -> None:
-        """CONTROL_STATUS: who is in control, for the whole system."""
+    def _control_status(self, now_us: int) -> None:
+        """Tell everybody by CONTROL_STATUS who is in control, for the whole system."""
         holder = self._holder(now_us)
-        system = self._pilot_holds or (0 if holder is None else holder.system_id)
-        client.link.send(CONTROL_STATUS, flags=1, gcs_main=system)
+        system = self._pilots.in_control or (0 if holder is None else holder.system_id)
+        for link in (*self._pilots.links, *(each.link for each in self._clients.values())):
+            link.send(CONTROL_STATUS, flags=1, gcs_main=system)
 
     def _down(self, number: int, now_us: int) -> None:
-        link = self._pilots.pop(number, None)
-        if link is not None and link.system_id == self._pilot_holds:
-            self._pilot_holds = 0
+        self._pilots.leave(number)
         client = self._clients.pop(number, None)
         if client is None:
             return
         self._requests.forget(number)
         self._held = [each for each in self._held if each.client is not client]
         self._uploads = {at: each for at, each in self._uploads.items() if each is not client}
-        if client.link.beats and not client.link.is_dead:
-            client.link.is_dead = True
-            client.link.record("dead", now_us)
+        if client.link.is_regular and not client.link.is_dead:
+            self._die(client, now_us)
+
+    def _die(self, client: _Client, now_us: int) -> None:
+        """A client is silent: nothing begins any more that it asked for, but to stop, return or land, unless another
+        connection of it lives.
+        """
+        name = client.link.name
+        client.link.is_dead = True
+        client.link.record("dead", now_us)
+        if all(each.link.is_dead for each in self._of(name)):
             self._end_without_client(now_us)
+            self._take_back(f"{name} is silent", now_us, name)
 
     def _end_without_client(self, now_us: int) -> None:
         """Cancel the mission, once, so that the contingency flies, where the client is dead whose step flies, or waits,
@@ -1098,11 +1088,7 @@ class Gateway:
         of = self._responsible()
         if of is None or not of.link.is_dead or (of.ended and self._anybody_beats(now_us)):
             return
-        self._cancelled = True
-        self._actions.append(Cancel(of.link.client, f"{of.link.name} is silent"))
-        for other in self._clients.values():
-            if other.link is not of.link:
-                other.link.text(f"{of.link.name} is silent: its flight is cancelled", now_us, severity=NOTICE)
+        self._cancel(of.link, f"{of.link.name} is silent", now_us)
 
     def _responsible(self) -> ClientProposal | None:
         """What flies, or waits, or flew last; None where it brings the vehicle down."""
@@ -1119,11 +1105,3 @@ class Gateway:
         """Whether what is left of a proposal only lands the vehicle."""
         contracts = (self._translation.contract(each.skill) for each in proposal.steps[max(proposal.done, 0) :])
         return all(each is not None and each.motion.kind in _DOWN for each in contracts) and not proposal.ended
-
-
-def _requests_control(message: Received) -> bool:
-    """Whether REQUEST_OPERATOR_CONTROL requests control: `param1` is 1. Stations of 2025 have their system id or 0 in
-    `param1`, the action in `param2`, and in `param3` 0 or 1, where now is a time of 3 s and more.
-    """
-    action, before, more = (message.number(f"param{at}") for at in (1, 2, 3))
-    return action == 1 or (before == 1 and more in (0, 1))

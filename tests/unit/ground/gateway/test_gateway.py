@@ -53,6 +53,13 @@ def cancels(actions: list[Action]) -> list[int]:
     return [each.client for each in actions if isinstance(each, Cancel)]
 
 
+def beat(world: GatewayWorld, client: int = 1) -> None:
+    """A client sends regular heartbeats."""
+    for _ in range(3):
+        world.send(BEAT, client=client)
+        world.now_us += 100_000
+
+
 def records(actions: list[Action]) -> list[Any]:
     return [json.loads(each.text) for each in actions if isinstance(each, ClientNote)]
 
@@ -356,6 +363,128 @@ def test_a_return_that_waits_is_not_withdrawn_by_a_landing() -> None:
     assert not [each for each in world.send(command_long(21)) if isinstance(each, Withdraw)]
 
 
+def piloted() -> GatewayWorld:
+    world = GatewayWorld()
+    world.client(9, "tower", pilot=True)
+    return world
+
+
+def control(world: GatewayWorld, wanted: int, station: int = 9, system: int = 255, to: int = SYSTEM) -> list[Action]:
+    """A pilot requests or releases control."""
+    message = mavlink.MAVLink_command_long_message(to, 1, 32_100, 0, 0, wanted, 0, 0, 0, 0, 0)
+    return world.send(message, client=station, sender=(system, 190), pilot=True)
+
+
+def test_nothing_that_waits_flies_once_the_pilot_is_in_control() -> None:
+    world = piloted()
+    world.send(TAKEOFF)
+    assert acks(control(world, 1)) == [(22, 6)], "it waited for a flight"
+    world = piloted()
+    world.ready()
+    proposed = number(world.send(TAKEOFF))
+    actions = control(world, 1)
+    assert (acks(actions), texts(actions)) == ([(22, 6)], ["takeoff withdrawn: the pilot is in control"])
+    assert Withdraw(proposed) in actions
+    world = piloted()
+    world.ready()
+    world.accept(world.send(TAKEOFF))
+    assert cancels(control(world, 1) + world.line(type="mission")) == [1]
+    world = piloted()
+    world.fly()
+    for message in (reposition(), command_long(21)):
+        proposed = number(world.send(message))
+        assert Withdraw(proposed) in control(world, 1), "landings too"
+        control(world, 0)
+
+
+def test_a_pilot_is_answered_and_told_who_is_in_control() -> None:
+    world = piloted()
+    world.client(8, "other tower", pilot=True)
+    assert controls(world.wait(1_000_000), 9) == [0]
+    actions = control(world, 1)
+    assert acks(actions, 9) == [(32_100, 0)]
+    assert [controls(actions, each) for each in (1, 8, 9)] == [[255]] * 3
+    assert acks(control(world, 1), 9) == [(32_100, 0)], "again"
+    assert acks(control(world, 0, to=7), 9) == [], "of another vehicle"
+    released = control(world, 0)
+    assert (acks(released, 9), controls(released, 9)) == ([(32_100, 0)], [0])
+    assert acks(control(world, 0), 9) == [(32_100, 0)]
+
+
+def test_only_the_pilot_who_has_control_releases_it_and_his_station_keeps_it_behind_a_radio() -> None:
+    world = piloted()
+    world.client(8, "other tower", pilot=True)
+    control(world, 1)
+    for station, system in ((9, 254), (8, 255)):
+        actions = control(world, 0, station, system)
+        assert acks(actions, station) == [(32_100, 2)]
+        assert texts(actions, station) == ["another pilot is in control"]
+    world.take(ClientDown(8))
+    assert texts(world.send(TAKEOFF)) == ["takeoff rejected: the pilot is in control"]
+    radio = mavlink.MAVLink_radio_status_message(1, 1, 1, 1, 1, 1, 1)
+    world.send(radio, client=9, sender=(51, 68), pilot=True)
+    world.take(ClientDown(9))
+    world.wait(300_000)
+    assert acks(world.send(TAKEOFF)) == [(22, 5)], "he is gone"
+    world.client(8, "other tower", pilot=True)
+    control(world, 1, 8, 254)
+    assert controls(world.wait(1_000_000)) == [254]
+    assert controls(control(world, 1, 8, 253)) == [253], "another pilot takes it"
+
+
+def test_a_take_off_of_a_dead_client_is_withdrawn_on_the_ground() -> None:
+    """By hand: whether the flight has it already, and whether the client disconnects."""
+    for handed_in in (False, True):
+        for gone in (False, True):
+            world = GatewayWorld()
+            world.ready()
+            beat(world)
+            proposed = number(world.send(TAKEOFF))
+            if handed_in:
+                world.take(ProposalChecked(proposed, None))
+            actions = world.take(ClientDown(1)) if gone else world.wait(6_000_000)
+            assert (Withdraw(proposed) in actions) is not handed_in
+            if handed_in:
+                world.take(ProposalAnswered(proposed, "accepted"))
+                assert cancels(world.line(type="mission")) == [1]
+
+
+def test_a_dead_connection_withdraws_nothing_while_another_one_of_its_client_lives() -> None:
+    world = GatewayWorld()
+    world.client(2, "script")
+    world.ready()
+    beat(world)
+    world.send(TAKEOFF)
+    assert not [each for each in world.take(ClientDown(1)) if isinstance(each, Withdraw)]
+
+
+def test_a_program_that_sends_no_heartbeats_is_not_judged_by_those_of_the_one_before() -> None:
+    """At an address with one peer both are one client; a radio on the way lives longer than either."""
+    radio = mavlink.MAVLink_radio_status_message(1, 1, 1, 1, 1, 1, 1)
+    for message, sender, cancelled in ((reposition(z=509), (245, 190), False), (radio, (51, 68), True)):
+        world = GatewayWorld()
+        world.fly()
+        beat(world)
+        for _ in range(6):
+            world.wait(1_000_000)
+            world.send(message if cancelled else LATE_TAKEOFF, sender=sender)
+        if not cancelled:
+            world.accept(world.send(message))
+            world.dispatch(0)
+            assert cancels(world.wait(10_000_000)) == []
+        else:
+            assert [each.said["effect"] for each in world.done if isinstance(each, ClientNote)] == ["dead"]
+
+
+def test_a_radio_is_never_in_control() -> None:
+    world = GatewayWorld()
+    world.fly()
+    world.accept(world.send(reposition()))
+    world.dispatch(0)
+    world.send(mavlink.MAVLink_radio_status_message(1, 1, 1, 1, 1, 1, 1), sender=(51, 68))
+    assert controls(world.wait(1_000_000)) == [245]
+
+
 # ---------------------------------------------------------------- which setpoints are heeded
 
 
@@ -584,8 +713,11 @@ def test_control_status_says_who_is_in_control() -> None:
 def test_a_client_that_requests_control_is_told_who_has_it() -> None:
     world = GatewayWorld()
     actions = world.send(command_long(32100, 0, 1))
-    assert (acks(actions), texts(actions)) == ([(32100, 2)], ["nobody is in control"])
+    assert (acks(actions), texts(actions)) == (
+        [(32100, 2)], ["nobody is in control: a step that is flown gives control"]
+    )  # fmt: skip
     world = two()
+    assert acks(world.send(command_long(32100, 0, 1))) == [(32100, 0)]
     assert texts(world.send(command_long(32100, 0, 1), client=2), 2) == ["script is in control"]
 
 
@@ -595,7 +727,7 @@ def test_a_pilot_in_control_keeps_every_client_out_until_he_releases() -> None:
     world.fly()
     actions = world.send(command_long(32100, 0, 1), client=9, sender=(250, 1), pilot=True)
     assert controls(actions) == [250]
-    assert records(actions) == [{"client": "tower", "effect": "passed", "message": 76, "command": 32100}]
+    assert records(actions) == [{"client": "tower", "effect": "absorbed", "message": 76, "command": 32100}]
     actions = world.send(reposition())
     assert (acks(actions), texts(actions)) == ([(192, 1)], ["goto rejected: the pilot is in control"])
     assert texts(world.send(command_long(32100, 0, 1))) == ["the pilot is in control"]
@@ -654,7 +786,7 @@ def test_a_dead_client_ends_its_flight_and_a_living_one_does_not() -> None:
     world.send(BEAT, client=2)
     actions = world.wait(5_500_000)
     assert [each for each in actions if isinstance(each, Cancel)] == [Cancel(1, "script is silent")]
-    assert texts(actions, 2) == ["script is silent: its flight is cancelled"]
+    assert texts(actions, 2) == ["script is silent: the flight is cancelled"]
     assert not [each for each in world.wait(5_000_000) if isinstance(each, Cancel)], "once"
 
 
@@ -702,12 +834,12 @@ def test_a_landing_that_is_refused_after_the_death_of_its_client_ends_the_flight
     world = two()
     world.line(type="effect", event="succeeded", kind=0, step=0)
     world.accept(world.send(command_long(21)))
-    world.send(BEAT)
+    beat(world)
     assert Cancel(1, "script is silent") in world.take(ClientDown(1)), "it was not dispatched"
     world = two()
     world.accept(world.send(command_long(21)), 1)
     world.dispatch(1)
-    world.send(BEAT)
+    beat(world)
     assert not [each for each in world.take(ClientDown(1)) if isinstance(each, Cancel)]
     assert Cancel(1, "script is silent") in world.line(type="effect", event="failed", kind=0, step=1) + world.wait(
         50_000
@@ -718,7 +850,7 @@ def test_a_dead_client_does_not_end_its_landing() -> None:
     for message, cancelled in ((command_long(21), False), (command_long(20), False), (command_long(193), True)):
         world = GatewayWorld()
         world.fly()
-        world.send(BEAT)
+        beat(world)
         world.accept(world.send(message))
         world.dispatch(0)
         assert (Cancel(1, "script is silent") in world.take(ClientDown(1))) is cancelled
@@ -748,7 +880,7 @@ def test_a_script_that_beats_now_and_then_may_be_silent(times_us: list[int]) -> 
 
 def test_a_client_that_disconnects_ends_its_flight() -> None:
     world = two()
-    world.send(BEAT)
+    beat(world)
     assert Cancel(1, "script is silent") in world.take(ClientDown(1))
     assert world.take(ClientDown(1)) == []
 
@@ -756,10 +888,10 @@ def test_a_client_that_disconnects_ends_its_flight() -> None:
 def test_a_mission_taken_after_the_death_of_its_client_is_cancelled() -> None:
     world = GatewayWorld()
     world.ready()
-    world.send(BEAT)
+    beat(world)
     proposed = number(world.send(TAKEOFF))
-    world.take(ClientDown(1))
     world.take(ProposalChecked(proposed, None))
+    world.take(ClientDown(1))
     assert world.take(ProposalAnswered(proposed, "accepted")) == [], "nothing can be cancelled yet"
     assert Cancel(1, "script is silent") in world.line(type="mission") + world.wait(50_000)
 

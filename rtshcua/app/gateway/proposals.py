@@ -146,7 +146,7 @@ class Proposals:
         try:
             signed = self._signed(compiled, moment)
         except Refused as error:
-            return [*events, ProposalChecked(compiled.proposal.number, str(error))], None
+            return [*events, ProposalChecked(compiled.proposal.number, str(error), for_now=error.for_now)], None
         self._sent, self._last = signed, compiled
         return [*events, ProposalChecked(signed.number, None, signed.first)], signed
 

@@ -21,8 +21,8 @@ from rtshcua.ground.gateway.client_frames import (
 from rtshcua.ground.gateway.client_link import ClientLink
 from rtshcua.ground.gateway.habits import tell_parameter
 from rtshcua.ground.gateway.interface import Action, GatewaySettings, RequestFrame
-from rtshcua.ground.gateway.translation import ACCEPTED, DENIED, FAILED, TEMPORARILY_REJECTED, UNSUPPORTED
-from rtshcua.ground.gateway.vehicle_seen import FRESH_US, VehicleSeen
+from rtshcua.ground.gateway.translation import ACCEPTED, DENIED, FAILED, IN_PROGRESS, TEMPORARILY_REJECTED, UNSUPPORTED
+from rtshcua.ground.gateway.vehicle_seen import FRESH_US, LASTING, VehicleSeen
 from rtshcua.mavlink import enums, layouts
 
 #: the interval of request frames to the flight, us, and how many may wait
@@ -63,8 +63,6 @@ _STREAMS: Final = {
 _ALL_STREAMS: Final = 0
 #: the shortest interval at which a lasting message is repeated, us
 _REPEAT_US: Final = 200_000
-#: messages that stay true, however old they are
-_LASTING: Final = frozenset({AUTOPILOT_VERSION, HOME_POSITION})
 
 
 @dataclass(slots=True)
@@ -94,12 +92,12 @@ class _Repeated:
 
 @dataclass(slots=True)
 class _Awaited:
-    """A single message that a client requested, until it comes."""
+    """A single message that a client requested, by its number and parameters 2 to 6, until it comes."""
 
     link: ClientLink
     to: tuple[int, int]
     command: int
-    message: int
+    wanted: tuple[int, tuple[float, ...]]
     until_us: int
 
 
@@ -123,6 +121,7 @@ class HarmlessRequests:
         self._repeated: dict[tuple[int, int], _Repeated] = {}
         #: the shortest interval that was asked for, by message, us
         self._intervals: dict[int, int] = dict(settings.needed_us)
+        self._needed_us = settings.needed_us
 
     # ---------------------------------------------------------------- commands
 
@@ -136,32 +135,41 @@ class HarmlessRequests:
             return DENIED
         if command == enums.MAV_CMD_SET_MESSAGE_INTERVAL:
             return self._set_interval(link, number, message.number("param2"), now_us)
-        return self.message(link, message.sender, command, number, now_us)
+        more = () if command in _REQUESTS else tuple(message.number(f"param{at}") for at in range(2, 7))
+        return self.message(link, message.sender, command, number, now_us, more if any(more) else ())
 
-    def message(self, link: ClientLink, to: tuple[int, int], command: int, number: int, now_us: int) -> int | None:
-        """Send a message as it was seen, or request it; `command` is acknowledged then."""
-        known = self._seen.frame(number)
-        if known is not None and (number in _LASTING or self._seen.message(number, FRESH_US, now_us) is not None):
+    def message(
+        self, link: ClientLink, to: tuple[int, int], command: int, number: int, now_us: int,
+        more: tuple[float, ...] = (),
+    ) -> int | None:  # fmt: skip
+        """Send a message as it was seen, or request it; `command` is acknowledged then. `more`: parameters 2 to 6,
+        which choose among several of the same number.
+        """
+        more = tuple(0.0 if isnan(each) else each for each in more)
+        known = None if any(more) else self._seen.frame(number)
+        if known is not None and (number in LASTING or self._seen.message(number, FRESH_US, now_us) is not None):
             link.forward(known)
             return ACCEPTED
         if not self._may(link, "messages", now_us):
             return DENIED
         if len(self._awaited) >= _MOST_AWAITED:
             return TEMPORARILY_REJECTED
-        if not any(each.message == number for each in self._awaited) and not self._request_message(link, number):
+        asked = any(each.wanted == (number, more) for each in self._awaited)
+        if not asked and not self._request_message(link, number, more):
             return TEMPORARILY_REJECTED
-        self._awaited.append(_Awaited(link, to, command, number, now_us + _PATIENCE_US))
+        self._awaited.append(_Awaited(link, to, command, (number, more), now_us + _PATIENCE_US))
         return None
 
-    def _request_message(self, link: ClientLink, number: int) -> bool:
+    def _request_message(self, link: ClientLink, number: int, more: tuple[float, ...] = ()) -> bool:
+        chosen: dict[str, Any] = {f"param{at}": value for at, value in enumerate((float(number), *more), start=1)}
         return self._hand_in(
-            link, layouts.COMMAND_LONG, command=enums.MAV_CMD_REQUEST_MESSAGE, param1=float(number), **self._target
+            link, layouts.COMMAND_LONG, command=enums.MAV_CMD_REQUEST_MESSAGE, **chosen, **self._target
         )
 
     def _set_interval(self, link: ClientLink, number: int, interval: float, now_us: int) -> int:
         if not self._may(link, "rates", now_us):
             return DENIED
-        if number in _LASTING:
+        if number in LASTING:
             self._repeat(link, number, interval, now_us)
             return ACCEPTED
         if isnan(interval) or interval <= 0 or interval > 1e9:
@@ -206,6 +214,9 @@ class HarmlessRequests:
         if stream == _ALL_STREAMS:
             numbers = tuple(number for each in _STREAMS.values() for number in each)
         for number in numbers:
+            if number in LASTING:
+                self._repeat(link, number, 1_000_000 / rate, now_us)
+                continue
             self._faster(link, number, max(1_000_000 // rate, SHORTEST_US))
 
     def read_parameter(self, link: ClientLink, message: Received, name: str, now_us: int) -> None:
@@ -262,17 +273,31 @@ class HarmlessRequests:
 
     def seen(self, number: int) -> None:
         """A message of the vehicle came, which went to all clients: answer those who requested it. If it refuses a
-        message, that is the oldest that is awaited: the flight itself requests only messages that it has.
+        message to the flight, that is the oldest that is awaited: the flight itself requests only messages that it has.
         """
         if not self._awaited:
             return
-        for each in [one for one in self._awaited if one.message == number]:
-            self._awaited.remove(each)
-            each.link.ack(each.to, each.command, ACCEPTED)
+        self._end([each for each in self._awaited if each.wanted[0] == number], ACCEPTED)
         answer = self._seen.message(COMMAND_ACK) if number == COMMAND_ACK and self._awaited else None
-        if answer is not None and answer.fields["command"] == enums.MAV_CMD_REQUEST_MESSAGE and answer.fields["result"]:
-            refused = self._awaited.pop(0)
-            refused.link.ack(refused.to, refused.command, answer.fields["result"])
+        if answer is not None and answer.fields["command"] == enums.MAV_CMD_REQUEST_MESSAGE:
+            ours = self._is_ours(answer) and answer.fields["result"] not in (ACCEPTED, IN_PROGRESS)
+            refused = [each for each in self._awaited if ours and each.wanted == self._awaited[0].wanted]
+            self._end(refused, answer.fields["result"])
+
+    def _is_ours(self, answer: Received) -> bool:
+        """Whether a COMMAND_ACK is for the flight, or names no target."""
+        to = answer.fields["target_system"], answer.fields["target_component"]
+        return all(each in (0, ours) for each, ours in zip(to, self._own, strict=True))
+
+    def _end(self, awaited: list[_Awaited], result: int) -> None:
+        for each in awaited:
+            self._awaited.remove(each)
+            each.link.ack(each.to, each.command, result)
+
+    def forget_vehicle(self) -> None:
+        """The vehicle has started again, with its own rates."""
+        self._intervals = dict(self._needed_us)
+        self._listed_us = -_LIST_EVERY_US
 
     def tick(self, now_us: int) -> None:
         """Hand in the next request, send parts of lists, and end requests that the vehicle did not answer."""
@@ -286,9 +311,7 @@ class HarmlessRequests:
             while len(self._handed) > _MOST_WAITING:
                 self._handed.pop(next(iter(self._handed)))
             self._actions.append(RequestFrame(self._number, request.link.client, request.frame))
-        for each in [one for one in self._awaited if now_us >= one.until_us]:
-            self._awaited.remove(each)
-            each.link.ack(each.to, each.command, FAILED)
+        self._end([each for each in self._awaited if now_us >= each.until_us], FAILED)
         self._send_lasting(now_us)
         for client, (link, rest) in list(self._lists.items()):
             for _ in range(min(_PARAMETERS_AT_ONCE, len(rest))):

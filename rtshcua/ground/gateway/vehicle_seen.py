@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from rtshcua.ground.gateway.client_frames import HOME_POSITION, Received, received
+from rtshcua.ground.gateway.client_frames import AUTOPILOT_VERSION, HOME_POSITION, Received, received
 from rtshcua.mavlink import enums, layouts
 from rtshcua.mavlink.framing import HEADER, message_id, sender_of, unsigned
 
@@ -11,6 +11,10 @@ _MOST_KINDS: Final = 512
 _MOST_PARAMETERS: Final = 4_096
 #: how old a position may be that stands for "here", us
 FRESH_US: Final = 2_000_000
+#: messages that stay true, however old they are, until the vehicle starts again
+LASTING: Final = frozenset({AUTOPILOT_VERSION, HOME_POSITION})
+#: by how much the time since the vehicle's start goes back only at another start, ms
+_RESTART_MS: Final = 2_000
 
 
 class VehicleSeen:
@@ -19,6 +23,7 @@ class VehicleSeen:
     def __init__(self, system: int) -> None:
         self._system = system
         self._frames: dict[int, tuple[bytes, int]] = {}
+        self._boot_ms: dict[int, int] = {}  # the time since its start in the last message of each kind
         self._read: dict[int, tuple[bytes, Received | None]] = {}
         #: the last PARAM_VALUE of each parameter, by name
         self.parameters: dict[str, Received] = {}
@@ -33,6 +38,22 @@ class VehicleSeen:
         if number == layouts.PARAM_VALUE:
             self._learn(received(frame))
         return number
+
+    def restarted(self, number: int) -> bool:
+        """Whether the time since its start went back in this message, which has come: then what was taken as lasting
+        is forgotten, because its settings may be others now.
+        """
+        message = self.message(number)
+        if message is None:
+            return False
+        before, now_ms = self._boot_ms.get(number, 0), int(message.fields["time_boot_ms"])
+        self._boot_ms[number] = now_ms
+        if now_ms >= before - _RESTART_MS:
+            return False
+        self._boot_ms, self.parameters = {number: now_ms}, {}
+        for each in LASTING:
+            self._frames.pop(each, None)
+        return True
 
     def frame(self, number: int) -> bytes | None:
         """The last frame of a message, without its signature; None if none came."""

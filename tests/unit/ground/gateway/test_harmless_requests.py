@@ -78,6 +78,50 @@ def test_the_vehicles_refusal_is_passed_to_who_waits_longest() -> None:
     assert acks(world.vehicle(mavlink.MAVLink_command_ack_message(512, 4))) == []
 
 
+def test_other_answers_of_the_vehicle_are_no_refusals_of_a_request() -> None:
+    """By hand: result and target of a COMMAND_ACK, and what the client gets. The flight is component 191."""
+    table = (
+        (2, (255, 190), []), (2, (SYSTEM, 1), []), (5, (SYSTEM, 191), []), (2, (SYSTEM, 191), [(512, 2)]),
+        (3, (0, 0), [(512, 3)]),
+    )  # fmt: skip
+    for result, to, answers in table:
+        world = GatewayWorld()
+        world.send(command_long(512, 242_000))
+        world.wait(100_000)
+        assert acks(world.vehicle(mavlink.MAVLink_command_ack_message(512, result, 0, 0, *to))) == answers
+
+
+def test_which_of_several_messages_of_one_number_is_part_of_the_request() -> None:
+    world = GatewayWorld()
+    sent = mavlink.MAVLink_storage_information_message(0, 2, 2, 0, 0, 0, 0, 0, 0)
+    world.vehicle(sent)
+    for wanted in (1, 3):
+        assert acks(world.send(command_long(512, 261, wanted))) == []
+    world.send(command_long(512, 261, 3))
+    asked = [(each.param1, each.param2) for each in requests(world.wait(500_000))]
+    assert asked == [(261, 1), (261, 3)]
+    assert acks(world.vehicle(sent)) == [(512, 0)] * 3
+
+
+def test_after_another_start_of_the_vehicle_nothing_is_taken_as_known() -> None:
+    world = GatewayWorld(needed_us={30: 200_000})
+    world.vehicle(mavlink.MAVLink_system_time_message(0, 60_000))
+    world.vehicle(version())
+    world.vehicle(parameter(b"P", 1, 0, 1))
+    assert acks(world.send(command_long(511, 30, 100_000))) == [(511, 0)]
+    assert len(requests(world.wait(200_000))) == 1
+    world.vehicle(mavlink.MAVLink_system_time_message(0, 61_000))
+    world.send(command_long(511, 30, 100_000))
+    assert requests(world.wait(200_000)) == [], "it is as often already"
+    world.vehicle(mavlink.MAVLink_system_time_message(0, 1_000))
+    world.send(command_long(511, 30, 100_000))
+    world.send(command_long(511, 30, 200_000))
+    world.send(command_long(512, 148))
+    world.send(mavlink.MAVLink_param_request_read_message(SYSTEM, 1, b"P", -1))
+    asked = [each.get_type() for each in requests(world.wait(500_000))]
+    assert asked == ["COMMAND_LONG", "COMMAND_LONG", "PARAM_REQUEST_READ"]
+
+
 def test_a_silent_vehicle_is_told_after_a_second() -> None:
     world = GatewayWorld()
     world.send(command_long(512, 435))

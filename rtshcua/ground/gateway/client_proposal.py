@@ -6,7 +6,7 @@ client is told so, and again every `AGAIN_US`, because clients give up after som
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 from rtshcua.ground.gateway.client_link import NOTICE, ClientLink
 from rtshcua.ground.gateway.interface import ProposedStep
@@ -24,19 +24,39 @@ PATIENCE_US: Final = 30_000_000
 _ENDS: Final = frozenset({"succeeded", "failed", "time-over", "superseded"})
 
 
-@dataclass(slots=True)
-class ClientProposal:
-    """A proposal of one client. `command` is the command to acknowledge, -1 for a message that is not acknowledged, and
-    `guided` whether it came as a mission item, which MISSION_ACK answers.
+#: the most who are answered for one proposal
+_MOST_ASKERS: Final = 16
+
+
+class Asker(NamedTuple):
+    """Who asked for a step: a connection and the sender behind it. `command` is the command to acknowledge, -1 for a
+    message that is not acknowledged, and `guided` whether it came as a mission item, which MISSION_ACK answers.
     """
 
-    number: int
     link: ClientLink
     sender: tuple[int, int]
     command: int
+    guided: bool = False
+
+    def tell(self, result: int) -> None:
+        """Answer with a MAV_RESULT."""
+        if not self.guided and self.command >= 0:
+            self.link.ack(self.sender, self.command, result)
+        elif self.guided and result != IN_PROGRESS:
+            accepted = MISSION_ACCEPTED if result == ACCEPTED else MISSION_DENIED
+            system, component = self.sender
+            self.link.send(layouts.MISSION_ACK, type=accepted, target_system=system, target_component=component)
+
+
+@dataclass(slots=True)
+class ClientProposal:
+    """A proposal of one client. `link` is the connection that asked last, and all `askers` are answered."""
+
+    number: int
+    link: ClientLink
+    askers: list[Asker]
     steps: tuple[ProposedStep, ...]
     began_us: int
-    guided: bool = False
     #: for the mission of a client: the item of each step
     item_of: tuple[int, ...] = ()
     #: the first step in the mission of the flight; -1 until the proposal is signed
@@ -63,12 +83,16 @@ class ClientProposal:
         if self.answered:
             return
         self.answered = True
-        if self.guided:
-            accepted = MISSION_ACCEPTED if result == ACCEPTED else MISSION_DENIED
-            system, component = self.sender
-            self.link.send(layouts.MISSION_ACK, type=accepted, target_system=system, target_component=component)
-        elif self.command >= 0:
-            self.link.ack(self.sender, self.command, result)
+        self._tell(result)
+
+    def _tell(self, result: int) -> None:
+        for each in self.askers:
+            each.tell(result)
+
+    @property
+    def command(self) -> int:
+        """The first command that is acknowledged; -1 if there is none."""
+        return next((each.command for each in self.askers if each.command >= 0), -1)
 
     def refuse(self, result: int, text: str, now_us: int) -> None:
         """End it with a reason. A step that was acknowledged before is only told about."""
@@ -83,11 +107,22 @@ class ClientProposal:
         self.ended = True
         self.answer(CANCELLED)
 
-    def again(self, link: ClientLink, sender: tuple[int, int], command: int) -> None:
-        """The same command came again, perhaps by another connection of the client: it is the one to be answered."""
-        self.link, self.sender, self.command = link, sender, command
-        if self.told_us and command >= 0 and not self.guided:
-            self.link.ack(sender, command, IN_PROGRESS)
+    def again(self, asker: Asker) -> None:
+        """The same was asked for again, perhaps by another command or connection: each one is answered."""
+        self.link = asker.link
+        if asker not in self.askers:
+            if len(self.askers) >= _MOST_ASKERS:
+                asker.tell(TEMPORARILY_REJECTED)
+                return
+            self.askers.append(asker)
+        if self.told_us:
+            asker.tell(IN_PROGRESS)
+
+    def move(self, gone: set[int], link: ClientLink) -> None:
+        """Another connection of the client is there: it gets the answers to those that are gone."""
+        self.link = link if self.link.client in gone else self.link
+        moved = (each._replace(link=link) if each.link.client in gone else each for each in self.askers)
+        self.askers = list(dict.fromkeys(moved))
 
     def tick(self, now_us: int) -> None:
         """Tell the client that it is in progress; give up when nobody answers."""
@@ -97,8 +132,7 @@ class ClientProposal:
             self.refuse(TEMPORARILY_REJECTED, f"{self.steps[0].skill} rejected: nothing answered in time", now_us)
         elif now_us - (self.told_us or self.began_us - AGAIN_US + QUICK_US) >= AGAIN_US:
             self.told_us = now_us
-            if self.command >= 0 and not self.guided:
-                self.link.ack(self.sender, self.command, IN_PROGRESS)
+            self._tell(IN_PROGRESS)
 
     def keep_before(self, first: int) -> None:
         """Another proposal replaced the mission of the flight from this step on."""

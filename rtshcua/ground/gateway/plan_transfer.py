@@ -31,6 +31,7 @@ MISSION_DENIED: Final = 14
 MISSION_CANCELLED: Final = 15
 
 MISSION: Final = 0  # MAV_MISSION_TYPE
+ALL_TYPES: Final = 255
 WAYPOINT: Final = 16
 LOITER_TIME: Final = 19
 #: the most items of an upload
@@ -109,20 +110,25 @@ class PlanTransfer:
 
     def count(self, message: Received, now_us: int) -> None:
         """MISSION_COUNT: an upload begins, or the mission is cleared."""
+        count = message.fields["count"]
+        if count == 0:
+            self.clear(message, now_us)
+            return
         if self._refuses_type(message, now_us):
             return
-        count = message.fields["count"]
         self._upload = self._checking = None
-        if count == 0:
-            self._plans.pop(self._link.name, None)
-            self._answer(message.sender, MISSION_ACCEPTED)
-        elif count > MOST_ITEMS:
+        if count > MOST_ITEMS:
             self._link.text(f"a mission of {count} items is too long: at most {MOST_ITEMS}", now_us)
             self._link.record("refused", now_us, message="MISSION_COUNT", count=count)
             self._answer(message.sender, MISSION_NO_SPACE)
         else:
             self._upload = _Upload(message.sender, count, now_us, now_us)
             self._ask(self._upload, now_us)
+
+    @staticmethod
+    def clears(message: Received) -> bool:
+        """Whether a MISSION_COUNT or MISSION_CLEAR_ALL clears the mission, perhaps among others."""
+        return message.fields["mission_type"] in (MISSION, ALL_TYPES) and not message.fields.get("count", 0)
 
     def item(self, message: Received, shadows: Mapping[str, float], now_us: int) -> UploadedPlan | None:
         """MISSION_ITEM or MISSION_ITEM_INT of an upload. Return the mission to be checked, once it is complete."""
@@ -202,12 +208,18 @@ class PlanTransfer:
         self._link.send(number, **fields)
 
     def clear(self, message: Received, now_us: int) -> None:
-        """MISSION_CLEAR_ALL: forget this client's mission. Fences stay as they are."""
-        if self._refuses_type(message, now_us):
+        """MISSION_CLEAR_ALL: forget this client's mission. It has no fence and no rally points to clear, and those of
+        the vehicle stay as they are.
+        """
+        kind = message.fields["mission_type"]
+        if self.clears(message):
+            self._upload = self._checking = None
+            self._plans.pop(self._link.name, None)
+        elif kind not in (enums.MAV_MISSION_TYPE_FENCE, enums.MAV_MISSION_TYPE_RALLY):
+            self._refuses_type(message, now_us)
             return
-        self._upload = self._checking = None
-        self._plans.pop(self._link.name, None)
-        self._answer(message.sender, MISSION_ACCEPTED)
+        self._link.record("absorbed", now_us, message=message.message, plan=kind)
+        self._answer(message.sender, MISSION_ACCEPTED, kind)
 
     def unsupported(self, message: Received, now_us: int) -> None:
         """A part of the protocol that is not offered: partial uploads."""
@@ -263,7 +275,7 @@ class _Steps:
         self._shadows = shadows
         self._now_us = now_us
         self._speed: float | None = None
-        self._height: dict[str, Any] | None = None  # frame and z of the last item that had a height
+        self._height: int | None = None  # of the last step that has one, mm above home
         self.steps: list[ProposedStep] = []
         self.item_of: list[int] = []
 
@@ -282,20 +294,23 @@ class _Steps:
             row = self._translation.row(ITEM, command, there)
             contract = None if row is None else self._translation.contract(row.skill)
             if contract is not None and contract.motion.kind in (MotionKind.HOLD, MotionKind.LAND):
-                return self._append(number, self._flight_to(item)) or self._append(number, there)
+                lands = contract.motion.kind == MotionKind.LAND
+                if lands and self._height is None:
+                    return RefusedPlan(MISSION_INVALID, "no item before it says at which height it is reached")
+                return self._append(number, self._flight_to(item, lands=lands)) or self._append(number, there)
         return self._append(number, item)
 
-    def _flight_to(self, item: Received) -> Received:
+    def _flight_to(self, item: Received, *, lands: bool) -> Received:
         """A waypoint at an item's place; one that lands has no height of its own, so it is reached at the last one."""
         fields = item.fields | {"command": WAYPOINT, "param1": 0.0}
-        if item.fields["command"] != LOITER_TIME and self._height is not None:
-            fields |= self._height
+        if lands and self._height is not None:
+            fields |= {"frame": enums.MAV_FRAME_GLOBAL_RELATIVE_ALT, "z": self._height / 1_000}
         return item._replace(fields=fields)
 
     def _change_speed(self, item: Received) -> RefusedPlan | None:
         kind, speed = item.number("param1"), item.number("param2")
         if kind not in (0, 1) or isnan(speed):
-            return RefusedPlan(MISSION_INVALID_PARAM1, "only the speed over ground can be changed")
+            return RefusedPlan(MISSION_INVALID_PARAM1, "only the horizontal speed can be changed")
         self._speed = speed if speed >= 0 else (None if speed == -2 else self._speed)
         return None
 
@@ -309,8 +324,9 @@ class _Steps:
             step = self._translation.with_speed(step, self._speed)
         if isinstance(step, Untranslated):
             return RefusedPlan(MISSION_INVALID, step.text)
-        if _has_place(item) and command == WAYPOINT:
-            self._height = {"frame": item.fields["frame"], "z": item.fields["z"]}
+        contract = self._translation.contract(step.skill)
+        if contract is not None and contract.motion.altitude >= 0:
+            self._height = step.values[contract.motion.altitude]
         self.steps.append(step)
         self.item_of.append(number)
         return None
@@ -330,7 +346,8 @@ def _in_form(item: Received, *, whole: bool) -> dict[str, Any]:
             scaled = item.number(name) * 1e7
             fields[name] = enums.NO_PLACE if isnan(scaled) or abs(scaled) >= enums.NO_PLACE else round(scaled)
     elif not whole and item.message == layouts.MISSION_ITEM_INT:
-        fields |= {name: item.fields[name] / 1e7 for name in ("x", "y")}
+        places = {name: item.fields[name] for name in ("x", "y")}
+        fields |= {name: float("nan") if at == enums.NO_PLACE else at / 1e7 for name, at in places.items()}
     return fields
 
 

@@ -11,6 +11,7 @@ policy decides on every step besides. A pilot who requests control keeps it unti
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from math import isnan
 from typing import Any, Final, TypeAlias
 
 from rtshcua.ground.gateway.accepted import COMMAND, ITEM, MESSAGE, MODE
@@ -34,7 +35,7 @@ from rtshcua.ground.gateway.client_frames import (
     received,
 )
 from rtshcua.ground.gateway.client_link import NOTICE, ClientLink
-from rtshcua.ground.gateway.client_proposal import AGAIN_US, ClientProposal
+from rtshcua.ground.gateway.client_proposal import AGAIN_US, Asker, ClientProposal
 from rtshcua.ground.gateway.habits import ShownState, set_parameter
 from rtshcua.ground.gateway.harmless_requests import COMMANDS as REQUESTING
 from rtshcua.ground.gateway.harmless_requests import HarmlessRequests
@@ -60,7 +61,7 @@ from rtshcua.ground.gateway.interface import (
     Withhold,
 )
 from rtshcua.ground.gateway.pilots import Pilots
-from rtshcua.ground.gateway.plan_transfer import PlanTransfer, RefusedPlan, UploadedPlan, read_plan
+from rtshcua.ground.gateway.plan_transfer import MISSION_DENIED, PlanTransfer, RefusedPlan, UploadedPlan, read_plan
 from rtshcua.ground.gateway.quick_decision import QuickDecision, QuickRefusal
 from rtshcua.ground.gateway.translation import (
     ACCEPTED,
@@ -79,6 +80,7 @@ from rtshcua.mavlink.modes import COPTER_NAMES, PX4, PX4_NAMES, CopterMode, Px4M
 from rtshcua.mavlink.parameters import is_bytewise
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now
+from rtshcua.wire.request import CONTINGENCY_LINK, STEP
 
 #: how long a client keeps control after its last step, us
 KEEPS_US: Final = 10_000_000
@@ -202,6 +204,7 @@ class Gateway:
         self._stage = ""  # of the flight: "", "waiting", "flying"
         self._unready: str | None = None
         self._flew = False  # whether the vehicle was in the air during this flight
+        self._displaced = False  # whether the flight flew something else after that, which is no hold
         self._cancelled = False  # whether this flight was cancelled, because its client is dead
         self._judged = False  # whether the flight has said if the vehicle is ready
         self._second_us = 0
@@ -214,6 +217,8 @@ class Gateway:
         self._quick = QuickDecision(settings)
         self._shadowed = shadowed_parameters(settings.accepted)
         policy = settings.policy.policy
+        links = enumerate(policy.contracts[link.skill].motion.kind for link in policy.contingency)
+        self._holding = {number for number, kind in links if kind == MotionKind.HOLD}
         self._safe = [policy.contracts[link.skill].name for link in policy.contingency]
 
     def renew(self, settings: GatewaySettings, now: Now) -> list[Action]:
@@ -308,8 +313,8 @@ class Gateway:
         shown = ShownState(link, self._seen, self._actions, self._settings.autopilot)
         self._clients[link.client] = client = _Client(link, source, shown, transfer)
         for each in self._proposals.values():
-            if each.link.name == link.name and each.link.client not in self._clients:
-                each.link = link
+            if each.link.name == link.name:
+                each.move({asker.link.client for asker in each.askers} - self._clients.keys(), link)
         self._of_mission(client, now_us)
 
     # ---------------------------------------------------------------- the vehicle and the pilot
@@ -321,6 +326,8 @@ class Gateway:
             for client in self._clients.values():
                 client.shown.update(now_us)
                 client.shown.heartbeat(now_us)
+        if number in (layouts.SYSTEM_TIME, layouts.GLOBAL_POSITION_INT) and self._seen.restarted(number):
+            self._requests.forget_vehicle()
         self._requests.seen(number)
 
     def _from_pilot(self, client: int, frame: bytes, now_us: int) -> None:
@@ -417,7 +424,7 @@ class Gateway:
         elif command == enums.MAV_CMD_DO_SET_MODE:
             result = self._do_set_mode(client, message, now)
         elif command == enums.MAV_CMD_MISSION_START:
-            result = self._start(client, message, command, now)
+            result = self._start_whole(client, message, command, now)
         elif command == enums.MAV_CMD_REQUEST_OPERATOR_CONTROL:
             result = self._asks_for_control(client, command, now_us)
         elif command == _SET_MISSION_CURRENT:
@@ -549,9 +556,11 @@ class Gateway:
         now_us, latest, safe = now.monotonic_us, client.latest, steps[0].skill in self._safe
         if safe:
             self._withdraw_waiting(f"{client.link.name} asks for {steps[0].skill}", now_us, client.link.name)
+        guided = message.message in (layouts.MISSION_ITEM_INT, MISSION_ITEM)
+        asker = Asker(client.link, message.sender, command, guided)
         if latest is not None and latest.steps == steps and self._stands(latest):
             if not latest.answered:
-                latest.again(client.link, message.sender, command)
+                latest.again(asker)
             return ACCEPTED if latest.answered else None
         own = [each for each in self._proposals.values() if each.link is client.link and not each.ended]
         waiting = [each for each in own if not each.taken]
@@ -572,10 +581,8 @@ class Gateway:
         client.setpoint_us = now_us + SETPOINT_US if command < 0 else client.setpoint_us
         self._number += 1
         proposal = ClientProposal(
-            self._number, client.link, message.sender, command, steps, now_us,
-            guided=message.message in (layouts.MISSION_ITEM_INT, MISSION_ITEM),
-            borrows=self._outranked(client, now_us) is not None,
-        )  # fmt: skip
+            self._number, client.link, [asker], steps, now_us, borrows=self._outranked(client, now_us) is not None
+        )
         self._proposals[self._number] = client.latest = proposal
         self._actions.append(Propose(self._number, client.link.client, client.link.settings.role, steps))
         return None
@@ -713,7 +720,8 @@ class Gateway:
 
     def _stands(self, proposal: ClientProposal) -> bool:
         """Whether a proposal still says what the vehicle does: it is under way, or nothing was flown after it."""
-        return not proposal.ended or (self._stage == "flying" and self._flown is proposal and proposal.done > 0)
+        stands = self._stage == "flying" and self._flown is proposal and proposal.done > 0 and not self._displaced
+        return not proposal.ended or stands
 
     def _hindrance(self, client: _Client, step: ProposedStep, now_us: int) -> str | None:
         """Why a step cannot be taken now, although the policy may permit it."""
@@ -863,12 +871,15 @@ class Gateway:
         if line.get("event") == "taken-over":
             for client in self._clients.values():
                 client.link.text("the pilot took over: the flight of your steps ended", now_us, "taken over")
+        kind, link = line.get("kind", STEP), line.get("link", -1)
+        if line.get("event") == "dispatched" and kind != STEP:
+            self._displaced |= kind != CONTINGENCY_LINK or link not in self._holding
         for proposal in list(self._proposals.values()):
             flies, done = proposal.flies, proposal.done
             if not proposal.line(line, now_us):
                 continue
             if proposal.flies != flies:
-                self._flown = proposal
+                self._flown, self._displaced = proposal, False
             if (proposal.flies, proposal.done) != (flies, done):
                 self._progress(proposal, now_us)
         self._tidy(now_us)
@@ -918,6 +929,16 @@ class Gateway:
         takeoff = next((each for each in takeoffs if each is not None), None)
         return (steps, 0) if takeoff is None else ((takeoff, *steps), 1)
 
+    def _start_whole(self, client: _Client, message: Received, command: int, now: Now) -> int | None:
+        """MISSION_START: a part of a mission is refused, as ArduCopter does."""
+        plan = client.transfer.plan
+        first, last = (message.number(each) for each in ("param1", "param2"))
+        ends = (0, -1) if plan is None else (0, -1, len(plan.items) - 1)
+        if (first != 0 and not isnan(first)) or (last not in ends and not isnan(last)):
+            self._reject(client, "a part of a mission is refused: start the whole one", command, now.monotonic_us)
+            return DENIED
+        return self._start(client, message, command, now)
+
     def _start(self, client: _Client, message: Received, command: int, now: Now) -> int | None:
         """Fly the client's mission, from the step that it did not finish."""
         plan, now_us = client.transfer.plan, now.monotonic_us
@@ -929,7 +950,7 @@ class Gateway:
         if mission is not None and mission[1] is plan and self._stage == "flying":
             last = mission[0]
             if not last.ended:
-                last.again(client.link, message.sender, command)
+                last.again(Asker(client.link, message.sender, command))
                 return ACCEPTED if last.answered else None
             before = 0 if last.done >= len(last.item_of) else last.done + len(plan.steps) - len(last.item_of)
         steps, more = self._from_ground(plan.steps[max(before, 0) :])
@@ -943,12 +964,19 @@ class Gateway:
 
     def _jump(self, client: _Client, item: float, now_us: int) -> int:
         """DO_SET_MISSION_CURRENT, MISSION_SET_CURRENT: only back to the beginning, before the start."""
+        if self._flies_mission(client):
+            self._reject(client, "the mission flies: stop it first", _SET_MISSION_CURRENT, now_us)
+            return TEMPORARILY_REJECTED
         if item == 0 and client.transfer.plan is not None:
-            mission = client.source.mission
-            client.source.mission = None if mission is None or mission[0].ended else mission
+            client.source.mission = None
             return ACCEPTED
         self._reject(client, "a mission starts at its first item", _SET_MISSION_CURRENT, now_us)
         return DENIED
+
+    @staticmethod
+    def _flies_mission(client: _Client) -> bool:
+        mission = client.source.mission
+        return mission is not None and mission[1] is client.transfer.plan and not mission[0].ended
 
     def _set_current(self, client: _Client, message: Received, now: Now) -> None:
         self._jump(client, message.fields["seq"], now.monotonic_us)
@@ -985,8 +1013,14 @@ class Gateway:
     def _transferred(
         self, function: Callable[[PlanTransfer, Received, int], None], client: _Client, message: Received, now: Now
     ) -> None:
-        function(client.transfer, message, now.monotonic_us)
-        self._of_mission(client, now.monotonic_us)
+        now_us, plan = now.monotonic_us, client.transfer.plan
+        if self._flies_mission(client) and PlanTransfer.clears(message):
+            client.transfer.refuse(message.sender, RefusedPlan(MISSION_DENIED, "it flies: stop it first"), now_us)
+            return
+        function(client.transfer, message, now_us)
+        if client.transfer.plan is not plan:
+            client.source.mission = None
+        self._of_mission(client, now_us)
 
     def _of_mission(self, client: _Client, now_us: int) -> None:
         """Withhold the vehicle's own reports of a mission from a client that has one here, or say why it has none."""

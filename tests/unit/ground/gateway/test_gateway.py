@@ -9,6 +9,7 @@ from reference.gateway_world import (
     GatewayWorld,
     acks,
     command_long,
+    item,
     proposals,
     reposition,
     setpoint,
@@ -226,6 +227,47 @@ def test_a_step_refused_while_another_flies_leaves_that_one() -> None:
 
 
 # ---------------------------------------------------------------- repeated setpoints
+
+
+def test_every_command_for_one_step_is_answered() -> None:
+    world = GatewayWorld()
+    world.fly()
+    world.client(2, "script")
+    landing = command_long(21)
+    proposed = world.send(landing)
+    for message, client in ((SAFE_MODES[2], 1), (landing, 1), (landing, 2)):
+        assert proposals(world.send(message, client=client)) == proposals(proposed) * (client == 2)
+    world.accept(proposed)
+    assert acks(world.dispatch(0)) == [(21, 0), (176, 0)]
+    world = GatewayWorld(ARDUPILOT)
+    world.fly()
+    target = item(0, 16, x=473_983_000, y=85_455_900, z=20)
+    target.current = 2
+    proposed = world.send(reposition())
+    world.send(target)
+    world.send(setpoint())
+    world.accept(proposed)
+    actions = world.dispatch(0)
+    assert acks(actions) == [(192, 0)]
+    assert [each.type for each in told(actions) if each.get_type() == "MISSION_ACK"] == [0]
+    world = GatewayWorld()
+    world.fly()
+    world.send(landing)
+    actions = [each for at in range(40) for each in world.send(landing, sender=(at + 1, 1))]
+    assert (21, 1) in acks(actions), "so many are answered, and no more"
+
+
+def test_a_target_is_flown_to_again_after_the_flight_has_left_it() -> None:
+    """By hand: the kind and the number of a link of the contingency, and whether it moves the vehicle."""
+    for kind, link, moves in ((2, 0, False), (2, 1, True), (1, 0, True)):
+        world = GatewayWorld()
+        world.fly()
+        world.accept(world.send(reposition()))
+        world.dispatch(0)
+        world.line(type="effect", event="succeeded", kind=0, step=0)
+        world.line(type="effect", event="dispatched", kind=kind, step=-1, link=link)
+        actions = world.send(reposition())
+        assert (len(proposals(actions)), acks(actions)) == ((1, []) if moves else (0, [(192, 0)]))
 
 
 def test_a_stream_of_one_target_is_one_proposal() -> None:

@@ -167,14 +167,26 @@ def test_a_client_may_give_up_its_upload() -> None:
 
 def test_fences_rally_points_and_partial_uploads_are_refused() -> None:
     world = GatewayWorld()
-    for kind, what in ((1, "fence"), (2, "rally points"), (255, "plan")):
-        for message in (count(4, kind), mavlink.MAVLink_mission_clear_all_message(SYSTEM, 1, kind)):
-            world.now_us += 6_000_000
-            actions = world.send(message)
-            assert results(actions) == [(14, kind)]
-            assert texts(actions) == [f"{what}: changes are refused"]
+    for kind, what in ((1, "fence"), (2, "rally points"), (255, "plan"), (9, "plan")):
+        world.now_us += 6_000_000
+        actions = world.send(count(4, kind))
+        assert (results(actions), texts(actions)) == ([(14, kind)], [f"{what}: changes are refused"])
     actions = world.send(mavlink.MAVLink_mission_write_partial_list_message(SYSTEM, 1, 0, 2, 0))
     assert results(actions) == [(3, 0)]
+
+
+def test_what_has_nothing_to_clear_is_cleared() -> None:
+    """MAVSDK and QGroundControl clear all kinds before an upload. By hand: the kind, its answer, what is left."""
+    for kind, result, left in ((0, 0, 0), (1, 0, 5), (2, 0, 5), (255, 0, 0), (9, 14, 5)):
+        for message in (count(0, kind), mavlink.MAVLink_mission_clear_all_message(SYSTEM, 1, kind)):
+            world = GatewayWorld()
+            world.ready()
+            stored(world, mission())
+            actions = world.send(message)
+            assert results(actions) == [(result, kind)]
+            assert texts(actions) == (["plan: changes are refused"] if result else [])
+            (listed,) = told(world.send(mavlink.MAVLink_mission_request_list_message(SYSTEM, 1, 0)))
+            assert listed.count == left, kind
 
 
 def test_the_number_of_items_is_bounded() -> None:
@@ -265,6 +277,17 @@ def test_items_that_stay_or_land_at_a_place_fly_there_first() -> None:
     assert meaning(item(0, LAND)) == [("emergency_land", {})]
 
 
+def test_a_place_of_landing_is_reached_at_the_height_of_the_last_step_that_had_one() -> None:
+    there = {"x": N, "y": E}
+    assert meaning(item(0, 22, z=15), item(1, LAND, **there)) == [
+        ("takeoff", {"altitude": "15 m"}), ("goto", THERE), ("emergency_land", {})
+    ]  # fmt: skip
+    on = item(0, WAYPOINT, x=N - 9, y=E, z=503, frame=0), item(1, LAND, **there, z=3)
+    assert meaning(*on)[1:] == [("goto", THERE), ("emergency_land", {})], "whatever its frame"
+    for autopilot in (PX4, ARDUPILOT):
+        assert meaning(item(int(autopilot == ARDUPILOT), LAND, **there), autopilot=autopilot)[0] == 5
+
+
 def test_slot_0_of_ardupilot_is_home() -> None:
     assert meaning(item(0, WAYPOINT, x=N, y=E, z=15), autopilot=ARDUPILOT) == [("goto", THERE)]
     assert meaning(autopilot=ARDUPILOT) == (5, "mission refused: the mission has no item that flies")
@@ -276,13 +299,13 @@ def test_what_cannot_be_a_step_is_refused_with_the_item() -> None:
         (item(0, 92, 1), 3, "item 0: command 92 has no mapping"),
         (item(0, 2000), 3, "item 0: command 2000 has no mapping"),
         (item(0, WAYPOINT, 5, x=N, y=E, z=15), 6, "item 0: waits at a waypoint are refused: use NAV_LOITER_TIME"),
-        (item(0, SPEED, 3, 5), 6, "item 0: only the speed over ground can be changed"),
-        (item(0, SPEED, 1, nan), 6, "item 0: only the speed over ground can be changed"),
+        (item(0, SPEED, 3, 5), 6, "item 0: only the horizontal speed can be changed"),
+        (item(0, SPEED, 1, nan), 6, "item 0: only the horizontal speed can be changed"),
         (item(0, SPEED, 1, 5), 5, "the mission has no item that flies"),
         (item(0, WAYPOINT, x=N, y=E, z=inf), 5, "item 0: goto: altitude is not a number in range"),
         (item(0, WAYPOINT, x=N, y=E, z=15, frame=10), 5, "item 0: goto: its frame has no latitude and longitude"),
         (item(0, WAYPOINT, x=0x7FFFFFFF, y=0x7FFFFFFF, z=15), 3, "item 0: command 16 has no mapping"),
-        (item(0, LAND, x=2_000_000_000, y=E), 5, "item 0: goto: the position is not on the globe"),
+        (item(0, LOITER, x=2_000_000_000, y=E), 5, "item 0: goto: the position is not on the globe"),
     )
     for each, result, text in table:
         assert meaning(each) == (result, f"mission refused: {text}"), text
@@ -421,11 +444,31 @@ def test_only_the_first_item_can_be_chosen() -> None:
     assert acks(world.send(command_long(224, 3))) == [(224, 2)]
     world.accept(world.send(command_long(300)))
     world.dispatch(0)
-    assert acks(world.send(command_long(224, 0))) == [(224, 0)], "without effect while it flies"
+    actions = world.send(command_long(224, 0))
+    assert (acks(actions), texts(actions)) == ([(224, 1)], ["the mission flies: stop it first"])
+    for clears in (count(0), mavlink.MAVLink_mission_clear_all_message(SYSTEM, 1, 0), count(0, 255)):
+        actions = world.send(clears)
+        assert (results(actions), texts(actions)) == ([(14, 0)], ["mission refused: it flies: stop it first"])
     world.line(type="effect", event="failed", kind=0, step=0)
     world.line(type="mission")
     assert acks(world.send(command_long(224, 0))) == [(224, 0)]
     assert states(world.wait(1_100_000))[-1] == ("current", 0, 2)
+
+
+def test_a_part_of_a_mission_is_not_started() -> None:
+    """By hand: parameters 1 and 2 of MISSION_START, and whether it is the whole mission of five items."""
+    table = (
+        (0, 0, True), (nan, nan, True), (0, 4, True), (0, -1, True), (2, 2, False), (1, 0, False), (0, 2, False),
+        (0, 3, False), (inf, 0, False),
+    )  # fmt: skip
+    for first, last, whole in table:
+        world = GatewayWorld()
+        world.ready()
+        stored(world, mission())
+        actions = world.send(command_long(300, first, last))
+        assert (proposals(actions) != []) is whole, (first, last)
+        assert acks(actions) == ([] if whole else [(300, 2)])
+        assert texts(actions) == ([] if whole else ["a part of a mission is refused: start the whole one"])
 
 
 # ---------------------------------------------------------------- ArduPilot's guided item

@@ -21,6 +21,8 @@ from typing import Final, NamedTuple
 
 import msgspec
 
+from rtshcua.mavlink import layouts
+
 _HEAD: Final = Struct("<BH")
 #: the most octets of a message or datagram on these sockets
 LARGEST: Final = 1 << 16
@@ -65,23 +67,12 @@ class RelayKind(IntEnum):
 #: the answers of the gateway to the client's own dialogues come as `ANSWER`
 DIALOGUES: Final = frozenset(
     {
-        38,  # MISSION_WRITE_PARTIAL_LIST
-        39,  # MISSION_ITEM
-        40,  # MISSION_REQUEST
-        43,  # MISSION_REQUEST_LIST
-        44,  # MISSION_COUNT
-        45,  # MISSION_CLEAR_ALL
-        47,  # MISSION_ACK
-        51,  # MISSION_REQUEST_INT
-        73,  # MISSION_ITEM_INT
-        77,  # COMMAND_ACK
-        80,  # COMMAND_CANCEL
-        110,  # FILE_TRANSFER_PROTOCOL
-        256,  # SETUP_SIGNING
-        385,  # TUNNEL
-        512,  # CONTROL_STATUS: the gateway says who is in control
+        layouts.MISSION_WRITE_PARTIAL_LIST, layouts.MISSION_ITEM, layouts.MISSION_REQUEST, layouts.MISSION_REQUEST_LIST,
+        layouts.MISSION_COUNT, layouts.MISSION_CLEAR_ALL, layouts.MISSION_ACK, layouts.MISSION_REQUEST_INT,
+        layouts.MISSION_ITEM_INT, layouts.COMMAND_ACK, layouts.COMMAND_CANCEL, layouts.FILE_TRANSFER_PROTOCOL,
+        layouts.SETUP_SIGNING, layouts.TUNNEL, layouts.CONTROL_STATUS,
     }
-)
+)  # fmt: skip
 
 
 class ClientSetup(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

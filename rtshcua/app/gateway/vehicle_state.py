@@ -15,13 +15,13 @@ from rtshcua.mavlink import dialect
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.enums import MAV_LANDED_STATE_ON_GROUND
 from rtshcua.mavlink.framing import HEADER, message_id
+from rtshcua.mavlink.layouts import EXTENDED_SYS_STATE
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.ports import Readings
 from rtshcua.onboard.runtime.monitor import StateMonitor
 
 _SYSTEM, _COMPONENT = 5, 6
-_EXTENDED_SYS_STATE: Final = 245
 _LANDED: Final = 1  # the offset of `landed_state` in its payload
 #: frames of one message that are kept: a battery counts from its second report on, and sensors have several instances
 _KEPT: Final = 4
@@ -47,7 +47,7 @@ class VehicleFrames:
         number = message_id(frame, 0)
         if frame[_SYSTEM] != self._system:
             return
-        if number == _EXTENDED_SYS_STATE and frame[_COMPONENT] == AUTOPILOT:
+        if number == EXTENDED_SYS_STATE and frame[_COMPONENT] == AUTOPILOT:
             landed = frame[HEADER + _LANDED] if frame[1] > _LANDED else 0
             self.aloft = landed != MAV_LANDED_STATE_ON_GROUND if landed else None
         if number in self._read:

@@ -73,7 +73,7 @@ class AcceptedCommand(NamedTuple):
 
 
 #: the unit of an autopilot's parameter, by the dimension of the argument
-_OF_PARAMETERS: Final = {
+UNITS_OF_PARAMETERS: Final = {
     Dimension.LENGTH: "m",
     Dimension.ALTITUDE: "m",
     Dimension.SPEED: "m/s",
@@ -116,7 +116,7 @@ def _source(dialect: Dialect, skill: SkillDecl, accepts: AcceptsDecl, source: So
     type = parameter_type(declared)
     dimension = None if type is None else type.dimension
     fields = fields_of(dialect, accepts)
-    unit = "degE7" if dimension is None else _OF_PARAMETERS[dimension]
+    unit = "degE7" if dimension is None else UNITS_OF_PARAMETERS[dimension]
     if source.fields:
         unit = fields[source.fields[0].text].unit
     scale = scale_of(unit, dimension)

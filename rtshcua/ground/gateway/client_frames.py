@@ -5,10 +5,10 @@ message cannot be verified, and nothing of it is read but its number.
 """
 
 from math import isnan
-from struct import Struct
 from struct import error as struct_error
 from typing import Any, Final, NamedTuple
 
+from rtshcua.mavlink import layouts
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1
 from rtshcua.mavlink.framing import (
     CHECKSUM,
@@ -20,70 +20,45 @@ from rtshcua.mavlink.framing import (
     frame_length,
     octets_of_checksum,
 )
-from rtshcua.mavlink.layouts import LAYOUTS, SET_POSITION_TARGET_GLOBAL_INT, Layout
-
-SET_MODE: Final = 11
-MISSION_WRITE_PARTIAL_LIST: Final = 38
-MISSION_ITEM: Final = 39
-MISSION_SET_CURRENT: Final = 41
-MISSION_CURRENT: Final = 42
-MISSION_ITEM_REACHED: Final = 46
-REQUEST_DATA_STREAM: Final = 66
-MANUAL_CONTROL: Final = 69
-RC_CHANNELS_OVERRIDE: Final = 70
-COMMAND_ACK: Final = 77
-SET_ATTITUDE_TARGET: Final = 82
-SET_POSITION_TARGET_LOCAL_NED: Final = 84
-FILE_TRANSFER_PROTOCOL: Final = 110
-LOG_REQUEST_LIST: Final = 117
-AUTOPILOT_VERSION: Final = 148
-AUTOPILOT_VERSION_REQUEST: Final = 183
-HOME_POSITION: Final = 242
-SETUP_SIGNING: Final = 256
-CONTROL_STATUS: Final = 512
+from rtshcua.mavlink.layouts import LAYOUTS, layout
 
 #: streams that move a vehicle, in words
 SETPOINTS: Final = {
-    SET_POSITION_TARGET_LOCAL_NED: "local setpoints",
-    SET_ATTITUDE_TARGET: "attitude and thrust setpoints",
-    RC_CHANNELS_OVERRIDE: "RC override",
-    MANUAL_CONTROL: "manual control",
-    SET_POSITION_TARGET_GLOBAL_INT: "setpoints other than a position",
+    layouts.SET_POSITION_TARGET_LOCAL_NED: "local setpoints",
+    layouts.SET_ATTITUDE_TARGET: "attitude and thrust setpoints",
+    layouts.RC_CHANNELS_OVERRIDE: "RC override",
+    layouts.MANUAL_CONTROL: "manual control",
+    layouts.SET_POSITION_TARGET_GLOBAL_INT: "setpoints other than a position",
 }
 
 _TARGET: Final = "target_system target_component"
 _MOTION: Final = "vx vy vz afx afy afz yaw yaw_rate type_mask"
 
 
-def _layout(extra: int, fields: str, names: str) -> Layout:
-    return Layout(extra, Struct(fields), tuple(names.split()))
-
-
 #: Of an array only the first element has the field's name. The layouts without all fields end before the others.
 LAYOUTS_OF_CLIENTS: Final = LAYOUTS | {
-    SET_MODE: _layout(89, "<IBB", "custom_mode target_system base_mode"),
-    MISSION_WRITE_PARTIAL_LIST: _layout(9, "<hhBBB", f"start_index end_index {_TARGET} mission_type"),
-    MISSION_ITEM: _layout(
+    layouts.SET_MODE: layout(89, "<IBB", "custom_mode target_system base_mode"),
+    layouts.MISSION_WRITE_PARTIAL_LIST: layout(9, "<hhBBB", f"start_index end_index {_TARGET} mission_type"),
+    layouts.MISSION_ITEM: layout(
         254, "<4f3fHHBBBBBB",
         f"param1 param2 param3 param4 x y z seq command {_TARGET} frame current autocontinue mission_type",
     ),
-    MISSION_SET_CURRENT: _layout(28, "<HBB", f"seq {_TARGET}"),
-    MISSION_CURRENT: _layout(28, "<HHBB", "seq total mission_state mission_mode"),
-    MISSION_ITEM_REACHED: _layout(11, "<H", "seq"),
-    REQUEST_DATA_STREAM: _layout(148, "<HBBBB", f"req_message_rate {_TARGET} req_stream_id start_stop"),
-    MANUAL_CONTROL: _layout(243, "<hhhhHB", "x y z r buttons target_system"),
-    RC_CHANNELS_OVERRIDE: _layout(124, "<16xBB", _TARGET),
-    COMMAND_ACK: _layout(143, "<HBBiBB", f"command result progress result_param2 {_TARGET}"),
-    SET_ATTITUDE_TARGET: _layout(49, "<36xBBB", f"{_TARGET} type_mask"),
-    SET_POSITION_TARGET_LOCAL_NED: _layout(
+    layouts.MISSION_SET_CURRENT: layout(28, "<HBB", f"seq {_TARGET}"),
+    layouts.MISSION_CURRENT: layout(28, "<HHBB", "seq total mission_state mission_mode"),
+    layouts.MISSION_ITEM_REACHED: layout(11, "<H", "seq"),
+    layouts.REQUEST_DATA_STREAM: layout(148, "<HBBBB", f"req_message_rate {_TARGET} req_stream_id start_stop"),
+    layouts.MANUAL_CONTROL: layout(243, "<hhhhHB", "x y z r buttons target_system"),
+    layouts.RC_CHANNELS_OVERRIDE: layout(124, "<16xBB", _TARGET),
+    layouts.COMMAND_ACK: layout(143, "<HBBiBB", f"command result progress result_param2 {_TARGET}"),
+    layouts.SET_ATTITUDE_TARGET: layout(49, "<36xBBB", f"{_TARGET} type_mask"),
+    layouts.SET_POSITION_TARGET_LOCAL_NED: layout(
         143, "<I11fHBBB", f"time_boot_ms x y z {_MOTION} {_TARGET} coordinate_frame"
     ),
-    FILE_TRANSFER_PROTOCOL: _layout(84, "<BBB251s", f"target_network {_TARGET} payload"),
-    LOG_REQUEST_LIST: _layout(128, "<HHBB", f"start end {_TARGET}"),
-    AUTOPILOT_VERSION_REQUEST: _layout(85, "<BB", _TARGET),
-    HOME_POSITION: _layout(104, "<iii", "latitude longitude altitude"),
-    SETUP_SIGNING: _layout(71, "<Q", "initial_timestamp"),
-    CONTROL_STATUS: _layout(21, "<BB", "flags gcs_main"),  # of the development dialect, since 2026
+    layouts.FILE_TRANSFER_PROTOCOL: layout(84, "<BBB251s", f"target_network {_TARGET} payload"),
+    layouts.AUTOPILOT_VERSION_REQUEST: layout(85, "<BB", _TARGET),
+    layouts.HOME_POSITION: layout(104, "<iii", "latitude longitude altitude"),
+    layouts.SETUP_SIGNING: layout(71, "<Q", "initial_timestamp"),
+    layouts.CONTROL_STATUS: layout(21, "<BB", "flags gcs_main"),  # of the development dialect, since 2026
 }  # fmt: skip
 
 
@@ -127,14 +102,14 @@ def received(frame: bytes) -> Received | None:
     if flags & ~FLAG_SIGNED or compatible:
         return None
     number, end = low | high << 16, HEADER + length
-    layout = LAYOUTS_OF_CLIENTS.get(number)
-    if layout is None:
+    of = LAYOUTS_OF_CLIENTS.get(number)
+    if of is None:
         return Received(system, component, number, {})
-    if checksum(frame[1:end] + bytes([layout.extra])) != int.from_bytes(frame[end : end + CHECKSUM], "little"):
+    if checksum(frame[1:end] + bytes([of.extra])) != int.from_bytes(frame[end : end + CHECKSUM], "little"):
         return None
-    size = layout.fields.size
+    size = of.fields.size
     payload = frame[HEADER : min(end, HEADER + size)].ljust(size, b"\0")  # trailing zeros are not sent
-    return Received(system, component, number, dict(zip(layout.names, layout.fields.unpack(payload), strict=True)))
+    return Received(system, component, number, dict(zip(of.names, of.fields.unpack(payload), strict=True)))
 
 
 def made(number: int, values: dict[str, Any], sender: tuple[int, int], sequence: int) -> bytes:
@@ -142,12 +117,12 @@ def made(number: int, values: dict[str, Any], sender: tuple[int, int], sequence:
 
     Raises ValueError for a value that does not fit its field.
     """
-    layout = LAYOUTS_OF_CLIENTS[number]
+    of = LAYOUTS_OF_CLIENTS[number]
     texts = ("text", "param_id", "payload")
     try:
-        payload = layout.fields.pack(*[values.get(name, b"" if name in texts else 0) for name in layout.names])
+        payload = of.fields.pack(*[values.get(name, b"" if name in texts else 0) for name in of.names])
     except (struct_error, OverflowError) as error:
         raise ValueError(str(error)) from None
     payload = payload.rstrip(b"\0") or b"\0"
     head = HEAD.pack(MARKER, len(payload), 0, 0, sequence % 256, *sender, number & 0xFFFF, number >> 16)
-    return head + payload + octets_of_checksum(head[1:] + payload + bytes([layout.extra]))
+    return head + payload + octets_of_checksum(head[1:] + payload + bytes([of.extra]))

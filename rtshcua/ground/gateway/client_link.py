@@ -5,7 +5,7 @@ from collections import deque
 from textwrap import shorten
 from typing import Any, Final
 
-from rtshcua.ground.gateway.client_frames import COMMAND_ACK, Received, made
+from rtshcua.ground.gateway.client_frames import Received, made
 from rtshcua.ground.gateway.interface import Action, ClientNote, ClientSettings, ToClient
 from rtshcua.mavlink import enums, layouts
 from rtshcua.mavlink.layouts import TEXT_OCTETS
@@ -98,7 +98,12 @@ class ClientLink:
         """Answer a command with a MAV_RESULT."""
         system, component = to
         self.send(
-            COMMAND_ACK, command=command, result=result, progress=255, target_system=system, target_component=component
+            layouts.COMMAND_ACK,
+            command=command,
+            result=result,
+            progress=255,
+            target_system=system,
+            target_component=component,
         )
 
     def text(self, text: str, now_us: int, key: str = "", severity: int = WARNING) -> None:

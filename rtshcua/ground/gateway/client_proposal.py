@@ -25,10 +25,10 @@ _ENDS: Final = frozenset({"succeeded", "failed", "time-over", "superseded"})
 
 
 #: the most who are answered for one proposal
-_MOST_ASKERS: Final = 16
+_MOST_ASKING: Final = 16
 
 
-class Asker(NamedTuple):
+class AskedBy(NamedTuple):
     """Who asked for a step: a connection and the sender behind it. `command` is the command to acknowledge, -1 for a
     message that is not acknowledged, and `guided` whether it came as a mission item, which MISSION_ACK answers.
     """
@@ -50,11 +50,11 @@ class Asker(NamedTuple):
 
 @dataclass(slots=True)
 class ClientProposal:
-    """A proposal of one client. `link` is the connection that asked last, and all `askers` are answered."""
+    """A proposal of one client. `link` is the connection that asked last, and all `asked_by` are answered."""
 
     number: int
     link: ClientLink
-    askers: list[Asker]
+    asked_by: list[AskedBy]
     steps: tuple[ProposedStep, ...]
     began_us: int
     #: for the mission of a client: the item of each step
@@ -86,13 +86,13 @@ class ClientProposal:
         self._tell(result)
 
     def _tell(self, result: int) -> None:
-        for each in self.askers:
+        for each in self.asked_by:
             each.tell(result)
 
     @property
     def command(self) -> int:
         """The first command that is acknowledged; -1 if there is none."""
-        return next((each.command for each in self.askers if each.command >= 0), -1)
+        return next((each.command for each in self.asked_by if each.command >= 0), -1)
 
     def refuse(self, result: int, text: str, now_us: int) -> None:
         """End it with a reason. A step that was acknowledged before is only told about."""
@@ -107,22 +107,24 @@ class ClientProposal:
         self.ended = True
         self.answer(CANCELLED)
 
-    def again(self, asker: Asker) -> None:
+    def again(self, asked: AskedBy) -> None:
         """The same was asked for again, perhaps by another command or connection: each one is answered."""
-        self.link = asker.link
-        if asker not in self.askers:
-            if len(self.askers) >= _MOST_ASKERS:
-                asker.tell(TEMPORARILY_REJECTED)
+        if self.answered:
+            return
+        self.link = asked.link
+        if asked not in self.asked_by:
+            if len(self.asked_by) >= _MOST_ASKING:
+                asked.tell(TEMPORARILY_REJECTED)
                 return
-            self.askers.append(asker)
+            self.asked_by.append(asked)
         if self.told_us:
-            asker.tell(IN_PROGRESS)
+            asked.tell(IN_PROGRESS)
 
     def move(self, gone: set[int], link: ClientLink) -> None:
         """Another connection of the client is there: it gets the answers to those that are gone."""
         self.link = link if self.link.client in gone else self.link
-        moved = (each._replace(link=link) if each.link.client in gone else each for each in self.askers)
-        self.askers = list(dict.fromkeys(moved))
+        moved = (each._replace(link=link) if each.link.client in gone else each for each in self.asked_by)
+        self.asked_by = list(dict.fromkeys(moved))
 
     def tick(self, now_us: int) -> None:
         """Tell the client that it is in progress; give up when nobody answers."""

@@ -152,10 +152,12 @@ def set_parameter(
     return False
 
 
-def tell_parameter(link: ClientLink, known: Received, shadows: bool = True) -> None:
+def tell_parameter(link: ClientLink, known: Received, *, bytewise: bool) -> None:
     """Send a parameter as it was seen, or as this client set it for itself."""
-    name, value = parameter_name(known), known.fields["param_value"]
-    _tell_parameter(link, known, known, link.shadows.get(name, value) if shadows else value)
+    value = known.fields["param_value"]
+    shadow = link.shadows.get(parameter_name(known))
+    own = None if shadow is None else encode(shadow, known.fields["param_type"], bytewise=bytewise)
+    _tell_parameter(link, known, known, value if own is None else own)
 
 
 def _tell_parameter(link: ClientLink, named: Received, known: Received | None, value: float) -> None:

@@ -10,20 +10,14 @@ from dataclasses import dataclass
 from math import isnan
 from typing import Any, Final
 
-from rtshcua.ground.gateway.client_frames import (
-    AUTOPILOT_VERSION,
-    COMMAND_ACK,
-    HOME_POSITION,
-    LOG_REQUEST_LIST,
-    Received,
-    made,
-)
+from rtshcua.ground.gateway.client_frames import Received, made
 from rtshcua.ground.gateway.client_link import ClientLink
 from rtshcua.ground.gateway.habits import tell_parameter
 from rtshcua.ground.gateway.interface import Action, GatewaySettings, RequestFrame
 from rtshcua.ground.gateway.translation import ACCEPTED, DENIED, FAILED, IN_PROGRESS, TEMPORARILY_REJECTED, UNSUPPORTED
 from rtshcua.ground.gateway.vehicle_seen import FRESH_US, LASTING, VehicleSeen
 from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink.parameters import is_bytewise
 
 #: the interval of request frames to the flight, us, and how many may wait
 REQUEST_EVERY_US: Final = 50_000
@@ -45,7 +39,10 @@ SHORTEST_US: Final = 20_000
 _GET_HOME_POSITION: Final = 410
 _REQUEST_PROTOCOL_VERSION: Final = 519
 _REQUEST_AUTOPILOT_CAPABILITIES: Final = 520
-_REQUESTS: Final = {_GET_HOME_POSITION: HOME_POSITION, _REQUEST_AUTOPILOT_CAPABILITIES: AUTOPILOT_VERSION}
+_REQUESTS: Final = {
+    _GET_HOME_POSITION: layouts.HOME_POSITION,
+    _REQUEST_AUTOPILOT_CAPABILITIES: layouts.AUTOPILOT_VERSION,
+}
 #: the commands that are answered here
 COMMANDS: Final = frozenset(
     {*_REQUESTS, enums.MAV_CMD_REQUEST_MESSAGE, enums.MAV_CMD_SET_MESSAGE_INTERVAL, _REQUEST_PROTOCOL_VERSION}
@@ -109,6 +106,7 @@ class HarmlessRequests:
         self._target = {"target_system": settings.system, "target_component": enums.MAV_COMP_ID_AUTOPILOT1}
         self._seen = seen
         self._actions = actions
+        self._bytewise = is_bytewise(settings.autopilot)
         self._number = 0
         self._sequence = 0
         self._waiting: deque[_Request] = deque()
@@ -227,7 +225,7 @@ class HarmlessRequests:
             every = self._seen.parameters.values()
             known = next((each for each in every if each.fields["param_index"] == index), None)
         if known is not None:
-            tell_parameter(link, known)
+            tell_parameter(link, known, bytewise=self._bytewise)
         elif self._may(link, "parameters", now_us):
             self._hand_in(
                 link,
@@ -260,7 +258,7 @@ class HarmlessRequests:
         """LOG_REQUEST_LIST."""
         if self._may(link, "logs", now_us):
             start, end = message.fields["start"], message.fields["end"]
-            self._hand_in(link, LOG_REQUEST_LIST, start=start, end=end, **self._target)
+            self._hand_in(link, layouts.LOG_REQUEST_LIST, start=start, end=end, **self._target)
 
     def _may(self, link: ClientLink, kind: str, now_us: int) -> bool:
         if kind in link.settings.requests:
@@ -278,7 +276,7 @@ class HarmlessRequests:
         if not self._awaited:
             return
         self._end([each for each in self._awaited if each.wanted[0] == number], ACCEPTED)
-        answer = self._seen.message(COMMAND_ACK) if number == COMMAND_ACK and self._awaited else None
+        answer = self._seen.message(layouts.COMMAND_ACK) if number == layouts.COMMAND_ACK and self._awaited else None
         if answer is not None and answer.fields["command"] == enums.MAV_CMD_REQUEST_MESSAGE:
             ours = self._is_ours(answer) and answer.fields["result"] not in (ACCEPTED, IN_PROGRESS)
             refused = [each for each in self._awaited if ours and each.wanted == self._awaited[0].wanted]
@@ -315,7 +313,7 @@ class HarmlessRequests:
         self._send_lasting(now_us)
         for client, (link, rest) in list(self._lists.items()):
             for _ in range(min(_PARAMETERS_AT_ONCE, len(rest))):
-                tell_parameter(link, rest.popleft())
+                tell_parameter(link, rest.popleft(), bytewise=self._bytewise)
             if not rest:
                 del self._lists[client]
 

@@ -12,7 +12,7 @@ from math import isnan
 from typing import Any, Final, NamedTuple
 
 from rtshcua.ground.gateway.accepted import ITEM
-from rtshcua.ground.gateway.client_frames import MISSION_ITEM, Received
+from rtshcua.ground.gateway.client_frames import Received
 from rtshcua.ground.gateway.client_link import ClientLink
 from rtshcua.ground.gateway.interface import ProposedStep
 from rtshcua.ground.gateway.translation import ACCEPTED, UNSUPPORTED, Translation, Untranslated
@@ -203,7 +203,7 @@ class PlanTransfer:
             self._answer(message.sender, MISSION_INVALID_SEQUENCE, kind)
             return
         whole = message.message == layouts.MISSION_REQUEST_INT
-        number = layouts.MISSION_ITEM_INT if whole else MISSION_ITEM
+        number = layouts.MISSION_ITEM_INT if whole else layouts.MISSION_ITEM
         fields = _in_form(items[at], whole=whole) | _target(message.sender) | {"seq": at, "current": 0}
         self._link.send(number, **fields)
 
@@ -341,7 +341,7 @@ def _has_place(item: Received) -> bool:
 def _in_form(item: Received, *, whole: bool) -> dict[str, Any]:
     """The fields of an item, with its place in the requested form."""
     fields = dict(item.fields)
-    if whole and item.message == MISSION_ITEM:
+    if whole and item.message == layouts.MISSION_ITEM:
         for name in ("x", "y"):
             scaled = item.number(name) * 1e7
             fields[name] = enums.NO_PLACE if isnan(scaled) or abs(scaled) >= enums.NO_PLACE else round(scaled)

@@ -10,8 +10,9 @@ from math import isfinite, isnan
 from typing import Final, NamedTuple, TypeAlias
 
 from rtshcua.ground.agent.value_patterns import written
-from rtshcua.ground.gateway.accepted import AcceptedCommand, ArgumentSource
-from rtshcua.ground.gateway.client_frames import MISSION_ITEM, Received
+from rtshcua.ground.checker.checks.accepts import scale_of
+from rtshcua.ground.gateway.accepted import UNITS_OF_PARAMETERS, AcceptedCommand, ArgumentSource
+from rtshcua.ground.gateway.client_frames import Received
 from rtshcua.ground.gateway.interface import GatewaySettings, ProposedStep
 from rtshcua.ground.gateway.vehicle_seen import VehicleSeen
 from rtshcua.mavlink import enums, layouts
@@ -39,21 +40,10 @@ HOME_FRAMES: Final = frozenset({enums.MAV_FRAME_GLOBAL_RELATIVE_ALT, enums.MAV_F
 _WHOLE: Final = frozenset({layouts.COMMAND_INT, layouts.MISSION_ITEM_INT, layouts.SET_POSITION_TARGET_GLOBAL_INT})
 #: the names of a table's fields in messages with x, y and z
 _PLACED: Final = {"param5": "x", "param6": "y", "param7": "z"}
-_WITH_XYZ: Final = frozenset({layouts.COMMAND_INT, layouts.MISSION_ITEM_INT, MISSION_ITEM})
+_WITH_XYZ: Final = frozenset({layouts.COMMAND_INT, layouts.MISSION_ITEM_INT, layouts.MISSION_ITEM})
 _POLE: Final = 900_000_000
 #: what an argument is that the message does not give, without a look at the vehicle's parameters
 _WITHOUT_VALUE: Final = frozenset({"default", "here", ""})
-#: canonical units in the unit of an autopilot's parameter (m, m/s, s, deg, V, %), by dimension
-_OF_PARAMETERS: Final = {
-    Dimension.LENGTH: 1_000,
-    Dimension.ALTITUDE: 1_000,
-    Dimension.SPEED: 1_000,
-    Dimension.DURATION: 1_000_000,
-    Dimension.ANGLE: 10_000_000,
-    Dimension.VOLTAGE: 1_000,
-    Dimension.RATIO: 100,
-    Dimension.COUNT: 1,
-}
 #: an argument: its cells in canonical units, and its text in the language
 Argument: TypeAlias = tuple[tuple[int, ...], str]
 
@@ -199,7 +189,9 @@ class Translation:
         known = shadows.get(name, self._seen.parameter(name))
         if known is None:
             return Untranslated(TEMPORARILY_REJECTED, f"{name} is not known yet: name the {parameter.name}", name)
-        value = quantise(known, _OF_PARAMETERS[Dimension(parameter.dimension)], 1)
+        dimension = Dimension(parameter.dimension)
+        scale = scale_of(UNITS_OF_PARAMETERS[dimension], dimension)
+        value = None if scale is None else quantise(known, scale, 1)
         if value is None or abs(value) > MAX_VALUE:
             return Untranslated(DENIED, f"{name} is not a number in range")
         above = self._above(datum)

@@ -2,7 +2,7 @@
 
 from typing import Final
 
-from rtshcua.ground.gateway.client_frames import AUTOPILOT_VERSION, HOME_POSITION, Received, received
+from rtshcua.ground.gateway.client_frames import Received, received
 from rtshcua.mavlink import enums, layouts
 from rtshcua.mavlink.framing import HEADER, message_id, sender_of, unsigned
 
@@ -12,7 +12,7 @@ _MOST_PARAMETERS: Final = 4_096
 #: how old a position may be that stands for "here", us
 FRESH_US: Final = 2_000_000
 #: messages that stay true, however old they are, until the vehicle starts again
-LASTING: Final = frozenset({AUTOPILOT_VERSION, HOME_POSITION})
+LASTING: Final = frozenset({layouts.AUTOPILOT_VERSION, layouts.HOME_POSITION})
 #: by how much the time since the vehicle's start goes back only at another start, ms
 _RESTART_MS: Final = 2_000
 
@@ -73,7 +73,7 @@ class VehicleSeen:
     @property
     def home_amsl(self) -> int | None:
         """The height of home above mean sea level, mm."""
-        home = self.message(HOME_POSITION)
+        home = self.message(layouts.HOME_POSITION)
         return None if home is None else int(home.fields["altitude"])
 
     def here(self, now_us: int) -> Received | None:

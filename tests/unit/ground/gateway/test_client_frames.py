@@ -8,13 +8,8 @@ from pymavlink.dialects.v10 import ardupilotmega as mavlink1
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from pymavlink.generator.mavcrc import x25crc
 
-from rtshcua.ground.gateway.client_frames import (
-    CONTROL_STATUS,
-    LAYOUTS_OF_CLIENTS,
-    LOG_REQUEST_LIST,
-    made,
-    received,
-)
+from rtshcua.ground.gateway.client_frames import LAYOUTS_OF_CLIENTS, made, received
+from rtshcua.mavlink import layouts
 from rtshcua.mavlink.layouts import LAYOUTS
 
 #: layouts that begin like the message but do not have all of its fields
@@ -22,7 +17,7 @@ SHORT = {69, 82, 242, 256}
 
 
 def kinds() -> Iterator[tuple[int, Any]]:
-    for number in sorted(LAYOUTS_OF_CLIENTS.keys() - LAYOUTS.keys() - {CONTROL_STATUS}):
+    for number in sorted(LAYOUTS_OF_CLIENTS.keys() - LAYOUTS.keys() - {layouts.CONTROL_STATUS}):
         yield number, mavlink.mavlink_map[number]
 
 
@@ -47,12 +42,12 @@ def test_layouts_are_those_of_pymavlink() -> None:
 
 def test_a_control_status_has_the_layout_of_the_development_dialect() -> None:
     """By hand from development.xml of July 2026: flags, gcs_main, and ten secondary stations, which are 0 here."""
-    frame = made(CONTROL_STATUS, {"gcs_main": 255, "flags": 1}, (1, 1), 7)
+    frame = made(layouts.CONTROL_STATUS, {"gcs_main": 255, "flags": 1}, (1, 1), 7)
     assert frame[:12] == bytes([0xFD, 2, 0, 0, 7, 1, 1, 0x00, 0x02, 0, 1, 255])
     checksum = x25crc()
     checksum.accumulate_str("CONTROL_STATUS uint8_t flags uint8_t gcs_main uint8_t gcs_secondary ")
     checksum.accumulate(bytes([10]))
-    assert LAYOUTS_OF_CLIENTS[CONTROL_STATUS].extra == (checksum.crc & 0xFF) ^ (checksum.crc >> 8)
+    assert LAYOUTS_OF_CLIENTS[layouts.CONTROL_STATUS].extra == (checksum.crc & 0xFF) ^ (checksum.crc >> 8)
 
 
 def test_frames_of_the_second_version_are_read() -> None:
@@ -111,11 +106,11 @@ def test_a_value_that_is_no_whole_number_is_none() -> None:
 
 
 def test_a_made_frame_is_one_for_pymavlink() -> None:
-    frame = made(LOG_REQUEST_LIST, {"end": 0xFFFF, "target_system": 1, "target_component": 1}, (1, 191), 300)
+    frame = made(layouts.LOG_REQUEST_LIST, {"end": 0xFFFF, "target_system": 1, "target_component": 1}, (1, 191), 300)
     message = mavlink.MAVLink(None).decode(bytearray(frame))
     assert (message.get_type(), message.start, message.end, message.get_seq()) == ("LOG_REQUEST_LIST", 0, 0xFFFF, 44)
     with pytest.raises(ValueError, match="format"):
-        made(LOG_REQUEST_LIST, {"end": 1 << 20}, (1, 191), 0)
+        made(layouts.LOG_REQUEST_LIST, {"end": 1 << 20}, (1, 191), 0)
 
 
 @given(st.binary(max_size=300))

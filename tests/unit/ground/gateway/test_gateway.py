@@ -952,7 +952,7 @@ def test_the_number_of_clients_is_bounded() -> None:
     world = GatewayWorld()
     for client in range(2, 400):
         world.client(client, "crowd")
-    assert len(world.gateway._clients) == 256
+    assert len(world.gateway._state.clients) == 256
 
 
 def test_what_is_kept_of_the_vehicle_is_bounded() -> None:
@@ -963,7 +963,7 @@ def test_what_is_kept_of_the_vehicle_is_bounded() -> None:
         world.take(FromVehicle(value[:7] + (1_000 + kind).to_bytes(3, "little") + value[10:]))
     for index in range(5_000):
         world.vehicle(mavlink.MAVLink_param_value_message(f"P{index}".encode(), 1, 9, 5_000, index))
-    seen = world.gateway._seen
+    seen = world.gateway._state.seen
     assert (len(seen._frames), len(seen.parameters)) == (512, 4_096)
     world.take(FromVehicle(value[:-1] + bytes([value[-1] ^ 1])))
     assert "P" not in seen.parameters, "a damaged frame"

@@ -323,10 +323,10 @@ def test_a_refused_target_is_told_once_in_five_seconds_however_often_it_comes() 
         said += texts(world.send(setpoint(z=55)))
     assert said == ["goto denied: altitude 55 m, accepted 40 m (authority/out-of-scope)"] * 2
     home_unknown = GatewayWorld()
-    home_unknown.gateway._seen._frames.pop(242)
+    home_unknown.gateway._state.seen._frames.pop(242)
     home_unknown.fly()
     home_unknown.offboard()
-    home_unknown.gateway._seen._frames.pop(242)
+    home_unknown.gateway._state.seen._frames.pop(242)
     assert len(texts(home_unknown.send(setpoint(z=508, frame=5)))) == 1
     assert texts(home_unknown.send(setpoint(z=508, frame=5))) == []
 
@@ -399,7 +399,7 @@ def test_long_texts_come_in_chunks_and_records_stay_short() -> None:
 def test_a_long_text_in_a_record_is_cut_between_words() -> None:
     world = GatewayWorld()
     reason = "the way home from there is longer than the charge that is left for it permits, so it is refused"
-    world.gateway._clients[1].link.record("refused", world.now_us, reason=reason)
+    world.gateway._state.clients[1].link.record("refused", world.now_us, reason=reason)
     (note,) = (each for each in world.wait() if isinstance(each, ClientNote))
     assert note.said == {"client": "script", "effect": "refused", "reason": reason}
     assert json.loads(note.text)["reason"] == "the way home from there is longer than the charge that is left for it..."
@@ -407,7 +407,7 @@ def test_a_long_text_in_a_record_is_cut_between_words() -> None:
 
 def test_a_text_of_whole_chunks_ends_with_an_empty_one() -> None:
     world = GatewayWorld()
-    link = world.gateway._clients[1].link
+    link = world.gateway._state.clients[1].link
     link.text("x" * 100, world.now_us)
     chunks = [message.text for message in told(world.wait())]
     assert chunks == ["x" * 50, "x" * 50, ""]

@@ -258,7 +258,7 @@ def test_the_list_of_messages_that_are_awaited_is_bounded() -> None:
     for number in range(300, 400):
         results.append(acks(world.send(command_long(512, number)) + world.wait(1, step_us=1)))
         world.now_us += 1
-        world.gateway._requests._next_us = 0
+        world.gateway._state.requests._next_us = 0
     assert results.count([(512, 1)]) == 36
 
 

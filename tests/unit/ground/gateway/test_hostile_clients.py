@@ -19,7 +19,7 @@ from reference.gateway_world import (
     reposition,
     setpoint,
 )
-from rtshcua.ground.gateway.client_frames import LAYOUTS_OF_CLIENTS, LOG_REQUEST_LIST, made
+from rtshcua.ground.gateway.client_frames import LAYOUTS_OF_CLIENTS, made
 from rtshcua.ground.gateway.interface import (
     Action,
     ClientDown,
@@ -33,6 +33,7 @@ from rtshcua.ground.gateway.interface import (
     ToClient,
 )
 from rtshcua.ground.gateway.translation import Translation
+from rtshcua.mavlink import layouts
 from rtshcua.mavlink.modes import ARDUPILOT, PX4
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.onboard.enforcement.allow_list import is_housekeeping, read_frame
@@ -76,7 +77,7 @@ def checked(world: GatewayWorld, actions: list[Action]) -> None:
                 if read is not None:
                     assert is_housekeeping(read)
                 else:
-                    assert int.from_bytes(frame[7:10], "little") == LOG_REQUEST_LIST
+                    assert int.from_bytes(frame[7:10], "little") == layouts.LOG_REQUEST_LIST
                 assert frame[5:7] == bytes([SYSTEM, 191])
             case ToClient(_, frame):
                 assert frame[5:7] == bytes([SYSTEM, 1])
@@ -199,7 +200,9 @@ def test_no_sequence_of_frames_leaves_the_table(autopilot: int, events: list[tup
 @settings(deadline=None)
 def test_without_rows_nothing_is_proposed(frame: bytes, flies: bool) -> None:
     world = GatewayWorld()
-    world.gateway._translation = Translation(world.gateway._settings._replace(accepted=()), world.gateway._seen)
+    world.gateway._state.translation = Translation(
+        world.gateway._state.settings._replace(accepted=()), world.gateway._state.seen
+    )
     world.ready()
     if flies:
         world.fly()

@@ -123,7 +123,7 @@ def test_what_stands_for_here_needs_a_fresh_position() -> None:
 
 def test_an_unknown_height_of_home_is_rejected_for_now() -> None:
     world = GatewayWorld()
-    world.gateway._seen._frames.pop(242)
+    world.gateway._state.seen._frames.pop(242)
     world.ready()
     assert one(world, command_long(22, 0, 0, 0, 0, 0, 0, 500)) == [
         (22, 1),
@@ -190,13 +190,13 @@ def test_rows_of_another_autopilot_do_not_count() -> None:
 
 def test_a_skill_without_a_rule_of_the_policy_is_denied() -> None:
     world = aloft()
-    del world.gateway._translation._contracts["goto"]
+    del world.gateway._state.translation._contracts["goto"]
     assert one(world, reposition()) == [(192, 2), "goto: no rule of bridge_inspection names this skill"]
 
 
 def test_a_parameter_without_a_value_is_denied() -> None:
     world = aloft()
-    world.gateway._translation._defaults = {}
+    world.gateway._state.translation._defaults = {}
     assert one(world, command_long(193, 0)) == [(193, 2), "hover: time is missing"]
 
 
@@ -209,5 +209,7 @@ def test_a_choice_or_a_zone_cannot_be_given_by_a_field() -> None:
     inspect = ArgumentSource("area", ("param1",), 1, "", "")
     row = AcceptedCommand("inspect_area", "command", "MAV_CMD_USER_1", 31010, "", (), (inspect,))
     rows = (*ROWS, row)
-    world.gateway._translation = Translation(world.gateway._settings._replace(accepted=rows), world.gateway._seen)
+    world.gateway._state.translation = Translation(
+        world.gateway._state.settings._replace(accepted=rows), world.gateway._state.seen
+    )
     assert one(world, command_long(31010, 1)) == [(31010, 2), "inspect_area: area cannot be given by a MAVLink field"]

@@ -42,11 +42,10 @@ class ClientMissions:
         for client in dict.fromkeys(self._uploads.values()):
             client.transfer.checked("the policy was renewed: upload it again", now_us)
         self._uploads.clear()
+        autopilot = self._state.settings.autopilot
         for name, plan in list(self._state.plans.items()):
             source = self._state.sources[name]
-            read = read_plan(
-                plan.items, self._state.translation, source.shadows, now_us, self._state.settings.autopilot
-            )
+            read = read_plan(plan.items, self._state.translation, source.shadows, now_us, autopilot)
             if isinstance(read, RefusedPlan):
                 self._withdraw(name, read.text, now_us)
                 continue
@@ -105,7 +104,7 @@ class ClientMissions:
                 client.reject(f"item {command} has no mapping", command, now_us)
                 result: int | None = UNSUPPORTED
             else:
-                step = self._state.step(client, row, message, now_us)
+                step = self._state.step(client.link, row, message, now)
                 result = self._proposing.propose(client, message, step, command, now)
             if result is not None:
                 client.transfer.answer_guided(message.sender, result)
@@ -207,17 +206,10 @@ class ClientMissions:
                 state = _PAUSED if proposal.ended else _ACTIVE
         if always or (item, state) != client.reported:
             client.reported = item, state
-            client.link.send(
-                layouts.MISSION_CURRENT, seq=item, total=len(plan.items), mission_state=state, mission_mode=1
-            )
+            total = len(plan.items)
+            client.link.send(layouts.MISSION_CURRENT, seq=item, total=total, mission_state=state, mission_mode=1)
 
-    def transferred(
-        self,
-        function: Callable[[PlanTransfer, Received, int], None],
-        client: ConnectedClient,
-        message: Received,
-        now: Now,
-    ) -> None:
+    def transferred(self, function: _Transfer, client: ConnectedClient, message: Received, now: Now) -> None:
         """A message that begins an upload, or clears."""
         now_us, plan = now.monotonic_us, client.transfer.plan
         if self._flies(client) and PlanTransfer.clears(message):
@@ -236,7 +228,5 @@ class ClientMissions:
             if why:
                 each.link.text(why, now_us)
                 each.link.record("withdrawn", now_us, message="MISSION_COUNT", reason=why)
-            each.shown.of_mission = (
-                frozenset({layouts.MISSION_CURRENT, layouts.MISSION_ITEM_REACHED}) if has else frozenset()
-            )
+            each.shown.of_mission = _REPORTS if has else frozenset()
             each.shown.update(now_us)

@@ -17,6 +17,7 @@ from rtshcua.ground.gateway.translation import Translation, Untranslated, shadow
 from rtshcua.ground.gateway.vehicle_seen import VehicleSeen
 from rtshcua.mavlink import enums
 from rtshcua.model.flat.contract import MotionKind
+from rtshcua.model.flat.situation import Now
 
 #: the most decisions a second on commands of one client; those that stop, return or land are counted apart
 MOST_DECISIONS: Final = 20
@@ -155,11 +156,9 @@ class GatewayState:
         contracts = (self.translation.contract(each.skill) for each in proposal.steps[max(proposal.done, 0) :])
         return all(each is not None and each.motion.kind in _DOWN for each in contracts) and not proposal.ended
 
-    def step(
-        self, client: ConnectedClient, row: AcceptedCommand, message: Received, now_us: int
-    ) -> ProposedStep | Untranslated:
+    def step(self, link: ClientLink, row: AcceptedCommand, message: Received, now: Now) -> ProposedStep | Untranslated:
         """The step for a message of a client that matches a row; a parameter that is missing for it is requested."""
-        step = self.translation.step(row, message, client.link.shadows, now_us)
+        step = self.translation.step(row, message, link.shadows, now.monotonic_us)
         if isinstance(step, Untranslated) and step.wanted:
-            self.requests.want_parameter(client.link, step.wanted)
+            self.requests.want_parameter(link, step.wanted)
         return step

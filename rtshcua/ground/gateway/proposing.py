@@ -60,9 +60,7 @@ class _Held:
 class Proposing:
     """The proposals of all clients of one gateway. `again` handles a command that has waited for a flight."""
 
-    def __init__(
-        self, state: GatewayState, control: Control, again: Callable[[ConnectedClient, Received, Now], None]
-    ) -> None:
+    def __init__(self, state: GatewayState, control: Control, again: Handler) -> None:
         self._state, self._control, self._again = state, control, again
         self._held: list[_Held] = []
         #: whether a command may wait for a flight: not one that has waited

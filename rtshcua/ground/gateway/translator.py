@@ -158,6 +158,7 @@ class Gateway:
         def asks(function: Callable[[ClientLink, Received, int], None]) -> Handler:
             return lambda client, message, now: function(client.link, message, now.monotonic_us)
 
+        requests = self._state.requests
         return {
             layouts.COMMAND_LONG: self._command,
             layouts.COMMAND_INT: self._command,
@@ -165,9 +166,7 @@ class Gateway:
             **dict.fromkeys(SETPOINTS, self._setpoint),
             layouts.PARAM_SET: self._param_set,
             layouts.PARAM_REQUEST_READ: self._param_read,
-            layouts.PARAM_REQUEST_LIST: asks(
-                lambda link, _, now_us: self._state.requests.list_parameters(link, now_us)
-            ),
+            layouts.PARAM_REQUEST_LIST: asks(lambda link, _, now_us: requests.list_parameters(link, now_us)),
             layouts.MISSION_COUNT: transfer(PlanTransfer.count),
             layouts.MISSION_CLEAR_ALL: transfer(PlanTransfer.clear),
             layouts.MISSION_WRITE_PARTIAL_LIST: transfer(PlanTransfer.unsupported),
@@ -178,9 +177,9 @@ class Gateway:
             layouts.MISSION_REQUEST_INT: lambda client, message, now: client.transfer.request(message),
             layouts.MISSION_ACK: lambda client, message, now: client.transfer.acknowledged(message),
             layouts.MISSION_SET_CURRENT: self._missions.set_current,
-            layouts.REQUEST_DATA_STREAM: asks(self._state.requests.data_stream),
-            layouts.TIMESYNC: asks(self._state.requests.time),
-            layouts.LOG_REQUEST_LIST: asks(self._state.requests.logs),
+            layouts.REQUEST_DATA_STREAM: asks(requests.data_stream),
+            layouts.TIMESYNC: asks(requests.time),
+            layouts.LOG_REQUEST_LIST: asks(requests.logs),
             layouts.AUTOPILOT_VERSION_REQUEST: self._version,
             layouts.FILE_TRANSFER_PROTOCOL: self._files,
         }
@@ -255,9 +254,8 @@ class Gateway:
         """A command that the table may have; its result, None if the answer comes later."""
         row, now_us = self._state.translation.row(COMMAND, command, message), now.monotonic_us
         if row is not None:
-            return self._proposing.propose(
-                client, message, self._state.step(client, row, message, now_us), command, now
-            )
+            step = self._state.step(client.link, row, message, now)
+            return self._proposing.propose(client, message, step, command, now)
         known = self._state.translation.knows(COMMAND, command)
         why = "with these parameters is refused" if known else "has no mapping"
         client.reject(f"command {command} {why}", command, now_us)
@@ -279,7 +277,7 @@ class Gateway:
             client.link.text(f"setpoints wait until you ask for mode {mode}", now_us, "guided", NOTICE)
             client.link.record("refused", now_us, message=message.message, reason=f"not in {mode}")
             return
-        result = self._proposing.propose(client, message, self._state.step(client, row, message, now_us), -1, now)
+        result = self._proposing.propose(client, message, self._state.step(client.link, row, message, now), -1, now)
         if result not in (None, ACCEPTED):
             client.setpoint_us = now_us + REFUSED_US
 
@@ -322,11 +320,8 @@ class Gateway:
             names = PX4_NAMES if self._state.settings.autopilot == PX4 else COPTER_NAMES
             client.reject(f"mode {names.get(mode, str(mode))} has no mapping", command, now_us)
             return DENIED
-        if (
-            self._state.rests
-            and self._state.translation.contract(row.skill) is not None
-            and not self._state.climbs(row.skill)
-        ):
+        state = self._state
+        if state.rests and state.translation.contract(row.skill) is not None and not state.climbs(row.skill):
             self._proposing.take_back(f"{client.link.name} asks for {row.skill}", now_us, client.link.name)
             client.source.guided = False
             hindrance = self._proposing.takes_off()
@@ -335,13 +330,11 @@ class Gateway:
                 return hindrance[0]
             client.shown.show_mode(mode, now_us)
             return ACCEPTED
-        return self._proposing.propose(client, message, self._state.step(client, row, message, now_us), command, now)
+        return self._proposing.propose(client, message, self._state.step(client.link, row, message, now), command, now)
 
     def _param_set(self, client: ConnectedClient, message: Received, now: Now) -> None:
-        bytewise = is_bytewise(self._state.settings.autopilot)
-        known = set_parameter(
-            client.link, self._state.seen, message, self._state.shadowed, now.monotonic_us, bytewise=bytewise
-        )
+        state, bytewise = self._state, is_bytewise(self._state.settings.autopilot)
+        known = set_parameter(client.link, state.seen, message, state.shadowed, now.monotonic_us, bytewise=bytewise)
         if not known and "parameters" in client.link.settings.requests:
             self._state.requests.want_parameter(client.link, parameter_name(message))
 
@@ -349,23 +342,19 @@ class Gateway:
         self._state.requests.read_parameter(client.link, message, parameter_name(message), now.monotonic_us)
 
     def _version(self, client: ConnectedClient, message: Received, now: Now) -> None:
-        self._state.requests.message(
-            client.link, message.sender, enums.MAV_CMD_REQUEST_MESSAGE, layouts.AUTOPILOT_VERSION, now.monotonic_us
-        )
+        asked = client.link, message.sender, enums.MAV_CMD_REQUEST_MESSAGE, layouts.AUTOPILOT_VERSION
+        self._state.requests.message(*asked, now.monotonic_us)
 
     def _files(self, client: ConnectedClient, message: Received, now: Now) -> None:
         """FTP is refused, with the protocol's own answer, so that no client waits for it."""
         payload = message.fields["payload"]
         sequence = int.from_bytes(payload[:2], "little") + 1 & 0xFFFF
         refusal, unknown_command = 129, 7
-        answer = sequence.to_bytes(2, "little") + bytes(
-            [payload[2], refusal, 1, payload[3], 0, 0, *bytes(4), unknown_command]
-        )
-        system, component = message.sender
-        client.link.send(
-            layouts.FILE_TRANSFER_PROTOCOL, target_system=system, target_component=component, payload=answer
-        )
-        client.link.record("refused", now.monotonic_us, message=layouts.FILE_TRANSFER_PROTOCOL)
+        said = bytes([payload[2], refusal, 1, payload[3], 0, 0, *bytes(4), unknown_command])
+        target = dict(zip(("target_system", "target_component"), message.sender, strict=True))
+        number = layouts.FILE_TRANSFER_PROTOCOL
+        client.link.send(number, **target, payload=sequence.to_bytes(2, "little") + said)
+        client.link.record("refused", now.monotonic_us, message=number)
 
     def _tick(self, now: Now) -> None:
         now_us = now.monotonic_us

@@ -17,17 +17,24 @@ def numbers(of: ModuleType) -> dict[str, int]:
 
 
 MESSAGES = {name: value for name, value in numbers(layouts).items() if name not in {"HEADER", "TEXT_OCTETS"}}
+#: of the development dialect, or newer than pymavlink
+NEWER = {
+    "CONTROL_STATUS": 512,
+    "COMMAND_CANCEL": 80,
+    "PROTOCOL_VERSION": 300,
+    "MAV_CMD_REQUEST_OPERATOR_CONTROL": 32_100,
+}
 OWN_WORDS = {"POSITION_ONLY", "NO_PLACE"}
 IGNORED = ("VX", "VY", "VZ", "AX", "AY", "AZ", "YAW", "YAW_RATE")
 
 
 def test_messages_have_the_dialects_numbers() -> None:
-    theirs = {name: getattr(dialect, f"MAVLINK_MSG_ID_{name}") for name in MESSAGES}
+    theirs = {name: getattr(dialect, f"MAVLINK_MSG_ID_{name}", NEWER.get(name)) for name in MESSAGES}
     assert theirs == MESSAGES
-    assert sorted(theirs.values()) == sorted(LAYOUTS)
+    assert set(theirs.values()) >= LAYOUTS.keys()
 
 
-@rows(("number", "layout"), LAYOUTS.items(), ids=MESSAGES)
+@rows(("number", "layout"), LAYOUTS.items(), ids=[name for name, number in MESSAGES.items() if number in LAYOUTS])
 def test_layouts_are_the_dialects(number: int, layout: Layout) -> None:
     kind = dialect.mavlink_map[number]
     assert layout.names == tuple(kind.ordered_fieldnames)
@@ -56,7 +63,7 @@ def test_fields_are_taken_by_name_and_zeros_at_the_end_need_not_be_there() -> No
 @rows(("name", "value"), numbers(enums).items(), ids=numbers(enums))
 def test_numbers_are_the_dialects(name: str, value: int) -> None:
     if name not in OWN_WORDS:
-        assert value == getattr(dialect, name)
+        assert value == getattr(dialect, name, NEWER.get(name))
 
 
 def test_position_mask_ignores_all_other_fields() -> None:

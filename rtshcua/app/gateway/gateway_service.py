@@ -38,7 +38,9 @@ from rtshcua.ground.gateway.interface import ClientSettings, Event, GatewaySetti
 from rtshcua.ground.gateway.translator import Gateway
 from rtshcua.mavlink import dialect
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
-from rtshcua.mavlink.framing import HEADER, MARKER, frames_in, message_id
+from rtshcua.mavlink.framing import HEADER, MARKER, frames_in, message_id, sender_of
+from rtshcua.mavlink.layouts import HEARTBEAT
+from rtshcua.mavlink.modes import is_vehicle
 from rtshcua.model.flat.mission import Mission
 from rtshcua.model.flat.situation import UTC_UNKNOWN_US, Now
 from rtshcua.wire.clock import DRIFT_US
@@ -64,8 +66,8 @@ _MOST_RELAYS: Final = 3
 #: exit codes of a flight that it would have again
 _LASTING: Final = (ExitCode.USAGE, ExitCode.INPUT, ExitCode.UNTRUSTED)
 _DESCRIPTOR: Final = re.compile(r"\bfd:[0-9]+\b", re.ASCII)
-#: HEARTBEAT: its number, and the offset of `autopilot` in its payload; the offset of the system in a frame
-_HEARTBEAT, _AUTOPILOT_AT, _SYSTEM_AT = 0, 5, 5
+#: the offsets of `type` and `autopilot` in the payload of HEARTBEAT
+_TYPE_AT, _AUTOPILOT_AT = 4, 5
 
 
 class GatewayConsole(Protocol):
@@ -359,7 +361,7 @@ class GatewayService:
 
     def _from_vehicle(self, frame: bytes, now: Now) -> None:
         if self._heard is None and self._is_heartbeat(frame):
-            self._heard = frame[_SYSTEM_AT], frame[HEADER + _AUTOPILOT_AT]
+            self._heard = sender_of(frame)[0], frame[HEADER + _AUTOPILOT_AT]
             self._begin_core(now)
         if self._frames is not None:
             self._frames.take(frame, now.monotonic_us)
@@ -367,9 +369,10 @@ class GatewayService:
 
     def _is_heartbeat(self, frame: bytes) -> bool:
         """Whether it is a heartbeat of the vehicle's autopilot."""
-        if message_id(frame, 0) != _HEARTBEAT or frame[_SYSTEM_AT + 1] != AUTOPILOT or frame[1] <= _AUTOPILOT_AT:
+        system, component = sender_of(frame)
+        if message_id(frame, 0) != HEARTBEAT or component != AUTOPILOT or self._system not in (None, system):
             return False
-        return self._system in (None, frame[_SYSTEM_AT])
+        return frame[1] > _AUTOPILOT_AT and is_vehicle(frame[HEADER + _TYPE_AT], frame[HEADER + _AUTOPILOT_AT])
 
     def _begin_core(self, now: Now) -> None:
         """Start the core for the vehicle and the policy, and tell it which clients there are; or renew its policy."""

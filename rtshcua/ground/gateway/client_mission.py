@@ -11,8 +11,8 @@ from rtshcua.ground.gateway.gateway_state import ConnectedClient, GatewayState
 from rtshcua.ground.gateway.interface import ProposalChecked, ProposedStep
 from rtshcua.ground.gateway.plan_transfer import MISSION_DENIED, PlanTransfer, RefusedPlan, UploadedPlan, read_plan
 from rtshcua.ground.gateway.proposing import Proposing
-from rtshcua.ground.gateway.translation import ACCEPTED, DENIED, TEMPORARILY_REJECTED, UNSUPPORTED
 from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink.command_results import ACCEPTED, DENIED, TEMPORARILY_REJECTED, UNSUPPORTED
 from rtshcua.model.flat.contract import MotionKind
 from rtshcua.model.flat.situation import Now
 

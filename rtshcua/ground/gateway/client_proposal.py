@@ -11,8 +11,8 @@ from typing import Any, Final, NamedTuple
 from rtshcua.ground.gateway.client_link import NOTICE, ClientLink
 from rtshcua.ground.gateway.interface import ProposedStep
 from rtshcua.ground.gateway.plan_transfer import MISSION_ACCEPTED, MISSION_DENIED
-from rtshcua.ground.gateway.translation import ACCEPTED, CANCELLED, DENIED, IN_PROGRESS, TEMPORARILY_REJECTED
 from rtshcua.mavlink import layouts
+from rtshcua.mavlink.command_results import ACCEPTED, CANCELLED, DENIED, IN_PROGRESS, TEMPORARILY_REJECTED
 from rtshcua.wire.request import STEP
 
 #: from when on a waiting command is in progress, and how often that is repeated, us

@@ -16,8 +16,8 @@ from rtshcua.ground.gateway.client_frames import SETPOINTS, Received, received
 from rtshcua.ground.gateway.client_link import ClientLink
 from rtshcua.ground.gateway.client_proposal import ClientProposal
 from rtshcua.ground.gateway.gateway_state import ConnectedClient, GatewayState
-from rtshcua.ground.gateway.translation import ACCEPTED, DENIED
 from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink.command_results import ACCEPTED, DENIED
 
 #: how long a client keeps control after its last step, us
 KEEPS_US: Final = 10_000_000

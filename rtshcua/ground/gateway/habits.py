@@ -12,9 +12,9 @@ from typing import Final
 from rtshcua.ground.gateway.client_frames import Received
 from rtshcua.ground.gateway.client_link import NOTICE, ClientLink
 from rtshcua.ground.gateway.interface import Action, Withhold
-from rtshcua.ground.gateway.translation import ACCEPTED, DENIED, TEMPORARILY_REJECTED
 from rtshcua.ground.gateway.vehicle_seen import VehicleSeen, parameter_name
 from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink.command_results import ACCEPTED, DENIED, TEMPORARILY_REJECTED
 from rtshcua.mavlink.modes import PX4
 from rtshcua.mavlink.parameters import decode, encode
 

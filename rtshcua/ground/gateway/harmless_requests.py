@@ -14,9 +14,9 @@ from rtshcua.ground.gateway.client_frames import Received, made
 from rtshcua.ground.gateway.client_link import ClientLink
 from rtshcua.ground.gateway.habits import tell_parameter
 from rtshcua.ground.gateway.interface import Action, GatewaySettings, RequestFrame
-from rtshcua.ground.gateway.translation import ACCEPTED, DENIED, FAILED, IN_PROGRESS, TEMPORARILY_REJECTED, UNSUPPORTED
 from rtshcua.ground.gateway.vehicle_seen import FRESH_US, LASTING, VehicleSeen
 from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink.command_results import ACCEPTED, DENIED, FAILED, IN_PROGRESS, TEMPORARILY_REJECTED, UNSUPPORTED
 from rtshcua.mavlink.parameters import is_bytewise
 
 #: the interval of request frames to the flight, us, and how many may wait

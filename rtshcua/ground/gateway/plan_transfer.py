@@ -15,8 +15,9 @@ from rtshcua.ground.gateway.accepted import ITEM
 from rtshcua.ground.gateway.client_frames import Received
 from rtshcua.ground.gateway.client_link import ClientLink
 from rtshcua.ground.gateway.interface import ProposedStep
-from rtshcua.ground.gateway.translation import ACCEPTED, UNSUPPORTED, Translation, Untranslated
+from rtshcua.ground.gateway.translation import Translation, Untranslated
 from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink.command_results import ACCEPTED, UNSUPPORTED
 from rtshcua.mavlink.modes import ARDUPILOT
 from rtshcua.model.flat.contract import MotionKind
 

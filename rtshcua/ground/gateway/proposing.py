@@ -16,15 +16,9 @@ from rtshcua.ground.gateway.control import Control
 from rtshcua.ground.gateway.gateway_state import MOST_DECISIONS, ConnectedClient, FlightSeen, GatewayState
 from rtshcua.ground.gateway.interface import Cancel, ProposalChecked, ProposedStep, Withdraw
 from rtshcua.ground.gateway.quick_decision import QuickRefusal
-from rtshcua.ground.gateway.translation import (
-    ACCEPTED,
-    CANCELLED,
-    DENIED,
-    IN_PROGRESS,
-    TEMPORARILY_REJECTED,
-    Untranslated,
-)
+from rtshcua.ground.gateway.translation import Untranslated
 from rtshcua.mavlink import layouts
+from rtshcua.mavlink.command_results import ACCEPTED, CANCELLED, DENIED, IN_PROGRESS, TEMPORARILY_REJECTED
 from rtshcua.model.flat.situation import Now
 from rtshcua.wire.request import CONTINGENCY_LINK, STEP
 

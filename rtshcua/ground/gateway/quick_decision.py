@@ -19,9 +19,10 @@ from rtshcua.decision.values import FALSE, TRUE, UNKNOWN
 from rtshcua.diagnostics.refusal import Refusal
 from rtshcua.ground.analysis.plane import nearest_inside
 from rtshcua.ground.gateway.interface import GatewaySettings, ProposedStep
-from rtshcua.ground.gateway.translation import DENIED, TEMPORARILY_REJECTED, degrees
+from rtshcua.ground.gateway.translation import degrees
 from rtshcua.ground.lower.mission import straight_plan
 from rtshcua.ground.why.trace import read_values
+from rtshcua.mavlink.command_results import DENIED, TEMPORARILY_REJECTED
 from rtshcua.model.decision import Decision
 from rtshcua.model.flat.contract import Contract, SourceKind
 from rtshcua.model.flat.limits import DAY

@@ -16,21 +16,13 @@ from rtshcua.ground.gateway.client_frames import Received
 from rtshcua.ground.gateway.interface import GatewaySettings, ProposedStep
 from rtshcua.ground.gateway.vehicle_seen import VehicleSeen
 from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink.command_results import DENIED, TEMPORARILY_REJECTED
 from rtshcua.mavlink.modes import ARDUPILOT, PX4
 from rtshcua.mavlink.quantise import quantise
 from rtshcua.model.flat.contract import PLACE, QUANTITY, Contract, MotionKind, Parameter
 from rtshcua.model.flat.limits import MAX_VALUE
 from rtshcua.model.flat.zone import HALF_TURN, MAX_COORDINATE, project
 from rtshcua.model.quantity import Dimension
-
-# MAV_RESULT
-ACCEPTED: Final = 0
-TEMPORARILY_REJECTED: Final = 1
-DENIED: Final = 2
-UNSUPPORTED: Final = 3
-FAILED: Final = 4
-IN_PROGRESS: Final = 5
-CANCELLED: Final = 6
 
 _AUTOPILOTS: Final = {PX4: "px4", ARDUPILOT: "ardupilot"}
 #: frames whose heights are above mean sea level, and above home

@@ -32,13 +32,9 @@ from rtshcua.ground.gateway.interface import (
 )
 from rtshcua.ground.gateway.plan_transfer import PlanTransfer
 from rtshcua.ground.gateway.proposing import Handler, Proposing
-from rtshcua.ground.gateway.translation import (
-    ACCEPTED,
-    DENIED,
-    UNSUPPORTED,
-)
 from rtshcua.ground.gateway.vehicle_seen import parameter_name
 from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink.command_results import ACCEPTED, DENIED, UNSUPPORTED
 from rtshcua.mavlink.modes import COPTER_NAMES, PX4, PX4_NAMES, CopterMode, Px4Mode
 from rtshcua.mavlink.parameters import is_bytewise
 from rtshcua.model.flat.situation import Now
@@ -47,8 +43,9 @@ from rtshcua.model.flat.situation import Now
 REFUSED_US: Final = 200_000
 _MOST_CLIENTS: Final = 256
 
-#: commands that would change the vehicle itself: denied; other commands without a mapping are not supported
-_DANGEROUS: Final = frozenset({179, 181, 183, 184, 185, 187, 207, 209, 241, 242, 245, 246, 420, 42_428})
+#: commands that would change the vehicle itself are denied; other commands without a mapping are not supported. Here:
+#: home, relays, servos, termination, actuators, fence, motor test, calibration, offsets, storage, reboot, failures
+_DANGEROUS: Final = frozenset({179, 181, 183, 184, 185, 187, 207, 209, 241, 242, 245, 246, 420})
 #: frames that say something about the client, and request nothing
 _SAYS_NOTHING: Final = frozenset(
     {
@@ -59,6 +56,7 @@ _SAYS_NOTHING: Final = frozenset(
 )  # fmt: skip
 #: what an absorbed mode is: clients ask for it before they send targets
 _WITHOUT_EFFECT: Final = (CopterMode.GUIDED, Px4Mode.OFFBOARD)
+_COMMANDS: Final = (layouts.COMMAND_LONG, layouts.COMMAND_INT)
 _MISSION_MODES: Final = (CopterMode.AUTO, Px4Mode.MISSION)
 
 
@@ -189,10 +187,15 @@ class Gateway:
         if client is None or message is None:
             return
         client.link.hear(message, now.monotonic_us)
-        if message.message in _SAYS_NOTHING or not message.is_for(self._state.settings.system):
+        if message.message in _SAYS_NOTHING:
+            return
+        if not message.is_for(self._state.settings.system):
+            if message.message in _COMMANDS and message.fields["target_system"] == self._state.settings.system:
+                command = message.fields["command"]
+                client.reject(f"command {command} is for another component: refused", command, now.monotonic_us)
             return
         handler = self._handlers.get(message.message)
-        if message.message not in (layouts.COMMAND_LONG, layouts.COMMAND_INT):
+        if message.message not in _COMMANDS:
             client.refused = None  # it may have changed what the command was refused for
         if handler is not None:
             handler(client, message, now)

@@ -6,7 +6,7 @@ from types import ModuleType
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from rtshcua.mavlink import enums, layouts
+from rtshcua.mavlink import command_results, enums, layouts
 from rtshcua.mavlink.layouts import LAYOUTS, Layout
 from rtshcua.mavlink.modes import COPTER_NAMES, PX4_NAMES, CopterMode, Px4Mode
 from virtual.rows import rows
@@ -19,11 +19,9 @@ def numbers(of: ModuleType) -> dict[str, int]:
 MESSAGES = {name: value for name, value in numbers(layouts).items() if name not in {"HEADER", "TEXT_OCTETS"}}
 #: of the development dialect, or newer than pymavlink
 NEWER = {
-    "CONTROL_STATUS": 512,
-    "COMMAND_CANCEL": 80,
-    "PROTOCOL_VERSION": 300,
-    "MAV_CMD_REQUEST_OPERATOR_CONTROL": 32_100,
-}
+    "COMMAND_CANCEL": 80, "PROTOCOL_VERSION": 300, "CONTROL_STATUS": 512, "MAV_CMD_REQUEST_OPERATOR_CONTROL": 32_100,
+    "CANCELLED": 6,
+}  # fmt: skip
 OWN_WORDS = {"POSITION_ONLY", "NO_PLACE"}
 IGNORED = ("VX", "VY", "VZ", "AX", "AY", "AZ", "YAW", "YAW_RATE")
 
@@ -64,6 +62,11 @@ def test_fields_are_taken_by_name_and_zeros_at_the_end_need_not_be_there() -> No
 def test_numbers_are_the_dialects(name: str, value: int) -> None:
     if name not in OWN_WORDS:
         assert value == getattr(dialect, name, NEWER.get(name))
+
+
+def test_results_of_commands_are_the_dialects() -> None:
+    found = numbers(command_results)
+    assert found == {name: getattr(dialect, f"MAV_RESULT_{name}", NEWER.get(name)) for name in found}
 
 
 def test_position_mask_ignores_all_other_fields() -> None:

@@ -387,8 +387,12 @@ def test_frames_of_mavlink_1_on_the_vehicles_link_are_no_fault(policy: PolicyInF
     landed = mavlink.MAVLink_extended_sys_state_message(0, 2).pack(new)
     said = mavlink1.MAVLink_mission_current_message(7), mavlink1.MAVLink_extended_sys_state_message(0, 1)
     others = [each.pack(old) for each in said]
+    station = mavlink.MAVLink_heartbeat_message(6, 12, 0, 0, 4, 3).pack(new)
     with serving(policy, tmp_path) as (service, vehicle):
-        vehicle.send(b"".join(others))
+        vehicle.send(b"".join(others) + station)
+        for _ in range(20):
+            assert service._turn(service._wait()) is None
+        assert service._heard is None, "a ground station is no vehicle"
         vehicle.send(others[0] + beat + others[1] + landed + others[0])
         end_s = time.monotonic() + 10
         while (service._frames is None or service._frames.aloft is None) and time.monotonic() < end_s:

@@ -1,4 +1,5 @@
 import json
+import struct
 from math import nan
 from pathlib import Path
 from typing import Any
@@ -331,6 +332,28 @@ def test_a_refused_target_is_told_once_in_five_seconds_however_often_it_comes() 
     assert texts(home_unknown.send(setpoint(z=508, frame=5))) == []
 
 
+def test_a_command_for_another_component_is_refused_with_a_text_and_no_answer_in_its_name() -> None:
+    world = GatewayWorld()
+    message = command_long(2000)
+    message.target_component = 100
+    actions = world.send(message)
+    assert acks(actions) == []
+    assert texts(actions) == ["command 2000 is for another component: refused"]
+    assert [each.said["effect"] for each in actions if isinstance(each, ClientNote)] == ["refused"]
+
+
+def test_an_integer_parameter_of_a_client_is_read_back_as_px4_encodes_it() -> None:
+    """By hand: the octets of the integer 7, as a float, in place of the number 7."""
+    (number,) = struct.unpack("<f", struct.pack("<i", 7))
+    for autopilot, raw in ((PX4, number), (ARDUPILOT, 7.0)):
+        world = GatewayWorld(autopilot)
+        world.gateway._state.shadowed = frozenset({"MIS_TAKEOFF_ALT"})
+        world.vehicle(mavlink.MAVLink_param_value_message(b"MIS_TAKEOFF_ALT", 0.0, 6, 1, 0))
+        world.send(mavlink.MAVLink_param_set_message(SYSTEM, 1, b"MIS_TAKEOFF_ALT", raw, 6))
+        (value,) = told(world.send(mavlink.MAVLink_param_request_read_message(SYSTEM, 1, b"MIS_TAKEOFF_ALT", -1)))
+        assert value.param_value == raw, autopilot
+
+
 def test_what_has_no_mapping_is_refused_and_recorded() -> None:
     """Commands that would change the vehicle are denied; others are not supported, as the autopilots say."""
     for command, result in ((246, 2), (185, 2), (179, 2), (241, 2), (420, 2), (2000, 3), (9999, 3), (115, 3), (519, 3)):
@@ -377,7 +400,7 @@ def test_what_says_something_about_the_client_is_passed_over() -> None:
 def test_frames_for_another_system_are_not_answered() -> None:
     world = GatewayWorld()
     assert world.send(mavlink.MAVLink_command_long_message(9, 1, 22, 0, 0, 0, 0, 0, 0, 0, 10)) == []
-    assert world.send(mavlink.MAVLink_command_long_message(1, 100, 2000, 0, 0, 0, 0, 0, 0, 0, 0)) == []
+    assert world.send(mavlink.MAVLink_set_mode_message(9, 1, 4)) == []
 
 
 def test_long_texts_come_in_chunks_and_records_stay_short() -> None:

@@ -121,7 +121,7 @@ class ProposalAnswered(NamedTuple):
 
 
 class RequestAnswered(NamedTuple):
-    """The flight answered a request frame: slug `accepted`, or why it did not pass it on; `refused` without a flight."""
+    """The flight answered a request frame: slug `accepted`, or why it is not passed on; `refused` without a flight."""
 
     number: int
     slug: str

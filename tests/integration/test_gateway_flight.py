@@ -4,6 +4,7 @@ Nothing is in place but a field's KML file: no keys, no policy, no configuration
 """
 
 import json
+import math
 import signal
 import time
 from pathlib import Path
@@ -98,6 +99,62 @@ def test_ctrl_c_brings_the_vehicle_down(tmp_path: Path) -> None:
         assert run.events[-1] == {"event": "summary", "exit_code": 130, "sessions": 1}
     assert told["ending"] == "interrupted"
     assert verified(run, ["--audit", told["log"]], tmp_path).returncode == 0
+
+
+def test_a_disarming_withdraws_the_take_off_before_it(tmp_path: Path) -> None:
+    with running(tmp_path, "--sessions", "1") as (run, client):
+        client.meet()
+        client.retry(lambda: client.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1))
+        results: list[tuple[int, int]] = []
+        highest_mm = 0
+
+        def heard(message: Any) -> bool:
+            nonlocal highest_mm
+            if message.get_type() == "COMMAND_ACK":
+                results.append((message.command, message.result))
+            if message.get_type() == "GLOBAL_POSITION_INT":
+                highest_mm = max(highest_mm, message.relative_alt)
+            return time.monotonic() >= end_s
+
+        here = client.position()
+        ground_m = (here.alt - here.relative_alt) / 1_000
+        values = (0, 0, 0, math.nan, math.nan, math.nan, ground_m + 8)
+        client.link.mav.command_long_send(client.link.target_system, 1, mavlink.MAV_CMD_NAV_TAKEOFF, 0, *values)
+        end_s = time.monotonic() + 0.06
+        client.until(heard)
+        client.link.mav.command_long_send(client.link.target_system, 1, 400, 0, *[0] * 7)
+        end_s = time.monotonic() + 15
+        client.until(heard)
+        assert (22, 0) not in results, results
+        assert results[-1] == (400, 0), results
+        assert highest_mm < 500, "it stays on the ground"
+        taken_off(client)  # and the next one flies
+        assert client.command(mavlink.MAV_CMD_NAV_LAND) == ACCEPTED
+        client.until_disarmed()
+        assert run.wait() == 0
+
+
+def test_a_stream_of_setpoints_does_not_undo_the_clients_landing(tmp_path: Path) -> None:
+    with running(tmp_path, "--flavour", "px4", "--sessions", "1") as (run, client):
+        taken_off(client)
+        latitude, longitude = INSIDE
+
+        def stream(seconds: float) -> None:
+            """At 5 Hz, a place 3 m higher."""
+            for _ in range(round(seconds * 5)):
+                client.link.mav.set_position_target_global_int_send(
+                    0, client.link.target_system, 1, 6, 0xDF8, round(latitude * 1e7), round(longitude * 1e7), 9,
+                    *[0] * 8,
+                )  # fmt: skip
+                client.until_s(0.2)
+
+        assert client.command(mavlink.MAV_CMD_DO_SET_MODE, 1, 6) == ACCEPTED
+        stream(3)
+        assert client.command(mavlink.MAV_CMD_NAV_LAND) == ACCEPTED
+        stream(10)
+        client.until_disarmed()
+        assert run.wait() == 0
+        assert run.wait_for("session")["ending"] == "completed"
 
 
 def test_ctrl_c_on_the_ground_ends_at_once(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ CHECKOUT = Path(__file__).resolve().parents[2]
 #: the limits of the counts of `make size`: lower a limit in the commit that lowers the count
 HELD = {
     "modules": 800,
-    "code lines": 97_202,  # rises with each feature: last the gateway
+    "code lines": 97_452,  # rises with each feature: last the gateway
     "shared class names": 0,
     "of them across packages": 0,
     "shared file names": 69,

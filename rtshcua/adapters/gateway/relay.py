@@ -249,17 +249,14 @@ class Relay:
                 pilot.send(datagram)
         theirs = every if DIALOGUES.isdisjoint(numbers) else parcels(_without(batch, DIALOGUES))
         for peer in self._ordinary:
-            for datagram in theirs if peer.withheld.isdisjoint(numbers) else self._reduced(theirs, peer):
+            gets_all = peer.withheld.isdisjoint(numbers)  # else less of the autopilot; others have the same messages
+            for datagram in theirs if gets_all else _without(theirs, peer.withheld, self._autopilot):
                 peer.send(datagram)
         for datagram in every:
             try:
                 self._telemetry.send(datagram)
             except OSError:
                 self._counters.telemetry_lost += 1
-
-    def _reduced(self, datagrams: Sequence[bytes], peer: ClientPeer) -> list[bytes]:
-        """What a peer gets: other components and systems behind the autopilot have the same messages."""
-        return _without(datagrams, peer.withheld, self._autopilot)
 
     def _to_vehicle(self, frames: bytes) -> None:
         """Lost while nobody was heard at an address that others send to."""

@@ -14,14 +14,13 @@ from rtshcua.ground.prove.step_starts import MissionStart, StartPlace
 from rtshcua.mavlink import dialect
 from rtshcua.mavlink.enums import MAV_COMP_ID_AUTOPILOT1 as AUTOPILOT
 from rtshcua.mavlink.enums import MAV_LANDED_STATE_ON_GROUND
-from rtshcua.mavlink.framing import HEADER, message_id
+from rtshcua.mavlink.framing import HEADER, message_id, sender_of
 from rtshcua.mavlink.layouts import EXTENDED_SYS_STATE
 from rtshcua.model.flat.limits import FULL
 from rtshcua.model.flat.situation import Now, State
 from rtshcua.onboard.ports import Readings
 from rtshcua.onboard.runtime.monitor import StateMonitor
 
-_SYSTEM, _COMPONENT = 5, 6
 _LANDED: Final = 1  # the offset of `landed_state` in its payload
 #: frames of one message that are kept: a battery counts from its second report on, and sensors have several instances
 _KEPT: Final = 4
@@ -44,14 +43,14 @@ class VehicleFrames:
 
     def take(self, frame: bytes, at_us: int) -> None:
         """Keep a frame that arrived at a monotonic time, in us."""
-        number = message_id(frame, 0)
-        if frame[_SYSTEM] != self._system:
+        number, (system, component) = message_id(frame, 0), sender_of(frame)
+        if system != self._system:
             return
-        if number == EXTENDED_SYS_STATE and frame[_COMPONENT] == AUTOPILOT:
+        if number == EXTENDED_SYS_STATE and component == AUTOPILOT:
             landed = frame[HEADER + _LANDED] if frame[1] > _LANDED else 0
             self.aloft = landed != MAV_LANDED_STATE_ON_GROUND if landed else None
         if number in self._read:
-            key = number, frame[_COMPONENT]
+            key = number, component
             if key not in self._last:
                 self._last[key] = deque(maxlen=_KEPT)
             self._last[key].append((at_us, frame))

@@ -128,8 +128,8 @@ class ClientMissions:
     def start_whole(self, client: ConnectedClient, message: Received, command: int, now: Now) -> int | None:
         """MISSION_START: a part of a mission is refused, as ArduCopter does."""
         plan = client.transfer.plan
-        first, last = (message.number(each) for each in ("param1", "param2"))
-        ends = (0, -1) if plan is None else (0, -1, len(plan.items) - 1)
+        first, last = message.number("param1"), message.number("param2")
+        ends = (0, -1, 0 if plan is None else len(plan.items) - 1)
         if (first != 0 and not isnan(first)) or (last not in ends and not isnan(last)):
             client.reject("a part of a mission is refused: start the whole one", command, now.monotonic_us)
             return DENIED

@@ -83,9 +83,6 @@ class ClientProposal:
         if self.answered:
             return
         self.answered = True
-        self._tell(result)
-
-    def _tell(self, result: int) -> None:
         for each in self.asked_by:
             each.tell(result)
 
@@ -134,7 +131,8 @@ class ClientProposal:
             self.refuse(TEMPORARILY_REJECTED, f"{self.steps[0].skill} rejected: nothing answered in time", now_us)
         elif now_us - (self.told_us or self.began_us - AGAIN_US + QUICK_US) >= AGAIN_US:
             self.told_us = now_us
-            self._tell(IN_PROGRESS)
+            for each in self.asked_by:
+                each.tell(IN_PROGRESS)
 
     def keep_before(self, first: int) -> None:
         """Another proposal replaced the mission of the flight from this step on."""

@@ -136,9 +136,9 @@ class Control:
         holder = self.holder(now_us)
         if holder is not None and holder.name == client.link.name and not self.pilots.in_control:
             return ACCEPTED
-        who = "the pilot" if self.pilots.in_control else "nobody" if holder is None else holder.name
-        more = ": a step that is flown gives control" if who == "nobody" else ""
-        client.reject(f"{who} is in control{more}", command, now_us)
+        nobody = "nobody is in control: a step that is flown gives control"
+        who = "the pilot" if self.pilots.in_control else "" if holder is None else holder.name
+        client.reject(f"{who} is in control" if who else nobody, command, now_us)
         return DENIED
 
     def tell(self, now_us: int) -> None:

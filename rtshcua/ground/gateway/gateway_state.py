@@ -151,6 +151,10 @@ class GatewayState:
         contract = self.translation.contract(skill)
         return contract is not None and contract.motion.kind == MotionKind.CLIMB
 
+    def is_safe(self, steps: tuple[ProposedStep, ...]) -> bool:
+        """Whether all steps are of skills of the contingency, which stops, returns or lands."""
+        return all(each.skill in self.safe for each in steps)
+
     def brings_down(self, proposal: ClientProposal) -> bool:
         """Whether what is left of a proposal only lands the vehicle."""
         contracts = (self.translation.contract(each.skill) for each in proposal.steps[max(proposal.done, 0) :])

@@ -273,8 +273,6 @@ class HarmlessRequests:
         """A message of the vehicle came, which went to all clients: answer those who requested it. If it refuses a
         message to the flight, that is the oldest that is awaited: the flight itself requests only messages that it has.
         """
-        if not self._awaited:
-            return
         self._end([each for each in self._awaited if each.wanted[0] == number], ACCEPTED)
         answer = self._seen.message(layouts.COMMAND_ACK) if number == layouts.COMMAND_ACK and self._awaited else None
         if answer is not None and answer.fields["command"] == enums.MAV_CMD_REQUEST_MESSAGE:

@@ -132,18 +132,9 @@ class Tick(NamedTuple):
 
 
 Event: TypeAlias = (
-    ClientUp
-    | ClientDown
-    | FromClient
-    | FromPilot
-    | FromVehicle
-    | FlightLine
-    | FlightEnded
-    | ProposalChecked
-    | ProposalAnswered
-    | RequestAnswered
-    | Tick
-)
+    ClientUp | ClientDown | FromClient | FromPilot | FromVehicle | FlightLine | FlightEnded
+    | ProposalChecked | ProposalAnswered | RequestAnswered | Tick
+)  # fmt: skip
 
 # ---------------------------------------------------------------- actions
 

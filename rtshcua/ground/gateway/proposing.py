@@ -75,7 +75,7 @@ class Proposing:
         self, client: ConnectedClient, steps: tuple[ProposedStep, ...], message: Received, command: int, now: Now
     ) -> int | None:
         """Propose steps; the result for the client, None if the answer comes later."""
-        now_us, latest, safe = now.monotonic_us, client.latest, steps[0].skill in self._state.safe
+        now_us, latest, safe = now.monotonic_us, client.latest, self._state.is_safe(steps)
         if safe:
             self._withdraw_waiting(f"{client.link.name} asks for {steps[0].skill}", now_us, client.link.name)
         asked = AskedBy(client.link, message.sender, command, message.message in _ITEMS)
@@ -90,7 +90,7 @@ class Proposing:
             client.link.text(_TOO_MANY, now_us, _TOO_MANY)
             client.link.record("refused", now_us, skill=steps[0].skill, reason=_TOO_MANY)
             return TEMPORARILY_REJECTED
-        refusal = self._refusal(client, steps[0], now)
+        refusal = self._refusal(client, steps, now)
         if refusal is not None:
             return self._refuse(client, refusal, message, command, now_us)
         if waiting >= MOST_OPEN:
@@ -101,7 +101,7 @@ class Proposing:
     def _add(self, client: ConnectedClient, steps: tuple[ProposedStep, ...], asked: AskedBy, now_us: int) -> None:
         """Propose steps. After those that stop, return or land the vehicle nothing follows from before."""
         link = client.link
-        if steps[0].skill in self._state.safe:
+        if self._state.is_safe(steps):
             self._withdraw_waiting(f"{link.name} asks for {steps[0].skill}", now_us)
             client.source.guided = False
         if asked.command < 0:
@@ -111,12 +111,13 @@ class Proposing:
         client.latest = ClientProposal(number, link, [asked], steps, now_us, borrows=borrows)
         self._state.proposals[number] = client.latest
 
-    def _refusal(self, client: ConnectedClient, step: ProposedStep, now: Now) -> QuickRefusal | None:
-        """Why a step is certainly refused by the policy, or cannot be taken now."""
+    def _refusal(self, client: ConnectedClient, steps: tuple[ProposedStep, ...], now: Now) -> QuickRefusal | None:
+        """Why the first step is certainly refused by the policy, or the steps cannot be taken now."""
+        step = steps[0]
         if self._state.climbs(step.skill) and self._state.lands:
             return QuickRefusal(TEMPORARILY_REJECTED, _LANDS, step.skill, _LANDS)
         refusal = self._state.quick.refusal(step, client.link.settings.role, now)
-        hindrance = None if refusal is not None else self._hindrance(client, step, now.monotonic_us)
+        hindrance = None if refusal is not None else self._hindrance(client, steps, now.monotonic_us)
         if hindrance is None:
             return refusal
         return QuickRefusal(TEMPORARILY_REJECTED, hindrance, step.skill, hindrance)
@@ -207,19 +208,19 @@ class Proposing:
         stands = flight.stage == "flying" and flight.flown is proposal and proposal.done > 0 and not flight.displaced
         return not proposal.ended or stands
 
-    def _hindrance(self, client: ConnectedClient, step: ProposedStep, now_us: int) -> str | None:
-        """Why a step cannot be taken now, although the policy may permit it."""
+    def _hindrance(self, client: ConnectedClient, steps: tuple[ProposedStep, ...], now_us: int) -> str | None:
+        """Why steps cannot be taken now, although the policy may permit them."""
         if self._control.pilots.in_control:
             return "the pilot is in control"
         rival = self._control.outranked(client, now_us)
-        if rival is not None and not self._control.is_safer(step.skill):
+        if rival is not None and not all(self._control.is_safer(each.skill) for each in steps):
             return f"{rival.name} is in control"
         flight, on_ground = self._state.flight, self._state.seen.on_ground
         if flight.stage == "flying" and (flight.flown is not None or not on_ground):
             return None
         if not on_ground:
             return "the vehicle flies under another control"
-        if not self._state.climbs(step.skill):
+        if not self._state.climbs(steps[0].skill):
             return "the vehicle is on the ground: take off first"
         return _NO_FLIGHT if flight.stage == "" else flight.unready
 
@@ -252,7 +253,7 @@ class Proposing:
             if not each.ended
             and each.flies < 0
             and name in ("", each.link.name)
-            and (safe_too or any(step.skill not in self._state.safe for step in each.steps))
+            and (safe_too or not self._state.is_safe(each.steps))
         ]
 
     def _cancel(self, link: ClientLink, why: str, now_us: int) -> None:

@@ -5,6 +5,7 @@ and proposals. It never passes a client's frame on.
 from collections.abc import Callable
 from typing import Final
 
+from rtshcua.ground.gateway import interface
 from rtshcua.ground.gateway.accepted import COMMAND, MESSAGE, MODE
 from rtshcua.ground.gateway.client_frames import SETPOINTS, Received, received
 from rtshcua.ground.gateway.client_link import NOTICE, ClientLink
@@ -13,23 +14,7 @@ from rtshcua.ground.gateway.control import Control
 from rtshcua.ground.gateway.gateway_state import SECOND_US, ClientSource, ConnectedClient, GatewayState
 from rtshcua.ground.gateway.habits import ShownState, set_parameter
 from rtshcua.ground.gateway.harmless_requests import COMMANDS as REQUESTING
-from rtshcua.ground.gateway.interface import (
-    Action,
-    ClientDown,
-    ClientUp,
-    Event,
-    FlightEnded,
-    FlightLine,
-    FromClient,
-    FromPilot,
-    FromVehicle,
-    GatewaySettings,
-    ProposalAnswered,
-    ProposalChecked,
-    RequestAnswered,
-    Tick,
-    Withhold,
-)
+from rtshcua.ground.gateway.interface import Action, Event, GatewaySettings
 from rtshcua.ground.gateway.plan_transfer import PlanTransfer
 from rtshcua.ground.gateway.proposing import Handler, Proposing
 from rtshcua.ground.gateway.vehicle_seen import parameter_name
@@ -81,29 +66,29 @@ class Gateway:
         """What is to be done after an event."""
         now_us = now.monotonic_us
         match event:
-            case FromVehicle(frame):
+            case interface.FromVehicle(frame):
                 self._from_vehicle(frame, now_us)
-            case FromClient(client, frame):
+            case interface.FromClient(client, frame):
                 self._from_client(client, frame, now)
-            case FromPilot(client, frame):
+            case interface.FromPilot(client, frame):
                 self._from_pilot(client, frame, now_us)
-            case FlightLine(line):
+            case interface.FlightLine(line):
                 for each in self._proposing.hear(line, now_us):
                     self._missions.progress(each)
-            case Tick():
+            case interface.Tick():
                 self._tick(now)
-            case ClientUp(client, of):
+            case interface.ClientUp(client, of):
                 self._up(ClientLink(client, of, self._state.settings.system, self._state.actions, now_us), now_us)
-            case ClientDown(client):
+            case interface.ClientDown(client):
                 self._down(client, now_us)
-            case RequestAnswered(number, slug):
+            case interface.RequestAnswered(number, slug):
                 self._state.requests.answered(number, slug, now_us)
-            case ProposalChecked():
+            case interface.ProposalChecked():
                 if not self._missions.checked(event, now_us):
                     self._proposing.checked(event, now_us)
-            case ProposalAnswered(number, slug, text):
+            case interface.ProposalAnswered(number, slug, text):
                 self._proposing.answered(number, slug, text, now_us)
-            case FlightEnded():
+            case interface.FlightEnded():
                 self._proposing.ended("", now_us)
         return self._taken()
 
@@ -114,7 +99,8 @@ class Gateway:
 
     def _up(self, link: ClientLink, now_us: int) -> None:
         """A client is there: it goes on with what its former connection left."""
-        self._state.actions.append(Withhold(link.client, frozenset()))  # an earlier gateway may have withheld something
+        # an earlier gateway may have withheld something
+        self._state.actions.append(interface.Withhold(link.client, frozenset()))
         if link.settings.pilot:
             self._control.pilots.links[link.client] = link
         if link.settings.pilot or len(self._state.clients) >= _MOST_CLIENTS:

@@ -44,9 +44,8 @@ class VehicleSeen:
         is forgotten, because its settings may be others now.
         """
         message = self.message(number)
-        if message is None:
-            return False
-        before, now_ms = self._boot_ms.get(number, 0), int(message.fields["time_boot_ms"])
+        before = self._boot_ms.get(number, 0)
+        now_ms = before if message is None else int(message.fields["time_boot_ms"])
         self._boot_ms[number] = now_ms
         if now_ms >= before - _RESTART_MS:
             return False

@@ -455,6 +455,19 @@ def test_only_the_first_item_can_be_chosen() -> None:
     assert states(world.wait(1_100_000))[-1] == ("current", 0, 2)
 
 
+def test_a_mission_that_begins_with_a_hold_gives_another_client_no_control() -> None:
+    world = GatewayWorld()
+    world.fly()
+    world.client(2, "other")
+    world.accept(world.send(reposition()))
+    world.dispatch(0)
+    stored(world, [item(0, LOITER, 7), item(1, WAYPOINT, x=N, y=E, z=15)], client=2)
+    actions = world.send(command_long(300), client=2)
+    assert (acks(actions, 2), texts(actions, 2)) == ([(300, 1)], ["hover rejected: script is in control"])
+    stored(world, [item(0, LOITER, 7), item(1, RETURN)], client=2)
+    assert [each for each, *_ in proposals(world.send(command_long(300), client=2))] == ["hover", "return_home"]
+
+
 def test_a_part_of_a_mission_is_not_started() -> None:
     """By hand: parameters 1 and 2 of MISSION_START, and whether it is the whole mission of five items."""
     table = (

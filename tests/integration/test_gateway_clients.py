@@ -61,7 +61,7 @@ def test_program_flies_and_reads_why_it_is_refused(name: str, flavour: str, tmp_
         assert "altitude 80 m, accepted 30 m" in reads(height)
         assert up["succeeded"], up
         assert not out["succeeded"]
-        assert "inside field" in reads(out)
+        assert "target outside field" in reads(out)
         assert there["succeeded"], there
         assert down["succeeded"], down
         flown(side.run, tmp_path, 2)

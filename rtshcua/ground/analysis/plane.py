@@ -1,6 +1,7 @@
 """The relations of a policy's zones in the plane, and places with given relations to them."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from math import isqrt
 from typing import Any, Protocol
 
@@ -147,11 +148,17 @@ def nearest_inside(zone: Zone, place: Point, margin_mm: int) -> Point | None:
     """
     import shapely  # noqa: PLC0415
 
-    room = _plan(zone).buffer(-margin_mm)
+    room = _room(zone, margin_mm)
     if room.is_empty:
         return None
     x, y = shapely.shortest_line(room, shapely.Point(place)).coords[0]
     return round(x), round(y)
+
+
+@lru_cache(maxsize=64)  # a client may ask for many places beyond the same zone
+def _room(zone: Zone, margin_mm: int) -> Any:
+    """The ground plan of a zone without a margin along its edge."""
+    return _plan(zone).buffer(-margin_mm)
 
 
 def _exact_region(zone: Zone) -> Region | None:
